@@ -1,0 +1,229 @@
+"""What one stage of the chain hands to the next: frozen, read-only, checked on construction.
+
+Skin -> `SedTraces` -> `CurrentTraces` -> `SpikeTrains` -> `ResponseMap` -> `HitRates`.
+The mechanical and the neural half of the package meet in `SedTraces` and nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.checks import FloatArray, float_array, increasing, positive
+from fingerpad.errors import InputError
+
+
+class Skin(Protocol):
+    """Anything that can tell the strain energy density below points of its surface."""
+
+    def sed(self, sites: ArrayLike) -> SedTraces:
+        """Strain energy density over time at `sites` (n_sites, 2), x and z on the skin. [mm]"""
+        ...
+
+
+def _freeze(signal: object, **arrays: FloatArray) -> None:
+    for name, array in arrays.items():
+        object.__setattr__(signal, name, array)
+
+
+def _traces(kind: str, name: str, times_ms: ArrayLike, values: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    times = increasing("times_ms", float_array("times_ms", times_ms, 1))
+    table = float_array(name, values, 2)
+    if table.shape[0] != times.size or times.size < 2:
+        raise InputError(
+            f"{kind} needs one row of {name} per time and at least two times: "
+            f"got {table.shape} for {times.size} times."
+        )
+    return times, table
+
+
+@dataclass(frozen=True)
+class SedTraces:
+    """Strain energy density at receptor sites, known at some times.
+
+    Parameters
+    ----------
+    times_ms : array (n_times,)
+        Strictly increasing, from the onset of the indentation. [ms]
+    sed_kpa : array (n_times, n_sites)
+        Strain energy density; not negative. [kPa = µJ/mm³]
+
+    Raises
+    ------
+    InputError
+        If shapes disagree, a value is not finite, or an energy is negative.
+
+    Examples
+    --------
+    >>> SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [1.8]]).n_sites
+    1
+    """
+
+    times_ms: FloatArray
+    sed_kpa: FloatArray
+
+    def __post_init__(self) -> None:
+        times, sed = _traces("SedTraces", "sed_kpa", self.times_ms, self.sed_kpa)
+        if (sed < 0.0).any():
+            raise InputError(f"sed_kpa must not be negative: the smallest value is {sed.min():.3g} kPa.")
+        _freeze(self, times_ms=times, sed_kpa=sed)
+
+    @property
+    def n_sites(self) -> int:
+        """Number of receptor sites."""
+        return self.sed_kpa.shape[1]
+
+
+@dataclass(frozen=True)
+class CurrentTraces:
+    """Membrane current at receptor sites, piecewise linear between its times.
+
+    Parameters
+    ----------
+    times_ms : array (n_times,)
+        Knots, strictly increasing. [ms]
+    current_ma : array (n_times, n_sites)
+        Current at the knots. [mA]
+    """
+
+    times_ms: FloatArray
+    current_ma: FloatArray
+
+    def __post_init__(self) -> None:
+        times, current = _traces("CurrentTraces", "current_ma", self.times_ms, self.current_ma)
+        _freeze(self, times_ms=times, current_ma=current)
+
+    @property
+    def n_sites(self) -> int:
+        """Number of receptor sites."""
+        return self.current_ma.shape[1]
+
+
+@dataclass(frozen=True)
+class SpikeTrains:
+    """Spike times of several afferents, one after the other in one array.
+
+    Parameters
+    ----------
+    times_ms : array (n_spikes,)
+        Spike times, afferent by afferent, increasing within each. [ms]
+    offsets : int array (n_afferents + 1,)
+        Afferent `i` owns `times_ms[offsets[i]:offsets[i + 1]]`.
+
+    Examples
+    --------
+    >>> trains = SpikeTrains.from_lists([[1.0, 2.5], [], [4.0]])
+    >>> [train.tolist() for train in trains]
+    [[1.0, 2.5], [], [4.0]]
+    """
+
+    times_ms: FloatArray
+    offsets: np.ndarray
+
+    def __post_init__(self) -> None:
+        times = float_array("times_ms", self.times_ms, 1)
+        offsets = np.array(self.offsets, dtype=np.int64)
+        if offsets.ndim != 1 or offsets.size == 0 or offsets[0] != 0 or offsets[-1] != times.size:
+            raise InputError(f"offsets must run from 0 to the number of spikes, {times.size}: got {offsets}.")
+        if (np.diff(offsets) < 0).any():
+            raise InputError(f"offsets must not decrease: got {offsets}.")
+        offsets.setflags(write=False)
+        _freeze(self, times_ms=times, offsets=offsets)
+        for train in self:
+            increasing("times_ms of each afferent", train)
+
+    @classmethod
+    def from_lists(cls, trains: Sequence[ArrayLike]) -> SpikeTrains:
+        """Spike trains from one sequence of spike times per afferent. [ms]"""
+        arrays = [np.asarray(train, dtype=np.float64) for train in trains]
+        offsets = np.concatenate([[0], np.cumsum([array.size for array in arrays])])
+        return cls(np.concatenate(arrays) if arrays else np.empty(0), offsets)
+
+    def __len__(self) -> int:
+        return self.offsets.size - 1
+
+    def __getitem__(self, afferent: int) -> FloatArray:
+        if not 0 <= afferent < len(self):
+            raise IndexError(f"afferent must be within 0 ... {len(self) - 1}: got {afferent}.")
+        return self.times_ms[self.offsets[afferent] : self.offsets[afferent + 1]]
+
+
+@dataclass(frozen=True)
+class ResponseMap:
+    """What a population of afferents answers to one touch.
+
+    Parameters
+    ----------
+    positions_mm : array (n_receptors, 2)
+        x (distal positive) and z (lateral) of each receptor on the skin. [mm]
+    pitch_mm : float
+        Distance between neighbours of the layout. [mm]
+    spikes : SpikeTrains
+        One train per receptor.
+    dynamic_rate_hz, static_rate_hz : array (n_receptors,)
+        Firing rates in the two windows, Eqs. 6-10; 0 without an interval. [spikes/s]
+    first_spike_latency_ms : array (n_receptors,)
+        Time of the first spike after onset; NaN without a spike. [ms]
+    """
+
+    positions_mm: FloatArray
+    pitch_mm: float
+    spikes: SpikeTrains
+    dynamic_rate_hz: FloatArray
+    static_rate_hz: FloatArray
+    first_spike_latency_ms: FloatArray
+
+    def __post_init__(self) -> None:
+        positions = float_array("positions_mm", self.positions_mm, 2)
+        if positions.shape[1] != 2:
+            raise InputError(f"positions_mm needs two columns, x and z: got shape {positions.shape}.")
+        positive("pitch_mm", self.pitch_mm, "mm")
+        dynamic = float_array("dynamic_rate_hz", self.dynamic_rate_hz, 1)
+        static = float_array("static_rate_hz", self.static_rate_hz, 1)
+        latency = np.array(self.first_spike_latency_ms, dtype=np.float64)
+        latency.setflags(write=False)
+        n = positions.shape[0]
+        for name, size in (
+            ("spikes", len(self.spikes)),
+            ("dynamic_rate_hz", dynamic.size),
+            ("static_rate_hz", static.size),
+            ("first_spike_latency_ms", latency.size),
+        ):
+            if size != n:
+                raise InputError(f"ResponseMap needs one entry of {name} per receptor: got {size} for {n}.")
+        _freeze(
+            self,
+            positions_mm=positions,
+            dynamic_rate_hz=dynamic,
+            static_rate_hz=static,
+            first_spike_latency_ms=latency,
+        )
+
+
+@dataclass(frozen=True)
+class HitRates:
+    """How often each comparison is told from the standard.
+
+    Parameters
+    ----------
+    hit_rate : array (n_comparisons,)
+        Mean fraction of correct judgements, mu_3. [0-1]
+    hit_rate_sd : array (n_comparisons,)
+        Its standard deviation over repetitions, sigma_3. [0-1]
+    """
+
+    hit_rate: FloatArray
+    hit_rate_sd: FloatArray
+
+    def __post_init__(self) -> None:
+        mean = float_array("hit_rate", self.hit_rate, 1)
+        spread = float_array("hit_rate_sd", self.hit_rate_sd, 1)
+        if mean.shape != spread.shape:
+            raise InputError(f"hit_rate and hit_rate_sd must match: got {mean.shape} and {spread.shape}.")
+        if ((mean < 0) | (mean > 1)).any() or (spread < 0).any():
+            raise InputError("hit_rate must lie within 0 ... 1 and hit_rate_sd must not be negative.")
+        _freeze(self, hit_rate=mean, hit_rate_sd=spread)
