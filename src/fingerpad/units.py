@@ -1,8 +1,7 @@
 """Units inside fingerpad: mm, ms, kPa, mN, mA, mF, mV.
 
-They close among themselves: 1 kPa mm² = 1 mN and 1 kPa = 1 µJ/mm³, so strain energy density (SED)
-in kPa is energy per volume. With mF, mV and ms a current comes out in mF mV/ms = mA·mV/V; the
-membrane equation (paper, Eq. 5) reads I/C in mA/mF = V/s = mV/ms, so no factor is needed there.
+They close among themselves: 1 kPa mm² = 1 mN, 1 kPa = 1 µJ/mm³ (so strain energy density, SED, in
+kPa is energy per volume), and 1 mF mV/ms = 1 mA, so no factor appears in any equation of the paper.
 """
 
 MS_PER_S = 1000.0
