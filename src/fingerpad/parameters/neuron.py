@@ -1,0 +1,38 @@
+"""Transduction and membrane of one SAI afferent: the two start points of the paper's fit.
+
+The units printed for the gains contradict each other. With the membrane as printed, the static gain gives
+rates like the observed ones if strain energy density is counted in kPa, so both gains are read that way.
+"""
+
+from fingerpad.parameters.published import Published
+
+_START_1 = "Gerling et al. 2014, section 2.2.2, first start point"
+_START_2 = "Gerling et al. 2014, section 2.2.2, second start point"
+_MEMBRANE = "Gerling et al. 2014, section 2.2.2, both start points"
+_IN_KPA = "; read with energy density in kPa"
+
+INTERCEPT_START = Published("intercept beta at the start", 0.0, "mA", _MEMBRANE, "paper")
+DYNAMIC_GAIN_START_1 = Published(
+    "dynamic gain k_d, first start", 8.0e-9, "mA ms/kPa", _START_1 + _IN_KPA, "paper"
+)
+DYNAMIC_GAIN_START_2 = Published(
+    "dynamic gain k_d, second start", 8.2e-9, "mA ms/kPa", _START_2 + _IN_KPA, "paper"
+)
+STATIC_GAIN_START_1 = Published("static gain k_s, first start", 7.0e-7, "mA/kPa", _START_1 + _IN_KPA, "paper")
+STATIC_GAIN_START_2 = Published(
+    "static gain k_s, second start", 3.0e-7, "mA/kPa", _START_2 + _IN_KPA, "paper"
+)
+DYNAMIC_GAIN_SCALE = Published(
+    "factor on the printed dynamic gains before a fit starts from them",
+    2.5e4,
+    "1",
+    "the printed gains are silent in the ramp; this brings them to 2e-4 mA ms/kPa, among the values that fit",
+    "assumed",
+)
+TIME_CONSTANT = Published("membrane time constant tau at the start", 68.0, "ms", _MEMBRANE, "paper")
+CAPACITANCE = Published("membrane capacitance C at the start", 1.0e-6, "mF", _MEMBRANE, "paper")
+THRESHOLD = Published("threshold v of the membrane potential at the start", 50.0, "mV", _MEMBRANE, "paper")
+REFRACTORY = Published("refractory period", 1.0, "ms", "Gerling et al. 2014, section 2.1.3", "paper")
+DIFFERENCE_STEP = Published(
+    "step h of the rate of change of energy density", 0.001, "ms", "Gerling et al. 2014, Eq. 2", "paper"
+)

@@ -1,0 +1,33 @@
+"""How the skin is touched and when spikes are counted."""
+
+from fingerpad.parameters.published import Published
+
+_PROTOCOL = "Gerling et al. 2014, section 2.2.2"
+_MECHANICS = "Gerling et al. 2014, section 2.2.1"
+_SPHERES = "Gerling et al. 2014, section 2.2.3"
+
+RAMP = Published("duration of the ramp", 50.0, "ms", _PROTOCOL, "paper")
+HOLD = Published("duration of the hold", 950.0, "ms", _PROTOCOL, "paper")
+DEPTH = Published("depth of indentation", 1.0, "mm", _PROTOCOL, "paper")
+DYNAMIC_WINDOW = Published("window of the dynamic firing rate", (30.0, 50.0), "ms", _PROTOCOL, "paper")
+STATIC_WINDOW = Published("window of the static firing rate", (600.0, 950.0), "ms", _PROTOCOL, "paper")
+
+BAR_WIDTH = Published("width of the bar", 3.0, "mm", _PROTOCOL, "paper")
+BAR_FILLET = Published(
+    "fillet radius of the bar's edges", 0.3, "mm", "later bar model of the authors' laboratory", "read"
+)
+BAR_SHIFTS = Published(
+    "lateral positions of the bar relative to the receptor",
+    tuple(round(-3.5 + 0.2 * step, 1) for step in range(36)),
+    "mm",
+    _PROTOCOL + ": 36 shifts in steps of 0.2 mm; first and last as in the recordings it is fitted to",
+    "paper",
+)
+
+LINE_DIAMETER = Published("diameter of the line load", 0.05, "mm", _MECHANICS, "paper")
+CYLINDER_DIAMETER = Published("diameter of the cylinder", 3.17, "mm", _MECHANICS, "paper")
+DEFLECTION_SPACING = Published("spacing of the imaged skin surface", 0.05, "mm", _MECHANICS, "paper")
+
+SPHERE_POSITIONS = Published(
+    "positions of the spheres along the finger, relative to the first", (0.0, 0.2), "mm", _SPHERES, "paper"
+)

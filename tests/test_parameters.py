@@ -1,0 +1,171 @@
+"""Published numbers: each has its story, and they agree with each other."""
+
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+
+from fingerpad.errors import InputError
+from fingerpad.parameters import (
+    STATUSES,
+    Published,
+    all_published,
+    fingertip,
+    neuron,
+    paper,
+    protocol,
+    psychophysics,
+    tissues,
+)
+
+
+def test_every_constant_of_every_module_is_collected_once() -> None:
+    modules = (fingertip, tissues, protocol, neuron, psychophysics, paper)
+    constants = [
+        getattr(module, name)
+        for module in modules
+        for name in vars(module)
+        if name.isupper() and not name.startswith("_") and name != "SPHERES"
+    ]
+    assert all(isinstance(constant, Published) for constant in constants)
+    assert sorted(map(id, constants)) == sorted(map(id, all_published()))
+
+
+def test_names_are_unique_and_statuses_known() -> None:
+    names = [number.name for number in all_published()]
+    assert len(set(names)) == len(names)
+    assert {number.status for number in all_published()} == set(STATUSES)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            {"status": "guessed"},
+            "status of depth must be one of paper, read, recalled, assumed: got 'guessed'",
+        ),
+        ({"name": " "}, "as name"),
+        ({"unit": ""}, "as unit"),
+        ({"source": ""}, "as source"),
+        ({"value": float("nan")}, "depth must be a finite number"),
+        ({"value": (1.0, float("inf"))}, "depth must be a finite number"),
+        ({"value": ()}, "at least one number"),
+    ],
+)
+def test_published_refuses_numbers_without_a_story(change: dict[str, object], said: str) -> None:
+    good: dict[str, object] = {
+        "name": "depth",
+        "value": 1.0,
+        "unit": "mm",
+        "source": "here",
+        "status": "paper",
+    }
+    with pytest.raises(InputError, match=said):
+        Published(**(good | change))  # type: ignore[type-var, arg-type]
+
+
+def test_published_is_frozen() -> None:
+    with pytest.raises(FrozenInstanceError):
+        protocol.DEPTH.value = 2.0  # type: ignore[misc]
+
+
+def test_profiles_have_one_value_per_station() -> None:
+    for stations, profiles in (
+        (fingertip.STATIONS_X, (fingertip.VOLAR_Y, fingertip.DORSAL_Y)),
+        (fingertip.HALF_WIDTH_X, (fingertip.HALF_WIDTH_Z,)),
+        (fingertip.BONE_STATIONS_X, (fingertip.BONE_VOLAR_Y, fingertip.BONE_DORSAL_Y)),
+    ):
+        assert (np.diff(stations.value) > 0).all()
+        assert all(len(profile.value) == len(stations.value) for profile in profiles)
+        assert stations.value[0] > 0
+        assert stations.value[-1] < fingertip.LENGTH.value
+
+
+def test_geometry_is_consistent() -> None:
+    layers = fingertip.STRATUM_CORNEUM.value + fingertip.LIVING_EPIDERMIS.value
+    assert layers == pytest.approx(fingertip.RECEPTOR_DEPTH.value, abs=1e-12)
+    x, y = fingertip.CONTACT_POINT.value
+    assert fingertip.VOLAR_Y.value[fingertip.STATIONS_X.value.index(x)] == y
+    assert 2 * max(fingertip.HALF_WIDTH_Z.value) == pytest.approx(fingertip.FULL_WIDTH.value, abs=0.05)
+    volar, dorsal = np.array(fingertip.BONE_VOLAR_Y.value), np.array(fingertip.BONE_DORSAL_Y.value)
+    assert fingertip.SPINE_Y.value == pytest.approx((volar + dorsal).mean() / 2, abs=0.4)
+    assert fingertip.BONE_HEIGHT.value == pytest.approx((dorsal - volar).max() / 2, abs=0.3)
+    assert fingertip.NAIL_X.value[0] < fingertip.BONE_TIP_X.value < fingertip.NAIL_X.value[1]
+
+
+def test_layers_soften_inwards_in_every_material_set() -> None:
+    for epidermis, dermis, subcutis in (
+        (tissues.MAENO_EPIDERMIS_YOUNG, tissues.MAENO_DERMIS_YOUNG, tissues.MAENO_SUBCUTIS_YOUNG),
+        (
+            tissues.LABORATORY_EPIDERMIS_SHEAR,
+            tissues.LABORATORY_DERMIS_SHEAR,
+            tissues.LABORATORY_SUBCUTIS_SHEAR,
+        ),
+        (tissues.SOFT_MIX_EPIDERMIS_SHEAR, tissues.SOFT_MIX_DERMIS_SHEAR, tissues.SOFT_MIX_SUBCUTIS_SHEAR),
+    ):
+        assert epidermis.value > dermis.value > subcutis.value > 0
+    assert tissues.WU_EPIDERMIS_YOUNG.value > tissues.MAENO_EPIDERMIS_YOUNG.value
+
+
+def test_hyperfoams_are_stable_at_rest_and_as_soft_as_their_source_says() -> None:
+    for mu, expected_young_kpa in (
+        (tissues.WU_SKIN_HYPERFOAM_MU, 3.25),
+        (tissues.WU_SUBCUTIS_HYPERFOAM_MU, 1.6),
+    ):
+        young_kpa = 2 * sum(mu.value) * (1 + tissues.WU_HYPERFOAM_POISSON.value)
+        assert young_kpa == pytest.approx(expected_young_kpa, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("shares", "times"),
+    [
+        (tissues.SKIN_PRONY_SHARES, tissues.SKIN_PRONY_TIMES),
+        (tissues.MOUSE_PRONY_SHARES, tissues.MOUSE_PRONY_TIMES),
+    ],
+)
+def test_prony_series_relax_but_never_below_zero(
+    shares: Published[tuple[float, ...]], times: Published[tuple[float, ...]]
+) -> None:
+    assert len(shares.value) == len(times.value)
+    assert 0 < sum(shares.value) < 1
+    assert min(times.value) > 0
+
+
+def test_bar_shifts_are_the_36_positions_of_the_figure() -> None:
+    shifts = np.array(protocol.BAR_SHIFTS.value)
+    assert shifts.size == 36
+    np.testing.assert_allclose(shifts, -shifts[::-1], atol=1e-12)
+    np.testing.assert_allclose(np.diff(shifts), 0.2, atol=1e-12)
+
+
+def test_windows_lie_in_their_phases() -> None:
+    end = protocol.RAMP.value + protocol.HOLD.value
+    assert 0 < protocol.DYNAMIC_WINDOW.value[0] < protocol.DYNAMIC_WINDOW.value[1] <= protocol.RAMP.value
+    assert protocol.RAMP.value < protocol.STATIC_WINDOW.value[0] < protocol.STATIC_WINDOW.value[1] <= end
+
+
+def test_start_points_differ_in_the_gains_only_and_the_scale_keeps_their_ratio() -> None:
+    first, second = neuron.DYNAMIC_GAIN_START_1.value, neuron.DYNAMIC_GAIN_START_2.value
+    assert second / first == pytest.approx(1.025)
+    assert 1e-4 <= first * neuron.DYNAMIC_GAIN_SCALE.value <= 4e-4
+    assert 1e-4 <= second * neuron.DYNAMIC_GAIN_SCALE.value <= 4e-4
+
+
+def test_assumed_spheres_are_never_called_the_papers() -> None:
+    statuses = {sphere.value: sphere.status for sphere in psychophysics.SPHERES}
+    assert statuses == {
+        287.0: "paper",
+        296.0: "paper",
+        305.0: "read",
+        316.0: "assumed",
+        328.0: "assumed",
+        340.0: "assumed",
+        365.0: "paper",
+    }
+    assert psychophysics.SPHERE_CURVATURES.status == "assumed"
+    assert (np.diff(psychophysics.SPHERE_CURVATURES.value) > 0).all()
+
+
+def test_paper_differences_follow_from_its_extremes() -> None:
+    difference = paper.DYNAMIC_RATE_MAXIMUM.value - paper.DYNAMIC_RATE_MINIMUM.value
+    assert difference == pytest.approx(paper.DYNAMIC_RATE_DIFFERENCE.value, abs=1.0)
