@@ -1,0 +1,229 @@
+"""Rigid indenters as signed gaps: how far a point of the skin is from the body, and which way it is pushed.
+
+Every indenter lives in its own frame: the tip at the origin, y along the direction of pressing (into the
+skin), x along the finger and z across it. The body fills y < 0 below its tip. `gap` is positive outside
+the body and negative inside; the normal points out of the body, along which a frictionless contact pushes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from fingerpad.checks import FloatArray, not_negative, positive
+from fingerpad.errors import InputError
+from fingerpad.parameters import protocol
+from fingerpad.units import radius_mm
+
+
+class Indenter(Protocol):
+    """A rigid body with a signed gap."""
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward unit normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        ...
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the body's extent along x where it can touch. [mm]"""
+        ...
+
+
+def _norm_and_direction(offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Length and unit direction of each row; a zero row points along y, the direction of pressing."""
+    length = np.linalg.norm(offsets, axis=1)
+    direction = np.where(length[:, None] > 0.0, offsets / np.where(length, length, 1.0)[:, None], [0.0, 1.0, 0.0])
+    return length, direction
+
+
+def _rounded(inside: FloatArray, depth: FloatArray, outward: FloatArray, fillet: float) -> tuple:
+    """Gap of a body with a flat top and rounded edges, from coordinates relative to its un-rounded core.
+
+    The body is all points within `fillet` of the core {inside <= 0, depth <= 0}: `inside` runs outwards
+    along the unit vector `outward` (n, 3), `depth` along y.
+    """
+    up = np.array([0.0, 1.0, 0.0])
+    beyond_side, beyond_top = np.maximum(inside, 0.0), np.maximum(depth, 0.0)
+    distance, direction = _norm_and_direction(beyond_side[:, None] * outward + beyond_top[:, None] * up)
+    within = (inside <= 0.0) & (depth <= 0.0)
+    nearest_face_is_top = depth >= inside
+    gap = np.where(within, np.maximum(inside, depth), distance) - fillet
+    normal = np.where(
+        within[:, None], np.where(nearest_face_is_top[:, None], up[None, :], outward), direction
+    )
+    return gap, normal
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """Cylinder that lies across the finger, its axis along z.
+
+    Parameters
+    ----------
+    diameter_mm : float
+        Diameter; the paper's is 3.17 mm. [mm]
+
+    Examples
+    --------
+    >>> gap, normal = Cylinder(diameter_mm=2.0).gap(np.array([[0.0, 0.5, 7.0]]))
+    >>> gap.tolist(), normal.tolist()
+    ([0.5], [[0.0, 1.0, 0.0]])
+    """
+
+    diameter_mm: float = protocol.CYLINDER_DIAMETER.value
+
+    def __post_init__(self) -> None:
+        positive("diameter_mm", self.diameter_mm, "mm")
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the body's extent along x. [mm]"""
+        return self.diameter_mm / 2
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        radius = self.diameter_mm / 2
+        distance, normal = _norm_and_direction((points_mm + [0.0, radius, 0.0]) * [1.0, 1.0, 0.0])
+        return distance - radius, normal
+
+
+def Line(diameter_mm: float = protocol.LINE_DIAMETER.value) -> Cylinder:  # noqa: N802 - reads as an indenter
+    """Return the paper's line load: a cylinder of 50 µm diameter across the finger.
+
+    Examples
+    --------
+    >>> Line()
+    Cylinder(diameter_mm=0.05)
+    """
+    return Cylinder(diameter_mm)
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """Sphere given by its curvature, as in the psychophysics literature.
+
+    Parameters
+    ----------
+    curvature_per_m : float
+        1/radius; the paper writes "RC ... 1/m" and means this. [1/m]
+
+    Examples
+    --------
+    >>> round(Sphere(curvature_per_m=287).radius_mm, 3)
+    3.484
+    """
+
+    curvature_per_m: float = protocol.STANDARD_CURVATURE.value
+
+    def __post_init__(self) -> None:
+        positive("curvature_per_m", self.curvature_per_m, "1/m")
+
+    @property
+    def radius_mm(self) -> float:
+        """Radius. [mm]"""
+        return radius_mm(self.curvature_per_m)
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the body's extent along x. [mm]"""
+        return self.radius_mm
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        distance, normal = _norm_and_direction(points_mm + [0.0, self.radius_mm, 0.0])
+        return distance - self.radius_mm, normal
+
+
+@dataclass(frozen=True)
+class Bar:
+    """Flat bar across the finger, long in z, its two edges rounded.
+
+    Parameters
+    ----------
+    width_mm : float
+        Full width along x, fillets included. [mm]
+    fillet_mm : float
+        Radius of the two edges. [mm]
+
+    Examples
+    --------
+    >>> Bar(width_mm=3.0, fillet_mm=0.3).gap(np.array([[0.0, -0.1, 0.0], [1.5, -0.3, 2.0]]))[0].round(3).tolist()
+    [-0.1, 0.0]
+    """
+
+    width_mm: float = protocol.BAR_WIDTH.value
+    fillet_mm: float = protocol.BAR_FILLET.value
+
+    def __post_init__(self) -> None:
+        positive("width_mm", self.width_mm, "mm")
+        _fillet_within(self.fillet_mm, self.width_mm, "width_mm")
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the width. [mm]"""
+        return self.width_mm / 2
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        x, y = points_mm[:, 0], points_mm[:, 1]
+        outward = np.zeros_like(points_mm)
+        outward[:, 0] = np.where(x < 0.0, -1.0, 1.0)
+        inside = np.abs(x) - (self.width_mm / 2 - self.fillet_mm)
+        return _rounded(inside, y + self.fillet_mm, outward, self.fillet_mm)
+
+
+@dataclass(frozen=True)
+class FlatPunch:
+    """Flat-ended round probe with a rounded rim.
+
+    Parameters
+    ----------
+    diameter_mm : float
+        Full diameter, rim included. [mm]
+    fillet_mm : float
+        Radius of the rim. [mm]
+    """
+
+    diameter_mm: float = protocol.PUNCH_DIAMETER.value
+    fillet_mm: float = protocol.BAR_FILLET.value
+
+    def __post_init__(self) -> None:
+        positive("diameter_mm", self.diameter_mm, "mm")
+        _fillet_within(self.fillet_mm, self.diameter_mm, "diameter_mm")
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the diameter. [mm]"""
+        return self.diameter_mm / 2
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        radial, outward = _norm_and_direction(points_mm * [1.0, 0.0, 1.0])
+        # On the axis any radial direction serves; x is taken, since y would not be radial.
+        outward = np.where(radial[:, None] > 0.0, outward, [1.0, 0.0, 0.0])
+        inside = radial - (self.diameter_mm / 2 - self.fillet_mm)
+        return _rounded(inside, points_mm[:, 1] + self.fillet_mm, outward, self.fillet_mm)
+
+
+@dataclass(frozen=True)
+class Plate:
+    """Flat plate without edges, larger than the finger."""
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the extent along x: no limit."""
+        return np.inf
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        return points_mm[:, 1].copy(), np.broadcast_to([0.0, 1.0, 0.0], points_mm.shape).copy()
+
+
+def _fillet_within(fillet_mm: float, width_mm: float, width_name: str) -> None:
+    not_negative("fillet_mm", fillet_mm, "mm")
+    if fillet_mm > width_mm / 2:
+        raise InputError(
+            f"fillet_mm must not exceed half of {width_name}, {width_mm / 2:g} mm: got {fillet_mm:g} mm."
+        )

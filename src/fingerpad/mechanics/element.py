@@ -1,0 +1,340 @@
+"""One 8-node brick with constant pressure at finite strain: energy, internal force, tangent.
+
+Mean dilatation (Simo, Taylor & Pister 1985), the displacement form of a hybrid brick with one pressure:
+
+    Pi_e = sum_q w_q [ s W(I1, I2)_q - 1/2 H_q : C~_q ] + V U(Jbar),       Jbar = v / V,
+
+with reference volume V, present volume v, C~ = J^(-2/3) F'F the isochoric right Cauchy-Green tensor,
+s and H from the Prony series of the step (see `viscoelastic`; s = 1, H = 0 without relaxation), and the
+pressure p = U'(Jbar) one number per element. A wedge is a brick with one edge collapsed (two pairs of equal
+nodes): its eight shape functions then add up to the six of the linear wedge.
+
+Tensors are stored as xx, yy, zz, xy, yz, xz. All functions are compiled and single-threaded,
+so the answer does not depend on the number of threads.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fingerpad.checks import FloatArray
+
+N_NODES = 8
+N_POINTS = 8
+ROW = np.array([0, 1, 2, 0, 1, 0])
+COLUMN = np.array([0, 1, 2, 1, 2, 2])
+
+
+def _shape_derivatives() -> FloatArray:
+    """dN/dxi of the trilinear brick at the 2x2x2 Gauss points, (8 points, 8 nodes, 3); weights are 1."""
+    corners = np.array(
+        [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
+        dtype=float,
+    )
+    points = corners / np.sqrt(3.0)
+    factor = 1.0 + points[:, None, :] * corners[None, :, :]
+    derivatives = np.empty((N_POINTS, N_NODES, 3))
+    for axis in range(3):
+        others = [other for other in range(3) if other != axis]
+        derivatives[:, :, axis] = corners[:, axis] * factor[:, :, others[0]] * factor[:, :, others[1]] / 8.0
+    return derivatives
+
+
+SHAPE_DERIVATIVES = _shape_derivatives()
+
+
+@njit(cache=True, inline="always")
+def _invert(matrix, inverse):  # type: ignore[no-untyped-def]
+    """Write the inverse of a 3x3 matrix and return its determinant."""
+    a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
+    d, e, f = matrix[1, 0], matrix[1, 1], matrix[1, 2]
+    g, h, i = matrix[2, 0], matrix[2, 1], matrix[2, 2]
+    minor_a, minor_b, minor_c = e * i - f * h, f * g - d * i, d * h - e * g
+    determinant = a * minor_a + b * minor_b + c * minor_c
+    scale = 1.0 / determinant
+    inverse[0, 0], inverse[0, 1], inverse[0, 2] = minor_a * scale, (c * h - b * i) * scale, (b * f - c * e) * scale
+    inverse[1, 0], inverse[1, 1], inverse[1, 2] = minor_b * scale, (a * i - c * g) * scale, (c * d - a * f) * scale
+    inverse[2, 0], inverse[2, 1], inverse[2, 2] = minor_c * scale, (b * g - a * h) * scale, (a * e - b * d) * scale
+    return determinant
+
+
+@njit(cache=True, inline="always")
+def _left_cauchy_green(gradient, jacobian, b, b2):  # type: ignore[no-untyped-def]
+    """Isochoric b~ = J^(-2/3) F F' and its square; return the invariants I1 and I2."""
+    scale = jacobian ** (-2.0 / 3.0)
+    for k in range(6):
+        i, j = ROW[k], COLUMN[k]
+        b[k] = scale * (
+            gradient[i, 0] * gradient[j, 0] + gradient[i, 1] * gradient[j, 1] + gradient[i, 2] * gradient[j, 2]
+        )
+    b2[0] = b[0] * b[0] + b[3] * b[3] + b[5] * b[5]
+    b2[1] = b[3] * b[3] + b[1] * b[1] + b[4] * b[4]
+    b2[2] = b[5] * b[5] + b[4] * b[4] + b[2] * b[2]
+    b2[3] = b[0] * b[3] + b[3] * b[1] + b[5] * b[4]
+    b2[4] = b[3] * b[5] + b[1] * b[4] + b[4] * b[2]
+    b2[5] = b[0] * b[5] + b[3] * b[4] + b[5] * b[2]
+    first = b[0] + b[1] + b[2]
+    second = 0.5 * (first * first - b2[0] - b2[1] - b2[2])
+    return first, second
+
+
+@njit(cache=True, inline="always")
+def _energy(law, first, second):  # type: ignore[no-untyped-def]
+    """Isochoric energy W and its first derivatives W1, W2 at the invariants."""
+    x, y = first - 3.0, second - 3.0
+    energy = law[0] * x + law[1] * y + law[2] * x * x + law[3] * x * y + law[4] * y * y
+    return energy, law[0] + 2.0 * law[2] * x + law[3] * y, law[1] + law[3] * x + 2.0 * law[4] * y
+
+
+@njit(cache=True, inline="always")
+def _push_forward(gradient, scale, reference, spatial):  # type: ignore[no-untyped-def]
+    """Write scale F T F' of a symmetric reference tensor T."""
+    for k in range(6):
+        i, j = ROW[k], COLUMN[k]
+        spatial[k] = scale * (
+            gradient[i, 0] * (reference[0] * gradient[j, 0] + reference[3] * gradient[j, 1] + reference[5] * gradient[j, 2])
+            + gradient[i, 1] * (reference[3] * gradient[j, 0] + reference[1] * gradient[j, 1] + reference[4] * gradient[j, 2])
+            + gradient[i, 2] * (reference[5] * gradient[j, 0] + reference[4] * gradient[j, 1] + reference[2] * gradient[j, 2])
+        )
+
+
+@njit(cache=True, inline="always")
+def _elasticity(law, s, first, b, b2, stress, deviator, pressure, moduli):  # type: ignore[no-untyped-def]
+    """Write the 6x6 spatial (Kirchhoff) elasticity of one point.
+
+    `stress` is the stress before the deviator is taken, T = s (g1 b + g2 b²) - h; `pressure` is p J.
+    c = P : c~ : P + 2/3 tr(T) (I_s - 1/3 1x1) - 2/3 (dev T x 1 + 1 x dev T) + p J (1x1 - 2 I_s).
+    """
+    w2 = law[1] + law[3] * (first - 3.0) + 2.0 * law[4] * (0.5 * (first * first - b2[0] - b2[1] - b2[2]) - 3.0)
+    w11, w12, w22 = 2.0 * law[2], law[3], 2.0 * law[4]
+    d1 = 4.0 * s * (w2 + w11 + 2.0 * first * w12 + first * first * w22)
+    d2 = -4.0 * s * (w12 + first * w22)
+    d3 = 4.0 * s * w22
+    d4 = -4.0 * s * w2
+    trace_b2 = b2[0] + b2[1] + b2[2]
+    trace = stress[0] + stress[1] + stress[2]
+    for m in range(6):
+        i, j = ROW[m], COLUMN[m]
+        one_m = 1.0 if m < 3 else 0.0
+        db_m, db2_m = b[m] - one_m * first / 3.0, b2[m] - one_m * trace_b2 / 3.0
+        for n in range(m, 6):
+            k, l = ROW[n], COLUMN[n]  # noqa: E741 - the index letters of the formula
+            one_n = 1.0 if n < 3 else 0.0
+            db_n, db2_n = b[n] - one_n * first / 3.0, b2[n] - one_n * trace_b2 / 3.0
+            value = d1 * db_m * db_n + d2 * (db_m * db2_n + db2_m * db_n) + d3 * db2_m * db2_n
+            product = 0.5 * (b[INDEX[i, k]] * b[INDEX[j, l]] + b[INDEX[i, l]] * b[INDEX[j, k]])
+            value += d4 * (product - (b2[m] * one_n + one_m * b2[n]) / 3.0 + trace_b2 * one_m * one_n / 9.0)
+            identity = 0.0
+            if m == n:
+                identity = 1.0 if m < 3 else 0.5
+            value += 2.0 / 3.0 * trace * (identity - one_m * one_n / 3.0)
+            value -= 2.0 / 3.0 * (deviator[m] * one_n + one_m * deviator[n])
+            value += pressure * (one_m * one_n - 2.0 * identity)
+            moduli[m, n] = value
+            moduli[n, m] = value
+
+
+INDEX = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
+
+
+@njit(cache=True)
+def _gradients(reference, displacement, weights, slopes, gradient):  # type: ignore[no-untyped-def]
+    """Reference gradients of the shape functions and deformation gradient at all points of one element.
+
+    Writes `weights` (8,), `slopes` dN/dX (8, 8, 3) and `gradient` F (8, 3, 3); returns the reference volume.
+    """
+    jacobian, inverse = np.empty((3, 3)), np.empty((3, 3))
+    volume = 0.0
+    for q in range(N_POINTS):
+        jacobian[:] = 0.0
+        for a in range(N_NODES):
+            for i in range(3):
+                for j in range(3):
+                    jacobian[i, j] += reference[a, i] * SHAPE_DERIVATIVES[q, a, j]
+        weights[q] = _invert(jacobian, inverse)
+        volume += weights[q]
+        for i in range(3):
+            for j in range(3):
+                gradient[q, i, j] = 1.0 if i == j else 0.0
+        for a in range(N_NODES):
+            for j in range(3):
+                slope = 0.0
+                for k in range(3):
+                    slope += SHAPE_DERIVATIVES[q, a, k] * inverse[k, j]
+                slopes[q, a, j] = slope
+                for i in range(3):
+                    gradient[q, i, j] += displacement[a, i] * slope
+    return volume
+
+
+@njit(cache=True)
+def element_system(reference, displacement, law, s, history, with_tangent, force, tangent):  # type: ignore[no-untyped-def]
+    """Energy, internal force and tangent of one element.
+
+    Parameters
+    ----------
+    reference, displacement : array (8, 3)
+        Nodes and their displacements. [mm]
+    law : array (8,)
+        One row of `MaterialTable.law`.
+    s : float
+        Factor on the instantaneous energy in this step.
+    history : array (8, 6)
+        H of the step at each point. [kPa]
+    with_tangent : bool
+        Whether `tangent` is written.
+    force : array (8, 3)
+        Overwritten with the internal force. [mN]
+    tangent : array (8, 8, 3, 3)
+        Overwritten with the tangent if wanted. [mN/mm]
+
+    Returns
+    -------
+    float
+        Incremental potential, or NaN if a point of the element is turned inside out. [µJ]
+    """
+    weights, slopes, gradients = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3)), np.empty((N_POINTS, 3, 3))
+    present, jacobians, inverse = np.empty((N_POINTS, N_NODES, 3)), np.empty(N_POINTS), np.empty((3, 3))
+    b, b2, relaxed, stress, deviator = np.empty(6), np.empty(6), np.empty(6), np.empty(6), np.empty(6)
+    moduli, column, dilatation = np.empty((6, 6)), np.empty((6, 3)), np.zeros((N_NODES, 3))
+
+    volume = _gradients(reference, displacement, weights, slopes, gradients)
+    present_volume = 0.0
+    for q in range(N_POINTS):
+        jacobians[q] = _invert(gradients[q], inverse)
+        if not jacobians[q] > 0.0:
+            return np.nan
+        present_volume += weights[q] * jacobians[q]
+        for a in range(N_NODES):
+            for i in range(3):
+                slope = 0.0
+                for k in range(3):
+                    slope += slopes[q, a, k] * inverse[k, i]
+                present[q, a, i] = slope
+                dilatation[a, i] += weights[q] * jacobians[q] * slope
+    change = present_volume / volume - 1.0
+    pressure = 2.0 * law[5] * change + 4.0 * law[6] * change**3
+    stiffness = (2.0 * law[5] + 12.0 * law[6] * change**2) / volume
+    potential = volume * (law[5] * change**2 + law[6] * change**4)
+
+    force[:] = 0.0
+    if with_tangent:
+        tangent[:] = 0.0
+    for q in range(N_POINTS):
+        scale = jacobians[q] ** (-2.0 / 3.0)
+        first, second = _left_cauchy_green(gradients[q], jacobians[q], b, b2)
+        energy, w1, w2 = _energy(law, first, second)
+        _push_forward(gradients[q], scale, history[q], relaxed)
+        for k in range(6):
+            stress[k] = 2.0 * s * ((w1 + first * w2) * b[k] - w2 * b2[k]) - relaxed[k]
+        # -1/2 H : C~ is half the trace of the pushed-forward history.
+        potential += weights[q] * (s * energy - 0.5 * (relaxed[0] + relaxed[1] + relaxed[2]))
+        mean = (stress[0] + stress[1] + stress[2]) / 3.0
+        for k in range(6):
+            deviator[k] = stress[k] - (mean if k < 3 else 0.0)
+        spherical = pressure * jacobians[q]
+        w = weights[q]
+        t0, t1, t2 = deviator[0] + spherical, deviator[1] + spherical, deviator[2] + spherical
+        t3, t4, t5 = deviator[3], deviator[4], deviator[5]
+        if with_tangent:
+            _elasticity(law, s, first, b, b2, stress, deviator, spherical, moduli)
+        for node in range(N_NODES):
+            x, y, z = present[q, node, 0], present[q, node, 1], present[q, node, 2]
+            traction_x, traction_y, traction_z = t0 * x + t3 * y + t5 * z, t3 * x + t1 * y + t4 * z, t5 * x + t4 * y + t2 * z
+            force[node, 0] += w * traction_x
+            force[node, 1] += w * traction_y
+            force[node, 2] += w * traction_z
+            if not with_tangent:
+                continue
+            for k in range(6):
+                column[k, 0] = w * (moduli[k, 0] * x + moduli[k, 3] * y + moduli[k, 5] * z)
+                column[k, 1] = w * (moduli[k, 3] * x + moduli[k, 1] * y + moduli[k, 4] * z)
+                column[k, 2] = w * (moduli[k, 5] * x + moduli[k, 4] * y + moduli[k, 2] * z)
+            for other in range(node + 1):
+                ox, oy, oz = present[q, other, 0], present[q, other, 1], present[q, other, 2]
+                geometric = w * (ox * traction_x + oy * traction_y + oz * traction_z)
+                for i in range(3):
+                    tangent[other, node, 0, i] += ox * column[0, i] + oy * column[3, i] + oz * column[5, i]
+                    tangent[other, node, 1, i] += ox * column[3, i] + oy * column[1, i] + oz * column[4, i]
+                    tangent[other, node, 2, i] += ox * column[5, i] + oy * column[4, i] + oz * column[2, i]
+                    tangent[other, node, i, i] += geometric
+    if with_tangent:
+        for node in range(N_NODES):
+            for other in range(node + 1):
+                for i in range(3):
+                    for j in range(3):
+                        tangent[other, node, i, j] += stiffness * dilatation[other, i] * dilatation[node, j]
+            for other in range(node):
+                for i in range(3):
+                    for j in range(3):
+                        tangent[node, other, j, i] = tangent[other, node, i, j]
+    return potential
+
+
+@njit(cache=True)
+def element_state(reference, displacement, law, instantaneous, energies):  # type: ignore[no-untyped-def]
+    """Instantaneous deviatoric stress and energies at the points of one element.
+
+    Parameters
+    ----------
+    reference, displacement : array (8, 3)
+        Nodes and their displacements. [mm]
+    law : array (8,)
+        One row of `MaterialTable.law`.
+    instantaneous : array (8, 6)
+        Overwritten with S0 = F~^-1 dev(tau0) F~^-T at each point. [kPa]
+    energies : array (8, 2)
+        Overwritten with the integration weight and the instantaneous energy W0. [mm³, kPa]
+
+    Returns
+    -------
+    float
+        Volumetric energy density U(Jbar). [kPa]
+    """
+    weights, slopes, gradients = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3)), np.empty((N_POINTS, 3, 3))
+    inverse, b, b2, deviator = np.empty((3, 3)), np.empty(6), np.empty(6), np.empty(6)
+    volume = _gradients(reference, displacement, weights, slopes, gradients)
+    present_volume = 0.0
+    for q in range(N_POINTS):
+        jacobian = _invert(gradients[q], inverse)
+        present_volume += weights[q] * jacobian
+        first, second = _left_cauchy_green(gradients[q], jacobian, b, b2)
+        energy, w1, w2 = _energy(law, first, second)
+        for k in range(6):
+            deviator[k] = 2.0 * ((w1 + first * w2) * b[k] - w2 * b2[k])
+        mean = (deviator[0] + deviator[1] + deviator[2]) / 3.0
+        for k in range(3):
+            deviator[k] -= mean
+        _push_forward(inverse, jacobian ** (2.0 / 3.0), deviator, instantaneous[q])
+        energies[q, 0], energies[q, 1] = weights[q], energy
+    change = present_volume / volume - 1.0
+    return law[5] * change**2 + law[6] * change**4
+
+
+@njit(cache=True)
+def deviatoric_norms(reference, displacement, tensors, norms):  # type: ignore[no-untyped-def]
+    """Norm of the spatial deviator F~ T F~' of reference tensors.
+
+    Parameters
+    ----------
+    reference, displacement : array (8, 3)
+        Nodes and their displacements. [mm]
+    tensors : array (n, 8, 6)
+        Reference tensors at each point. [kPa]
+    norms : array (n, 8)
+        Overwritten with the squared norms. [kPa²]
+    """
+    weights, slopes, gradients = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3)), np.empty((N_POINTS, 3, 3))
+    inverse, spatial = np.empty((3, 3)), np.empty(6)
+    _gradients(reference, displacement, weights, slopes, gradients)
+    for q in range(N_POINTS):
+        scale = _invert(gradients[q], inverse) ** (-2.0 / 3.0)
+        for n in range(tensors.shape[0]):
+            _push_forward(gradients[q], scale, tensors[n, q], spatial)
+            mean = (spatial[0] + spatial[1] + spatial[2]) / 3.0
+            total = 0.0
+            for k in range(6):
+                component = spatial[k] - (mean if k < 3 else 0.0)
+                total += component * component * (1.0 if k < 3 else 2.0)
+            norms[n, q] = total

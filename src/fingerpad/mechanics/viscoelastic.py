@@ -1,0 +1,160 @@
+"""Prony series in the convected frame, one step at a time (after Simo 1987; Simo & Hughes 1998, ch. 10).
+
+Every branch i keeps S_i, the stress that it has already relaxed away. With S0 the instantaneous deviatoric
+stress, assumed linear within a step of length dt,
+
+    gamma_i = exp(-dt/tau_i),   a_i = 1 - tau_i/dt (1 - gamma_i),   b_i = tau_i/dt (1 - gamma_i) - gamma_i,
+    S_i     = a_i g_i S0 + b_i g_i S0_n + gamma_i S_i,n,
+    S       = S0 - sum_i S_i = (1 - sum_i a_i g_i) S0 - H,    H = sum_i (b_i g_i S0_n + gamma_i S_i,n).
+
+H is known before the step, so the step has a potential, and its tangent is exact and symmetric.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from fingerpad.checks import FloatArray
+from fingerpad.mechanics.element import N_POINTS, deviatoric_norms, element_state
+from fingerpad.mechanics.materials import MaterialTable
+
+
+@dataclass(frozen=True)
+class StepCoefficients:
+    """Coefficients of one time step, one row per layer.
+
+    Parameters
+    ----------
+    s : array (n_layers,)
+        1 - sum_i a_i g_i, the factor on the instantaneous energy.
+    new, old, decay : array (n_layers, n_terms)
+        a_i g_i, b_i g_i and gamma_i.
+    """
+
+    s: FloatArray
+    new: FloatArray
+    old: FloatArray
+    decay: FloatArray
+
+    @classmethod
+    def of(cls, table: MaterialTable, step_ms: float) -> StepCoefficients:
+        """Coefficients of a step of `step_ms`. [ms]"""
+        decay = np.exp(-step_ms / table.times_ms)
+        average = table.times_ms / step_ms * (1.0 - decay)
+        new, old = (1.0 - average) * table.shares, (average - decay) * table.shares
+        return cls(1.0 - new.sum(axis=1), new, old, decay)
+
+
+@dataclass(frozen=True)
+class StressHistory:
+    """Stress state that a step starts from, at every Gauss point of every element.
+
+    Parameters
+    ----------
+    instantaneous : array (n_elements, 8, 6)
+        S0, the instantaneous deviatoric stress. [kPa]
+    relaxed : array (n_terms, n_elements, 8, 6)
+        S_i, the stress that each branch has relaxed away. [kPa]
+    """
+
+    instantaneous: FloatArray
+    relaxed: FloatArray
+
+    @classmethod
+    def unloaded(cls, n_elements: int, n_terms: int) -> StressHistory:
+        """Stress-free state."""
+        return cls(np.zeros((n_elements, N_POINTS, 6)), np.zeros((n_terms, n_elements, N_POINTS, 6)))
+
+    def carried(self, step: StepCoefficients, layer: np.ndarray) -> FloatArray:
+        """H of the next step, (n_elements, 8, 6). [kPa]"""
+        total = np.zeros_like(self.instantaneous)
+        for term, relaxed in enumerate(self.relaxed):
+            total += step.old[layer, term][:, None, None] * self.instantaneous
+            total += step.decay[layer, term][:, None, None] * relaxed
+        return total
+
+    def advanced(self, step: StepCoefficients, layer: np.ndarray, instantaneous: FloatArray) -> StressHistory:
+        """State at the end of the step, given S0 there."""
+        relaxed = np.empty_like(self.relaxed)
+        for term in range(len(relaxed)):
+            relaxed[term] = (
+                step.new[layer, term][:, None, None] * instantaneous
+                + step.old[layer, term][:, None, None] * self.instantaneous
+                + step.decay[layer, term][:, None, None] * self.relaxed[term]
+            )
+        return StressHistory(instantaneous, relaxed)
+
+
+@njit(cache=True)
+def _all_states(nodes, elements, displacement, layer, law, instantaneous, energies, volumetric):  # type: ignore[no-untyped-def]
+    for e in range(elements.shape[0]):
+        volumetric[e] = element_state(
+            nodes[elements[e]], displacement[elements[e]], law[layer[e]], instantaneous[e], energies[e]
+        )
+
+
+@njit(cache=True)
+def _stored_energy(  # type: ignore[no-untyped-def]
+    nodes, elements, displacement, layer, law, shares, instantaneous, relaxed, energies, volumetric, stored
+):
+    n_terms = relaxed.shape[0]
+    tensors, norms = np.empty((n_terms + 1, N_POINTS, 6)), np.empty((n_terms + 1, N_POINTS))
+    for e in range(elements.shape[0]):
+        tensors[0] = instantaneous[e]
+        for term in range(n_terms):
+            tensors[term + 1] = shares[layer[e], term] * instantaneous[e] - relaxed[term, e]
+        deviatoric_norms(nodes[elements[e]], displacement[elements[e]], tensors, norms)
+        total, volume = 0.0, 0.0
+        for q in range(N_POINTS):
+            share = law[layer[e], 7]
+            for term in range(n_terms):
+                if shares[layer[e], term] > 0.0 and norms[0, q] > 0.0:
+                    share += norms[term + 1, q] / (shares[layer[e], term] * norms[0, q])
+            total += energies[e, q, 0] * share * energies[e, q, 1]
+            volume += energies[e, q, 0]
+        stored[e] = total / volume + volumetric[e]
+
+
+def instantaneous_state(
+    nodes: FloatArray, elements: np.ndarray, displacement: FloatArray, layer: np.ndarray, table: MaterialTable
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """S0 (n_elements, 8, 6), weights and energies W0 (n_elements, 8, 2), volumetric energy (n_elements,)."""
+    n = len(elements)
+    instantaneous, energies, volumetric = np.empty((n, N_POINTS, 6)), np.empty((n, N_POINTS, 2)), np.empty(n)
+    _all_states(nodes, elements, displacement, layer, table.law, instantaneous, energies, volumetric)
+    return instantaneous, energies, volumetric
+
+
+def stored_energy_density(
+    nodes: FloatArray,
+    elements: np.ndarray,
+    displacement: FloatArray,
+    layer: np.ndarray,
+    table: MaterialTable,
+    history: StressHistory,
+    energies: FloatArray,
+    volumetric: FloatArray,
+) -> FloatArray:
+    """Strain energy density that the springs hold now, mean over each element. [kPa]
+
+    The long-term spring holds (1 - sum g_i) W0. Branch i, with stress tau_i out of g_i tau0, holds
+
+        e_i = g_i W0 |tau_i|² / |g_i tau0|²,
+
+    which is exact for a linear law and for an unrelaxed branch of any law (docs/decisions/stored-energy.md).
+    The volumetric part does not relax.
+
+    Returns
+    -------
+    array (n_elements,)
+        Stored energy per reference volume. [kPa = µJ/mm³]
+    """
+    stored = np.empty(len(elements))
+    _stored_energy(
+        nodes, elements, displacement, layer, table.law, table.shares,
+        history.instantaneous, history.relaxed, energies, volumetric, stored,
+    )  # fmt: skip
+    return stored

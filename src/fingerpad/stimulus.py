@@ -1,0 +1,71 @@
+"""The motion of the indenter: ramp and hold, and the phases that the analysis refers to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.checks import FloatArray, positive
+from fingerpad.parameters import protocol
+
+
+@dataclass(frozen=True)
+class RampAndHold:
+    """Indent at constant speed to a depth, then hold it.
+
+    Parameters
+    ----------
+    depth_mm : float
+        Depth of the hold, from first touch of the undeformed skin along the direction of pressing. [mm]
+    ramp_ms : float
+        Duration of the ramp. [ms]
+    hold_ms : float
+        Duration of the hold. [ms]
+
+    Raises
+    ------
+    InputError
+        If a value is not a finite number above zero.
+
+    Examples
+    --------
+    >>> RampAndHold(depth_mm=1.0, ramp_ms=50.0, hold_ms=950.0).depth_at([0.0, 25.0, 50.0, 400.0]).tolist()
+    [0.0, 0.5, 1.0, 1.0]
+    """
+
+    depth_mm: float = protocol.DEPTH.value
+    ramp_ms: float = protocol.RAMP.value
+    hold_ms: float = protocol.HOLD.value
+
+    def __post_init__(self) -> None:
+        positive("depth_mm", self.depth_mm, "mm")
+        positive("ramp_ms", self.ramp_ms, "ms")
+        positive("hold_ms", self.hold_ms, "ms")
+
+    @property
+    def end_ms(self) -> float:
+        """End of the hold. [ms]"""
+        return self.ramp_ms + self.hold_ms
+
+    def depth_at(self, times_ms: ArrayLike) -> FloatArray:
+        """Depth at `times_ms`, any shape. [mm]"""
+        return self.depth_mm * np.clip(np.asarray(times_ms, dtype=float) / self.ramp_ms, 0.0, 1.0)
+
+    def times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
+        """Times to solve at: 0, equal steps in the ramp, steps that grow geometrically in the hold. [ms]
+
+        The first hold step is as long as a ramp step where that leaves room to grow, since relaxation is
+        fastest right after the ramp.
+
+        Examples
+        --------
+        >>> RampAndHold().times_ms(2, 3).round(1).tolist()
+        [0.0, 25.0, 50.0, 75.0, 209.0, 1000.0]
+        """
+        ramp = np.linspace(0.0, self.ramp_ms, ramp_steps + 1)
+        first = min(self.ramp_ms / ramp_steps, self.hold_ms / hold_steps)
+        hold = self.ramp_ms + (np.geomspace(first, self.hold_ms, hold_steps) if hold_steps > 1 else np.array([self.hold_ms]))
+        hold[-1] = self.end_ms
+        return np.concatenate([ramp, hold])
