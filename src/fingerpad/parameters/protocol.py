@@ -31,3 +31,19 @@ DEFLECTION_SPACING = Published("spacing of the imaged skin surface", 0.05, "mm",
 SPHERE_POSITIONS = Published(
     "positions of the spheres along the finger, relative to the first", (0.0, 0.2), "mm", _SPHERES, "paper"
 )
+
+DYNAMIC_WEIGHT = Published(
+    "weight of the dynamic rates in the fractional sum of squares",
+    0.25,
+    "1",
+    _PROTOCOL + ", Eq. 12: a third of the static weight; the two add up to 1",
+    "paper",
+)
+STATIC_WEIGHT = Published(
+    "weight of the static rates in the fractional sum of squares",
+    0.75,
+    "1",
+    _PROTOCOL + ", Eq. 12: three times the dynamic weight; the two add up to 1",
+    "paper",
+)
+FOLDS = Published("folds of the cross validation", 6.0, "1", _PROTOCOL, "paper")
