@@ -7,7 +7,7 @@ The mechanical and the neural half of the package meet in `SedTraces` and nowher
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -25,13 +25,13 @@ class Skin(Protocol):
         ...
 
 
-def _freeze(signal: object, **arrays: FloatArray) -> None:
+def _freeze(signal: object, **arrays: np.ndarray) -> None:
     for name, array in arrays.items():
         object.__setattr__(signal, name, array)
 
 
 def _traces(kind: str, name: str, times_ms: ArrayLike, values: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    times = increasing("times_ms", float_array("times_ms", times_ms, 1))
+    times = float_array("times_ms", times_ms, 1)
     table = float_array(name, values, 2)
     if table.shape[0] != times.size or times.size < 2:
         raise InputError(
@@ -51,11 +51,14 @@ class SedTraces:
         Strictly increasing, from the onset of the indentation. [ms]
     sed_kpa : array (n_times, n_sites)
         Strain energy density; not negative. [kPa = µJ/mm³]
+    kinks_ms : array (n_kinks,), optional
+        Those of `times_ms` at which the motion changes abruptly, as from ramp to hold: there the
+        rate of change of SED jumps, and whoever interpolates must not smooth across. [ms]
 
     Raises
     ------
     InputError
-        If shapes disagree, a value is not finite, or an energy is negative.
+        If shapes disagree, a value is not finite, an energy is negative or a kink is not among the times.
 
     Examples
     --------
@@ -65,12 +68,17 @@ class SedTraces:
 
     times_ms: FloatArray
     sed_kpa: FloatArray
+    kinks_ms: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         times, sed = _traces("SedTraces", "sed_kpa", self.times_ms, self.sed_kpa)
+        increasing("times_ms", times)
         if (sed < 0.0).any():
             raise InputError(f"sed_kpa must not be negative: the smallest value is {sed.min():.3g} kPa.")
-        _freeze(self, times_ms=times, sed_kpa=sed)
+        kinks = increasing("kinks_ms", float_array("kinks_ms", self.kinks_ms, 1))
+        if not np.isin(kinks, times).all():
+            raise InputError(f"kinks_ms must be among times_ms: got {kinks[~np.isin(kinks, times)]}.")
+        _freeze(self, times_ms=times, sed_kpa=sed, kinks_ms=kinks)
 
     @property
     def n_sites(self) -> int:
@@ -82,12 +90,21 @@ class SedTraces:
 class CurrentTraces:
     """Membrane current at receptor sites, piecewise linear between its times.
 
+    A time that stands twice is a jump: its first row is the current just before, its second just after.
+
     Parameters
     ----------
     times_ms : array (n_times,)
-        Knots, strictly increasing. [ms]
+        Knots, in order; a time may stand twice, not more often. [ms]
     current_ma : array (n_times, n_sites)
         Current at the knots. [mA]
+
+    Examples
+    --------
+    A current that drops from 2 to 1 µA after 50 ms:
+
+    >>> CurrentTraces([0.0, 50.0, 50.0, 1000.0], [[2e-3], [2e-3], [1e-3], [1e-3]]).n_sites
+    1
     """
 
     times_ms: FloatArray
@@ -95,6 +112,8 @@ class CurrentTraces:
 
     def __post_init__(self) -> None:
         times, current = _traces("CurrentTraces", "current_ma", self.times_ms, self.current_ma)
+        if (np.diff(times) < 0.0).any() or (times[2:] == times[:-2]).any():
+            raise InputError(f"times_ms must not decrease, nor repeat more than once: got {times[:4]} ...")
         _freeze(self, times_ms=times, current_ma=current)
 
     @property
@@ -133,8 +152,12 @@ class SpikeTrains:
             raise InputError(f"offsets must not decrease: got {offsets}.")
         offsets.setflags(write=False)
         _freeze(self, times_ms=times, offsets=offsets)
-        for train in self:
-            increasing("times_ms of each afferent", train)
+        falls = np.diff(times) <= 0.0
+        falls[offsets[(offsets > 0) & (offsets < times.size)] - 1] = False  # from one train to the next
+        if falls.any():
+            raise InputError(
+                f"times_ms must increase within each afferent: it does not at {times[1:][falls][:4]}."
+            )
 
     @classmethod
     def from_lists(cls, trains: Sequence[ArrayLike]) -> SpikeTrains:

@@ -1,0 +1,124 @@
+"""Spike times -> firing rate in a window, first-spike latency, modulation (paper, Eqs. 6-11)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.checks import FloatArray, finite
+from fingerpad.errors import InputError
+from fingerpad.signals import SpikeTrains
+from fingerpad.units import MS_PER_S
+
+
+def firing_rate_hz(spikes: SpikeTrains, window_ms: tuple[float, float]) -> FloatArray:
+    """Rate at which every afferent fires in a window, one over its mean interspike interval, Eqs. 6-10.
+
+    An interval belongs to the window that holds its closing spike; the window excludes its start and
+    includes its end, so that windows side by side share no interval.
+
+    Parameters
+    ----------
+    spikes : SpikeTrains
+        One train per afferent.
+    window_ms : (float, float)
+        Start and end of the window. [ms]
+
+    Returns
+    -------
+    array (n_afferents,)
+        Rate; 0 where no interval closes in the window. [spikes/s]
+
+    Raises
+    ------
+    InputError
+        If the window does not end after it starts.
+
+    Examples
+    --------
+    >>> trains = SpikeTrains.from_lists([[10.0, 35.0, 40.0, 60.0], [45.0], []])
+    >>> firing_rate_hz(trains, (30.0, 50.0)).round(3).tolist()
+    [66.667, 0.0, 0.0]
+    """
+    start, end = finite("window start", window_ms[0], "ms"), finite("window end", window_ms[1], "ms")
+    if end <= start:
+        raise InputError(f"window_ms must end after it starts: got {start:g} to {end:g} ms.")
+    times, n_afferents = spikes.times_ms, len(spikes)
+    opens_train = np.zeros(times.size, dtype=bool)
+    opens_train[spikes.offsets[:-1][np.diff(spikes.offsets) > 0]] = True
+    closes = (times > start) & (times <= end) & ~opens_train
+    closing = np.flatnonzero(closes)
+    intervals_ms = times[closing] - times[closing - 1]
+    owners = np.repeat(np.arange(n_afferents), np.diff(spikes.offsets))[closing]
+    count = np.bincount(owners, minlength=n_afferents)
+    total_ms = np.bincount(owners, weights=intervals_ms, minlength=n_afferents)
+    return MS_PER_S * np.divide(count, total_ms, out=np.zeros(n_afferents), where=count > 0)
+
+
+def first_spike_latency_ms(spikes: SpikeTrains) -> FloatArray:
+    """Time from the onset of the indentation to the first spike of every afferent.
+
+    Parameters
+    ----------
+    spikes : SpikeTrains
+        One train per afferent; times count from the onset.
+
+    Returns
+    -------
+    array (n_afferents,)
+        Latency; NaN for an afferent that stays silent. [ms]
+
+    Examples
+    --------
+    >>> first_spike_latency_ms(SpikeTrains.from_lists([[10.0, 35.0], []])).tolist()
+    [10.0, nan]
+    """
+    latency_ms = np.full(len(spikes), np.nan)
+    fires = np.diff(spikes.offsets) > 0
+    latency_ms[fires] = spikes.times_ms[spikes.offsets[:-1][fires]]
+    return latency_ms
+
+
+def modulation_index(largest_hz: ArrayLike, smallest_hz: ArrayLike) -> FloatArray:
+    """Modulation index, Eq. 11: (R_max - R_min) / (R_max + R_min).
+
+    Parameters
+    ----------
+    largest_hz, smallest_hz : array_like
+        Rates with the edge and with the flat part of the stimulus above the receptor; same shape or
+        shapes that broadcast. [spikes/s]
+
+    Returns
+    -------
+    array
+        Index within 0 ... 1 for rates in order; NaN where both rates are 0. [1]
+
+    Examples
+    --------
+    >>> float(modulation_index(60.0, 20.0))
+    0.5
+    """
+    largest, smallest = np.asarray(largest_hz, np.float64), np.asarray(smallest_hz, np.float64)
+    difference, total = largest - smallest, largest + smallest
+    return np.divide(difference, total, out=np.full(np.shape(total), np.nan), where=total != 0.0)
+
+
+def modulation_difference(largest_hz: ArrayLike, smallest_hz: ArrayLike) -> FloatArray:
+    """Difference R_max - R_min, which the paper's text quotes under the name of modulation index.
+
+    Parameters
+    ----------
+    largest_hz, smallest_hz : array_like
+        As in `modulation_index`. [spikes/s]
+
+    Returns
+    -------
+    array
+        Difference of the rates. [spikes/s]
+
+    Examples
+    --------
+    >>> float(modulation_difference(212.0, 54.0))
+    158.0
+    """
+    return np.asarray(largest_hz, np.float64) - np.asarray(smallest_hz, np.float64)
