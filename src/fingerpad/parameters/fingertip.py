@@ -11,35 +11,35 @@ _FIGURE_1 = "Gerling et al. 2014, Figure 1"
 
 STATIONS_X = Published(
     "stations of the outline along the finger",
-    (5.0, 10.0, 15.0, 17.37, 20.0, 22.0, 24.0, 26.0, 28.0, 30.0),
+    (0.0, 5.0, 10.0, 15.0, 17.37, 20.0, 22.0, 24.0, 26.0, 28.0, 30.0, 31.0),
     "mm",
     _MODEL,
     "read",
 )
 VOLAR_Y = Published(
     "height of the volar skin at the stations of the outline",
-    (-10.12, -10.29, -10.11, -9.85, -9.41, -9.03, -8.60, -8.04, -7.17, -5.72),
+    (-9.70, -10.12, -10.29, -10.11, -9.85, -9.41, -9.03, -8.60, -8.04, -7.17, -5.72, -4.34),
     "mm",
     _MODEL,
     "read",
 )
 DORSAL_Y = Published(
     "height of the dorsal skin at the stations of the outline",
-    (6.16, 5.84, 5.05, 4.00, 4.00, 4.01, 3.89, 3.66, 3.23, 2.43),
+    (6.25, 6.16, 5.84, 5.05, 4.00, 4.00, 4.01, 3.89, 3.66, 3.23, 2.43, 1.67),
     "mm",
     _MODEL,
     "read",
 )
 HALF_WIDTH_X = Published(
     "stations of the half-width along the finger",
-    (12.0, 15.0, 17.37, 20.0, 22.0, 24.0, 26.0),
+    (0.0, 5.0, 12.0, 15.0, 17.37, 20.0, 22.0, 24.0, 26.0, 28.0, 30.0, 31.0),
     "mm",
     _MODEL,
     "read",
 )
 HALF_WIDTH_Z = Published(
     "half-width of the finger at its stations",
-    (9.89, 9.90, 9.75, 9.60, 9.42, 9.13, 8.59),
+    (9.52, 9.73, 9.89, 9.90, 9.75, 9.60, 9.42, 9.13, 8.59, 7.76, 6.34, 4.79),
     "mm",
     _MODEL,
     "read",
@@ -94,6 +94,13 @@ BONE_WIDTH = Published(
     "mm",
     "not known; a little more than the bone's height, as in distal phalanges",
     "assumed",
+)
+SPINE_END_X = Published(
+    "distal end of the straight axis of the bone, where its rounded cap begins",
+    20.0,
+    "mm",
+    "the read sides of the bone draw together from here to its tip",
+    "read",
 )
 BONE_TIP_X = Published("distal end of the bone", 25.1, "mm", _MODEL, "read")
 
