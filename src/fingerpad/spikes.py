@@ -11,7 +11,7 @@ from fingerpad.signals import SpikeTrains
 from fingerpad.units import MS_PER_S
 
 
-def firing_rate_hz(spikes: SpikeTrains, window_ms: tuple[float, float]) -> FloatArray:
+def firing_rate_hz(spikes: SpikeTrains, window_ms: tuple[float, ...]) -> FloatArray:
     """Rate at which every afferent fires in a window, one over its mean interspike interval, Eqs. 6-10.
 
     An interval belongs to the window that holds its closing spike; the window excludes its start and
@@ -32,7 +32,7 @@ def firing_rate_hz(spikes: SpikeTrains, window_ms: tuple[float, float]) -> Float
     Raises
     ------
     InputError
-        If the window does not end after it starts.
+        If the window is not two numbers, the second above the first.
 
     Examples
     --------
@@ -40,9 +40,10 @@ def firing_rate_hz(spikes: SpikeTrains, window_ms: tuple[float, float]) -> Float
     >>> firing_rate_hz(trains, (30.0, 50.0)).round(3).tolist()
     [66.667, 0.0, 0.0]
     """
-    start, end = finite("window start", window_ms[0], "ms"), finite("window end", window_ms[1], "ms")
-    if end <= start:
-        raise InputError(f"window_ms must end after it starts: got {start:g} to {end:g} ms.")
+    bounds = [finite("window_ms", bound, "ms") for bound in window_ms]
+    if len(bounds) != 2 or bounds[1] <= bounds[0]:
+        raise InputError(f"window_ms must be a start and a later end: got {window_ms!r}.")
+    start, end = bounds
     times, n_afferents = spikes.times_ms, len(spikes)
     opens_train = np.zeros(times.size, dtype=bool)
     opens_train[spikes.offsets[:-1][np.diff(spikes.offsets) > 0]] = True
