@@ -1,0 +1,33 @@
+"""Fit any function of a few parameters; nothing here knows a model.
+
+Goodness of fit (Eqs. 12-14), the response surface method and cross validation of the paper's section 2.2.2.
+"""
+
+from fingerpad.fitting.cross_validation import CrossValidation, FoldFit, cross_validate, interleaved_folds
+from fingerpad.fitting.fractional_sum_of_squares import (
+    fractional_sum_of_squares,
+    weighted_fractional_sum_of_squares,
+)
+from fingerpad.fitting.response_surface import (
+    Iteration,
+    ResponseSurfaceFit,
+    coding_increments,
+    factorial_design,
+    maximise,
+    regression_slopes,
+)
+
+__all__ = [
+    "CrossValidation",
+    "FoldFit",
+    "Iteration",
+    "ResponseSurfaceFit",
+    "coding_increments",
+    "cross_validate",
+    "factorial_design",
+    "fractional_sum_of_squares",
+    "interleaved_folds",
+    "maximise",
+    "regression_slopes",
+    "weighted_fractional_sum_of_squares",
+]

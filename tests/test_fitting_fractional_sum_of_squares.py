@@ -1,0 +1,65 @@
+"""FSS against its closed forms (Eqs. 12-14)."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fingerpad.errors import InputError
+from fingerpad.fitting import fractional_sum_of_squares, weighted_fractional_sum_of_squares
+from fingerpad.reference import bar_firing_rates
+
+RATES = np.array([0.0, 20.0, 135.0, 210.0, 72.0, 5.0])
+
+
+def test_perfect_prediction_scores_one_and_silence_zero() -> None:
+    assert fractional_sum_of_squares(RATES, RATES) == 1.0
+    assert fractional_sum_of_squares(RATES, np.zeros(6)) == 0.0
+
+
+def test_mean_prediction_scores_one_minus_variance_over_mean_square() -> None:
+    predicted = np.full(RATES.size, RATES.mean())
+    expected = 1.0 - RATES.var() / (RATES**2).mean()
+    assert fractional_sum_of_squares(RATES, predicted) == pytest.approx(expected, rel=1e-14)
+
+
+@given(st.floats(-5.0, 5.0))
+def test_a_scaled_prediction_loses_the_square_of_its_error(scale: float) -> None:
+    expected = 1.0 - (1.0 - scale) ** 2
+    assert fractional_sum_of_squares(RATES, scale * RATES) == pytest.approx(expected, abs=1e-12)
+
+
+def test_the_score_does_not_depend_on_the_unit_of_the_rates() -> None:
+    predicted = RATES[::-1]
+    assert fractional_sum_of_squares(RATES / 1e3, predicted / 1e3) == pytest.approx(
+        fractional_sum_of_squares(RATES, predicted), rel=1e-13
+    )
+
+
+def test_static_phase_weighs_three_times_the_dynamic_phase() -> None:
+    observed = bar_firing_rates()
+    dynamic, static = observed.dynamic_rate_hz, observed.static_rate_hz
+    silent = np.zeros(dynamic.size)
+    assert weighted_fractional_sum_of_squares(dynamic, dynamic, static, silent) == 0.25
+    assert weighted_fractional_sum_of_squares(dynamic, silent, static, static) == 0.75
+    assert weighted_fractional_sum_of_squares(dynamic, dynamic, static, silent, 0.4, 0.6) == 0.4
+
+
+def test_best_symmetric_prediction_of_the_bar_has_the_known_weighted_score() -> None:
+    observed = bar_firing_rates()
+    dynamic, static = observed.dynamic_rate_hz, observed.static_rate_hz
+    score = weighted_fractional_sum_of_squares(
+        dynamic, (dynamic + dynamic[::-1]) / 2, static, (static + static[::-1]) / 2
+    )
+    assert score == pytest.approx(0.979, abs=5e-4)
+
+
+def test_what_cannot_be_scored_is_refused() -> None:
+    with pytest.raises(InputError, match="must match: got 2 and 3 values"):
+        fractional_sum_of_squares([1.0, 2.0], [1.0, 2.0, 3.0])
+    with pytest.raises(InputError, match="at least one value other than 0"):
+        fractional_sum_of_squares([0.0, 0.0], [1.0, 2.0])
+    with pytest.raises(InputError, match="predicted must hold finite numbers"):
+        fractional_sum_of_squares([1.0, 2.0], [1.0, np.nan])
+    with pytest.raises(InputError, match="static_weight must not be negative"):
+        weighted_fractional_sum_of_squares([1.0], [1.0], [1.0], [1.0], static_weight=-0.75)

@@ -1,0 +1,169 @@
+"""Response surface method: exact on planes, close on bowls, honest when it fails."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fingerpad.errors import ConvergenceError, InputError
+from fingerpad.fitting import coding_increments, factorial_design, maximise, regression_slopes
+
+
+class Counted:
+    """An objective that remembers where it was evaluated."""
+
+    def __init__(self, function):
+        self.function = function
+        self.points: list[np.ndarray] = []
+
+    def __call__(self, parameters: np.ndarray) -> float:
+        self.points.append(np.array(parameters))
+        return float(self.function(parameters))
+
+
+def bowl(centre, curvature):
+    return lambda parameters: 1.0 - float((curvature * (parameters - centre) ** 2).sum())
+
+
+def test_design_of_six_parameters_has_65_different_runs() -> None:
+    design = factorial_design(6)
+    assert design.shape == (65, 6)
+    corners = {tuple(row) for row in design[:-1]}
+    assert corners == set(itertools.product((-1.0, 1.0), repeat=6))
+    assert not design[-1].any()
+
+
+@pytest.mark.parametrize("n_parameters", [1, 2, 3, 6])
+def test_slopes_are_those_of_ordinary_least_squares(n_parameters: int) -> None:
+    generator = np.random.default_rng(7)
+    design = factorial_design(n_parameters)
+    values = generator.normal(size=len(design))
+    with_constant = np.column_stack([np.ones(len(design)), design])
+    reference = np.linalg.lstsq(with_constant, values, rcond=None)[0]
+    np.testing.assert_allclose(regression_slopes(design, values), reference[1:], atol=1e-14)
+
+
+def test_direction_on_a_plane_is_exact_in_coded_units() -> None:
+    slopes, increments = np.array([3.0, -4.0]), np.array([0.1, 10.0])
+    start = np.array([1.0, 5.0])
+
+    def capped_plane(parameters: np.ndarray) -> float:
+        return min(float(slopes @ ((parameters - start) / increments)), 15.0)
+
+    fit = maximise(capped_plane, start, increments)
+    moved = (fit.history[1].parameters - start) / increments
+    np.testing.assert_allclose(fit.history[1].slopes, slopes, rtol=1e-12)
+    # Steps of 1 and 2 units gain 5 and 10; everything farther is flat.
+    np.testing.assert_allclose(moved, 3.0 * slopes / 5.0, rtol=1e-12)
+    assert fit.objective == pytest.approx(15.0)
+
+
+def test_first_iteration_runs_65_points_before_it_steps() -> None:
+    objective = Counted(bowl(np.full(6, 2.0), np.ones(6)))
+    start, increments = np.ones(6), np.full(6, 0.01)
+    fit = maximise(objective, start, increments)
+    np.testing.assert_allclose(objective.points[:65], start + factorial_design(6) * increments)
+    np.testing.assert_allclose(objective.points[65], start + 0.01 / np.sqrt(6.0), rtol=1e-12)
+    assert fit.n_runs == len(objective.points)
+    assert fit.n_runs >= 65 * (fit.n_iterations + 1)
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=3),
+    st.lists(st.floats(0.5, 2.0), min_size=3, max_size=3),
+)
+def test_the_top_of_a_bowl_is_found_within_an_increment(centre: list[float], curvature: list[float]) -> None:
+    increment = 0.01
+    fit = maximise(
+        bowl(np.array(centre), np.array(curvature)), np.zeros(3), np.full(3, increment), smallest_gain=0.0
+    )
+    # No unit step gains: the slope is below half a unit times the largest curvature, divided by the smallest.
+    assert np.abs(fit.parameters - centre).max() <= 0.5 * increment * 2.0 / 0.5
+    assert fit.objective <= 1.0
+
+
+def test_history_never_falls_and_ends_with_the_result() -> None:
+    centre, curvature = np.array([1.0, -2.0, 0.5]), np.array([1.0, 8.0, 3.0])
+    function = bowl(centre, curvature)
+    fit = maximise(function, np.zeros(3), np.full(3, 0.01))
+    values = [row.objective for row in fit.history]
+    assert (np.diff(values) > 1e-4).all()
+    assert values == [function(row.parameters) for row in fit.history]
+    assert fit.history[0].parameters.tolist() == [0.0, 0.0, 0.0]
+    assert fit.objective == values[-1]
+    assert fit.parameters.tolist() == fit.history[-1].parameters.tolist()
+    assert sum(row.n_runs for row in fit.history) + 9 < fit.n_runs
+    assert fit.n_iterations == len(values) - 1 >= 2
+
+
+def test_a_start_at_the_top_stays_there() -> None:
+    fit = maximise(bowl(np.zeros(2), np.ones(2)), np.zeros(2), np.full(2, 0.1))
+    assert fit.parameters.tolist() == [0.0, 0.0]
+    assert (fit.n_iterations, fit.n_runs) == (0, 5)
+
+
+def test_jumps_smaller_than_an_increment_do_not_stop_the_climb() -> None:
+    centre = np.array([3.0, -1.0])
+
+    def stairs(parameters: np.ndarray) -> float:
+        return float(np.round(100.0 * bowl(centre, np.full(2, 0.1))(parameters)) / 100.0)
+
+    fit = maximise(stairs, np.zeros(2), np.full(2, 0.2))
+    assert fit.objective >= 0.98
+
+
+def test_the_climb_is_deterministic() -> None:
+    first, second = (
+        maximise(bowl(np.ones(2), np.array([1.0, 5.0])), [0.0, 0.3], [0.01, 0.02]) for _ in range(2)
+    )
+    assert first.parameters.tobytes() == second.parameters.tobytes()
+    assert first.n_runs == second.n_runs
+
+
+def test_no_run_goes_below_a_bound_and_the_free_parameter_still_climbs() -> None:
+    objective = Counted(bowl(np.array([-5.0, 4.0]), np.ones(2)))
+    fit = maximise(objective, [1.0, 1.0], [0.1, 0.1], lower_bounds=[0.5, -np.inf])
+    assert np.min(objective.points, axis=0)[0] >= 0.5 - 1e-12
+    np.testing.assert_allclose(fit.parameters, [0.6, 4.0], atol=0.1)
+
+
+def test_increments_are_a_share_of_the_base_and_a_zero_needs_its_own() -> None:
+    np.testing.assert_allclose(coding_increments([-2.0, 50.0], 0.01), [0.02, 0.5])
+    with pytest.raises(InputError, match="increments must be greater than 0"):
+        coding_increments([0.0, 50.0], 0.01)
+    np.testing.assert_allclose(coding_increments([0.0, 50.0], 0.01, where_zero=[1e-8, 9.0]), [1e-8, 0.5])
+
+
+def test_an_objective_without_maximum_is_reported_with_its_history() -> None:
+    with pytest.raises(ConvergenceError, match="still gains after 200 steps"):
+        maximise(lambda parameters: float(parameters[0]), [0.0], [1.0])
+    with pytest.raises(ConvergenceError, match="after 2 iterations") as caught:
+        maximise(bowl(np.ones(2), np.array([1.0, 30.0])), [0.0, 0.0], [0.01, 0.01], most_iterations=2)
+    assert len(caught.value.history) == 3
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"increments": [0.1]}, "one entry per parameter: got 1 for 2"),
+        ({"increments": [0.1, 0.0]}, "increments must be greater than 0"),
+        ({"lower_bounds": [0.0]}, "lower_bounds needs one number"),
+        ({"lower_bounds": [0.95, 0.0]}, "at least one increment above lower_bounds"),
+        ({"start": [[1.0, 1.0]]}, "start must have 1 dimension"),
+        ({"smallest_gain": -1.0}, "smallest_gain must not be negative"),
+        ({"most_iterations": 0}, "most_iterations must be a whole number of at least 1"),
+        ({"objective": lambda parameters: np.nan}, r"objective at \[0.9, 0.9\] must be a finite number"),
+    ],
+)
+def test_what_cannot_be_climbed_is_refused(change: dict, said: str) -> None:
+    good = {"objective": bowl(np.zeros(2), np.ones(2)), "start": [1.0, 1.0], "increments": [0.1, 0.1]}
+    with pytest.raises(InputError, match=said):
+        maximise(**(good | change))
+
+
+def test_a_design_of_too_many_parameters_is_refused() -> None:
+    with pytest.raises(InputError, match="at most 12: got 13"):
+        factorial_design(13)
