@@ -1,0 +1,520 @@
+"""From geometry to bricks: one structured grid along x around x through, for a finger or a block.
+
+Every element is an 8-node brick with its lower face on the bone's side and its upper face on the skin's side.
+At the tip of the finger all rays of a grid line meet in one pole; the bricks there have one side collapsed
+(two pairs of repeated nodes), so one kernel serves bricks and wedges alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+from fingerpad.checks import FloatArray, finite, float_array, increasing, one_of, positive, whole
+from fingerpad.errors import InputError
+from fingerpad.fingertip import Fingertip
+
+IntArray = NDArray[np.int64]
+
+LAYERS = ("stratum corneum", "living epidermis", "dermis", "subcutis")
+RESOLUTIONS = ("quick", "standard", "paper")
+_LIVING_EPIDERMIS = 1
+_ARC_POINTS = (
+    4001  # for arc lengths along the skin: chords of 0.01 mm are short by less than 1e-6 of their length
+)
+_CORNERS = np.array(
+    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
+    dtype=np.float64,
+)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Hexahedra in a structured grid, with the sets of nodes that mechanics needs.
+
+    Parameters
+    ----------
+    nodes_mm : array (n_nodes, 3)
+        x, y and z of the nodes. [mm]
+    elements : int array (n_elements, 8)
+        Nodes of each brick: lower face (towards the bone) counter-clockwise seen from the skin, then upper face.
+        Elements are numbered along, around, through (skin to bone), the last running fastest.
+    layer : int array (n_elements,)
+        Index into `LAYERS`.
+    shape : (int, int, int)
+        Number of elements along, around and through.
+    full : bool
+        Whether both halves are there; else only z >= 0, with `symmetry_nodes` on the plane z = 0.
+    skin_grid : int array (n_along + 1, n_around + 1)
+        Nodes of the skin in grid order; the pole, and the seam of a full finger, appear more than once.
+    bone_nodes, nail_nodes, symmetry_nodes : int array
+        Nodes on the bone (or bottom of a block), under the nail, and on the plane of symmetry.
+    midline_nodes : int array (n_along + 1,)
+        Nodes of the volar skin at z = 0, x increasing.
+    living_epidermis : int array (n_along, n_around)
+        The sheet of elements just above the epidermal-dermal border; empty if there is none.
+    """
+
+    nodes_mm: FloatArray
+    elements: IntArray
+    layer: IntArray
+    shape: tuple[int, int, int]
+    full: bool
+    skin_grid: IntArray
+    bone_nodes: IntArray
+    nail_nodes: IntArray
+    symmetry_nodes: IntArray
+    midline_nodes: IntArray
+    living_epidermis: IntArray
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    @cached_property
+    def skin_nodes(self) -> IntArray:
+        """Nodes of the skin, each once, increasing."""
+        return np.unique(self.skin_grid)
+
+    @cached_property
+    def fixed_nodes(self) -> IntArray:
+        """Nodes that do not move: bone and nail."""
+        return np.union1d(self.bone_nodes, self.nail_nodes)
+
+    @cached_property
+    def skin_area_mm2(self) -> FloatArray:
+        """Undeformed area of the skin that belongs to each of `skin_nodes` [mm²].
+
+        The integral of each node's bilinear shape function over the faces of the mesh.
+        """
+        grid = self.skin_grid
+        faces = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
+        area = np.zeros(len(self.nodes_mm))
+        for point in _CORNERS[:4, :2] / np.sqrt(3.0):
+            signs = _CORNERS[:4, :2]
+            shape = 0.25 * (1.0 + signs[:, 0] * point[0]) * (1.0 + signs[:, 1] * point[1])
+            along = 0.25 * signs[:, 0] * (1.0 + signs[:, 1] * point[1])
+            around = 0.25 * signs[:, 1] * (1.0 + signs[:, 0] * point[0])
+            corners = self.nodes_mm[faces]
+            tangents = (np.einsum("a,fad->fd", weights, corners) for weights in (along, around))
+            patch = np.linalg.norm(np.cross(*tangents), axis=1)
+            np.add.at(area, faces, patch[:, None] * shape)
+        return area[self.skin_nodes]
+
+
+def _bricks(grid: IntArray) -> IntArray:
+    """Bricks of a grid of node ids (along, around, through), through counted from the skin downwards."""
+    below, above = grid[:, :, 1:], grid[:, :, :-1]
+    faces = [(face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]) for face in (below, above)]
+    return np.stack([corner for face in faces for corner in face], axis=-1).reshape(-1, 8)
+
+
+def _mesh(
+    nodes_mm: FloatArray,
+    grid: IntArray,
+    layers: IntArray,
+    full: bool,
+    midline: int,
+    nail: IntArray,
+    symmetry: IntArray,
+) -> Mesh:
+    along, around, through = (size - 1 for size in grid.shape)
+    layer = np.tile(layers, along * around)
+    numbers = np.arange(layer.size).reshape(along, around, through)
+    epidermis = np.flatnonzero(layers == _LIVING_EPIDERMIS)
+    return Mesh(
+        nodes_mm=nodes_mm,
+        elements=_bricks(grid),
+        layer=layer,
+        shape=(along, around, through),
+        full=full,
+        skin_grid=grid[:, :, 0].copy(),
+        bone_nodes=np.unique(grid[:, :, -1]),
+        nail_nodes=nail,
+        symmetry_nodes=symmetry,
+        midline_nodes=grid[:, midline, 0].copy(),
+        living_epidermis=numbers[:, :, epidermis[-1]] if epidermis.size else np.empty((0, 0), dtype=np.int64),
+    )
+
+
+def block_mesh(
+    x_edges: ArrayLike, y_edges: ArrayLike, z_edges: ArrayLike, layers: Sequence[int], symmetric: bool = False
+) -> Mesh:
+    """A block of layers: skin at y = 0 facing -y, depth along +y, its bottom the set `bone_nodes`.
+
+    Parameters
+    ----------
+    x_edges, y_edges, z_edges : array
+        Grid lines, increasing; `y_edges` starts at 0, the skin. [mm]
+    layers : sequence of int
+        Index into `LAYERS` for each interval of `y_edges`.
+    symmetric : bool
+        Whether the plane z = 0, the first of `z_edges`, is one of symmetry.
+
+    Returns
+    -------
+    Mesh
+        Its midline is the grid line nearest to z = 0.
+
+    Raises
+    ------
+    InputError
+        If edges do not increase, the skin is not at 0 or layers do not match.
+
+    Examples
+    --------
+    >>> block = block_mesh([0.0, 1.0, 2.0], [0.0, 0.5], [0.0, 1.0], layers=[2])
+    >>> block.elements.shape, float(block.skin_area_mm2.sum())
+    ((2, 8), 2.0)
+    """
+    x, y, z = (
+        increasing(name, float_array(name, edges, 1))
+        for name, edges in (("x_edges", x_edges), ("y_edges", y_edges), ("z_edges", z_edges))
+    )
+    if min(x.size, y.size, z.size) < 2 or y[0] != 0.0:
+        raise InputError("A block needs two edges or more each way, y_edges starting at the skin, 0 mm.")
+    layer = np.array([whole("layers", index, 0) for index in layers], dtype=np.int64)
+    if layer.size != y.size - 1 or (layer >= len(LAYERS)).any():
+        raise InputError(
+            f"layers needs an index below {len(LAYERS)} for each interval of y_edges: got {layers}."
+        )
+    if symmetric and z[0] != 0.0:
+        raise InputError(f"z_edges of a symmetric block must start at 0 mm: got {z[0]}.")
+    corners = np.stack(np.meshgrid(x, z, y, indexing="ij"), axis=-1)[..., [0, 2, 1]]
+    grid = np.arange(x.size * z.size * y.size).reshape(x.size, z.size, y.size)
+    none = np.empty(0, dtype=np.int64)
+    symmetry = np.unique(grid[:, 0]) if symmetric else none
+    return _mesh(corners.reshape(-1, 3), grid, layer, not symmetric, int(np.abs(z).argmin()), none, symmetry)
+
+
+@dataclass(frozen=True)
+class Grading:
+    """Where the mesh of a finger is fine, and how fine.
+
+    Parameters
+    ----------
+    centre_mm : float
+        x of the middle of the fine zone on the volar midline. [mm]
+    half_length_mm, half_width_mm : float
+        The fine zone, measured on the skin: to either side along the finger, and across from the midline. [mm]
+    size_x_mm, size_z_mm : float
+        Size of the elements in the fine zone along and across. [mm]
+    largest_mm : float
+        Largest size of an element on the skin away from the fine zone. [mm]
+    growth : float
+        Largest ratio of neighbouring sizes, above 1 and at most 1.3.
+    stratum_corneum, living_epidermis, dermis, subcutis : int
+        Number of elements through each layer.
+    full : bool
+        Both halves of the finger, or only z >= 0.
+
+    Raises
+    ------
+    InputError
+        If a value is out of its range.
+    """
+
+    centre_mm: float
+    half_length_mm: float
+    half_width_mm: float
+    size_x_mm: float
+    size_z_mm: float
+    largest_mm: float = 2.0
+    growth: float = 1.3
+    stratum_corneum: int = 4
+    living_epidermis: int = 1
+    dermis: int = 4
+    subcutis: int = 5
+    full: bool = False
+
+    def __post_init__(self) -> None:
+        finite("centre_mm", self.centre_mm, "mm")
+        for name in ("half_length_mm", "half_width_mm", "size_x_mm", "size_z_mm", "largest_mm"):
+            positive(name, getattr(self, name), "mm")
+        if not 1.0 < finite("growth", self.growth) <= 1.3:
+            raise InputError(f"growth must be above 1 and at most 1.3: got {self.growth!r}.")
+        for name in ("stratum_corneum", "living_epidermis", "dermis", "subcutis"):
+            whole(name, getattr(self, name), 1)
+
+    @property
+    def counts(self) -> tuple[int, int, int, int]:
+        """Number of elements through each of `LAYERS`."""
+        return self.stratum_corneum, self.living_epidermis, self.dermis, self.subcutis
+
+
+def resolution_grading(
+    resolution: str, centre_mm: float, half_length_mm: float = 5.0, half_width_mm: float = 1.0
+) -> Grading:
+    """Grading of a named resolution.
+
+    Parameters
+    ----------
+    resolution : {"quick", "standard", "paper"}
+        "quick" for a look, "standard" for results, "paper" for the published size: both halves, at least
+        232,000 nodes, edges of 0.1 mm all over the pad at the skin and the epidermal-dermal border.
+    centre_mm, half_length_mm, half_width_mm : float
+        The fine zone, as in `Grading`; "paper" widens it to the whole pad. [mm]
+
+    Returns
+    -------
+    Grading
+
+    Examples
+    --------
+    >>> resolution_grading("quick", 17.37).size_x_mm
+    0.4
+    """
+    one_of("resolution", resolution, RESOLUTIONS)
+    zone = Grading(centre_mm, half_length_mm, half_width_mm, 0.22, 0.22)
+    if resolution == "quick":
+        return replace(
+            zone, size_x_mm=0.4, size_z_mm=0.4, largest_mm=3.0, stratum_corneum=2, dermis=3, subcutis=3
+        )
+    if resolution == "standard":
+        return zone
+    length, width = max(half_length_mm, 6.0), max(half_width_mm, 5.0)
+    pad = replace(zone, half_length_mm=length, half_width_mm=width)
+    return replace(pad, size_x_mm=0.1, size_z_mm=0.1, full=True)
+
+
+@dataclass(frozen=True)
+class GridLines:
+    """The grid of a finger's mesh before it is mapped to the finger.
+
+    Parameters
+    ----------
+    along_mm : array (n_along + 1,)
+        Arc length on the volar midline from the cut to the pole at the tip. [mm]
+    around_rad : array (n_around + 1,)
+        Angle about the bone's axis: 0 volar, pi dorsal; from -pi for both halves. [rad]
+    through : array (n_through + 1,)
+        0 at the skin, 1, 2 and 3 at the lower borders of stratum corneum, living epidermis and dermis, 4 at
+        the bone.
+    """
+
+    along_mm: FloatArray
+    around_rad: FloatArray
+    through: FloatArray
+
+    @property
+    def full(self) -> bool:
+        """Whether the lines go all around the finger."""
+        return bool(self.around_rad[0] < 0.0)
+
+    def parent(self) -> GridLines:
+        """Every second line along and around, and within each layer that has an even number of elements.
+
+        Layer borders stay, so elements keep one material, and the nodes of the parent are nodes of its child.
+        """
+        through = [np.zeros(1)]
+        for layer in range(len(LAYERS)):
+            lines = self.through[(self.through > layer) & (self.through <= layer + 1)]
+            through.append(lines[1::2] if lines.size % 2 == 0 else lines)
+        return GridLines(self.along_mm[::2], self.around_rad[::2], np.concatenate(through))
+
+
+def _graded(fine: float, size: float, length: float, growth: float, largest: float) -> FloatArray:
+    """Lines from 0 to `length`: equal steps over the fine zone, then growing ones; an even number of steps."""
+    n_fine = int(np.ceil(min(fine, length) / size - 1e-9))
+    rest = length - n_fine * size
+    if rest < size:
+        n_even = 2 * int(np.ceil(0.5 * length / size))
+        return np.linspace(0.0, length, n_even + 1)
+
+    def outer(ratio: float, count: int) -> FloatArray:
+        return np.minimum(size * ratio ** np.arange(1, count + 1), largest)
+
+    count = 1
+    while outer(growth, count).sum() < rest or (n_fine + count) % 2:
+        count += 1
+    ratio = brentq(lambda ratio: outer(ratio, count).sum() - rest, 1e-3, growth, xtol=1e-15)
+    steps = np.concatenate([np.full(n_fine, size), outer(ratio, count)])
+    lines = np.concatenate([[0.0], np.cumsum(steps)])
+    lines[-1] = length
+    return lines
+
+
+def _rays(finger: Fingertip, station: FloatArray, around_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Origins and directions (..., 3) of rays from the bone's axis.
+
+    `station` is x along the axis and, beyond its end, 1 mm per radian of the fan that turns towards the tip.
+    """
+    turn = np.clip(station - finger.spine_end_x_mm, 0.0, 0.5 * np.pi)
+    # Exact zeros on the plane of symmetry and at the pole, where sin(pi) and cos(pi / 2) leave rounding.
+    side = np.where(np.abs(around_rad) == np.pi, 0.0, np.sin(around_rad))
+    radial = np.where(turn == 0.5 * np.pi, 0.0, np.cos(turn))
+    x = np.minimum(station, finger.spine_end_x_mm)
+    origins = np.stack(np.broadcast_arrays(x, finger.spine_y_mm, 0.0 * around_rad), axis=-1)
+    directions = np.stack(
+        np.broadcast_arrays(np.sin(turn), -radial * np.cos(around_rad), radial * side), axis=-1
+    )
+    return origins, directions
+
+
+def _skin(finger: Fingertip, station: FloatArray, around_rad: FloatArray) -> FloatArray:
+    origins, directions = _rays(finger, station, around_rad)
+    return origins + finger.skin_distance_mm(origins, directions)[..., None] * directions
+
+
+def _arc_length(points: FloatArray) -> FloatArray:
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def _midline(finger: Fingertip) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Stations of rays, and x and arc length of the volar midline there."""
+    station = np.linspace(0.0, finger.spine_end_x_mm + 0.5 * np.pi, _ARC_POINTS)
+    points = _skin(finger, station, np.zeros(1))
+    return station, points[:, 0], _arc_length(points)
+
+
+def finger_lines(finger: Fingertip, grading: Grading) -> GridLines:
+    """Grid lines of a finger: even numbers of steps to either side of the centre, so that parents keep it.
+
+    Parameters
+    ----------
+    finger : Fingertip
+        The geometry.
+    grading : Grading
+        Where it is fine, and how fine.
+
+    Returns
+    -------
+    GridLines
+
+    Raises
+    ------
+    InputError
+        If the centre does not lie on the volar midline between cut and tip.
+    """
+    station, x, arc = _midline(finger)
+    centre = grading.centre_mm
+    if not 0.0 < centre < x[-1]:
+        raise InputError(f"centre_mm must lie between 0 and {x[-1]:.2f} mm: got {centre}.")
+    middle = np.interp(centre, x, arc)
+    growth, largest = grading.growth, grading.largest_mm
+    proximal, distal = (
+        _graded(grading.half_length_mm, grading.size_x_mm, length, growth, largest)
+        for length in (middle, arc[-1] - middle)
+    )
+    along = np.concatenate([middle - proximal[::-1], middle + distal[1:]])
+    along[0] = 0.0
+    angle = np.linspace(0.0, np.pi, _ARC_POINTS)
+    girth = _arc_length(_skin(finger, np.interp(centre, x, station), angle))
+    lines = _graded(grading.half_width_mm, grading.size_z_mm, girth[-1], growth, largest)
+    around = np.interp(lines, girth, angle)
+    if grading.full:
+        around = np.concatenate([-around[:0:-1], around])
+    through = [np.zeros(1)]
+    through += [layer + np.linspace(0.0, 1.0, n + 1)[1:] for layer, n in enumerate(grading.counts[:3])]
+    through.append(3.0 + _subcutis_fractions(finger, grading))
+    return GridLines(along, around, np.concatenate(through))
+
+
+def _subcutis_fractions(finger: Fingertip, grading: Grading) -> FloatArray:
+    """Fractions of the subcutis, steps growing inwards from the size of the dermis' elements at the centre."""
+    thickness = float(finger.depth_available_mm(grading.centre_mm, 0.0)) - finger.layer_depths_mm[-1]
+    count = grading.subcutis
+    first = finger.dermis_mm / grading.dermis
+
+    def excess(ratio: float) -> float:
+        return first * (ratio ** np.arange(1, count + 1)).sum() - thickness
+
+    ratio = 1.0 if excess(1.0) >= 0.0 else brentq(excess, 1.0, 10.0)
+    steps = np.cumsum(ratio ** np.arange(1, count + 1))
+    return steps / steps[-1]
+
+
+def finger_mesh(finger: Fingertip, grading: Grading | GridLines) -> Mesh:
+    """Mesh of a finger.
+
+    Rays leave the bone's straight axis at right angles and fan out from its end to the tip. On each ray lie a
+    point of the bone and one of the skin; layers are offset from the skin along its normal, and the subcutis
+    runs straight from there to the bone.
+
+    Parameters
+    ----------
+    finger : Fingertip
+        The geometry.
+    grading : Grading or GridLines
+        What to build; lines come from `finger_lines` and `GridLines.parent`.
+
+    Returns
+    -------
+    Mesh
+
+    Examples
+    --------
+    >>> mesh = finger_mesh(Fingertip(), resolution_grading("quick", 17.37))
+    >>> bool((jacobian_at_gauss(mesh) > 0).all())
+    True
+    """
+    lines = grading if isinstance(grading, GridLines) else finger_lines(finger, grading)
+    around = lines.around_rad[:-1] if lines.full else lines.around_rad
+    points = _finger_points(finger, lines, around)
+    n_along, n_around, n_through = (
+        size - 1 for size in (lines.along_mm.size, around.size, lines.through.size)
+    )
+    ids = np.arange(n_along * (n_around + 1) * (n_through + 1)).reshape(n_along, n_around + 1, n_through + 1)
+    pole = np.broadcast_to(ids.size + np.arange(n_through + 1), (1, n_around + 1, n_through + 1))
+    grid = np.concatenate([ids, pole])
+    if lines.full:
+        grid = np.concatenate([grid, grid[:, :1]], axis=1)
+    nodes = np.concatenate([points[:-1].reshape(-1, 3), points[-1, 0]])
+    layers = (0.5 * (lines.through[1:] + lines.through[:-1])).astype(np.int64)
+    skin = np.unique(grid[:, :, 0])
+    nail = skin[finger.is_under_nail(nodes[skin])]
+    symmetry = np.empty(0, dtype=np.int64) if lines.full else np.unique(grid[:, [0, -1]])
+    return _mesh(nodes, grid, layers, lines.full, int(np.abs(lines.around_rad).argmin()), nail, symmetry)
+
+
+def _finger_points(finger: Fingertip, lines: GridLines, around_rad: FloatArray) -> FloatArray:
+    station, _, arc = _midline(finger)
+    origins, directions = _rays(finger, np.interp(lines.along_mm, arc, station)[:, None], around_rad)
+    skin = origins + finger.skin_distance_mm(origins, directions)[..., None] * directions
+    bone = origins + finger.bone_distance_mm(origins, directions)[..., None] * directions
+    normal = finger.skin_normal(skin)
+    borders = (0.0, *finger.layer_depths_mm)
+    depth = np.interp(lines.through, np.arange(4.0), borders)[:, None]
+    share = np.maximum(lines.through - 3.0, 0.0)[:, None]
+    offset = skin[:, :, None] - depth * normal[:, :, None]
+    return (1.0 - share) * offset + share * bone[:, :, None]
+
+
+def _jacobians(mesh: Mesh, points: FloatArray) -> FloatArray:
+    """Jacobian matrices (n_elements, n_points, 3, 3), columns along the local axes, at local `points`."""
+    factors = 1.0 + points[:, None, :] * _CORNERS
+    gradients = np.stack(
+        [_CORNERS[:, axis] * np.delete(factors, axis, axis=2).prod(axis=2) / 8.0 for axis in range(3)],
+        axis=-1,
+    )
+    return np.einsum("mad,qac->mqdc", mesh.nodes_mm[mesh.elements], gradients, optimize=True)
+
+
+def jacobian_at_gauss(mesh: Mesh) -> FloatArray:
+    """Determinant of the Jacobian at the 2 x 2 x 2 Gauss points, (n_elements, 8) [mm³].
+
+    An element's volume is the sum of its row.
+    """
+    return np.linalg.det(_jacobians(mesh, _CORNERS / np.sqrt(3.0)))
+
+
+def scaled_jacobian(mesh: Mesh) -> FloatArray:
+    """Smallest Jacobian of each element over the product of its edges' lengths, (n_elements,); 1 is a box.
+
+    Bricks are judged at their corners; wedges, whose collapsed side has none, at the Gauss points.
+    """
+    wedge = (np.diff(np.sort(mesh.elements, axis=1), axis=1) == 0).any(axis=1)
+    quality = np.empty(len(mesh.elements))
+    for chosen, points in ((~wedge, _CORNERS), (wedge, _CORNERS / np.sqrt(3.0))):
+        part = replace(mesh, elements=mesh.elements[chosen])
+        jacobian = _jacobians(part, points)
+        scaled = np.linalg.det(jacobian) / np.linalg.norm(jacobian, axis=2).prod(axis=2)
+        quality[chosen] = scaled.min(axis=1, initial=1.0)
+    return quality
