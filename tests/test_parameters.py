@@ -164,6 +164,7 @@ def test_assumed_spheres_are_never_called_the_papers() -> None:
     }
     assert psychophysics.SPHERE_CURVATURES.status == "assumed"
     assert (np.diff(psychophysics.SPHERE_CURVATURES.value) > 0).all()
+    assert psychophysics.SPHERE_CURVATURES.value[0] == protocol.STANDARD_CURVATURE.value
 
 
 def test_paper_differences_follow_from_its_extremes() -> None:

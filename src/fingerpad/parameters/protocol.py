@@ -28,6 +28,15 @@ LINE_DIAMETER = Published("diameter of the line load", 0.05, "mm", _MECHANICS, "
 CYLINDER_DIAMETER = Published("diameter of the cylinder", 3.17, "mm", _MECHANICS, "paper")
 DEFLECTION_SPACING = Published("spacing of the imaged skin surface", 0.05, "mm", _MECHANICS, "paper")
 
+PUNCH_DIAMETER = Published(
+    "diameter of the flat punch",
+    6.35,
+    "mm",
+    "a quarter of an inch, the usual flat probe of compression studies on the finger pad",
+    "assumed",
+)
+STANDARD_CURVATURE = Published("curvature of the standard sphere", 287.0, "1/m", _SPHERES, "paper")
+
 SPHERE_POSITIONS = Published(
     "positions of the spheres along the finger, relative to the first", (0.0, 0.2), "mm", _SPHERES, "paper"
 )

@@ -6,15 +6,13 @@ _PAPER = "Gerling et al. 2014, section 2.2.3"
 _GOODWIN = "Goodwin, John & Marceglia 1991, as quoted by Gerling et al. 2014, section 2.2.3"
 _LOST = "lost; placed between the known spheres"
 
-SPHERE_287 = Published("curvature of the standard sphere", 287.0, "1/m", _PAPER, "paper")
-SPHERE_296 = Published("curvature of the nearest comparison sphere", 296.0, "1/m", _PAPER, "paper")
-SPHERE_305 = Published(
-    "curvature of the second comparison sphere", 305.0, "1/m", "Goodwin, John & Marceglia 1991", "read"
-)
-SPHERE_316 = Published("curvature of the third comparison sphere", 316.0, "1/m", _LOST, "assumed")
-SPHERE_328 = Published("curvature of the fourth comparison sphere", 328.0, "1/m", _LOST, "assumed")
-SPHERE_340 = Published("curvature of the fifth comparison sphere", 340.0, "1/m", _LOST, "assumed")
-SPHERE_365 = Published("curvature of the farthest comparison sphere", 365.0, "1/m", _PAPER, "paper")
+SPHERE_287 = Published("curvature of sphere 1 of 7, the standard", 287.0, "1/m", _PAPER, "paper")
+SPHERE_296 = Published("curvature of sphere 2 of 7, the nearest comparison", 296.0, "1/m", _PAPER, "paper")
+SPHERE_305 = Published("curvature of sphere 3 of 7", 305.0, "1/m", "Goodwin, John & Marceglia 1991", "read")
+SPHERE_316 = Published("curvature of sphere 4 of 7", 316.0, "1/m", _LOST, "assumed")
+SPHERE_328 = Published("curvature of sphere 5 of 7", 328.0, "1/m", _LOST, "assumed")
+SPHERE_340 = Published("curvature of sphere 6 of 7", 340.0, "1/m", _LOST, "assumed")
+SPHERE_365 = Published("curvature of sphere 7 of 7, the farthest comparison", 365.0, "1/m", _PAPER, "paper")
 SPHERES = (SPHERE_287, SPHERE_296, SPHERE_305, SPHERE_316, SPHERE_328, SPHERE_340, SPHERE_365)
 SPHERE_CURVATURES = Published(
     "curvatures of the seven spheres, the standard first",
