@@ -153,7 +153,8 @@ class Fingertip:
             positive(name, getattr(self, name), "mm")
         for name in ("bone_height_mm", "bone_width_mm", "nail_half_width_mm"):
             positive(name, getattr(self, name), "mm")
-        finite("spine_y_mm", self.spine_y_mm, "mm")
+        if finite("spine_y_mm", self.spine_y_mm, "mm") >= 0.0:
+            raise InputError(f"spine_y_mm must lie below 0, the widest height: got {self.spine_y_mm!r}.")
         nail = float_array("nail_x_mm", self.nail_x_mm, 1)
         if nail.size != 2 or not nail[0] < nail[1]:
             raise InputError(f"nail_x_mm must be two increasing numbers: got {self.nail_x_mm}.")
