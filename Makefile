@@ -1,0 +1,45 @@
+# make reproduce   run the studies of the paper      (ARGS="..." goes to `fingerpad reproduce`)
+# make test        check style, types, imports and behaviour; stops at the first failure
+# make clean       remove what the two have made, the environment included
+#
+# Both make their own environment in .venv; PYTHON names the interpreter it is made with.
+
+PYTHON ?= python3
+ARGS ?=
+PYTEST_ARGS ?= -n 2
+
+bin := .venv/bin
+# Nothing but the environment's own packages may answer an import.
+export PYTHONNOUSERSITE := 1
+unexport PYTHONPATH
+
+.PHONY: reproduce test clean
+.DEFAULT_GOAL := test
+
+reproduce: .venv/installed
+	$(bin)/fingerpad reproduce $(ARGS)
+
+test: .venv/installed-for-tests
+	$(bin)/ruff check
+	$(bin)/ruff format --check
+	$(bin)/mypy
+	$(bin)/lint-imports
+	$(bin)/pytest $(PYTEST_ARGS)
+
+.venv/installed: pyproject.toml | $(bin)/python
+	$(bin)/python -m pip install --quiet --disable-pip-version-check --editable .
+	touch $@
+
+.venv/installed-for-tests: pyproject.toml | $(bin)/python
+	$(bin)/python -m pip install --quiet --disable-pip-version-check --editable ".[test]"
+	touch $@ .venv/installed
+
+$(bin)/python:
+	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	    echo "fingerpad needs Python 3.11 or newer: PYTHON=$(PYTHON) is $$("$(PYTHON)" --version 2>&1)." \
+	         "Name another one, for example: make PYTHON=python3.12 $(MAKECMDGOALS)" >&2; exit 1; }
+	"$(PYTHON)" -m venv .venv
+
+clean:
+	rm -rf .venv build dist reproduction .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,67 @@
+"""The package as a user meets it: what it exports, explains and weighs at import."""
+
+import dataclasses
+import importlib
+import inspect
+import pkgutil
+import re
+import subprocess
+import sys
+from importlib.metadata import version
+
+import pytest
+
+import fingerpad
+
+MODULES = sorted(
+    module.name
+    for module in pkgutil.walk_packages(fingerpad.__path__, prefix="fingerpad.")
+    if not module.name.endswith("__main__")
+)
+
+
+def test_everything_promised_can_be_imported_by_star() -> None:
+    namespace: dict[str, object] = {}
+    exec("from fingerpad import *", namespace)
+    assert fingerpad.__all__
+    assert set(fingerpad.__all__) <= set(namespace)
+    assert len(set(fingerpad.__all__)) == len(fingerpad.__all__)
+
+
+def test_every_exported_name_is_explained() -> None:
+    assert [name for name in fingerpad.__all__ if not explained(getattr(fingerpad, name))] == []
+
+
+def explained(thing: object) -> bool:
+    """Whether a function, class or module has words of its own; other values need none."""
+    if not callable(thing) and not inspect.ismodule(thing):
+        return True
+    said = thing.__doc__ or ""
+    written_by_dataclass = said.startswith(f"{getattr(thing, '__name__', '')}(")
+    return len(said.split()) >= 3 and not written_by_dataclass
+
+
+def test_a_dataclass_without_words_does_not_count_as_explained() -> None:
+    silent = dataclasses.make_dataclass("Silent", [("depth_mm", float), ("width_mm", float)])
+    assert not explained(silent)
+    assert explained(inspect.getdoc)
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_every_module_says_what_it_is_for_and_keeps_its_promises(name: str) -> None:
+    module = importlib.import_module(name)
+    assert module.__doc__
+    assert all(hasattr(module, promised) for promised in getattr(module, "__all__", ()))
+
+
+def test_version_is_the_installed_one() -> None:
+    assert re.fullmatch(r"\d+\.\d+\.\d+\S*", fingerpad.__version__)
+    assert version("fingerpad") == fingerpad.__version__
+
+
+def test_import_chooses_no_plotting_backend_and_warns_of_nothing() -> None:
+    code = "import sys, fingerpad; print('matplotlib.pyplot' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout.strip(), done.stderr) == (0, "False", "")
