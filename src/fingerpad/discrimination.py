@@ -274,7 +274,7 @@ def expected_hit_rates(
     draws = float_array("standard_normals", standard_normals, 2)
     if draws.shape[1] != values.shape[1] or len(draws) < 2:
         raise InputError(
-            f"standard_normals needs one column for each of {values.shape[1]} receptors and two rows or more: "
+            f"standard_normals needs two rows or more and {values.shape[1]} columns, one per receptor: "
             f"got shape {draws.shape}."
         )
     noise = 1.0 + not_negative("noise_sigma", noise_sigma) * draws

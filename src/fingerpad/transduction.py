@@ -121,8 +121,9 @@ def drive(
     Each interval between two given times is cut into `pieces` equal pieces (fewer where they would be
     shorter than `shortest_piece_ms`), on which the cubic and its derivative are replaced by straight
     lines. The error falls with the square of the number of pieces and scales with the change of SED in
-    the interval, so that long smooth intervals need no more knots than short steep ones. With 32 pieces
-    no spike of a ramp and hold given at 8 + 12 steps moves by more than 0.02 ms when they are doubled.
+    the interval, so that long smooth intervals need no more knots than short steep ones. Twice the
+    default number moves no spike of a ramp and hold given at 8 + 12 steps by more than 0.02 ms, save the
+    spikes of an afferent that only just reaches its threshold, once or twice (0.2 ms).
 
     Parameters
     ----------

@@ -1,0 +1,154 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from fingerpad.errors import InputError
+from fingerpad.lif import LeakyIntegrateAndFire
+from fingerpad.signals import CurrentTraces, SedTraces
+from fingerpad.transduction import Drive, Transduction, drive
+
+RAMP_MS = 50.0
+TIMES_MS = np.concatenate([np.linspace(0.0, RAMP_MS, 9), RAMP_MS + np.geomspace(1.0, 950.0, 12)])
+
+
+def ramp_and_hold(peaks_kpa=(1.0, 2.0, 3.0)):
+    """SED that accelerates in the ramp and relaxes in the hold, at one site per peak."""
+    rise = np.clip(TIMES_MS / RAMP_MS, 0.0, 1.0) ** 1.6
+    relaxed = 1.0 - 0.15 * (1.0 - np.exp(-np.maximum(TIMES_MS - RAMP_MS, 0.0) / 120.0))
+    return SedTraces(TIMES_MS, np.outer(rise * relaxed, peaks_kpa), kinks_ms=[RAMP_MS])
+
+
+def test_a_straight_ramp_has_its_slope_as_rate_and_none_at_the_onset_or_in_the_hold():
+    driven = drive(SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0]))
+    ramp = (driven.times_ms > 0.0) & (driven.times_ms < 50.0)
+    assert driven.rate_kpa_per_ms[0] == 0.0
+    assert_allclose(driven.rate_kpa_per_ms[ramp], 0.04, rtol=1e-12)
+    assert_allclose(driven.sed_kpa[ramp, 0], 0.04 * driven.times_ms[ramp], rtol=1e-12)
+    assert_array_equal(driven.rate_kpa_per_ms[driven.times_ms > 50.0], 0.0)
+
+
+def test_the_rate_jumps_at_a_kink_and_nowhere_else():
+    driven = drive(ramp_and_hold())
+    repeated = np.flatnonzero(np.diff(driven.times_ms) == 0.0)
+    assert_array_equal(driven.times_ms[repeated], [0.0, RAMP_MS])
+    before, after = driven.rate_kpa_per_ms[repeated[1]], driven.rate_kpa_per_ms[repeated[1] + 1]
+    assert (before > 5.0 * after).all()
+    assert_allclose(driven.sed_kpa[repeated], driven.sed_kpa[repeated + 1], rtol=1e-15)
+
+
+def test_without_a_kink_the_rate_is_continuous():
+    smooth = SedTraces(TIMES_MS, ramp_and_hold().sed_kpa)
+    times = drive(smooth).times_ms
+    assert_array_equal(times[:-1][np.diff(times) == 0.0], [0.0])
+
+
+def test_given_times_stay_knots_to_the_last_bit_and_keep_their_energy():
+    sed = ramp_and_hold()
+    driven = drive(sed)
+    assert np.isin(sed.times_ms, driven.times_ms).all()
+    knots = np.searchsorted(driven.times_ms, sed.times_ms)
+    assert_allclose(driven.sed_kpa[knots], sed.sed_kpa, rtol=1e-14)
+
+
+def test_energy_between_given_times_stays_between_their_values():
+    rng = np.random.default_rng(3)
+    sed = SedTraces(np.arange(12.0), rng.uniform(0.0, 3.0, (12, 20)))
+    driven = drive(sed, shortest_piece_ms=0.01)
+    interval = np.clip(np.searchsorted(sed.times_ms, driven.times_ms, side="right") - 1, 0, 10)
+    low = np.minimum(sed.sed_kpa[interval], sed.sed_kpa[interval + 1])
+    high = np.maximum(sed.sed_kpa[interval], sed.sed_kpa[interval + 1])
+    assert (driven.sed_kpa >= low - 1e-12).all()
+    assert (driven.sed_kpa <= high + 1e-12).all()
+
+
+def test_the_rate_is_absolute_and_its_integral_the_path_that_energy_travels():
+    sed = SedTraces([0.0, 10.0, 20.0], [[1.0], [3.0], [0.5]], kinks_ms=[10.0])
+    driven = drive(sed)
+    assert (driven.rate_kpa_per_ms >= 0.0).all()
+    travelled = np.trapezoid(driven.rate_kpa_per_ms[:, 0], driven.times_ms)
+    assert_allclose(travelled, 2.0 + 2.5, rtol=1e-12)
+
+
+@pytest.mark.parametrize("step_ms", [1e-2, 1e-3])
+def test_the_printed_difference_approaches_the_derivative_at_first_order(step_ms):
+    sed = ramp_and_hold()
+    exact, printed = drive(sed), drive(sed, difference_step_ms=step_ms)
+    # Where a step reaches back across the onset or the kink, the two differ by definition.
+    calm = ~np.isin(exact.times_ms, [0.0, RAMP_MS])
+    shared = np.searchsorted(printed.times_ms, exact.times_ms[calm])
+    assert_array_equal(printed.times_ms[shared], exact.times_ms[calm])
+    difference = np.abs(printed.rate_kpa_per_ms[shared] - exact.rate_kpa_per_ms[calm]).max()
+    largest_curvature = 3.0 * 1.6 * 0.6 * 8**0.4 / RAMP_MS**2  # of the steepest site, in the second interval
+    assert 0.05 * step_ms * largest_curvature < difference < 2.0 * step_ms * largest_curvature
+
+
+def test_the_printed_difference_is_the_formula_of_the_paper_read_literally():
+    sed = SedTraces([0.0, 50.0, 100.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    step = 0.5
+    printed = drive(sed, difference_step_ms=step)
+    energy = np.interp(printed.times_ms, sed.times_ms, sed.sed_kpa[:, 0])
+    earlier = np.interp(np.maximum(printed.times_ms - step, 0.0), sed.times_ms, sed.sed_kpa[:, 0])
+    assert_allclose(printed.rate_kpa_per_ms[:, 0], np.abs(energy - earlier) / step, atol=1e-13)
+    assert printed.rate_kpa_per_ms[0] == 0.0
+    assert 50.5 in printed.times_ms
+
+
+def test_the_printed_difference_gives_the_same_spikes_as_the_derivative():
+    sed, gains = ramp_and_hold(), Transduction(1e-7, 2e-4, 1e-6)
+    neuron = LeakyIntegrateAndFire(68.0, 1e-6, 50.0, 1.0)
+    exact = neuron.spikes(gains.current(sed))
+    printed = neuron.spikes(gains.current(drive(sed, difference_step_ms=0.001)))
+    assert_array_equal(exact.offsets, printed.offsets)
+    assert_allclose(exact.times_ms, printed.times_ms, rtol=0.0, atol=0.01)
+
+
+def test_twice_as_many_pieces_move_no_spike_by_more_than_the_bound_of_the_docstring():
+    sed, gains = ramp_and_hold(np.linspace(0.3, 3.0, 20)), Transduction(0.0, 2e-4, 1e-6)
+    neuron = LeakyIntegrateAndFire(68.0, 1e-6, 50.0, 1.0)
+    default = neuron.spikes(gains.current(sed))
+    finer = neuron.spikes(gains.current(drive(sed, pieces=64, shortest_piece_ms=0.125)))
+    assert default.times_ms.size > 300
+    assert_array_equal(default.offsets, finer.offsets)
+    moved = np.abs(default.times_ms - finer.times_ms)
+    grazes = np.repeat(np.diff(default.offsets) < 3, np.diff(default.offsets))
+    assert np.count_nonzero(grazes) < 10
+    assert moved[~grazes].max() < 0.02
+    assert moved.max() < 0.2
+
+
+def test_current_is_the_linear_combination_of_equation_1():
+    driven = Drive([0.0, 1.0], [[2.0], [4.0]], [[0.0], [3.0]])
+    current = Transduction(0.5, 10.0, 0.25).current(driven)
+    assert_array_equal(current.current_ma, [[1.0], [0.5 + 30.0 + 1.0]])
+    assert_array_equal(current.times_ms, driven.times_ms)
+
+
+def test_traces_and_their_drive_give_the_same_current():
+    sed, gains = ramp_and_hold(), Transduction(1e-7, 2e-4, 1e-6)
+    assert_array_equal(gains.current(sed).current_ma, gains.current(drive(sed)).current_ma)
+
+
+def test_two_times_are_enough_and_kinks_at_the_ends_change_nothing():
+    plain = drive(SedTraces([0.0, 10.0], [[0.0], [1.0]]))
+    marked = drive(SedTraces([0.0, 10.0], [[0.0], [1.0]], kinks_ms=[0.0, 10.0]))
+    assert_array_equal(plain.times_ms, marked.times_ms)
+    assert_array_equal(plain.rate_kpa_per_ms, marked.rate_kpa_per_ms)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], kinks_ms=[0.5]), "kinks_ms must be among times_ms"),
+        (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], kinks_ms=[1.0, 0.0]), "kinks_ms must increase"),
+        (lambda: CurrentTraces([0.0, 0.0, 0.0], np.zeros((3, 1))), "nor repeat more than once"),
+        (lambda: CurrentTraces([0.0, 2.0, 1.0], np.zeros((3, 1))), "must not decrease"),
+        (lambda: Drive([0.0, 1.0], np.zeros((2, 1)), np.zeros((2, 2))), "Drive needs one row"),
+        (lambda: Transduction(np.nan, 0.0, 0.0), "intercept_ma must be a finite number"),
+        (lambda: drive(ramp_and_hold(), pieces=0), "pieces must be a whole number"),
+        (lambda: drive(ramp_and_hold(), difference_step_ms=0.0), "difference_step_ms must be greater"),
+        (lambda: drive(ramp_and_hold(), shortest_piece_ms=-1.0), "shortest_piece_ms must be greater"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(wrong, message):
+    with pytest.raises(InputError, match=message):
+        wrong()
