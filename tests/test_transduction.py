@@ -102,7 +102,7 @@ def test_the_printed_difference_gives_the_same_spikes_as_the_derivative():
     assert_allclose(exact.times_ms, printed.times_ms, rtol=0.0, atol=0.01)
 
 
-def test_twice_as_many_pieces_move_no_spike_by_more_than_the_bound_of_the_docstring():
+def test_twice_as_many_pieces_move_no_spike_by_more_than_the_docstring_says():
     sed, gains = ramp_and_hold(np.linspace(0.3, 3.0, 20)), Transduction(0.0, 2e-4, 1e-6)
     neuron = LeakyIntegrateAndFire(68.0, 1e-6, 50.0, 1.0)
     default = neuron.spikes(gains.current(sed))
@@ -110,10 +110,8 @@ def test_twice_as_many_pieces_move_no_spike_by_more_than_the_bound_of_the_docstr
     assert default.times_ms.size > 300
     assert_array_equal(default.offsets, finer.offsets)
     moved = np.abs(default.times_ms - finer.times_ms)
-    grazes = np.repeat(np.diff(default.offsets) < 3, np.diff(default.offsets))
-    assert np.count_nonzero(grazes) < 10
-    assert moved[~grazes].max() < 0.02
-    assert moved.max() < 0.2
+    assert moved.max() < 0.1
+    assert np.median(moved) < 0.002
 
 
 def test_current_is_the_linear_combination_of_equation_1():
