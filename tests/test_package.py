@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 
@@ -65,3 +66,29 @@ def test_import_chooses_no_plotting_backend_and_warns_of_nothing() -> None:
         [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stdout.strip(), done.stderr) == (0, "False", "")
+
+
+DECISIONS = Path(__file__).parents[1] / "docs" / "decisions"
+PAGES = sorted(page.name for page in DECISIONS.glob("*.md") if page.name != "README.md")
+
+
+def test_the_index_lists_every_decision_once() -> None:
+    linked = re.findall(r"\]\(([\w-]+\.md)\)", (DECISIONS / "README.md").read_text(encoding="utf-8"))
+    assert sorted(linked) == PAGES
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_decision_is_complete_and_names_only_what_exists(page: str) -> None:
+    text = (DECISIONS / page).read_text(encoding="utf-8")
+    parts = re.findall(r"^\*\*(Question|Choice|Reason|To change it)\.\*\*", text, flags=re.MULTILINE)
+    assert parts == ["Question", "Choice", "Reason", "To change it"]
+    for name in re.findall(r"`(fingerpad(?:\.\w+)+)`", text):
+        assert pkgutil.resolve_name(name) is not None
+    for link in re.findall(r"\]\(([\w-]+\.md)\)", text):
+        assert link in PAGES
+    for names, owner in re.findall(
+        r"((?:`\w+`(?:, | and )?)+) of `(fingerpad(?:\.\w+)+)`", " ".join(text.split())
+    ):
+        thing = pkgutil.resolve_name(owner)
+        known = set(dir(thing)) | set(inspect.signature(thing).parameters)
+        assert set(re.findall(r"`(\w+)`", names)) <= known
