@@ -1,0 +1,255 @@
+"""Meshes against volumes, areas and distances known without a mesh, and against each other."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fingerpad.errors import InputError
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import Grading, graded_lines, resolution_grading
+from fingerpad.mesh import LAYERS, Mesh, block_mesh, finger_lines, finger_mesh
+from fingerpad.mesh_quality import jacobian_at_gauss, scaled_jacobian
+
+FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
+FINGER = Fingertip()
+CONTACT_X = 17.37
+
+
+@pytest.fixture(scope="module")
+def quick() -> Mesh:
+    return finger_mesh(FINGER, resolution_grading("quick", CONTACT_X))
+
+
+@pytest.fixture(scope="module")
+def standard() -> Mesh:
+    return finger_mesh(FINGER, resolution_grading("standard", CONTACT_X))
+
+
+@pytest.fixture(scope="module")
+def paper() -> Mesh:
+    return finger_mesh(FINGER, resolution_grading("paper", CONTACT_X))
+
+
+def block() -> Mesh:
+    return block_mesh([0, 1, 3, 4], [0, 0.371, 0.471, 2], [0, 0.5, 2], layers=[0, 1, 2], symmetric=True)
+
+
+def boundary_faces(mesh: Mesh) -> np.ndarray:
+    """Faces of only one element, as rows of sorted nodes, collapsed faces left out."""
+    faces = np.sort(mesh.elements[:, FACES].reshape(-1, 4), axis=1)
+    faces = faces[(np.diff(faces, axis=1) == 0).sum(axis=1) < 2]
+    rows, counts = np.unique(faces, axis=0, return_counts=True)
+    assert counts.max() == 2
+    return rows[counts == 1]
+
+
+def test_a_block_has_its_volume_its_skin_and_its_layers():
+    mesh = block()
+    assert mesh.shape == (3, 2, 3)
+    volumes = jacobian_at_gauss(mesh).sum(axis=1)
+    by_layer = [volumes[mesh.layer == layer].sum() for layer in range(len(LAYERS))]
+    np.testing.assert_allclose(by_layer, np.array([0.371, 0.1, 1.529, 0.0]) * 4 * 2)
+    np.testing.assert_allclose(scaled_jacobian(mesh), 1.0)
+    assert (mesh.nodes_mm[mesh.skin_nodes, 1] == 0).all()
+    assert (mesh.nodes_mm[mesh.fixed_nodes, 1] == 2).all()
+    assert mesh.fixed_nodes.size == mesh.skin_nodes.size == 12
+    assert (mesh.nodes_mm[mesh.symmetry_nodes, 2] == 0).all()
+    assert mesh.symmetry_nodes.size == 16
+    np.testing.assert_array_equal(
+        mesh.nodes_mm[mesh.midline_nodes], [[0, 0, 0], [1, 0, 0], [3, 0, 0], [4, 0, 0]]
+    )
+    assert (mesh.layer[mesh.living_epidermis] == 1).all()
+    assert mesh.living_epidermis.shape == (3, 2)
+
+
+def test_skin_area_of_a_block_is_that_of_each_nodes_share():
+    mesh = block()
+    along, across = np.array([0.5, 1.5, 1.5, 0.5]), np.array([0.25, 1.0, 0.75])
+    np.testing.assert_allclose(mesh.skin_area_mm2, np.outer(along, across).ravel())
+
+
+def test_upper_faces_look_out_of_the_skin():
+    mesh = block()
+    corners = mesh.nodes_mm[mesh.elements[:, 4:]]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0])
+    assert (normal[:, 1] < 0).all()
+    np.testing.assert_allclose(normal[:, [0, 2]], 0.0, atol=1e-15)
+
+
+def test_scaled_jacobian_of_a_sheared_box_is_the_cosine_of_its_shear():
+    mesh = block_mesh([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], layers=[2])
+    sheared = replace(mesh, nodes_mm=mesh.nodes_mm @ np.array([[1, 0, 0], [np.tan(0.6), 1, 0], [0, 0, 1.0]]))
+    np.testing.assert_allclose(scaled_jacobian(sheared), np.cos(0.6))
+    np.testing.assert_allclose(jacobian_at_gauss(sheared), 1 / 8)
+
+
+@pytest.mark.parametrize("resolution", ["quick", "standard", "paper"])
+def test_every_brick_is_sound(resolution, request):
+    mesh = request.getfixturevalue(resolution)
+    assert (jacobian_at_gauss(mesh) > 0).all()
+    quality = scaled_jacobian(mesh)
+    assert quality.min() > 0.5
+    assert np.quantile(quality, 0.01) > 0.6
+    middle = mesh.nodes_mm[mesh.elements].mean(axis=1)
+    near = (np.linalg.norm(middle[:, [0, 2]] - [CONTACT_X, 0], axis=1) < 2) & (middle[:, 1] < -6)
+    assert near.sum() > 100
+    assert quality[near].min() > 0.95
+
+
+def test_sizes_are_those_of_the_presets(quick, standard, paper):
+    assert 4_000 < len(quick.nodes_mm) < 8_000
+    assert 12_000 < len(standard.nodes_mm) < 20_000
+    assert len(paper.nodes_mm) >= 232_000
+    assert paper.full
+    assert not quick.full
+    assert not standard.full
+
+
+def test_paper_edges_are_a_tenth_of_a_millimetre_over_the_pad(paper):
+    x, _, z = np.moveaxis(paper.nodes_mm[paper.skin_grid], -1, 0)
+    pad = (np.abs(x - CONTACT_X) < 5.5) & (np.abs(z) < 4.5) & (paper.nodes_mm[paper.skin_grid][..., 1] < -5)
+    for depth in (0, 5):  # skin, and epidermal-dermal border below four and one elements
+        ids = paper.skin_grid + depth
+        points = paper.nodes_mm[ids]
+        along = np.linalg.norm(np.diff(points, axis=0), axis=-1)[pad[:-1] & pad[1:]]
+        around = np.linalg.norm(np.diff(points, axis=1), axis=-1)[pad[:, :-1] & pad[:, 1:]]
+        for edges in (along, around):  # sections of other girth, and the inner side of the bend, stretch them
+            assert edges.size > 5_000
+            assert 0.085 < edges.min() < edges.max() < 0.11
+
+
+def test_neighbours_share_whole_faces_and_every_node_is_used(quick):
+    along, around, through = quick.shape
+    # skin and bone, the cut, and the plane of symmetry on the volar and on the dorsal side
+    assert len(boundary_faces(quick)) == 2 * along * around + around * through + 2 * along * through
+    np.testing.assert_array_equal(np.unique(quick.elements), np.arange(len(quick.nodes_mm)))
+
+
+def test_a_full_finger_closes_around(quick):
+    full = finger_mesh(FINGER, replace(resolution_grading("quick", CONTACT_X), full=True))
+    along, around, through = full.shape
+    assert around == 2 * quick.shape[1]
+    assert len(boundary_faces(full)) == 2 * along * around + around * through
+    assert full.symmetry_nodes.size == 0
+    assert jacobian_at_gauss(full).sum() == pytest.approx(2 * jacobian_at_gauss(quick).sum(), rel=1e-12)
+    assert full.skin_area_mm2.sum() == pytest.approx(2 * quick.skin_area_mm2.sum(), rel=1e-12)
+    np.testing.assert_array_equal(full.nodes_mm[full.midline_nodes], quick.nodes_mm[quick.midline_nodes])
+    points = {tuple(point) for point in full.nodes_mm.round(9) + 0.0}
+    assert points == {tuple(point) for point in (full.nodes_mm * [1, 1, -1]).round(9) + 0.0}
+
+
+def test_wedges_are_bricks_with_two_pairs_of_equal_nodes(quick):
+    distinct = np.array([len(set(row)) for row in quick.elements])
+    wedges = distinct == 6
+    assert wedges.sum() == quick.shape[1] * quick.shape[2]
+    assert (distinct[~wedges] == 8).all()
+
+
+def test_volume_approaches_that_of_the_outline_without_the_bone(standard):
+    """Half the finger: quarter ellipses of the sections, less half a tube and a quarter ellipsoid of bone."""
+    x = np.linspace(0.0, FINGER.length_mm, 20_001)
+    volar, dorsal, half_width = FINGER.section(x)
+    skin = np.trapezoid(np.pi / 4 * half_width * (volar + dorsal), x)
+    bone = np.pi * 2.3 * 2.6 / 2 * (20.0 + 2 / 3 * 5.1)
+    volume = jacobian_at_gauss(standard).sum()
+    assert 0.97 * (skin - bone) < volume < skin - bone
+
+
+def test_skin_bone_and_symmetry_nodes_lie_where_they_belong(standard):
+    nodes = standard.nodes_mm
+    np.testing.assert_allclose(FINGER.level(nodes[standard.skin_nodes]), 0.0, atol=1e-12)
+    x, y, z = nodes[standard.bone_nodes].T
+    past = np.maximum(x - 20.0, 0.0) / 5.1
+    np.testing.assert_allclose(past**2 + ((y + 2) / 2.3) ** 2 + (z / 2.6) ** 2, 1.0)
+    assert (nodes[standard.symmetry_nodes, 2] == 0).all()
+    np.testing.assert_array_equal(np.flatnonzero(nodes[:, 2] == 0), standard.symmetry_nodes)
+    assert (nodes[:, 2] >= 0).all()
+    assert set(standard.nail_nodes) <= set(standard.skin_nodes)
+    assert FINGER.is_under_nail(nodes[standard.nail_nodes]).all()
+    np.testing.assert_array_equal(
+        standard.fixed_nodes, sorted({*standard.bone_nodes.tolist(), *standard.nail_nodes.tolist()})
+    )
+
+
+def test_midline_runs_along_the_volar_skin_and_through_the_centre(standard):
+    points = standard.nodes_mm[standard.midline_nodes]
+    assert (np.diff(points[:, 0]) > 0).all()
+    assert (points[:, 1] < -1.9).all()
+    assert np.abs(points[:, 0] - CONTACT_X).min() < 1e-4
+    fine = np.abs(points[:, 0] - CONTACT_X) < 4.5
+    steps = np.linalg.norm(np.diff(points[fine], axis=0), axis=1)
+    np.testing.assert_allclose(steps, 0.25, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("layer", "depth"), [(0, 0.371), (1, 0.471), (2, 1.624)])
+def test_layers_end_at_their_depth_along_the_volar_normal(standard, layer, depth):
+    ends = {0: 4, 1: 5, 2: 9}[layer]
+    skin = standard.nodes_mm[standard.skin_grid]
+    below = standard.nodes_mm[standard.skin_grid + ends]
+    volar = skin[..., 1] < FINGER.spine_y_mm
+    np.testing.assert_allclose(below[volar], FINGER.subsurface(skin[volar], depth), rtol=0, atol=1e-12)
+    across = ((skin - below) * FINGER.skin_normal(skin)).sum(axis=-1)
+    np.testing.assert_allclose(across, depth, rtol=1e-12)
+
+
+def test_sheet_of_living_epidermis_lies_on_the_border(standard):
+    sheet = standard.living_epidermis
+    assert sheet.shape == standard.shape[:2]
+    assert (standard.layer[sheet] == 1).all()
+    lower = standard.nodes_mm[standard.elements[sheet][..., :4]].mean(axis=2)
+    expected = FINGER.subsurface(FINGER.skin_point(CONTACT_X, 0.0), 0.471)
+    assert np.linalg.norm(lower - expected, axis=-1).min() < 0.2
+
+
+def test_the_nodes_of_a_parent_are_nodes_of_its_child():
+    lines = finger_lines(FINGER, resolution_grading("standard", CONTACT_X))
+    child, parent = finger_mesh(FINGER, lines), finger_mesh(FINGER, lines.parent())
+    assert len(parent.nodes_mm) < len(child.nodes_mm) / 5
+    assert {tuple(point) for point in parent.nodes_mm} <= {tuple(point) for point in child.nodes_mm}
+    assert (jacobian_at_gauss(parent) > 0).all()
+    assert set(parent.layer) == set(range(len(LAYERS)))
+    assert np.abs(parent.nodes_mm[parent.midline_nodes, 0] - CONTACT_X).min() < 1e-4
+
+
+def test_a_line_indenter_gets_elements_of_its_own_size():
+    mesh = finger_mesh(FINGER, Grading(CONTACT_X, 0.3, 0.6, size_x_mm=0.03, size_z_mm=0.3))
+    x = mesh.nodes_mm[mesh.midline_nodes, 0]
+    assert np.diff(x[np.abs(x - CONTACT_X) < 0.25]).max() < 0.0301
+    assert (jacobian_at_gauss(mesh) > 0).all()
+    assert len(mesh.nodes_mm) < 20_000
+
+
+@pytest.mark.parametrize("fine", [0.1, 1.0, 4.9, 7.0])
+@pytest.mark.parametrize("length", [3.3, 5.0, 17.2])
+@pytest.mark.parametrize("size", [0.05, 0.22, 2.0])
+def test_graded_lines_keep_their_growth_their_limit_and_their_end(fine, length, size):
+    lines = graded_lines(fine, size, length, growth=1.3, largest=2.5)
+    steps = np.diff(lines)
+    assert lines[0] == 0.0
+    assert lines[-1] == length
+    assert steps.size % 2 == 0
+    assert steps.max() <= 2.5 + 1e-9
+    assert (steps[1:] / steps[:-1]).max() <= 1.3 + 1e-9
+    n_fine = int(min(fine, length) / size)
+    assert (steps[:n_fine] <= size + 1e-12).all()
+
+
+def test_what_cannot_be_meshed_is_refused():
+    with pytest.raises(InputError, match="centre_mm must lie between"):
+        finger_mesh(FINGER, resolution_grading("quick", 40.0))
+    with pytest.raises(InputError, match="resolution must be one of quick"):
+        resolution_grading("coarse", 10.0)
+    with pytest.raises(InputError, match="growth must be above 1"):
+        Grading(10.0, 1.0, 1.0, 0.2, 0.2, growth=1.5)
+    with pytest.raises(InputError, match="dermis must be a whole number"):
+        Grading(10.0, 1.0, 1.0, 0.2, 0.2, dermis=0)
+    with pytest.raises(InputError, match="y_edges starting at the skin"):
+        block_mesh([0, 1], [1, 2], [0, 1], layers=[0])
+    with pytest.raises(InputError, match="for each interval of y_edges"):
+        block_mesh([0, 1], [0, 2], [0, 1], layers=[0, 1])
+    with pytest.raises(InputError, match="must start at 0"):
+        block_mesh([0, 1], [0, 2], [1, 2], layers=[0], symmetric=True)
+    odd = finger_lines(FINGER, resolution_grading("quick", CONTACT_X))
+    with pytest.raises(InputError, match="even numbers of steps"):
+        replace(odd, along_mm=odd.along_mm[1:]).parent()
