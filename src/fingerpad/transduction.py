@@ -123,7 +123,7 @@ def drive(
     lines. The error falls with the square of the number of pieces and scales with the change of SED in
     the interval, so that long smooth intervals need no more knots than short steep ones. Twice the
     default number moves no spike of a ramp and hold given at 8 + 12 steps by more than 0.1 ms, which
-    is a spike that only grazes the threshold, and half of the spikes by less than 0.002 ms.
+    is a spike that only grazes the threshold, and half of the spikes by less than 0.005 ms.
 
     Parameters
     ----------

@@ -1,0 +1,108 @@
+import time
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from fingerpad.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.errors import InputError
+from fingerpad.parameters import neuron
+from fingerpad.signals import SedTraces
+from fingerpad.spikes import firing_rate_hz
+from fingerpad.transduction import drive
+
+
+def ramp_and_hold(*peaks_kpa):
+    return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 1.0], peaks_kpa), kinks_ms=[50.0])
+
+
+def test_the_stages_are_chained():
+    afferent, sed = Afferent(static_gain=1.5e-6), ramp_and_hold(1.0, 2.0)
+    by_hand = afferent.membrane.spikes(afferent.transduction.current(sed))
+    assert by_hand.times_ms.size > 20
+    assert_array_equal(afferent.spikes(sed).times_ms, by_hand.times_ms)
+    dynamic_hz, static_hz = afferent.rates(sed)
+    assert_array_equal(dynamic_hz, firing_rate_hz(by_hand, (30.0, 50.0)))
+    assert_array_equal(static_hz, firing_rate_hz(by_hand, (600.0, 950.0)))
+
+
+def test_static_rate_is_the_closed_form_of_a_steady_current():
+    afferent = Afferent(static_gain=1.4e-6)
+    _, static_hz = afferent.rates(ramp_and_hold(2.0))
+    drive_mv = 1.4e-6 * 2.0 * afferent.time_constant_ms / afferent.capacitance_mf
+    interval_ms = afferent.refractory_ms - afferent.time_constant_ms * np.log1p(
+        -afferent.threshold_mv / drive_mv
+    )
+    assert_allclose(static_hz, 1000.0 / interval_ms, rtol=1e-10)
+
+
+def test_the_default_afferent_answers_like_an_sai():
+    """Fast in the ramp, slow in the hold, more for more: SED of a 1 mm touch is 2 to 4 kPa."""
+    dynamic_hz, static_hz = Afferent().rates(ramp_and_hold(0.0, 2.0, 3.0, 4.0))
+    assert dynamic_hz[0] == static_hz[0] == 0.0
+    assert (np.diff(dynamic_hz) > 0).all()
+    assert (np.diff(static_hz) > 0).all()
+    assert 100.0 < dynamic_hz[1] < 200.0
+    assert 10.0 < static_hz[1] < 60.0
+    assert 40.0 < static_hz[3] < 60.0
+
+
+def test_the_printed_dynamic_gain_is_silent_in_the_ramp():
+    """The reason for DYNAMIC_GAIN_SCALE."""
+    printed = Afferent(dynamic_gain=neuron.DYNAMIC_GAIN_START_1.value)
+    without = Afferent(dynamic_gain=0.0)
+    sed = ramp_and_hold(1.0, 2.0, 3.0)
+    assert_array_equal(printed.rates(sed)[0], without.rates(sed)[0])
+    assert (Afferent().rates(sed)[0] > 50.0).all()
+
+
+def test_parameters_go_round():
+    values = [1e-7, 3e-4, 1e-6, 40.0, 2e-6, 30.0]
+    afferent = Afferent.from_parameters(values, refractory_ms=2.0)
+    assert_array_equal(afferent.parameters, values)
+    assert [getattr(afferent, name) for name in PARAMETER_NAMES] == values
+    assert afferent.refractory_ms == 2.0
+    assert Afferent.from_parameters(Afferent().parameters) == Afferent()
+
+
+def test_capacitance_and_threshold_only_scale_the_gains():
+    values = Afferent().parameters
+    scaled = Afferent.from_parameters(values * [6.0, 6.0, 6.0, 1.0, 2.0, 3.0])
+    sed = ramp_and_hold(2.0, 3.0)
+    assert_allclose(scaled.spikes(sed).times_ms, Afferent().spikes(sed).times_ms, rtol=1e-11)
+
+
+def test_a_drive_gives_what_its_traces_give_and_a_fit_can_afford_it():
+    sed = SedTraces(
+        np.append(np.linspace(0.0, 50.0, 9), 50.0 + np.geomspace(2.0, 950.0, 12)),
+        np.outer(np.append(np.linspace(0.0, 1.0, 9), np.linspace(0.99, 0.85, 12)), np.linspace(0.3, 3.0, 36)),
+        kinks_ms=[50.0],
+    )
+    prepared, afferent = drive(sed), Afferent()
+    assert_array_equal(afferent.rates(prepared), afferent.rates(sed))
+    durations = []
+    for _ in range(20):
+        start = time.perf_counter()
+        afferent.rates(prepared)
+        durations.append(time.perf_counter() - start)
+    assert min(durations) < 2e-3
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        ([0.0, 1.0], "parameters must hold intercept_ma"),
+        ([0.0, 1.0, 1.0, -1.0, 1.0, 1.0], "time_constant_ms must be greater than 0"),
+        ([np.nan, 1.0, 1.0, 1.0, 1.0, 1.0], "parameters must hold finite"),
+    ],
+)
+def test_impossible_parameters_are_refused_on_construction(numbers, message):
+    with pytest.raises(InputError, match=message):
+        Afferent.from_parameters(numbers)
+
+
+def test_a_single_wrong_field_is_named():
+    with pytest.raises(InputError, match="threshold_mv"):
+        Afferent(threshold_mv=0.0)
+    with pytest.raises(InputError, match="dynamic_gain"):
+        Afferent(dynamic_gain=np.inf)

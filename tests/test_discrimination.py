@@ -1,0 +1,327 @@
+import math
+import time
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.special import ndtr
+
+from fingerpad.discrimination import (
+    END_OF_STIMULUS_MS,
+    Experiment,
+    discriminate_euclidean,
+    discriminate_gradient_sum,
+    expected_hit_rates,
+    fit_noise_sigma,
+)
+from fingerpad.encoding import distance, gradient_sum, neighbour_pairs
+from fingerpad.errors import ConvergenceError, InputError
+from fingerpad.population import Population
+
+GRID = Population.grid()
+PAIRS = neighbour_pairs(GRID.positions_mm, GRID.pitch_mm)
+SMALL = Experiment(presentations=6, distributions=4, pairs=5, hit_rates=7, presentations_varied=9)
+CURVATURES = np.array([287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0])
+TWO = [[0, 1]]
+
+
+def generator(seed=0):
+    return np.random.default_rng(seed)
+
+
+def bumps(curvatures=CURVATURES):
+    """Rates that grow and sharpen with curvature, as under a sphere."""
+    x, z = (GRID.positions_mm - [17.37, 0.0]).T
+    width = 1.8 * 287.0 / np.asarray(curvatures)[:, np.newaxis]
+    return 40.0 * np.exp(-(x**2 + z**2) / (2.0 * width**2))
+
+
+def one_by_one(values, sigma, count, draws):
+    """(a): noise drawn number by number, in the order sphere, presentation, receptor."""
+    return [
+        [[value * (1.0 + sigma * draws.standard_normal()) for value in sphere] for _ in range(count)]
+        for sphere in values
+    ]
+
+
+def mean_and_sd(numbers):
+    mean = sum(numbers) / len(numbers)
+    return mean, math.sqrt(sum((number - mean) ** 2 for number in numbers) / (len(numbers) - 1))
+
+
+def normal_beyond(point, mean, sd, side):
+    return 0.5 * math.erfc(-side * (mean - point) / sd / math.sqrt(2.0))
+
+
+def test_gradient_sum_follows_the_printed_steps():
+    values, sigma, plan = bumps([287.0, 310.0, 260.0]), 0.05, SMALL
+    draws = generator(5)
+    fitted = []
+    for _ in range(plan.distributions):  # (f)
+        noisy = one_by_one(values, sigma, plan.presentations, draws)
+        sums = [[float(gradient_sum(one, PAIRS)) for one in sphere] for sphere in noisy]  # (b)-(d)
+        fitted.append([mean_and_sd(of_sphere) for of_sphere in sums])  # (e)
+    pooled = [sum(one[sphere][0] for one in fitted) / plan.distributions for sphere in range(3)]
+    picks = draws.integers(plan.distributions, size=(2, plan.hit_rates, 2))
+    expected = []
+    for comparison in (1, 2):  # (j)
+        side = 1.0 if pooled[comparison] > pooled[0] else -1.0
+        rates = []
+        for judgement in range(plan.hit_rates):  # (i)
+            standard_mean, _ = fitted[picks[0, judgement, comparison - 1]][0]  # (g)
+            mean, sd = fitted[picks[1, judgement, comparison - 1]][comparison]
+            rates.append(normal_beyond(0.5 * (standard_mean + mean), mean, sd, side))  # (h)
+        expected.append(mean_and_sd(rates))  # (k)
+    rates = discriminate_gradient_sum(values, PAIRS, sigma, generator(5), plan)
+    assert pooled[2] != pooled[0]
+    assert_allclose(rates.hit_rate, [mean for mean, _ in expected], rtol=1e-11)
+    assert_allclose(rates.hit_rate_sd, [sd for _, sd in expected], rtol=1e-9)
+
+
+def test_the_varied_criterion_follows_the_printed_steps():
+    values, sigma = bumps([287.0, 310.0, 340.0]), 0.05
+    plan = Experiment(presentations_varied=9, hit_rates=7, criterion_sigma=0.02)
+    draws = generator(6)
+    sums = [
+        [float(gradient_sum(one, PAIRS)) for one in sphere]
+        for sphere in one_by_one(values, sigma, plan.presentations_varied, draws)
+    ]
+    (standard_mean, _), *others = [mean_and_sd(of_sphere) for of_sphere in sums]
+    hits = [[], []]
+    for _ in range(plan.hit_rates):
+        for comparison, (mean, sd) in enumerate(others):
+            point = 0.5 * (standard_mean + mean) * (1.0 + 0.02 * draws.standard_normal())
+            hits[comparison].append(normal_beyond(point, mean, sd, math.copysign(1.0, mean - standard_mean)))
+    rates = discriminate_gradient_sum(values, PAIRS, sigma, generator(6), plan)
+    assert_allclose(rates.hit_rate, [mean_and_sd(rate)[0] for rate in hits], rtol=1e-11)
+    assert_allclose(rates.hit_rate_sd, [mean_and_sd(rate)[1] for rate in hits], rtol=1e-9)
+
+
+@pytest.mark.parametrize("norm", ["city-block", "euclidean"])
+def test_euclidean_distance_follows_the_printed_steps(norm):
+    values, sigma, plan = bumps([287.0, 310.0, 330.0]), 0.05, SMALL
+    draws = generator(8)
+    repetitions = []
+    for _ in range(plan.hit_rates):
+        sets = one_by_one(values, sigma, plan.presentations, draws)  # (a)-(d*)
+        of_standard = draws.integers(plan.presentations, size=(3, plan.pairs))
+        of_sphere = draws.integers(plan.presentations, size=(3, plan.pairs))
+        other = draws.integers(plan.presentations - 1, size=plan.pairs)
+        sums = [[], [], []]
+        for pair in range(plan.pairs):  # (f*)
+            for sphere in range(3):  # (g*)
+                first = of_standard[sphere, pair]
+                second = of_sphere[sphere, pair]
+                if sphere == 0:
+                    second = [index for index in range(plan.presentations) if index != first][other[pair]]
+                    assert second != first
+                apart = [a - b for a, b in zip(sets[0][first], sets[sphere][second], strict=True)]
+                power = 1 if norm == "city-block" else 2
+                sums[sphere].append(sum(abs(difference) ** power for difference in apart) ** (1 / power))
+        repetitions.append(sums)
+    pooled = [np.mean([sums[sphere] for sums in repetitions]) for sphere in range(3)]
+    hits = [[], []]
+    for sums in repetitions:
+        for comparison in (1, 2):
+            midpoint = 0.5 * (np.mean(sums[0]) + np.mean(sums[comparison]))
+            above = pooled[comparison] > pooled[0]
+            judged = [(one > midpoint) == above for one in sums[comparison]]  # (h*)
+            hits[comparison - 1].append(sum(judged) / plan.pairs)
+    rates = discriminate_euclidean(values, sigma, generator(8), plan, norm=norm)
+    assert_allclose(rates.hit_rate, [mean_and_sd(rate)[0] for rate in hits], rtol=1e-12)
+    assert_allclose(rates.hit_rate_sd, [mean_and_sd(rate)[1] for rate in hits], rtol=1e-9, atol=1e-15)
+
+
+def test_gradient_sum_of_two_receptors_is_normal_and_its_hit_rate_the_closed_form():
+    """Sum = 2 |a n1 - b n2| with a well below b: Normal(2 (b - a), 2 sigma sqrt(a² + b²))."""
+    values, sigma = np.array([[50.0, 80.0], [50.0, 82.0], [50.0, 86.0]]), 0.03
+    separation = values[1:, 1] - values[0, 1]
+    spread = sigma * np.hypot(values[1:, 0], values[1:, 1])
+    closed = ndtr(separation / (2.0 * spread))
+    draws = generator(1).standard_normal((200_000, 2))
+    assert_allclose(expected_hit_rates(values, TWO, sigma, draws), closed, atol=2e-3)
+    plan = Experiment(presentations=1000, distributions=300, hit_rates=3000)
+    sampled = discriminate_gradient_sum(values, TWO, sigma, generator(2), plan)
+    assert_allclose(sampled.hit_rate, closed, atol=4e-3)
+    # Error propagation through z = (mu_c - mu_s) / (2 sigma_c): two means and one standard deviation vary.
+    z = separation / (2.0 * spread)
+    standard = sigma * np.hypot(*values[0])
+    of_z = np.sqrt((1.0 + (standard / spread) ** 2) / 4.0 + z**2 / 2.0) / math.sqrt(plan.presentations)
+    density = np.exp(-0.5 * z**2) / math.sqrt(2.0 * math.pi)
+    assert_allclose(sampled.hit_rate_sd, density * of_z, rtol=0.1)
+
+
+@pytest.mark.parametrize("criterion", [0.2, 0.5, 0.8])
+def test_the_criterion_moves_the_decision_point(criterion):
+    values, sigma = np.array([[50.0, 80.0], [50.0, 84.0]]), 0.03
+    margin = (1.0 - criterion) * 4.0 / (sigma * np.hypot(50.0, 84.0))
+    draws = generator(1).standard_normal((200_000, 2))
+    assert_allclose(expected_hit_rates(values, TWO, sigma, draws, criterion), ndtr(margin), atol=2e-3)
+    plan = Experiment(presentations=1000, criterion=criterion)
+    sampled = discriminate_gradient_sum(values, TWO, sigma, generator(2), plan)
+    assert_allclose(sampled.hit_rate, ndtr(margin), atol=0.01)
+
+
+def test_equal_spheres_are_told_apart_by_chance_only():
+    values = np.repeat(bumps([287.0]), 3, axis=0)
+    assert_allclose(discriminate_gradient_sum(values, PAIRS, 0.05, generator()).hit_rate, 0.5, atol=0.02)
+    assert_allclose(discriminate_euclidean(values, 0.05, generator()).hit_rate, 0.5, atol=0.03)
+
+
+def test_very_different_spheres_are_always_told_apart():
+    values = bumps([287.0, 2000.0])
+    assert discriminate_gradient_sum(values, PAIRS, 0.05, generator()).hit_rate[0] > 0.999
+    assert discriminate_euclidean(values, 0.05, generator()).hit_rate[0] > 0.999
+
+
+def test_hit_rates_rise_with_curvature_and_fall_with_noise():
+    quiet = discriminate_gradient_sum(bumps(), PAIRS, 0.03, generator()).hit_rate
+    loud = discriminate_gradient_sum(bumps(), PAIRS, 0.1, generator()).hit_rate
+    apart = discriminate_euclidean(bumps(), 0.1, generator()).hit_rate
+    assert (np.diff(quiet[:-1]) > 0).all()
+    assert (np.diff(loud) > 0).all()
+    assert (np.diff(apart) > 0).all()
+    assert (quiet > loud).all()
+
+
+def test_a_measure_that_falls_with_curvature_is_read_like_one_that_rises():
+    """Swapping standard and comparison swaps the side of the decision, not the observer's success."""
+    rising = np.array([[50.0, 80.0], [50.0, 84.0]])
+    falling = np.array([[50.0, 84.0], [50.0, 80.0]])
+    plan = Experiment(presentations=1000)
+    up = discriminate_gradient_sum(rising, TWO, 0.03, generator(1), plan).hit_rate[0]
+    down = discriminate_gradient_sum(falling, TWO, 0.03, generator(2), plan).hit_rate[0]
+    assert up == pytest.approx(ndtr(2.0 / (0.03 * np.hypot(50.0, 84.0))), abs=0.01)
+    assert down == pytest.approx(ndtr(2.0 / (0.03 * np.hypot(50.0, 80.0))), abs=0.01)
+
+
+def test_a_wavering_criterion_widens_the_error_bars_and_leaves_the_means():
+    steady, little, much = (
+        discriminate_gradient_sum(
+            bumps(), PAIRS, 0.055, generator(3), Experiment(criterion_sigma=sigma, hit_rates=2000)
+        )
+        for sigma in (1e-9, 0.01, 0.02)
+    )
+    assert (steady.hit_rate_sd < 1e-6).all()
+    assert (much.hit_rate_sd > 1.5 * little.hit_rate_sd).all()
+    assert_allclose(little.hit_rate, steady.hit_rate, atol=0.01)
+    assert_allclose(much.hit_rate, steady.hit_rate, atol=0.03)
+
+
+def test_fewer_presentations_widen_the_error_bars():
+    """The paper's Figure 7 (g): 10 noise matrices instead of 100."""
+    many = discriminate_gradient_sum(bumps(), PAIRS, 0.055, generator(4))
+    few = discriminate_gradient_sum(bumps(), PAIRS, 0.055, generator(4), Experiment(presentations=10))
+    assert (few.hit_rate_sd[:4] > 2.0 * many.hit_rate_sd[:4]).all()
+
+
+def test_without_noise_every_difference_is_seen_and_no_difference_is_a_coin_flip():
+    values = bumps([287.0, 287.0, 288.0])
+    for rates in (
+        discriminate_gradient_sum(values, PAIRS, 0.0, generator(), SMALL),
+        discriminate_euclidean(values, 0.0, generator(), SMALL),
+    ):
+        assert_array_equal(rates.hit_rate, [0.5, 1.0])
+        assert_array_equal(rates.hit_rate_sd, [0.0, 0.0])
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
+    first, again, other = (
+        discriminate_gradient_sum(bumps(), PAIRS, 0.05, generator(seed)) for seed in (9, 9, 10)
+    )
+    assert_array_equal(first.hit_rate, again.hit_rate)
+    assert (first.hit_rate != other.hit_rate).any()
+    assert_array_equal(
+        discriminate_euclidean(bumps(), 0.05, generator(9)).hit_rate,
+        discriminate_euclidean(bumps(), 0.05, generator(9)).hit_rate,
+    )
+
+
+def test_expected_hit_rates_are_those_that_sampling_approaches():
+    draws = generator(11).standard_normal((20_000, 18))
+    expected = expected_hit_rates(bumps(), PAIRS, 0.055, draws)
+    plan = Experiment(presentations=500, distributions=50, hit_rates=2000)
+    sampled = discriminate_gradient_sum(bumps(), PAIRS, 0.055, generator(12), plan)
+    assert_allclose(sampled.hit_rate, expected, atol=0.01)
+
+
+def test_the_noise_behind_synthetic_hit_rates_is_recovered():
+    truth = 0.073
+    plan = Experiment(presentations=2000, distributions=100, hit_rates=4000)
+    observed = discriminate_gradient_sum(bumps()[[0, 1, 6]], PAIRS, truth, generator(13), plan).hit_rate
+    draws = generator(14).standard_normal((10_000, 18))
+    fit = fit_noise_sigma(lambda sigma: expected_hit_rates(bumps()[[0, 1, 6]], PAIRS, sigma, draws), observed)
+    assert fit.noise_sigma == pytest.approx(truth, rel=0.03)
+    assert_allclose(fit.hit_rates, observed, atol=0.01)
+    assert fit.root_mean_square_error < 0.01
+
+
+def test_noise_that_meets_exact_targets_is_found_to_many_digits():
+    def predict(sigma):
+        return ndtr(np.array([0.01, 0.09]) / sigma)
+
+    assert fit_noise_sigma(predict, predict(0.0411)).noise_sigma == pytest.approx(0.0411, rel=1e-6)
+
+
+def test_targets_that_no_noise_can_meet_are_an_error():
+    with pytest.raises(ConvergenceError, match="No noise within"):
+        fit_noise_sigma(lambda sigma: ndtr(np.array([1.0, 2.0]) / sigma), [0.3, 0.2])
+
+
+def test_silent_receptors_need_a_rule():
+    latencies = np.where(bumps() > 8.0, 60.0 - bumps(), np.nan)
+    assert np.isnan(latencies).any()
+    with pytest.raises(InputError, match="silent_value"):
+        discriminate_gradient_sum(latencies, PAIRS, 0.05, generator(), SMALL)
+    filled = np.where(np.isnan(latencies), END_OF_STIMULUS_MS, latencies)
+    assert END_OF_STIMULUS_MS == 1000.0
+    assert_array_equal(
+        discriminate_gradient_sum(
+            latencies, PAIRS, 0.05, generator(), SMALL, silent_value=END_OF_STIMULUS_MS
+        ).hit_rate,
+        discriminate_gradient_sum(filled, PAIRS, 0.05, generator(), SMALL).hit_rate,
+    )
+    assert np.isnan(latencies).any()
+
+
+def test_the_whole_protocol_takes_a_fraction_of_a_second():
+    start = time.perf_counter()
+    discriminate_gradient_sum(bumps(), PAIRS, 0.055, generator())
+    discriminate_euclidean(bumps(), 0.055, generator())
+    assert time.perf_counter() - start < 1.0
+
+
+def test_city_block_and_euclidean_distance_lead_to_different_hit_rates():
+    values = bumps()
+    assert not np.allclose(distance(values[0], values), distance(values[0], values, "euclidean"))
+    city_block = discriminate_euclidean(values, 0.05, generator(1)).hit_rate
+    euclidean = discriminate_euclidean(values, 0.05, generator(1), norm="euclidean").hit_rate
+    assert (city_block != euclidean).any()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: Experiment(presentations=1), "presentations must be a whole number"),
+        (lambda: Experiment(hit_rates=2.5), "hit_rates must be a whole number"),
+        (lambda: Experiment(criterion=math.nan), "criterion must be a finite number"),
+        (lambda: Experiment(criterion_sigma=-0.1), "criterion_sigma must not be negative"),
+        (lambda: discriminate_gradient_sum(bumps()[:1], PAIRS, 0.1, generator()), "at least one comparison"),
+        (lambda: discriminate_gradient_sum(bumps()[0], PAIRS, 0.1, generator()), "2 dimension"),
+        (lambda: discriminate_gradient_sum(bumps(), PAIRS, -0.1, generator()), "noise_sigma must not"),
+        (lambda: discriminate_gradient_sum(bumps(), PAIRS + 1, 0.1, generator()), "neighbours must be"),
+        (lambda: discriminate_gradient_sum([["a"]], PAIRS, 0.1, generator()), "responses must be numbers"),
+        (lambda: discriminate_gradient_sum([[np.inf]] * 2, TWO, 0.1, generator()), "finite numbers only"),
+        (lambda: discriminate_euclidean(bumps(), 0.1, generator(), norm="maximum"), "norm must be one of"),
+        (
+            lambda: discriminate_euclidean(bumps(), 0.1, generator(), Experiment(criterion_sigma=0.1)),
+            "criterion_sigma must be 0",
+        ),
+        (lambda: expected_hit_rates(bumps(), PAIRS, 0.1, np.ones((9, 17))), "standard_normals needs"),
+        (lambda: fit_noise_sigma(lambda sigma: [0.5]), "must give 2 hit rates: got 1"),
+        (lambda: fit_noise_sigma(lambda sigma: [0.5, 0.5], bounds=(0.2, 0.1)), "bounds must be"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(wrong, message):
+    with pytest.raises(InputError, match=message):
+        wrong()

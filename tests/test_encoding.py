@@ -1,0 +1,108 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from fingerpad.encoding import distance, gradient_sum, neighbour_pairs
+from fingerpad.errors import InputError
+from fingerpad.population import Population
+
+GRID = Population.grid()
+EIGHT = neighbour_pairs(GRID.positions_mm, GRID.pitch_mm, 8)
+
+
+def printed_gradient_sum(table, steps):
+    """Steps (b) and (c) as printed: element by element over a table of rows and columns."""
+    rows, columns = table.shape
+    total = 0.0
+    for row in range(rows):
+        for column in range(columns):
+            for down, right in steps:
+                if 0 <= row + down < rows and 0 <= column + right < columns:
+                    total += abs(table[row, column] - table[row + down, column + right])
+    return total
+
+
+FOUR_STEPS = [(-1, 0), (1, 0), (0, -1), (0, 1)]
+EIGHT_STEPS = [*FOUR_STEPS, (-1, -1), (-1, 1), (1, -1), (1, 1)]
+
+
+@pytest.mark.parametrize(("count", "steps"), [(4, FOUR_STEPS), (8, EIGHT_STEPS)])
+@settings(max_examples=20, deadline=None)
+@given(st.integers(1, 4), st.integers(1, 5), st.sampled_from([70.0, 100.0]), st.integers(0, 1000))
+def test_gradient_sum_is_the_printed_one(count, steps, rows, columns, density, seed):
+    population = Population.grid(density, rows, columns)
+    values = np.random.default_rng(seed).uniform(0.0, 100.0, (3, rows * columns))
+    pairs = neighbour_pairs(population.positions_mm, population.pitch_mm, count)
+    expected = [printed_gradient_sum(row.reshape(rows, columns), steps) for row in values]
+    assert_allclose(gradient_sum(values, pairs), expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(("count", "pairs", "inside", "corner"), [(8, 47, 8, 3), (4, 27, 4, 2)])
+def test_the_papers_population_has_the_neighbours_of_a_lattice(count, pairs, inside, corner):
+    found = neighbour_pairs(GRID.positions_mm, GRID.pitch_mm, count)
+    neighbours = np.bincount(found.ravel(), minlength=18).reshape(3, 6)
+    assert len(found) == pairs
+    assert (neighbours[1, 1:5] == inside).all()
+    assert (neighbours[[0, 0, 2, 2], [0, 5, 0, 5]] == corner).all()
+    assert (found[:, 0] < found[:, 1]).all()
+
+
+def test_neighbours_survive_a_small_jitter_and_ignore_the_order_of_receptors():
+    rng = np.random.default_rng(5)
+    jittered = GRID.positions_mm + rng.uniform(-0.1, 0.1, (18, 2))
+    assert_array_equal(neighbour_pairs(jittered, GRID.pitch_mm), EIGHT)
+    order = rng.permutation(18)
+    values = rng.uniform(size=18)
+    shuffled = neighbour_pairs(GRID.positions_mm[order], GRID.pitch_mm)
+    assert_allclose(gradient_sum(values[order], shuffled), gradient_sum(values, EIGHT), rtol=1e-13)
+
+
+def test_gradient_sum_ignores_what_all_share_and_scales_with_contrast():
+    values = np.random.default_rng(1).uniform(0.0, 50.0, 18)
+    assert_allclose(gradient_sum(values + 7.0, EIGHT), gradient_sum(values, EIGHT), rtol=1e-12)
+    assert_allclose(gradient_sum(-3.0 * values, EIGHT), 3.0 * gradient_sum(values, EIGHT), rtol=1e-12)
+    assert gradient_sum(np.full(18, 4.0), EIGHT) == 0.0
+
+
+def test_leading_axes_are_populations():
+    values = np.random.default_rng(2).uniform(size=(2, 3, 18))
+    sums = gradient_sum(values, EIGHT)
+    assert sums.shape == (2, 3)
+    assert_allclose(sums[1, 2], gradient_sum(values[1, 2], EIGHT), rtol=1e-14)
+    assert distance(values, values[:, :1]).shape == (2, 3)
+
+
+@pytest.mark.parametrize("norm", ["city-block", "euclidean"])
+def test_distance_is_a_metric(norm):
+    first, second, third = np.random.default_rng(3).uniform(size=(3, 40, 18))
+    assert_array_equal(distance(first, first, norm), np.zeros(40))
+    assert_array_equal(distance(first, second, norm), distance(second, first, norm))
+    assert (
+        distance(first, third, norm) <= distance(first, second, norm) + distance(second, third, norm)
+    ).all()
+
+
+def test_distances_are_the_two_norms():
+    first, second = np.random.default_rng(4).uniform(size=(2, 5, 18))
+    assert_allclose(distance(first, second), np.linalg.norm(first - second, ord=1, axis=1), rtol=1e-13)
+    assert_allclose(distance(first, second, "euclidean"), np.linalg.norm(first - second, axis=1), rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: neighbour_pairs([[0.0, 0.0]], 1.0, count=6), "count must be 8 or 4"),
+        (lambda: neighbour_pairs([[0.0, 0.0, 0.0]], 1.0), "rows of x and z"),
+        (lambda: neighbour_pairs([[0.0, 0.0]], 0.0), "pitch_mm must be greater"),
+        (lambda: gradient_sum(np.ones(17), EIGHT), "neighbours must be within 0 ... 16"),
+        (lambda: gradient_sum(np.ones(2), [[0, -1]]), "neighbours must be within"),
+        (lambda: gradient_sum(np.ones(2), [[0.0, 1.0]]), "rows of two receptor indices"),
+        (lambda: distance(np.ones(2), np.ones(3)), "the same receptors twice"),
+        (lambda: distance(np.ones(2), np.ones(2), "manhattan"), "norm must be one of"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(wrong, message):
+    with pytest.raises(InputError, match=message):
+        wrong()

@@ -1,0 +1,96 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from fingerpad.afferent import Afferent
+from fingerpad.errors import InputError
+from fingerpad.population import Population
+from fingerpad.signals import SedTraces
+
+
+class Bump:
+    """A skin whose SED falls off with the distance from a point."""
+
+    def __init__(self, x_mm, z_mm, peak_kpa=4.0, width_mm=2.0):
+        self.centre, self.peak_kpa, self.width_mm = np.array([x_mm, z_mm]), peak_kpa, width_mm
+
+    def sed(self, sites):
+        squared = np.square(np.asarray(sites) - self.centre).sum(axis=1)
+        peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
+        return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.9], peaks), kinks_ms=[50.0])
+
+
+def test_the_papers_population_is_3_by_6_at_1_mm_and_symmetric_across_the_finger():
+    population = Population.grid()
+    x, z = population.positions_mm.T
+    assert population.pitch_mm == 1.0
+    assert_allclose(np.unique(x), [16.37, 17.37, 18.37], rtol=1e-14)
+    assert_array_equal(np.unique(z), [-2.5, -1.5, -0.5, 0.5, 1.5, 2.5])
+    assert len({tuple(position) for position in population.positions_mm}) == 18
+
+
+@pytest.mark.parametrize("density", [25.0, 70.0, 100.0, 400.0])
+def test_density_is_one_receptor_per_cell_of_the_lattice(density):
+    pitch = Population.grid(density, rows=2, columns=2).pitch_mm
+    assert_allclose(100.0 / pitch**2, density, rtol=1e-14)
+
+
+def test_a_lattice_is_symmetric_about_its_centre():
+    positions = Population.grid(70.0, rows=4, columns=5, centre_mm=(10.0, 2.0)).positions_mm
+    mirrored = np.array([20.0, 4.0]) - positions
+    assert_allclose(positions[np.lexsort(positions.T)], mirrored[np.lexsort(mirrored.T)], rtol=1e-12)
+
+
+def test_each_receptor_answers_what_a_lone_afferent_would_answer_there():
+    population, skin = Population.grid(afferent=Afferent(static_gain=1.2e-6)), Bump(17.0, 0.3)
+    response = population.respond(skin)
+    assert len(response.spikes) == 18
+    for receptor, position in enumerate(population.positions_mm):
+        sed = skin.sed([position])
+        assert_array_equal(response.spikes[receptor], population.afferent.spikes(sed)[0])
+        dynamic_hz, static_hz = population.afferent.rates(sed)
+        assert response.dynamic_rate_hz[receptor] == dynamic_hz[0]
+        assert response.static_rate_hz[receptor] == static_hz[0]
+
+
+def test_the_map_peaks_under_the_touch_and_latency_is_shortest_there():
+    population = Population.grid()
+    response = population.respond(Bump(17.37, 0.5))
+    under = int(np.argmin(np.square(population.positions_mm - [17.37, 0.5]).sum(axis=1)))
+    assert np.argmax(response.static_rate_hz) == under
+    assert np.argmax(response.dynamic_rate_hz) == under
+    assert np.nanargmin(response.first_spike_latency_ms) == under
+
+
+def test_a_mirrored_touch_gives_a_mirrored_map():
+    population = Population.grid()
+    left, right = population.respond(Bump(17.0, -0.8)), population.respond(Bump(17.0, 0.8))
+    mirrored = left.dynamic_rate_hz.reshape(3, 6)[:, ::-1].ravel()
+    assert (right.dynamic_rate_hz > 0).any()
+    assert_allclose(right.dynamic_rate_hz, mirrored, rtol=1e-9)
+
+
+def test_an_untouched_skin_is_silent():
+    response = Population.grid().respond(Bump(17.0, 0.0, peak_kpa=0.0))
+    assert_array_equal(response.static_rate_hz, np.zeros(18))
+    assert np.isnan(response.first_spike_latency_ms).all()
+
+
+class OneTrace:
+    def sed(self, sites):
+        return SedTraces([0.0, 1.0], [[0.0], [1.0]])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: Population([[1.0, 2.0, 3.0]], 1.0), "rows of x and z"),
+        (lambda: Population([[1.0, 2.0]], 0.0), "pitch_mm must be greater"),
+        (lambda: Population.grid(density_per_cm2=-1.0), "density_per_cm2 must be greater"),
+        (lambda: Population.grid(rows=0), "rows must be a whole number"),
+        (lambda: Population.grid().respond(OneTrace()), "one trace per receptor: got 1 for 18"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(wrong, message):
+    with pytest.raises(InputError, match=message):
+        wrong()
