@@ -36,7 +36,7 @@ test: .venv/installed-for-tests
 
 $(bin)/python:
 	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
-	    echo "fingerpad needs Python 3.11 or newer: PYTHON=$(PYTHON) is $$("$(PYTHON)" --version 2>&1)." \
+	    echo "fingerpad needs Python 3.11 or newer: PYTHON=$(PYTHON) is $$("$(PYTHON)" --version 2>&1 | head -n 1)." \
 	         "Name another one, for example: make PYTHON=python3.12 $(MAKECMDGOALS)" >&2; exit 1; }
 	"$(PYTHON)" -m venv .venv
 
