@@ -77,7 +77,8 @@ def resolution_grading(
     ----------
     resolution : {"quick", "standard", "paper"}
         "quick" for a look, "standard" for results, "paper" for the published size: both halves, at least
-        232,000 nodes, edges of about 0.1 mm (0.087-0.106) all over the pad at the skin and the epidermal-dermal border.
+        232,000 nodes, edges of 0.1 mm (none above 0.106 mm) over an oval pad of 11 by 9 mm, at the skin and
+        at the epidermal-dermal border.
     centre_mm, half_length_mm, half_width_mm : float
         The fine zone, as in `Grading`; "paper" widens it to the whole pad. [mm]
 
