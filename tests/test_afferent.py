@@ -59,9 +59,17 @@ def test_the_printed_dynamic_gain_is_silent_in_the_ramp():
 def test_parameters_go_round():
     values = [1e-7, 3e-4, 1e-6, 40.0, 2e-6, 30.0]
     afferent = Afferent.from_parameters(values, refractory_ms=2.0)
+    assert afferent == Afferent(
+        intercept_ma=1e-7,
+        dynamic_gain=3e-4,
+        static_gain=1e-6,
+        time_constant_ms=40.0,
+        capacitance_mf=2e-6,
+        threshold_mv=30.0,
+        refractory_ms=2.0,
+    )
     assert_array_equal(afferent.parameters, values)
     assert [getattr(afferent, name) for name in PARAMETER_NAMES] == values
-    assert afferent.refractory_ms == 2.0
     assert Afferent.from_parameters(Afferent().parameters) == Afferent()
 
 

@@ -225,6 +225,15 @@ def test_without_noise_every_difference_is_seen_and_no_difference_is_a_coin_flip
         assert_array_equal(rates.hit_rate_sd, [0.0, 0.0])
 
 
+def test_sums_that_never_vary_are_compared_as_they_are():
+    """Integers, so that mean and standard deviation are exact: the standard deviation is 0."""
+    values = [[50.0, 60.0], [50.0, 60.0], [50.0, 61.0]]
+    plan = Experiment(presentations=8, distributions=8, hit_rates=8)
+    rates = discriminate_gradient_sum(values, TWO, 0.0, generator(), plan)
+    assert_array_equal(rates.hit_rate, [0.5, 1.0])
+    assert_array_equal(expected_hit_rates(values, TWO, 0.0, np.zeros((4, 2))), [0.5, 1.0])
+
+
 def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
     first, again, other = (
         discriminate_gradient_sum(bumps(), PAIRS, 0.05, generator(seed)) for seed in (9, 9, 10)
