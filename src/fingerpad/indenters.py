@@ -25,6 +25,10 @@ class Indenter(Protocol):
         """Signed gap (n,) and outward unit normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         ...
 
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+        ...
+
     @property
     def half_width_mm(self) -> float:
         """Half of the body's extent along x where it can touch. [mm]"""
@@ -36,6 +40,12 @@ def _norm_and_direction(offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
     length = np.linalg.norm(offsets, axis=1)
     direction = np.where(length[:, None] > 0.0, offsets / np.where(length, length, 1.0)[:, None], [0.0, 1.0, 0.0])
     return length, direction
+
+
+def _round_front(beside: FloatArray, radius: float) -> FloatArray:
+    """y of a rounded edge or ball at lateral distances from its centre line: 0 up to there, -inf beyond it."""
+    height = np.sqrt(np.maximum(radius**2 - np.maximum(beside, 0.0) ** 2, 0.0)) - radius
+    return np.where(beside <= radius, height, -np.inf)
 
 
 def _rounded(inside: FloatArray, depth: FloatArray, outward: FloatArray, fillet: float) -> tuple:
@@ -81,6 +91,10 @@ class Cylinder:
     def half_width_mm(self) -> float:
         """Half of the body's extent along x. [mm]"""
         return self.diameter_mm / 2
+
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+        return _round_front(np.abs(points_mm[:, 0]), self.diameter_mm / 2)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
@@ -130,6 +144,10 @@ class Sphere:
         """Half of the body's extent along x. [mm]"""
         return self.radius_mm
 
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+        return _round_front(np.hypot(points_mm[:, 0], points_mm[:, 2]), self.radius_mm)
+
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         distance, normal = _norm_and_direction(points_mm + [0.0, self.radius_mm, 0.0])
@@ -165,6 +183,10 @@ class Bar:
         """Half of the width. [mm]"""
         return self.width_mm / 2
 
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+        return _round_front(np.abs(points_mm[:, 0]) - self.width_mm / 2 + self.fillet_mm, self.fillet_mm)
+
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         x, y = points_mm[:, 0], points_mm[:, 1]
@@ -198,6 +220,12 @@ class FlatPunch:
         """Half of the diameter. [mm]"""
         return self.diameter_mm / 2
 
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+        return _round_front(
+            np.hypot(points_mm[:, 0], points_mm[:, 2]) - self.diameter_mm / 2 + self.fillet_mm, self.fillet_mm
+        )
+
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         radial, outward = _norm_and_direction(points_mm * [1.0, 0.0, 1.0])
@@ -215,6 +243,10 @@ class Plate:
     def half_width_mm(self) -> float:
         """Half of the extent along x: no limit."""
         return np.inf
+
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+        return np.zeros(len(points_mm))
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""

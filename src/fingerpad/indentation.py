@@ -1,0 +1,195 @@
+"""One touch: put an indenter on the finger, press, and hand over what the skin did."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+
+from fingerpad.checks import finite, one_of
+from fingerpad.errors import InputError
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import RESOLUTIONS, Grading, resolution_grading
+from fingerpad.indenters import Indenter
+from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.materials import Tissues
+from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.mesh import Mesh, finger_mesh
+from fingerpad.parameters import fingertip as published
+from fingerpad.sampling import SkinResponse
+from fingerpad.stimulus import RampAndHold
+
+CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
+STEPS = {"quick": (6, 5), "standard": (8, 8), "paper": (8, 8)}
+"""Steps in ramp and hold of each resolution."""
+
+_LONGEST_REACH_MM = 5.0
+_CLEARANCE_TO_BONE = 0.8
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Everything that determines one indentation: its value is the key under which the result is stored.
+
+    Parameters
+    ----------
+    finger : Fingertip
+        The finger.
+    indenter : Indenter
+        The rigid body.
+    stimulus : RampAndHold
+        Its motion.
+    tissues : Tissues
+        Laws of the four layers.
+    grading : Grading
+        Where the mesh is fine.
+    settings : PressSettings
+        Steps and tolerances.
+    at_mm : (float, float)
+        x and z of the indenter's axis; it presses along y, perpendicular to the finger's long axis. [mm]
+
+    Raises
+    ------
+    InputError
+        If the axis misses the finger, the depth reaches the bone, or an axis beside the midline meets
+        half a finger.
+    """
+
+    finger: Fingertip
+    indenter: Indenter
+    stimulus: RampAndHold
+    tissues: Tissues
+    grading: Grading
+    settings: PressSettings = field(default_factory=PressSettings)
+    at_mm: tuple[float, float] = CONTACT_POINT_MM
+
+    def __post_init__(self) -> None:
+        x, z = _check_position(self.at_mm)
+        object.__setattr__(self, "at_mm", (x, z))
+        if z != 0.0 and not self.grading.full:
+            raise InputError(f"at_mm beside the midline (z = {z:g} mm) needs a grading with full=True.")
+        available = _CLEARANCE_TO_BONE * float(self.finger.depth_available_mm(x, z))
+        if self.stimulus.depth_mm > available:
+            raise InputError(
+                f"depth_mm must stay below {available:.2f} mm at x = {x:g}, z = {z:g} mm, where the bone comes: "
+                f"got {self.stimulus.depth_mm:g} mm."
+            )
+
+    def solve(self) -> SkinResponse:
+        """Press and return the answer of the skin.
+
+        Raises
+        ------
+        ConvergenceError
+            If a step cannot be solved; nothing partial is returned.
+        """
+        mesh = _mesh(self.finger, self.grading)
+        x, z = self.at_mm
+        skin = mesh.nodes_mm[mesh.skin_nodes]
+        placement = place(self.indenter, skin, np.array([x, skin[:, 1].min(), z]), np.eye(3))
+        done = press(mesh, self.tissues.layers, self.indenter, placement, self.stimulus, self.settings)
+        return SkinResponse(
+            mesh=mesh,
+            times_ms=done.times_ms,
+            kinks_ms=(self.stimulus.ramp_ms,),
+            force_mn=done.force_mn,
+            skin_displacement_mm=done.displacement_mm[:, mesh.skin_nodes],
+            displacement_mm=done.displacement_mm[-1],
+            sed_kpa=done.sed_kpa,
+            axis_x_mm=x,
+            direction=placement.axis,
+            penetration_mm=done.penetration_mm,
+            newton_steps=done.newton_steps,
+            factorisations=done.factorisations,
+        )
+
+    @property
+    def mesh(self) -> Mesh:
+        """The undeformed finger of this touch."""
+        return _mesh(self.finger, self.grading)
+
+
+@lru_cache(maxsize=4)
+def _mesh(finger: Fingertip, grading: Grading) -> Mesh:
+    return finger_mesh(finger, grading)
+
+
+def indent(
+    finger: Fingertip,
+    indenter: Indenter,
+    stimulus: RampAndHold | None = None,
+    materials: str | Tissues = "trial3",
+    resolution: str = "quick",
+    at_mm: Sequence[float] = CONTACT_POINT_MM,
+) -> SkinResponse:
+    """Press an indenter into a finger.
+
+    Parameters
+    ----------
+    finger : Fingertip
+        The finger.
+    indenter : Indenter
+        `Line`, `Cylinder`, `Bar`, `Sphere`, `FlatPunch` or `Plate`.
+    stimulus : RampAndHold, optional
+        The motion; the paper's by default.
+    materials : str or Tissues
+        "trial1", "trial2", "trial3" (paper, section 2.2.1), "laboratory2014", or tissues of your own.
+    resolution : {"quick", "standard", "paper"}
+        How fine the mesh and the steps are.
+    at_mm : (float, float)
+        x and z of the indenter's axis on the finger; half of the finger is solved on the midline. [mm]
+
+    Returns
+    -------
+    SkinResponse
+        Force, surface profile and strain energy density over time.
+
+    Raises
+    ------
+    InputError
+        If an argument cannot be used: unknown name, depth beyond the finger, indenter beside it.
+    ConvergenceError
+        If the mechanics cannot be solved.
+
+    Examples
+    --------
+    >>> import fingerpad as fp
+    >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287), fp.RampAndHold(depth_mm=0.3))
+    >>> print(f"{skin.surface_profile().deflection_mm.max():.2f} mm")
+    0.30 mm
+    """
+    one_of("resolution", resolution, RESOLUTIONS)
+    x, z = _check_position(at_mm)
+    return Touch(
+        finger=finger,
+        indenter=indenter,
+        stimulus=stimulus or RampAndHold(),
+        tissues=materials if isinstance(materials, Tissues) else named_tissues(materials),
+        grading=grading_about(indenter, resolution, x, z),
+        settings=settings_of(resolution),
+        at_mm=(x, z),
+    ).solve()
+
+
+def settings_of(resolution: str) -> PressSettings:
+    """Steps and tolerances of a named resolution."""
+    ramp_steps, hold_steps = STEPS[resolution]
+    return PressSettings(ramp_steps, hold_steps)
+
+
+def grading_about(indenter: Indenter, resolution: str, x_mm: float, z_mm: float = 0.0) -> Grading:
+    """Mesh that is fine where an indenter at (x, z) touches and just beyond."""
+    reach = min(indenter.half_width_mm + 1.0, _LONGEST_REACH_MM)
+    grading = resolution_grading(resolution, x_mm, half_length_mm=reach, half_width_mm=abs(z_mm) + reach)
+    return replace(grading, full=True) if z_mm != 0.0 else grading
+
+
+def _check_position(at_mm: Sequence[float]) -> tuple[float, float]:
+    try:
+        x, z = at_mm
+    except (TypeError, ValueError) as error:
+        raise InputError(f"at_mm must be a pair, x and z in mm: got {at_mm!r}.") from error
+    return finite("x of at_mm", x, "mm"), finite("z of at_mm", z, "mm")

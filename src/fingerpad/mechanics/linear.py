@@ -1,0 +1,254 @@
+"""The linear system behind a Newton step: conjugate gradients around a factor that is kept.
+
+A tangent changes little from one Newton step to the next, so one single-precision sparse factor serves as
+preconditioner for many of them; conjugate gradients (SciPy) restore double precision. The factor is renewed
+when the iterations grow. MKL's PARDISO does the factoring where pypardiso has it; elsewhere smoothed
+aggregation (pyamg) takes its place behind the same two methods.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import weakref
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, cg
+
+from fingerpad.checks import FloatArray
+from fingerpad.errors import ConvergenceError
+from fingerpad.mechanics.assembly import Sparsity
+
+try:
+    import pypardiso
+except ImportError:  # no MKL wheel for this processor
+    pypardiso = None
+
+RENEW_AFTER_ITERATIONS = 16
+MOST_ITERATIONS = 400
+
+
+class Preconditioner(Protocol):
+    """An approximate inverse of the tangent on the free degrees of freedom."""
+
+    def renew(self, blocks: FloatArray) -> None:
+        """Take a new tangent, blocks (n_blocks, 3, 3)."""
+        ...
+
+    def apply(self, residual: FloatArray) -> FloatArray:
+        """Approximate solution for a residual (n_free,)."""
+        ...
+
+
+class PardisoFactor:
+    """Single-precision Cholesky factor from MKL's PARDISO on one thread.
+
+    Parameters
+    ----------
+    sparsity : Sparsity
+        Block pattern of the tangent.
+    free : int array (n_free,)
+        Degrees of freedom that move.
+    """
+
+    def __init__(self, sparsity: Sparsity, free: np.ndarray):
+        n = 3 * (len(sparsity.row_start) - 1)
+        number = np.full(n, -1, dtype=np.int64)
+        number[free] = np.arange(free.size)
+        rows = np.repeat(np.arange(n // 3), np.diff(sparsity.row_start))
+        row = number[3 * rows[:, None, None] + np.arange(3)[None, :, None]]
+        column = number[3 * sparsity.column[:, None, None] + np.arange(3)[None, None, :]]
+        row, column = np.broadcast_arrays(row, column)
+        wanted = np.flatnonzero((row.ravel() >= 0) & (column.ravel() >= row.ravel()))
+        order = np.argsort(row.ravel()[wanted] * free.size + column.ravel()[wanted], kind="stable")
+        self._entries = wanted[order]
+        self._column = (column.ravel()[self._entries]).astype(np.int32)
+        self._row_start = np.searchsorted(row.ravel()[self._entries], np.arange(free.size + 1)).astype(np.int32)
+        self._values = np.empty(self._entries.size, dtype=np.float32)
+        self._size = free.size
+        self._mkl = pypardiso.PyPardisoSolver(mtype=2)
+        self._mkl.libmkl.MKL_Set_Num_Threads_Local(1)
+        for index, value in {1: 1, 2: 2, 8: 0, 10: 8, 11: 0, 13: 0, 18: -1, 24: 0, 28: 1, 35: 1}.items():
+            # Numbered as in MKL's manual: own settings, METIS order, no refinement, single precision, 0-based.
+            self._mkl.iparm[index - 1] = value
+        self._analysed = False
+        weakref.finalize(self, self._mkl.free_memory, everything=True)
+
+    def renew(self, blocks: FloatArray) -> None:
+        """Factor the tangent given by its blocks (n_blocks, 3, 3).
+
+        Raises
+        ------
+        ConvergenceError
+            If the matrix is not positive definite.
+        """
+        self._values[:] = blocks.ravel()[self._entries]
+        empty = np.zeros(self._size, dtype=np.float32)
+        if not self._analysed:
+            self._call(11, empty, empty.copy())
+            self._analysed = True
+        self._call(22, empty, empty.copy())
+
+    def apply(self, residual: FloatArray) -> FloatArray:
+        """Solve with the factor for a residual (n_free,)."""
+        right = residual.astype(np.float32)
+        solution = np.empty_like(right)
+        self._call(33, right, solution)
+        return solution.astype(np.float64)
+
+    def _call(self, phase: int, right: np.ndarray, solution: np.ndarray) -> None:
+        """One phase of PARDISO; pypardiso's own call handles double precision only."""
+        integers = ctypes.POINTER(ctypes.c_int32)
+
+        def number(value: int) -> ctypes._CArgObject:  # type: ignore[name-defined]
+            return ctypes.byref(ctypes.c_int32(value))
+
+        error = ctypes.c_int32(0)
+        self._mkl.libmkl.MKL_Set_Num_Threads_Local(1)
+        self._mkl._mkl_pardiso(
+            self._mkl.pt.ctypes.data_as(ctypes.POINTER(self._mkl._pt_type[0])),
+            number(1), number(1), number(2), number(phase), number(self._size),
+            self._values.ctypes.data_as(ctypes.c_void_p),
+            self._row_start.ctypes.data_as(integers), self._column.ctypes.data_as(integers),
+            self._mkl.perm.ctypes.data_as(integers), number(1),
+            self._mkl.iparm.ctypes.data_as(integers), number(0),
+            right.ctypes.data_as(ctypes.c_void_p), solution.ctypes.data_as(ctypes.c_void_p),
+            ctypes.byref(error),
+        )  # fmt: skip
+        if error.value:
+            raise ConvergenceError(f"PARDISO could not finish phase {phase}: error {error.value}.")
+
+
+
+class AggregationHierarchy:
+    """Smoothed aggregation multigrid from pyamg, with the rigid motions as near null space.
+
+    Parameters
+    ----------
+    sparsity : Sparsity
+        Block pattern of the tangent.
+    free : int array (n_free,)
+        Degrees of freedom that move.
+    nodes_mm : array (n_nodes, 3)
+        Reference nodes. [mm]
+    """
+
+    def __init__(self, sparsity: Sparsity, free: np.ndarray, nodes_mm: FloatArray):
+        self._sparsity, self._free = sparsity, free
+        self._rigid = _rigid_motions(nodes_mm)[free]
+
+    def renew(self, blocks: FloatArray) -> None:
+        """Build the hierarchy for the tangent given by its blocks (n_blocks, 3, 3)."""
+        import pyamg
+
+        matrix = self._sparsity.matrix(blocks).tocsr()[self._free][:, self._free].tocsr()
+        self._cycle = pyamg.smoothed_aggregation_solver(
+            matrix, B=self._rigid, symmetry="symmetric", max_coarse=500
+        ).aspreconditioner()
+
+    def apply(self, residual: FloatArray) -> FloatArray:
+        """One V-cycle for a residual (n_free,)."""
+        return self._cycle @ residual
+
+
+def _rigid_motions(nodes_mm: FloatArray) -> FloatArray:
+    """Three translations and three rotations of the nodes, (3 n_nodes, 6)."""
+    x, y, z = (nodes_mm - nodes_mm.mean(axis=0)).T
+    zero, one = np.zeros_like(x), np.ones_like(x)
+    motions = [(one, zero, zero), (zero, one, zero), (zero, zero, one), (-y, x, zero), (zero, -z, y), (z, zero, -x)]
+    return np.stack([np.stack(motion, axis=1).ravel() for motion in motions], axis=1)
+
+
+def preconditioner(sparsity: Sparsity, free: np.ndarray, nodes_mm: FloatArray) -> Preconditioner:
+    """Best preconditioner that this machine has: PARDISO's factor, else pyamg's hierarchy."""
+    if pypardiso is not None:
+        return PardisoFactor(sparsity, free)
+    return AggregationHierarchy(sparsity, free, nodes_mm)
+
+
+@dataclass
+class LinearSolver:
+    """Solve with a tangent on the free degrees of freedom, keeping the preconditioner while it serves.
+
+    Parameters
+    ----------
+    sparsity : Sparsity
+        Block pattern of the tangent.
+    free : int array (n_free,)
+        Degrees of freedom that move.
+    approximate : Preconditioner
+        Its approximate inverse.
+    """
+
+    sparsity: Sparsity
+    free: np.ndarray
+    approximate: Preconditioner
+    renewals: int = field(default=0, init=False)
+    iterations: int = field(default=0, init=False)
+    _stale: bool = field(default=True, init=False)
+
+    def solve(self, blocks: FloatArray, residual: FloatArray, relative_tolerance: float) -> FloatArray:
+        """Solve K x = r for the free degrees of freedom.
+
+        Parameters
+        ----------
+        blocks : array (n_blocks, 3, 3)
+            The tangent.
+        residual : array (n_free,)
+            Right-hand side.
+        relative_tolerance : float
+            Residual norm to reach, relative to the right-hand side's.
+
+        Returns
+        -------
+        array (n_free,)
+            The solution.
+
+        Raises
+        ------
+        ConvergenceError
+            If conjugate gradients do not converge even with a new preconditioner.
+        """
+        matrix = self.sparsity.matrix(blocks)
+        full = np.zeros(matrix.shape[0])
+
+        def multiply(direction: FloatArray) -> FloatArray:
+            full[self.free] = direction
+            return (matrix @ full)[self.free]
+
+        size = self.free.size
+        operator = LinearOperator((size, size), matvec=multiply, dtype=np.float64)
+        inverse = LinearOperator((size, size), matvec=self.approximate.apply, dtype=np.float64)
+        for _ in range(2):
+            fresh = self._stale
+            if self._stale:
+                self.approximate.renew(blocks)
+                self.renewals += 1
+                self._stale = False
+            count = 0
+
+            def counted(_: FloatArray) -> None:
+                nonlocal count
+                count += 1
+
+            solution, failed = cg(
+                operator, residual, rtol=relative_tolerance, maxiter=MOST_ITERATIONS, M=inverse, callback=counted
+            )
+            self.iterations += count
+            self._stale = count > RENEW_AFTER_ITERATIONS
+            if not failed and np.isfinite(solution).all():
+                return solution
+            self._stale = True
+            if fresh:
+                break
+        raise ConvergenceError(f"The linear solver stopped after {count} iterations without converging.")
+
+
+def free_degrees_of_freedom(n_nodes: int, fixed_nodes: np.ndarray, symmetry_nodes: np.ndarray) -> np.ndarray:
+    """Degrees of freedom left when some nodes are fixed and some stay in the plane z = constant."""
+    moves = np.ones((n_nodes, 3), dtype=bool)
+    moves[fixed_nodes] = False
+    moves[symmetry_nodes, 2] = False
+    return np.flatnonzero(moves.ravel())

@@ -1,0 +1,226 @@
+"""One equilibrium: Newton's method with a line search on the incremental potential, contact included."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingerpad.checks import FloatArray, positive, whole
+from fingerpad.errors import ConvergenceError
+from fingerpad.mechanics.assembly import Sparsity, assemble
+from fingerpad.mechanics.contact import Contact, ContactState
+from fingerpad.mechanics.linear import LinearSolver
+from fingerpad.mechanics.materials import MaterialTable
+from fingerpad.mechanics.viscoelastic import StepCoefficients
+from fingerpad.mesh import Mesh
+
+SMALLEST_FORCE_MN = 1e-6
+SUFFICIENT_DECREASE = 1e-4
+SHORTEST_STEP = 1.0 / 64
+CURVATURE_BELOW_RESIDUAL = 0.1
+REMEMBERED_POTENTIALS = 6
+
+
+@dataclass(frozen=True)
+class NewtonSettings:
+    """When an equilibrium counts as found.
+
+    Parameters
+    ----------
+    residual_tolerance : float
+        Norm of the out-of-balance nodal forces over the contact force.
+    penetration_tolerance : float
+        Deepest penetration over the depth of indentation; contact is augmented until it is met.
+    most_iterations : int
+        Newton steps before the attempt is given up.
+    """
+
+    residual_tolerance: float = 1e-5
+    penetration_tolerance: float = 5e-3
+    most_iterations: int = 40
+
+    def __post_init__(self) -> None:
+        positive("residual_tolerance", self.residual_tolerance)
+        positive("penetration_tolerance", self.penetration_tolerance)
+        whole("most_iterations", self.most_iterations, at_least=1)
+
+
+@dataclass(frozen=True)
+class Body:
+    """The discretised tissue with what its equations need.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Nodes, bricks and node sets.
+    table : MaterialTable
+        Laws, one row per layer.
+    sparsity : Sparsity
+        Pattern of the tangent.
+    free : int array (n_free,)
+        Degrees of freedom that move.
+    """
+
+    mesh: Mesh
+    table: MaterialTable
+    sparsity: Sparsity
+    free: np.ndarray
+
+
+@dataclass(frozen=True)
+class Load:
+    """What acts on the body in one time step.
+
+    Parameters
+    ----------
+    contact : Contact
+        The indenter.
+    depth_mm : float
+        How far it has advanced since first touch. [mm]
+    step : StepCoefficients
+        Relaxation coefficients of the step.
+    carried : array (n_elements, 8, 6)
+        H, the history that the step starts from. [kPa]
+    """
+
+    contact: Contact
+    depth_mm: float
+    step: StepCoefficients
+    carried: FloatArray
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A converged configuration.
+
+    Parameters
+    ----------
+    displacement_mm : array (n_nodes, 3)
+        Displacements. [mm]
+    contact : ContactState
+        Contact there.
+    multipliers_mn : array (n_candidates,)
+        Contact multipliers to start the next step from. [mN]
+    iterations : int
+        Newton steps taken.
+    """
+
+    displacement_mm: FloatArray
+    contact: ContactState
+    multipliers_mn: FloatArray
+    iterations: int
+
+
+class _Evaluation:
+    """Potential, residual and tangent at one trial configuration."""
+
+    def __init__(self, body: Body, load: Load, displacement: FloatArray, multipliers: FloatArray, blocks: FloatArray):
+        mesh, contact = body.mesh, load.contact
+        force = np.empty_like(displacement)
+        internal = assemble(
+            mesh.nodes_mm, mesh.elements, displacement, mesh.layer, body.table.law, load.step.s, load.carried,
+            body.sparsity.position, True, force, blocks,
+        )  # fmt: skip
+        self.displacement = displacement
+        positions = mesh.nodes_mm[contact.nodes] + displacement[contact.nodes]
+        self.contact = contact.state(positions, load.depth_mm, multipliers)
+        self.potential = internal + self.contact.potential
+        np.negative(force, out=force)
+        force[contact.nodes] += self.contact.force_mn
+        self.residual = force.ravel()[body.free]
+        pressed = np.linalg.norm(self.contact.force_mn.sum(axis=0))
+        self.relative_residual = float(np.linalg.norm(self.residual) / max(pressed, SMALLEST_FORCE_MN))
+        stiffness = self.contact.stiffness
+        if self.relative_residual < CURVATURE_BELOW_RESIDUAL:
+            stiffness = stiffness + contact.curvature_stiffness(self.contact, positions, load.depth_mm)
+        blocks[body.sparsity.diagonal[contact.nodes]] += stiffness
+
+
+def find_equilibrium(
+    body: Body,
+    load: Load,
+    solver: LinearSolver,
+    guess_mm: FloatArray,
+    multipliers_mn: FloatArray,
+    settings: NewtonSettings,
+) -> Equilibrium:
+    """Newton's method from a guess.
+
+    Parameters
+    ----------
+    body : Body
+        The tissue.
+    load : Load
+        What acts in this step.
+    solver : LinearSolver
+        Keeps its preconditioner from call to call.
+    guess_mm : array (n_nodes, 3)
+        Displacements to start from; fixed nodes must be at their place. [mm]
+    multipliers_mn : array (n_candidates,)
+        Contact multipliers to start from. [mN]
+    settings : NewtonSettings
+        When to stop.
+
+    Raises
+    ------
+    ConvergenceError
+        If no equilibrium is found; its history has one line per Newton step.
+    """
+    blocks = np.empty((body.sparsity.column.size, 3, 3))
+    multipliers = multipliers_mn
+    allowed_mm = settings.penetration_tolerance * load.depth_mm
+    history: list[str] = []
+    state = _Evaluation(body, load, guess_mm, multipliers, blocks)
+    if np.isnan(state.potential):
+        raise ConvergenceError("The starting guess turns an element inside out.")
+    potentials = [state.potential]
+    for iteration in range(settings.most_iterations):
+        history.append(
+            f"iteration {iteration}: residual {state.relative_residual:.2e}, "
+            f"penetration {1e3 * state.contact.penetration_mm:.3f} µm"
+        )
+        if state.relative_residual <= settings.residual_tolerance:
+            if state.contact.penetration_mm <= allowed_mm:
+                return Equilibrium(state.displacement, state.contact, multipliers, iteration)
+            multipliers = load.contact.augmented(state.contact)
+            state = _Evaluation(body, load, state.displacement, multipliers, blocks)
+            potentials = [state.potential]
+        forcing = float(np.clip(0.1 * state.relative_residual, 1e-4, 5e-3))
+        try:
+            direction = solver.solve(blocks, state.residual, forcing)
+        except ConvergenceError as error:
+            raise ConvergenceError(str(error), tuple(history)) from error
+        highest = max(potentials[-REMEMBERED_POTENTIALS:])
+        state = _line_search(body, load, state, direction, highest, multipliers, blocks, history)
+        potentials.append(state.potential)
+    raise ConvergenceError(f"No equilibrium after {settings.most_iterations} Newton steps.", tuple(history))
+
+
+def _line_search(
+    body: Body,
+    load: Load,
+    start: _Evaluation,
+    direction: FloatArray,
+    highest: float,
+    multipliers: FloatArray,
+    blocks: FloatArray,
+    history: list[str],
+) -> _Evaluation:
+    """Go along `direction`, halving until the potential falls below the highest remembered one.
+
+    Nodes that come into contact raise the potential for a step or two before the next steps push them
+    out again; a memory of some steps lets them (Grippo, Lampariello & Lucidi 1986).
+    """
+    slope = -float(direction @ start.residual)
+    length = 1.0
+    while length >= SHORTEST_STEP:
+        displacement = start.displacement.copy()
+        displacement.ravel()[body.free] += length * direction
+        trial = _Evaluation(body, load, displacement, multipliers, blocks)
+        falls = trial.potential <= highest + SUFFICIENT_DECREASE * length * slope
+        # Near the solution the fall of the potential drowns in round-off and the residual decides.
+        if falls or trial.relative_residual < 0.9 * start.relative_residual:
+            return trial
+        length /= 2
+    raise ConvergenceError("The line search found no better configuration.", tuple(history))

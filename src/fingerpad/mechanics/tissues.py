@@ -1,0 +1,77 @@
+"""Sets of tissues by name: the paper's three trials and published alternatives (docs/decisions/trial-materials.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from fingerpad.checks import one_of
+from fingerpad.mechanics.materials import Material, Prony, Tissues
+from fingerpad.parameters import tissues as published
+from fingerpad.parameters.published import Published
+from fingerpad.units import MS_PER_S
+
+NU = published.POISSON_RATIO.value
+
+
+def skin_prony() -> Prony:
+    """Relaxation of skin (Wu 2004), used in every layer as in the paper's trials."""
+    times = tuple(MS_PER_S * time_s for time_s in published.SKIN_PRONY_TIMES.value)
+    return Prony(published.SKIN_PRONY_SHARES.value, times)
+
+
+def _linear(young: Published) -> Material:
+    return Material.linear_elastic(young.value, NU, skin_prony())
+
+
+def _shear(shear: Published) -> Material:
+    return Material.neo_hooke(shear.value, NU, skin_prony())
+
+
+def trial_1() -> Tissues:
+    """All layers linear elastic after Maeno, with a Prony series."""
+    epidermis = _linear(published.MAENO_EPIDERMIS_YOUNG)
+    return Tissues(epidermis, epidermis, _linear(published.MAENO_DERMIS_YOUNG), _linear(published.MAENO_SUBCUTIS_YOUNG))
+
+
+def trial_2() -> Tissues:
+    """Stiff epidermis over the hyperelastic dermis and subcutis."""
+    epidermis = _linear(published.WU_EPIDERMIS_YOUNG)
+    return Tissues(epidermis, epidermis, *_hyperelastic())
+
+
+def trial_3() -> Tissues:
+    """Trial 1's soft epidermis over Trial 2's hyperelastic dermis and subcutis."""
+    epidermis = _linear(published.MAENO_EPIDERMIS_YOUNG)
+    return Tissues(epidermis, epidermis, *_hyperelastic())
+
+
+def laboratory_2014() -> Tissues:
+    """The authors' laboratory's later neo-Hookean fit of this fingertip."""
+    epidermis = _shear(published.LABORATORY_EPIDERMIS_SHEAR)
+    return Tissues(
+        epidermis, epidermis, _shear(published.LABORATORY_DERMIS_SHEAR), _shear(published.LABORATORY_SUBCUTIS_SHEAR)
+    )
+
+
+def _hyperelastic() -> tuple[Material, Material]:
+    """Dermis and subcutis of Trials 2 and 3: stand-ins for the lost Table 2."""
+    return _shear(published.SOFT_MIX_DERMIS_SHEAR), _shear(published.SOFT_MIX_SUBCUTIS_SHEAR)
+
+
+TISSUES: dict[str, Callable[[], Tissues]] = {
+    "trial1": trial_1,
+    "trial2": trial_2,
+    "trial3": trial_3,
+    "laboratory2014": laboratory_2014,
+}
+
+
+def named_tissues(name: str) -> Tissues:
+    """Tissues by name.
+
+    Examples
+    --------
+    >>> round(named_tissues("trial1").dermis.shear_modulus_kpa, 2)
+    27.03
+    """
+    return TISSUES[one_of("materials", name, tuple(TISSUES))]()

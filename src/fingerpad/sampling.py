@@ -1,0 +1,147 @@
+"""The only place where skin becomes signal: surface profile, and strain energy density at receptor depth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CloughTocher2DInterpolator
+from scipy.spatial import Delaunay
+
+from fingerpad.checks import FloatArray, float_array
+from fingerpad.errors import InputError
+from fingerpad.mesh import Mesh
+from fingerpad.signals import SedTraces
+
+
+@dataclass(frozen=True)
+class SurfaceProfile:
+    """Deflection of the skin along the midline of the finger.
+
+    Parameters
+    ----------
+    distance_mm : array (n_nodes,)
+        Position of the undeformed skin relative to the indenter's axis, distal positive. [mm]
+    deflection_mm : array (n_nodes,)
+        Displacement along the direction of pressing, towards the bone positive. [mm]
+    """
+
+    distance_mm: FloatArray
+    deflection_mm: FloatArray
+
+    def at(self, distance_mm: ArrayLike) -> FloatArray:
+        """Deflection at other distances, linear between nodes. [mm]"""
+        return np.interp(np.asarray(distance_mm, dtype=float), self.distance_mm, self.deflection_mm)
+
+
+@dataclass(frozen=True)
+class SkinResponse:
+    """What one touch did to the skin; the end of the mechanical half of the chain.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The undeformed body.
+    times_ms : array (n_times,)
+        From 0, the unloaded state. [ms]
+    kinks_ms : tuple of float
+        Times at which the motion changes its speed abruptly: the end of the ramp. [ms]
+    force_mn : array (n_times,)
+        Force of the indenter along its axis, on the whole finger. [mN]
+    skin_displacement_mm : array (n_times, n_skin_nodes, 3)
+        Displacement of `mesh.skin_nodes`. [mm]
+    displacement_mm : array (n_nodes, 3)
+        Displacement of all nodes at the last time. [mm]
+    sed_kpa : array (n_times, n_elements)
+        Stored strain energy density, element mean. [kPa]
+    axis_x_mm : float
+        Where the indenter's axis meets the midline. [mm]
+    direction : array (3,)
+        Unit direction of pressing.
+    penetration_mm : float
+        Deepest penetration of the indenter by any node at any time. [mm]
+    newton_steps, factorisations : int
+        Work that the solution took.
+    """
+
+    mesh: Mesh
+    times_ms: FloatArray
+    kinks_ms: tuple[float, ...]
+    force_mn: FloatArray
+    skin_displacement_mm: FloatArray
+    displacement_mm: FloatArray
+    sed_kpa: FloatArray
+    axis_x_mm: float
+    direction: FloatArray
+    penetration_mm: float
+    newton_steps: int
+    factorisations: int
+
+    def surface_profile(self, time_index: int = -1) -> SurfaceProfile:
+        """Deflection along the midline of the volar skin (paper, section 2.2.1).
+
+        Parameters
+        ----------
+        time_index : int
+            Which of `times_ms`; the last by default.
+
+        Returns
+        -------
+        SurfaceProfile
+            One entry per node of the midline, from proximal to distal.
+        """
+        row = np.searchsorted(self.mesh.skin_nodes, self.mesh.midline_nodes)
+        distance = self.mesh.nodes_mm[self.mesh.midline_nodes, 0] - self.axis_x_mm
+        return SurfaceProfile(distance, self.skin_displacement_mm[time_index, row] @ self.direction)
+
+    def sed(self, sites: ArrayLike) -> SedTraces:
+        """Strain energy density in the living epidermis below points of the undeformed skin.
+
+        The means of the elements just above the epidermal-dermal border (0.371 to 0.471 mm deep) are
+        interpolated across that sheet by a cubic of class C1, and never across the border, where SED jumps.
+
+        Parameters
+        ----------
+        sites : array (n_sites, 2)
+            x and z on the volar skin. [mm]
+
+        Returns
+        -------
+        SedTraces
+            One column per site, with the end of the ramp as kink. [kPa]
+
+        Raises
+        ------
+        InputError
+            If `sites` is not an array of pairs, or a site is not on the volar skin.
+        """
+        points = float_array("sites", sites, 2)
+        if points.shape[1] != 2:
+            raise InputError(f"sites needs two columns, x and z in mm: got shape {points.shape}.")
+        triangulation, elements = self._border
+        outside = np.flatnonzero(triangulation.find_simplex(points) < 0)
+        if outside.size:
+            x, z = points[outside[0]]
+            raise InputError(f"sites must lie on the volar skin of the mesh: (x, z) = ({x:g}, {z:g}) mm does not.")
+        interpolate = CloughTocher2DInterpolator(triangulation, self.sed_kpa[:, elements].T.astype(np.float64))
+        # The cubic may dip below zero beside a steep front; an energy cannot.
+        return SedTraces(self.times_ms, np.maximum(interpolate(points).T, 0.0), np.array(self.kinks_ms))
+
+    @cached_property
+    def _border(self) -> tuple[Delaunay, np.ndarray]:
+        """Triangulated (x, z) of the volar sheet of living epidermis, and its elements; both halves."""
+        mesh = self.mesh
+        elements = mesh.living_epidermis.ravel()
+        if not elements.size:
+            raise InputError("This mesh has no living epidermis: SED can only be sampled in a layered finger.")
+        corners = mesh.nodes_mm[mesh.elements[elements]]
+        centre = corners.mean(axis=1)
+        # The upper face (last four nodes) looks towards the skin: volar where its normal has y < 0.
+        normal = np.cross(corners[:, 6] - corners[:, 4], corners[:, 7] - corners[:, 5])
+        volar = normal[:, 1] < 0.0
+        plane, elements = centre[volar][:, [0, 2]], elements[volar]
+        if mesh.symmetry_nodes.size:
+            plane, elements = np.vstack([plane, plane * [1.0, -1.0]]), np.tile(elements, 2)
+        return Delaunay(plane), elements
