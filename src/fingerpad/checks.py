@@ -70,7 +70,7 @@ def float_array(name: str, values: ArrayLike, ndim: int) -> FloatArray:
     if array.ndim != ndim:
         raise InputError(f"{name} must have {ndim} dimension(s): got shape {array.shape}.")
     if not np.isfinite(array).all():
-        raise InputError(f"{name} must hold finite numbers only: {np.count_nonzero(~np.isfinite(array))} are not.")
+        raise InputError(f"{name} must hold finite numbers only: {(~np.isfinite(array)).sum()} are not.")
     array.setflags(write=False)
     return array
 

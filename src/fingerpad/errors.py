@@ -1,4 +1,4 @@
-"""The failures everybody shares: each is one sentence that says what was expected, what came and what to do."""
+"""The failures everybody shares: one sentence that says what was expected, what came and what to do."""
 
 
 class FingerpadError(Exception):

@@ -124,8 +124,11 @@ class SkinResponse:
         outside = np.flatnonzero(triangulation.find_simplex(points) < 0)
         if outside.size:
             x, z = points[outside[0]]
-            raise InputError(f"sites must lie on the volar skin of the mesh: (x, z) = ({x:g}, {z:g}) mm does not.")
-        interpolate = CloughTocher2DInterpolator(triangulation, self.sed_kpa[:, elements].T.astype(np.float64))
+            raise InputError(
+                f"sites must lie on the volar skin of the mesh: (x, z) = ({x:g}, {z:g}) mm does not."
+            )
+        sed_kpa = self.sed_kpa[:, elements].T.astype(np.float64)
+        interpolate = CloughTocher2DInterpolator(triangulation, sed_kpa)
         # The cubic may dip below zero beside a steep front; an energy cannot.
         return SedTraces(self.times_ms, np.maximum(interpolate(points).T, 0.0), np.array(self.kinks_ms))
 
@@ -135,7 +138,7 @@ class SkinResponse:
         mesh = self.mesh
         elements = mesh.living_epidermis.ravel()
         if not elements.size:
-            raise InputError("This mesh has no living epidermis: SED can only be sampled in a layered finger.")
+            raise InputError("This mesh has no living epidermis: SED is sampled only in a layered finger.")
         corners = mesh.nodes_mm[mesh.elements[elements]]
         centre = corners.mean(axis=1)
         # The upper face (last four nodes) looks towards the skin: volar where its normal has y < 0.

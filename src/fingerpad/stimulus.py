@@ -54,7 +54,7 @@ class RampAndHold:
         return self.depth_mm * np.clip(np.asarray(times_ms, dtype=float) / self.ramp_ms, 0.0, 1.0)
 
     def times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
-        """Times to solve at: 0, equal steps in the ramp, steps that grow geometrically in the hold. [ms]
+        """List the times to solve at: 0, equal ramp steps, hold steps that grow geometrically. [ms]
 
         The first hold step is as long as a ramp step where that leaves room to grow, since relaxation is
         fastest right after the ramp.
@@ -66,6 +66,6 @@ class RampAndHold:
         """
         ramp = np.linspace(0.0, self.ramp_ms, ramp_steps + 1)
         first = min(self.ramp_ms / ramp_steps, self.hold_ms / hold_steps)
-        hold = self.ramp_ms + (np.geomspace(first, self.hold_ms, hold_steps) if hold_steps > 1 else np.array([self.hold_ms]))
-        hold[-1] = self.end_ms
-        return np.concatenate([ramp, hold])
+        since_ramp = np.geomspace(first, self.hold_ms, hold_steps)
+        since_ramp[-1] = self.hold_ms
+        return np.concatenate([ramp, self.ramp_ms + since_ramp])

@@ -96,8 +96,9 @@ def assemble(nodes, elements, displacement, layer, law, s, history, position, wi
                 moved[a, i] = displacement[elements[e, a], i]
         material = layer[e]
         potential += element_system(
-            reference, moved, law[material], s[material], history[e], with_tangent, element_force, element_tangent
-        )
+            reference, moved, law[material], s[material], history[e], with_tangent,
+            element_force, element_tangent,
+        )  # fmt: skip
         if np.isnan(potential):
             return potential
         for a in range(8):

@@ -75,8 +75,8 @@ def place(indenter: Indenter, skin_mm: FloatArray, at_mm: FloatArray, rotation: 
     advance = float((local[:, 1] - indenter.front(local)).min())
     if not np.isfinite(advance):
         raise InputError(
-            f"{type(indenter).__name__} at x = {at_mm[0]:g}, z = {at_mm[2]:g} mm never touches a node of the skin: "
-            "place it over the finger, or refine the mesh under a thin indenter."
+            f"{type(indenter).__name__} at x = {at_mm[0]:g}, z = {at_mm[2]:g} mm never touches a node of the "
+            "skin: place it over the finger, or refine the mesh under a thin indenter."
         )
     return Placement(at_mm + advance * rotation[:, 1], rotation)
 
@@ -146,7 +146,9 @@ class Contact:
             potential=float(0.5 * (pressed**2 / stiffness).sum()),
         )
 
-    def curvature_stiffness(self, state: ContactState, positions_mm: FloatArray, depth_mm: float) -> FloatArray:
+    def curvature_stiffness(
+        self, state: ContactState, positions_mm: FloatArray, depth_mm: float
+    ) -> FloatArray:
         """Second part of the stiffness, -lambda dn/dx by central differences, (n, 3, 3). [mN/mm]"""
         pressed = np.linalg.norm(state.force_mn, axis=1)
         touching = np.flatnonzero(pressed)

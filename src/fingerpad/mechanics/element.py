@@ -53,9 +53,12 @@ def _invert(matrix, inverse):  # type: ignore[no-untyped-def]
     minor_a, minor_b, minor_c = e * i - f * h, f * g - d * i, d * h - e * g
     determinant = a * minor_a + b * minor_b + c * minor_c
     scale = 1.0 / determinant
-    inverse[0, 0], inverse[0, 1], inverse[0, 2] = minor_a * scale, (c * h - b * i) * scale, (b * f - c * e) * scale
-    inverse[1, 0], inverse[1, 1], inverse[1, 2] = minor_b * scale, (a * i - c * g) * scale, (c * d - a * f) * scale
-    inverse[2, 0], inverse[2, 1], inverse[2, 2] = minor_c * scale, (b * g - a * h) * scale, (a * e - b * d) * scale
+    inverse[0, 0], inverse[0, 1], inverse[0, 2] = minor_a, c * h - b * i, b * f - c * e
+    inverse[1, 0], inverse[1, 1], inverse[1, 2] = minor_b, a * i - c * g, c * d - a * f
+    inverse[2, 0], inverse[2, 1], inverse[2, 2] = minor_c, b * g - a * h, a * e - b * d
+    for row in range(3):
+        for column in range(3):
+            inverse[row, column] *= scale
     return determinant
 
 
@@ -64,10 +67,8 @@ def _left_cauchy_green(gradient, jacobian, b, b2):  # type: ignore[no-untyped-de
     """Isochoric b~ = J^(-2/3) F F' and its square; return the invariants I1 and I2."""
     scale = jacobian ** (-2.0 / 3.0)
     for k in range(6):
-        i, j = ROW[k], COLUMN[k]
-        b[k] = scale * (
-            gradient[i, 0] * gradient[j, 0] + gradient[i, 1] * gradient[j, 1] + gradient[i, 2] * gradient[j, 2]
-        )
+        f, g = gradient[ROW[k]], gradient[COLUMN[k]]
+        b[k] = scale * (f[0] * g[0] + f[1] * g[1] + f[2] * g[2])
     b2[0] = b[0] * b[0] + b[3] * b[3] + b[5] * b[5]
     b2[1] = b[3] * b[3] + b[1] * b[1] + b[4] * b[4]
     b2[2] = b[5] * b[5] + b[4] * b[4] + b[2] * b[2]
@@ -91,11 +92,11 @@ def _energy(law, first, second):  # type: ignore[no-untyped-def]
 def _push_forward(gradient, scale, reference, spatial):  # type: ignore[no-untyped-def]
     """Write scale F T F' of a symmetric reference tensor T."""
     for k in range(6):
-        i, j = ROW[k], COLUMN[k]
+        f, g = gradient[ROW[k]], gradient[COLUMN[k]]
         spatial[k] = scale * (
-            gradient[i, 0] * (reference[0] * gradient[j, 0] + reference[3] * gradient[j, 1] + reference[5] * gradient[j, 2])
-            + gradient[i, 1] * (reference[3] * gradient[j, 0] + reference[1] * gradient[j, 1] + reference[4] * gradient[j, 2])
-            + gradient[i, 2] * (reference[5] * gradient[j, 0] + reference[4] * gradient[j, 1] + reference[2] * gradient[j, 2])
+            f[0] * (reference[0] * g[0] + reference[3] * g[1] + reference[5] * g[2])
+            + f[1] * (reference[3] * g[0] + reference[1] * g[1] + reference[4] * g[2])
+            + f[2] * (reference[5] * g[0] + reference[4] * g[1] + reference[2] * g[2])
         )
 
 
@@ -106,13 +107,14 @@ def _elasticity(law, s, first, b, b2, stress, deviator, pressure, moduli):  # ty
     `stress` is the stress before the deviator is taken, T = s (g1 b + g2 b²) - h; `pressure` is p J.
     c = P : c~ : P + 2/3 tr(T) (I_s - 1/3 1x1) - 2/3 (dev T x 1 + 1 x dev T) + p J (1x1 - 2 I_s).
     """
-    w2 = law[1] + law[3] * (first - 3.0) + 2.0 * law[4] * (0.5 * (first * first - b2[0] - b2[1] - b2[2]) - 3.0)
+    trace_b2 = b2[0] + b2[1] + b2[2]
+    second = 0.5 * (first * first - trace_b2)
+    w2 = law[1] + law[3] * (first - 3.0) + 2.0 * law[4] * (second - 3.0)
     w11, w12, w22 = 2.0 * law[2], law[3], 2.0 * law[4]
     d1 = 4.0 * s * (w2 + w11 + 2.0 * first * w12 + first * first * w22)
     d2 = -4.0 * s * (w12 + first * w22)
     d3 = 4.0 * s * w22
     d4 = -4.0 * s * w2
-    trace_b2 = b2[0] + b2[1] + b2[2]
     trace = stress[0] + stress[1] + stress[2]
     for m in range(6):
         i, j = ROW[m], COLUMN[m]
@@ -140,7 +142,7 @@ INDEX = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 
 @njit(cache=True)
 def _gradients(reference, displacement, weights, slopes, gradient):  # type: ignore[no-untyped-def]
-    """Reference gradients of the shape functions and deformation gradient at all points of one element.
+    """Write gradients of the shape functions and of the deformation at all points of one element.
 
     Writes `weights` (8,), `slopes` dN/dX (8, 8, 3) and `gradient` F (8, 3, 3); returns the reference volume.
     """
@@ -194,7 +196,8 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
     float
         Incremental potential, or NaN if a point of the element is turned inside out. [µJ]
     """
-    weights, slopes, gradients = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3)), np.empty((N_POINTS, 3, 3))
+    weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
+    gradients = np.empty((N_POINTS, 3, 3))
     present, jacobians, inverse = np.empty((N_POINTS, N_NODES, 3)), np.empty(N_POINTS), np.empty((3, 3))
     b, b2, relaxed, stress, deviator = np.empty(6), np.empty(6), np.empty(6), np.empty(6), np.empty(6)
     moduli, column, dilatation = np.empty((6, 6)), np.empty((6, 3)), np.zeros((N_NODES, 3))
@@ -241,7 +244,9 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
             _elasticity(law, s, first, b, b2, stress, deviator, spherical, moduli)
         for node in range(N_NODES):
             x, y, z = present[q, node, 0], present[q, node, 1], present[q, node, 2]
-            traction_x, traction_y, traction_z = t0 * x + t3 * y + t5 * z, t3 * x + t1 * y + t4 * z, t5 * x + t4 * y + t2 * z
+            traction_x = t0 * x + t3 * y + t5 * z
+            traction_y = t3 * x + t1 * y + t4 * z
+            traction_z = t5 * x + t4 * y + t2 * z
             force[node, 0] += w * traction_x
             force[node, 1] += w * traction_y
             force[node, 2] += w * traction_z
@@ -292,7 +297,8 @@ def element_state(reference, displacement, law, instantaneous, energies):  # typ
     float
         Volumetric energy density U(Jbar). [kPa]
     """
-    weights, slopes, gradients = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3)), np.empty((N_POINTS, 3, 3))
+    weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
+    gradients = np.empty((N_POINTS, 3, 3))
     inverse, b, b2, deviator = np.empty((3, 3)), np.empty(6), np.empty(6), np.empty(6)
     volume = _gradients(reference, displacement, weights, slopes, gradients)
     present_volume = 0.0
@@ -325,7 +331,8 @@ def deviatoric_norms(reference, displacement, tensors, norms):  # type: ignore[n
     norms : array (n, 8)
         Overwritten with the squared norms. [kPa²]
     """
-    weights, slopes, gradients = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3)), np.empty((N_POINTS, 3, 3))
+    weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
+    gradients = np.empty((N_POINTS, 3, 3))
     inverse, spatial = np.empty((3, 3)), np.empty(6)
     _gradients(reference, displacement, weights, slopes, gradients)
     for q in range(N_POINTS):

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg
 
 from fingerpad.checks import FloatArray
@@ -65,13 +64,14 @@ class PardisoFactor:
         order = np.argsort(row.ravel()[wanted] * free.size + column.ravel()[wanted], kind="stable")
         self._entries = wanted[order]
         self._column = (column.ravel()[self._entries]).astype(np.int32)
-        self._row_start = np.searchsorted(row.ravel()[self._entries], np.arange(free.size + 1)).astype(np.int32)
+        row_start = np.searchsorted(row.ravel()[self._entries], np.arange(free.size + 1))
+        self._row_start = row_start.astype(np.int32)
         self._values = np.empty(self._entries.size, dtype=np.float32)
         self._size = free.size
         self._mkl = pypardiso.PyPardisoSolver(mtype=2)
         self._mkl.libmkl.MKL_Set_Num_Threads_Local(1)
         for index, value in {1: 1, 2: 2, 8: 0, 10: 8, 11: 0, 13: 0, 18: -1, 24: 0, 28: 1, 35: 1}.items():
-            # Numbered as in MKL's manual: own settings, METIS order, no refinement, single precision, 0-based.
+            # Numbers of MKL's manual: own settings, METIS order, no refinement, single precision, 0-based.
             self._mkl.iparm[index - 1] = value
         self._analysed = False
         weakref.finalize(self, self._mkl.free_memory, everything=True)
@@ -102,7 +102,7 @@ class PardisoFactor:
         """One phase of PARDISO; pypardiso's own call handles double precision only."""
         integers = ctypes.POINTER(ctypes.c_int32)
 
-        def number(value: int) -> ctypes._CArgObject:  # type: ignore[name-defined]
+        def number(value: int) -> ctypes._CArgObject:
             return ctypes.byref(ctypes.c_int32(value))
 
         error = ctypes.c_int32(0)
@@ -119,7 +119,6 @@ class PardisoFactor:
         )  # fmt: skip
         if error.value:
             raise ConvergenceError(f"PARDISO could not finish phase {phase}: error {error.value}.")
-
 
 
 class AggregationHierarchy:
@@ -157,8 +156,10 @@ def _rigid_motions(nodes_mm: FloatArray) -> FloatArray:
     """Three translations and three rotations of the nodes, (3 n_nodes, 6)."""
     x, y, z = (nodes_mm - nodes_mm.mean(axis=0)).T
     zero, one = np.zeros_like(x), np.ones_like(x)
-    motions = [(one, zero, zero), (zero, one, zero), (zero, zero, one), (-y, x, zero), (zero, -z, y), (z, zero, -x)]
-    return np.stack([np.stack(motion, axis=1).ravel() for motion in motions], axis=1)
+    translations = [(one, zero, zero), (zero, one, zero), (zero, zero, one)]
+    rotations = [(-y, x, zero), (zero, -z, y), (z, zero, -x)]
+    motions = [np.stack(motion, axis=1).ravel() for motion in translations + rotations]
+    return np.stack(motions, axis=1)
 
 
 def preconditioner(sparsity: Sparsity, free: np.ndarray, nodes_mm: FloatArray) -> Preconditioner:
@@ -234,8 +235,9 @@ class LinearSolver:
                 count += 1
 
             solution, failed = cg(
-                operator, residual, rtol=relative_tolerance, maxiter=MOST_ITERATIONS, M=inverse, callback=counted
-            )
+                operator, residual, rtol=relative_tolerance, maxiter=MOST_ITERATIONS,
+                M=inverse, callback=counted,
+            )  # fmt: skip
             self.iterations += count
             self._stale = count > RENEW_AFTER_ITERATIONS
             if not failed and np.isfinite(solution).all():

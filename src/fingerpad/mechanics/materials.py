@@ -47,7 +47,8 @@ class Prony:
     def __post_init__(self) -> None:
         if len(self.shares) != len(self.times_ms):
             raise InputError(
-                f"Prony needs one time per share: got {len(self.shares)} shares and {len(self.times_ms)} times."
+                "Prony needs one time per share: "
+                f"got {len(self.shares)} shares and {len(self.times_ms)} times."
             )
         for share, time in zip(self.shares, self.times_ms, strict=True):
             not_negative("each Prony share", share)
@@ -220,4 +221,6 @@ class MaterialTable:
             law[row, 5:] = material.bulk_linear, material.bulk_cubic, material.prony.long_term_share
             terms = len(material.prony.shares)
             shares[row, :terms], times[row, :terms] = material.prony.shares, material.prony.times_ms
-        return cls(float_array("law", law, 2), float_array("shares", shares, 2), float_array("times_ms", times, 2))
+        return cls(
+            float_array("law", law, 2), float_array("shares", shares, 2), float_array("times_ms", times, 2)
+        )

@@ -115,7 +115,9 @@ class Equilibrium:
 class _Evaluation:
     """Potential, residual and tangent at one trial configuration."""
 
-    def __init__(self, body: Body, load: Load, displacement: FloatArray, multipliers: FloatArray, blocks: FloatArray):
+    def __init__(
+        self, body: Body, load: Load, displacement: FloatArray, multipliers: FloatArray, blocks: FloatArray
+    ):
         mesh, contact = body.mesh, load.contact
         force = np.empty_like(displacement)
         internal = assemble(
@@ -129,8 +131,8 @@ class _Evaluation:
         np.negative(force, out=force)
         force[contact.nodes] += self.contact.force_mn
         self.residual = force.ravel()[body.free]
-        pressed = np.linalg.norm(self.contact.force_mn.sum(axis=0))
-        self.relative_residual = float(np.linalg.norm(self.residual) / max(pressed, SMALLEST_FORCE_MN))
+        pressed = float(np.linalg.norm(self.contact.force_mn.sum(axis=0)))
+        self.relative_residual = float(np.linalg.norm(self.residual)) / max(pressed, SMALLEST_FORCE_MN)
         stiffness = self.contact.stiffness
         if self.relative_residual < CURVATURE_BELOW_RESIDUAL:
             stiffness = stiffness + contact.curvature_stiffness(self.contact, positions, load.depth_mm)

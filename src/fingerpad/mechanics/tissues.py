@@ -1,4 +1,4 @@
-"""Sets of tissues by name: the paper's three trials and published alternatives (docs/decisions/trial-materials.md)."""
+"""Sets of tissues by name: the paper's three trials and a later fit by the same laboratory."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ def _shear(shear: Published) -> Material:
 def trial_1() -> Tissues:
     """All layers linear elastic after Maeno, with a Prony series."""
     epidermis = _linear(published.MAENO_EPIDERMIS_YOUNG)
-    return Tissues(epidermis, epidermis, _linear(published.MAENO_DERMIS_YOUNG), _linear(published.MAENO_SUBCUTIS_YOUNG))
+    dermis, subcutis = _linear(published.MAENO_DERMIS_YOUNG), _linear(published.MAENO_SUBCUTIS_YOUNG)
+    return Tissues(epidermis, epidermis, dermis, subcutis)
 
 
 def trial_2() -> Tissues:
@@ -46,11 +47,10 @@ def trial_3() -> Tissues:
 
 
 def laboratory_2014() -> Tissues:
-    """The authors' laboratory's later neo-Hookean fit of this fingertip."""
+    """Neo-Hookean fit of this fingertip, published later by the authors' laboratory."""
     epidermis = _shear(published.LABORATORY_EPIDERMIS_SHEAR)
-    return Tissues(
-        epidermis, epidermis, _shear(published.LABORATORY_DERMIS_SHEAR), _shear(published.LABORATORY_SUBCUTIS_SHEAR)
-    )
+    dermis, subcutis = _shear(published.LABORATORY_DERMIS_SHEAR), _shear(published.LABORATORY_SUBCUTIS_SHEAR)
+    return Tissues(epidermis, epidermis, dermis, subcutis)
 
 
 def _hyperelastic() -> tuple[Material, Material]:
