@@ -26,6 +26,9 @@ CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
 STEPS = {"quick": (6, 5), "standard": (8, 8), "paper": (8, 8)}
 """Steps in ramp and hold of each resolution."""
 
+THIN_SIZE_MM = 0.05
+"""Elements along the finger below an indenter that is thinner than the mesh. [mm]"""
+
 _LONGEST_REACH_MM = 5.0
 _CLEARANCE_TO_BONE = 0.8
 
@@ -184,6 +187,9 @@ def grading_about(indenter: Indenter, resolution: str, x_mm: float, z_mm: float 
     """Mesh that is fine where an indenter at (x, z) touches and just beyond."""
     reach = min(indenter.half_width_mm + 1.0, _LONGEST_REACH_MM)
     grading = resolution_grading(resolution, x_mm, half_length_mm=reach, half_width_mm=abs(z_mm) + reach)
+    if indenter.half_width_mm < grading.size_x_mm:
+        # A line needs elements of its own size below it; a few of them, from which the mesh grows.
+        grading = replace(grading, size_x_mm=THIN_SIZE_MM, half_length_mm=4 * THIN_SIZE_MM)
     return replace(grading, full=True) if z_mm != 0.0 else grading
 
 

@@ -29,6 +29,10 @@ class Indenter(Protocol):
         """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
         ...
 
+    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
+        """Which of the undeformed points (n, 3) can come into contact at all; bool (n,)."""
+        ...
+
     @property
     def half_width_mm(self) -> float:
         """Half of the body's extent along x where it can touch. [mm]"""
@@ -46,6 +50,21 @@ def _round_front(beside: FloatArray, radius: float) -> FloatArray:
     """y of a rounded edge or ball at lateral distances from its centre line: 0 up to there, -inf beyond it."""
     height = np.sqrt(np.maximum(radius**2 - np.maximum(beside, 0.0) ** 2, 0.0)) - radius
     return np.where(beside <= radius, height, -np.inf)
+
+
+def _ball(centred: FloatArray, lateral: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
+    """Gap and normal of a ball or cylinder from offsets (n, 3) to its centre or axis.
+
+    A thin body moves past a node within one step. A node behind the widest section is therefore measured
+    along the direction of pressing, so that it is pushed out in front and not out at the back.
+    """
+    distance, normal = _norm_and_direction(centred)
+    passed = (centred[:, 1] < 0.0) & (lateral < radius)
+    forward = np.sqrt(np.maximum(radius**2 - lateral**2, 0.0)) / radius
+    front_normal = centred / radius
+    front_normal[:, 1] = forward
+    gap = np.where(passed, (centred[:, 1] - radius * forward) * forward, distance - radius)
+    return gap, np.where(passed[:, None], front_normal, normal)
 
 
 def _rounded(inside: FloatArray, depth: FloatArray, outward: FloatArray, fillet: float) -> tuple:
@@ -96,22 +115,57 @@ class Cylinder:
         """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
         return _round_front(np.abs(points_mm[:, 0]), self.diameter_mm / 2)
 
+    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
+        """Every point of the skin may; bool (n,)."""
+        return np.ones(len(undeformed_mm), dtype=bool)
+
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         radius = self.diameter_mm / 2
-        distance, normal = _norm_and_direction((points_mm + [0.0, radius, 0.0]) * [1.0, 1.0, 0.0])
-        return distance - radius, normal
+        centred = (points_mm + [0.0, radius, 0.0]) * [1.0, 1.0, 0.0]
+        return _ball(centred, np.abs(centred[:, 0]), radius)
 
 
-def Line(diameter_mm: float = protocol.LINE_DIAMETER.value) -> Cylinder:  # noqa: N802 - reads as an indenter
-    """Return the paper's line load: a cylinder of 50 µm diameter across the finger.
+@dataclass(frozen=True)
+class Line:
+    """Line load across the finger: a wire thinner than the elements of the skin, taken as a blade.
+
+    Nodes cannot resolve a body thinner than their spacing: one node would balance on its top and slide off.
+    The line of nodes that lies under the undeformed wire is therefore pushed along the direction of
+    pressing and stays under it (docs/decisions/line-load.md).
+
+    Parameters
+    ----------
+    diameter_mm : float
+        Diameter of the wire; the paper's is 50 µm. [mm]
 
     Examples
     --------
-    >>> Line()
-    Cylinder(diameter_mm=0.05)
+    >>> Line().may_touch(np.array([[0.0, 0.3, 1.0], [0.05, 0.0, 1.0]])).tolist()
+    [True, False]
     """
-    return Cylinder(diameter_mm)
+
+    diameter_mm: float = protocol.LINE_DIAMETER.value
+
+    def __post_init__(self) -> None:
+        positive("diameter_mm", self.diameter_mm, "mm")
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the body's extent along x. [mm]"""
+        return self.diameter_mm / 2
+
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """y of the blade's edge above the x and z of points (n, 3), -inf beside it. [mm]"""
+        return np.where(np.abs(points_mm[:, 0]) <= self.diameter_mm / 2, 0.0, -np.inf)
+
+    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
+        """Only the points below the undeformed wire; bool (n,)."""
+        return np.abs(undeformed_mm[:, 0]) <= self.diameter_mm / 2
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Gap along y (n,) and that direction (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        return Plate().gap(points_mm)
 
 
 @dataclass(frozen=True)
@@ -148,10 +202,14 @@ class Sphere:
         """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
         return _round_front(np.hypot(points_mm[:, 0], points_mm[:, 2]), self.radius_mm)
 
+    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
+        """Every point of the skin may; bool (n,)."""
+        return np.ones(len(undeformed_mm), dtype=bool)
+
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
-        distance, normal = _norm_and_direction(points_mm + [0.0, self.radius_mm, 0.0])
-        return distance - self.radius_mm, normal
+        centred = points_mm + [0.0, self.radius_mm, 0.0]
+        return _ball(centred, np.hypot(centred[:, 0], centred[:, 2]), self.radius_mm)
 
 
 @dataclass(frozen=True)
@@ -186,6 +244,10 @@ class Bar:
     def front(self, points_mm: FloatArray) -> FloatArray:
         """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
         return _round_front(np.abs(points_mm[:, 0]) - self.width_mm / 2 + self.fillet_mm, self.fillet_mm)
+
+    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
+        """Every point of the skin may; bool (n,)."""
+        return np.ones(len(undeformed_mm), dtype=bool)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
@@ -226,6 +288,10 @@ class FlatPunch:
             np.hypot(points_mm[:, 0], points_mm[:, 2]) - self.diameter_mm / 2 + self.fillet_mm, self.fillet_mm
         )
 
+    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
+        """Every point of the skin may; bool (n,)."""
+        return np.ones(len(undeformed_mm), dtype=bool)
+
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         radial, outward = _norm_and_direction(points_mm * [1.0, 0.0, 1.0])
@@ -247,6 +313,10 @@ class Plate:
     def front(self, points_mm: FloatArray) -> FloatArray:
         """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
         return np.zeros(len(points_mm))
+
+    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
+        """Every point of the skin may; bool (n,)."""
+        return np.ones(len(undeformed_mm), dtype=bool)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""

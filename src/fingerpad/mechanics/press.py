@@ -129,8 +129,9 @@ def press(
     sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
     body = Body(mesh, table, sparsity, free)
     solver = LinearSolver(sparsity, free, preconditioner(sparsity, free, mesh.nodes_mm))
-    loose = ~np.isin(mesh.skin_nodes, mesh.fixed_nodes)
-    contact = Contact(indenter, placement, mesh.skin_nodes[loose], mesh.skin_area_mm2[loose])
+    undeformed = placement.to_local(mesh.nodes_mm[mesh.skin_nodes], depth_mm=0.0)
+    candidates = indenter.may_touch(undeformed) & ~np.isin(mesh.skin_nodes, mesh.fixed_nodes)
+    contact = Contact(indenter, placement, mesh.skin_nodes[candidates], mesh.skin_area_mm2[candidates])
 
     times = stimulus.times_ms(settings.ramp_steps, settings.hold_steps)
     march = _March(
@@ -170,12 +171,16 @@ def _advance(
         try:
             found, sed = _one_step(body, contact, stimulus, solver, march, target, settings)
         except ConvergenceError as error:
-            attempts.append(f"step from {march.time_ms:.4g} to {target:.4g} ms: {error}")
+            attempts.append(
+                f"step from {march.time_ms:.4g} to {target:.4g} ms: {error.args[0]} "
+                f"Last: {error.history[-1] if error.history else 'no iteration'}."
+            )
             share /= 2
             if share < SMALLEST_CUT:
+                depth_mm = stimulus.depth_at(march.time_ms)
                 raise ConvergenceError(
-                    f"The press stopped at {march.time_ms:.4g} ms, depth "
-                    f"{stimulus.depth_at(march.time_ms):.4g} mm: try a smaller depth, a finer mesh or more ramp steps.",
+                    f"The press stopped at {march.time_ms:.4g} ms, depth {depth_mm:.4g} mm: "
+                    "try a smaller depth, a finer mesh or more ramp steps.",
                     tuple(attempts),
                 ) from error
             continue
@@ -198,15 +203,16 @@ def _one_step(
     step = StepCoefficients.of(body.table, step_ms)
     load = Load(contact, float(stimulus.depth_at(target_ms)), step, march.history.carried(step, mesh.layer))
     # Motion goes on as before inside a phase; at the end of the ramp it stops, and so does the guess.
-    goes_on = (march.time_ms < stimulus.ramp_ms) == (target_ms <= stimulus.ramp_ms)
-    guess = march.displacement + (step_ms * march.velocity if goes_on and march.time_ms < stimulus.ramp_ms else 0.0)
+    ramps = target_ms <= stimulus.ramp_ms
+    guess = march.displacement + (step_ms * march.velocity if ramps else 0.0)
     found = find_equilibrium(body, load, solver, guess, march.multipliers, settings.newton)
     instantaneous, energies, volumetric = instantaneous_state(
         mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, body.table
     )
     march.history = march.history.advanced(step, mesh.layer, instantaneous)
     march.velocity = (found.displacement_mm - march.displacement) / step_ms
-    march.displacement, march.multipliers, march.time_ms = found.displacement_mm, found.multipliers_mn, target_ms
+    march.displacement, march.multipliers = found.displacement_mm, found.multipliers_mn
+    march.time_ms = target_ms
     march.newton_steps += found.iterations
     sed = stored_energy_density(
         mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, body.table,
