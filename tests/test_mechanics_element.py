@@ -1,0 +1,297 @@
+"""The compiled brick against a slow one that only writes the energy down, and against laws of elements."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+from fingerpad.mechanics.assembly import Sparsity, assemble
+from fingerpad.mechanics.element import deviatoric_norms, element_state, element_system
+from fingerpad.mechanics.materials import Material, MaterialTable
+from fingerpad.mesh import Mesh, block_mesh
+from fingerpad.mesh_quality import jacobian_at_gauss
+
+NEO_HOOKE = Material.neo_hooke(shear_kpa=11.0, poisson=0.48)
+MOONEY = Material(c10=4.0, c01=1.5, bulk_linear=130.0)
+POLYNOMIAL = Material(c10=4.0, c01=1.5, c20=2.5, c11=0.7, c02=0.9, bulk_linear=130.0, bulk_cubic=400.0)
+LAWS = pytest.mark.parametrize(
+    "material", [NEO_HOOKE, MOONEY, POLYNOMIAL], ids=["neo-hooke", "mooney", "polynomial"]
+)
+COMPLEX_STEP = 1e-30
+
+BRICK = np.array(
+    [[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [0, 0, 1.5], [2, 0, 1.5], [2, 1, 1.5], [0, 1, 1.5]],
+    dtype=float,
+)
+DISTORTED = BRICK + np.random.default_rng(3).uniform(-0.15, 0.15, BRICK.shape)
+WEDGE = DISTORTED[[0, 1, 1, 3, 4, 5, 5, 7]]  # two pairs of equal nodes: one side collapsed to an edge
+SHAPES = pytest.mark.parametrize("nodes", [DISTORTED, WEDGE], ids=["brick", "wedge"])
+
+
+def local_corners():
+    """Corners in the order lower face, then upper face, each counter-clockwise."""
+    face = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    return [(*corner, height) for height in (-1, 1) for corner in face]
+
+
+def shape_functions(point):
+    return np.array(
+        [np.prod([1 + c * p for c, p in zip(corner, point, strict=True)]) / 8 for corner in local_corners()]
+    )
+
+
+def shape_slopes(point):
+    """dN/dxi (8, 3) by complex steps."""
+    steps = 1j * COMPLEX_STEP * np.eye(3)
+    return np.stack([shape_functions(point + step).imag / COMPLEX_STEP for step in steps], axis=1)
+
+
+def symmetric(components):
+    xx, yy, zz, xy, yz, xz = components
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def slow_points(nodes, displacement):
+    """Weight and deformation gradient at the 2x2x2 points."""
+    for point in product(*3 * [(-1 / np.sqrt(3), 1 / np.sqrt(3))]):
+        slopes = shape_slopes(np.array(point))
+        jacobian = nodes.T @ slopes
+        yield np.linalg.det(jacobian), np.eye(3) + displacement.T @ slopes @ np.linalg.inv(jacobian)
+
+
+def kernel_order():
+    """Row of the kernel's points for each point of `slow_points`: it numbers them like the nodes."""
+    signs = list(product(*3 * [(-1, 1)]))
+    return [local_corners().index(sign) for sign in signs]
+
+
+def slow_energy(material, nodes, displacement, s, history):
+    """Pi_e from its definition; complex displacements allowed."""
+    isochoric, volume, present = 0.0, 0.0, 0.0
+    for (weight, gradient), row in zip(slow_points(nodes, displacement), kernel_order(), strict=True):
+        jacobian = np.linalg.det(gradient)
+        right = jacobian ** (-2 / 3) * gradient.T @ gradient
+        first = np.trace(right)
+        second = (first**2 - np.trace(right @ right)) / 2
+        x, y = first - 3, second - 3
+        energy = material.c10 * x + material.c01 * y
+        energy += material.c20 * x**2 + material.c11 * x * y + material.c02 * y**2
+        isochoric += weight * (s * energy - 0.5 * (symmetric(history[row]) * right).sum())
+        volume, present = volume + weight, present + weight * jacobian
+    change = present / volume - 1
+    return isochoric + volume * (material.bulk_linear * change**2 + material.bulk_cubic * change**4)
+
+
+def slow_force(material, nodes, displacement, s, history):
+    """Gradient of the energy by complex steps, exact to round-off."""
+    force = np.empty((8, 3))
+    for a, i in product(range(8), range(3)):
+        moved = displacement.astype(complex)
+        moved[a, i] += 1j * COMPLEX_STEP
+        force[a, i] = slow_energy(material, nodes, moved, s, history).imag / COMPLEX_STEP
+    return force
+
+
+def kernel(material, nodes, displacement, s=1.0, history=None):
+    law = MaterialTable.of([material]).law[0]
+    force, tangent = np.empty((8, 3)), np.empty((8, 8, 3, 3))
+    history = np.zeros((8, 6)) if history is None else history
+    energy = element_system(nodes, displacement, law, s, history, True, force, tangent)
+    return energy, force, tangent.transpose(0, 2, 1, 3).reshape(24, 24)
+
+
+def random_state(nodes, seed=0, size=0.1):
+    """Displacements (equal for equal nodes), a factor s and a history."""
+    generator = np.random.default_rng(seed)
+    displacement = generator.uniform(-size, size, nodes.shape)
+    same = (nodes[:, None] == nodes[None]).all(axis=2).argmax(axis=1)
+    return displacement[same], 0.7, generator.uniform(-3.0, 3.0, (8, 6))
+
+
+@SHAPES
+@LAWS
+def test_energy_and_force_are_those_of_the_definition(material, nodes):
+    displacement, s, history = random_state(nodes)
+    energy, force, _ = kernel(material, nodes, displacement, s, history)
+    np.testing.assert_allclose(energy, slow_energy(material, nodes, displacement, s, history), rtol=1e-12)
+    expected = slow_force(material, nodes, displacement, s, history)
+    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+@SHAPES
+@LAWS
+def test_tangent_is_the_derivative_of_the_force_and_symmetric(material, nodes):
+    displacement, s, history = random_state(nodes)
+    _, _, tangent = kernel(material, nodes, displacement, s, history)
+    differences, step = np.empty((24, 24)), 1e-3
+    for column in range(24):
+        offset = np.zeros(24)
+        offset[column] = step
+        offset = offset.reshape(8, 3)
+        one, two = (
+            kernel(material, nodes, displacement + k * offset, s, history)[1]
+            - kernel(material, nodes, displacement - k * offset, s, history)[1]
+            for k in (1, 2)
+        )
+        differences[:, column] = ((8 * one - two) / (12 * step)).ravel()  # fourth order
+    np.testing.assert_allclose(tangent, differences, rtol=0, atol=1e-8 * np.abs(tangent).max())
+    np.testing.assert_allclose(tangent, tangent.T, rtol=0, atol=1e-13 * np.abs(tangent).max())
+
+
+def test_wedge_adds_up_to_the_tangent_of_its_six_nodes():
+    """Equal nodes must move together: their rows and columns then act as one."""
+    displacement, s, history = random_state(WEDGE)
+    _, _, tangent = kernel(POLYNOMIAL, WEDGE, displacement, s, history)
+    node = np.array([0, 1, 1, 2, 3, 4, 4, 5])
+    gather = np.kron(node[:, None] == np.arange(6), np.eye(3))
+    step = 1e-6
+    direction = gather @ np.random.default_rng(1).uniform(-1, 1, 18)
+    change = [
+        kernel(POLYNOMIAL, WEDGE, displacement + sign * step * direction.reshape(8, 3), s, history)[1]
+        for sign in (1, -1)
+    ]
+    slope = gather.T @ (change[0] - change[1]).ravel() / (2 * step)
+    np.testing.assert_allclose(
+        gather.T @ tangent @ direction, slope, rtol=1e-6, atol=1e-7 * np.abs(slope).max()
+    )
+
+
+def rotation(seed=5):
+    q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    q = q * np.sign(np.diag(r))
+    return q * np.linalg.det(q)
+
+
+@SHAPES
+@LAWS
+def test_rigid_motion_leaves_no_stress(material, nodes):
+    turned = nodes @ rotation().T + [0.3, -2.0, 1.0] - nodes
+    energy, force, _ = kernel(material, nodes, turned)
+    assert abs(energy) < 1e-12 * material.bulk_modulus_kpa
+    assert np.abs(force).max() < 1e-12 * material.bulk_modulus_kpa
+
+
+@SHAPES
+@LAWS
+def test_rotated_body_keeps_its_energy_and_turns_its_forces(material, nodes):
+    displacement, s, history = random_state(nodes)
+    turn = rotation()
+    energy, force, tangent = kernel(material, nodes, displacement, s, history)
+    rotated = kernel(material, nodes, (nodes + displacement) @ turn.T - nodes, s, history)
+    np.testing.assert_allclose(rotated[0], energy, rtol=1e-12)
+    np.testing.assert_allclose(rotated[1], force @ turn.T, rtol=0, atol=1e-12 * np.abs(force).max())
+    blocks = np.kron(np.eye(8), turn)
+    np.testing.assert_allclose(
+        rotated[2], blocks @ tangent @ blocks.T, rtol=0, atol=1e-12 * np.abs(tangent).max()
+    )
+
+
+def test_forces_balance_and_exert_no_moment():
+    displacement, s, history = random_state(DISTORTED)
+    _, force, _ = kernel(POLYNOMIAL, DISTORTED, displacement, s, history)
+    size = np.abs(force).max()
+    assert np.abs(force.sum(axis=0)).max() < 1e-13 * size * 8
+    assert np.abs(np.cross(DISTORTED + displacement, force).sum(axis=0)).max() < 1e-13 * size * 24
+
+
+def test_inside_out_element_has_no_energy():
+    mirrored = BRICK * [1.0, 1.0, -1.0] - BRICK
+    assert np.isnan(kernel(NEO_HOOKE, BRICK, mirrored)[0])
+
+
+@SHAPES
+@LAWS
+def test_instantaneous_stress_as_history_takes_the_place_of_the_energy(material, nodes):
+    """d(-1/2 H : C~) with H = -S0 is the deviatoric stress power, so both give the same forces."""
+    displacement, _, _ = random_state(nodes)
+    isochoric = replace(material, bulk_linear=1e-9, bulk_cubic=0.0)
+    law = MaterialTable.of([isochoric]).law[0]
+    stress, energies = np.empty((8, 6)), np.empty((8, 2))
+    element_state(nodes, displacement, law, stress, energies)
+    _, by_energy, _ = kernel(isochoric, nodes, displacement)
+    _, by_history, _ = kernel(isochoric, nodes, displacement, s=0.0, history=-stress)
+    np.testing.assert_allclose(by_history, by_energy, rtol=0, atol=1e-12 * np.abs(by_energy).max())
+
+
+@LAWS
+def test_state_reports_weights_and_energies_that_add_up(material):
+    displacement, _, _ = random_state(DISTORTED)
+    law = MaterialTable.of([material]).law[0]
+    energies = np.empty((8, 2))
+    volumetric = element_state(DISTORTED, displacement, law, np.empty((8, 6)), energies)
+    volume = energies[:, 0].sum()
+    total, _, _ = kernel(material, DISTORTED, displacement)
+    np.testing.assert_allclose(energies[:, 0] @ energies[:, 1] + volume * volumetric, total, rtol=1e-13)
+
+
+def test_norms_are_those_of_the_spatial_deviators():
+    displacement, _, _ = random_state(DISTORTED)
+    tensors = np.random.default_rng(2).normal(size=(3, 8, 6))
+    norms = np.empty((3, 8))
+    deviatoric_norms(DISTORTED, displacement, tensors, norms)
+    points = zip(slow_points(DISTORTED, displacement), kernel_order(), strict=True)
+    for (_, gradient), row in points:
+        isochoric = np.linalg.det(gradient) ** (-1 / 3) * gradient
+        for n in range(3):
+            spatial = isochoric @ symmetric(tensors[n, row]) @ isochoric.T
+            deviator = spatial - np.trace(spatial) / 3 * np.eye(3)
+            np.testing.assert_allclose(norms[n, row], (deviator**2).sum(), rtol=1e-12)
+
+
+def shaken(mesh: Mesh, interior, size):
+    nodes = mesh.nodes_mm.copy()
+    nodes[interior] += np.random.default_rng(7).uniform(-size, size, (interior.size, 3))
+    return replace(mesh, nodes_mm=nodes)
+
+
+def brick_patch():
+    """3 x 3 x 3 distorted bricks and their interior nodes."""
+    mesh = block_mesh(np.arange(4.0), np.arange(4.0), np.arange(4.0), layers=[2, 2, 2])
+    interior = np.flatnonzero(((mesh.nodes_mm > 0) & (mesh.nodes_mm < 3)).all(axis=1))
+    return shaken(mesh, interior, 0.2), interior
+
+
+def wedge_patch():
+    """A disc: bricks around wedges that meet in an axis, as at the tip of the finger."""
+    mesh = block_mesh([0.0, 1.0, 2.0], np.arange(4.0), np.arange(6.0), layers=[2, 2, 2])
+    x, y, z = mesh.nodes_mm.T
+    radius, angle = 2.0 - x, 2 * np.pi * z / 5
+    same = np.arange(len(x))
+    for node in range(len(x)):  # the seam closes, and the axis is one node per height
+        if x[node] == 2.0 or z[node] == 5.0:
+            same[node] = np.flatnonzero((x == x[node]) & (y == y[node]) & (z == 0.0))[0]
+    mesh = replace(
+        mesh,
+        nodes_mm=np.stack([radius * np.cos(angle), y, -radius * np.sin(angle)], axis=1),
+        elements=same[mesh.elements],
+    )
+    used = np.unique(mesh.elements)
+    interior = used[(radius[used] < 2.0) & (y[used] > 0) & (y[used] < 3)]
+    return shaken(mesh, interior, 0.15), interior
+
+
+SMALL = 1e-4 * np.array([[1.0, 0.5, -0.2], [0.3, -0.7, 0.4], [-0.6, 0.2, 0.9]])
+
+
+@pytest.mark.parametrize("gradient", [SMALL, 3e3 * SMALL], ids=["small", "finite"])
+@pytest.mark.parametrize("patch", [brick_patch, wedge_patch])
+def test_patch(patch, gradient):
+    """Boundary nodes follow a homogeneous deformation: interior nodes must find it, whatever the mesh."""
+    mesh, interior = patch()
+    assert (jacobian_at_gauss(mesh) > 0).all()
+    table = MaterialTable.of([POLYNOMIAL] * 4)
+    sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
+    exact = mesh.nodes_mm @ gradient.T
+    displacement = exact.copy()
+    displacement[interior] += 0.02 * np.random.default_rng(9).uniform(-1, 1, (interior.size, 3))
+    free = (3 * interior[:, None] + np.arange(3)).ravel()
+    force, blocks = np.empty_like(exact), np.empty((sparsity.column.size, 3, 3))
+    for _ in range(7):
+        assemble(
+            mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table.law, np.ones(4),
+            np.zeros((len(mesh.elements), 8, 6)), sparsity.position, True, force, blocks,
+        )  # fmt: skip
+        tangent = sparsity.matrix(blocks).toarray()[np.ix_(free, free)]
+        displacement.ravel()[free] -= np.linalg.solve(tangent, force.ravel()[free])
+    np.testing.assert_allclose(displacement, exact, rtol=0, atol=1e-12)
