@@ -1,0 +1,163 @@
+"""Relaxation against closed forms of Prony series, and the energy that springs hold."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from fingerpad.mechanics.assembly import Sparsity, assemble
+from fingerpad.mechanics.materials import Material, MaterialTable, Prony
+from fingerpad.mechanics.viscoelastic import (
+    StepCoefficients,
+    StressHistory,
+    instantaneous_state,
+    stored_energy_density,
+)
+from fingerpad.mesh import block_mesh
+
+PRONY = Prony(shares=(0.25, 0.35), times_ms=(40.0, 900.0))
+SKIN = Material(c10=4.0, c01=1.5, c20=2.5, c11=0.7, c02=0.9, bulk_linear=130.0, prony=PRONY)
+CUBE = block_mesh([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], layers=[0])
+TABLE = MaterialTable.of([SKIN])
+SHARES, TIMES_MS = np.array(PRONY.shares), np.array(PRONY.times_ms)
+FAST_MS, SLOW_MS = 1e-6, 1e7
+
+
+def shear(amount):
+    """Displacement of the cube's nodes in simple shear."""
+    return np.outer(CUBE.nodes_mm[:, 1], [amount, 0.0, 0.0])
+
+
+def march(times_ms, displacements, table=TABLE):
+    """Impose displacements at times (from the unloaded state at 0); internal forces and stored energies."""
+    sparsity = Sparsity.of(CUBE.elements, len(CUBE.nodes_mm))
+    history = StressHistory.unloaded(1, table.shares.shape[1])
+    blocks, forces, energies, before = np.empty((sparsity.column.size, 3, 3)), [], [], 0.0
+    for time, displacement in zip(times_ms, displacements, strict=True):
+        step = StepCoefficients.of(table, time - before)
+        force = np.empty_like(displacement)
+        assemble(
+            CUBE.nodes_mm, CUBE.elements, displacement, CUBE.layer, table.law, step.s,
+            history.carried(step, CUBE.layer), sparsity.position, False, force, blocks,
+        )  # fmt: skip
+        stress, points, volumetric = instantaneous_state(
+            CUBE.nodes_mm, CUBE.elements, displacement, CUBE.layer, table
+        )
+        history = history.advanced(step, CUBE.layer, stress)
+        energy = stored_energy_density(
+            CUBE.nodes_mm, CUBE.elements, displacement, CUBE.layer, table, history, points, volumetric
+        )
+        forces.append(force)
+        energies.append(energy[0])
+        before = time
+    return np.array(forces), np.array(energies)
+
+
+def elastic(factor):
+    """The same tissue without relaxation, its coefficients times `factor`."""
+    coefficients = [factor * getattr(SKIN, name) for name in ("c10", "c01", "c20", "c11", "c02")]
+    return MaterialTable.of([Material(*coefficients, bulk_linear=SKIN.bulk_linear)])
+
+
+def test_moduli_go_from_instantaneous_to_long_term():
+    displacement = shear(0.6)
+    (fast, slow), _ = march([FAST_MS, SLOW_MS], [displacement] * 2)
+    (instantaneous,), _ = march([1.0], [displacement], elastic(1 / PRONY.long_term_share))
+    (long_term,), _ = march([1.0], [displacement], elastic(1.0))
+    np.testing.assert_allclose(fast, instantaneous, rtol=0, atol=1e-6 * np.abs(fast).max())
+    np.testing.assert_allclose(slow, long_term, rtol=0, atol=1e-4 * np.abs(slow).max())
+
+
+def test_hold_after_a_step_is_the_prony_sum():
+    """Shear held from time 0 on, at finite strain: every force component follows the same g(t)."""
+    displacement, times = shear(0.6), np.array([1.0, 7.0, 40.0, 300.0, 2000.0])
+    forces, _ = march([FAST_MS, *(FAST_MS + times)], [displacement] * 6)
+    relaxation = 1 - (SHARES * (1 - np.exp(-times[:, None] / TIMES_MS))).sum(axis=1)
+    expected = relaxation[:, None, None] * forces[0]
+    np.testing.assert_allclose(forces[1:], expected, rtol=0, atol=1e-6 * np.abs(forces[0]).max())
+
+
+def ramp_factor(times_ms, ramp_ms):
+    """S(t) / S0(end of ramp) for S0 that rises linearly and is then held: convolution of g with the ramp."""
+    since = np.asarray(times_ms)[:, None]
+    inside = np.minimum(since, ramp_ms)
+    lost = inside - TIMES_MS * (np.exp(-(since - inside) / TIMES_MS) - np.exp(-since / TIMES_MS))
+    return (inside[:, 0] - (SHARES * lost).sum(axis=1)) / ramp_ms
+
+
+@pytest.mark.parametrize(
+    "times_ms",
+    [[50.0, 1000.0], [10.0, 25.0, 30.0, 50.0, 51.0, 400.0, 1000.0], list(np.arange(5.0, 1001.0, 5.0))],
+    ids=["2 steps", "7 uneven steps", "200 steps"],
+)
+def test_steps_of_any_size_give_the_same_exact_ramp_and_hold(times_ms):
+    """The recurrence is exact while S0 is linear in time within each step."""
+    layer = np.zeros(1, dtype=int)
+    end = np.random.default_rng(4).normal(size=(1, 8, 6))
+    history, before = StressHistory.unloaded(1, 2), 0.0
+    for time in times_ms:
+        step = StepCoefficients.of(TABLE, time - before)
+        stress = min(time / 50.0, 1.0) * end
+        relaxed = step.s[0] * stress - history.carried(step, layer)
+        history, before = history.advanced(step, layer, stress), time
+        np.testing.assert_allclose(relaxed, ramp_factor([time], 50.0)[0] * end, rtol=1e-11)
+        np.testing.assert_allclose(stress - history.relaxed.sum(axis=0), relaxed, rtol=1e-11)
+
+
+def test_small_shear_ramp_and_hold_follow_the_linear_theory():
+    """Force and stored energy of a generalised Maxwell solid, its springs one by one.
+
+    A branch's spring shear follows h' = g' - h / tau: h = g' tau (1 - exp(-t / tau)) in the ramp, then it
+    decays; the springs hold G0 (g_inf g² + sum g_i h_i²) / 2.
+    """
+    final, ramp = 1e-3, 50.0
+    times = np.concatenate([np.linspace(5.0, 50.0, 10), [60.0, 100.0, 400.0, 1500.0]])
+    amounts = final * np.minimum(times / ramp, 1.0)
+    forces, energies = march(times, [shear(amount) for amount in amounts])
+    instantaneous = SKIN.shear_modulus_kpa / PRONY.long_term_share
+    top = CUBE.nodes_mm[:, 1] == 1.0
+    stress = forces[:, top, 0].sum(axis=1)
+    np.testing.assert_allclose(stress, instantaneous * final * ramp_factor(times, ramp), rtol=3e-6)
+    since, inside = times[:, None], np.minimum(times, ramp)[:, None]
+    spring = final / ramp * TIMES_MS * (np.exp(-(since - inside) / TIMES_MS) - np.exp(-since / TIMES_MS))
+    springs = PRONY.long_term_share * amounts**2 + (SHARES * spring**2).sum(axis=1)
+    np.testing.assert_allclose(energies, instantaneous * springs / 2, rtol=3e-6)
+
+
+def test_stored_energy_of_a_held_shear_decays_from_instantaneous_to_long_term():
+    displacement, times = shear(0.6), np.array([3.0, 40.0, 700.0])
+    _, energies = march([FAST_MS, *(FAST_MS + times), SLOW_MS], [displacement] * 5)
+    _, (instantaneous,) = march([1.0], [displacement], elastic(1 / PRONY.long_term_share))
+    _, (long_term,) = march([1.0], [displacement], elastic(1.0))
+    share = PRONY.long_term_share + (SHARES * np.exp(-2 * times[:, None] / TIMES_MS)).sum(axis=1)
+    np.testing.assert_allclose(energies[0], instantaneous, rtol=1e-6)
+    np.testing.assert_allclose(energies[1:-1], share * instantaneous, rtol=1e-6)
+    np.testing.assert_allclose(energies[-1], long_term, rtol=1e-6)
+
+
+def test_volumetric_energy_does_not_relax():
+    displacement = 0.05 * CUBE.nodes_mm
+    _, energies = march([FAST_MS, 100.0, SLOW_MS], [displacement] * 3)
+    np.testing.assert_allclose(energies, SKIN.bulk_linear * (1.05**3 - 1) ** 2, rtol=1e-10)
+
+
+def test_springs_never_hold_less_than_nothing_nor_more_than_was_put_in():
+    """Small random deformations: 0 <= stored energy <= work done so far (Clausius and Duhem)."""
+    generator = np.random.default_rng(8)
+    corners = 1e-4 * np.cumsum(generator.normal(size=(60, 8, 3)), axis=0)
+    smooth = np.concatenate([np.linspace(a, b, 9)[1:] for a, b in pairwise(corners)])
+    times = 3.0 * np.arange(1, len(smooth) + 1)
+    forces, energies = march(times, smooth)
+    work = np.cumsum(0.5 * ((forces[1:] + forces[:-1]) * np.diff(smooth, axis=0)).sum(axis=(1, 2)))
+    assert (energies > 0).all()
+    supplied, held = work, energies[1:] - energies[0]
+    assert (held <= supplied).all()
+    assert held[-1] < 0.99 * supplied[-1]  # and some is lost
+
+
+def test_material_without_relaxation_is_elastic():
+    table = elastic(1.0)
+    assert StepCoefficients.of(table, 5.0).s.tolist() == [1.0]
+    forces, energies = march([1.0, 500.0], [shear(0.4)] * 2, table)
+    np.testing.assert_array_equal(forces[0], forces[1])
+    assert energies[0] == energies[1]
