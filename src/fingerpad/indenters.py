@@ -26,7 +26,7 @@ class Indenter(Protocol):
         ...
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         ...
 
     def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
@@ -42,12 +42,12 @@ class Indenter(Protocol):
 def _norm_and_direction(offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Length and unit direction of each row; a zero row points along y, the direction of pressing."""
     length = np.linalg.norm(offsets, axis=1)
-    direction = np.where(length[:, None] > 0.0, offsets / np.where(length, length, 1.0)[:, None], [0.0, 1.0, 0.0])
-    return length, direction
+    unit = offsets / np.where(length, length, 1.0)[:, None]
+    return length, np.where(length[:, None] > 0.0, unit, [0.0, 1.0, 0.0])
 
 
 def _round_front(beside: FloatArray, radius: float) -> FloatArray:
-    """y of a rounded edge or ball at lateral distances from its centre line: 0 up to there, -inf beyond it."""
+    """Height y of a rounded edge or ball at distances beside its centre line: 0 on it, -inf beyond `radius`."""
     height = np.sqrt(np.maximum(radius**2 - np.maximum(beside, 0.0) ** 2, 0.0)) - radius
     return np.where(beside <= radius, height, -np.inf)
 
@@ -112,7 +112,7 @@ class Cylinder:
         return self.diameter_mm / 2
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return _round_front(np.abs(points_mm[:, 0]), self.diameter_mm / 2)
 
     def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
@@ -122,7 +122,7 @@ class Cylinder:
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         radius = self.diameter_mm / 2
-        centred = (points_mm + [0.0, radius, 0.0]) * [1.0, 1.0, 0.0]
+        centred = (points_mm + np.array([0.0, radius, 0.0])) * [1.0, 1.0, 0.0]
         return _ball(centred, np.abs(centred[:, 0]), radius)
 
 
@@ -156,7 +156,7 @@ class Line:
         return self.diameter_mm / 2
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """y of the blade's edge above the x and z of points (n, 3), -inf beside it. [mm]"""
+        """Height y of the blade's edge above the x and z of points (n, 3), -inf beside it. [mm]"""
         return np.where(np.abs(points_mm[:, 0]) <= self.diameter_mm / 2, 0.0, -np.inf)
 
     def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
@@ -199,7 +199,7 @@ class Sphere:
         return self.radius_mm
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return _round_front(np.hypot(points_mm[:, 0], points_mm[:, 2]), self.radius_mm)
 
     def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
@@ -208,7 +208,7 @@ class Sphere:
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
-        centred = points_mm + [0.0, self.radius_mm, 0.0]
+        centred = points_mm + np.array([0.0, self.radius_mm, 0.0])
         return _ball(centred, np.hypot(centred[:, 0], centred[:, 2]), self.radius_mm)
 
 
@@ -225,7 +225,8 @@ class Bar:
 
     Examples
     --------
-    >>> Bar(width_mm=3.0, fillet_mm=0.3).gap(np.array([[0.0, -0.1, 0.0], [1.5, -0.3, 2.0]]))[0].round(3).tolist()
+    >>> gap, _ = Bar(width_mm=3.0, fillet_mm=0.3).gap(np.array([[0.0, -0.1, 0.0], [1.5, -0.3, 2.0]]))
+    >>> gap.round(3).tolist()
     [-0.1, 0.0]
     """
 
@@ -242,7 +243,7 @@ class Bar:
         return self.width_mm / 2
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return _round_front(np.abs(points_mm[:, 0]) - self.width_mm / 2 + self.fillet_mm, self.fillet_mm)
 
     def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
@@ -283,7 +284,7 @@ class FlatPunch:
         return self.diameter_mm / 2
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return _round_front(
             np.hypot(points_mm[:, 0], points_mm[:, 2]) - self.diameter_mm / 2 + self.fillet_mm, self.fillet_mm
         )
@@ -311,7 +312,7 @@ class Plate:
         return np.inf
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return np.zeros(len(points_mm))
 
     def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
