@@ -47,7 +47,7 @@ def _norm_and_direction(offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _round_front(beside: FloatArray, radius: float) -> FloatArray:
-    """Height y of a rounded edge or ball at distances beside its centre line: 0 on it, -inf beyond `radius`."""
+    """Height y of a rounded edge or ball beside its centre line: 0 on it, -inf beyond `radius`."""
     height = np.sqrt(np.maximum(radius**2 - np.maximum(beside, 0.0) ** 2, 0.0)) - radius
     return np.where(beside <= radius, height, -np.inf)
 
