@@ -1,0 +1,168 @@
+"""Gaps against distances to densely drawn bodies; normals against slopes of the gap."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+from fingerpad.errors import InputError
+from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+
+RADIUS = 1.5
+CYLINDER, SPHERE = Cylinder(diameter_mm=2 * RADIUS), Sphere(curvature_per_m=1000.0 / RADIUS)
+BAR, PUNCH = Bar(width_mm=3.0, fillet_mm=0.3), FlatPunch(diameter_mm=3.0, fillet_mm=0.4)
+BODIES = [CYLINDER, SPHERE, BAR, PUNCH]
+ALL = [*BODIES, Line(), Plate()]
+NAMES = [type(body).__name__ for body in ALL]
+
+
+def beside(body, points):
+    """Distance from the axis or the middle plane: the coordinate in which each body is one profile."""
+    return np.hypot(points[:, 0], points[:, 2]) if body in (SPHERE, PUNCH) else np.abs(points[:, 0])
+
+
+def profile(body, s):
+    """Half of the outline: (beside, y) at arc length s from the middle of the face."""
+    if body in (CYLINDER, SPHERE):
+        return RADIUS * np.sin(s / RADIUS), RADIUS * (np.cos(s / RADIUS) - 1)
+    half, fillet = body.half_width_mm, body.fillet_mm
+    flat, turn = half - fillet, 0.5 * np.pi * fillet
+    if s < flat:
+        return s, 0.0
+    if s < flat + turn:
+        angle = (s - flat) / fillet
+        return flat + fillet * np.sin(angle), fillet * (np.cos(angle) - 1)
+    return half, -fillet - (s - flat - turn)
+
+
+def brute_force_distance(body, width, height):
+    """Smallest distance to the outline: the best of a dense scan, refined."""
+
+    def distance(s):
+        at = profile(body, s)
+        return np.hypot(at[0] - width, at[1] - height)
+
+    length = np.pi * RADIUS if body in (CYLINDER, SPHERE) else 6.0
+    scan = np.linspace(0.0, length, 1501)
+    best = scan[np.argmin([distance(s) for s in scan])]
+    step = scan[1]
+    bounds = max(best - step, 0.0), min(best + step, length)
+    return min(
+        minimize_scalar(distance, bounds=bounds, method="bounded", options={"xatol": 1e-10}).fun,
+        distance(best),
+    )
+
+
+def points_about(body, seed=0, n=40):
+    """Random points around a body's face, none of them past the widest section of a ball."""
+    generator = np.random.default_rng(seed)
+    return generator.uniform([-2.5, -1.4, -2.5], [2.5, 0.8, 2.5], (n, 3))
+
+
+@pytest.mark.parametrize("body", BODIES, ids=NAMES[:4])
+def test_gap_is_the_distance_to_the_surface(body):
+    points = points_about(body)
+    gap, _ = body.gap(points)
+    width = beside(body, points)
+    expected = [brute_force_distance(body, w, y) for w, y in zip(width, points[:, 1], strict=True)]
+    np.testing.assert_allclose(np.abs(gap), expected, rtol=0, atol=1e-8)
+    within = points[:, 1] < body.front(points)  # below the face, and none is past the widest section
+    np.testing.assert_array_equal(gap < 0, within)
+    assert within.any()
+    assert (~within).any()
+
+
+@pytest.mark.parametrize("body", ALL, ids=NAMES)
+def test_normal_is_the_slope_of_the_gap_and_of_unit_length(body):
+    points, step = points_about(body, seed=1), 1e-6
+    _, normal = body.gap(points)
+    offsets = step * np.eye(3)
+    slope = [(body.gap(points + offset)[0] - body.gap(points - offset)[0]) / (2 * step) for offset in offsets]
+    np.testing.assert_allclose(normal, np.transpose(slope), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0, rtol=1e-14)
+
+
+@pytest.mark.parametrize("body", ALL, ids=NAMES)
+def test_front_is_where_the_gap_changes_sign(body):
+    lateral = np.random.default_rng(2).uniform(-0.98, 0.98, (30, 3))
+    lateral *= min(body.half_width_mm, RADIUS) / np.sqrt(2)
+    face = lateral.copy()
+    face[:, 1] = body.front(lateral)
+    assert np.isfinite(face).all()
+    up = np.array([0.0, 1e-3, 0.0])
+    np.testing.assert_allclose(body.gap(face)[0], 0.0, rtol=0, atol=1e-14)
+    assert (body.gap(face + up)[0] > 0).all()
+    assert (body.gap(face - up)[0] < 0).all()
+
+
+@pytest.mark.parametrize("body", [*BODIES, Line()], ids=NAMES[:5])
+def test_nothing_is_in_front_beside_a_body(body):
+    half = body.half_width_mm
+    edges = np.array([[-1.001 * half, 0.0, 0.0], [1.001 * half, 0.0, 0.0]])
+    assert (body.front(edges) == -np.inf).all()
+
+
+@pytest.mark.parametrize("body", ALL, ids=NAMES)
+def test_tip_is_the_origin_and_pushes_along_y(body):
+    gap, normal = body.gap(np.zeros((1, 3)))
+    np.testing.assert_allclose(gap, 0.0, atol=1e-15)
+    np.testing.assert_array_equal(normal, [[0.0, 1.0, 0.0]])
+
+
+@pytest.mark.parametrize("body", ALL, ids=NAMES)
+def test_bodies_are_mirror_symmetric(body):
+    points = points_about(body, seed=3)
+    gap, normal = body.gap(points)
+    for mirror in ([-1.0, 1.0, 1.0], [1.0, 1.0, -1.0]):
+        mirrored_gap, mirrored_normal = body.gap(points * mirror)
+        np.testing.assert_array_equal(mirrored_gap, gap)
+        np.testing.assert_array_equal(mirrored_normal, normal * mirror)
+
+
+@pytest.mark.parametrize("body", [CYLINDER, SPHERE], ids=NAMES[:2])
+def test_node_that_a_ball_has_passed_is_pushed_out_in_front(body):
+    points = np.random.default_rng(4).uniform([-0.9, -6.0, -0.4], [0.9, -RADIUS, 0.4], (30, 3))
+    gap, normal = body.gap(points)
+    assert (gap < 0).all()
+    assert (normal[:, 1] > 0).all()
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0, rtol=1e-14)
+
+
+def test_bodies_across_the_finger_do_not_end_in_z_and_round_ones_have_no_preferred_direction():
+    points = points_about(CYLINDER, seed=5)
+    turned = points[:, [2, 1, 0]]
+    for body in (CYLINDER, BAR, Line(), Plate()):
+        np.testing.assert_array_equal(body.gap(points)[0], body.gap(points + np.array([0.0, 0.0, 50.0]))[0])
+    for body in (SPHERE, PUNCH):
+        np.testing.assert_allclose(body.gap(points)[0], body.gap(turned)[0], rtol=0, atol=1e-15)
+
+
+def test_fully_rounded_bar_is_a_cylinder():
+    points = points_about(BAR, seed=6)
+    points = points[points[:, 1] > -RADIUS]
+    round_bar = Bar(width_mm=2 * RADIUS, fillet_mm=RADIUS)
+    np.testing.assert_allclose(round_bar.gap(points)[0], CYLINDER.gap(points)[0], rtol=0, atol=1e-14)
+
+
+def test_line_presses_only_the_nodes_below_it():
+    points = np.array([[0.0, 0.4, 3.0], [0.02, 0.0, 0.0], [0.03, 0.0, 0.0], [-0.5, -2.0, 0.0]])
+    assert Line(diameter_mm=0.05).may_touch(points).tolist() == [True, True, False, False]
+    assert all(body.may_touch(points).all() for body in [*BODIES, Plate()])
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Cylinder(0.0), "diameter_mm"),
+        (lambda: Line(-0.05), "diameter_mm"),
+        (lambda: Sphere(np.nan), "curvature_per_m"),
+        (lambda: Bar(width_mm=np.inf), "width_mm"),
+        (lambda: Bar(width_mm=1.0, fillet_mm=0.6), "half of width_mm, 0.5 mm: got 0.6 mm"),
+        (lambda: FlatPunch(diameter_mm=1.0, fillet_mm=-0.1), "fillet_mm"),
+        (lambda: FlatPunch(diameter_mm="wide"), "diameter_mm"),
+    ],
+)
+def test_impossible_bodies_are_refused_in_one_sentence(make, said):
+    with pytest.raises(InputError, match=said) as refusal:
+        make()
+    assert str(refusal.value).endswith(".")
+    assert "\n" not in str(refusal.value)

@@ -1,0 +1,50 @@
+"""The motion of the indenter and the times at which it is solved."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fingerpad.errors import InputError
+from fingerpad.stimulus import RampAndHold
+
+
+def test_depth_rises_linearly_then_stays():
+    motion = RampAndHold(depth_mm=2.0, ramp_ms=40.0, hold_ms=100.0)
+    np.testing.assert_allclose(
+        motion.depth_at([-5.0, 0.0, 10.0, 40.0, 41.0, 140.0]), [0, 0, 0.5, 2, 2, 2], rtol=1e-15
+    )
+    assert motion.end_ms == 140.0
+    assert motion.depth_at(np.zeros((2, 3))).shape == (2, 3)
+
+
+@given(
+    ramp_ms=st.floats(1.0, 500.0),
+    hold_ms=st.floats(0.5, 5000.0),
+    ramp_steps=st.integers(1, 12),
+    hold_steps=st.integers(1, 12),
+)
+def test_times_cover_both_phases_and_increase(ramp_ms, hold_ms, ramp_steps, hold_steps):
+    motion = RampAndHold(depth_mm=1.0, ramp_ms=ramp_ms, hold_ms=hold_ms)
+    times = motion.times_ms(ramp_steps, hold_steps)
+    assert times.size == 1 + ramp_steps + hold_steps
+    assert times[0] == 0.0
+    assert times[ramp_steps] == ramp_ms
+    assert times[-1] == motion.end_ms
+    steps = np.diff(times)
+    assert (steps > 0).all()
+    np.testing.assert_allclose(steps[:ramp_steps], ramp_ms / ramp_steps, rtol=1e-9)
+
+
+def test_hold_times_grow_geometrically_from_the_ramp_step():
+    since_ramp = RampAndHold(depth_mm=1.0, ramp_ms=50.0, hold_ms=950.0).times_ms(5, 6)[6:] - 50.0
+    np.testing.assert_allclose(since_ramp[0], 10.0, rtol=1e-13)
+    np.testing.assert_allclose(since_ramp[1:] / since_ramp[:-1], 95.0 ** (1 / 5), rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["depth_mm", "ramp_ms", "hold_ms"])
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "1 mm", True])
+def test_impossible_motions_are_refused_in_one_sentence(name, value):
+    with pytest.raises(InputError, match=name) as refusal:
+        RampAndHold(**{name: value})
+    assert str(refusal.value).endswith(".")
