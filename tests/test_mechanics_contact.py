@@ -1,0 +1,142 @@
+"""First touch, pressures and stiffness of contact against differences and by hand."""
+
+import numpy as np
+import pytest
+
+from fingerpad.errors import InputError
+from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.mechanics.contact import Contact, Placement, place
+
+RADIUS = 2.0
+SPHERE = Sphere(curvature_per_m=1000.0 / RADIUS)
+BODIES = [SPHERE, Cylinder(diameter_mm=3.0), Bar(3.0, 0.3), FlatPunch(3.0, 0.4), Plate()]
+NAMES = [type(body).__name__ for body in BODIES]
+
+
+def tilted():
+    """A frame whose columns are orthonormal and right-handed."""
+    q, r = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))
+    q = q * np.sign(np.diag(r))
+    return q * np.linalg.det(q)
+
+
+def rough_skin(seed=1, n=400):
+    """Points of an uneven surface that faces -y."""
+    generator = np.random.default_rng(seed)
+    points = generator.uniform(-3.0, 3.0, (n, 3))
+    points[:, 1] = 0.05 * (points[:, 0] ** 2 + points[:, 2] ** 2) + generator.uniform(0, 0.1, n)
+    return points
+
+
+@pytest.mark.parametrize("body", BODIES, ids=NAMES)
+@pytest.mark.parametrize("rotation", [np.eye(3), tilted()], ids=["along y", "tilted"])
+def test_first_touch_is_where_the_smallest_gap_is_zero(body, rotation):
+    skin = rough_skin() @ rotation.T
+    placement = place(body, skin, rotation @ np.array([0.2, -4.0, -0.1]), rotation)
+    np.testing.assert_allclose(body.gap(placement.to_local(skin, 0.0))[0].min(), 0.0, rtol=0, atol=1e-14)
+    assert body.gap(placement.to_local(skin, 1e-6))[0].min() < 0.0
+    # The axis stays where it was asked for, and the start along it does not matter.
+    further = place(body, skin, rotation @ np.array([0.2, 9.0, -0.1]), rotation)
+    np.testing.assert_allclose(further.origin_mm, placement.origin_mm, rtol=0, atol=1e-14)
+
+
+def test_first_touch_of_a_ball_with_one_node_beside_its_axis():
+    skin = np.array([[1.2, 0.0, 0.0]])
+    placement = place(SPHERE, skin, np.array([0.0, -7.0, 0.0]), np.eye(3))
+    np.testing.assert_allclose(
+        placement.origin_mm, [0.0, RADIUS - np.sqrt(RADIUS**2 - 1.2**2), 0.0], atol=1e-14
+    )
+
+
+@pytest.mark.parametrize("body", [SPHERE, Line()], ids=["Sphere", "Line"])
+def test_passing_by_is_refused(body):
+    with pytest.raises(InputError, match="never touches") as refusal:
+        place(body, np.array([[5.0, 0.0, 0.0]]), np.zeros(3), np.eye(3))
+    assert str(refusal.value).endswith(".")
+
+
+def test_frame_moves_with_the_depth():
+    placement = Placement(np.array([1.0, 2.0, 3.0]), tilted())
+    point = placement.origin_mm + 0.7 * placement.axis + 0.2 * placement.rotation[:, 0]
+    np.testing.assert_allclose(placement.to_local(point[None], 0.5), [[0.2, 0.2, 0.0]], atol=1e-14)
+
+
+def tilted_contact(body, seed=2, n=12):
+    """Nodes pressed a little into a tilted body, away from its kinks, with multipliers."""
+    generator = np.random.default_rng(seed)
+    rotation = tilted()
+    local = generator.uniform([-1.6, 0, -1.6], [1.6, 0, 1.6], (n, 3))
+    local[:, 1] = np.maximum(body.front(local), -0.25) - generator.uniform(0.0, 0.02, n)
+    placement = Placement(np.array([0.3, -0.2, 0.1]), rotation)
+    depth = 0.4
+    positions = local @ rotation.T + placement.origin_mm + depth * placement.axis
+    area = generator.uniform(0.05, 0.2, n)
+    return Contact(body, placement, np.arange(n), area), positions, depth, generator.uniform(0.0, 5.0, n)
+
+
+@pytest.mark.parametrize("body", BODIES, ids=NAMES)
+def test_force_is_the_slope_of_the_potential(body):
+    contact, positions, depth, multipliers = tilted_contact(body)
+    state = contact.state(positions, depth, multipliers)
+    assert (np.linalg.norm(state.force_mn, axis=1) > 0).sum() >= 3
+    step = 1e-6
+    slope = np.empty_like(positions)
+    for index in np.ndindex(positions.shape):
+        offset = np.zeros_like(positions)
+        offset[index] = step
+        ahead = contact.state(positions + offset, depth, multipliers).potential
+        behind = contact.state(positions - offset, depth, multipliers).potential
+        slope[index] = (ahead - behind) / (2 * step)
+    np.testing.assert_allclose(state.force_mn, -slope, rtol=0, atol=1e-6 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize("body", BODIES, ids=NAMES)
+def test_stiffness_with_curvature_is_the_slope_of_the_force(body):
+    contact, positions, depth, multipliers = tilted_contact(body)
+    state = contact.state(positions, depth, multipliers)
+    stiffness = state.stiffness + contact.curvature_stiffness(state, positions, depth)
+    step = 1e-7
+    for axis, offset in enumerate(step * np.eye(3)):
+        ahead = contact.state(positions + offset, depth, multipliers).force_mn
+        behind = contact.state(positions - offset, depth, multipliers).force_mn
+        slope = (ahead - behind) / (2 * step)
+        np.testing.assert_allclose(stiffness[:, :, axis], -slope, rtol=0, atol=1e-5 * np.abs(stiffness).max())
+    np.testing.assert_allclose(stiffness, stiffness.transpose(0, 2, 1), atol=1e-12 * np.abs(stiffness).max())
+
+
+def test_pressures_by_hand():
+    """Under a plate: lambda = <lambda_k - epsilon A g> along y, potential lambda² / (2 epsilon A)."""
+    placement = Placement(np.zeros(3), np.eye(3))
+    contact = Contact(Plate(), placement, np.arange(4), np.array([0.1, 0.2, 0.1, 0.1]), 1000.0)
+    heights = np.array([0.49, 0.48, 0.51, 0.52])
+    positions = np.stack([np.zeros(4), heights, np.zeros(4)], axis=1)
+    state = contact.state(positions, 0.5, np.array([0.0, 1.0, 3.0, 1.0]))
+    np.testing.assert_allclose(state.gap_mm, [-0.01, -0.02, 0.01, 0.02], atol=1e-15)
+    np.testing.assert_allclose(state.force_mn[:, 1], [1.0, 5.0, 2.0, 0.0], atol=1e-12)
+    np.testing.assert_array_equal(state.force_mn[:, [0, 2]], 0.0)
+    np.testing.assert_allclose(state.stiffness[:, 1, 1], [100.0, 200.0, 100.0, 0.0], rtol=1e-13)
+    np.testing.assert_allclose(state.potential, 1 / 200 + 25 / 400 + 4 / 200, rtol=1e-12)
+    np.testing.assert_allclose(state.penetration_mm, 0.02, rtol=1e-13)
+    np.testing.assert_allclose(contact.augmented(state), [1.0, 5.0, 2.0, 0.0], atol=1e-12)
+
+
+def test_augmentation_keeps_the_force_of_a_node_that_no_longer_penetrates():
+    contact, positions, depth, multipliers = tilted_contact(SPHERE)
+    state = contact.state(positions, depth, multipliers)
+    gap, normal = state.gap_mm, state.force_mn
+    pressed = np.linalg.norm(normal, axis=1) > 0
+    outward = normal[pressed] / np.linalg.norm(normal[pressed], axis=1)[:, None]
+    out = positions.copy()
+    out[pressed] -= gap[pressed, None] * outward  # a ball's normal does not change along itself
+    after = contact.state(out, depth, contact.augmented(state))
+    np.testing.assert_allclose(after.force_mn, state.force_mn, rtol=1e-9, atol=1e-9)
+
+
+def test_no_contact_no_force():
+    contact, positions, depth, _ = tilted_contact(Plate())
+    away = contact.state(positions + contact.placement.axis, depth, np.zeros(len(positions)))
+    assert not away.force_mn.any()
+    assert not away.stiffness.any()
+    assert away.potential == 0.0
+    assert away.penetration_mm == 0.0
+    assert not contact.curvature_stiffness(away, positions, depth).any()
