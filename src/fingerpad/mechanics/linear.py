@@ -29,6 +29,10 @@ RENEW_AFTER_ITERATIONS = 16
 MOST_ITERATIONS = 400
 
 
+class _NotPositiveDefiniteError(Exception):
+    """Conjugate gradients met a direction along which the tangent has no stiffness."""
+
+
 class Preconditioner(Protocol):
     """An approximate inverse of the tangent on the free degrees of freedom."""
 
@@ -210,14 +214,19 @@ class LinearSolver:
         Raises
         ------
         ConvergenceError
-            If conjugate gradients do not converge even with a new preconditioner.
+            If the tangent is not positive definite, or conjugate gradients do not converge even with a new
+            preconditioner.
         """
         matrix = self.sparsity.matrix(blocks)
         full = np.zeros(matrix.shape[0])
 
         def multiply(direction: FloatArray) -> FloatArray:
             full[self.free] = direction
-            return (matrix @ full)[self.free]
+            product = (matrix @ full)[self.free]
+            # Conjugate gradients may run through an indefinite tangent unnoticed, to no minimum.
+            if direction @ product < 0.0:
+                raise _NotPositiveDefiniteError
+            return product
 
         size = self.free.size
         operator = LinearOperator((size, size), matvec=multiply, dtype=np.float64)
@@ -234,10 +243,14 @@ class LinearSolver:
                 nonlocal count
                 count += 1
 
-            solution, failed = cg(
-                operator, residual, rtol=relative_tolerance, maxiter=MOST_ITERATIONS,
-                M=inverse, callback=counted,
-            )  # fmt: skip
+            try:
+                solution, failed = cg(
+                    operator, residual, rtol=relative_tolerance, maxiter=MOST_ITERATIONS,
+                    M=inverse, callback=counted,
+                )  # fmt: skip
+            except _NotPositiveDefiniteError:
+                self._stale = True
+                raise ConvergenceError("The tangent is not positive definite.") from None
             self.iterations += count
             self._stale = count > RENEW_AFTER_ITERATIONS
             if not failed and np.isfinite(solution).all():

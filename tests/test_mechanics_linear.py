@@ -1,0 +1,128 @@
+"""The kept factor and the hierarchy against SciPy's direct solver, and systems without a solution."""
+
+import numpy as np
+import pytest
+from scipy.sparse.linalg import spsolve
+
+from fingerpad.errors import ConvergenceError
+from fingerpad.mechanics.assembly import Sparsity, assemble
+from fingerpad.mechanics.linear import (
+    AggregationHierarchy,
+    LinearSolver,
+    PardisoFactor,
+    free_degrees_of_freedom,
+    pypardiso,
+)
+from fingerpad.mechanics.materials import Material, MaterialTable
+from fingerpad.mesh import block_mesh
+
+needs_pardiso = pytest.mark.skipif(pypardiso is None, reason="MKL has no wheel for this processor")
+BLOCK = block_mesh(np.arange(7.0), np.arange(5.0), np.arange(5.0), layers=[0, 1, 2, 3], symmetric=True)
+SPARSITY = Sparsity.of(BLOCK.elements, len(BLOCK.nodes_mm))
+FREE = free_degrees_of_freedom(len(BLOCK.nodes_mm), BLOCK.fixed_nodes, BLOCK.symmetry_nodes)
+
+
+def tangent(shift=0.0):
+    """Blocks of a layered block's tangent; `shift` is taken from every diagonal entry."""
+    table = MaterialTable.of([Material.neo_hooke(shear, 0.45) for shear in (40.0, 40.0, 20.0, 5.0)])
+    nothing = np.zeros_like(BLOCK.nodes_mm)
+    blocks, force = np.empty((SPARSITY.column.size, 3, 3)), np.empty_like(nothing)
+    assemble(
+        BLOCK.nodes_mm, BLOCK.elements, nothing, BLOCK.layer, table.law, np.ones(4),
+        np.zeros((len(BLOCK.elements), 8, 6)), SPARSITY.position, True, force, blocks,
+    )  # fmt: skip
+    blocks[SPARSITY.diagonal] -= shift * np.eye(3)
+    return blocks
+
+
+def direct(blocks, residual):
+    matrix = SPARSITY.matrix(blocks).tocsc()[FREE][:, FREE]
+    return spsolve(matrix, residual)
+
+
+def residual_of(seed=0):
+    return np.random.default_rng(seed).normal(size=FREE.size)
+
+
+PRECONDITIONERS = pytest.mark.parametrize(
+    "make",
+    [
+        pytest.param(lambda: PardisoFactor(SPARSITY, FREE), id="pardiso", marks=needs_pardiso),
+        pytest.param(lambda: AggregationHierarchy(SPARSITY, FREE, BLOCK.nodes_mm), id="aggregation"),
+    ],
+)
+
+
+def test_pattern_holds_every_pair_of_an_element_once():
+    pairs = {(a, b) for element in BLOCK.elements for a in element for b in element}
+    rows = np.repeat(np.arange(len(BLOCK.nodes_mm)), np.diff(SPARSITY.row_start))
+    assert list(zip(rows.tolist(), SPARSITY.column.tolist(), strict=True)) == sorted(pairs)
+    np.testing.assert_array_equal(rows[SPARSITY.diagonal], SPARSITY.column[SPARSITY.diagonal])
+    for element, position in zip(BLOCK.elements, SPARSITY.position, strict=True):
+        np.testing.assert_array_equal(rows[position], np.repeat(element[:, None], 8, axis=1))
+        np.testing.assert_array_equal(SPARSITY.column[position], np.repeat(element[None], 8, axis=0))
+
+
+def test_free_degrees_of_freedom_by_hand():
+    free = free_degrees_of_freedom(3, fixed_nodes=np.array([1]), symmetry_nodes=np.array([1, 2]))
+    assert free.tolist() == [0, 1, 2, 6, 7]
+
+
+@needs_pardiso
+def test_factor_solves_to_single_precision():
+    blocks, residual = tangent(), residual_of()
+    factor = PardisoFactor(SPARSITY, FREE)
+    factor.renew(blocks)
+    exact = direct(blocks, residual)
+    np.testing.assert_allclose(factor.apply(residual), exact, rtol=0, atol=1e-4 * np.abs(exact).max())
+
+
+@PRECONDITIONERS
+def test_solver_restores_double_precision(make):
+    blocks, residual = tangent(), residual_of()
+    solver = LinearSolver(SPARSITY, FREE, make())
+    exact = direct(blocks, residual)
+    solution = solver.solve(blocks, residual, relative_tolerance=1e-12)
+    np.testing.assert_allclose(solution, exact, rtol=0, atol=1e-9 * np.abs(exact).max())
+
+
+@needs_pardiso
+def test_factor_is_kept_while_it_serves_and_renewed_when_not():
+    solver = LinearSolver(SPARSITY, FREE, PardisoFactor(SPARSITY, FREE))
+    blocks = tangent()
+    for scale in (1.0, 1.05, 0.95):
+        solver.solve(scale * blocks, residual_of(), 1e-8)
+    assert solver.renewals == 1
+    other = blocks.copy()
+    other[SPARSITY.diagonal] += (
+        np.diag([500.0, 0.0, 5.0]) * residual_of(1)[: len(BLOCK.nodes_mm), None, None] ** 2
+    )
+    exact = direct(other, residual_of(2))
+    found = [solver.solve(other, residual_of(2), 1e-10) for _ in range(2)]
+    assert solver.renewals == 2
+    for solution in found:
+        np.testing.assert_allclose(solution, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
+
+
+@PRECONDITIONERS
+def test_indefinite_tangent_is_refused(make):
+    solver = LinearSolver(SPARSITY, FREE, make())
+    with pytest.raises(ConvergenceError):
+        solver.solve(tangent(shift=60.0), residual_of(), 1e-8)
+
+
+@PRECONDITIONERS
+def test_tangent_that_turns_indefinite_under_a_kept_factor_is_refused(make):
+    solver = LinearSolver(SPARSITY, FREE, make())
+    solver.solve(tangent(), residual_of(), 1e-8)
+    with pytest.raises(ConvergenceError):
+        solver.solve(tangent(shift=60.0), residual_of(), 1e-8)
+
+
+@needs_pardiso
+def test_body_that_nothing_holds_is_refused():
+    """All nodes free: the tangent is singular and no displacement balances a net force."""
+    everything = np.arange(3 * len(BLOCK.nodes_mm))
+    solver = LinearSolver(SPARSITY, everything, PardisoFactor(SPARSITY, everything))
+    with pytest.raises(ConvergenceError):
+        solver.solve(tangent(), np.ones(everything.size), 1e-8)
