@@ -1,0 +1,186 @@
+"""Results -> figures and one self-contained page."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from fingerpad.errors import InputError
+from fingerpad.files import write_atomically
+from fingerpad.report import discrimination, nail, population, single_unit, skin_deflection, tables
+from fingerpad.report.appearance import png
+from fingerpad.report.summary import summary
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """One figure of the report: its number in the paper, file name, and what draws and explains it."""
+
+    number: int
+    name: str
+    title: str
+    draw: Callable[[dict[str, Any]], Figure]
+    caption: Callable[[dict[str, Any]], str]
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """One section of the results on the page: its figures, then its tables."""
+
+    section: str
+    title: str
+    drawings: tuple[Drawing, ...]
+    tables: Callable[[Any], list[tables.Table]]
+
+
+def _no_tables(_: Any) -> list[tables.Table]:
+    return []
+
+
+CHAPTERS = (
+    Chapter(
+        "skin_deflection",
+        "Level 1: skin",
+        (
+            Drawing(
+                4,
+                "figure_4_skin_deflection",
+                "Deflection of the skin",
+                skin_deflection.draw,
+                skin_deflection.caption,
+            ),
+        ),
+        tables.skin_deflection,
+    ),
+    Chapter(
+        "single_unit",
+        "Level 2: single afferent",
+        (Drawing(5, "figure_5_single_unit", "Rates under a bar", single_unit.draw, single_unit.caption),),
+        tables.single_unit,
+    ),
+    Chapter(
+        "population",
+        "Level 3: population",
+        (Drawing(6, "figure_6_population", "Rates under a sphere", population.draw, population.caption),),
+        _no_tables,
+    ),
+    Chapter(
+        "discrimination",
+        "Level 3: discrimination",
+        (
+            Drawing(
+                7,
+                "figure_7_discrimination",
+                "Spheres told from the standard",
+                discrimination.draw_observers,
+                discrimination.caption_observers,
+            ),
+            Drawing(
+                8,
+                "figure_8_varied_criterion",
+                "The same with a varied criterion",
+                discrimination.draw_criterion,
+                discrimination.caption_criterion,
+            ),
+        ),
+        tables.hit_rates,
+    ),
+    Chapter(
+        "nail",
+        "The border of the nail",
+        (Drawing(9, "figure_9_nail", "Strain energy density all over the finger", nail.draw, nail.caption),),
+        _no_tables,
+    ),
+    Chapter("inputs", "What this rests on", (), tables.inputs),
+    Chapter("manifest", "How this was made", (), tables.manifest),
+)
+
+
+def write_report(results: Mapping[str, Any], folder: Path) -> Path:
+    """Draw finished results: `figures/*.png` and `report.html`, which holds the figures itself.
+
+    Parameters
+    ----------
+    results : mapping
+        JSON-able sections: skin_deflection, single_unit, population, discrimination, nail, comparison, inputs
+        and manifest. A section that is absent is said to be so; one of another name is listed as it stands.
+        None stands for what does not exist, such as the latency of a silent afferent.
+    folder : Path
+        Made if needed; every file in it is written whole or not at all.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    InputError
+        If `results` is no mapping, or a section lacks a part.
+    StoreError
+        If the folder cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     page = write_report({"manifest": {"seed": 1, "wall_s": 4.2}}, Path(folder))
+    ...     page.name, "<td>4.2</td>" in page.read_text(encoding="utf-8")
+    ('report.html', True)
+    """
+    if not isinstance(results, Mapping):
+        raise InputError(f"results must map names of sections to sections: got {type(results).__name__}.")
+    chapters = [_drawn(chapter, results.get(chapter.section)) for chapter in CHAPTERS]
+    others = {key: value for key, value in results.items() if key not in _KNOWN}
+    page = _page(results, chapters, [tables.generic(tables.spelled(key), others[key]) for key in others])
+    for chapter in chapters:
+        for figure in chapter["figures"]:
+            write_atomically(Path(folder) / "figures" / f"{figure['drawing'].name}.png", figure["png"])
+    path = Path(folder) / "report.html"
+    write_atomically(path, page.encode())
+    return path
+
+
+_KNOWN = {"comparison", *(chapter.section for chapter in CHAPTERS)}
+
+
+def _drawn(chapter: Chapter, section: Any) -> dict[str, Any]:
+    """Chapter with its figures and tables; empty if the results do not have it."""
+    try:
+        figures = [
+            {"drawing": drawing, "png": png(drawing.draw, section), "caption": drawing.caption(section)}
+            for drawing in (chapter.drawings if section else ())
+        ]
+        return {
+            "chapter": chapter,
+            "figures": figures,
+            "tables": chapter.tables(section) if section else [],
+            "absent": not section,
+        }
+    except KeyError as error:
+        raise InputError(f"results[{chapter.section!r}] must hold {error.args[0]!r}: it does not.") from error
+
+
+def _page(results: Mapping[str, Any], chapters: list[dict[str, Any]], others: list[tables.Table]) -> str:
+    environment = Environment(
+        loader=PackageLoader("fingerpad.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["base64"] = lambda content: base64.b64encode(content).decode("ascii")
+    comparison = results.get("comparison")
+    return environment.get_template("template.html").render(
+        summary=summary(results),
+        manifest=results.get("manifest") or {},
+        comparison=tables.comparison(comparison) if comparison else None,
+        chapters=chapters,
+        others=others,
+    )

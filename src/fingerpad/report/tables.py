@@ -1,0 +1,257 @@
+"""The tables of the report: rows of finished text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from fingerpad.parameters import STATUSES, paper
+from fingerpad.report import discrimination
+from fingerpad.report.skin_deflection import INDENTERS, TRIALS
+from fingerpad.report.words import ABSENT, number, plain, spelled
+
+Kind = Literal["", "met", "missed", "open", "assumed", "final"]
+VERDICTS: dict[bool | None, tuple[Kind, str]] = {
+    True: ("met", "✓ met"),
+    False: ("missed", "✗ missed"),
+    None: ("open", "○ not judged"),
+}
+PARAMETERS = {
+    "intercept_ma": "intercept β",
+    "dynamic_gain": "dynamic gain k_d",
+    "static_gain": "static gain k_s",
+    "time_constant_ms": "time constant τ",
+    "capacitance_mf": "capacitance C",
+    "threshold_mv": "threshold v",
+}
+PAPER_FOLD = 3
+
+
+@dataclass(frozen=True)
+class Row:
+    """Texts of one row, the first its heading, and how the row is marked."""
+
+    cells: Sequence[str]
+    kind: Kind = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with its title, column headings, rows and a closing note."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Row]
+    note: str = ""
+
+
+def comparison(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """Return ours beside the paper's; a miss is marked in words as well as in colour."""
+    return Table(
+        "This run beside the paper",
+        ("quantity", "paper", "this run", "difference", "verdict", "rests on", "note"),
+        [
+            Row(
+                (
+                    *(plain(row.get(key)) for key in ("quantity", "paper", "ours", "difference")),
+                    VERDICTS[row.get("met")][1],
+                    *(plain(row.get(key) or "") for key in ("status", "note")),
+                ),
+                VERDICTS[row.get("met")][0],
+            )
+            for row in rows
+        ],
+    )
+
+
+def skin_deflection(section: Mapping[str, Any]) -> list[Table]:
+    """Return fit and force of each material trial."""
+    rows = [
+        Row(
+            (
+                f"{name}, {INDENTERS[indenter]}",
+                *(number(section[trial][indenter].get(key)) for key in ("r2", "r2_mirrored", "force_mn")),
+            )
+        )
+        for trial, (name, _, _) in TRIALS.items()
+        for indenter in INDENTERS
+        if indenter in section.get(trial, {})
+    ]
+    note = (
+        "R² mirrored: with proximal and distal exchanged, since the observations do not say which is which."
+    )
+    return [Table("Fit and force", ("trial", "R²", "R², mirrored", "force [mN]"), rows, note)]
+
+
+def single_unit(section: Mapping[str, Any]) -> list[Table]:
+    """Return parameters, folds, the steps of one fit, and modulation."""
+    tables = [_fit(section), _parameters(section), _folds(section.get("folds") or [])]
+    tables += [_history(fold) for fold in section.get("folds") or [] if fold["fold"] == PAPER_FOLD]
+    tables.append(_modulation(section.get("modulation") or {}))
+    if section.get("edge_response"):
+        tables.append(generic("Response to an edge", section["edge_response"]))
+    return [table for table in tables if table.rows]
+
+
+def _fit(section: Mapping[str, Any]) -> Table:
+    names = {
+        "fss_out_of_sample": ("positions not fitted to, mean of the folds", paper.FSS_OUT_OF_SAMPLE.value),
+        "fss_in_sample": ("all positions, dynamic and static weighted 1:3", None),
+        "fss_in_sample_dynamic": ("all positions, dynamic rates", None),
+        "fss_in_sample_static": ("all positions, static rates", None),
+    }
+    rows = [Row((name, number(printed), number(section.get(key)))) for key, (name, printed) in names.items()]
+    return Table("Fractional sum of squares (FSS)", ("over", "paper", "this run"), rows)
+
+
+def _parameters(section: Mapping[str, Any]) -> Table:
+    starts, final, units = (
+        section.get("start_points") or [],
+        section["parameters"],
+        section.get("units") or {},
+    )
+    rows = [
+        Row(
+            (
+                PARAMETERS.get(name, spelled(name)),
+                *(number(start.get(name)) for start in starts),
+                number(value),
+                units.get(name, ""),
+            )
+        )
+        for name, value in final.items()
+    ]
+    columns = ("parameter", *(f"start {index}" for index in range(1, len(starts) + 1)), "fitted", "unit")
+    return Table("Parameters of the afferent", columns, rows)
+
+
+def _folds(folds: Sequence[Mapping[str, Any]]) -> Table:
+    rows = [
+        Row(
+            (
+                plain(fold["fold"]),
+                ", ".join(f"{shift:+.1f}".replace("-", "−") for shift in fold["testing_shift_mm"]),
+                plain(fold.get("start")),
+                number(fold.get("fss_train")),
+                number(fold.get("fss_test")),
+            )
+        )
+        for fold in folds
+    ]
+    columns = ("fold", "positions kept for testing [mm]", "better start", "FSS, training", "FSS, testing")
+    return Table("Folds of the cross-validation (the paper's Table 3)", columns, rows)
+
+
+def _history(fold: Mapping[str, Any]) -> Table:
+    history = fold.get("history") or []
+    names = list(fold["parameters"])
+    rows = [
+        Row(
+            (
+                plain(step["iteration"]),
+                number(step.get("fss")),
+                *(number(step["parameters"].get(name)) for name in names),
+            ),
+            "final" if step is history[-1] else "",
+        )
+        for step in history
+    ]
+    note = (
+        "The last row, in bold, is final; its FSS on the testing positions is "
+        f"{number(fold.get('fss_test'))}. The paper's fit of fold 3 from start 2 rose from "
+        f"{number(paper.FOLD_3_FSS_START.value)} to {number(paper.FOLD_3_FSS_FITTED.value)} in "
+        f"{number(paper.FOLD_3_ITERATIONS.value)} iterations, and reached "
+        f"{number(paper.FOLD_3_FSS_TEST.value)} on its testing positions."
+    )
+    title = f"Steps of the fit: fold {fold['fold']}, start {plain(fold.get('start'))} (the paper's Table 4)"
+    columns = ("iteration", "FSS, training", *(PARAMETERS.get(name, spelled(name)) for name in names))
+    return Table(title, columns, rows, note)
+
+
+def _modulation(modulation: Mapping[str, Any]) -> Table:
+    keys = ("maximum_hz", "minimum_hz", "difference_hz", "index")
+    rows = [
+        Row((f"{phase}, {who}", *(number(modulation[phase].get(source, {}).get(key)) for key in keys)))
+        for phase in ("dynamic", "static")
+        if phase in modulation
+        for who, source in (("observed", "observed"), ("this run", "ours"))
+    ]
+    note = (
+        "All but the index in spikes/s. The paper predicts a dynamic minimum of "
+        f"{number(paper.DYNAMIC_RATE_MINIMUM.value)}, maximum of {number(paper.DYNAMIC_RATE_MAXIMUM.value)} "
+        f"and difference of {number(paper.DYNAMIC_RATE_DIFFERENCE.value)}, and a static difference of "
+        f"{number(paper.STATIC_RATE_DIFFERENCE.value)}; it calls the differences modulation indices."
+    )
+    columns = ("rates", "maximum R_max", "minimum R_min", "R_max − R_min", "index, Eq. 11")
+    return Table("Modulation at the edge of the bar (the paper's Table 5)", columns, rows, note)
+
+
+def hit_rates(section: Mapping[str, Any]) -> list[Table]:
+    """Return the numbers behind Figures 7 and 8."""
+    panels = [*discrimination.observer_panels(dict(section)), *discrimination.criterion_panels(dict(section))]
+    rows = [
+        Row((f"{title.replace(chr(10), ', ')}, sphere at {place} mm", *_with_spread(rates, suffix)))
+        for title, rates in panels
+        if rates
+        for place, suffix in (("0.0", ""), ("0.2", "_shifted"))
+        if rates.get(f"hit_rate{suffix}")
+    ]
+    columns = ("observer", *(f"{number(curvature)} 1/m" for curvature in section["curvature_per_m"][1:]))
+    return [Table("Hit rates, mean ± standard deviation", columns, rows)] if rows else []
+
+
+def _with_spread(rates: Mapping[str, Any], suffix: str) -> list[str]:
+    means = rates[f"hit_rate{suffix}"]
+    spreads = rates.get(f"hit_rate{suffix}_sd") or [None] * len(means)
+    return [
+        ABSENT if mean is None else f"{mean:.2f}" + ("" if spread is None else f" ± {spread:.2f}")
+        for mean, spread in zip(means, spreads, strict=True)
+    ]
+
+
+def inputs(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
+    """Return the meaning of the four words, and every published number with its own."""
+    counts = {status: sum(row["status"] == status for row in rows) for status in STATUSES}
+    words = [
+        Row((status, meaning, plain(counts[status])), "assumed" if status == "assumed" else "")
+        for status, meaning in STATUSES.items()
+    ]
+    listed = [
+        Row(
+            (
+                plain(row["name"]),
+                plain(row["value"]),
+                "" if row["unit"] == "1" else plain(row["unit"]),
+                plain(row["status"]),
+                plain(row["source"]),
+            ),
+            "assumed" if row["status"] == "assumed" else "",
+        )
+        for row in rows
+    ]
+    return [
+        Table("What the four words mean", ("status", "meaning", "numbers"), words),
+        Table("Published numbers", ("number", "value", "unit", "status", "source"), listed),
+    ]
+
+
+def manifest(content: Mapping[str, Any]) -> list[Table]:
+    """Return how the run was made: single facts, then its stages, then the packages."""
+    facts = {key: value for key, value in content.items() if key not in ("stages", "packages")}
+    tables = [generic("The run", facts)]
+    stages = content.get("stages") or []
+    if stages:
+        keys = list(dict.fromkeys(key for stage in stages for key in stage))
+        rows = [Row([plain(stage.get(key)) for key in keys]) for stage in stages]
+        tables.append(Table("Stages", [spelled(key) for key in keys], rows))
+    if content.get("packages"):
+        packages = [Row((name, plain(version))) for name, version in content["packages"].items()]
+        tables.append(Table("Packages", ("package", "version"), packages))
+    return tables
+
+
+def generic(title: str, content: Any) -> Table:
+    """Return any content as names and values."""
+    facts = content if isinstance(content, Mapping) else {"value": content}
+    return Table(title, ("", ""), [Row((spelled(str(key)), plain(value))) for key, value in facts.items()])

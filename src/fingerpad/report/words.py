@@ -1,0 +1,113 @@
+"""Numbers and lists as people read them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+ABSENT = "–"
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_LONG_LIST = 8
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a number with so many significant digits, or a dash for one that does not exist.
+
+    Parameters
+    ----------
+    value : float or None
+        Any number; None and NaN are what silent afferents and skipped steps leave.
+    digits : int
+        Significant digits of fractions; whole numbers keep all of theirs up to a million.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> number(0.8371), number(232000), number(8e-9), number(-0.25), number(None)
+    ('0.837', '232 000', '8 × 10⁻⁹', '−0.25', '–')
+    """
+    if value is None or math.isnan(value):
+        return ABSENT
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    size = abs(value)
+    if float(value).is_integer() and size < 1e6:
+        text = f"{value:,.0f}".replace(",", " ") if size >= 1e4 else f"{value:.0f}"
+    elif size >= 1e6 or size < 1e-3:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
+        text = f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}"
+    elif size >= 10.0**digits:
+        text = f"{value:,.0f}".replace(",", " ")
+    else:
+        text = f"{value:.{digits}g}"
+    return text.replace("-", "−") if text.startswith("-") else text
+
+
+def joined(parts: Sequence[str]) -> str:
+    """Return a list as a sentence has it.
+
+    Examples
+    --------
+    >>> joined(["skin", "nerve", "percept"])
+    'skin, nerve and percept'
+    """
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
+
+
+def spelled(key: str) -> str:
+    """Return the name of a field in words, its unit in brackets.
+
+    Examples
+    --------
+    >>> spelled("peak_memory_mb"), spelled("time_constant_ms"), spelled("worst_scaled_jacobian")
+    ('peak memory [MB]', 'time constant [ms]', 'worst scaled jacobian')
+    """
+    words = key.split("_")
+    for length, unit in ((2, _UNITS.get("_".join(words[-2:]))), (1, _UNITS.get(words[-1]))):
+        if unit and len(words) > length:
+            return f"{' '.join(words[:-length])} [{unit}]"
+    return " ".join(words)
+
+
+_UNITS = {
+    "per_m": "1/m",
+    "per_mm": "1/mm",
+    "mm": "mm",
+    "ms": "ms",
+    "s": "s",
+    "mb": "MB",
+    "hz": "spikes/s",
+    "kpa": "kPa",
+    "mn": "mN",
+    "ma": "mA",
+    "mf": "mF",
+    "mv": "mV",
+}
+
+
+def plain(value: Any) -> str:
+    """Return any JSON value as a short text: long lists by their size and range.
+
+    Examples
+    --------
+    >>> plain(True), plain(0.5), plain("coarse"), plain([1, 2]), plain(list(range(40)))
+    ('yes', '0.5', 'coarse', '1, 2', '40 values, 0 … 39')
+    """
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if value is None or isinstance(value, int | float):
+        return number(value)
+    if isinstance(value, Mapping):
+        return "; ".join(f"{spelled(str(key))}: {plain(item)}" for key, item in value.items())
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        if len(value) <= _LONG_LIST:
+            return ", ".join(plain(item) for item in value) or ABSENT
+        known = [item for item in value if isinstance(item, int | float) and not math.isnan(item)]
+        span = f", {number(min(known))} … {number(max(known))}" if known else ""
+        return f"{len(value)} values{span}"
+    return str(value)
