@@ -91,7 +91,7 @@ def criterion_panels(section: dict[str, Any]) -> list[Panel]:
 
 def _draw(section: dict[str, Any], panels: list[Panel], columns: int) -> Figure:
     rows = max(1, -(-len(panels) // columns))
-    figure = new_figure(11.0 if columns > 2 else 8.0, 3.1 * rows + 0.5)
+    figure = new_figure(11.0 if columns > 2 else 10.0, 3.1 * rows + 0.5)
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     comparison = numbers(section["curvature_per_m"])[1:]
     for index, axes in enumerate(grid.flat):

@@ -67,7 +67,15 @@ CHAPTERS = (
     Chapter(
         "population",
         "Level 3: population",
-        (Drawing(6, "figure_6_population", "Rates under a sphere", population.draw, population.caption),),
+        (
+            Drawing(
+                6,
+                "figure_6_population",
+                "Rates and latencies under a sphere",
+                population.draw,
+                population.caption,
+            ),
+        ),
         _no_tables,
     ),
     Chapter(

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from fingerpad.checks import FloatArray
+from fingerpad.parameters import protocol
 from fingerpad.report.appearance import GREY, PALE, new_figure, numbers, say_nothing_to_draw
 from fingerpad.report.words import number
 
@@ -106,7 +107,7 @@ def caption(section: dict[str, Any]) -> str:
     """Say what Figure 6 shows."""
     return (
         f"Response of afferents all over the pad to a sphere of {number(section['curvature_per_m'])} 1/m, "
-        "1.0 mm deep. Left: the quantity as a height. Right: the same from above; circles are the receptors "
-        "that the observers of Figures 7 and 8 read, hatched places stay silent. The paper shows rates that "
-        "are highest and first spikes that come earliest under the sphere."
+        f"{protocol.DEPTH.value} mm deep. Left: the quantity as a height. Right: the same from above; "
+        "circles are the receptors that the observers of Figures 7 and 8 read, hatched places stay silent. "
+        "The paper shows rates that are highest and first spikes that come earliest under the sphere."
     )

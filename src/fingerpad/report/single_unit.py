@@ -6,12 +6,12 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from fingerpad.parameters import paper
+from fingerpad.parameters import paper, protocol
 from fingerpad.report.appearance import BLACK, BLUE, new_figure, numbers
-from fingerpad.report.words import number
+from fingerpad.report.words import fixed, number
 
 PHASES = {"dynamic": "dynamic ramp", "static": "static hold"}
-BAR_HALF_WIDTH_MM = 1.5
+BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
 
 
 def draw(section: dict[str, Any]) -> Figure:
@@ -58,11 +58,11 @@ def caption(section: dict[str, Any]) -> str:
     """Say what Figure 5 shows and what the paper found."""
     ours = section.get("fss_out_of_sample")
     return (
-        "Firing rate of one SAI afferent under a bar 3.0 mm wide, pressed in by 1.0 mm at 36 positions "
-        "relative to the centre of its receptive field; shaded: positions at which the bar covers the "
-        "centre. Observed: Phillips & Johnson 1981. The line is predicted with the parameters below. "
-        "Fractional sum of squares (FSS, 1 is perfect) on shifts that were not used for fitting: "
-        f"{number(ours)} here, {number(paper.FSS_OUT_OF_SAMPLE.value)} in the paper. The paper's dynamic "
-        f"rates run from {number(paper.DYNAMIC_RATE_MINIMUM.value)} to "
-        f"{number(paper.DYNAMIC_RATE_MAXIMUM.value)} spikes/s."
+        f"Firing rate of one SAI afferent under a bar {protocol.BAR_WIDTH.value} mm wide, pressed in by "
+        f"{protocol.DEPTH.value} mm at {len(section['shift_mm'])} positions relative to the centre of its "
+        "receptive field; shaded: positions at which the bar covers the centre. Observed: Phillips & "
+        "Johnson 1981. The line is predicted with the parameters below. Fractional sum of squares (FSS, 1 "
+        f"is perfect) on positions that were not used for fitting: {fixed(ours, 2)} here, "
+        f"{fixed(paper.FSS_OUT_OF_SAMPLE.value, 2)} in the paper. The paper's dynamic rates run from "
+        f"{number(paper.DYNAMIC_RATE_MINIMUM.value)} to {number(paper.DYNAMIC_RATE_MAXIMUM.value)} spikes/s."
     )

@@ -7,15 +7,19 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fingerpad.parameters import protocol
 from fingerpad.report.appearance import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, numbers
-from fingerpad.report.words import number
 
+UM_PER_MM = 1000.0
 TRIALS = {
     "trial1": ("Trial 1", BLUE, (0, (5, 2))),
     "trial2": ("Trial 2", ORANGE, (0, (1, 1.2))),
     "trial3": ("Trial 3", GREEN, "-"),
 }
-INDENTERS = {"line": "50 µm line", "cylinder": "3.17 mm cylinder"}
+INDENTERS = {
+    "line": f"{protocol.LINE_DIAMETER.value * UM_PER_MM:.0f} µm line",
+    "cylinder": f"{protocol.CYLINDER_DIAMETER.value} mm cylinder",
+}
 NEAR_MM = 2.5
 
 
@@ -39,7 +43,7 @@ def draw(section: dict[str, Any]) -> Figure:
             _profiles(axes, section, indenter)
             if indenter == "cylinder":
                 _observed(axes, section.get("observed"))
-        whole.set_title(f"({'ab'[row]}) {name}, 1.0 mm deep")
+        whole.set_title(f"({'ab'[row]}) {name}, {protocol.DEPTH.value} mm deep")
         whole.margins(x=0.01)
         whole.set_ylabel("deflection towards the bone [mm]")
         near.set_title("the middle, enlarged")
@@ -47,7 +51,7 @@ def draw(section: dict[str, Any]) -> Figure:
         whole.legend(loc="lower left")
         whole.invert_yaxis()  # Skin that yields goes down; the row shares this axis.
     for axes in panels[-1]:
-        axes.set_xlabel("distance from the indenter's axis, distal positive [mm]")
+        axes.set_xlabel("distance from the indenter's axis along the finger [mm]")
     panels[-1, 1].set_xlabel("distance [mm]")
     return figure
 
@@ -92,18 +96,12 @@ def _observed(axes: Axes, observed: dict[str, Any] | None) -> None:
         )
 
 
-def caption(section: dict[str, Any]) -> str:
+def caption(_: dict[str, Any]) -> str:
     """Say what Figure 4 shows and what the paper found."""
-    forces = [
-        f"{name} {number(section[trial]['cylinder']['force_mn'])} mN"
-        for trial, (name, _, _) in TRIALS.items()
-        if section.get(trial, {}).get("cylinder", {}).get("force_mn") is not None
-    ]
     return (
         "Deflection of the skin along the midline of the fingertip at the end of the indentation, drawn "
         "downwards as the skin goes. Points: a living human fingertip under the cylinder; the cross is a "
         "step that digitising left at the end of the curve and is left out of R². No observations under the "
         "line are available to us. The paper found that Trial 1 overshoots, Trial 2 undershoots and Trial "
         "3, which combines the two, matches."
-        + (f" Force on the cylinder, whole finger: {', '.join(forces)}." if forces else "")
     )

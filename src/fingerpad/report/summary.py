@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from fingerpad.parameters import paper
-from fingerpad.report.words import joined, number
+from fingerpad.report.words import fixed, joined, number
 
 
 def summary(results: Mapping[str, Any]) -> list[str]:
@@ -45,7 +45,7 @@ def _skin(section: Mapping[str, Any]) -> str:
     if not fits:
         return ""
     best = max(fits, key=lambda name: fits[name])
-    listed = joined([f"{name} {number(fit, 2)}" for name, fit in fits.items()])
+    listed = joined([f"{name} {fixed(fit, 2)}" for name, fit in fits.items()])
     return (
         f"Skin: of the material trials, {best} comes closest to the observed deflection under the cylinder "
         f"(R²: {listed}); in the paper Trial 3 does."
@@ -55,9 +55,9 @@ def _skin(section: Mapping[str, Any]) -> str:
 def _nerve(section: Mapping[str, Any]) -> str:
     return (
         "Nerve: the fitted afferent reaches a fractional sum of squares of "
-        f"{number(section.get('fss_out_of_sample'), 2)} on positions of the bar that it was not fitted to "
-        f"(the paper: {number(paper.FSS_OUT_OF_SAMPLE.value)}) and {number(section.get('fss_in_sample'), 2)} "
-        "on all positions."
+        f"{fixed(section.get('fss_out_of_sample'), 2)} on positions of the bar that it was not fitted to "
+        f"(the paper: {fixed(paper.FSS_OUT_OF_SAMPLE.value, 2)}) and "
+        f"{fixed(section.get('fss_in_sample'), 2)} on all positions."
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 from fingerpad.parameters import STATUSES, paper
 from fingerpad.report import discrimination
 from fingerpad.report.skin_deflection import INDENTERS, TRIALS
-from fingerpad.report.words import ABSENT, number, plain, spelled
+from fingerpad.report.words import ABSENT, fixed, number, plain, spelled
 
 Kind = Literal["", "met", "missed", "open", "assumed", "final"]
 VERDICTS: dict[bool | None, tuple[Kind, str]] = {
@@ -26,6 +26,7 @@ PARAMETERS = {
     "threshold_mv": "threshold v",
 }
 PAPER_FOLD = 3
+UNBROKEN = "\N{NO-BREAK SPACE}"
 
 
 @dataclass(frozen=True)
@@ -71,23 +72,23 @@ def skin_deflection(section: Mapping[str, Any]) -> list[Table]:
         Row(
             (
                 f"{name}, {INDENTERS[indenter]}",
-                *(number(section[trial][indenter].get(key)) for key in ("r2", "r2_mirrored", "force_mn")),
+                *(fixed(section[trial][indenter].get(key), 3) for key in ("r2", "r2_mirrored")),
+                fixed(section[trial][indenter].get("force_mn"), 1),
             )
         )
         for trial, (name, _, _) in TRIALS.items()
         for indenter in INDENTERS
         if indenter in section.get(trial, {})
     ]
-    note = (
-        "R² mirrored: with proximal and distal exchanged, since the observations do not say which is which."
-    )
+    note = "R², mirrored: with the proximal and the distal side of the observations exchanged."
     return [Table("Fit and force", ("trial", "R²", "R², mirrored", "force [mN]"), rows, note)]
 
 
 def single_unit(section: Mapping[str, Any]) -> list[Table]:
     """Return parameters, folds, the steps of one fit, and modulation."""
     tables = [_fit(section), _parameters(section), _folds(section.get("folds") or [])]
-    tables += [_history(fold) for fold in section.get("folds") or [] if fold["fold"] == PAPER_FOLD]
+    units = section.get("units") or {}
+    tables += [_history(fold, units) for fold in section.get("folds") or [] if fold["fold"] == PAPER_FOLD]
     tables.append(_modulation(section.get("modulation") or {}))
     if section.get("edge_response"):
         tables.append(generic("Response to an edge", section["edge_response"]))
@@ -101,7 +102,9 @@ def _fit(section: Mapping[str, Any]) -> Table:
         "fss_in_sample_dynamic": ("all positions, dynamic rates", None),
         "fss_in_sample_static": ("all positions, static rates", None),
     }
-    rows = [Row((name, number(printed), number(section.get(key)))) for key, (name, printed) in names.items()]
+    rows = [
+        Row((name, fixed(printed, 2), fixed(section.get(key), 3))) for key, (name, printed) in names.items()
+    ]
     return Table("Fractional sum of squares (FSS)", ("over", "paper", "this run"), rows)
 
 
@@ -133,8 +136,8 @@ def _folds(folds: Sequence[Mapping[str, Any]]) -> Table:
                 plain(fold["fold"]),
                 ", ".join(f"{shift:+.1f}".replace("-", "−") for shift in fold["testing_shift_mm"]),
                 plain(fold.get("start")),
-                number(fold.get("fss_train")),
-                number(fold.get("fss_test")),
+                fixed(fold.get("fss_train"), 3),
+                fixed(fold.get("fss_test"), 3),
             )
         )
         for fold in folds
@@ -143,14 +146,14 @@ def _folds(folds: Sequence[Mapping[str, Any]]) -> Table:
     return Table("Folds of the cross-validation (the paper's Table 3)", columns, rows)
 
 
-def _history(fold: Mapping[str, Any]) -> Table:
+def _history(fold: Mapping[str, Any], units: Mapping[str, str]) -> Table:
     history = fold.get("history") or []
     names = list(fold["parameters"])
     rows = [
         Row(
             (
                 plain(step["iteration"]),
-                number(step.get("fss")),
+                fixed(step.get("fss"), 3),
                 *(number(step["parameters"].get(name)) for name in names),
             ),
             "final" if step is history[-1] else "",
@@ -159,13 +162,16 @@ def _history(fold: Mapping[str, Any]) -> Table:
     ]
     note = (
         "The last row, in bold, is final; its FSS on the testing positions is "
-        f"{number(fold.get('fss_test'))}. The paper's fit of fold 3 from start 2 rose from "
+        f"{fixed(fold.get('fss_test'), 3)}. The paper's fit of fold 3 from start 2 rose from "
         f"{number(paper.FOLD_3_FSS_START.value)} to {number(paper.FOLD_3_FSS_FITTED.value)} in "
         f"{number(paper.FOLD_3_ITERATIONS.value)} iterations, and reached "
         f"{number(paper.FOLD_3_FSS_TEST.value)} on its testing positions."
     )
     title = f"Steps of the fit: fold {fold['fold']}, start {plain(fold.get('start'))} (the paper's Table 4)"
-    columns = ("iteration", "FSS, training", *(PARAMETERS.get(name, spelled(name)) for name in names))
+    headings = [
+        PARAMETERS.get(name, spelled(name)) + (f" [{units[name]}]" if name in units else "") for name in names
+    ]
+    columns = ("iteration", "FSS, training", *headings)
     return Table(title, columns, rows, note)
 
 
@@ -183,7 +189,7 @@ def _modulation(modulation: Mapping[str, Any]) -> Table:
         f"and difference of {number(paper.DYNAMIC_RATE_DIFFERENCE.value)}, and a static difference of "
         f"{number(paper.STATIC_RATE_DIFFERENCE.value)}; it calls the differences modulation indices."
     )
-    columns = ("rates", "maximum R_max", "minimum R_min", "R_max − R_min", "index, Eq. 11")
+    columns = ("rates", "maximum", "minimum", "difference", "index, Eq. 11")
     return Table("Modulation at the edge of the bar (the paper's Table 5)", columns, rows, note)
 
 
@@ -191,13 +197,17 @@ def hit_rates(section: Mapping[str, Any]) -> list[Table]:
     """Return the numbers behind Figures 7 and 8."""
     panels = [*discrimination.observer_panels(dict(section)), *discrimination.criterion_panels(dict(section))]
     rows = [
-        Row((f"{title.replace(chr(10), ', ')}, sphere at {place} mm", *_with_spread(rates, suffix)))
+        Row((title.replace("\n", ", "), place, *_with_spread(rates, suffix)))
         for title, rates in panels
         if rates
         for place, suffix in (("0.0", ""), ("0.2", "_shifted"))
         if rates.get(f"hit_rate{suffix}")
     ]
-    columns = ("observer", *(f"{number(curvature)} 1/m" for curvature in section["curvature_per_m"][1:]))
+    columns = (
+        "observer",
+        "sphere at [mm]",
+        *(f"{number(curvature)} 1/m" for curvature in section["curvature_per_m"][1:]),
+    )
     return [Table("Hit rates, mean ± standard deviation", columns, rows)] if rows else []
 
 
@@ -205,7 +215,9 @@ def _with_spread(rates: Mapping[str, Any], suffix: str) -> list[str]:
     means = rates[f"hit_rate{suffix}"]
     spreads = rates.get(f"hit_rate{suffix}_sd") or [None] * len(means)
     return [
-        ABSENT if mean is None else f"{mean:.2f}" + ("" if spread is None else f" ± {spread:.2f}")
+        ABSENT
+        if mean is None
+        else f"{mean:.2f}" + ("" if spread is None else f"{UNBROKEN}±{UNBROKEN}{spread:.2f}")
         for mean, spread in zip(means, spreads, strict=True)
     ]
 

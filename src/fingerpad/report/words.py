@@ -48,6 +48,19 @@ def number(value: float | None, digits: int = 3) -> str:
     return text.replace("-", "−") if text.startswith("-") else text
 
 
+def fixed(value: float | None, decimals: int) -> str:
+    """Return a number with so many decimals, for columns that are compared by eye.
+
+    Examples
+    --------
+    >>> fixed(0.9, 2), fixed(-0.1, 2), fixed(None, 2)
+    ('0.90', '−0.10', '–')
+    """
+    if value is None or not math.isfinite(value):
+        return number(value)
+    return f"{value:.{decimals}f}".replace("-", "−")
+
+
 def joined(parts: Sequence[str]) -> str:
     """Return a list as a sentence has it.
 
