@@ -117,7 +117,17 @@ def test_pressures_by_hand():
     np.testing.assert_allclose(state.stiffness[:, 1, 1], [100.0, 200.0, 100.0, 0.0], rtol=1e-13)
     np.testing.assert_allclose(state.potential, 1 / 200 + 25 / 400 + 4 / 200, rtol=1e-12)
     np.testing.assert_allclose(state.penetration_mm, 0.02, rtol=1e-13)
+    np.testing.assert_allclose(state.misfit_mm, 0.02, rtol=1e-13)
     np.testing.assert_allclose(contact.augmented(state), [1.0, 5.0, 2.0, 0.0], atol=1e-12)
+
+
+def test_pressed_node_that_hovers_is_a_misfit_and_no_penetration():
+    contact = Contact(Plate(), Placement(np.zeros(3), np.eye(3)), np.arange(2), np.full(2, 0.1), 1000.0)
+    state = contact.state(np.array([[0.0, 0.53, 0.0], [0.0, 0.9, 0.0]]), 0.5, np.array([4.0, 0.0]))
+    assert state.penetration_mm == 0.0
+    np.testing.assert_allclose(
+        state.misfit_mm, 0.03, rtol=1e-12
+    )  # the far node is neither pressed nor inside
 
 
 def test_augmentation_keeps_the_force_of_a_node_that_no_longer_penetrates():
@@ -139,4 +149,5 @@ def test_no_contact_no_force():
     assert not away.stiffness.any()
     assert away.potential == 0.0
     assert away.penetration_mm == 0.0
+    assert away.misfit_mm == 0.0
     assert not contact.curvature_stiffness(away, positions, depth).any()

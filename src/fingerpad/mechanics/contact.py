@@ -107,6 +107,15 @@ class ContactState:
         """Deepest penetration of any node. [mm]"""
         return float(max(0.0, -self.gap_mm.min()))
 
+    @property
+    def misfit_mm(self) -> float:
+        """Largest distance from the indenter's surface of a node that penetrates or is pressed. [mm]
+
+        A pressed node may also hover above the surface: while the skin relaxes, its multiplier is too large.
+        """
+        touching = (self.gap_mm < 0.0) | self.force_mn.any(axis=1)
+        return float(np.abs(self.gap_mm[touching]).max(initial=0.0))
+
 
 @dataclass(frozen=True)
 class Contact:

@@ -31,7 +31,8 @@ class NewtonSettings:
     residual_tolerance : float
         Norm of the out-of-balance nodal forces over the contact force.
     penetration_tolerance : float
-        Deepest penetration over the depth of indentation; contact is augmented until it is met.
+        Largest distance between pressed skin and indenter, over the depth of indentation; contact is
+        augmented until it is met.
     most_iterations : int
         Newton steps before the attempt is given up.
     """
@@ -133,6 +134,9 @@ class _Evaluation:
         self.residual = force.ravel()[body.free]
         pressed = float(np.linalg.norm(self.contact.force_mn.sum(axis=0)))
         self.relative_residual = float(np.linalg.norm(self.residual)) / max(pressed, SMALLEST_FORCE_MN)
+        if np.isnan(internal):
+            # Forces were left half summed, and could look balanced.
+            self.relative_residual = np.inf
         stiffness = self.contact.stiffness
         if self.relative_residual < CURVATURE_BELOW_RESIDUAL:
             stiffness = stiffness + contact.curvature_stiffness(self.contact, positions, load.depth_mm)
@@ -180,10 +184,10 @@ def find_equilibrium(
     for iteration in range(settings.most_iterations):
         history.append(
             f"iteration {iteration}: residual {state.relative_residual:.2e}, "
-            f"penetration {1e3 * state.contact.penetration_mm:.3f} µm"
+            f"misfit {1e3 * state.contact.misfit_mm:.3f} µm"
         )
         if state.relative_residual <= settings.residual_tolerance:
-            if state.contact.penetration_mm <= allowed_mm:
+            if state.contact.misfit_mm <= allowed_mm:
                 return Equilibrium(state.displacement, state.contact, multipliers, iteration)
             multipliers = load.contact.augmented(state.contact)
             state = _Evaluation(body, load, state.displacement, multipliers, blocks)
