@@ -1,6 +1,30 @@
 """The report draws finished numbers: all of them, escaped, and whole or not at all."""
 
+import base64
+import re
+import struct
+import subprocess
+import sys
+
+import matplotlib
 import numpy as np
+import pytest
+
+from fingerpad.errors import InputError
+from fingerpad.parameters import all_published
+from fingerpad.report import (
+    discrimination,
+    nail,
+    page,
+    population,
+    single_unit,
+    skin_deflection,
+    summary,
+    tables,
+    words,
+    write_report,
+)
+from fingerpad.report.appearance import BLUE, GREEN, ORANGE, RESOLUTION_DPI
 
 SHIFT_MM = np.linspace(-3.5, 3.5, 36)
 CURVATURE_PER_M = [287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0]
@@ -221,3 +245,324 @@ def _nail() -> dict:
             "displaced": True,
         },
     }
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    return write_report(synthetic_results(), tmp_path_factory.mktemp("report"))
+
+
+def pixels_per_metre(png: bytes) -> int:
+    start = png.index(b"pHYs") + 4
+    return struct.unpack(">I", png[start : start + 4])[0]
+
+
+def test_one_picture_per_figure_of_the_paper_at_its_resolution(report):
+    pictures = sorted((report.parent / "figures").iterdir())
+    assert [picture.name.split("_")[1] for picture in pictures] == ["4", "5", "6", "7", "8", "9"]
+    for picture in pictures:
+        assert pixels_per_metre(picture.read_bytes()) == round(RESOLUTION_DPI / 0.0254)
+
+
+def test_the_page_holds_the_pictures_themselves_and_asks_for_nothing_else(report):
+    text = report.read_text(encoding="utf-8")
+    inside = [base64.b64decode(code) for code in re.findall(r"data:image/png;base64,([^\"]+)", text)]
+    assert inside == [picture.read_bytes() for picture in sorted((report.parent / "figures").iterdir())]
+    without_pictures = re.sub(r"base64,[^\"]+", "", text)
+    assert not re.search(r"<script|<link|@import|url\(|https?:", without_pictures)
+    assert text.startswith("<!DOCTYPE html>")
+    assert len(re.findall(r'<img alt="Figure \d: \w', text)) == len(inside)
+
+
+def test_nothing_unfinished_is_left_beside_the_report(report):
+    left = sorted(entry.name for entry in report.parent.rglob("*") if entry.is_file())
+    assert len(left) == 7
+    assert all(name.endswith((".png", ".html")) for name in left)
+
+
+def test_equal_results_give_equal_bytes(tmp_path):
+    results = {key: synthetic_results()[key] for key in ("single_unit", "comparison", "manifest")}
+    first, second = (write_report(results, tmp_path / name).read_bytes() for name in "ab")
+    assert first == second
+
+
+def test_drawing_changes_no_results_and_no_settings_of_matplotlib(tmp_path):
+    results, settings = synthetic_results(), dict(matplotlib.rcParams)
+    write_report(results, tmp_path)
+    assert results == synthetic_results()
+    assert dict(matplotlib.rcParams) == settings
+
+
+def test_the_report_needs_no_window_system():
+    code = "import sys, fingerpad.report; print('matplotlib.pyplot' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
+def test_a_figure_that_fails_leaves_the_old_report_as_it_was(tmp_path, monkeypatch):
+    results = {"single_unit": _single_unit()}
+    path = write_report(results, tmp_path)
+    before = {entry: entry.read_bytes() for entry in tmp_path.rglob("*.*")}
+    del results["single_unit"]["shift_mm"]
+    with pytest.raises(InputError, match=r"results\['single_unit'\] must hold 'shift_mm'"):
+        write_report(results, tmp_path)
+    assert {entry: entry.read_bytes() for entry in tmp_path.rglob("*.*")} == before
+    assert path in before
+
+
+def test_results_must_be_sections():
+    with pytest.raises(InputError, match="results must map"):
+        write_report([1, 2], "unused")
+
+
+HOSTILE = "<script>alert('x')</script>&\""
+
+
+def poisoned(value):
+    """The same results with hostile texts and hostile names wherever a name is free."""
+    if isinstance(value, dict):
+        return {key: poisoned(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [poisoned(item) for item in value]
+    return (
+        HOSTILE if isinstance(value, str) and value not in ("paper", "read", "recalled", "assumed") else value
+    )
+
+
+def test_texts_are_escaped_wherever_they_stand(tmp_path):
+    results = poisoned(synthetic_results())
+    results["manifest"][HOSTILE] = HOSTILE
+    results["manifest"]["packages"][HOSTILE] = HOSTILE
+    results["single_unit"]["parameters"][HOSTILE] = 1.0
+    results["further"] = {HOSTILE: [HOSTILE]}
+    text = write_report(results, tmp_path).read_text(encoding="utf-8")
+    assert "<script" not in text
+    assert text.count("&lt;script&gt;") > 40
+
+
+def without_numbers(value):
+    """The same results with None for every number that a run may fail to have."""
+    keep = ("distance_mm", "shift_mm", "x_mm", "y_mm", "z_mm", "receptors_mm", "curvature_per_m", "fold")
+    keep += ("testing_shift_mm", "is_artefact", "inputs", "iteration")
+    if isinstance(value, dict):
+        return {key: item if key in keep else without_numbers(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [without_numbers(item) for item in value]
+    return None if isinstance(value, int | float) else value
+
+
+def test_what_does_not_exist_is_drawn_as_nothing_and_written_as_a_dash(tmp_path):
+    text = write_report(without_numbers(synthetic_results()), tmp_path).read_text(encoding="utf-8")
+    visible = re.sub(r"base64,[^\"]+", "", text)
+    assert "nan" not in re.sub(r"<[^>]+>", " ", visible).lower().split()
+    assert "None" not in visible
+    assert visible.count("<td>–</td>") > 50
+
+
+def test_sections_that_a_run_does_not_have_are_named_as_absent(tmp_path):
+    text = write_report({}, tmp_path).read_text(encoding="utf-8")
+    assert text.count("These results do not have this part.") == len(page.CHAPTERS)
+    assert not (tmp_path / "figures").exists()
+
+
+def test_sections_of_another_name_are_listed_as_they_stand(tmp_path):
+    text = write_report({"mesh_study": {"peak_sed_kpa": 2.75}}, tmp_path).read_text(encoding="utf-8")
+    assert "Further results" in text
+    assert "peak sed [kPa]</th><td>2.75</td>" in text
+
+
+def test_a_miss_is_marked_in_words_and_by_its_row(report):
+    text = report.read_text(encoding="utf-8")
+    rows = re.findall(r'<tr class="(met|missed|open)"><th scope="row">([^<]+)</th>.*?([✓✗○][^<]+)</td>', text)
+    assert rows == [
+        ("met", "FSS out of sample", "✓ met"),
+        ("missed", "hit rate at 296 /m", "✗ missed"),
+        ("open", "force under the cylinder", "○ not judged"),
+    ]
+
+
+def test_the_summary_counts_and_names_what_was_missed():
+    found, verdicts = summary.summary(synthetic_results())
+    assert "Trial 3 comes closest" in found
+    assert "0.84" in found
+    assert "296 1/m in 63 % of trials (people: 58 %)" in found
+    assert verdicts == (
+        "Of 2 judged comparisons with the paper, 1 is met and 1 is missed. "
+        "Missed: hit rate at 296 /m (0.71, the paper 0.58). 1 more is shown without a verdict."
+    )
+
+
+def test_the_summary_follows_the_numbers():
+    results = synthetic_results()
+    results["skin_deflection"]["trial1"]["cylinder"]["r2"] = 0.99
+    results["comparison"] = [{**row, "met": True} for row in results["comparison"]]
+    found, verdicts = summary.summary(results)
+    assert "Trial 1 comes closest" in found
+    assert verdicts == "Of 3 judged comparisons with the paper, 3 are met and 0 are missed."
+
+
+def test_inputs_are_listed_exactly_and_the_assumed_ones_are_marked():
+    numbers = [
+        {name: getattr(number, name) for name in ("name", "value", "unit", "source", "status")}
+        for number in all_published()
+    ]
+    meanings, listed = tables.inputs(numbers)
+    assert [row.cells[0] for row in meanings.rows] == ["paper", "read", "recalled", "assumed"]
+    assert sum(int(row.cells[2]) for row in meanings.rows) == len(numbers)
+    for number, row in zip(numbers, listed.rows, strict=True):
+        values = number["value"] if isinstance(number["value"], tuple) else (number["value"],)
+        # Numbers are set in groups of three and with true minus signs; undone, they are the very numbers.
+        texts = row.cells[1].replace("−", "-").replace("⁻", "-").split(", ")
+        read = [
+            text.translate(str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789", " ")).replace("×10", "e")
+            for text in texts
+        ]
+        assert [float(text) for text in read] == list(values)
+        assert (row.kind == "assumed") == (number["status"] == "assumed")
+
+
+def test_the_last_step_of_the_papers_fold_is_marked_and_others_are_not():
+    table = next(table for table in tables.single_unit(_single_unit()) if table.title.startswith("Steps"))
+    assert "fold 3, start 2" in table.title
+    assert [row.kind for row in table.rows] == ["", "", "", "", "final"]
+    assert table.rows[-1].cells[:2] == ("4", "0.820")
+
+
+def test_hit_rates_stand_in_the_table_as_they_are_drawn():
+    (table,) = tables.hit_rates(_discrimination())
+    assert table.columns[2:] == ("296 1/m", "305 1/m", "316 1/m", "328 1/m", "340 1/m", "365 1/m")
+    assert len(table.rows) == 20
+    first = _discrimination()["gradient_sum"]["static"]
+    assert table.rows[0].cells[2] == f"{first['hit_rate'][0]:.2f}\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}0.02"
+    assert all(len(row.cells) == len(table.columns) for row in table.rows)
+
+
+def test_every_table_is_rectangular(monkeypatch):
+    results = synthetic_results()
+    made = [table for chapter in page.CHAPTERS for table in chapter.tables(results[chapter.section])]
+    made.append(tables.comparison(results["comparison"]))
+    assert len(made) > 12
+    for table in made:
+        assert {len(row.cells) for row in table.rows} == {len(table.columns)}, table.title
+
+
+def lines(axes):
+    return {line.get_label(): line for line in axes.get_lines()}
+
+
+def test_figure_4_draws_the_profiles_given_and_sets_the_artefact_apart():
+    section = _skin_deflection()
+    line, _, cylinder, near = skin_deflection.draw(section).axes
+    for trial, name in (("trial1", "Trial 1"), ("trial2", "Trial 2"), ("trial3", "Trial 3")):
+        np.testing.assert_array_equal(lines(line)[name].get_ydata(), section[trial]["line"]["deflection_mm"])
+    drawn = lines(cylinder)
+    assert "Trial 3, $R^2$ = 0.92" in drawn
+    assert drawn["observed"].get_xdata().size == 44
+    assert drawn["observed, artefact (left out)"].get_xdata().tolist() == [-9.25]
+    assert not any("observed" in name for name in lines(line))
+    assert cylinder.yaxis_inverted()
+    assert near.get_xlim() == (-skin_deflection.NEAR_MM, skin_deflection.NEAR_MM)
+
+
+def test_figure_5_draws_predicted_lines_over_observed_points():
+    section = _single_unit()
+    for axes, phase in zip(single_unit.draw(section).axes, ("dynamic", "static"), strict=True):
+        drawn = lines(axes)
+        np.testing.assert_array_equal(drawn["predicted"].get_ydata(), section[f"{phase}_rate_hz"])
+        np.testing.assert_array_equal(drawn["observed"].get_ydata(), section[f"observed_{phase}_rate_hz"])
+        assert drawn["observed"].get_marker() == "o"
+        assert drawn["predicted"].get_marker() in ("None", "")
+
+
+def test_figure_6_leaves_silent_places_open():
+    section = _population()
+    maps = [axes for axes in population.draw(section).axes if axes.name != "3d" and axes.get_xlabel()]
+    assert len(maps) == 3
+    shown = np.ma.getmaskarray(maps[2].collections[0].get_array()).reshape(21, 21)
+    silent = np.array([[value is None for value in row] for row in section["first_spike_latency_ms"]])
+    assert 0 < silent.sum() < silent.size
+    np.testing.assert_array_equal(shown, silent.T)
+    for axes in maps:
+        np.testing.assert_array_equal(axes.get_lines()[0].get_xydata(), section["receptors_mm"])
+
+
+def test_figure_7_keeps_the_papers_letters_and_shows_people_in_every_panel():
+    section = _discrimination()
+    panels = [axes for axes in discrimination.draw_observers(section).axes if axes.get_title()]
+    titles = [axes.get_title().replace("\n", " ") for axes in panels]
+    assert titles[0] == "(a) Gradient Sum, static σ₁ = 0.12"
+    assert titles[3] == "(d) Euclidean, static σ₁ = 0.12"
+    assert titles[4:7] == [
+        "(e) Gradient Sum, static σ₁ = 0.025",
+        "(f) Gradient Sum, static σ₁ = 0.085",
+        "(g) Gradient Sum, static σ₁ = 0.12, 10 matrices",
+    ]
+    for axes in panels:
+        people = lines(axes)["people (Goodwin et al. 1991)"]
+        assert people.get_xydata().tolist() == [[296.0, 0.58], [365.0, 0.95]]
+
+
+def test_figure_7_draws_solid_in_place_and_dotted_shifted_with_bars_of_one_deviation():
+    section = _discrimination()
+    axes = discrimination.draw_observers(section).axes[1]
+    rates = section["gradient_sum"]["dynamic"]
+    for container, suffix, style in zip(axes.containers, ("", "_shifted"), ("-", ":"), strict=True):
+        curve, _, (bars,) = container.lines
+        assert curve.get_linestyle() == style
+        assert curve.get_ydata().tolist() == rates[f"hit_rate{suffix}"]
+        lengths = [bar[1, 1] - bar[0, 1] for bar in bars.get_segments()]
+        np.testing.assert_allclose(lengths, 2.0 * np.array(rates[f"hit_rate{suffix}_sd"]))
+
+
+def test_figure_7_shows_rates_far_below_chance():
+    section = _discrimination()
+    section["gradient_sum"]["latency"]["hit_rate_shifted"] = [0.1] * 6
+    assert discrimination.draw_observers(section).axes[0].get_ylim()[0] < 0.1
+
+
+def test_figure_9_shows_each_place_from_the_side_it_is_seen_from():
+    section = _nail()
+    below, above, side, cut = discriminating = nail.draw(section).axes[:4]
+    cells = 39 * (2 * 30 - 1)
+    assert [axes.collections[0].get_array().size for axes in discriminating[:3]] == [cells] * 3
+    seen = [np.ma.getdata(axes.collections[0].get_array()) for axes in (below, above)]
+    # The pad, with the peak under the sphere, is nearest to the eye below and farthest from it above.
+    assert seen[0].argmax() > cells / 2 > seen[1].argmax()
+    corners = np.array([path.vertices[:4] for path in side.collections[0].get_paths()])
+    assert corners[..., 1].min() == pytest.approx(-10.0)
+    assert len(cut.collections[0].get_paths()) == len(section["section"]["sed_kpa"])
+
+
+def test_figure_9_scales_every_view_alike():
+    section = _nail()
+    scales = [axes.collections[0].norm for axes in nail.draw(section).axes[:4]]
+    assert len({(scale.vmin, scale.vmax) for scale in scales}) == 1
+    assert scales[0].vmax == max(np.max(section["sed_kpa"]), np.max(section["section"]["sed_kpa"]))
+
+
+def test_colours_of_trials_differ_in_grey_and_lines_differ_without_colour():
+    greys = [
+        np.dot(matplotlib.colors.to_rgb(colour), (0.2126, 0.7152, 0.0722)) for colour in (BLUE, ORANGE, GREEN)
+    ]
+    assert min(abs(np.subtract.outer(greys, greys))[np.triu_indices(3, 1)]) > 0.08
+    assert len({style for _, _, style in skin_deflection.TRIALS.values()}) == 3
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (-0.0, "0"),
+        (999.6, "1000"),
+        (1234.5, "1234"),
+        (12345.6, "12 346"),
+        (0.00099996, "0.001"),
+        (0.000999, "9.99 × 10⁻⁴"),
+        (9.99e-7, "9.99 × 10⁻⁷"),
+        (-3e7, "−3 × 10⁷"),
+        (float("nan"), "–"),
+        (float("-inf"), "−∞"),
+    ],
+)
+def test_numbers_read_well_at_the_ends_of_each_notation(value, text):
+    assert words.number(value) == text

@@ -187,8 +187,16 @@ def _page(results: Mapping[str, Any], chapters: list[dict[str, Any]], others: li
     comparison = results.get("comparison")
     return environment.get_template("template.html").render(
         summary=summary(results),
-        manifest=results.get("manifest") or {},
+        edition=_edition(results.get("manifest") or {}),
         comparison=tables.comparison(comparison) if comparison else None,
         chapters=chapters,
         others=others,
+    )
+
+
+def _edition(manifest: Mapping[str, Any]) -> str:
+    """Which program made the page and how, as far as the manifest says."""
+    words = {"version": "fingerpad {}", "resolution": "{} resolution", "seed": "seed {}"}
+    return ", ".join(
+        form.format(manifest[key]) for key, form in words.items() if manifest.get(key) is not None
     )

@@ -109,5 +109,5 @@ def caption(section: dict[str, Any]) -> str:
         f"Response of afferents all over the pad to a sphere of {number(section['curvature_per_m'])} 1/m, "
         f"{protocol.DEPTH.value} mm deep. Left: the quantity as a height. Right: the same from above; "
         "circles are the receptors that the observers of Figures 7 and 8 read, hatched places stay silent. "
-        "The paper shows rates that are highest and first spikes that come earliest under the sphere."
+        "The paper draws the same three quantities."
     )

@@ -26,6 +26,8 @@ PARAMETERS = {
     "threshold_mv": "threshold v",
 }
 PAPER_FOLD = 3
+# Inputs are the record of what was used: nothing of them is rounded or left out.
+ALL_DIGITS, ALL_VALUES = 12, 1000
 UNBROKEN = "\N{NO-BREAK SPACE}"
 
 
@@ -233,7 +235,7 @@ def inputs(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
         Row(
             (
                 plain(row["name"]),
-                plain(row["value"]),
+                plain(row["value"], digits=ALL_DIGITS, longest=ALL_VALUES),
                 "" if row["unit"] == "1" else plain(row["unit"]),
                 plain(row["status"]),
                 plain(row["source"]),

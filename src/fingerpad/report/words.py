@@ -8,7 +8,6 @@ from typing import Any
 
 ABSENT = "–"
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_LONG_LIST = 8
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -34,18 +33,20 @@ def number(value: float | None, digits: int = 3) -> str:
         return ABSENT
     if math.isinf(value):
         return "∞" if value > 0 else "−∞"
-    size = abs(value)
-    if float(value).is_integer() and size < 1e6:
-        text = f"{value:,.0f}".replace(",", " ") if size >= 1e4 else f"{value:.0f}"
-    elif size >= 1e6 or size < 1e-3:
-        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    if float(value).is_integer() or abs(value) < 10.0**digits:
+        shown = float(value) if float(value).is_integer() else float(f"{value:.{digits}g}")
+    else:
+        shown = float(round(value))
+    size = abs(shown)
+    if size >= 1e6 or 0.0 < size < 1e-3:
+        mantissa, exponent = f"{size:.{digits - 1}e}".split("e")
         mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
         text = f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}"
-    elif size >= 10.0**digits:
-        text = f"{value:,.0f}".replace(",", " ")
+    elif size >= 1e4:
+        text = f"{size:,.0f}".replace(",", " ")
     else:
-        text = f"{value:.{digits}g}"
-    return text.replace("-", "−") if text.startswith("-") else text
+        text = f"{size:.12g}"
+    return f"−{text}" if shown < 0.0 else text
 
 
 def fixed(value: float | None, decimals: int) -> str:
@@ -103,8 +104,8 @@ _UNITS = {
 }
 
 
-def plain(value: Any) -> str:
-    """Return any JSON value as a short text: long lists by their size and range.
+def plain(value: Any, digits: int = 3, longest: int = 8) -> str:
+    """Return any JSON value as a short text: lists above the longest by their size and range.
 
     Examples
     --------
@@ -114,12 +115,14 @@ def plain(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if value is None or isinstance(value, int | float):
-        return number(value)
+        return number(value, digits)
     if isinstance(value, Mapping):
-        return "; ".join(f"{spelled(str(key))}: {plain(item)}" for key, item in value.items())
+        return "; ".join(
+            f"{spelled(str(key))}: {plain(item, digits, longest)}" for key, item in value.items()
+        )
     if isinstance(value, Sequence) and not isinstance(value, str):
-        if len(value) <= _LONG_LIST:
-            return ", ".join(plain(item) for item in value) or ABSENT
+        if len(value) <= longest:
+            return ", ".join(plain(item, digits, longest) for item in value) or ABSENT
         known = [item for item in value if isinstance(item, int | float) and not math.isnan(item)]
         span = f", {number(min(known))} … {number(max(known))}" if known else ""
         return f"{len(value)} values{span}"
