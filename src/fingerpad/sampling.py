@@ -129,6 +129,9 @@ class SkinResponse:
             )
         sed_kpa = self.sed_kpa[:, elements].T.astype(np.float64)
         interpolate = CloughTocher2DInterpolator(triangulation, sed_kpa)
+        if self.mesh.symmetry_nodes.size:
+            # Diagonals of the triangles are not mirrored: without this, a site and its mirror image differ.
+            points = np.column_stack([points[:, 0], np.abs(points[:, 1])])
         # The cubic may dip below zero beside a steep front; an energy cannot.
         return SedTraces(self.times_ms, np.maximum(interpolate(points).T, 0.0), np.array(self.kinks_ms))
 

@@ -1,0 +1,138 @@
+"""What is read from the skin: exact for linear fields, mirrored in z, refused beside the finger."""
+
+import numpy as np
+import pytest
+
+from fingerpad.errors import InputError
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import resolution_grading
+from fingerpad.mesh import LAYERS, block_mesh, finger_mesh
+from fingerpad.sampling import SkinResponse, SurfaceProfile
+
+TIMES_MS = np.array([0.0, 50.0, 1000.0])
+DEPTHS_MM = np.array([0.0, 0.2, 0.371, 0.471, 1.0, 1.624, 5.0])
+LAYER_OF_INTERVAL = [0, 0, 1, 2, 2, 3]
+SITES = np.random.default_rng(0).uniform(-2.0, 2.0, (60, 2))
+
+
+def block(symmetric=True):
+    lines = np.concatenate([[0.0], np.cumsum(0.25 * 1.1 ** np.arange(8))])
+    both = np.concatenate([-lines[:0:-1], lines])
+    return block_mesh(both, DEPTHS_MM, lines if symmetric else both, LAYER_OF_INTERVAL, symmetric=symmetric)
+
+
+def response(mesh, field=None, displacement=None, axis_x_mm=0.0):
+    """Skin whose SED is `field` (centres (n, 3) -> (n,)) at the end and half of it at the end of the ramp."""
+    centres = mesh.nodes_mm[mesh.elements].mean(axis=1)
+    sed = np.zeros((3, len(mesh.elements)))
+    if field is not None:
+        sed[1:] = np.outer([0.5, 1.0], field(centres))
+    moved = np.zeros_like(mesh.nodes_mm) if displacement is None else displacement(mesh.nodes_mm)
+    return SkinResponse(
+        mesh=mesh,
+        times_ms=TIMES_MS,
+        kinks_ms=(50.0,),
+        force_mn=np.zeros(3),
+        skin_displacement_mm=np.array([0.0, 0.5, 1.0])[:, None, None] * moved[mesh.skin_nodes],
+        displacement_mm=moved,
+        sed_kpa=sed,
+        axis_x_mm=axis_x_mm,
+        direction=np.array([0.0, 1.0, 0.0]),
+        penetration_mm=0.0,
+        newton_steps=0,
+        factorisations=0,
+    )
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_linear_field_is_read_exactly_at_every_time(symmetric):
+    slope_z = 0.0 if symmetric else -0.4
+    skin = response(block(symmetric), lambda centre: 9.0 + 0.7 * centre[:, 0] + slope_z * centre[:, 2])
+    traces = skin.sed(SITES)
+    expected = 9.0 + SITES @ [0.7, slope_z]
+    # SciPy estimates the slopes of its cubic to a relative 1e-6.
+    np.testing.assert_allclose(traces.sed_kpa, np.outer([0.0, 0.5, 1.0], expected), rtol=0, atol=1e-6)
+    assert traces.times_ms.tolist() == TIMES_MS.tolist()
+    assert traces.kinks_ms.tolist() == [50.0]
+
+
+def test_only_the_living_epidermis_is_read():
+    """A field that differs from layer to layer: no element of another layer may leak in."""
+    mesh = block()
+    values = np.array([100.0, 3.0, 100.0, 100.0])
+    skin = response(mesh, lambda centre: values[mesh.layer])
+    np.testing.assert_allclose(skin.sed(SITES).sed_kpa[-1], 3.0, rtol=1e-12)
+    assert LAYERS[1] == "living epidermis"
+
+
+def bump(centre):
+    """Peak beside the middle, even in z."""
+    return 0.1 + np.exp(-((centre[:, 0] - 0.2) ** 2 + centre[:, 2] ** 2))
+
+
+def test_half_a_body_is_read_the_same_on_both_sides():
+    skin = response(block(), bump)
+    left, right = skin.sed(SITES).sed_kpa, skin.sed(SITES * [1.0, -1.0]).sed_kpa
+    np.testing.assert_array_equal(left, right)
+
+
+def test_smooth_field_is_read_within_the_error_of_its_mesh():
+    for symmetric in (True, False):
+        read = response(block(symmetric), bump).sed(SITES).sed_kpa[-1]
+        expected = bump(np.column_stack([SITES[:, 0], np.zeros(len(SITES)), SITES[:, 1]]))
+        np.testing.assert_allclose(read, expected, rtol=0, atol=0.01)
+
+
+def test_energy_never_falls_below_zero_beside_a_steep_front():
+    skin = response(block(), lambda centre: np.where(centre[:, 0] > 0.0, 5.0, 0.0))
+    assert (skin.sed(SITES).sed_kpa >= 0.0).all()
+
+
+def test_finger_is_read_on_its_volar_side_only():
+    mesh = finger_mesh(Fingertip(), resolution_grading("quick", 17.37))
+    skin = response(mesh, lambda centre: np.where(centre[:, 1] < 0.0, centre[:, 0], 1e3))
+    sites = np.random.default_rng(1).uniform([10.0, -7.0], [26.0, 7.0], (80, 2))
+    np.testing.assert_allclose(skin.sed(sites).sed_kpa[-1], sites[:, 0], rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("site", [(17.37, 12.0), (40.0, 0.0), (-1.0, 0.0), (31.0, 8.0)])
+def test_site_beside_the_finger_is_refused(site):
+    skin = response(finger_mesh(Fingertip(), resolution_grading("quick", 17.37)))
+    with pytest.raises(InputError, match="must lie on the volar skin") as refusal:
+        skin.sed([(17.37, 0.0), site])
+    assert f"({site[0]:g}, {site[1]:g})" in str(refusal.value)
+
+
+@pytest.mark.parametrize("sites", [[1.0, 2.0], [[1.0, 2.0, 3.0]], [[np.nan, 0.0]], "middle"])
+def test_sites_that_are_no_pairs_are_refused(sites):
+    with pytest.raises(InputError, match="sites"):
+        response(block()).sed(sites)
+
+
+def test_body_without_epidermis_has_nothing_to_read():
+    mesh = block_mesh([0.0, 1.0, 2.0], [0.0, 1.0], [0.0, 1.0], layers=[2])
+    with pytest.raises(InputError, match="no living epidermis"):
+        response(mesh).sed([(1.0, 0.5)])
+
+
+def test_profile_is_the_deflection_towards_the_bone_along_the_midline():
+    """A displacement with a known y component; x and z components must not show."""
+    mesh = block()
+    axis_x = 0.5
+
+    def dent(nodes):
+        x, _, z = nodes.T
+        return np.stack([0.3 * x, np.exp(-((x - axis_x) ** 2)) - z, -z], axis=1)
+
+    skin = response(mesh, displacement=dent, axis_x_mm=axis_x)
+    profile = skin.surface_profile()
+    assert profile.distance_mm.shape == profile.deflection_mm.shape == mesh.midline_nodes.shape
+    assert (np.diff(profile.distance_mm) > 0).all()
+    np.testing.assert_allclose(profile.deflection_mm, np.exp(-(profile.distance_mm**2)), rtol=1e-12)
+    np.testing.assert_allclose(skin.surface_profile(1).deflection_mm, 0.5 * profile.deflection_mm, rtol=1e-15)
+    assert not skin.surface_profile(0).deflection_mm.any()
+
+
+def test_profile_between_nodes_is_linear():
+    profile = SurfaceProfile(np.array([-1.0, 0.0, 2.0]), np.array([0.0, 1.0, 0.5]))
+    np.testing.assert_allclose(profile.at([-0.5, 0.0, 1.0]), [0.5, 1.0, 0.75], rtol=1e-15)
