@@ -64,7 +64,7 @@ def observer_panels(section: dict[str, Any]) -> list[Panel]:
     """
     sums, variants = section.get("gradient_sum", {}), section.get("variants", {})
     best = f"σ₁ = {number(section.get('noise_sigma'))}"
-    printed = f"sigma_{section.get('noise_sigma_paper', psychophysics.NOISE_SIGMA.value)}"
+    printed = f"sigma_{section.get('noise_sigma_paper') or psychophysics.NOISE_SIGMA.value}"
     levels = sorted(name for name in variants if name.startswith("sigma_") and name != printed)
     panels: list[Panel] = [
         (f"Gradient Sum, static\n{best}", sums.get("static")),
@@ -169,7 +169,7 @@ def caption_observers(section: dict[str, Any]) -> str:
     """Say what Figure 7 shows and what the paper found."""
     ours, theirs = (
         section.get("noise_sigma"),
-        section.get("noise_sigma_paper", psychophysics.NOISE_SIGMA.value),
+        section.get("noise_sigma_paper") or psychophysics.NOISE_SIGMA.value,
     )
     return (
         "Fraction of trials in which a sphere is told from the standard of "

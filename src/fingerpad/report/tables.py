@@ -9,7 +9,7 @@ from typing import Any, Literal
 from fingerpad.parameters import STATUSES, paper
 from fingerpad.report import discrimination
 from fingerpad.report.skin_deflection import INDENTERS, TRIALS
-from fingerpad.report.words import ABSENT, fixed, number, plain, spelled
+from fingerpad.report.words import fixed, number, plain, spelled
 
 Kind = Literal["", "met", "missed", "open", "assumed", "final"]
 VERDICTS: dict[bool | None, tuple[Kind, str]] = {
@@ -217,9 +217,8 @@ def _with_spread(rates: Mapping[str, Any], suffix: str) -> list[str]:
     means = rates[f"hit_rate{suffix}"]
     spreads = rates.get(f"hit_rate{suffix}_sd") or [None] * len(means)
     return [
-        ABSENT
-        if mean is None
-        else f"{mean:.2f}" + ("" if spread is None else f"{UNBROKEN}±{UNBROKEN}{spread:.2f}")
+        fixed(mean, 2)
+        + ("" if mean is None or spread is None else f"{UNBROKEN}±{UNBROKEN}{fixed(spread, 2)}")
         for mean, spread in zip(means, spreads, strict=True)
     ]
 
