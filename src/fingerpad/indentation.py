@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
-from fingerpad.checks import finite, one_of
+from fingerpad.checks import FloatArray, finite, one_of
 from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import RESOLUTIONS, Grading, resolution_grading
@@ -23,12 +24,13 @@ from fingerpad.sampling import SkinResponse
 from fingerpad.stimulus import RampAndHold
 
 CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
-STEPS = {"quick": (6, 5), "standard": (8, 8), "paper": (8, 8)}
+STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
 """Steps in ramp and hold of each resolution."""
 
 THIN_SIZE_MM = 0.05
 """Elements along the finger below an indenter that is thinner than the mesh. [mm]"""
 
+LARGEST_TILT_DEG = 45.0
 _LONGEST_REACH_MM = 5.0
 _CLEARANCE_TO_BONE = 0.8
 
@@ -52,7 +54,10 @@ class Touch:
     settings : PressSettings
         Steps and tolerances.
     at_mm : (float, float)
-        x and z of the indenter's axis; it presses along y, perpendicular to the finger's long axis. [mm]
+        x and z of the skin point that the indenter's axis goes through. [mm]
+    tilt_deg : float
+        Rotation of the indenter about z. At 0 it presses along y, perpendicular to the finger's long axis;
+        a positive tilt turns the direction of pressing towards the proximal end. [degrees]
 
     Raises
     ------
@@ -68,10 +73,13 @@ class Touch:
     grading: Grading
     settings: PressSettings = field(default_factory=PressSettings)
     at_mm: tuple[float, float] = CONTACT_POINT_MM
+    tilt_deg: float = 0.0
 
     def __post_init__(self) -> None:
         x, z = _check_position(self.at_mm)
         object.__setattr__(self, "at_mm", (x, z))
+        if abs(finite("tilt_deg", self.tilt_deg, "degrees")) > LARGEST_TILT_DEG:
+            raise InputError(f"tilt_deg must lie within {LARGEST_TILT_DEG:g} degrees: got {self.tilt_deg:g}.")
         if z != 0.0 and not self.grading.full:
             raise InputError(f"at_mm beside the midline (z = {z:g} mm) needs a grading with full=True.")
         available = _CLEARANCE_TO_BONE * float(self.finger.depth_available_mm(x, z))
@@ -92,8 +100,10 @@ class Touch:
         mesh = _mesh(self.finger, self.grading)
         x, z = self.at_mm
         skin = mesh.nodes_mm[mesh.skin_nodes]
-        placement = place(self.indenter, skin, np.array([x, skin[:, 1].min(), z]), np.eye(3))
-        done = press(mesh, self.tissues.layers, self.indenter, placement, self.stimulus, self.settings)
+        placement = place(self.indenter, skin, self.finger.skin_point(x, z), _rotation(self.tilt_deg))
+        # One thread: vector sums would otherwise depend on the number of cores, and idle threads only spin.
+        with threadpool_limits(limits=1):
+            done = press(mesh, self.tissues.layers, self.indenter, placement, self.stimulus, self.settings)
         return SkinResponse(
             mesh=mesh,
             times_ms=done.times_ms,
@@ -115,9 +125,53 @@ class Touch:
         return _mesh(self.finger, self.grading)
 
 
+def _rotation(tilt_deg: float) -> FloatArray:
+    """Axes of an indenter tilted about z, as columns."""
+    cosine, sine = np.cos(np.deg2rad(tilt_deg)), np.sin(np.deg2rad(tilt_deg))
+    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+
 @lru_cache(maxsize=4)
 def _mesh(finger: Fingertip, grading: Grading) -> Mesh:
     return finger_mesh(finger, grading)
+
+
+def touch_of(
+    finger: Fingertip,
+    indenter: Indenter,
+    stimulus: RampAndHold | None = None,
+    materials: str | Tissues = "trial3",
+    resolution: str = "quick",
+    at_mm: Sequence[float] = CONTACT_POINT_MM,
+    grading: Grading | None = None,
+    tilt_deg: float = 0.0,
+) -> Touch:
+    """Describe a touch without solving it; arguments as in `indent`.
+
+    Parameters
+    ----------
+    grading : Grading, optional
+        Mesh to use instead of the one that `resolution` grades about the indenter.
+    tilt_deg : float
+        Rotation of the indenter about z, see `Touch`. [degrees]
+
+    Returns
+    -------
+    Touch
+        A value that can be solved, stored and compared.
+    """
+    one_of("resolution", resolution, RESOLUTIONS)
+    x, z = _check_position(at_mm)
+    return Touch(
+        finger=finger,
+        indenter=indenter,
+        stimulus=stimulus or RampAndHold(),
+        tissues=materials if isinstance(materials, Tissues) else named_tissues(materials),
+        grading=grading or grading_about(indenter, resolution, x, z),
+        settings=settings_of(resolution),
+        at_mm=(x, z),
+        tilt_deg=tilt_deg,
+    )
 
 
 def indent(
@@ -164,17 +218,7 @@ def indent(
     >>> print(f"{skin.surface_profile().deflection_mm.max():.2f} mm")
     0.30 mm
     """
-    one_of("resolution", resolution, RESOLUTIONS)
-    x, z = _check_position(at_mm)
-    return Touch(
-        finger=finger,
-        indenter=indenter,
-        stimulus=stimulus or RampAndHold(),
-        tissues=materials if isinstance(materials, Tissues) else named_tissues(materials),
-        grading=grading_about(indenter, resolution, x, z),
-        settings=settings_of(resolution),
-        at_mm=(x, z),
-    ).solve()
+    return touch_of(finger, indenter, stimulus, materials, resolution, at_mm).solve()
 
 
 def settings_of(resolution: str) -> PressSettings:

@@ -117,6 +117,27 @@ def _elasticity(law, s, first, b, b2, stress, deviator, pressure, moduli):  # ty
     d4 = -4.0 * s * w2
     trace = stress[0] + stress[1] + stress[2]
     for m in range(6):
+        one_m = 1.0 if m < 3 else 0.0
+        for n in range(m, 6):
+            one_n = 1.0 if n < 3 else 0.0
+            identity = 0.0
+            if m == n:
+                identity = 1.0 if m < 3 else 0.5
+            value = 2.0 / 3.0 * trace * (identity - one_m * one_n / 3.0)
+            value -= 2.0 / 3.0 * (deviator[m] * one_n + one_m * deviator[n])
+            moduli[m, n] = value + pressure * (one_m * one_n - 2.0 * identity)
+    if d1 != 0.0 or d2 != 0.0 or d3 != 0.0 or d4 != 0.0:  # all are zero for neo-Hooke
+        _add_second_derivatives(d1, d2, d3, d4, first, b, b2, moduli)
+    for m in range(6):
+        for n in range(m):
+            moduli[m, n] = moduli[n, m]
+
+
+@njit(cache=True)
+def _add_second_derivatives(d1, d2, d3, d4, first, b, b2, moduli):  # type: ignore[no-untyped-def]
+    """Add P : (d1 b x b + d2 (b x b² + b² x b) + d3 b² x b² + d4 b . b) : P to the upper triangle."""
+    trace_b2 = b2[0] + b2[1] + b2[2]
+    for m in range(6):
         i, j = ROW[m], COLUMN[m]
         one_m = 1.0 if m < 3 else 0.0
         db_m, db2_m = b[m] - one_m * first / 3.0, b2[m] - one_m * trace_b2 / 3.0
@@ -124,17 +145,42 @@ def _elasticity(law, s, first, b, b2, stress, deviator, pressure, moduli):  # ty
             k, l = ROW[n], COLUMN[n]  # noqa: E741 - the index letters of the formula
             one_n = 1.0 if n < 3 else 0.0
             db_n, db2_n = b[n] - one_n * first / 3.0, b2[n] - one_n * trace_b2 / 3.0
-            value = d1 * db_m * db_n + d2 * (db_m * db2_n + db2_m * db_n) + d3 * db2_m * db2_n
             product = 0.5 * (b[INDEX[i, k]] * b[INDEX[j, l]] + b[INDEX[i, l]] * b[INDEX[j, k]])
-            value += d4 * (product - (b2[m] * one_n + one_m * b2[n]) / 3.0 + trace_b2 * one_m * one_n / 9.0)
-            identity = 0.0
-            if m == n:
-                identity = 1.0 if m < 3 else 0.5
-            value += 2.0 / 3.0 * trace * (identity - one_m * one_n / 3.0)
-            value -= 2.0 / 3.0 * (deviator[m] * one_n + one_m * deviator[n])
-            value += pressure * (one_m * one_n - 2.0 * identity)
-            moduli[m, n] = value
-            moduli[n, m] = value
+            moduli[m, n] += d1 * db_m * db_n + d2 * (db_m * db2_n + db2_m * db_n) + d3 * db2_m * db2_n
+            moduli[m, n] += d4 * (
+                product - (b2[m] * one_n + one_m * b2[n]) / 3.0 + trace_b2 * one_m * one_n / 9.0
+            )
+
+
+@njit(cache=True, fastmath={"contract"})
+def _add_tangent(weight, moduli, stress, spherical, slopes, packed):  # type: ignore[no-untyped-def]
+    """Add one point's K_ij = w G' A_ij G, with A_ij,pr = c_ip,jr + delta_ij tau_pr, for i <= j.
+
+    `slopes` is G (3, 8), the present gradients of the shape functions; `packed` (3, 3, 8, 8) is K_ij with
+    the second node before the first, so that the innermost loop runs over neighbours in memory. Products
+    and sums may be contracted into one rounding; nothing else is reordered.
+    """
+    a = np.empty((3, 3))
+    for i in range(3):
+        for j in range(i, 3):
+            for p in range(3):
+                for r in range(3):
+                    a[p, r] = moduli[INDEX[i, p], INDEX[j, r]]
+                    if i == j:
+                        a[p, r] += stress[INDEX[p, r]]
+                if i == j:
+                    a[p, p] += spherical
+            axx, axy, axz = weight * a[0, 0], weight * a[0, 1], weight * a[0, 2]
+            ayx, ayy, ayz = weight * a[1, 0], weight * a[1, 1], weight * a[1, 2]
+            azx, azy, azz = weight * a[2, 0], weight * a[2, 1], weight * a[2, 2]
+            for node in range(N_NODES):
+                x, y, z = slopes[0, node], slopes[1, node], slopes[2, node]
+                first, second = axx * x + axy * y + axz * z, ayx * x + ayy * y + ayz * z
+                third = azx * x + azy * y + azz * z
+                for other in range(N_NODES):
+                    packed[i, j, node, other] += (
+                        slopes[0, other] * first + slopes[1, other] * second + slopes[2, other] * third
+                    )
 
 
 INDEX = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
@@ -198,9 +244,9 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
     """
     weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
     gradients = np.empty((N_POINTS, 3, 3))
-    present, jacobians, inverse = np.empty((N_POINTS, N_NODES, 3)), np.empty(N_POINTS), np.empty((3, 3))
+    present, jacobians, inverse = np.empty((N_POINTS, 3, N_NODES)), np.empty(N_POINTS), np.empty((3, 3))
     b, b2, relaxed, stress, deviator = np.empty(6), np.empty(6), np.empty(6), np.empty(6), np.empty(6)
-    moduli, column, dilatation = np.empty((6, 6)), np.empty((6, 3)), np.zeros((N_NODES, 3))
+    moduli, packed, dilatation = np.empty((6, 6)), np.zeros((3, 3, N_NODES, N_NODES)), np.zeros((3, N_NODES))
 
     volume = _gradients(reference, displacement, weights, slopes, gradients)
     present_volume = 0.0
@@ -214,16 +260,14 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
                 slope = 0.0
                 for k in range(3):
                     slope += slopes[q, a, k] * inverse[k, i]
-                present[q, a, i] = slope
-                dilatation[a, i] += weights[q] * jacobians[q] * slope
+                present[q, i, a] = slope
+                dilatation[i, a] += weights[q] * jacobians[q] * slope
     change = present_volume / volume - 1.0
     pressure = 2.0 * law[5] * change + 4.0 * law[6] * change**3
     stiffness = (2.0 * law[5] + 12.0 * law[6] * change**2) / volume
     potential = volume * (law[5] * change**2 + law[6] * change**4)
 
     force[:] = 0.0
-    if with_tangent:
-        tangent[:] = 0.0
     for q in range(N_POINTS):
         scale = jacobians[q] ** (-2.0 / 3.0)
         first, second = _left_cauchy_green(gradients[q], jacobians[q], b, b2)
@@ -238,42 +282,24 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
             deviator[k] = stress[k] - (mean if k < 3 else 0.0)
         spherical = pressure * jacobians[q]
         w = weights[q]
-        t0, t1, t2 = deviator[0] + spherical, deviator[1] + spherical, deviator[2] + spherical
-        t3, t4, t5 = deviator[3], deviator[4], deviator[5]
+        for node in range(N_NODES):
+            x, y, z = w * present[q, 0, node], w * present[q, 1, node], w * present[q, 2, node]
+            force[node, 0] += (deviator[0] + spherical) * x + deviator[3] * y + deviator[5] * z
+            force[node, 1] += deviator[3] * x + (deviator[1] + spherical) * y + deviator[4] * z
+            force[node, 2] += deviator[5] * x + deviator[4] * y + (deviator[2] + spherical) * z
         if with_tangent:
             _elasticity(law, s, first, b, b2, stress, deviator, spherical, moduli)
-        for node in range(N_NODES):
-            x, y, z = present[q, node, 0], present[q, node, 1], present[q, node, 2]
-            traction_x = t0 * x + t3 * y + t5 * z
-            traction_y = t3 * x + t1 * y + t4 * z
-            traction_z = t5 * x + t4 * y + t2 * z
-            force[node, 0] += w * traction_x
-            force[node, 1] += w * traction_y
-            force[node, 2] += w * traction_z
-            if not with_tangent:
-                continue
-            for k in range(6):
-                column[k, 0] = w * (moduli[k, 0] * x + moduli[k, 3] * y + moduli[k, 5] * z)
-                column[k, 1] = w * (moduli[k, 3] * x + moduli[k, 1] * y + moduli[k, 4] * z)
-                column[k, 2] = w * (moduli[k, 5] * x + moduli[k, 4] * y + moduli[k, 2] * z)
-            for other in range(node + 1):
-                ox, oy, oz = present[q, other, 0], present[q, other, 1], present[q, other, 2]
-                geometric = w * (ox * traction_x + oy * traction_y + oz * traction_z)
-                for i in range(3):
-                    tangent[other, node, 0, i] += ox * column[0, i] + oy * column[3, i] + oz * column[5, i]
-                    tangent[other, node, 1, i] += ox * column[3, i] + oy * column[1, i] + oz * column[4, i]
-                    tangent[other, node, 2, i] += ox * column[5, i] + oy * column[4, i] + oz * column[2, i]
-                    tangent[other, node, i, i] += geometric
+            _add_tangent(w, moduli, deviator, spherical, present[q], packed)
     if with_tangent:
-        for node in range(N_NODES):
-            for other in range(node + 1):
-                for i in range(3):
-                    for j in range(3):
-                        tangent[other, node, i, j] += stiffness * dilatation[other, i] * dilatation[node, j]
-            for other in range(node):
-                for i in range(3):
-                    for j in range(3):
-                        tangent[node, other, j, i] = tangent[other, node, i, j]
+        for i in range(3):
+            for j in range(i, 3):
+                for node in range(N_NODES):
+                    for other in range(N_NODES):
+                        value = (
+                            packed[i, j, node, other] + stiffness * dilatation[i, other] * dilatation[j, node]
+                        )
+                        tangent[other, node, i, j] = value
+                        tangent[node, other, j, i] = value
     return potential
 
 

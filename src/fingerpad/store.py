@@ -1,0 +1,262 @@
+"""Finished touches on disk: found again by everything that determines them, and computed where missing.
+
+The key of a touch is a hash of its whole value (finger, indenter, motion, tissues, mesh, tolerances) and of
+the source code of the mechanical half. One file per touch, written atomically, so a run that is killed at any
+moment goes on from the last finished touch and ends with the same bits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import sys
+import threading
+import time
+import zipfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from functools import lru_cache
+from importlib.resources import files
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fingerpad.checks import whole
+from fingerpad.errors import InputError, StoreError
+from fingerpad.files import write_atomically
+from fingerpad.indentation import Touch
+from fingerpad.sampling import SkinResponse
+
+MECHANICAL_SOURCES = (
+    "units.py",
+    "fingertip.py",
+    "grading.py",
+    "indenters.py",
+    "stimulus.py",
+    "mesh.py",
+    "indentation.py",
+    "mechanics",
+)
+"""Source files and folders on which the stored numbers depend."""
+
+_ARRAYS = ("times_ms", "force_mn", "skin_displacement_mm", "displacement_mm", "sed_kpa", "direction")
+_SINGLE_PRECISION = ("skin_displacement_mm", "displacement_mm", "sed_kpa")
+_ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+_LOOK_FOR_PARENT_S = 1.0
+
+
+@lru_cache(maxsize=1)
+def code_hash() -> str:
+    """Hash of the source code on which stored results depend, 16 hexadecimal digits."""
+    digest = hashlib.sha256()
+    package = files("fingerpad")
+    for name in MECHANICAL_SOURCES:
+        entry = package / name
+        sources = [entry] if entry.is_file() else sorted(entry.iterdir(), key=lambda source: source.name)
+        for source in sources:
+            if source.name.endswith(".py"):
+                digest.update(source.name.encode() + b"\0" + source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def touch_key(touch: Touch) -> str:
+    """Key under which a touch is stored, 32 hexadecimal digits.
+
+    Examples
+    --------
+    >>> import fingerpad as fp
+    >>> touch = fp.touch_of(fp.Fingertip(), fp.Line())
+    >>> len(touch_key(touch)), touch_key(touch) == touch_key(fp.touch_of(fp.Fingertip(), fp.Bar()))
+    (32, False)
+    """
+    text = json.dumps([code_hash(), _plain(touch)], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def _plain(value: Any) -> Any:
+    """Nested lists and exact numbers that say the same as a nested frozen value."""
+    if is_dataclass(value):
+        return [
+            type(value).__name__,
+            {field.name: _plain(getattr(value, field.name)) for field in fields(value)},
+        ]
+    if isinstance(value, tuple | list):
+        return [_plain(item) for item in value]
+    if isinstance(value, float | np.floating):
+        return float(value).hex()
+    if isinstance(value, str | int | bool) or value is None:
+        return value
+    raise InputError(
+        f"A touch can only be stored if its parts are frozen values: got {type(value).__name__}."
+    )
+
+
+class Store:
+    """Folder of finished touches.
+
+    Parameters
+    ----------
+    folder : Path
+        Made when first needed.
+    """
+
+    def __init__(self, folder: Path):
+        self.folder = Path(folder)
+
+    def path(self, touch: Touch) -> Path:
+        """File of a touch, whether it exists or not."""
+        return self.folder / f"{touch_key(touch)}.npz"
+
+    def holds(self, touch: Touch) -> bool:
+        """Whether a touch is finished."""
+        return self.path(touch).exists()
+
+    def save(self, touch: Touch, response: SkinResponse) -> None:
+        """Write a finished touch; nothing half-written is ever left behind.
+
+        Raises
+        ------
+        StoreError
+            If the folder cannot be written.
+        """
+        content: dict[str, Any] = {name: getattr(response, name) for name in _ARRAYS}
+        for name in _SINGLE_PRECISION:
+            content[name] = content[name].astype(np.float32)
+        work = [response.penetration_mm, response.newton_steps, response.factorisations]
+        buffer = io.BytesIO()
+        np.savez(buffer, **content, work=np.array(work, dtype=np.float64))
+        write_atomically(self.path(touch), buffer.getvalue())
+
+    def load(self, touch: Touch) -> SkinResponse:
+        """Read a finished touch.
+
+        Raises
+        ------
+        StoreError
+            If its file is missing, damaged or not of this touch.
+        """
+        path = self.path(touch)
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                content = {name: file[name].astype(np.float64) for name in (*_ARRAYS, "work")}
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+            raise StoreError(
+                f"The stored result {path} cannot be read ({error}): delete it and run again."
+            ) from error
+        mesh, times = touch.mesh, content["times_ms"]
+        expected = {
+            "sed_kpa": (times.size, len(mesh.elements)),
+            "displacement_mm": mesh.nodes_mm.shape,
+            "skin_displacement_mm": (times.size, mesh.skin_nodes.size, 3),
+        }
+        for name, shape in expected.items():
+            if content[name].shape != shape or not np.isfinite(content[name]).all():
+                raise StoreError(f"The stored result {path} is damaged in {name}: delete it and run again.")
+        penetration, newton_steps, factorisations = content.pop("work")
+        return SkinResponse(
+            mesh=mesh,
+            kinks_ms=(touch.stimulus.ramp_ms,),
+            axis_x_mm=touch.at_mm[0],
+            penetration_mm=float(penetration),
+            newton_steps=int(newton_steps),
+            factorisations=int(factorisations),
+            **content,
+        )
+
+
+def _compute(touch: Touch, store: Store) -> float:
+    """Solve and store one touch; return the seconds it took."""
+    started = time.perf_counter()
+    store.save(touch, touch.solve())
+    return time.perf_counter() - started
+
+
+def solve_missing(
+    touches: Sequence[Touch], store: Store, jobs: int, on_finished: Callable[[float], None] | None = None
+) -> int:
+    """Compute the touches that the store does not hold.
+
+    Parameters
+    ----------
+    touches : sequence of Touch
+        What is wanted; equal ones are computed once.
+    store : Store
+        Where finished ones are.
+    jobs : int
+        Processes to use; the results do not depend on it.
+    on_finished : callable, optional
+        Called with the seconds that each finished touch took.
+
+    Returns
+    -------
+    int
+        How many were computed.
+
+    Raises
+    ------
+    ConvergenceError
+        If one cannot be solved; those finished before stay in the store.
+    """
+    whole("jobs", jobs, at_least=1)
+    missing = list({touch_key(touch): touch for touch in touches if not store.holds(touch)}.values())
+    for seconds in (
+        _in_processes(missing, store, jobs) if jobs > 1 and len(missing) > 1 else _in_turn(missing, store)
+    ):
+        if on_finished:
+            on_finished(seconds)
+    return len(missing)
+
+
+def _in_turn(touches: Sequence[Touch], store: Store) -> Iterator[float]:
+    for touch in touches:
+        yield _compute(touch, store)
+
+
+def _in_processes(touches: Sequence[Touch], store: Store, jobs: int) -> Iterator[float]:
+    with (
+        _environment(_ONE_THREAD),
+        ProcessPoolExecutor(
+            min(jobs, len(touches)), get_context("spawn"), _end_with_parent, (os.getpid(),)
+        ) as pool,
+    ):
+        waiting: set[Future[float]] = {pool.submit(_compute, touch, store) for touch in touches}
+        try:
+            while waiting:
+                done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                for future in done:
+                    yield future.result()
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def _environment(variables: dict[str, str]) -> Iterator[None]:
+    """Environment that new processes start with: one core each, since there is one process per core."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _end_with_parent(parent: int) -> None:
+    """Let a worker end when its parent was killed: nothing else would tell it."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_LOOK_FOR_PARENT_S)
+        os._exit(1)
+
+    if sys.platform != "win32":
+        threading.Thread(target=watch, daemon=True).start()
