@@ -85,8 +85,8 @@ class Touch:
         available = _CLEARANCE_TO_BONE * float(self.finger.depth_available_mm(x, z))
         if self.stimulus.depth_mm > available:
             raise InputError(
-                f"depth_mm must stay below {available:.2f} mm at x = {x:g}, z = {z:g} mm, where the bone comes: "
-                f"got {self.stimulus.depth_mm:g} mm."
+                f"depth_mm must stay below {available:.2f} mm at x = {x:g}, z = {z:g} mm, "
+                f"where the bone comes: got {self.stimulus.depth_mm:g} mm."
             )
 
     def solve(self) -> SkinResponse:
@@ -222,7 +222,7 @@ def indent(
 
 
 def settings_of(resolution: str) -> PressSettings:
-    """Steps and tolerances of a named resolution."""
+    """Return steps and tolerances of a named resolution."""
     ramp_steps, hold_steps = STEPS[resolution]
     return PressSettings(ramp_steps, hold_steps)
 

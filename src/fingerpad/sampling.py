@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CloughTocher2DInterpolator
 from scipy.spatial import Delaunay
+from threadpoolctl import threadpool_limits
 
 from fingerpad.checks import FloatArray, float_array
 from fingerpad.errors import InputError
@@ -150,4 +151,9 @@ class SkinResponse:
         plane, elements = centre[volar][:, [0, 2]], elements[volar]
         if mesh.symmetry_nodes.size:
             plane, elements = np.vstack([plane, plane * [1.0, -1.0]]), np.tile(elements, 2)
-        return Delaunay(plane), elements
+        triangulation = Delaunay(plane)
+        # Its first search solves one 2x2 system per triangle, for each of which OpenBLAS would wake its
+        # threads: on busy processors 8 ms a triangle, half a minute in all.
+        with threadpool_limits(limits=1):
+            triangulation.find_simplex(plane[:1])
+        return triangulation, elements

@@ -1,0 +1,162 @@
+"""One touch from arguments to skin: what it must obey, and what it refuses."""
+
+import numpy as np
+import pytest
+
+from fingerpad.errors import InputError
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import Grading
+from fingerpad.indentation import Touch, grading_about, indent, settings_of
+from fingerpad.indenters import Bar, Cylinder, Line, Plate, Sphere
+from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.stimulus import RampAndHold
+
+FINGER, BALL = Fingertip(), Sphere(curvature_per_m=287)
+NAMES = ["Sphere", "Cylinder", "Bar", "Line", "Plate"]
+SHALLOW = RampAndHold(depth_mm=0.05)
+COARSE = Grading(17.37, 1.2, 1.2, 0.6, 0.6, largest_mm=4.0, stratum_corneum=1, dermis=1, subcutis=2)
+
+
+def coarse_touch(**changes):
+    arguments = {
+        "finger": FINGER,
+        "indenter": BALL,
+        "stimulus": RampAndHold(depth_mm=0.5),
+        "tissues": named_tissues("trial3"),
+        "grading": COARSE,
+        "settings": PressSettings(ramp_steps=2, hold_steps=2),
+    }
+    return Touch(**(arguments | changes))
+
+
+@pytest.fixture(scope="module")
+def skin():
+    return coarse_touch().solve()
+
+
+def test_skin_moves_with_the_indenter_and_only_there(skin):
+    profile = skin.surface_profile()
+    mesh = skin.mesh
+    placement = place(BALL, mesh.nodes_mm[mesh.skin_nodes], FINGER.skin_point(17.37, 0.0), np.eye(3))
+    on_axis = np.abs(profile.distance_mm).argmin()
+    tip_mm = placement.origin_mm[1] + 0.5 - mesh.nodes_mm[mesh.midline_nodes[on_axis], 1]
+    np.testing.assert_allclose(profile.distance_mm[on_axis], 0.0, atol=1e-9)
+    np.testing.assert_allclose(profile.deflection_mm[on_axis], tip_mm, rtol=0, atol=0.005 * 0.5)
+    assert 0.45 < tip_mm < 0.5  # the pad is inclined: the ball touches first beside its axis
+    assert abs(profile.at(10.0)) < 0.1 * 0.5
+    assert not skin.surface_profile(0).deflection_mm.any()
+
+
+def test_response_holds_one_row_per_time(skin):
+    n_times = skin.times_ms.size
+    assert skin.times_ms[[0, -1]].tolist() == [0.0, 1000.0]
+    assert skin.kinks_ms == (50.0,)
+    assert skin.kinks_ms[0] in skin.times_ms
+    assert skin.force_mn.shape == (n_times,)
+    assert skin.sed_kpa.shape == (n_times, len(skin.mesh.elements))
+    assert skin.skin_displacement_mm.shape == (n_times, skin.mesh.skin_nodes.size, 3)
+    np.testing.assert_array_equal(skin.skin_displacement_mm[-1], skin.displacement_mm[skin.mesh.skin_nodes])
+    assert skin.force_mn[0] == 0.0
+    assert skin.force_mn[2] > skin.force_mn[1] > 0.0
+    assert (np.diff(skin.force_mn[2:]) < 0).all()
+
+
+def test_energy_is_greatest_below_the_indenter(skin):
+    x = np.linspace(12.0, 23.0, 45)
+    traces = skin.sed(np.column_stack([x, np.zeros(45)]))
+    assert abs(x[traces.sed_kpa[2].argmax()] - 17.37) < 1.0
+    assert traces.sed_kpa[2].max() > 10 * traces.sed_kpa[2, [0, -1]].max()
+
+
+def test_stiffer_tissues_need_more_force(skin):
+    stiff = coarse_touch(tissues=named_tissues("trial1")).solve()
+    assert stiff.force_mn[-1] > 1.1 * skin.force_mn[-1]
+
+
+def test_indent_is_the_touch_that_its_arguments_describe():
+    """The named resolution and materials, spelt out."""
+    whole = indent(FINGER, BALL, SHALLOW, materials="trial1", resolution="quick", at_mm=(16.0, 0.0))
+    touch = Touch(
+        finger=FINGER,
+        indenter=BALL,
+        stimulus=SHALLOW,
+        tissues=named_tissues("trial1"),
+        grading=grading_about(BALL, "quick", 16.0),
+        settings=settings_of("quick"),
+        at_mm=(16.0, 0.0),
+    )
+    spelt_out = touch.solve()
+    np.testing.assert_array_equal(whole.force_mn, spelt_out.force_mn)
+    np.testing.assert_array_equal(whole.sed_kpa, spelt_out.sed_kpa)
+    assert whole.axis_x_mm == 16.0
+
+
+def test_touches_are_values():
+    assert coarse_touch() == coarse_touch()
+    assert hash(coarse_touch()) == hash(coarse_touch())
+    assert coarse_touch(at_mm=[17.37, 0]) == coarse_touch()
+    assert coarse_touch(indenter=Cylinder()) != coarse_touch()
+
+
+@pytest.mark.parametrize("indenter", [BALL, Cylinder(), Bar(), Line(), Plate()], ids=NAMES)
+def test_mesh_is_fine_wherever_an_indenter_touches_first(indenter):
+    grading = grading_about(indenter, "standard", 17.37)
+    assert grading.size_x_mm <= max(0.25, indenter.half_width_mm)
+    assert grading.half_length_mm >= min(indenter.half_width_mm, 2.0)
+    assert not grading.full
+    beside = grading_about(indenter, "standard", 17.37, 2.0)
+    assert beside.full
+    assert beside.half_width_mm >= 2.0 + min(indenter.half_width_mm, 2.0)
+
+
+def refused(said, **changes):
+    arguments = {"finger": FINGER, "indenter": BALL, "stimulus": SHALLOW}
+    return pytest.param(arguments | changes, said, id=", ".join(f"{k}={v}" for k, v in changes.items()))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        refused("trial1, trial2, trial3, laboratory2014: got 'steel'", materials="steel"),
+        refused("materials must be one of", materials=None),
+        refused("resolution must be one of quick, standard, paper: got 'fine'", resolution="fine"),
+        refused("depth_mm must stay below", stimulus=RampAndHold(depth_mm=6.0)),
+        refused("at_mm must be a finite number", at_mm=(np.nan, 0.0)),
+        refused("at_mm must be a pair", at_mm=17.37),
+        refused("at_mm must be a pair", at_mm=(17.37, 0.0, 0.0)),
+        refused("x = 50", at_mm=(50.0, 0.0)),
+        refused("z = 12", at_mm=(17.37, 12.0)),
+        refused("x = -1", at_mm=(-1.0, 0.0)),
+        refused("never touches a node", indenter=Sphere(curvature_per_m=1e6), at_mm=(17.0, 3.3)),
+    ],
+)
+def test_unusable_arguments_are_refused_in_one_sentence(arguments, said):
+    with pytest.raises(InputError, match=said) as refusal:
+        indent(**arguments)
+    assert str(refusal.value).endswith(".")
+    assert "\n" not in str(refusal.value)
+
+
+def test_half_a_finger_cannot_be_touched_beside_its_midline():
+    with pytest.raises(InputError, match="full=True"):
+        coarse_touch(at_mm=(17.37, 1.0))
+
+
+def test_tilted_indenter_presses_along_its_axis_and_meets_its_point():
+    """A tilt by the slope of the skin puts a ball's first touch on its axis."""
+    skin_slope = np.diff(FINGER.skin_point([17.36, 17.38], 0.0)[:, 1])[0] / 0.02
+    touch = coarse_touch(tilt_deg=np.rad2deg(np.arctan(skin_slope)))
+    skin = touch.solve()
+    np.testing.assert_allclose(np.linalg.norm(skin.direction), 1.0, rtol=1e-14)
+    inward = np.array([-skin_slope, 1.0, 0.0]) / np.hypot(skin_slope, 1.0)
+    np.testing.assert_allclose(skin.direction, inward, rtol=1e-12)
+    profile = skin.surface_profile()
+    np.testing.assert_allclose(profile.deflection_mm.max(), 0.5, rtol=0, atol=0.005)
+
+
+@pytest.mark.parametrize("tilt_deg", [50.0, -90.0, np.nan])
+def test_tilt_has_a_limit(tilt_deg):
+    with pytest.raises(InputError, match="tilt_deg"):
+        coarse_touch(tilt_deg=tilt_deg)
