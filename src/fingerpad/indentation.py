@@ -27,8 +27,8 @@ CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
 STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
 """Steps in ramp and hold of each resolution."""
 
-THIN_SIZE_MM = 0.05
-"""Elements along the finger below an indenter that is thinner than the mesh. [mm]"""
+THIN_SIZE_MM = 0.025
+"""Elements along the finger below a wire: two across the strip that it pushes. [mm]"""
 
 LARGEST_TILT_DEG = 45.0
 _LONGEST_REACH_MM = 5.0
@@ -82,6 +82,8 @@ class Touch:
             raise InputError(f"tilt_deg must lie within {LARGEST_TILT_DEG:g} degrees: got {self.tilt_deg:g}.")
         if z != 0.0 and not self.grading.full:
             raise InputError(f"at_mm beside the midline (z = {z:g} mm) needs a grading with full=True.")
+        if self.indenter.grips and self.tilt_deg != 0.0:
+            raise InputError(f"tilt_deg must be 0 for {type(self.indenter).__name__}: got {self.tilt_deg:g} degrees.")
         available = _CLEARANCE_TO_BONE * float(self.finger.depth_available_mm(x, z))
         if self.stimulus.depth_mm > available:
             raise InputError(
@@ -232,7 +234,7 @@ def grading_about(indenter: Indenter, resolution: str, x_mm: float, z_mm: float 
     reach = min(indenter.half_width_mm + 1.0, _LONGEST_REACH_MM)
     grading = resolution_grading(resolution, x_mm, half_length_mm=reach, half_width_mm=abs(z_mm) + reach)
     if indenter.half_width_mm < grading.size_x_mm:
-        # A line needs elements of its own size below it; a few of them, from which the mesh grows.
+        # A wire needs elements of its own size below it; a few of them, from which the mesh grows.
         grading = replace(grading, size_x_mm=THIN_SIZE_MM, half_length_mm=4 * THIN_SIZE_MM)
     return replace(grading, full=True) if z_mm != 0.0 else grading
 

@@ -34,6 +34,11 @@ class Indenter(Protocol):
         ...
 
     @property
+    def grips(self) -> bool:
+        """Whether the skin that may touch cannot slide along the finger."""
+        ...
+
+    @property
     def half_width_mm(self) -> float:
         """Half of the body's extent along x where it can touch. [mm]"""
         ...
@@ -107,6 +112,11 @@ class Cylinder:
         positive("diameter_mm", self.diameter_mm, "mm")
 
     @property
+    def grips(self) -> bool:
+        """The body is frictionless."""
+        return False
+
+    @property
     def half_width_mm(self) -> float:
         """Half of the body's extent along x. [mm]"""
         return self.diameter_mm / 2
@@ -130,9 +140,9 @@ class Cylinder:
 class Line:
     """Line load across the finger: a wire thinner than the elements of the skin, taken as a blade.
 
-    Nodes cannot resolve a body thinner than their spacing: one node would balance on its top and slide off.
-    The line of nodes that lies under the undeformed wire is therefore pushed along the direction of
-    pressing and stays under it (docs/decisions/line-load.md).
+    Nodes cannot resolve the roundness of a body as thin as their spacing: one node would balance on its top
+    and slide off. The strip of skin that lies under the undeformed wire is therefore pushed along the
+    direction of pressing and does not slide along the finger (docs/decisions/line-load.md).
 
     Parameters
     ----------
@@ -151,6 +161,11 @@ class Line:
         positive("diameter_mm", self.diameter_mm, "mm")
 
     @property
+    def grips(self) -> bool:
+        """The skin under the wire does not slide along the finger."""
+        return True
+
+    @property
     def half_width_mm(self) -> float:
         """Half of the body's extent along x. [mm]"""
         return self.diameter_mm / 2
@@ -161,7 +176,7 @@ class Line:
 
     def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
         """Only the points below the undeformed wire; bool (n,)."""
-        return np.abs(undeformed_mm[:, 0]) <= self.diameter_mm / 2
+        return np.abs(undeformed_mm[:, 0]) <= self.diameter_mm / 2 * (1 + 1e-6)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Gap along y (n,) and that direction (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
@@ -192,6 +207,11 @@ class Sphere:
     def radius_mm(self) -> float:
         """Radius. [mm]"""
         return radius_mm(self.curvature_per_m)
+
+    @property
+    def grips(self) -> bool:
+        """The body is frictionless."""
+        return False
 
     @property
     def half_width_mm(self) -> float:
@@ -238,6 +258,11 @@ class Bar:
         _fillet_within(self.fillet_mm, self.width_mm, "width_mm")
 
     @property
+    def grips(self) -> bool:
+        """The body is frictionless."""
+        return False
+
+    @property
     def half_width_mm(self) -> float:
         """Half of the width. [mm]"""
         return self.width_mm / 2
@@ -279,6 +304,11 @@ class FlatPunch:
         _fillet_within(self.fillet_mm, self.diameter_mm, "diameter_mm")
 
     @property
+    def grips(self) -> bool:
+        """The body is frictionless."""
+        return False
+
+    @property
     def half_width_mm(self) -> float:
         """Half of the diameter. [mm]"""
         return self.diameter_mm / 2
@@ -305,6 +335,11 @@ class FlatPunch:
 @dataclass(frozen=True)
 class Plate:
     """Flat plate without edges, larger than the finger."""
+
+    @property
+    def grips(self) -> bool:
+        """The body is frictionless."""
+        return False
 
     @property
     def half_width_mm(self) -> float:

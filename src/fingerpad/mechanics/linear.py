@@ -27,6 +27,7 @@ except ImportError:  # no MKL wheel for this processor
 
 RENEW_AFTER_ITERATIONS = 16
 MOST_ITERATIONS = 400
+NO_NODES = np.empty(0, dtype=np.int64)
 
 
 class _NotPositiveDefiniteError(Exception):
@@ -261,9 +262,12 @@ class LinearSolver:
         raise ConvergenceError(f"The linear solver stopped after {count} iterations without converging.")
 
 
-def free_degrees_of_freedom(n_nodes: int, fixed_nodes: np.ndarray, symmetry_nodes: np.ndarray) -> np.ndarray:
-    """Degrees of freedom left when some nodes are fixed and some stay in the plane z = constant."""
+def free_degrees_of_freedom(
+    n_nodes: int, fixed_nodes: np.ndarray, symmetry_nodes: np.ndarray, gripped_nodes: np.ndarray = NO_NODES
+) -> np.ndarray:
+    """Degrees of freedom left when nodes are fixed, stay in the plane of symmetry, or do not move along x."""
     moves = np.ones((n_nodes, 3), dtype=bool)
     moves[fixed_nodes] = False
     moves[symmetry_nodes, 2] = False
+    moves[gripped_nodes, 0] = False
     return np.flatnonzero(moves.ravel())

@@ -11,7 +11,7 @@ from fingerpad.errors import ConvergenceError
 from fingerpad.indenters import Indenter
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.contact import Contact, Placement
-from fingerpad.mechanics.linear import LinearSolver, free_degrees_of_freedom, preconditioner
+from fingerpad.mechanics.linear import NO_NODES, LinearSolver, free_degrees_of_freedom, preconditioner
 from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.newton import Body, Equilibrium, Load, NewtonSettings, find_equilibrium
 from fingerpad.mechanics.viscoelastic import (
@@ -125,13 +125,14 @@ def press(
     """
     settings = settings or PressSettings()
     table = MaterialTable.of(materials)
-    free = free_degrees_of_freedom(len(mesh.nodes_mm), mesh.fixed_nodes, mesh.symmetry_nodes)
-    sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
-    body = Body(mesh, table, sparsity, free)
-    solver = LinearSolver(sparsity, free, preconditioner(sparsity, free, mesh.nodes_mm))
     undeformed = placement.to_local(mesh.nodes_mm[mesh.skin_nodes], depth_mm=0.0)
     candidates = indenter.may_touch(undeformed) & ~np.isin(mesh.skin_nodes, mesh.fixed_nodes)
     contact = Contact(indenter, placement, mesh.skin_nodes[candidates], mesh.skin_area_mm2[candidates])
+    gripped = contact.nodes if indenter.grips else NO_NODES
+    free = free_degrees_of_freedom(len(mesh.nodes_mm), mesh.fixed_nodes, mesh.symmetry_nodes, gripped)
+    sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
+    body = Body(mesh, table, sparsity, free)
+    solver = LinearSolver(sparsity, free, preconditioner(sparsity, free, mesh.nodes_mm))
 
     times = stimulus.times_ms(settings.ramp_steps, settings.hold_steps)
     march = _March(

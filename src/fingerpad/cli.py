@@ -1,0 +1,123 @@
+"""The command line: `fingerpad reproduce`."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import Progress as RichProgress
+
+from fingerpad import __version__
+from fingerpad.errors import ConvergenceError, FingerpadError, InputError
+from fingerpad.files import write_atomically
+from fingerpad.grading import RESOLUTIONS
+from fingerpad.report import write_report
+from fingerpad.studies import Reproduction, reproduce
+from fingerpad.studies.conditions import Conditions
+
+EXPECTED_MINUTES = {"quick": "about 4", "standard": "about 15", "paper": "many hours"}
+"""On two cores, nothing stored yet; measured in benchmarks/."""
+
+app = typer.Typer(
+    help="From a touch on a finite-element human fingertip to the spikes of SAI afferents to a percept.",
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"fingerpad {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command("reproduce")
+def reproduce_command(
+    resolution: Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTIONS)}.")] = "standard",
+    out: Annotated[Path, typer.Option(help="Folder for report, figures, results and stored indentations.")] = Path(
+        "reproduction"
+    ),
+    jobs: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the observer's noise.")] = 0,
+) -> None:
+    """Press, fire, fit and discriminate as in Gerling et al. 2014, and report beside the paper's numbers."""
+    conditions = Conditions(resolution=resolution, seed=seed)
+    run = Reproduction(conditions, _writable(out), jobs if jobs is not None else _cores())
+    console = Console(stderr=True)
+    if console.is_terminal:
+        console.print(
+            f"Reproducing at {resolution} resolution with {run.jobs} process(es): {EXPECTED_MINUTES[resolution]} "
+            "minutes on two cores. The first run also compiles the kernels, about a minute. "
+            "Stop it at any time; it goes on from the last finished indentation."
+        )
+    results = reproduce(run, _Bars(console))
+    write_atomically(out / "results.json", json.dumps(results, indent=1, allow_nan=False).encode())
+    report = write_report(results, out)
+    missed = [row["quantity"] for row in results["comparison"] if row["met"] is False]
+    typer.echo(f"Report: {report}")
+    typer.echo(f"Results: {out / 'results.json'}")
+    typer.echo(f"Missed: {'; '.join(missed) if missed else 'nothing'}")
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _writable(folder: Path) -> Path:
+    """Return `folder`, made if need be, once a file could be written into it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise InputError(f"--out must be a folder that can be written: {folder} cannot ({error.strerror}).") from error
+    return folder
+
+
+class _Bars:
+    """A bar per stage on a terminal, silence elsewhere."""
+
+    def __init__(self, console: Console):
+        self._console = console
+
+    @contextmanager
+    def stage(self, name: str, total: int) -> Iterator[Callable[[], None]]:
+        """Show one stage with its expected time."""
+        bars = RichProgress(
+            TextColumn(f"{name:<24}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("left"),
+            TimeRemainingColumn(), console=self._console, disable=not self._console.is_terminal,
+        )  # fmt: skip
+        with bars:
+            task = bars.add_task(name, total=total)
+            yield lambda: bars.advance(task)
+
+
+def main() -> None:
+    """Run the command line; a failure is one sentence on standard error and exit status 2."""
+    try:
+        app(standalone_mode=True)
+    except ConvergenceError as error:
+        print(f"fingerpad: {error}", file=sys.stderr)
+        sys.exit(2)
+    except FingerpadError as error:
+        print(f"fingerpad: {error}", file=sys.stderr)
+        sys.exit(2)

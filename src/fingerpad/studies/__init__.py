@@ -1,0 +1,5 @@
+"""One file per claim of the paper: what is pressed, and what is read from it; `reproduction` runs them all."""
+
+from fingerpad.studies.reproduction import Reproduction, reproduce
+
+__all__ = ["Reproduction", "reproduce"]

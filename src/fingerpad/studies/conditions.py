@@ -1,0 +1,81 @@
+"""What the studies have in common: finger, tissues, meshes and steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from fingerpad.checks import one_of, whole
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import RESOLUTIONS, Grading, resolution_grading
+from fingerpad.indentation import CONTACT_POINT_MM, grading_about, touch_of
+from fingerpad.indentation import Touch as Touch
+from fingerpad.indenters import Indenter
+
+RECEPTOR_X_MM = CONTACT_POINT_MM[0]
+"""Where the single receptor of the bar study lies, and the middle of the population. [mm]"""
+
+BAR_REACH_MM = 2.6
+"""Fine zone about the receptor in the bar study: an edge farther away hardly reaches it. [mm]"""
+
+BAR_SIZE_MM = {"quick": (0.2, 0.6), "standard": (0.1, 0.5)}
+"""Elements along and across under the bar. The shifts of 0.2 mm are whole elements, so that the mesh under
+an edge looks the same from shift to shift. [mm]"""
+
+SPHERE_REACH_MM = 2.8
+"""Fine zone about the spheres, along and across: the contact and the population's outermost receptor. [mm]"""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Finger, tissues and accuracy of a reproduction.
+
+    Parameters
+    ----------
+    resolution : {"quick", "standard", "paper"}
+        How fine meshes and steps are.
+    seed : int
+        Seed of the observer's noise.
+    materials : str
+        Tissues of the single-unit and the population study, see `mechanics.tissues`.
+    finger : Fingertip
+        The finger.
+    """
+
+    resolution: str = "standard"
+    seed: int = 0
+    materials: str = "trial3"
+    finger: Fingertip = field(default_factory=Fingertip)
+
+    def __post_init__(self) -> None:
+        one_of("resolution", self.resolution, RESOLUTIONS)
+        whole("seed", self.seed, at_least=0)
+
+    def touch(
+        self, indenter: Indenter, x_mm: float, grading: Grading, materials: str | None = None, tilt_deg: float = 0.0
+    ) -> Touch:
+        """One touch of the paper's protocol, 1.0 mm in 50 ms, held for 950 ms, on the midline at x."""
+        return touch_of(
+            self.finger,
+            indenter,
+            materials=materials or self.materials,
+            resolution=self.resolution,
+            at_mm=(x_mm, 0.0),
+            grading=grading,
+            tilt_deg=tilt_deg,
+        )
+
+    def deflection_grading(self, indenter: Indenter) -> Grading:
+        """Mesh of the skin deflection study: fine about the indenter."""
+        return grading_about(indenter, self.resolution, RECEPTOR_X_MM)
+
+    def bar_grading(self) -> Grading:
+        """Mesh of the single-unit study: fine about the receptor, the same for all shifts."""
+        grading = resolution_grading(self.resolution, RECEPTOR_X_MM, BAR_REACH_MM, half_width_mm=0.6)
+        if self.resolution in BAR_SIZE_MM:
+            size_x, size_z = BAR_SIZE_MM[self.resolution]
+            grading = replace(grading, size_x_mm=size_x, size_z_mm=size_z)
+        return grading
+
+    def sphere_grading(self) -> Grading:
+        """Mesh of the population study: fine about both positions, the same for all spheres."""
+        return resolution_grading(self.resolution, RECEPTOR_X_MM, SPHERE_REACH_MM, SPHERE_REACH_MM)

@@ -1,0 +1,236 @@
+"""The whole paper in one run: press, fire, fit, discriminate, compare."""
+
+from __future__ import annotations
+
+import math
+import platform
+import resource
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from fingerpad import __version__
+from fingerpad.afferent import Afferent
+from fingerpad.checks import whole
+from fingerpad.mesh_quality import jacobian_at_gauss, scaled_jacobian
+from fingerpad.parameters import all_published
+from fingerpad.sampling import SkinResponse
+from fingerpad.store import Store, code_hash, solve_missing
+from fingerpad.studies import nail_border, single_unit, skin_deflection, sphere_discrimination
+from fingerpad.studies.comparison import comparison
+from fingerpad.studies.conditions import Conditions, Touch
+
+STORE_FOLDER = "indentations"
+PACKAGES = ("numpy", "scipy", "numba", "matplotlib", "pypardiso", "pyamg")
+STANDARD_SPHERE = (sphere_discrimination.POSITIONS_MM[0], sphere_discrimination.CURVATURES[0])
+BYTES_PER_KIB = 1024
+
+Key = TypeVar("Key")
+
+
+class Progress(Protocol):
+    """Tells somebody how far a reproduction is."""
+
+    def stage(self, name: str, total: int) -> AbstractContextManager[Callable[[], None]]:
+        """Open a stage of `total` parts; call the result once per finished part."""
+        ...
+
+
+class NoProgress:
+    """Tells nobody."""
+
+    @contextmanager
+    def stage(self, name: str, total: int) -> Iterator[Callable[[], None]]:
+        """Open a stage that is not shown."""
+        yield lambda: None
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """A run of all studies.
+
+    Parameters
+    ----------
+    conditions : Conditions
+        Finger, tissues, accuracy and seed.
+    folder : Path
+        Where finished indentations are stored.
+    jobs : int
+        Processes to use; the numbers do not depend on it.
+    """
+
+    conditions: Conditions
+    folder: Path
+    jobs: int = 1
+
+    def __post_init__(self) -> None:
+        whole("jobs", self.jobs, at_least=1)
+
+
+def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, Any]:
+    """Run the three validations and compare them with the paper.
+
+    Parameters
+    ----------
+    run : Reproduction
+        What to run and where to keep finished indentations.
+    progress : Progress, optional
+        Told about each finished part.
+
+    Returns
+    -------
+    dict
+        Numbers, strings and lists only, as written to results.json. All but the times, dates and memory of
+        `manifest` depend on nothing but the conditions.
+
+    Raises
+    ------
+    ConvergenceError
+        If an indentation cannot be solved; finished ones stay stored.
+    StoreError
+        If a stored indentation is damaged or the folder cannot be written.
+    """
+    progress = progress or NoProgress()
+    started, clock = datetime.now(UTC), time.perf_counter()
+    store, conditions = Store(run.folder / STORE_FOLDER), run.conditions
+    stages: list[dict[str, Any]] = []
+
+    deflection = _pressed("skin deflection", skin_deflection.touches(conditions), store, run.jobs, progress, stages)
+    bars = dict(enumerate(single_unit.touches(conditions)))
+    bar_responses = _pressed("bar, 36 shifts", bars, store, run.jobs, progress, stages)
+    spheres = sphere_discrimination.touches(conditions)
+    sphere_responses = _pressed("spheres", spheres, store, run.jobs, progress, stages)
+
+    with _timed("fit and discrimination", 3, progress, stages) as advance:
+        recordings = single_unit.Recordings(single_unit.receptor_sed(list(bar_responses.values())))
+        best, folds = single_unit.fit(recordings)
+        advance()
+        afferent = Afferent.from_parameters(best.parameters)
+        discrimination = sphere_discrimination.result(sphere_responses, afferent, conditions.seed)
+        advance()
+        standard = sphere_responses[STANDARD_SPHERE]
+        results: dict[str, Any] = {
+            "skin_deflection": skin_deflection.result(deflection),
+            "single_unit": single_unit.result(recordings, best, folds),
+            "discrimination": discrimination,
+            "population": sphere_discrimination.population_map(standard, afferent),
+            "nail": nail_border.result(standard),
+        }
+        advance()
+    results["comparison"] = comparison(results)
+    results["inputs"] = [
+        {"name": number.name, "value": number.value, "unit": number.unit, "source": number.source, "status": number.status}
+        for number in all_published()
+    ]
+    results["manifest"] = _manifest(conditions, spheres[STANDARD_SPHERE], deflection, bar_responses, stages) | {
+        "started": started.isoformat(timespec="seconds"),
+        "wall_s": round(time.perf_counter() - clock, 2),
+        "peak_memory_mb": _peak_memory_mb(),
+        "stages": stages,
+    }
+    return plain(results)
+
+
+def _pressed(
+    name: str,
+    touches: Mapping[Key, Touch],
+    store: Store,
+    jobs: int,
+    progress: Progress,
+    stages: list[dict[str, Any]],
+) -> dict[Key, SkinResponse]:
+    """Compute what is missing and load everything of one stage."""
+    missing = sum(not store.holds(touch) for touch in touches.values())
+    with _timed(name, missing, progress, stages) as advance:
+        stages[-1]["indentations"] = len(touches)
+        stages[-1]["computed"] = solve_missing(list(touches.values()), store, jobs, lambda seconds: advance())
+        return {key: store.load(touch) for key, touch in touches.items()}
+
+
+@contextmanager
+def _timed(
+    name: str, total: int, progress: Progress, stages: list[dict[str, Any]]
+) -> Iterator[Callable[[], None]]:
+    started = time.perf_counter()
+    stages.append({"name": name, "wall_s": 0.0})
+    with progress.stage(name, total) as advance:
+        yield advance
+    stages[-1]["wall_s"] = round(time.perf_counter() - started, 2)
+
+
+def _manifest(
+    conditions: Conditions,
+    standard: Touch,
+    deflection: Mapping[Any, SkinResponse],
+    bars: Mapping[int, SkinResponse],
+    stages: Sequence[Mapping[str, Any]],
+) -> dict[str, Any]:
+    """What ran, so that the run can be repeated and its meshes judged."""
+    meshes = {"sphere": standard.mesh, "bar": bars[0].mesh}
+    meshes |= {name: deflection["trial3", name].mesh for name in skin_deflection.INDENTERS}
+    return {
+        "version": __version__,
+        "seed": conditions.seed,
+        "resolution": conditions.resolution,
+        "materials": conditions.materials,
+        "code_hash": code_hash(),
+        "nodes": len(standard.mesh.nodes_mm),
+        "elements": len(standard.mesh.elements),
+        "meshes": {
+            name: {
+                "nodes": len(mesh.nodes_mm),
+                "elements": len(mesh.elements),
+                "smallest_gauss_jacobian_mm3": float(jacobian_at_gauss(mesh).min()),
+                "smallest_scaled_jacobian": float(np.nanmin(scaled_jacobian(mesh))),
+            }
+            for name, mesh in meshes.items()
+        },
+        "half_model": not standard.grading.full,
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "packages": {name: version(name) for name in PACKAGES if _installed(name)},
+    }
+
+
+def _installed(package: str) -> bool:
+    try:
+        version(package)
+    except ModuleNotFoundError:  # importlib.metadata.PackageNotFoundError is one
+        return False
+    return True
+
+
+def _peak_memory_mb() -> float:
+    """Largest resident memory of this process or of one of its workers. [MB]"""
+    unit = 1 if sys.platform == "darwin" else BYTES_PER_KIB
+    peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return round(peak * unit / 1e6, 1)
+
+
+def plain(value: Any) -> Any:
+    """Nested dicts and lists of plain numbers, with None for what is not a finite number.
+
+    Examples
+    --------
+    >>> plain({"rate": np.array([1.0, np.nan]), "n": np.int64(3)})
+    {'rate': [1.0, None], 'n': 3}
+    """
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

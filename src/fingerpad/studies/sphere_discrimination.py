@@ -1,0 +1,151 @@
+"""Level 3: can a person tell two spheres apart? (paper, 2.2.3, 3.3, Figures 6-8)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from fingerpad.afferent import Afferent
+from fingerpad.checks import FloatArray
+from fingerpad.discrimination import (
+    END_OF_STIMULUS_MS,
+    Experiment,
+    discriminate_euclidean,
+    discriminate_gradient_sum,
+    expected_hit_rates,
+    fit_noise_sigma,
+)
+from fingerpad.encoding import gradient_sum, neighbour_pairs
+from fingerpad.indenters import Sphere
+from fingerpad.parameters import protocol, psychophysics
+from fingerpad.population import Population
+from fingerpad.sampling import SkinResponse
+from fingerpad.signals import HitRates, ResponseMap
+from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions, Touch
+
+CURVATURES = psychophysics.SPHERE_CURVATURES.value
+POSITIONS_MM = protocol.SPHERE_POSITIONS.value
+NOISE_DRAWS = 400
+"""Common random presentations behind the fit of the noise."""
+
+MAP_REACH_MM, MAP_STEP_MM = 5.0, 0.5
+
+Measure = Callable[[ResponseMap], FloatArray]
+MEASURES: dict[str, Measure] = {
+    "static": lambda response: response.static_rate_hz,
+    "dynamic": lambda response: response.dynamic_rate_hz,
+    "latency": lambda response: response.first_spike_latency_ms,
+}
+
+
+def touches(conditions: Conditions) -> dict[tuple[float, float], Touch]:
+    """Seven spheres at two positions along the finger; keys are position and curvature."""
+    return {
+        (position, curvature): conditions.touch(
+            Sphere(curvature), RECEPTOR_X_MM + position, conditions.sphere_grading()
+        )
+        for position in POSITIONS_MM
+        for curvature in CURVATURES
+    }
+
+
+def result(responses: dict[tuple[float, float], SkinResponse], afferent: Afferent, seed: int) -> dict[str, Any]:
+    """Hit rates of both strategies and all measures, at the noise that fits Goodwin's two points best."""
+    population = Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0))
+    neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
+    answers = {key: population.respond(skin) for key, skin in responses.items()}
+
+    def table(measure: str, position: float) -> FloatArray:
+        return np.array([MEASURES[measure](answers[position, curvature]) for curvature in CURVATURES])
+
+    goodwin = [CURVATURES.index(curvature) - 1 for curvature in psychophysics.GOODWIN_CURVATURES.value]
+    draws = np.random.default_rng([seed, 0]).standard_normal(
+        (len(CURVATURES), NOISE_DRAWS, len(population.positions_mm))
+    )
+    static = table("static", POSITIONS_MM[0])
+    noise = fit_noise_sigma(lambda sigma: expected_hit_rates(static, neighbours, sigma, draws)[goodwin])
+
+    def gradient(measure: str, sigma: float = noise.noise_sigma, experiment: Experiment | None = None) -> dict[str, Any]:
+        return _at_both_positions(
+            lambda position, generator: discriminate_gradient_sum(
+                table(measure, position), neighbours, sigma, generator, experiment, silent_value=END_OF_STIMULUS_MS
+            ),
+            seed,
+        )
+
+    variants = {f"sigma_{sigma:g}": gradient("static", sigma) for sigma in _shown_noise()}
+    variants["ten_matrices"] = gradient("static", experiment=Experiment(presentations=10))
+    for sigma in psychophysics.DECISION_CRITERION_SIGMA.value:
+        variants[f"criterion_{sigma:g}"] = gradient("static", experiment=Experiment(criterion_sigma=sigma))
+    return {
+        "curvature_per_m": CURVATURES,
+        "noise_sigma": noise.noise_sigma,
+        "noise_fit_error": noise.root_mean_square_error,
+        "noise_sigma_paper": psychophysics.NOISE_SIGMA.value,
+        "goodwin": {
+            "curvature_per_m": psychophysics.GOODWIN_CURVATURES.value,
+            "hit_rate": psychophysics.GOODWIN_HIT_RATES.value,
+        },
+        "gradient_sums": {
+            measure: [
+                gradient_sum(_spoken(table(measure, position)), neighbours) for position in POSITIONS_MM
+            ]
+            for measure in MEASURES
+        },
+        "gradient_sum": {measure: gradient(measure) for measure in MEASURES},
+        "euclidean": {
+            "static": _at_both_positions(
+                lambda position, generator: discriminate_euclidean(
+                    table("static", position), noise.noise_sigma, generator
+                ),
+                seed,
+            )
+        },
+        "variants": variants,
+    }
+
+
+def _spoken(values: FloatArray) -> FloatArray:
+    """Values with the rule for silent units applied: their first spike counts as coming at the end."""
+    return np.where(np.isnan(values), END_OF_STIMULUS_MS, values)
+
+
+def _shown_noise() -> list[float]:
+    """Noise of Figure 7: the paper's best and those on either side of it."""
+    return sorted({psychophysics.NOISE_SIGMA.value, *psychophysics.NOISE_SIGMA_SHOWN.value})
+
+
+def _at_both_positions(
+    discriminate: Callable[[float, np.random.Generator], HitRates], seed: int
+) -> dict[str, FloatArray]:
+    """Hit rates at both positions, each with its own stream of random numbers."""
+    first, shifted = (
+        discriminate(position, np.random.default_rng([seed, 1, number]))
+        for number, position in enumerate(POSITIONS_MM)
+    )
+    return {
+        "hit_rate": first.hit_rate,
+        "hit_rate_sd": first.hit_rate_sd,
+        "hit_rate_shifted": shifted.hit_rate,
+        "hit_rate_shifted_sd": shifted.hit_rate_sd,
+    }
+
+
+def population_map(skin: SkinResponse, afferent: Afferent) -> dict[str, Any]:
+    """Response of a dense sheet of afferents to the standard sphere, and the 18 receptors in it (Figure 6)."""
+    offsets = np.arange(-MAP_REACH_MM, MAP_REACH_MM + MAP_STEP_MM / 2, MAP_STEP_MM)
+    x, z = RECEPTOR_X_MM + offsets, offsets
+    sites = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
+    answer = Population(positions_mm=sites, pitch_mm=MAP_STEP_MM, afferent=afferent).respond(skin)
+    shape = (x.size, z.size)
+    return {
+        "curvature_per_m": psychophysics.SPHERE_CURVATURES.value[0],
+        "x_mm": x,
+        "z_mm": z,
+        "dynamic_rate_hz": answer.dynamic_rate_hz.reshape(shape),
+        "static_rate_hz": answer.static_rate_hz.reshape(shape),
+        "first_spike_latency_ms": answer.first_spike_latency_ms.reshape(shape),
+        "receptors_mm": Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0)).positions_mm,
+    }
