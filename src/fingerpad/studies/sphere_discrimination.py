@@ -61,9 +61,7 @@ def result(responses: dict[tuple[float, float], SkinResponse], afferent: Afferen
         return np.array([MEASURES[measure](answers[position, curvature]) for curvature in CURVATURES])
 
     goodwin = [CURVATURES.index(curvature) - 1 for curvature in psychophysics.GOODWIN_CURVATURES.value]
-    draws = np.random.default_rng([seed, 0]).standard_normal(
-        (len(CURVATURES), NOISE_DRAWS, len(population.positions_mm))
-    )
+    draws = np.random.default_rng([seed, 0]).standard_normal((NOISE_DRAWS, len(population.positions_mm)))
     static = table("static", POSITIONS_MM[0])
     noise = fit_noise_sigma(lambda sigma: expected_hit_rates(static, neighbours, sigma, draws)[goodwin])
 
