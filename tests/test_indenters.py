@@ -147,6 +147,7 @@ def test_line_presses_only_the_nodes_below_it():
     points = np.array([[0.0, 0.4, 3.0], [0.02, 0.0, 0.0], [0.03, 0.0, 0.0], [-0.5, -2.0, 0.0]])
     assert Line(diameter_mm=0.05).may_touch(points).tolist() == [True, True, False, False]
     assert all(body.may_touch(points).all() for body in [*BODIES, Plate()])
+    assert [type(body).__name__ for body in ALL if body.grips] == ["Line"]
 
 
 @pytest.mark.parametrize(

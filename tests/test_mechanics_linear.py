@@ -66,6 +66,8 @@ def test_pattern_holds_every_pair_of_an_element_once():
 def test_free_degrees_of_freedom_by_hand():
     free = free_degrees_of_freedom(3, fixed_nodes=np.array([1]), symmetry_nodes=np.array([1, 2]))
     assert free.tolist() == [0, 1, 2, 6, 7]
+    gripped = free_degrees_of_freedom(3, np.array([1]), np.array([1, 2]), gripped_nodes=np.array([0, 2]))
+    assert gripped.tolist() == [1, 2, 7]
 
 
 @needs_pardiso
@@ -117,6 +119,26 @@ def test_tangent_that_turns_indefinite_under_a_kept_factor_is_refused(make):
     solver.solve(tangent(), residual_of(), 1e-8)
     with pytest.raises(ConvergenceError):
         solver.solve(tangent(shift=60.0), residual_of(), 1e-8)
+
+
+class Useless:
+    """A preconditioner that does nothing."""
+
+    def renew(self, blocks):
+        pass
+
+    def apply(self, residual):
+        return residual
+
+
+def test_solution_that_is_not_reached_is_refused():
+    """Stiffness over ten decades: plain conjugate gradients do not get through in their iterations."""
+    blocks = tangent()
+    blocks[SPARSITY.diagonal] += np.logspace(0, 10, len(BLOCK.nodes_mm))[:, None, None] * np.eye(3)
+    solver = LinearSolver(SPARSITY, FREE, Useless())
+    with pytest.raises(ConvergenceError, match="without converging"):
+        solver.solve(blocks, residual_of(), 1e-8)
+    assert solver.renewals == 1
 
 
 @needs_pardiso

@@ -8,7 +8,7 @@ import pytest
 from fingerpad.errors import ConvergenceError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import Grading
-from fingerpad.indenters import Bar, Cylinder, FlatPunch, Plate, Sphere
+from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.mechanics import linear
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import Contact, place
@@ -103,6 +103,18 @@ def test_fixed_nodes_stay_and_the_plane_of_symmetry_stays_plane():
     assert not done.displacement_mm[:, mesh.fixed_nodes].any()
     assert not done.displacement_mm[:, mesh.symmetry_nodes, 2].any()
     assert done.displacement_mm[:, mesh.symmetry_nodes, 1].any()
+
+
+def test_skin_under_a_wire_goes_down_with_it_and_does_not_slide():
+    mesh = block()
+    motion = RampAndHold(0.2, 50.0, 100.0)
+    done = pressed(mesh, indenter=Line(), motion=motion)
+    under = mesh.skin_nodes[mesh.nodes_mm[mesh.skin_nodes, 0] == 0.0]
+    assert not done.displacement_mm[:, under, 0].any()
+    deepest = done.displacement_mm[:, under, 1].max(axis=1)
+    np.testing.assert_allclose(deepest, motion.depth_at(done.times_ms), rtol=0, atol=0.005 * 0.2)
+    beside = mesh.skin_nodes[np.abs(mesh.nodes_mm[mesh.skin_nodes, 0] - 0.4) < 1e-9]
+    assert done.displacement_mm[-1, beside, 0].any()
 
 
 def test_penetration_is_within_its_tolerance_and_the_tip_lies_at_its_depth():
