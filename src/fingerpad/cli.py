@@ -24,8 +24,8 @@ from fingerpad.report import write_report
 from fingerpad.studies import Reproduction, reproduce
 from fingerpad.studies.conditions import Conditions
 
-EXPECTED_MINUTES = {"quick": "about 4", "standard": "about 15", "paper": "many hours"}
-"""On two cores, nothing stored yet; measured in benchmarks/."""
+EXPECTED_TIME = {"quick": "about 4 minutes", "standard": "about 15 minutes", "paper": "many hours"}
+"""On two cores, nothing stored yet."""
 
 app = typer.Typer(
     help="From a touch on a finite-element human fingertip to the spikes of SAI afferents to a percept.",
@@ -44,7 +44,8 @@ def _show_version(wanted: bool) -> None:
 @app.callback()
 def _options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit."),
     ] = False,
 ) -> None:
     pass
@@ -53,9 +54,9 @@ def _options(
 @app.command("reproduce")
 def reproduce_command(
     resolution: Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTIONS)}.")] = "standard",
-    out: Annotated[Path, typer.Option(help="Folder for report, figures, results and stored indentations.")] = Path(
-        "reproduction"
-    ),
+    out: Annotated[
+        Path, typer.Option(help="Folder for report, figures, results and stored indentations.")
+    ] = Path("reproduction"),
     jobs: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the observer's noise.")] = 0,
 ) -> None:
@@ -65,8 +66,8 @@ def reproduce_command(
     console = Console(stderr=True)
     if console.is_terminal:
         console.print(
-            f"Reproducing at {resolution} resolution with {run.jobs} process(es): {EXPECTED_MINUTES[resolution]} "
-            "minutes on two cores. The first run also compiles the kernels, about a minute. "
+            f"Reproducing at {resolution} resolution with {run.jobs} process(es): {EXPECTED_TIME[resolution]} "
+            "on two cores. The first run also compiles the kernels, about a minute. "
             "Stop it at any time; it goes on from the last finished indentation."
         )
     results = reproduce(run, _Bars(console))
@@ -89,7 +90,9 @@ def _writable(folder: Path) -> Path:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise InputError(f"--out must be a folder that can be written: {folder} cannot ({error.strerror}).") from error
+        raise InputError(
+            f"--out must be a folder that can be written: {folder} cannot ({error.strerror})."
+        ) from error
     return folder
 
 
@@ -103,8 +106,9 @@ class _Bars:
     def stage(self, name: str, total: int) -> Iterator[Callable[[], None]]:
         """Show one stage with its expected time."""
         bars = RichProgress(
-            TextColumn(f"{name:<24}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("left"),
-            TimeRemainingColumn(), console=self._console, disable=not self._console.is_terminal,
+            TextColumn(f"{name:<24}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+            TextColumn("left"), TimeRemainingColumn(),
+            console=self._console, disable=not self._console.is_terminal,
         )  # fmt: skip
         with bars:
             task = bars.add_task(name, total=total)

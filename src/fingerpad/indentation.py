@@ -83,7 +83,9 @@ class Touch:
         if z != 0.0 and not self.grading.full:
             raise InputError(f"at_mm beside the midline (z = {z:g} mm) needs a grading with full=True.")
         if self.indenter.grips and self.tilt_deg != 0.0:
-            raise InputError(f"tilt_deg must be 0 for {type(self.indenter).__name__}: got {self.tilt_deg:g} degrees.")
+            raise InputError(
+                f"tilt_deg must be 0 for {type(self.indenter).__name__}: got {self.tilt_deg:g} degrees."
+            )
         available = _CLEARANCE_TO_BONE * float(self.finger.depth_available_mm(x, z))
         if self.stimulus.depth_mm > available:
             raise InputError(

@@ -15,8 +15,9 @@ import sys
 import threading
 import time
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
@@ -47,7 +48,7 @@ MECHANICAL_SOURCES = (
 
 _ARRAYS = ("times_ms", "force_mn", "skin_displacement_mm", "displacement_mm", "sed_kpa", "direction")
 _SINGLE_PRECISION = ("skin_displacement_mm", "displacement_mm", "sed_kpa")
-_ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _LOOK_FOR_PARENT_S = 1.0
 
 
@@ -125,13 +126,7 @@ class Store:
         StoreError
             If the folder cannot be written.
         """
-        content: dict[str, Any] = {name: getattr(response, name) for name in _ARRAYS}
-        for name in _SINGLE_PRECISION:
-            content[name] = content[name].astype(np.float32)
-        work = [response.penetration_mm, response.newton_steps, response.factorisations]
-        buffer = io.BytesIO()
-        np.savez(buffer, **content, work=np.array(work, dtype=np.float64))
-        write_atomically(self.path(touch), buffer.getvalue())
+        write_atomically(self.path(touch), _packed(response))
 
     def load(self, touch: Touch) -> SkinResponse:
         """Read a finished touch.
@@ -170,10 +165,24 @@ class Store:
         )
 
 
-def _compute(touch: Touch, store: Store) -> float:
-    """Solve and store one touch; return the seconds it took."""
+def _packed(response: SkinResponse) -> bytes:
+    """Content of a stored file."""
+    content: dict[str, Any] = {name: getattr(response, name) for name in _ARRAYS}
+    for name in _SINGLE_PRECISION:
+        content[name] = content[name].astype(np.float32)
+    work = [response.penetration_mm, response.newton_steps, response.factorisations]
+    buffer = io.BytesIO()
+    np.savez(buffer, **content, work=np.array(work, dtype=np.float64))
+    return buffer.getvalue()
+
+
+def _compute(touch: Touch, path: Path) -> float:
+    """Solve one touch and store it at `path`; return the seconds it took.
+
+    The path is given, not found again: a worker would hash the sources as they are by then.
+    """
     started = time.perf_counter()
-    store.save(touch, touch.solve())
+    write_atomically(path, _packed(touch.solve()))
     return time.perf_counter() - started
 
 
@@ -204,33 +213,37 @@ def solve_missing(
         If one cannot be solved; those finished before stay in the store.
     """
     whole("jobs", jobs, at_least=1)
-    missing = list({touch_key(touch): touch for touch in touches if not store.holds(touch)}.values())
-    for seconds in (
-        _in_processes(missing, store, jobs) if jobs > 1 and len(missing) > 1 else _in_turn(missing, store)
-    ):
+    missing = {store.path(touch): touch for touch in touches if not store.holds(touch)}
+    in_processes = jobs > 1 and len(missing) > 1
+    for seconds in _in_processes(missing, jobs) if in_processes else _in_turn(missing):
         if on_finished:
             on_finished(seconds)
     return len(missing)
 
 
-def _in_turn(touches: Sequence[Touch], store: Store) -> Iterator[float]:
-    for touch in touches:
-        yield _compute(touch, store)
+def _in_turn(touches: Mapping[Path, Touch]) -> Iterator[float]:
+    for path, touch in touches.items():
+        yield _compute(touch, path)
 
 
-def _in_processes(touches: Sequence[Touch], store: Store, jobs: int) -> Iterator[float]:
+def _in_processes(touches: Mapping[Path, Touch], jobs: int) -> Iterator[float]:
     with (
         _environment(_ONE_THREAD),
         ProcessPoolExecutor(
             min(jobs, len(touches)), get_context("spawn"), _end_with_parent, (os.getpid(),)
         ) as pool,
     ):
-        waiting: set[Future[float]] = {pool.submit(_compute, touch, store) for touch in touches}
+        waiting: set[Future[float]] = {pool.submit(_compute, touch, path) for path, touch in touches.items()}
         try:
             while waiting:
                 done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
                 for future in done:
                     yield future.result()
+        except BrokenProcessPool as error:
+            raise StoreError(
+                "A worker process was ended from outside (out of memory?): run again, perhaps with fewer jobs; "
+                "finished indentations are kept."
+            ) from error
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 

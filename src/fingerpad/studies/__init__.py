@@ -1,4 +1,4 @@
-"""One file per claim of the paper: what is pressed, and what is read from it; `reproduction` runs them all."""
+"""One file per claim of the paper, what is pressed and what is read from it; `reproduction` runs all."""
 
 from fingerpad.studies.reproduction import Reproduction, reproduce
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
 from fingerpad.parameters import paper, psychophysics
@@ -26,7 +27,11 @@ def comparison(results: Mapping[str, Any]) -> list[dict[str, Any]]:
         `quantity`, `paper`, `ours`, `difference`, `status`, `met` (None where the paper gives no criterion)
         and `note`.
     """
-    return [*_deflection(results["skin_deflection"]), *_single_unit(results["single_unit"]), *_percept(results["discrimination"])]
+    return [
+        *_deflection(results["skin_deflection"]),
+        *_single_unit(results["single_unit"]),
+        *_percept(results["discrimination"]),
+    ]
 
 
 def _row(
@@ -88,7 +93,9 @@ def _mean_excess(trial: Mapping[str, Any], reference: Mapping[str, Any]) -> floa
     """Mean deflection above the reference's, over the nodes within 5 mm that both have. [mm]"""
     pairs = [
         a - b
-        for x, a, b in zip(trial["distance_mm"], trial["deflection_mm"], reference["deflection_mm"], strict=True)
+        for x, a, b in zip(
+            trial["distance_mm"], trial["deflection_mm"], reference["deflection_mm"], strict=True
+        )
         if abs(x) <= 5.0
     ]
     return float(sum(pairs) / len(pairs))
@@ -97,17 +104,35 @@ def _mean_excess(trial: Mapping[str, Any], reference: Mapping[str, Any]) -> floa
 def _single_unit(found: Mapping[str, Any]) -> list[dict[str, Any]]:
     status = MATERIALS + "; recordings read"
     rows = [
-        _measured("Single unit, FSS out of sample (mean of six folds)", paper.FSS_OUT_OF_SAMPLE, found["fss_out_of_sample"], status, at_least=True),
-        _measured("Single unit, FSS in sample (all 36 shifts)", paper.FOLD_3_FSS_FITTED, found["fss_in_sample"], status + "; paper's value is of fold 3", at_least=True),
-    ]  # fmt: skip
+        _measured(
+            "Single unit, FSS out of sample (mean of six folds)",
+            paper.FSS_OUT_OF_SAMPLE,
+            found["fss_out_of_sample"],
+            status,
+            at_least=True,
+        ),
+        _measured(
+            "Single unit, FSS in sample (all 36 shifts)",
+            paper.FOLD_3_FSS_FITTED,
+            found["fss_in_sample"],
+            status + "; the paper's value is of fold 3",
+            at_least=True,
+        ),
+    ]
     fold_3 = found["folds"][2]
     rows += [
         _measured("Fold 3, FSS at start point 2", paper.FOLD_3_FSS_START, fold_3["fss_start"][1], status),
-        _measured("Fold 3, FSS of the testing set", paper.FOLD_3_FSS_TEST, fold_3["fss_test"], status, at_least=True),
+        _measured(
+            "Fold 3, FSS of the testing set", paper.FOLD_3_FSS_TEST, fold_3["fss_test"], status, at_least=True
+        ),
     ]
     dynamic, static = found["modulation"]["dynamic"]["ours"], found["modulation"]["static"]["ours"]
     for quantity, published, ours in (
-        ("Dynamic rate, smallest under the flat face [spikes/s]", paper.DYNAMIC_RATE_MINIMUM, dynamic["minimum_hz"]),
+        (
+            "Dynamic rate, smallest under the flat face [spikes/s]",
+            paper.DYNAMIC_RATE_MINIMUM,
+            dynamic["minimum_hz"],
+        ),
         ("Dynamic rate, largest [spikes/s]", paper.DYNAMIC_RATE_MAXIMUM, dynamic["maximum_hz"]),
         ("Dynamic rate, difference [spikes/s]", paper.DYNAMIC_RATE_DIFFERENCE, dynamic["difference_hz"]),
         ("Static rate, difference [spikes/s]", paper.STATIC_RATE_DIFFERENCE, static["difference_hz"]),
@@ -132,9 +157,19 @@ def _measured(
 def _percept(found: Mapping[str, Any]) -> list[dict[str, Any]]:
     status = MATERIALS + "; curvatures 316, 328, 340 /m assumed"
     sigma, published = found["noise_sigma"], psychophysics.NOISE_SIGMA.value
-    rows = [_row("Noise sigma_1 that fits Goodwin's two points", f"{published:g}", f"{sigma:.3f}", f"{sigma - published:+.3f}", status)]
+    rows = [
+        _row(
+            "Noise sigma_1 that fits Goodwin's two points",
+            f"{published:g}",
+            f"{sigma:.3f}",
+            f"{sigma - published:+.3f}",
+            status,
+        )
+    ]
     static = found["gradient_sum"]["static"]
-    for curvature, observed in zip(found["goodwin"]["curvature_per_m"], found["goodwin"]["hit_rate"], strict=True):
+    for curvature, observed in zip(
+        found["goodwin"]["curvature_per_m"], found["goodwin"]["hit_rate"], strict=True
+    ):
         column = list(found["curvature_per_m"]).index(curvature) - 1
         ours = float(static["hit_rate"][column])
         rows.append(
@@ -151,7 +186,7 @@ def _percept(found: Mapping[str, Any]) -> list[dict[str, Any]]:
     for measure in ("static", "dynamic", "latency"):
         for name, key in (("0.0 mm", "hit_rate"), ("0.2 mm", "hit_rate_shifted")):
             rates = [float(rate) for rate in found["gradient_sum"][measure][key]]
-            rises = all(later > earlier for earlier, later in zip(rates, rates[1:], strict=False))
+            rises = all(later > earlier for earlier, later in pairwise(rates))
             rows.append(
                 _row(
                     f"Hit rate rises with curvature, {measure} Gradient Sum at {name}",
@@ -165,7 +200,9 @@ def _percept(found: Mapping[str, Any]) -> list[dict[str, Any]]:
             )
     for measure in ("static", "dynamic", "latency"):
         both = found["gradient_sum"][measure]
-        shift = max(abs(float(a) - float(b)) for a, b in zip(both["hit_rate"], both["hit_rate_shifted"], strict=True))
+        shift = max(
+            abs(float(a) - float(b)) for a, b in zip(both["hit_rate"], both["hit_rate_shifted"], strict=True)
+        )
         rows.append(
             _row(
                 f"Largest change of hit rate by the 0.2 mm shift, {measure}",

@@ -51,7 +51,12 @@ class Conditions:
         whole("seed", self.seed, at_least=0)
 
     def touch(
-        self, indenter: Indenter, x_mm: float, grading: Grading, materials: str | None = None, tilt_deg: float = 0.0
+        self,
+        indenter: Indenter,
+        x_mm: float,
+        grading: Grading,
+        materials: str | None = None,
+        tilt_deg: float = 0.0,
     ) -> Touch:
         """One touch of the paper's protocol, 1.0 mm in 50 ms, held for 950 ms, on the midline at x."""
         return touch_of(

@@ -29,7 +29,7 @@ def result(skin: SkinResponse) -> dict[str, Any]:
         "ratio": ratio,
         "text": (
             f"At the border of the nail the strain energy density reaches {border:.3g} kPa, "
-            f"{ratio:.3g} times the median of the dorsal skin more than {FAR_FROM_NAIL_MM:g} mm away from the nail."
+            f"{ratio:.3g} times the median of the dorsal skin more than {FAR_FROM_NAIL_MM:g} mm away from it."
         ),
         "section": _section(mesh, skin),
     }
@@ -38,7 +38,9 @@ def result(skin: SkinResponse) -> dict[str, Any]:
 def _nail_concentration(mesh: Mesh, centre: np.ndarray, sed: np.ndarray) -> tuple[float, float, float]:
     """Largest SED beside the nail, median SED of the dorsal skin far from it, and their ratio."""
     under_nail = np.isin(mesh.skin_grid, mesh.nail_nodes)
-    corners = under_nail[:-1, :-1].astype(int) + under_nail[1:, :-1] + under_nail[1:, 1:] + under_nail[:-1, 1:]
+    corners = (
+        under_nail[:-1, :-1].astype(int) + under_nail[1:, :-1] + under_nail[1:, 1:] + under_nail[:-1, 1:]
+    )
     at_border = (corners > 0) & (corners < 4)
     nail = mesh.nodes_mm[mesh.nail_nodes]
     offset = centre.reshape(-1, 1, 3) - nail[None]

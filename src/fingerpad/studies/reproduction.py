@@ -103,7 +103,9 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
     store, conditions = Store(run.folder / STORE_FOLDER), run.conditions
     stages: list[dict[str, Any]] = []
 
-    deflection = _pressed("skin deflection", skin_deflection.touches(conditions), store, run.jobs, progress, stages)
+    deflection = _pressed(
+        "skin deflection", skin_deflection.touches(conditions), store, run.jobs, progress, stages
+    )
     bars = dict(enumerate(single_unit.touches(conditions)))
     bar_responses = _pressed("bar, 36 shifts", bars, store, run.jobs, progress, stages)
     spheres = sphere_discrimination.touches(conditions)
@@ -127,10 +129,18 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
         advance()
     results["comparison"] = comparison(results)
     results["inputs"] = [
-        {"name": number.name, "value": number.value, "unit": number.unit, "source": number.source, "status": number.status}
+        {
+            "name": number.name,
+            "value": number.value,
+            "unit": number.unit,
+            "source": number.source,
+            "status": number.status,
+        }
         for number in all_published()
     ]
-    results["manifest"] = _manifest(conditions, spheres[STANDARD_SPHERE], deflection, bar_responses, stages) | {
+    results["manifest"] = _manifest(
+        conditions, spheres[STANDARD_SPHERE], deflection, bar_responses, stages
+    ) | {
         "started": started.isoformat(timespec="seconds"),
         "wall_s": round(time.perf_counter() - clock, 2),
         "peak_memory_mb": _peak_memory_mb(),
@@ -173,7 +183,7 @@ def _manifest(
     bars: Mapping[int, SkinResponse],
     stages: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
-    """What ran, so that the run can be repeated and its meshes judged."""
+    """Say what ran, so that the run can be repeated and its meshes judged."""
     meshes = {"sphere": standard.mesh, "bar": bars[0].mesh}
     meshes |= {name: deflection["trial3", name].mesh for name in skin_deflection.INDENTERS}
     return {

@@ -1,4 +1,4 @@
-"""Level 2: firing of one afferent under a shifted bar, fitted and cross-validated (paper, 2.2.2, 3.2, Figure 5)."""
+"""Level 2: one afferent under a shifted bar, fitted and cross-validated (paper, 2.2.2, 3.2 and Figure 5)."""
 
 from __future__ import annotations
 
@@ -32,18 +32,20 @@ INCREMENT = 0.01
 
 UNITS = ("mA", "mA ms/kPa", "mA/kPa", "ms", "mF", "mV")
 LOWEST_SHARE = 0.05
-"""Time constant, capacitance and threshold stay above this share of their start, so that they stay physical."""
+"""Time constant, capacitance and threshold stay above this share of their start, to stay physical."""
 
 
 def touches(conditions: Conditions) -> list[Touch]:
-    """36 touches of the bar, shifted along the finger; its flat face stays parallel to the skin at the receptor.
+    """36 touches of the bar, shifted along the finger.
 
-    A positive shift moves the bar towards the proximal end (docs/decisions/shift-sign.md).
+    Its flat face stays parallel to the skin at the receptor (docs/decisions/bar-orientation.md). A positive shift moves the bar towards the proximal end (docs/decisions/shift-sign.md).
     """
     tilt = skin_tilt_deg(conditions)
     grading = conditions.bar_grading()
     return [
-        conditions.touch(Bar(), RECEPTOR_X_MM - shift * float(np.cos(np.deg2rad(tilt))), grading, tilt_deg=tilt)
+        conditions.touch(
+            Bar(), RECEPTOR_X_MM - shift * float(np.cos(np.deg2rad(tilt))), grading, tilt_deg=tilt
+        )
         for shift in protocol.BAR_SHIFTS.value
     ]
 
@@ -80,7 +82,7 @@ def start_points() -> FloatArray:
 
 
 def increments(starts: FloatArray) -> FloatArray:
-    """One coding increment per start point and parameter; that of the intercept is a share of the rheobase."""
+    """Coding increments of both start points (2, 6); that of the intercept is a share of the rheobase."""
     time_constant, capacitance, threshold = starts[0, 3:]
     rheobase = capacitance * threshold / time_constant
     where_zero = np.full(6, INCREMENT * rheobase)

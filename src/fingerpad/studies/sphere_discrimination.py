@@ -51,7 +51,9 @@ def touches(conditions: Conditions) -> dict[tuple[float, float], Touch]:
     }
 
 
-def result(responses: dict[tuple[float, float], SkinResponse], afferent: Afferent, seed: int) -> dict[str, Any]:
+def result(
+    responses: dict[tuple[float, float], SkinResponse], afferent: Afferent, seed: int
+) -> dict[str, Any]:
     """Hit rates of both strategies and all measures, at the noise that fits Goodwin's two points best."""
     population = Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0))
     neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
@@ -65,10 +67,17 @@ def result(responses: dict[tuple[float, float], SkinResponse], afferent: Afferen
     static = table("static", POSITIONS_MM[0])
     noise = fit_noise_sigma(lambda sigma: expected_hit_rates(static, neighbours, sigma, draws)[goodwin])
 
-    def gradient(measure: str, sigma: float = noise.noise_sigma, experiment: Experiment | None = None) -> dict[str, Any]:
+    def gradient(
+        measure: str, sigma: float = noise.noise_sigma, experiment: Experiment | None = None
+    ) -> dict[str, Any]:
         return _at_both_positions(
             lambda position, generator: discriminate_gradient_sum(
-                table(measure, position), neighbours, sigma, generator, experiment, silent_value=END_OF_STIMULUS_MS
+                table(measure, position),
+                neighbours,
+                sigma,
+                generator,
+                experiment,
+                silent_value=END_OF_STIMULUS_MS,
             ),
             seed,
         )
@@ -132,7 +141,7 @@ def _at_both_positions(
 
 
 def population_map(skin: SkinResponse, afferent: Afferent) -> dict[str, Any]:
-    """Response of a dense sheet of afferents to the standard sphere, and the 18 receptors in it (Figure 6)."""
+    """Answers of a dense sheet of afferents to the standard sphere, and the 18 receptors in it (Figure 6)."""
     offsets = np.arange(-MAP_REACH_MM, MAP_REACH_MM + MAP_STEP_MM / 2, MAP_STEP_MM)
     x, z = RECEPTOR_X_MM + offsets, offsets
     sites = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
