@@ -62,7 +62,7 @@ class RampAndHold:
         Examples
         --------
         >>> RampAndHold().times_ms(2, 3).round(1).tolist()
-        [0.0, 25.0, 50.0, 75.0, 209.0, 1000.0]
+        [0.0, 25.0, 50.0, 75.0, 204.1, 1000.0]
         """
         ramp = np.linspace(0.0, self.ramp_ms, ramp_steps + 1)
         first = min(self.ramp_ms / ramp_steps, self.hold_ms / hold_steps)
