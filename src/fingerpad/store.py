@@ -241,8 +241,8 @@ def _in_processes(touches: Mapping[Path, Touch], jobs: int) -> Iterator[float]:
                     yield future.result()
         except BrokenProcessPool as error:
             raise StoreError(
-                "A worker process was ended from outside (out of memory?): run again, perhaps with fewer jobs; "
-                "finished indentations are kept."
+                "A worker process was ended from outside (out of memory?): run again, perhaps with fewer "
+                "jobs; finished indentations are kept."
             ) from error
         finally:
             pool.shutdown(wait=False, cancel_futures=True)

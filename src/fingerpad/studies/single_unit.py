@@ -38,7 +38,8 @@ LOWEST_SHARE = 0.05
 def touches(conditions: Conditions) -> list[Touch]:
     """36 touches of the bar, shifted along the finger.
 
-    Its flat face stays parallel to the skin at the receptor (docs/decisions/bar-orientation.md). A positive shift moves the bar towards the proximal end (docs/decisions/shift-sign.md).
+    Its flat face stays parallel to the skin at the receptor (docs/decisions/bar-orientation.md). A positive
+    shift moves the bar towards the proximal end (docs/decisions/bar-shift.md).
     """
     tilt = skin_tilt_deg(conditions)
     grading = conditions.bar_grading()
