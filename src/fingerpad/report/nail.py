@@ -15,7 +15,7 @@ from fingerpad.checks import FloatArray
 from fingerpad.report.appearance import GREY, PALE, new_figure, numbers, say_nothing_to_draw
 from fingerpad.report.words import number
 
-DECADES = 3.0
+DECADES = 5.0
 LABEL = "strain energy density [kPa]"
 
 
@@ -62,8 +62,8 @@ def _scale(sed: FloatArray) -> LogNorm:
 
 
 def _both_halves(half: FloatArray, mirrored: FloatArray) -> FloatArray:
-    """Half a finger and its mirror image as one grid; the midline, where they meet, stands twice."""
-    return np.concatenate([mirrored[:, ::-1], half], axis=1)
+    """Half a finger and its mirror image as one closed grid, joined along both midlines."""
+    return np.concatenate([mirrored[:, ::-1], half, mirrored[:, -1:]], axis=1)
 
 
 def _corners(grid: FloatArray) -> FloatArray:

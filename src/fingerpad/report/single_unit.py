@@ -47,7 +47,7 @@ def draw(section: dict[str, Any]) -> Figure:
             label="observed",
         )
         axes.set_title(f"({'ab'[phase == 'static']}) {name}" + ("" if fit is None else f", FSS = {fit:.2f}"))
-        axes.set_xlabel("position of the bar, distal positive [mm]")
+        axes.set_xlabel("position of the bar, proximal positive [mm]")
         axes.set_ylabel("firing rate [spikes/s]")
         axes.set_ylim(bottom=0.0)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)

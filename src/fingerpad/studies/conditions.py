@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from fingerpad.checks import one_of, whole
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import RESOLUTIONS, Grading, resolution_grading
@@ -49,6 +51,12 @@ class Conditions:
     def __post_init__(self) -> None:
         one_of("resolution", self.resolution, RESOLUTIONS)
         whole("seed", self.seed, at_least=0)
+
+    @property
+    def skin_tilt_deg(self) -> float:
+        """Tilt at which an indenter presses along the inward normal of the skin at the receptor. [degrees]"""
+        x, y, _ = np.ravel(self.finger.skin_normal(self.finger.skin_point(RECEPTOR_X_MM, 0.0)))
+        return float(np.rad2deg(np.arctan2(x, -y)))
 
     def touch(
         self,

@@ -41,7 +41,7 @@ def touches(conditions: Conditions) -> list[Touch]:
     Its flat face stays parallel to the skin at the receptor (docs/decisions/bar-orientation.md). A positive
     shift moves the bar towards the proximal end (docs/decisions/bar-shift.md).
     """
-    tilt = skin_tilt_deg(conditions)
+    tilt = conditions.skin_tilt_deg
     grading = conditions.bar_grading()
     return [
         conditions.touch(
@@ -49,13 +49,6 @@ def touches(conditions: Conditions) -> list[Touch]:
         )
         for shift in protocol.BAR_SHIFTS.value
     ]
-
-
-def skin_tilt_deg(conditions: Conditions) -> float:
-    """Tilt at which an indenter presses along the inward normal of the skin at the receptor. [degrees]"""
-    point = conditions.finger.skin_point(RECEPTOR_X_MM, 0.0)
-    x, y, _ = np.ravel(conditions.finger.skin_normal(point))
-    return float(np.rad2deg(np.arctan2(x, -y)))
 
 
 def receptor_sed(responses: list[SkinResponse]) -> SedTraces:

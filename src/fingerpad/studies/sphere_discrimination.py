@@ -41,10 +41,16 @@ MEASURES: dict[str, Measure] = {
 
 
 def touches(conditions: Conditions) -> dict[tuple[float, float], Touch]:
-    """Seven spheres at two positions along the finger; keys are position and curvature."""
+    """Seven spheres at two positions along the finger; keys are position and curvature.
+
+    They press along the skin's normal, so that a sphere at 0.0 mm is centred on the population.
+    """
     return {
         (position, curvature): conditions.touch(
-            Sphere(curvature), RECEPTOR_X_MM + position, conditions.sphere_grading()
+            Sphere(curvature),
+            RECEPTOR_X_MM + position,
+            conditions.sphere_grading(),
+            tilt_deg=conditions.skin_tilt_deg,
         )
         for position in POSITIONS_MM
         for curvature in CURVATURES
