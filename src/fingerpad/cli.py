@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -17,7 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as RichProgress
 
 from fingerpad import __version__
-from fingerpad.errors import ConvergenceError, FingerpadError, InputError
+from fingerpad.errors import FingerpadError, InputError
 from fingerpad.files import write_atomically
 from fingerpad.grading import RESOLUTIONS
 from fingerpad.report import write_report
@@ -30,9 +30,14 @@ EXPECTED_TIME = {"quick": "about 4 minutes", "standard": "about 15 minutes", "pa
 app = typer.Typer(
     help="From a touch on a finite-element human fingertip to the spikes of SAI afferents to a percept.",
     add_completion=False,
-    no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
+
+MISUSE: Any = typer.BadParameter.__base__
+"""What typer raises for options that it does not know or cannot read; it names only this child of it."""
+
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, by convention."""
 
 
 def _show_version(wanted: bool) -> None:
@@ -41,14 +46,25 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+def _whole_number(text: str) -> int:
+    """Read an option, and repeat what came where it cannot be read."""
+    try:
+        return int(text)
+    except ValueError as error:
+        raise typer.BadParameter(f"must be a whole number: got {text!r}.") from error
+
+
+@app.callback(invoke_without_command=True)
 def _options(
+    context: typer.Context,
     version: Annotated[
         bool,
         typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit."),
     ] = False,
 ) -> None:
-    pass
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+        raise typer.Exit(2)
 
 
 @app.command("reproduce")
@@ -57,12 +73,18 @@ def reproduce_command(
     out: Annotated[
         Path, typer.Option(help="Folder for report, figures, results and stored indentations.")
     ] = Path("reproduction"),
-    jobs: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the observer's noise.")] = 0,
+    jobs: Annotated[
+        int | None,
+        typer.Option(parser=_whole_number, metavar="INTEGER", help="Processes; one per core by default."),
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(parser=_whole_number, metavar="INTEGER", help="Seed of the observer's noise.")
+    ] = 0,
 ) -> None:
     """Press, fire, fit and discriminate as in Gerling et al. 2014, and report beside the paper's numbers."""
     conditions = Conditions(resolution=resolution, seed=seed)
-    run = Reproduction(conditions, _writable(out), jobs if jobs is not None else _cores())
+    run = Reproduction(conditions, out, jobs if jobs is not None else _cores())
+    _make_writable(out)
     console = Console(stderr=True)
     if console.is_terminal:
         console.print(
@@ -83,8 +105,8 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _writable(folder: Path) -> Path:
-    """Return `folder`, made if need be, once a file could be written into it."""
+def _make_writable(folder: Path) -> None:
+    """Make `folder` if need be, and see whether a file can be written into it."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -93,7 +115,6 @@ def _writable(folder: Path) -> Path:
         raise InputError(
             f"--out must be a folder that can be written: {folder} cannot ({error.strerror})."
         ) from error
-    return folder
 
 
 class _Bars:
@@ -118,10 +139,16 @@ class _Bars:
 def main() -> None:
     """Run the command line; a failure is one sentence on standard error and exit status 2."""
     try:
-        app(standalone_mode=True)
-    except ConvergenceError as error:
-        print(f"fingerpad: {error}", file=sys.stderr)
-        sys.exit(2)
+        sys.exit(app(standalone_mode=False))
     except FingerpadError as error:
         print(f"fingerpad: {error}", file=sys.stderr)
         sys.exit(2)
+    except MISUSE as error:
+        print(f"fingerpad: {error.format_message().rstrip('.')}.", file=sys.stderr)
+        sys.exit(2)
+    except typer.Abort:
+        print(
+            "fingerpad: stopped; the same command goes on from the last finished indentation.",
+            file=sys.stderr,
+        )
+        sys.exit(INTERRUPTED)
