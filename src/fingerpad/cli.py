@@ -92,13 +92,25 @@ def reproduce_command(
             f"{EXPECTED_TIME[resolution]} on two cores. The first run also compiles the kernels, about a "
             "minute. Stop it at any time; it goes on from the last finished indentation."
         )
-    results = reproduce(run, _Bars(console))
-    write_atomically(out / "results.json", json.dumps(results, indent=1, allow_nan=False).encode())
-    report = write_report(results, out)
+    with _interruptible():
+        results = reproduce(run, _Bars(console))
+        write_atomically(out / "results.json", json.dumps(results, indent=1, allow_nan=False).encode())
+        report = write_report(results, out)
     missed = [row["quantity"] for row in results["comparison"] if row["met"] is False]
     typer.echo(f"Report: {report}")
     typer.echo(f"Results: {out / 'results.json'}")
     typer.echo(f"Missed: {'; '.join(missed) if missed else 'nothing'}")
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        typer.echo(
+            "fingerpad: stopped; the same command goes on from the last finished indentation.", err=True
+        )
+        raise typer.Exit(INTERRUPTED) from error
 
 
 def _cores() -> int:
@@ -146,9 +158,3 @@ def main() -> None:
     except MISUSE as error:
         print(f"fingerpad: {error.format_message().rstrip('.')}.", file=sys.stderr)
         sys.exit(2)
-    except typer.Abort:
-        print(
-            "fingerpad: stopped; the same command goes on from the last finished indentation.",
-            file=sys.stderr,
-        )
-        sys.exit(INTERRUPTED)

@@ -1,0 +1,152 @@
+"""The command line as a shell meets it: what it says, where, and with which status."""
+
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from fingerpad import __version__, cli
+from fingerpad.errors import ConvergenceError, FingerpadError, StoreError
+
+COMMAND = [sys.executable, "-W", "error", "-m", "fingerpad"]
+
+
+@pytest.fixture
+def call(monkeypatch, capsys, tmp_path):
+    """Run the command line in this process, in an empty folder; a study would fail the test."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cli, "reproduce", pytest.fail)
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["fingerpad", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        said = capsys.readouterr()
+        return ended.value.code or 0, said.out, said.err
+
+    return run
+
+
+def test_version_is_that_of_the_package(call):
+    assert call("--version") == (0, f"fingerpad {__version__}\n", "")
+
+
+def test_help_names_every_option_and_resolution(call):
+    status, said, errors = call("reproduce", "--help")
+    assert (status, errors) == (0, "")
+    words = " ".join(re.sub("[^\\w-]", " ", said).split())
+    assert "quick standard paper" in words
+    for option in ("--resolution", "--out", "--jobs", "--seed"):
+        assert option in words
+
+
+def test_without_a_command_the_help_is_shown(call):
+    status, said, errors = call()
+    assert (status, errors) == (2, "")
+    assert "reproduce" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named", "came"),
+    [
+        (["reproduce", "--depth", "1"], "No such option", "--depth"),
+        (["reproduce", "--resolution", "qick"], "resolution must be one of quick, standard, paper", "'qick'"),
+        (["reproduce", "--resolution", "nan"], "resolution must be one of quick, standard, paper", "'nan'"),
+        (["reproduce", "--resolution", ""], "resolution must be one of quick, standard, paper", "''"),
+        (["reproduce", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
+        (["reproduce", "--jobs", "-2"], "jobs must be a whole number of at least 1", "-2"),
+        (["reproduce", "--jobs", "nan"], "'--jobs': must be a whole number", "'nan'"),
+        (["reproduce", "--jobs", "1.5"], "'--jobs': must be a whole number", "'1.5'"),
+        (["reproduce", "--seed", "-1"], "seed must be a whole number of at least 0", "-1"),
+        (["reproduce", "--seed", "abc"], "'--seed': must be a whole number", "'abc'"),
+        (["reproduce", "--seed", "nan"], "'--seed': must be a whole number", "'nan'"),
+        (["reproduce", "--seed", "inf"], "'--seed': must be a whole number", "'inf'"),
+        (["reproduce", "--seed", ""], "'--seed': must be a whole number", "''"),
+        (["reproduce", "--seed"], "--seed", "requires an argument"),
+        (["reproduce", "twice"], "unexpected extra argument", "twice"),
+        (["reproduse"], "No such command", "'reproduse'"),
+        (["--resolution", "quick"], "No such option", "--resolution"),
+    ],
+    ids=" ".join,
+)
+def test_misuse_is_one_sentence_and_status_2_and_nothing_is_written(call, tmp_path, arguments, named, came):
+    status, said, errors = call(*arguments)
+    assert (status, said) == (2, "")
+    assert errors.startswith("fingerpad: ")
+    assert errors.endswith(".\n")
+    assert errors.count("\n") == 1
+    assert named in errors
+    assert came in errors.removeprefix("fingerpad: ")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("below", ["", "/deeper", "/deeper/still"])
+def test_a_folder_that_cannot_be_is_named_and_what_is_there_stays(call, tmp_path, below):
+    (tmp_path / "note").write_text("mine")
+    status, said, errors = call("reproduce", "--out", f"note{below}")
+    assert (status, said, errors.count("\n")) == (2, "", 1)
+    assert f"--out must be a folder that can be written: note{below} cannot" in errors
+    assert [path.name for path in tmp_path.iterdir()] == ["note"]
+    assert (tmp_path / "note").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    "failure",
+    [
+        FingerpadError("It went wrong."),
+        StoreError("x.npz cannot be read: delete it."),
+        ConvergenceError(
+            "No equilibrium at 3 ms: try more steps.", ("at 3 ms: 40 steps", "at 1 ms: 40 steps")
+        ),
+    ],
+    ids=lambda failure: type(failure).__name__,
+)
+def test_failures_of_a_run_are_said_without_a_traceback(call, monkeypatch, tmp_path, failure):
+    def fail(*_):
+        raise failure
+
+    monkeypatch.setattr(cli, "reproduce", fail)
+    status, said, errors = call("reproduce", "--out", "run")
+    assert (status, said, errors) == (2, "", f"fingerpad: {failure}\n")
+    assert list((tmp_path / "run").iterdir()) == []
+
+
+def test_an_interrupted_run_says_how_it_goes_on(call, monkeypatch):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "reproduce", stop)
+    status, said, errors = call("reproduce")
+    assert (status, said) == (128 + signal.SIGINT, "")
+    assert (
+        errors.strip() == "fingerpad: stopped; the same command goes on from the last finished indentation."
+    )
+
+
+def test_options_reach_the_run(call, monkeypatch, tmp_path):
+    runs = []
+
+    def note(run, progress):
+        runs.append(run)
+        raise FingerpadError("Enough.")
+
+    monkeypatch.setattr(cli, "reproduce", note)
+    call("reproduce", "--resolution", "paper", "--out", "a/b", "--jobs", "3", "--seed", "7")
+    call("reproduce")
+    given, default = runs
+    assert (given.conditions.resolution, given.conditions.seed, given.jobs) == ("paper", 7, 3)
+    assert given.folder.resolve() == tmp_path / "a" / "b"
+    assert (default.conditions.resolution, default.conditions.seed) == ("standard", 0)
+    assert default.jobs >= 1
+    assert default.folder.resolve() == tmp_path / "reproduction"
+
+
+def test_the_shell_sees_the_same_without_a_warning(tmp_path):
+    done = subprocess.run(
+        [*COMMAND, "reproduce", "--seed", "abc"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    expected = "fingerpad: Invalid value for '--seed': must be a whole number: got 'abc'.\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", expected)
+    assert list(tmp_path.iterdir()) == []
