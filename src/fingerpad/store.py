@@ -14,12 +14,11 @@ import os
 import sys
 import threading
 import time
-import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass
+from dataclasses import Field, fields, is_dataclass
 from functools import lru_cache
 from importlib.resources import files
 from multiprocessing import get_context
@@ -80,22 +79,27 @@ def touch_key(touch: Touch) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def _plain(value: Any) -> Any:
-    """Nested lists and exact numbers that say the same as a nested frozen value."""
+def _plain(value: Any, is_float: bool = False) -> Any:
+    """Nested lists and exact numbers: the same for equal values, others for others."""
     if is_dataclass(value):
         return [
             type(value).__name__,
-            {field.name: _plain(getattr(value, field.name)) for field in fields(value)},
+            {field.name: _plain(getattr(value, field.name), _holds_floats(field)) for field in fields(value)},
         ]
     if isinstance(value, tuple | list):
-        return [_plain(item) for item in value]
-    if isinstance(value, float | np.floating):
-        return float(value).hex()
+        return [_plain(item, is_float) for item in value]
+    if isinstance(value, float | np.floating) or (is_float and isinstance(value, int | np.integer)):
+        return (float(value) + 0.0).hex()  # 0.0 added: -0.0 equals 0.0 but is written with its sign
     if isinstance(value, str | int | bool) or value is None:
         return value
     raise InputError(
         f"A touch can only be stored if its parts are frozen values: got {type(value).__name__}."
     )
+
+
+def _holds_floats(field: Field[Any]) -> bool:
+    """Whether a whole number in this field means a float: 287 and 287.0 are the same sphere."""
+    return "float" in str(field.type)
 
 
 class Store:
@@ -138,24 +142,20 @@ class Store:
         """
         path = self.path(touch)
         try:
-            with np.load(path, allow_pickle=False) as file:
+            # Opened here, since np.load leaves the file open where the archive is damaged.
+            with open(path, "rb") as opened, np.load(opened, allow_pickle=False) as file:
                 content = {name: file[name].astype(np.float64) for name in (*_ARRAYS, "work")}
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        except Exception as error:  # bytes that are not ours may fail in any way
+            said = " ".join(str(error).split()).rstrip(".")
             raise StoreError(
-                f"The stored result {path} cannot be read ({error}): delete it and run again."
+                f"The stored result {path} cannot be read ({said}): delete it and run again."
             ) from error
-        mesh, times = touch.mesh, content["times_ms"]
-        expected = {
-            "sed_kpa": (times.size, len(mesh.elements)),
-            "displacement_mm": mesh.nodes_mm.shape,
-            "skin_displacement_mm": (times.size, mesh.skin_nodes.size, 3),
-        }
-        for name, shape in expected.items():
+        for name, shape in _shapes(touch, content["times_ms"].size).items():
             if content[name].shape != shape or not np.isfinite(content[name]).all():
                 raise StoreError(f"The stored result {path} is damaged in {name}: delete it and run again.")
         penetration, newton_steps, factorisations = content.pop("work")
         return SkinResponse(
-            mesh=mesh,
+            mesh=touch.mesh,
             kinks_ms=(touch.stimulus.ramp_ms,),
             axis_x_mm=touch.at_mm[0],
             penetration_mm=float(penetration),
@@ -163,6 +163,20 @@ class Store:
             factorisations=int(factorisations),
             **content,
         )
+
+
+def _shapes(touch: Touch, n_times: int) -> dict[str, tuple[int, ...]]:
+    """Shapes of the arrays that a stored file of this touch holds."""
+    mesh = touch.mesh
+    return {
+        "times_ms": (n_times,),
+        "force_mn": (n_times,),
+        "sed_kpa": (n_times, len(mesh.elements)),
+        "skin_displacement_mm": (n_times, mesh.skin_nodes.size, 3),
+        "displacement_mm": mesh.nodes_mm.shape,
+        "direction": (3,),
+        "work": (3,),
+    }
 
 
 def _packed(response: SkinResponse) -> bytes:

@@ -1,0 +1,466 @@
+"""Finished touches are found again by all that determines them, and survive any kill."""
+
+import os
+import pickle
+import re
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fingerpad import store as store_module
+from fingerpad.errors import ConvergenceError, StoreError
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import Grading
+from fingerpad.indentation import Touch
+from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.mechanics.materials import Prony
+from fingerpad.mechanics.newton import NewtonSettings
+from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.sampling import SkinResponse
+from fingerpad.stimulus import RampAndHold
+from fingerpad.store import Store, solve_missing, touch_key
+
+COARSE = Grading(
+    17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=6.0, stratum_corneum=1, living_epidermis=1, dermis=1, subcutis=1
+)
+TINY = Touch(
+    finger=Fingertip(),
+    indenter=Sphere(curvature_per_m=287.0),
+    stimulus=RampAndHold(depth_mm=0.1),
+    tissues=named_tissues("trial3"),
+    grading=COARSE,
+    settings=PressSettings(ramp_steps=1, hold_steps=1),
+)
+HOPELESS = replace(TINY, settings=PressSettings(1, 1, NewtonSettings(most_iterations=1)))
+SIX = [
+    replace(TINY, settings=PressSettings(3, 3), stimulus=RampAndHold(depth_mm=depth))
+    for depth in (0.10, 0.12, 0.14, 0.16, 0.18, 0.20)
+]
+ARRAYS = [field.name for field in fields(SkinResponse) if field.type == "FloatArray"]
+SINGLE = ("sed_kpa", "displacement_mm", "skin_displacement_mm")
+
+
+@pytest.fixture(scope="module")
+def skin():
+    return TINY.solve()
+
+
+@pytest.fixture
+def stored(tmp_path, skin):
+    """A store that holds one touch."""
+    store = Store(tmp_path / "store")
+    store.save(TINY, skin)
+    return store
+
+
+# Keys
+
+
+def leaves(value, path=()):
+    """Every number, word and flag in a nested frozen value, with the way to it."""
+    if is_dataclass(value):
+        for field in fields(value):
+            yield from leaves(getattr(value, field.name), (*path, field.name))
+    elif isinstance(value, tuple):
+        for place, item in enumerate(value):
+            yield from leaves(item, (*path, place))
+    else:
+        yield path, value
+
+
+def changed(value, path, leaf):
+    """The same value with one leaf exchanged, checks or no checks."""
+    if not path:
+        return leaf
+    first, rest = path[0], path[1:]
+    if isinstance(value, tuple):
+        return (*value[:first], changed(value[first], rest, leaf), *value[first + 1 :])
+    copy = object.__new__(type(value))
+    for field in fields(value):
+        object.__setattr__(copy, field.name, getattr(value, field.name))
+    object.__setattr__(copy, first, changed(getattr(value, first), rest, leaf))
+    return copy
+
+
+def nearest_other(leaf):
+    """A value that differs by as little as its type allows."""
+    if isinstance(leaf, bool):
+        return not leaf
+    if isinstance(leaf, int):
+        return leaf + 1
+    return float(np.nextafter(leaf, np.inf)) if isinstance(leaf, float) else leaf + "'"
+
+
+def test_key_changes_with_the_last_bit_of_every_input():
+    paths = dict(leaves(TINY))
+    named = {path[0] for path in paths}
+    assert named == {field.name for field in fields(Touch)}
+    assert ("settings", "newton", "residual_tolerance") in paths
+    keys = [touch_key(changed(TINY, path, nearest_other(leaf))) for path, leaf in paths.items()]
+    assert len({touch_key(TINY), *keys}) == 1 + len(paths)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"indenter": Sphere(curvature_per_m=296.0)},
+        {"stimulus": RampAndHold(depth_mm=0.2)},
+        {"tissues": named_tissues("trial1")},
+        {"tissues": replace(TINY.tissues, dermis=replace(TINY.tissues.dermis, prony=Prony((0.1,), (9.0,))))},
+        {"grading": replace(COARSE, full=True)},
+        {"settings": PressSettings(2, 1)},
+        {"at_mm": (17.0, 0.0)},
+        {"tilt_deg": 3.0},
+    ],
+    ids=lambda change: next(iter(change)),
+)
+def test_key_changes_with_what_a_user_would_change(change):
+    assert touch_key(replace(TINY, **change)) != touch_key(TINY)
+
+
+def test_indenters_of_equal_numbers_have_different_keys():
+    bodies = [Line(0.9), Cylinder(0.9), Bar(0.9), FlatPunch(0.9), Sphere(0.9), Plate(), Bar(0.9, 0.1)]
+    assert len({touch_key(replace(TINY, indenter=body)) for body in bodies}) == len(bodies)
+
+
+def test_equal_touches_have_one_key_whatever_their_numbers_were_written_as():
+    again = Touch(
+        finger=Fingertip(),
+        indenter=Sphere(curvature_per_m=287),
+        stimulus=RampAndHold(depth_mm=np.float64(0.1), ramp_ms=50, hold_ms=950),
+        tissues=named_tissues("trial3"),
+        grading=replace(COARSE, largest_mm=6),
+        settings=PressSettings(1, 1),
+        at_mm=[17.37, -0.0],
+        tilt_deg=-0.0,
+    )
+    assert again == TINY
+    assert touch_key(again) == touch_key(TINY)
+
+
+def test_key_is_the_same_in_another_process():
+    code = "import pickle, sys; from fingerpad.store import touch_key as key; "
+    code += "print(key(pickle.load(sys.stdin.buffer)))"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        input=pickle.dumps(TINY),
+        capture_output=True,
+        check=True,
+        env=os.environ | {"PYTHONHASHSEED": "12345"},
+    )
+    assert done.stdout.decode().strip() == touch_key(TINY)
+
+
+def test_key_changes_with_the_sources_of_mechanics_and_with_no_others(monkeypatch, tmp_path):
+    package = tmp_path / "package"
+    for name in store_module.MECHANICAL_SOURCES:
+        target = package / name if name.endswith(".py") else package / name / "law.py"
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(f"{name} = 1\n")
+    monkeypatch.setattr(store_module, "files", lambda _: package)
+
+    def key():
+        store_module.code_hash.cache_clear()
+        return touch_key(TINY)
+
+    before = key()
+    try:
+        (package / "report.py").write_text("colour = 'blue'\n")
+        (package / "mechanics" / "__pycache__").mkdir()
+        assert key() == before
+        seen = {before}
+        for name in store_module.MECHANICAL_SOURCES:
+            source = package / name if name.endswith(".py") else package / name / "law.py"
+            source.write_text(f"{name} = 2\n")
+            seen.add(key())
+        assert len(seen) == 1 + len(store_module.MECHANICAL_SOURCES)
+    finally:
+        store_module.code_hash.cache_clear()
+
+
+def test_every_source_that_mechanics_imports_counts_for_the_key():
+    """Apart from what cannot alter a solved number: checks, errors, the results' class and published values.
+
+    Published values reach a touch as its own fields, which are in the key already.
+    """
+    package = Path(store_module.__file__).parent
+    sources = [package / name for name in store_module.MECHANICAL_SOURCES]
+    paths = [path for source in sources for path in ([source] if source.is_file() else source.glob("*.py"))]
+    assert len(paths) > len(sources)
+    imported = {
+        module
+        for path in paths
+        for module in re.findall(r"^from fingerpad\.(\w+)", path.read_text(encoding="utf-8"), re.MULTILINE)
+    }
+    counted = {name.removesuffix(".py") for name in store_module.MECHANICAL_SOURCES}
+    assert imported & counted
+    assert imported - counted <= {"checks", "errors", "parameters", "sampling"}
+
+
+# What is stored
+
+
+def test_what_comes_back_is_what_went_in_rounded_to_single_precision(stored, skin):
+    back = stored.load(TINY)
+    assert set(SINGLE) < set(ARRAYS)
+    for name in ARRAYS:
+        went, came = getattr(skin, name), getattr(back, name)
+        assert came.dtype == np.float64
+        np.testing.assert_array_equal(came, went.astype(np.float32) if name in SINGLE else went)
+    for name in ("kinks_ms", "axis_x_mm", "penetration_mm", "newton_steps", "factorisations"):
+        assert getattr(back, name) == getattr(skin, name)
+    assert back.mesh is TINY.mesh
+    assert (skin.sed_kpa != back.sed_kpa).any()  # or rounding would not have been tested
+
+
+def test_a_second_round_changes_no_bit(stored):
+    first, content = stored.load(TINY), stored.path(TINY).read_bytes()
+    stored.save(TINY, first)
+    assert stored.path(TINY).read_bytes() == content
+    for name in ARRAYS:
+        np.testing.assert_array_equal(getattr(stored.load(TINY), name), getattr(first, name))
+
+
+def test_only_the_touch_itself_is_held(stored):
+    assert stored.holds(TINY)
+    assert not stored.holds(SIX[0])
+    with pytest.raises(StoreError, match="cannot be read"):
+        stored.load(SIX[0])
+    assert not Store(stored.folder / "elsewhere").holds(TINY)
+
+
+def without(name):
+    def rewrite(path):
+        with np.load(path) as file:
+            content = {key: file[key] for key in file.files if key != name}
+        with open(path, "wb") as file:
+            np.savez(file, **content)
+
+    return rewrite
+
+
+def with_array(name, array):
+    def rewrite(path):
+        with np.load(path) as file:
+            content = {key: file[key] for key in file.files} | {name: array}
+        with open(path, "wb") as file:
+            np.savez(file, **content)
+
+    return rewrite
+
+
+def one_bit_in_the_middle(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def an_array_of_its_own(path):
+    with open(path, "wb") as file:
+        np.save(file, np.zeros(3))
+
+
+def a_folder(path):
+    path.unlink()
+    path.mkdir()
+
+
+DAMAGES = {
+    "empty": lambda path: path.write_bytes(b""),
+    "truncated by a byte": lambda path: path.write_bytes(path.read_bytes()[:-1]),
+    "half": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
+    "head only": lambda path: path.write_bytes(path.read_bytes()[:20]),
+    "one bit": one_bit_in_the_middle,
+    "text": lambda path: path.write_text("not a result\n"),
+    "pickle": lambda path: path.write_bytes(pickle.dumps({"sed_kpa": [1.0]})),
+    "array": an_array_of_its_own,
+    "folder": a_folder,
+    "array missing": without("sed_kpa"),
+    "work missing": without("work"),
+    "work of other shape": with_array("work", np.zeros(2)),
+    "times of other shape": with_array("times_ms", np.zeros((3, 1))),
+    "one time too few": with_array("times_ms", np.array([0.0, 50.0])),
+    "one force too few": with_array("force_mn", np.zeros(2)),
+    "direction in a plane": with_array("direction", np.ones(2)),
+    "other mesh": with_array("sed_kpa", np.zeros((3, 7))),
+    "not a number": with_array("force_mn", np.array([0.0, np.nan, 1.0])),
+    "words": with_array("force_mn", np.array(["a", "b", "c"])),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_a_damaged_file_is_named_in_one_sentence(stored, damage):
+    path = stored.path(TINY)
+    damage(path)
+    with pytest.raises(StoreError) as refusal:
+        stored.load(TINY)
+    said = str(refusal.value)
+    assert str(path) in said
+    assert said.endswith(": delete it and run again.")
+    assert "\n" not in said
+
+
+def test_any_byte_changed_is_noticed_or_harmless(stored):
+    path, before = stored.path(TINY), stored.load(TINY)
+    content, generator = path.read_bytes(), np.random.default_rng(1)
+    # Most bytes are data, which a checksum guards; headers and the directory at the end need a closer look.
+    places = np.concatenate([generator.integers(0, len(content), 40), generator.integers(-800, 300, 160)])
+    noticed = 0
+    for place in places:
+        changed_bytes = bytearray(content)
+        changed_bytes[place] ^= int(generator.integers(1, 256))
+        path.write_bytes(changed_bytes)
+        try:
+            back = stored.load(TINY)
+        except StoreError:
+            noticed += 1
+        else:
+            assert all((getattr(back, name) == getattr(before, name)).all() for name in ARRAYS)
+    assert noticed > len(places) // 4
+
+
+def test_a_store_that_cannot_be_written_says_so(tmp_path, skin):
+    (tmp_path / "file").write_text("in the way")
+    store = Store(tmp_path / "file" / "store")
+    assert not store.holds(TINY)
+    with pytest.raises(StoreError, match="cannot be written") as refusal:
+        store.save(TINY, skin)
+    assert str(store.path(TINY)) in str(refusal.value)
+    with pytest.raises(StoreError, match="cannot be written"):
+        solve_missing([TINY], store, jobs=1)
+
+
+@pytest.mark.parametrize("failure", [KeyboardInterrupt(), OSError(28, "No space left on device")])
+def test_a_save_that_is_cut_short_leaves_nothing(tmp_path, monkeypatch, skin, failure):
+    def fail(*_):
+        raise failure
+
+    store = Store(tmp_path)
+    monkeypatch.setattr(os, "replace", fail)
+    with pytest.raises((KeyboardInterrupt, StoreError)):
+        store.save(TINY, skin)
+    assert not store.holds(TINY)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_rest_of_a_killed_write_does_not_count(stored):
+    path = stored.path(TINY)
+    unfinished = path.with_name(f".{path.name}.0123456789abcdef.part")
+    path.rename(unfinished)
+    assert not stored.holds(TINY)
+    assert solve_missing([TINY], stored, jobs=1) == 1
+    assert path.read_bytes() == unfinished.read_bytes()
+
+
+# What is computed
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory):
+    """Store in which the six touches were solved in turn, in this process."""
+    store = Store(tmp_path_factory.mktemp("uninterrupted"))
+    assert solve_missing(SIX, store, jobs=1) == len(SIX)
+    return store
+
+
+def contents(store):
+    return {path.name: path.read_bytes() for path in store.folder.glob("*.npz")}
+
+
+def test_each_missing_touch_is_computed_once_and_reported(stored, monkeypatch):
+    solved, solve = [], Touch.solve
+    monkeypatch.setattr(Touch, "solve", lambda touch: (solved.append(touch), solve(touch))[1])
+    seconds: list[float] = []
+    deeper = replace(TINY, stimulus=RampAndHold(depth_mm=0.11))
+    assert solve_missing([deeper, TINY, deeper, TINY], stored, 1, seconds.append) == 1
+    assert solved == [deeper]
+    assert len(seconds) == 1
+    assert seconds[0] > 0.0
+    assert solve_missing([deeper, TINY], stored, 1, seconds.append) == 0
+    assert len(seconds) == 1
+    assert solve_missing([], stored, 1, seconds.append) == 0
+
+
+def test_two_processes_write_the_same_bytes_as_one(tmp_path, uninterrupted):
+    store, seconds = Store(tmp_path), []
+    environment = dict(os.environ)
+    assert solve_missing([*SIX[:3], *SIX[:3]], store, 2, seconds.append) == 3
+    assert len(seconds) == 3
+    assert dict(os.environ) == environment
+    expected = contents(uninterrupted)
+    assert contents(store) == {store.path(touch).name: expected[store.path(touch).name] for touch in SIX[:3]}
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_what_does_not_converge_raises_and_is_not_stored(tmp_path, skin, jobs):
+    store = Store(tmp_path)
+    with pytest.raises(ConvergenceError) as failure:
+        solve_missing([TINY, HOPELESS], store, jobs)
+    assert failure.value.history
+    assert not store.holds(HOPELESS)
+    assert [path.name for path in tmp_path.iterdir()] == [store.path(TINY).name] * store.holds(TINY)
+    if jobs == 1:
+        assert store.holds(TINY)
+    assert solve_missing([TINY], store, jobs=1) == (0 if store.holds(TINY) else 1)
+
+
+SCRIPT = """
+import pickle, sys
+from pathlib import Path
+from fingerpad.store import Store, solve_missing
+
+if __name__ == "__main__":
+    touches = pickle.loads(Path(sys.argv[1]).read_bytes())
+    solve_missing(touches, Store(Path(sys.argv[2])), jobs=2)
+"""
+LIMIT_S = 120.0
+
+
+def wait_until(condition, limit_s=LIMIT_S):
+    end = time.monotonic() + limit_s
+    while not condition():
+        assert time.monotonic() < end, "waited too long"
+        time.sleep(0.005)
+
+
+def group_lives(group):
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="kill -9 and process groups are POSIX")
+@pytest.mark.parametrize("kill", [os.kill, os.killpg], ids=["parent only", "whole group"])
+def test_a_run_killed_at_any_moment_goes_on_and_ends_with_the_same_bits(tmp_path, uninterrupted, kill):
+    (tmp_path / "script.py").write_text(SCRIPT)
+    (tmp_path / "touches").write_bytes(pickle.dumps(SIX))
+    store = Store(tmp_path / "store")
+    run = subprocess.Popen(
+        [sys.executable, tmp_path / "script.py", tmp_path / "touches", store.folder], start_new_session=True
+    )
+    try:
+        wait_until(lambda: run.poll() is not None or contents(store))
+        assert run.poll() is None
+        kill(run.pid, signal.SIGKILL)
+        assert run.wait() == -signal.SIGKILL
+        wait_until(lambda: not group_lives(run.pid), limit_s=10.0)  # workers notice within a second
+    finally:
+        if group_lives(run.pid):
+            os.killpg(run.pid, signal.SIGKILL)
+    finished = {path.name: path.stat().st_mtime_ns for path in store.folder.glob("*.npz")}
+    assert 0 < len(finished) < len(SIX)
+    assert contents(store).items() <= contents(uninterrupted).items()
+
+    assert solve_missing(SIX, store, jobs=1) == len(SIX) - len(finished)
+    assert contents(store) == contents(uninterrupted)
+    later = {path.name: path.stat().st_mtime_ns for path in store.folder.glob("*.npz")}
+    assert finished.items() <= later.items()
