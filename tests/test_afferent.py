@@ -27,7 +27,7 @@ def test_the_stages_are_chained():
 
 
 def test_static_rate_is_the_closed_form_of_a_steady_current():
-    afferent = Afferent(static_gain=1.4e-6)
+    afferent = Afferent(intercept_ma=0.0, static_gain=1.4e-6)
     _, static_hz = afferent.rates(ramp_and_hold(2.0))
     drive_mv = 1.4e-6 * 2.0 * afferent.time_constant_ms / afferent.capacitance_mf
     interval_ms = afferent.refractory_ms - afferent.time_constant_ms * np.log1p(
@@ -37,23 +37,31 @@ def test_static_rate_is_the_closed_form_of_a_steady_current():
 
 
 def test_the_default_afferent_answers_like_an_sai():
-    """Fast in the ramp, slow in the hold, more for more: SED of a 1 mm touch is 2 to 4 kPa."""
-    dynamic_hz, static_hz = Afferent().rates(ramp_and_hold(0.0, 2.0, 3.0, 4.0))
+    """Fast in the ramp, slow in the hold, more for more: SED of a 1 mm touch is 1 to 2 kPa."""
+    dynamic_hz, static_hz = Afferent().rates(ramp_and_hold(0.0, 1.0, 1.5, 2.0))
     assert dynamic_hz[0] == static_hz[0] == 0.0
     assert (np.diff(dynamic_hz) > 0).all()
     assert (np.diff(static_hz) > 0).all()
-    assert 100.0 < dynamic_hz[1] < 200.0
-    assert 10.0 < static_hz[1] < 60.0
-    assert 40.0 < static_hz[3] < 60.0
+    assert 100.0 < dynamic_hz[1] < dynamic_hz[3] < 250.0
+    assert 20.0 < static_hz[1] < 40.0
+    assert 50.0 < static_hz[3] < 70.0
 
 
 def test_the_printed_dynamic_gain_is_silent_in_the_ramp():
     """The reason for DYNAMIC_GAIN_SCALE."""
-    printed = Afferent(dynamic_gain=neuron.DYNAMIC_GAIN_START_1.value)
-    without = Afferent(dynamic_gain=0.0)
+    start = {
+        "intercept_ma": neuron.INTERCEPT_START.value,
+        "static_gain": neuron.STATIC_GAIN_START_1.value,
+        "time_constant_ms": neuron.TIME_CONSTANT.value,
+        "capacitance_mf": neuron.CAPACITANCE.value,
+        "threshold_mv": neuron.THRESHOLD.value,
+    }
+    gain = neuron.DYNAMIC_GAIN_START_1.value
     sed = ramp_and_hold(1.0, 2.0, 3.0)
-    assert_array_equal(printed.rates(sed)[0], without.rates(sed)[0])
-    assert (Afferent().rates(sed)[0] > 50.0).all()
+    without = Afferent(dynamic_gain=0.0, **start).rates(sed)[0]
+    assert_array_equal(Afferent(dynamic_gain=gain, **start).rates(sed)[0], without)
+    rescaled = Afferent(dynamic_gain=gain * neuron.DYNAMIC_GAIN_SCALE.value, **start)
+    assert (rescaled.rates(sed)[0] > 50.0).all()
 
 
 def test_parameters_go_round():

@@ -29,8 +29,8 @@ PARAMETER_NAMES = (
 class Afferent:
     """A slowly adapting type I (SAI) afferent.
 
-    The defaults are the first start point of the paper's fit, its dynamic gain rescaled: as printed it
-    is silent during the ramp (see `fingerpad.parameters.neuron.DYNAMIC_GAIN_SCALE`).
+    The defaults are our fit to the recordings under the shifted bar (`fingerpad.parameters.neuron`, names
+    ending in FITTED); they belong to the finger and tissues they were fitted with.
 
     Parameters
     ----------
@@ -59,17 +59,17 @@ class Afferent:
     SED rises to 2 kPa in 50 ms and stays: the afferent fires fast in the ramp, slowly in the hold.
 
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-    >>> dynamic_hz, static_hz = Afferent(static_gain=1.4e-6).rates(sed)
+    >>> dynamic_hz, static_hz = Afferent().rates(sed)
     >>> dynamic_hz.round().tolist(), static_hz.round().tolist()
-    ([162.0], [46.0])
+    ([217.0], [63.0])
     """
 
-    intercept_ma: float = neuron.INTERCEPT_START.value
-    dynamic_gain: float = neuron.DYNAMIC_GAIN_START_1.value * neuron.DYNAMIC_GAIN_SCALE.value
-    static_gain: float = neuron.STATIC_GAIN_START_1.value
-    time_constant_ms: float = neuron.TIME_CONSTANT.value
-    capacitance_mf: float = neuron.CAPACITANCE.value
-    threshold_mv: float = neuron.THRESHOLD.value
+    intercept_ma: float = neuron.INTERCEPT_FITTED.value
+    dynamic_gain: float = neuron.DYNAMIC_GAIN_FITTED.value
+    static_gain: float = neuron.STATIC_GAIN_FITTED.value
+    time_constant_ms: float = neuron.TIME_CONSTANT_FITTED.value
+    capacitance_mf: float = neuron.CAPACITANCE_FITTED.value
+    threshold_mv: float = neuron.THRESHOLD_FITTED.value
     refractory_ms: float = neuron.REFRACTORY.value
 
     def __post_init__(self) -> None:

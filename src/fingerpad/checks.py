@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from fingerpad.errors import InputError
 
 FloatArray = NDArray[np.float64]
+Kind = TypeVar("Kind")
 
 
 def finite(name: str, value: float, unit: str = "") -> float:
@@ -58,6 +59,13 @@ def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
     """Return `value` if it is one of `allowed`, else raise `InputError` that lists them."""
     if value not in allowed:
         raise InputError(f"{name} must be one of {', '.join(allowed)}: got {value!r}.")
+    return value
+
+
+def instance(name: str, value: Kind, kind: type) -> Kind:
+    """Return `value` if it is a `kind`, else raise `InputError`."""
+    if not isinstance(value, kind):
+        raise InputError(f"{name} must be a {kind.__name__}: got {value!r}.")
     return value
 
 

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fingerpad.checks import FloatArray, finite, one_of
+from fingerpad.checks import FloatArray, finite, instance, one_of
 from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import RESOLUTIONS, Grading, resolution_grading
@@ -76,6 +76,15 @@ class Touch:
     tilt_deg: float = 0.0
 
     def __post_init__(self) -> None:
+        for name, kind in (
+            ("finger", Fingertip),
+            ("indenter", Indenter),
+            ("stimulus", RampAndHold),
+            ("tissues", Tissues),
+            ("grading", Grading),
+            ("settings", PressSettings),
+        ):
+            instance(name, getattr(self, name), kind)
         x, z = _check_position(self.at_mm)
         object.__setattr__(self, "at_mm", (x, z))
         if abs(finite("tilt_deg", self.tilt_deg, "degrees")) > LARGEST_TILT_DEG:
@@ -166,6 +175,9 @@ def touch_of(
     """
     one_of("resolution", resolution, RESOLUTIONS)
     x, z = _check_position(at_mm)
+    # The mesh is graded about this point, so finger, indenter and point are checked before it is.
+    instance("finger", finger, Fingertip).skin_point(x, z)
+    instance("indenter", indenter, Indenter)
     return Touch(
         finger=finger,
         indenter=indenter,

@@ -7,8 +7,8 @@ the body and negative inside; the normal points out of the body, along which a f
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -18,30 +18,30 @@ from fingerpad.parameters import protocol
 from fingerpad.units import radius_mm
 
 
-class Indenter(Protocol):
-    """A rigid body with a signed gap."""
+class Indenter(ABC):
+    """A rigid body with a signed gap; derive from it to press a body of your own."""
 
+    @abstractmethod
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward unit normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
-        ...
 
+    @abstractmethod
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
-        ...
+        """Y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+
+    @property
+    @abstractmethod
+    def half_width_mm(self) -> float:
+        """Half of the body's extent along x where it can touch. [mm]"""
 
     def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
         """Which of the undeformed points (n, 3) can come into contact at all; bool (n,)."""
-        ...
+        return np.ones(len(undeformed_mm), dtype=bool)
 
     @property
     def grips(self) -> bool:
-        """Whether the skin that may touch cannot slide along the finger."""
-        ...
-
-    @property
-    def half_width_mm(self) -> float:
-        """Half of the body's extent along x where it can touch. [mm]"""
-        ...
+        """Whether the skin that may touch cannot slide along the finger; most bodies are frictionless."""
+        return False
 
 
 def _norm_and_direction(offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -91,7 +91,7 @@ def _rounded(inside: FloatArray, depth: FloatArray, outward: FloatArray, fillet:
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class Cylinder(Indenter):
     """Cylinder that lies across the finger, its axis along z.
 
     Parameters
@@ -112,11 +112,6 @@ class Cylinder:
         positive("diameter_mm", self.diameter_mm, "mm")
 
     @property
-    def grips(self) -> bool:
-        """The body is frictionless."""
-        return False
-
-    @property
     def half_width_mm(self) -> float:
         """Half of the body's extent along x. [mm]"""
         return self.diameter_mm / 2
@@ -124,10 +119,6 @@ class Cylinder:
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return _round_front(np.abs(points_mm[:, 0]), self.diameter_mm / 2)
-
-    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
-        """Every point of the skin may; bool (n,)."""
-        return np.ones(len(undeformed_mm), dtype=bool)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
@@ -137,7 +128,7 @@ class Cylinder:
 
 
 @dataclass(frozen=True)
-class Line:
+class Line(Indenter):
     """Line load across the finger: a wire thinner than the elements of the skin, taken as a blade.
 
     Nodes cannot resolve the roundness of a body as thin as their spacing: one node would balance on its top
@@ -184,7 +175,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Sphere:
+class Sphere(Indenter):
     """Sphere given by its curvature, as in the psychophysics literature.
 
     Parameters
@@ -209,11 +200,6 @@ class Sphere:
         return radius_mm(self.curvature_per_m)
 
     @property
-    def grips(self) -> bool:
-        """The body is frictionless."""
-        return False
-
-    @property
     def half_width_mm(self) -> float:
         """Half of the body's extent along x. [mm]"""
         return self.radius_mm
@@ -222,10 +208,6 @@ class Sphere:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return _round_front(np.hypot(points_mm[:, 0], points_mm[:, 2]), self.radius_mm)
 
-    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
-        """Every point of the skin may; bool (n,)."""
-        return np.ones(len(undeformed_mm), dtype=bool)
-
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         centred = points_mm + np.array([0.0, self.radius_mm, 0.0])
@@ -233,7 +215,7 @@ class Sphere:
 
 
 @dataclass(frozen=True)
-class Bar:
+class Bar(Indenter):
     """Flat bar across the finger, long in z, its two edges rounded.
 
     Parameters
@@ -258,11 +240,6 @@ class Bar:
         _fillet_within(self.fillet_mm, self.width_mm, "width_mm")
 
     @property
-    def grips(self) -> bool:
-        """The body is frictionless."""
-        return False
-
-    @property
     def half_width_mm(self) -> float:
         """Half of the width. [mm]"""
         return self.width_mm / 2
@@ -270,10 +247,6 @@ class Bar:
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return _round_front(np.abs(points_mm[:, 0]) - self.width_mm / 2 + self.fillet_mm, self.fillet_mm)
-
-    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
-        """Every point of the skin may; bool (n,)."""
-        return np.ones(len(undeformed_mm), dtype=bool)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
@@ -285,7 +258,7 @@ class Bar:
 
 
 @dataclass(frozen=True)
-class FlatPunch:
+class FlatPunch(Indenter):
     """Flat-ended round probe with a rounded rim.
 
     Parameters
@@ -304,11 +277,6 @@ class FlatPunch:
         _fillet_within(self.fillet_mm, self.diameter_mm, "diameter_mm")
 
     @property
-    def grips(self) -> bool:
-        """The body is frictionless."""
-        return False
-
-    @property
     def half_width_mm(self) -> float:
         """Half of the diameter. [mm]"""
         return self.diameter_mm / 2
@@ -318,10 +286,6 @@ class FlatPunch:
         return _round_front(
             np.hypot(points_mm[:, 0], points_mm[:, 2]) - self.diameter_mm / 2 + self.fillet_mm, self.fillet_mm
         )
-
-    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
-        """Every point of the skin may; bool (n,)."""
-        return np.ones(len(undeformed_mm), dtype=bool)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
@@ -333,13 +297,8 @@ class FlatPunch:
 
 
 @dataclass(frozen=True)
-class Plate:
+class Plate(Indenter):
     """Flat plate without edges, larger than the finger."""
-
-    @property
-    def grips(self) -> bool:
-        """The body is frictionless."""
-        return False
 
     @property
     def half_width_mm(self) -> float:
@@ -349,10 +308,6 @@ class Plate:
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return np.zeros(len(points_mm))
-
-    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
-        """Every point of the skin may; bool (n,)."""
-        return np.ones(len(undeformed_mm), dtype=bool)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
