@@ -1,0 +1,638 @@
+"""The studies press what the paper pressed and read from it what they say, miss or no miss."""
+
+import copy
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fingerpad.afferent import Afferent
+from fingerpad.errors import InputError
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import Grading
+from fingerpad.indentation import Touch
+from fingerpad.indenters import Bar, Cylinder, Line, Sphere
+from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.parameters import paper, psychophysics
+from fingerpad.reference import bar_firing_rates, cylinder_deflection
+from fingerpad.sampling import SurfaceProfile
+from fingerpad.signals import SedTraces
+from fingerpad.stimulus import RampAndHold
+from fingerpad.studies import (
+    Reproduction,
+    comparison,
+    nail_border,
+    single_unit,
+    skin_deflection,
+    sphere_discrimination,
+)
+from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.studies.reproduction import plain
+
+RESOLUTIONS = ["quick", "standard", "paper"]
+CURVATURES = [287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0]
+
+
+# What is pressed
+
+
+@pytest.fixture(params=RESOLUTIONS)
+def conditions(request):
+    return Conditions(resolution=request.param)
+
+
+def follows_the_protocol(touch):
+    moved = (touch.stimulus.depth_mm, touch.stimulus.ramp_ms, touch.stimulus.hold_ms)
+    return moved == (1.0, 50.0, 950.0) and touch.at_mm[1] == 0.0
+
+
+def test_three_trials_press_a_line_and_a_cylinder_at_one_place(conditions):
+    touches = skin_deflection.touches(conditions)
+    assert set(touches) == {
+        (trial, name) for trial in ("trial1", "trial2", "trial3") for name in ("line", "cylinder")
+    }
+    for (trial, name), touch in touches.items():
+        assert follows_the_protocol(touch)
+        assert touch.tissues == named_tissues(trial)
+        assert touch.indenter == {"line": Line(0.05), "cylinder": Cylinder(3.17)}[name]
+        assert (touch.at_mm[0], touch.tilt_deg) == (17.37, 0.0)
+        assert touch.grading == touches["trial1", name].grading
+    assert len(set(touches.values())) == 6
+
+
+def test_the_bar_is_shifted_36_times_along_the_skin_over_one_mesh(conditions):
+    touches = single_unit.touches(conditions)
+    shift = -np.array([touch.at_mm[0] - 17.37 for touch in touches])  # positive towards the proximal end
+    tilt_deg = touches[0].tilt_deg
+    along_skin = shift / np.cos(np.deg2rad(tilt_deg))
+    np.testing.assert_allclose(along_skin, np.arange(-35, 36, 2) / 10, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(along_skin, bar_firing_rates().shift_mm, rtol=0, atol=1e-12)
+    assert all(follows_the_protocol(touch) for touch in touches)
+    assert {touch.indenter for touch in touches} == {Bar(3.0, 0.3)}
+    assert {touch.tissues for touch in touches} == {named_tissues("trial3")}
+    assert len({(touch.grading, touch.tilt_deg, touch.settings) for touch in touches}) == 1
+    assert len(set(touches)) == 36
+
+
+def test_the_bar_presses_along_the_inward_normal_of_the_skin_at_the_receptor():
+    conditions = Conditions("quick")
+    tilt = np.deg2rad(conditions.skin_tilt_deg)
+    pressing = np.array([-np.sin(tilt), np.cos(tilt), 0.0])  # y turned by the tilt about z
+    before, after = conditions.finger.skin_point([RECEPTOR_X_MM - 1e-4, RECEPTOR_X_MM + 1e-4], 0.0)
+    np.testing.assert_allclose(pressing @ (after - before) / 2e-4, 0.0, rtol=0, atol=1e-6)
+    assert pressing[1] > 0.9
+
+
+@pytest.mark.parametrize("resolution", ["quick", "standard"])
+def test_bar_shifts_are_whole_elements_and_all_edges_of_the_sampled_zone_lie_in_it(resolution):
+    grading = Conditions(resolution).bar_grading()
+    per_shift = 0.2 / grading.size_x_mm
+    assert per_shift == pytest.approx(round(per_shift), abs=1e-12)
+    assert grading.centre_mm == RECEPTOR_X_MM
+    assert grading.half_length_mm > 1.5  # an edge stands over the receptor at a shift of 1.5 mm
+
+
+def test_seven_spheres_are_pressed_at_two_places_over_one_mesh(conditions):
+    touches = sphere_discrimination.touches(conditions)
+    assert sorted(touches) == [(position, curvature) for position in (0.0, 0.2) for curvature in CURVATURES]
+    for (position, curvature), touch in touches.items():
+        assert follows_the_protocol(touch)
+        assert touch.indenter == Sphere(curvature)
+        assert touch.at_mm[0] == pytest.approx(17.37 + position, abs=1e-12)
+        assert touch.tilt_deg == conditions.skin_tilt_deg
+    assert len({touch.grading for touch in touches.values()}) == 1
+    assert len(set(touches.values())) == 14
+
+
+@pytest.mark.parametrize("materials", ["trial1", "laboratory2014"])
+def test_materials_of_the_conditions_reach_the_later_studies_but_not_the_trials(materials):
+    conditions = Conditions("quick", materials=materials)
+    tissues = named_tissues(materials)
+    assert {touch.tissues for touch in single_unit.touches(conditions)} == {tissues}
+    assert {touch.tissues for touch in sphere_discrimination.touches(conditions).values()} == {tissues}
+    assert skin_deflection.touches(conditions) == skin_deflection.touches(Conditions("quick"))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda: Conditions("fine"), "resolution must be one of quick, standard, paper: got 'fine'"),
+        (lambda: Conditions(seed=-1), "seed must be a whole number of at least 0: got -1"),
+        (lambda: Conditions(seed=0.5), "seed must be a whole number of at least 0: got 0.5"),
+        (lambda: Reproduction(Conditions(), "here", jobs=0), "jobs must be a whole number of at least 1"),
+        (lambda: Reproduction(Conditions(), "here", jobs=True), "jobs must be a whole number of at least 1"),
+    ],
+)
+def test_unusable_conditions_are_refused(wrong, said):
+    with pytest.raises(InputError, match=said):
+        wrong()
+
+
+# Level 1
+
+
+def test_r2_has_its_closed_forms():
+    observed = np.array([0.1, 0.5, 0.9, 0.4, 0.2])
+    scatter = np.square(observed - observed.mean()).sum()
+    r2 = skin_deflection.coefficient_of_determination
+    assert r2(observed, observed) == 1.0
+    assert r2(observed, np.full(5, observed.mean())) == pytest.approx(0.0, abs=1e-14)
+    assert r2(observed, observed + 0.1) == pytest.approx(1.0 - 5 * 0.1**2 / scatter, rel=1e-12)
+    assert r2(observed, 2 * observed.mean() - observed) == pytest.approx(-3.0, rel=1e-12)
+    assert r2(10 * observed + 3, 10 * (observed + 0.1) + 3) == pytest.approx(r2(observed, observed + 0.1))
+
+
+def test_r2_of_a_regression_is_the_squared_correlation():
+    generator = np.random.default_rng(3)
+    x = generator.normal(size=40)
+    y = 0.7 * x + generator.normal(size=40)
+    regressed = np.polyval(np.polyfit(x, y, 1), x)
+    expected = np.corrcoef(x, y)[0, 1] ** 2
+    assert skin_deflection.coefficient_of_determination(y, regressed) == pytest.approx(expected, rel=1e-12)
+
+
+def observed_profile(direction, at_artefact_mm=None):
+    """The observations themselves as a profile whose distal distances are `direction` times theirs."""
+    observed = cylinder_deflection()
+    deflection = np.where(
+        observed.is_artefact & (at_artefact_mm is not None), at_artefact_mm or 0.0, observed.deflection_mm
+    )
+    order = np.argsort(direction * observed.distance_mm)
+    return SurfaceProfile((direction * observed.distance_mm)[order], deflection[order])
+
+
+@pytest.mark.parametrize(("direction", "proximal_positive"), [(-1.0, True), (1.0, False)])
+def test_deflection_r2_reads_the_observations_in_the_direction_asked_for(direction, proximal_positive):
+    profile = observed_profile(direction)
+    assert skin_deflection.deflection_r2(profile, proximal_positive) == 1.0
+    assert skin_deflection.deflection_r2(profile, not proximal_positive) < 0.999
+
+
+def test_deflection_r2_reads_proximal_as_positive_unless_told_otherwise():
+    assert skin_deflection.deflection_r2(observed_profile(-1.0)) == 1.0
+
+
+def test_deflection_r2_leaves_the_artefact_out():
+    assert skin_deflection.deflection_r2(observed_profile(-1.0, at_artefact_mm=50.0)) == 1.0
+
+
+@pytest.fixture(scope="module")
+def tiny_skin():
+    """A coarse, shallow press: its numbers are rough, but all that the studies read is there."""
+    grading = Grading(
+        17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=4.0, stratum_corneum=1, living_epidermis=1, dermis=1, subcutis=1
+    )
+    touch = Touch(
+        finger=Fingertip(),
+        indenter=Sphere(287.0),
+        stimulus=RampAndHold(depth_mm=0.2),
+        tissues=named_tissues("trial3"),
+        grading=grading,
+        settings=PressSettings(1, 1),
+    )
+    return touch.solve()
+
+
+def test_deflection_is_reported_from_the_observations_side(tiny_skin):
+    responses = {
+        (trial, name): tiny_skin for trial in skin_deflection.TRIALS for name in ("line", "cylinder")
+    }
+    found = skin_deflection.result(responses)
+    profile = tiny_skin.surface_profile()
+    for trial in skin_deflection.TRIALS:
+        for name in ("line", "cylinder"):
+            shown = found[trial][name]
+            assert (np.diff(shown["distance_mm"]) > 0).all()
+            assert np.abs(shown["distance_mm"]).max() <= 10.0
+            np.testing.assert_allclose(shown["deflection_mm"], profile.at(-shown["distance_mm"]), rtol=1e-12)
+            assert shown["force_mn"] == tiny_skin.force_mn[-1]
+            assert ("r2" in shown) == (name == "cylinder")
+        cylinder = found[trial]["cylinder"]
+        assert cylinder["r2"] == skin_deflection.deflection_r2(profile)
+        assert cylinder["r2_mirrored"] == skin_deflection.deflection_r2(profile, proximal_positive=False)
+    assert found["observed"]["distance_mm"].size == cylinder_deflection().distance_mm.size
+
+
+# Level 2
+
+
+def bar_traces(shift_mm):
+    """SED at a receptor that sees an edge-enhanced bar: flat in the middle, peaks near +-1.5 mm."""
+    edges = np.exp(-np.square((np.abs(shift_mm) - 1.5) / 0.5))
+    peak_kpa = 0.4 + 1.6 * edges + 0.5 * (np.abs(shift_mm) < 1.5) + 0.1 * np.tanh(shift_mm)
+    times_ms = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 100.0, 300.0, 1000.0])
+    course = np.array([0.0, 0.06, 0.2, 0.42, 0.7, 1.0, 0.92, 0.85, 0.8])
+    return SedTraces(times_ms, np.outer(course, peak_kpa), kinks_ms=[50.0])
+
+
+@pytest.fixture(scope="module")
+def synthetic_recordings():
+    """What a known afferent would have been recorded to answer."""
+    recordings = single_unit.Recordings(bar_traces(bar_firing_rates().shift_mm))
+    truth = np.array([3e-7, 2.6e-4, 1.1e-6, 60.0, 1.0e-6, 50.0])
+    recordings.dynamic, recordings.static = recordings.predict(truth)
+    return recordings, truth
+
+
+@pytest.fixture(scope="module")
+def synthetic_fit(synthetic_recordings):
+    return single_unit.fit(synthetic_recordings[0])
+
+
+def test_a_known_afferent_scores_perfectly_and_others_do_not(synthetic_recordings):
+    recordings, truth = synthetic_recordings
+    everything = np.arange(36)
+    assert np.ptp(recordings.dynamic) > 50.0
+    assert np.ptp(recordings.static) > 10.0
+    assert recordings.score(truth, everything) == 1.0
+    assert recordings.score(truth * [1, 1, 1.3, 1, 1, 1], everything) < 0.95
+    assert recordings.score(truth * [1, 1.3, 1, 1, 1, 1], everything) < 0.99
+
+
+def test_the_fit_finds_what_a_known_afferent_answered(synthetic_recordings, synthetic_fit):
+    recordings, _ = synthetic_recordings
+    best, folds = synthetic_fit
+    assert best.objective > 0.98
+    assert best.objective == recordings.score(best.parameters, np.arange(36))
+    assert folds.fss_test > 0.97
+    starts = [recordings.score(start, np.arange(36)) for start in single_unit.start_points()]
+    assert best.objective > max(starts)
+
+
+def test_single_unit_result_names_every_number(synthetic_recordings, synthetic_fit):
+    recordings, _ = synthetic_recordings
+    best, folds = synthetic_fit
+    found = single_unit.result(recordings, best, folds)
+    dynamic, static = recordings.predict(best.parameters)
+    np.testing.assert_array_equal(found["dynamic_rate_hz"], dynamic)
+    np.testing.assert_array_equal(found["static_rate_hz"], static)
+    assert list(found["parameters"].values()) == best.parameters.tolist()
+    assert set(found["parameters"]) == set(found["units"])
+    assert [fold["fold"] for fold in found["folds"]] == [1, 2, 3, 4, 5, 6]
+    tested = np.concatenate([fold["testing_shift_mm"] for fold in found["folds"]])
+    np.testing.assert_array_equal(np.sort(tested), recordings.shift_mm)
+    assert found["fss_out_of_sample"] == pytest.approx(np.mean([fold["fss_test"] for fold in found["folds"]]))
+    for fold in found["folds"]:
+        assert fold["history"][-1]["fss"] == fold["fss_train"]
+        assert fold["fss_train"] >= max(fold["fss_start"])
+    weighted = 0.25 * found["fss_in_sample_dynamic"] + 0.75 * found["fss_in_sample_static"]
+    assert found["fss_in_sample"] == pytest.approx(weighted, rel=1e-12)
+    ours = found["modulation"]["static"]["ours"]
+    under = static[np.abs(recordings.shift_mm) < 1.2]
+    assert (ours["maximum_hz"], ours["minimum_hz"]) == (static.max(), under.min())
+    json.dumps(plain(found), allow_nan=False)
+
+
+def test_both_start_points_are_the_papers_with_the_dynamic_gain_rescaled_alike():
+    first, second = single_unit.start_points()
+    np.testing.assert_allclose(first[[0, 2, 3, 4, 5]], [0.0, 7e-7, 68.0, 1e-6, 50.0], rtol=1e-14)
+    np.testing.assert_allclose(second[[0, 2, 3, 4, 5]], [0.0, 3e-7, 68.0, 1e-6, 50.0], rtol=1e-14)
+    assert second[1] / first[1] == pytest.approx(8.2 / 8.0, rel=1e-12)
+    steps = single_unit.increments(single_unit.start_points())
+    np.testing.assert_allclose(steps[:, 1:], 0.01 * np.array([first, second])[:, 1:], rtol=1e-12)
+    np.testing.assert_allclose(
+        steps[:, 0], 0.01 * 1e-6 * 50.0 / 68.0, rtol=1e-12
+    )  # of the rheobase C v / tau
+
+
+def test_sed_of_the_receptor_is_one_column_per_touch():
+    class Skin:
+        def __init__(self, peak_kpa):
+            self.peak_kpa = peak_kpa
+
+        def sed(self, sites):
+            assert np.array_equal(sites, [[17.37, 0.0]])
+            return SedTraces([0.0, 50.0, 1000.0], [[0.0], [self.peak_kpa], [1.0]], kinks_ms=[50.0])
+
+    sed = single_unit.receptor_sed([Skin(1.5), Skin(2.5), Skin(3.5)])
+    np.testing.assert_array_equal(sed.sed_kpa, [[0.0, 0.0, 0.0], [1.5, 2.5, 3.5], [1.0, 1.0, 1.0]])
+    assert sed.kinks_ms.tolist() == [50.0]
+
+
+# Level 3
+
+
+class SphereSkin:
+    """SED below a ball: the more curved, the higher and narrower."""
+
+    def __init__(self, position_mm, curvature_per_m):
+        self.centre = np.array([17.37 + position_mm, 0.0])
+        sharpness = curvature_per_m / 287.0
+        self.peak_kpa, self.width_mm = 2.5 * sharpness**1.5, 2.0 / sharpness**0.5
+
+    def sed(self, sites):
+        squared = np.square(np.asarray(sites) - self.centre).sum(axis=1)
+        peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
+        return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.85], peaks), kinks_ms=[50.0])
+
+
+SKINS = {
+    (position, curvature): SphereSkin(position, curvature)
+    for position in (0.0, 0.2)
+    for curvature in CURVATURES
+}
+SENSITIVE = Afferent(static_gain=1.2e-6)
+
+
+@pytest.fixture(scope="module")
+def discrimination():
+    return sphere_discrimination.result(SKINS, SENSITIVE, seed=0)
+
+
+def test_hit_rates_rise_with_curvature_at_both_positions(discrimination):
+    for name in ("hit_rate", "hit_rate_shifted"):
+        rates = np.asarray(discrimination["gradient_sum"]["static"][name])
+        assert rates.shape == (6,)
+        assert (np.diff(rates) > 0).all()
+        assert (rates >= 0).all()
+        assert (rates <= 1).all()
+    static = np.asarray(discrimination["gradient_sum"]["static"]["hit_rate"])
+    assert abs(static[0] - 0.58) < 0.2  # the noise was fitted to this and to the last
+    assert abs(static[-1] - 0.95) < 0.2
+    assert 0.0 < discrimination["noise_sigma"] < 1.0
+
+
+def test_every_strategy_measure_and_variant_has_six_hit_rates_at_both_positions(discrimination):
+    tables = [
+        *(discrimination["gradient_sum"][measure] for measure in ("static", "dynamic", "latency")),
+        discrimination["euclidean"]["static"],
+        *discrimination["variants"].values(),
+    ]
+    assert len(discrimination["variants"]) == 6
+    for table in tables:
+        assert set(table) == {"hit_rate", "hit_rate_sd", "hit_rate_shifted", "hit_rate_shifted_sd"}
+        for values in table.values():
+            assert np.shape(values) == (6,)
+    assert list(discrimination["curvature_per_m"]) == CURVATURES
+    for sums in discrimination["gradient_sums"].values():
+        assert np.shape(sums) == (2, 7)
+
+
+def test_more_noise_makes_spheres_harder_to_tell(discrimination):
+    variants = discrimination["variants"]
+    rates = [np.mean(variants[f"sigma_{sigma}"]["hit_rate"]) for sigma in ("0.025", "0.055", "0.085")]
+    assert rates[0] > rates[1] > rates[2]
+
+
+def test_a_seed_gives_the_same_bits_and_another_seed_gives_others(discrimination):
+    again = sphere_discrimination.result(SKINS, SENSITIVE, seed=0)
+    other = sphere_discrimination.result(SKINS, SENSITIVE, seed=1)
+    assert json.dumps(plain(again)) == json.dumps(plain(discrimination))
+    assert plain(other["gradient_sum"]["static"]) != plain(discrimination["gradient_sum"]["static"])
+    assert plain(other["gradient_sums"]) == plain(discrimination["gradient_sums"])
+
+
+def test_positions_draw_their_noise_apart():
+    """Equal skins at both positions: hit rates agree within their scatter but not to the bit."""
+    same = {(position, curvature): SKINS[0.0, curvature] for position, curvature in SKINS}
+    static = sphere_discrimination.result(same, SENSITIVE, seed=0)["gradient_sum"]["static"]
+    first, second = np.asarray(static["hit_rate"]), np.asarray(static["hit_rate_shifted"])
+    assert (first != second).any()
+    np.testing.assert_allclose(first, second, rtol=0, atol=0.05)
+
+
+def test_population_map_is_a_sheet_that_peaks_under_the_sphere_and_is_silent_far_from_it():
+    found = sphere_discrimination.population_map(SphereSkin(0.0, 287.0), SENSITIVE)
+    x, z = found["x_mm"], found["z_mm"]
+    np.testing.assert_allclose(x, 17.37 + np.arange(-10, 11) / 2, rtol=1e-14)
+    np.testing.assert_allclose(z, np.arange(-10, 11) / 2, rtol=0, atol=1e-14)
+    assert found["receptors_mm"].shape == (18, 2)
+    assert found["curvature_per_m"] == 287.0
+    for name in ("dynamic_rate_hz", "static_rate_hz"):
+        rates = found[name]
+        assert rates.shape == (21, 21)
+        assert rates[10, 10] == rates.max() > 0.0
+        np.testing.assert_allclose(rates, rates[:, ::-1], rtol=1e-9)
+        assert rates[0, 0] == 0.0
+    latency = found["first_spike_latency_ms"]
+    assert np.isnan(latency[0, 0])
+    assert np.nanmin(latency) == latency[10, 10]
+    # Rows are x, columns are z: moved along the finger, the peak moves along the rows.
+    moved = sphere_discrimination.population_map(SphereSkin(1.0, 287.0), SENSITIVE)["static_rate_hz"]
+    assert np.unravel_index(moved.argmax(), moved.shape) == (12, 10)
+
+
+# The nail
+
+
+def test_nail_concentration_is_that_of_a_slow_look_at_every_element(tiny_skin):
+    found = nail_border.result(tiny_skin)
+    mesh = tiny_skin.mesh
+    nail = set(mesh.nail_nodes.tolist())
+    border, far = [], []
+    for i in range(mesh.skin_grid.shape[0] - 1):
+        for j in range(mesh.skin_grid.shape[1] - 1):
+            corners = [int(mesh.skin_grid[i + a, j + b]) for a in (0, 1) for b in (0, 1)]
+            sed = tiny_skin.sed_kpa[-1, mesh.living_epidermis[i, j]]
+            if 0 < sum(corner in nail for corner in corners) < 4:
+                border.append(sed)
+            centre = mesh.nodes_mm[mesh.elements[mesh.living_epidermis[i, j]]].mean(axis=0)
+            away = min(np.linalg.norm(centre - mesh.nodes_mm[node]) for node in nail)
+            if centre[1] > 0 and away > 2.0:
+                far.append(sed)
+    assert border
+    assert far
+    assert found["border_kpa"] == max(border)
+    assert found["far_kpa"] == pytest.approx(np.median(far), rel=1e-12)
+    assert found["ratio"] == pytest.approx(max(border) / np.median(far), rel=1e-12)
+    assert found["x_mm"].shape == found["sed_kpa"].shape == mesh.living_epidermis.shape
+
+
+def test_the_section_is_every_face_on_the_midplane(tiny_skin):
+    """A slow look at all six faces of every brick; those of a wedge's missing edge have no area."""
+    still = replace(tiny_skin, displacement_mm=np.zeros_like(tiny_skin.displacement_mm))
+    section = nail_border.result(still)["section"]
+    mesh = tiny_skin.mesh
+    faces = [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+    expected = []
+    for element, nodes in enumerate(mesh.elements):
+        for face in faces:
+            corners = mesh.nodes_mm[nodes[list(face)]]
+            if (np.abs(corners[:, 2]) < 1e-9).all() and _area(corners[:, 0], corners[:, 1]) > 1e-9:
+                expected.append((tiny_skin.sed_kpa[-1, element], _area(corners[:, 0], corners[:, 1])))
+    areas = map(_area, section["x_mm"], section["y_mm"])
+    found = list(zip(section["sed_kpa"], areas, strict=True))
+    np.testing.assert_allclose(sorted(found), sorted(expected), rtol=1e-12)
+    assert sum(area for _, area in expected) > 300.0
+
+
+def _area(x, y):
+    return 0.5 * abs((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
+
+
+def test_the_section_is_deformed_by_as_much_as_the_skin_was_pressed(tiny_skin):
+    still = replace(tiny_skin, displacement_mm=np.zeros_like(tiny_skin.displacement_mm))
+    before, after = nail_border.result(still)["section"], nail_border.result(tiny_skin)["section"]
+    assert after["sed_kpa"].tolist() == before["sed_kpa"].tolist()
+    assert np.abs(after["y_mm"] - before["y_mm"]).max() == pytest.approx(0.2, rel=0.1)
+
+
+# Paper beside ours
+
+
+def good_results():
+    """Numbers that meet everything the comparison asks for."""
+
+    def profile(scale):
+        x = np.arange(-6.0, 6.5, 0.5)
+        return {"distance_mm": x, "deflection_mm": scale * np.exp(-np.abs(x))}
+
+    trials = {
+        f"trial{number}": {name: profile(scale) for name in ("line", "cylinder")}
+        for number, scale in ((1, 1.1), (2, 0.9), (3, 1.0))
+    }
+    trials["trial3"]["cylinder"] |= {"r2": 0.95, "r2_mirrored": 0.91}
+    rising = np.array([0.58, 0.65, 0.72, 0.80, 0.88, 0.95])
+    dynamic = {"minimum_hz": 54.0, "maximum_hz": 212.0, "difference_hz": 158.0}
+    static = {"minimum_hz": 5.0, "maximum_hz": 57.0, "difference_hz": 52.0}
+    fold = {"fss_start": [0.7, 0.78], "fss_test": 0.84}
+    return {
+        "skin_deflection": trials,
+        "single_unit": {
+            "fss_out_of_sample": 0.82,
+            "fss_in_sample": 0.83,
+            "folds": [copy.deepcopy(fold) for _ in range(6)],
+            "modulation": {"dynamic": {"ours": dynamic}, "static": {"ours": static}},
+        },
+        "discrimination": {
+            "noise_sigma": 0.06,
+            "curvature_per_m": CURVATURES,
+            "goodwin": {"curvature_per_m": [296.0, 365.0], "hit_rate": [0.58, 0.95]},
+            "gradient_sum": {
+                measure: {"hit_rate": rising.copy(), "hit_rate_shifted": rising - change}
+                for measure, change in (("static", 0.01), ("dynamic", 0.1), ("latency", 0.12))
+            },
+        },
+    }
+
+
+def rows(results):
+    return {row["quantity"]: row for row in plain(comparison.comparison(results))}
+
+
+def test_a_good_run_meets_every_criterion():
+    found = plain(comparison.comparison(good_results()))
+    assert [row["quantity"] for row in found if not row["met"]] == []
+    assert len({row["quantity"] for row in found}) == len(found) > 20
+    for row in found:
+        assert set(row) == {"quantity", "paper", "ours", "difference", "status", "met", "note"}
+        assert row["paper"]
+        assert row["ours"]
+
+
+def worse(*path):
+    """Change one number: the last item of `path` goes where the others lead."""
+
+    def change(results):
+        *keys, last, value = path
+        place = results
+        for key in keys:
+            place = place[key]
+        place[last] = value
+
+    return change
+
+
+R2 = "Trial 3, deflection under the cylinder, R²"
+OUT_OF_SAMPLE = "Single unit, FSS out of sample (mean of six folds)"
+IN_SAMPLE = "Single unit, FSS in sample (all 36 shifts)"
+FOLD_3 = "Fold 3, FSS of the testing set"
+NOISE = "Noise sigma_1 that fits Goodwin's two points"
+CHANGE = "Largest change of hit rate by the 0.2 mm shift"
+MODULATION = ("single_unit", "modulation", "dynamic", "ours")
+SAME = good_results()["discrimination"]["gradient_sum"]["dynamic"]["hit_rate"]
+RISES = "Hit rate rises with curvature, {} Gradient Sum at {}"
+STATIC = ("discrimination", "gradient_sum", "static", "hit_rate")
+
+
+@pytest.mark.parametrize(
+    ("change", "missed"),
+    [
+        (worse("skin_deflection", "trial3", "cylinder", "r2", 0.9299), {R2}),
+        (worse("single_unit", "fss_out_of_sample", 0.8099), {OUT_OF_SAMPLE}),
+        (worse("single_unit", "fss_in_sample", 0.8199), {IN_SAMPLE}),
+        (worse("single_unit", "folds", 2, "fss_test", 0.8369), {FOLD_3}),
+        (worse("single_unit", "folds", 3, "fss_test", 0.1), set()),
+        (worse("discrimination", "noise_sigma", 0.0661), {NOISE}),
+        (worse("discrimination", "noise_sigma", 0.0439), {NOISE}),
+        (worse(*MODULATION, "maximum_hz", 212 * 1.21), {"Dynamic rate, largest [spikes/s]"}),
+        (worse(*MODULATION, "maximum_hz", 212 * 0.79), {"Dynamic rate, largest [spikes/s]"}),
+        (worse(*MODULATION, "minimum_hz", 0.0), {"Dynamic rate, smallest under the flat face [spikes/s]"}),
+        (worse("discrimination", "gradient_sum", "dynamic", "hit_rate_shifted", SAME), {CHANGE}),
+        (worse(*STATIC, 0, 0.529), {"Hit rate at 296 /m, static Gradient Sum, noise fitted"}),
+        (worse(*STATIC, 0, 0.631), {"Hit rate at 296 /m, static Gradient Sum, noise fitted"}),
+        (worse(*STATIC, 5, 0.899), {"Hit rate at 365 /m, static Gradient Sum, noise fitted"}),
+        (worse(*STATIC, 2, 0.65), {RISES.format("static", "0.0 mm")}),
+        (worse(*STATIC, 2, np.nan), {RISES.format("static", "0.0 mm")}),
+        (
+            worse("discrimination", "gradient_sum", "latency", "hit_rate_shifted", 5, 0.2),
+            {RISES.format("latency", "0.2 mm")},
+        ),
+        (
+            worse("skin_deflection", "trial1", "line", "deflection_mm", np.full(25, -1.0)),
+            {"Trial 1, deflection under the line, against Trial 3"},
+        ),
+        (
+            worse("skin_deflection", "trial2", "cylinder", "deflection_mm", np.full(25, 2.0)),
+            {"Trial 2, deflection under the cylinder, against Trial 3"},
+        ),
+    ],
+)
+def test_a_number_made_worse_is_marked_as_a_miss_and_no_other(change, missed):
+    results = good_results()
+    change(results)
+    found = rows(results)
+    assert {name for name, row in found.items() if row["met"] is False} == missed
+    assert sum(row["met"] is True for row in found.values()) == len(found) - len(missed)
+
+
+def test_deflection_far_from_the_indenter_does_not_decide_between_trials():
+    results = good_results()
+    line = results["skin_deflection"]["trial1"]["line"]
+    line["deflection_mm"] = np.where(np.abs(line["distance_mm"]) > 5.0, -100.0, line["deflection_mm"])
+    assert rows(results)["Trial 1, deflection under the line, against Trial 3"]["met"] is True
+
+
+@pytest.mark.parametrize(
+    ("quantity", "published", "ours", "difference"),
+    [
+        (OUT_OF_SAMPLE, f"{paper.FSS_OUT_OF_SAMPLE.value:g}", "0.820", "+0.010"),
+        ("Dynamic rate, largest [spikes/s]", "212", "212", "+0"),
+        (
+            NOISE,
+            f"{psychophysics.NOISE_SIGMA.value:g}",
+            "0.060",
+            "+0.005",
+        ),
+        (R2, "matches (figure); laboratory's later model 0.93", "0.950", "+0.020"),
+    ],
+)
+def test_both_numbers_and_their_difference_are_written(quantity, published, ours, difference):
+    row = rows(good_results())[quantity]
+    assert (row["paper"], row["ours"], row["difference"]) == (published, ours, difference)
+
+
+# What is written
+
+
+def test_plain_values_are_json_and_say_none_where_there_is_no_number():
+    value = {
+        "rates": np.array([[1.0, np.nan], [np.inf, -np.inf]]),
+        287.0: (np.float32(0.5), np.int64(3), np.bool_(True), True, None, "word"),
+        "deep": [{"latency": float("nan"), "empty": np.array([])}],
+        "scalar": np.array(2.5),
+    }
+    expected = {
+        "rates": [[1.0, None], [None, None]],
+        "287.0": [0.5, 3, True, True, None, "word"],
+        "deep": [{"latency": None, "empty": []}],
+        "scalar": 2.5,
+    }
+    found = plain(value)
+    assert found == expected
+    assert found["287.0"][2] is True
+    assert isinstance(found["287.0"][1], int)
+    assert json.loads(json.dumps(found, allow_nan=False)) == expected
+    assert np.isnan(value["rates"][0, 1])  # the input is left as it was
