@@ -65,7 +65,7 @@ def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
 def instance(name: str, value: Kind, kind: type) -> Kind:
     """Return `value` if it is a `kind`, else raise `InputError`."""
     if not isinstance(value, kind):
-        raise InputError(f"{name} must be a {kind.__name__}: got {value!r}.")
+        raise InputError(f"{name} must be of type {kind.__name__}: got {value!r}.")
     return value
 
 
