@@ -1,0 +1,312 @@
+"""The whole paper by the command line, once from nothing, and what a reader may then rely on."""
+
+import json
+import math
+import os
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import time
+from html.parser import HTMLParser
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fingerpad import __version__
+from fingerpad.parameters import all_published
+from fingerpad.studies.reproduction import STORE_FOLDER
+
+COMMAND = (sys.executable, "-W", "error", "-m", "fingerpad", "reproduce")
+MEASURES = ("static", "dynamic", "latency")
+HIT_RATES = ("hit_rate", "hit_rate_sd", "hit_rate_shifted", "hit_rate_shifted_sd")
+PARAMETERS = {
+    "intercept_ma",
+    "dynamic_gain",
+    "static_gain",
+    "time_constant_ms",
+    "capacitance_mf",
+    "threshold_mv",
+}
+MEASURED = ("started", "wall_s", "peak_memory_mb", "stages")
+"""Parts of the manifest that no two runs share."""
+
+INDENTATIONS = 6 + 36 + 14
+
+
+def run(folder, *options):
+    """Reproduce in a subprocess whose warnings are errors."""
+    started = time.perf_counter()
+    done = subprocess.run(
+        [*COMMAND, "--resolution", "quick", "--jobs", "2", "--out", str(folder), *options],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=folder.parent,
+    )
+    text = (folder / "results.json").read_text(encoding="utf-8") if done.returncode == 0 else "null"
+    return SimpleNamespace(
+        folder=folder,
+        status=done.returncode,
+        said=done.stdout,
+        errors=done.stderr,
+        text=text,
+        results=json.loads(text),
+        wall_s=time.perf_counter() - started,
+    )
+
+
+@pytest.fixture(scope="session")
+def first(tmp_path_factory):
+    """The run from nothing: minutes of mechanics, shared by all tests of this module."""
+    return run(tmp_path_factory.mktemp("reproduction") / "out")
+
+
+@pytest.fixture(scope="session")
+def stamps(first):
+    """When each indentation was stored."""
+    return {path.name: path.stat().st_mtime_ns for path in (first.folder / STORE_FOLDER).iterdir()}
+
+
+@pytest.fixture(scope="session")
+def page(first):
+    """The report with its figures as the first run wrote them."""
+    return (first.folder / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="session")
+def second(first, stamps, page):
+    """The same run again, in the same folder."""
+    return run(first.folder)
+
+
+@pytest.fixture(scope="session")
+def other_seed(first, tmp_path_factory):
+    """The same indentations met by other observers."""
+    folder = tmp_path_factory.mktemp("other_seed") / "out"
+    shutil.copytree(first.folder / STORE_FOLDER, folder / STORE_FOLDER)
+    return run(folder, "--seed", "7")
+
+
+# From nothing
+
+
+def test_it_ends_well_and_says_where_the_results_are_and_what_was_missed(first):
+    assert (first.status, first.errors) == (0, "")
+    report, results, missed = first.said.splitlines()
+    assert report == f"Report: {first.folder / 'report.html'}"
+    assert results == f"Results: {first.folder / 'results.json'}"
+    names = [row["quantity"] for row in first.results["comparison"] if row["met"] is False]
+    assert missed == "Missed: " + ("; ".join(names) if names else "nothing")
+
+
+def test_the_folder_holds_whole_files_only(first, stamps):
+    assert sorted(os.listdir(first.folder)) == ["figures", STORE_FOLDER, "report.html", "results.json"]
+    assert len(stamps) == INDENTATIONS
+    assert all(re.fullmatch(r"[0-9a-f]{32}\.npz", name) for name in stamps)
+
+
+def numbers(value):
+    """Every number in nested lists and dicts."""
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list):
+        for item in value:
+            yield from numbers(item)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield value
+
+
+def test_results_have_every_section_and_finite_numbers_only(first):
+    sections = {"skin_deflection", "single_unit", "discrimination", "population", "nail"}
+    assert set(first.results) == sections | {"comparison", "inputs", "manifest"}
+    assert not re.search(r"\b(NaN|Infinity)\b", first.text)
+    assert all(math.isfinite(number) for number in numbers(first.results))
+
+
+def test_skin_deflection_is_complete(first):
+    found = first.results["skin_deflection"]
+    assert set(found) == {"trial1", "trial2", "trial3", "observed"}
+    for trial in ("trial1", "trial2", "trial3"):
+        assert set(found[trial]) == {"line", "cylinder"}
+        for name, profile in found[trial].items():
+            distance, deflection = profile["distance_mm"], profile["deflection_mm"]
+            assert len(distance) == len(deflection) > 20
+            assert distance == sorted(distance)
+            assert 0.5 < max(deflection) <= 1.01
+            assert abs(distance[int(np.argmax(deflection))]) < 0.6
+            assert 50.0 < profile["force_mn"] < 1000.0
+            assert ("r2" in profile) == (name == "cylinder")
+        assert found[trial]["cylinder"]["r2"] < 1.0
+
+
+def test_single_unit_is_complete(first):
+    found = first.results["single_unit"]
+    for name in ("shift_mm", "dynamic_rate_hz", "static_rate_hz"):
+        assert len(found[name]) == 36
+    np.testing.assert_allclose(np.diff(found["shift_mm"]), 0.2, rtol=0, atol=1e-12)
+    assert set(found["parameters"]) == PARAMETERS
+    assert len(found["folds"]) == 6
+    for fold in found["folds"]:
+        assert set(fold["parameters"]) == PARAMETERS
+        assert fold["fss_train"] <= 1.0
+        assert fold["fss_test"] <= 1.0
+    mean = np.mean([fold["fss_test"] for fold in found["folds"]])
+    assert found["fss_out_of_sample"] == pytest.approx(mean, rel=1e-12)
+    assert found["fss_in_sample"] <= 1.0
+
+
+def test_discrimination_is_complete(first):
+    found = first.results["discrimination"]
+    assert len(found["curvature_per_m"]) == 7
+    assert found["curvature_per_m"] == sorted(found["curvature_per_m"])
+    assert 0.0 < found["noise_sigma"] < 1.0
+    assert set(found["gradient_sum"]) == set(MEASURES)
+    assert set(found["euclidean"]) == {"static"}
+    for table in (*found["gradient_sum"].values(), found["euclidean"]["static"]):
+        assert set(table) == set(HIT_RATES)
+        for values in table.values():
+            assert len(values) == 6
+            assert all(0.0 <= value <= 1.0 for value in values)
+
+
+def test_population_and_nail_are_maps(first):
+    population, nail = first.results["population"], first.results["nail"]
+    shape = (len(population["x_mm"]), len(population["z_mm"]))
+    for name in ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms"):
+        assert np.shape(population[name]) == shape
+    assert np.shape(population["receptors_mm"]) == (18, 2)
+    assert np.shape(nail["sed_kpa"]) == np.shape(nail["x_mm"]) == np.shape(nail["z_mm"])
+    assert nail["border_kpa"] > nail["far_kpa"] > 0.0
+
+
+def test_the_manifest_says_how_to_repeat_it(first):
+    manifest = first.results["manifest"]
+    assert (manifest["version"], manifest["seed"], manifest["resolution"]) == (__version__, 0, "quick")
+    assert manifest["nodes"] > manifest["elements"] > 1000
+    assert 100.0 < manifest["peak_memory_mb"] < 4000.0
+    assert 1.0 < manifest["wall_s"] <= first.wall_s
+    stages = manifest["stages"]
+    assert [stage.get("computed") for stage in stages] == [6, 36, 14, None]
+    assert sum(stage["wall_s"] for stage in stages) <= manifest["wall_s"] + 0.1
+    assert all(mesh["smallest_gauss_jacobian_mm3"] > 0 for mesh in manifest["meshes"].values())
+
+
+def test_every_published_number_is_listed_with_its_status(first):
+    listed = first.results["inputs"]
+    assert [number["name"] for number in listed] == [number.name for number in all_published()]
+    assert {number["status"] for number in listed} <= {"paper", "read", "recalled", "assumed"}
+
+
+# The claims
+
+
+def test_trial_3_follows_the_observed_skin(first):
+    assert first.results["skin_deflection"]["trial3"]["cylinder"]["r2"] >= 0.93
+
+
+def test_fss_out_of_sample_reaches_the_papers(first):
+    assert first.results["single_unit"]["fss_out_of_sample"] >= 0.81
+
+
+@pytest.mark.parametrize("position", ["hit_rate", "hit_rate_shifted"])
+def test_static_hit_rates_rise_with_curvature(first, position):
+    rates = first.results["discrimination"]["gradient_sum"]["static"][position]
+    assert (np.diff(rates) > 0).all()
+
+
+def test_the_comparison_marks_what_it_misses(first):
+    rows = first.results["comparison"]
+    assert len(rows) >= 20
+    for row in rows:
+        assert set(row) == {"quantity", "paper", "ours", "difference", "status", "met", "note"}
+        assert row["met"] in (True, False, None)
+    assert any(row["met"] is True for row in rows)
+
+
+# The page
+
+
+class Links(HTMLParser):
+    """Everything that a browser would follow or load."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.loaded, self.tags = [], []
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        attributes = dict(attrs)
+        for name in ("src", "href", "srcset", "data", "action", "poster", "xlink:href"):
+            if name in attributes:
+                self.loaded.append(attributes[name] or "")
+
+
+def test_the_page_needs_nothing_from_outside(page):
+    links = Links(page)
+    assert links.tags.count("img") == 6
+    assert all(link.startswith(("data:image/png;base64,", "#")) for link in links.loaded)
+    assert not {"script", "link", "iframe", "object", "embed", "base"} & set(links.tags)
+    without_data = re.sub(r"data:[^\"']*", "", page)
+    assert not re.search(r"url\(|@import|(src|href)\s*=\s*[\"']?(https?:)?//", without_data)
+
+
+def test_the_page_shows_every_compared_number_and_no_machine_path(first, page):
+    text = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", page))
+    for row in first.results["comparison"]:
+        assert row["ours"] in text
+    assert str(first.folder) not in page
+    assert str(Path.home()) + "/" not in page
+
+
+def test_figures_are_images_of_a_readable_size(first):
+    figures = sorted((first.folder / "figures").iterdir())
+    assert [int(re.match(r"figure_(\d)_\w+\.png$", path.name)[1]) for path in figures] == [4, 5, 6, 7, 8, 9]
+    for path in figures:
+        content = path.read_bytes()
+        assert content.startswith(b"\x89PNG\r\n\x1a\n")
+        assert content.endswith(b"IEND\xaeB`\x82")
+        width, height = struct.unpack(">II", content[16:24])
+        assert min(width, height) > 400
+        assert len(content) > 10_000
+
+
+# Again
+
+
+def unmeasured(results):
+    kept = {name: value for name, value in results["manifest"].items() if name not in MEASURED}
+    return results | {"manifest": kept}
+
+
+def test_a_second_run_takes_everything_from_the_store(first, second, stamps):
+    assert (second.status, second.errors) == (0, "")
+    folder = first.folder / STORE_FOLDER
+    assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == stamps
+    assert [stage.get("computed") for stage in second.results["manifest"]["stages"]] == [0, 0, 0, None]
+    assert second.wall_s < first.wall_s / 3
+
+
+def test_a_second_run_gives_the_same_results_bit_for_bit(first, second):
+    assert json.dumps(unmeasured(second.results)) == json.dumps(unmeasured(first.results))
+    assert second.said == first.said
+
+
+def test_another_seed_changes_what_the_observer_draws_and_nothing_else(first, other_seed):
+    assert (other_seed.status, other_seed.errors) == (0, "")
+    ours, theirs = unmeasured(first.results), unmeasured(other_seed.results)
+    for section in ("skin_deflection", "single_unit", "population", "nail", "inputs"):
+        assert theirs[section] == ours[section]
+    assert theirs["manifest"] == ours["manifest"] | {"seed": 7}
+    drawn, drawn_theirs = ours["discrimination"], theirs["discrimination"]
+    for name in ("curvature_per_m", "goodwin", "gradient_sums", "noise_sigma_paper"):
+        assert drawn_theirs[name] == drawn[name]
+    for measure in MEASURES:
+        rates, rates_theirs = drawn["gradient_sum"][measure], drawn_theirs["gradient_sum"][measure]
+        assert rates_theirs["hit_rate"] != rates["hit_rate"]
+        np.testing.assert_allclose(rates_theirs["hit_rate"], rates["hit_rate"], rtol=0, atol=0.1)
+    assert [stage.get("computed") for stage in other_seed.results["manifest"]["stages"]] == [0, 0, 0, None]
