@@ -69,7 +69,7 @@ def test_without_a_command_the_help_is_shown(call):
         (["reproduse"], "No such command", "'reproduse'"),
         (["--resolution", "quick"], "No such option", "--resolution"),
     ],
-    ids=" ".join,
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
 def test_misuse_is_one_sentence_and_status_2_and_nothing_is_written(call, tmp_path, arguments, named, came):
     status, said, errors = call(*arguments)

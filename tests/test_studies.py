@@ -382,6 +382,10 @@ def test_a_seed_gives_the_same_bits_and_another_seed_gives_others(discrimination
     assert json.dumps(plain(again)) == json.dumps(plain(discrimination))
     assert plain(other["gradient_sum"]["static"]) != plain(discrimination["gradient_sum"]["static"])
     assert plain(other["gradient_sums"]) == plain(discrimination["gradient_sums"])
+    # Whatever noise was fitted, the draws themselves are others.
+    for name in ("hit_rate", "hit_rate_shifted"):
+        rates = [found["variants"]["sigma_0.055"][name] for found in (discrimination, other)]
+        assert (np.asarray(rates[0]) != np.asarray(rates[1])).any()
 
 
 def test_positions_draw_their_noise_apart():
@@ -418,20 +422,27 @@ def test_population_map_is_a_sheet_that_peaks_under_the_sphere_and_is_silent_far
 
 
 def test_nail_concentration_is_that_of_a_slow_look_at_every_element(tiny_skin):
-    found = nail_border.result(tiny_skin)
     mesh = tiny_skin.mesh
+    # Energies at random: pressed skin has so little under the nail that its elements would not be missed.
+    scattered = np.random.default_rng(5).lognormal(size=tiny_skin.sed_kpa.shape)
+    under = np.isin(mesh.skin_grid, mesh.nail_nodes)
+    under_all = under[:-1, :-1] & under[1:, :-1] & under[1:, 1:] & under[:-1, 1:]
+    scattered[-1, mesh.living_epidermis[under_all]] += 1e3
+    skin = replace(tiny_skin, sed_kpa=scattered)
+    found = nail_border.result(skin)
     nail = set(mesh.nail_nodes.tolist())
     border, far = [], []
     for i in range(mesh.skin_grid.shape[0] - 1):
         for j in range(mesh.skin_grid.shape[1] - 1):
             corners = [int(mesh.skin_grid[i + a, j + b]) for a in (0, 1) for b in (0, 1)]
-            sed = tiny_skin.sed_kpa[-1, mesh.living_epidermis[i, j]]
+            sed = skin.sed_kpa[-1, mesh.living_epidermis[i, j]]
             if 0 < sum(corner in nail for corner in corners) < 4:
                 border.append(sed)
             centre = mesh.nodes_mm[mesh.elements[mesh.living_epidermis[i, j]]].mean(axis=0)
             away = min(np.linalg.norm(centre - mesh.nodes_mm[node]) for node in nail)
             if centre[1] > 0 and away > 2.0:
                 far.append(sed)
+    assert under_all.any()
     assert border
     assert far
     assert found["border_kpa"] == max(border)
