@@ -156,7 +156,7 @@ def _measured(
         f"{ours - published.value:+.{digits}f}",
         status,
         bool(ours >= published.value if at_least else close),
-        "" if at_least else f"met: within {CLOSE:.0%}",
+        "" if at_least else f"judged: within {CLOSE:.0%}",
     )
 
 
@@ -184,7 +184,7 @@ def _percept(found: Mapping[str, Any]) -> list[dict[str, Any]]:
                 f"{ours - observed:+.3f}",
                 status,
                 abs(ours - observed) <= 0.05,
-                "met: within 0.05",
+                "judged: within 0.05",
             )
         )
     for measure in ("static", "dynamic", "latency"):
@@ -214,7 +214,7 @@ def _percept(found: Mapping[str, Any]) -> list[dict[str, Any]]:
             "",
             status,
             change["static"] < min(change["dynamic"], change["latency"]),
-            "met: static changes least",
+            "judged: static changes least",
         )
     )
     return rows

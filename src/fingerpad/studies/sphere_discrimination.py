@@ -10,7 +10,6 @@ import numpy as np
 from fingerpad.afferent import Afferent
 from fingerpad.checks import FloatArray
 from fingerpad.discrimination import (
-    END_OF_STIMULUS_MS,
     Experiment,
     discriminate_euclidean,
     discriminate_gradient_sum,
@@ -30,13 +29,16 @@ POSITIONS_MM = protocol.SPHERE_POSITIONS.value
 NOISE_DRAWS = 400
 """Common random presentations behind the fit of the noise."""
 
+PATIENCE_MS = protocol.RAMP.value
+"""How long the observer waits for first spikes. [ms]"""
+
 MAP_REACH_MM, MAP_STEP_MM = 5.0, 0.5
 
 Measure = Callable[[ResponseMap], FloatArray]
 MEASURES: dict[str, Measure] = {
     "static": lambda response: response.static_rate_hz,
     "dynamic": lambda response: response.dynamic_rate_hz,
-    "latency": lambda response: response.first_spike_latency_ms,
+    "latency": lambda response: _waited(response.first_spike_latency_ms),
 }
 
 
@@ -83,7 +85,6 @@ def result(
                 sigma,
                 generator,
                 experiment,
-                silent_value=END_OF_STIMULUS_MS,
             ),
             seed,
         )
@@ -102,9 +103,7 @@ def result(
             "hit_rate": psychophysics.GOODWIN_HIT_RATES.value,
         },
         "gradient_sums": {
-            measure: [
-                gradient_sum(_spoken(table(measure, position)), neighbours) for position in POSITIONS_MM
-            ]
+            measure: [gradient_sum(table(measure, position), neighbours) for position in POSITIONS_MM]
             for measure in MEASURES
         },
         "gradient_sum": {measure: gradient(measure) for measure in MEASURES},
@@ -120,9 +119,13 @@ def result(
     }
 
 
-def _spoken(values: FloatArray) -> FloatArray:
-    """Values with the rule for silent units applied: their first spike counts as coming at the end."""
-    return np.where(np.isnan(values), END_OF_STIMULUS_MS, values)
+def _waited(latency_ms: FloatArray) -> FloatArray:
+    """Latencies of an observer who waits until the ramp ends: a later first spike, or none, counts as that.
+
+    The rule has no jump: a receptor that falls silent says the same before and after
+    (docs/decisions/silent-receptors.md).
+    """
+    return np.fmin(latency_ms, PATIENCE_MS)
 
 
 def _shown_noise() -> list[float]:
