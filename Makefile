@@ -6,7 +6,8 @@
 
 PYTHON ?= python3
 ARGS ?=
-PYTEST_ARGS ?= -n 2
+# One file per process: the tests of a file may share one long run.
+PYTEST_ARGS ?= -n 2 --dist loadfile
 
 bin := .venv/bin
 # Nothing but the environment's own packages may answer an import.

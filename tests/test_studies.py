@@ -516,6 +516,7 @@ def good_results():
                 for measure, change in (("static", 0.01), ("dynamic", 0.1), ("latency", 0.12))
             },
         },
+        "nail": {"ratio": 3.0, "border_kpa": 0.001},
     }
 
 
@@ -525,7 +526,8 @@ def rows(results):
 
 def test_a_good_run_meets_every_criterion():
     found = plain(comparison.comparison(good_results()))
-    assert [row["quantity"] for row in found if not row["met"]] == []
+    # The paper shows the border of the nail without a number to judge by.
+    assert [row["quantity"].split()[-2:] for row in found if row["met"] is not True] == [["(Figure", "9)"]]
     assert len({row["quantity"] for row in found}) == len(found) > 20
     for row in found:
         assert set(row) == {"quantity", "paper", "ours", "difference", "status", "met", "note"}

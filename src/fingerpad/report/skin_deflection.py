@@ -51,7 +51,7 @@ def draw(section: dict[str, Any]) -> Figure:
         whole.legend(loc="lower left")
         whole.invert_yaxis()  # Skin that yields goes down; the row shares this axis.
     for axes in panels[-1]:
-        axes.set_xlabel("distance from the indenter's axis along the finger [mm]")
+        axes.set_xlabel("distance from the indenter's axis along the finger, proximal positive [mm]")
     panels[-1, 1].set_xlabel("distance [mm]")
     return figure
 

@@ -34,6 +34,7 @@ def comparison(results: Mapping[str, Any]) -> list[dict[str, Any]]:
         *_deflection(results["skin_deflection"]),
         *_single_unit(results["single_unit"]),
         *_percept(results["discrimination"]),
+        *_nail(results["nail"]),
     ]
 
 
@@ -218,3 +219,17 @@ def _percept(found: Mapping[str, Any]) -> list[dict[str, Any]]:
         )
     )
     return rows
+
+
+def _nail(found: Mapping[str, Any]) -> list[dict[str, Any]]:
+    return [
+        _row(
+            "Energy density at the border of the nail over that of the dorsal skin away from it (Figure 9)",
+            "high concentrations (figure)",
+            f"{found['ratio']:.1f} times",
+            "",
+            MATERIALS + "; width of the nail assumed",
+            None,
+            f"{found['border_kpa']:.2g} kPa at the border; the paper gives no number",
+        )
+    ]
