@@ -521,7 +521,7 @@ def test_figure_7_shows_rates_far_below_chance():
 def test_figure_9_shows_each_place_from_the_side_it_is_seen_from():
     section = _nail()
     below, above, side, cut = nail.draw(section).axes[:4]
-    cells = 19 * (2 * 16 - 1)
+    cells = 19 * 2 * 16  # closed all around: joined along the volar and along the dorsal midline
     assert [axes.collections[0].get_array().size for axes in (below, above, side)] == [cells] * 3
     seen = [np.ma.getdata(axes.collections[0].get_array()) for axes in (below, above)]
     # The pad, with the peak under the sphere, is nearest to the eye below and farthest from it above.
