@@ -231,8 +231,8 @@ def indent(
     --------
     >>> import fingerpad as fp
     >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287), fp.RampAndHold(depth_mm=0.3))
-    >>> print(f"{skin.surface_profile().deflection_mm.max():.2f} mm")
-    0.30 mm
+    >>> print(f"{skin.surface_profile().deflection_mm.max():.1f} mm deep, {skin.force_mn[-1]:.0f} mN")
+    0.3 mm deep, 32 mN
     """
     return touch_of(finger, indenter, stimulus, materials, resolution, at_mm).solve()
 
