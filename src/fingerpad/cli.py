@@ -24,7 +24,7 @@ from fingerpad.report import write_report
 from fingerpad.studies import Reproduction, reproduce
 from fingerpad.studies.conditions import Conditions
 
-EXPECTED_TIME = {"quick": "about 3 minutes", "standard": "about 9 minutes", "paper": "many hours"}
+EXPECTED_TIME = {"quick": "about 3 minutes", "standard": "about 9 minutes", "paper": "more than a day"}
 """On two cores, nothing stored yet."""
 
 app = typer.Typer(
