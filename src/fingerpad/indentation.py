@@ -110,7 +110,7 @@ class Touch:
         ConvergenceError
             If a step cannot be solved; nothing partial is returned.
         """
-        mesh = _mesh(self.finger, self.grading)
+        mesh = self.mesh
         x, z = self.at_mm
         skin = mesh.nodes_mm[mesh.skin_nodes]
         placement = place(self.indenter, skin, self.finger.skin_point(x, z), _rotation(self.tilt_deg))

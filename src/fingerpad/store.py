@@ -138,7 +138,7 @@ class Store:
         Raises
         ------
         StoreError
-            If its file is missing, damaged or not of this touch.
+            If its file is missing or damaged, or its arrays have not the shapes of this touch.
         """
         path = self.path(touch)
         try:

@@ -7,9 +7,9 @@ import platform
 import resource
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -128,19 +128,8 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
         }
         advance()
     results["comparison"] = comparison(results)
-    results["inputs"] = [
-        {
-            "name": number.name,
-            "value": number.value,
-            "unit": number.unit,
-            "source": number.source,
-            "status": number.status,
-        }
-        for number in all_published()
-    ]
-    results["manifest"] = _manifest(
-        conditions, spheres[STANDARD_SPHERE], deflection, bar_responses, stages
-    ) | {
+    results["inputs"] = [asdict(number) for number in all_published()]
+    results["manifest"] = _manifest(conditions, spheres[STANDARD_SPHERE], deflection, bar_responses) | {
         "started": started.isoformat(timespec="seconds"),
         "wall_s": round(time.perf_counter() - clock, 2),
         "peak_memory_mb": _peak_memory_mb(),
@@ -181,7 +170,6 @@ def _manifest(
     standard: Touch,
     deflection: Mapping[Any, SkinResponse],
     bars: Mapping[int, SkinResponse],
-    stages: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
     """Say what ran, so that the run can be repeated and its meshes judged."""
     meshes = {"sphere": standard.mesh, "bar": bars[0].mesh}
