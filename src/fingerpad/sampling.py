@@ -51,6 +51,8 @@ class SkinResponse:
         Times at which the motion changes its speed abruptly: the end of the ramp. [ms]
     force_mn : array (n_times,)
         Force of the indenter along its axis, on the whole finger. [mN]
+    depth_mm : array (n_times,)
+        How far the indenter has advanced since first touch. [mm]
     skin_displacement_mm : array (n_times, n_skin_nodes, 3)
         Displacement of `mesh.skin_nodes`. [mm]
     displacement_mm : array (n_nodes, 3)
@@ -61,6 +63,9 @@ class SkinResponse:
         Where the indenter's axis meets the midline. [mm]
     direction : array (3,)
         Unit direction of pressing.
+    force_imbalance : float
+        Largest difference at any time between the indenter's force and the reaction of bone and nail, over
+        that force.
     penetration_mm : float
         Deepest penetration of the indenter by any node at any time. [mm]
     newton_steps, factorisations : int
@@ -71,11 +76,13 @@ class SkinResponse:
     times_ms: FloatArray
     kinks_ms: tuple[float, ...]
     force_mn: FloatArray
+    depth_mm: FloatArray
     skin_displacement_mm: FloatArray
     displacement_mm: FloatArray
     sed_kpa: FloatArray
     axis_x_mm: float
     direction: FloatArray
+    force_imbalance: float
     penetration_mm: float
     newton_steps: int
     factorisations: int

@@ -45,7 +45,15 @@ MECHANICAL_SOURCES = (
 )
 """Source files and folders on which the stored numbers depend."""
 
-_ARRAYS = ("times_ms", "force_mn", "skin_displacement_mm", "displacement_mm", "sed_kpa", "direction")
+_ARRAYS = (
+    "times_ms",
+    "force_mn",
+    "depth_mm",
+    "skin_displacement_mm",
+    "displacement_mm",
+    "sed_kpa",
+    "direction",
+)
 _SINGLE_PRECISION = ("skin_displacement_mm", "displacement_mm", "sed_kpa")
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _LOOK_FOR_PARENT_S = 1.0
@@ -153,11 +161,12 @@ class Store:
         for name, shape in _shapes(touch, content["times_ms"].size).items():
             if content[name].shape != shape or not np.isfinite(content[name]).all():
                 raise StoreError(f"The stored result {path} is damaged in {name}: delete it and run again.")
-        penetration, newton_steps, factorisations = content.pop("work")
+        imbalance, penetration, newton_steps, factorisations = content.pop("work")
         return SkinResponse(
             mesh=touch.mesh,
             kinks_ms=(touch.stimulus.ramp_ms,),
             axis_x_mm=touch.at_mm[0],
+            force_imbalance=float(imbalance),
             penetration_mm=float(penetration),
             newton_steps=int(newton_steps),
             factorisations=int(factorisations),
@@ -171,11 +180,12 @@ def _shapes(touch: Touch, n_times: int) -> dict[str, tuple[int, ...]]:
     return {
         "times_ms": (n_times,),
         "force_mn": (n_times,),
+        "depth_mm": (n_times,),
         "sed_kpa": (n_times, len(mesh.elements)),
         "skin_displacement_mm": (n_times, mesh.skin_nodes.size, 3),
         "displacement_mm": mesh.nodes_mm.shape,
         "direction": (3,),
-        "work": (3,),
+        "work": (4,),
     }
 
 
@@ -184,7 +194,12 @@ def _packed(response: SkinResponse) -> bytes:
     content: dict[str, Any] = {name: getattr(response, name) for name in _ARRAYS}
     for name in _SINGLE_PRECISION:
         content[name] = content[name].astype(np.float32)
-    work = [response.penetration_mm, response.newton_steps, response.factorisations]
+    work = [
+        response.force_imbalance,
+        response.penetration_mm,
+        response.newton_steps,
+        response.factorisations,
+    ]
     buffer = io.BytesIO()
     np.savez(buffer, **content, work=np.array(work, dtype=np.float64))
     return buffer.getvalue()

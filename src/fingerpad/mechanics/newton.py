@@ -39,14 +39,19 @@ class NewtonSettings:
         augmented until it is met.
     most_iterations : int
         Newton steps before the attempt is given up.
+    balance_tolerance : float
+        Difference between the force of the indenter and the reaction of the supports, over that force. A
+        small residual does not imply it: many small nodal forces of one sign add up.
     """
 
     residual_tolerance: float = 1e-5
     penetration_tolerance: float = 5e-3
     most_iterations: int = 40
+    balance_tolerance: float = 1e-4
 
     def __post_init__(self) -> None:
         positive("residual_tolerance", self.residual_tolerance)
+        positive("balance_tolerance", self.balance_tolerance)
         positive("penetration_tolerance", self.penetration_tolerance)
         whole("most_iterations", self.most_iterations, at_least=1)
 
@@ -96,6 +101,25 @@ class Load:
 
 
 @dataclass(frozen=True)
+class Balance:
+    """The force of the indenter against the reaction of everything that holds the body.
+
+    Bone and nail hold every direction. The plane of symmetry holds z, and a strip of skin that does not slide
+    is held along x by the indenter; these two count as supports in the direction that they hold.
+
+    Parameters
+    ----------
+    reaction_mn : array (3,)
+        Force of the body on bone and nail. [mN]
+    imbalance : float
+        Contact force minus the force on all supports, over the contact force along the indenter's axis.
+    """
+
+    reaction_mn: FloatArray
+    imbalance: float
+
+
+@dataclass(frozen=True)
 class Equilibrium:
     """A converged configuration.
 
@@ -109,12 +133,15 @@ class Equilibrium:
         Contact multipliers to start the next step from. [mN]
     iterations : int
         Newton steps taken.
+    balance : Balance
+        Reaction of the supports.
     """
 
     displacement_mm: FloatArray
     contact: ContactState
     multipliers_mn: FloatArray
     iterations: int
+    balance: Balance
 
 
 class _Evaluation:
@@ -135,6 +162,7 @@ class _Evaluation:
         self.potential = internal + self.contact.potential
         np.negative(force, out=force)
         force[contact.nodes] += self.contact.force_mn
+        self.out_of_balance = force
         self.residual = force.ravel()[body.free]
         pressed = float(np.linalg.norm(self.contact.force_mn.sum(axis=0)))
         self.relative_residual = float(np.linalg.norm(self.residual)) / max(pressed, SMALLEST_FORCE_MN)
@@ -145,6 +173,15 @@ class _Evaluation:
         if self.relative_residual < CURVATURE_BELOW_RESIDUAL:
             stiffness = stiffness + contact.curvature_stiffness(self.contact, positions, load.depth_mm)
         blocks[body.sparsity.diagonal[contact.nodes]] += stiffness
+
+    def balance(self, body: Body, load: Load) -> Balance:
+        """Compare the force of the indenter with what the supports take: nothing new is assembled."""
+        taken = self.out_of_balance.copy()
+        taken.ravel()[body.free] = 0.0
+        given = self.contact.force_mn.sum(axis=0)
+        missing = float(np.linalg.norm(given - taken.sum(axis=0)))
+        scale = max(float(given @ load.contact.placement.axis), SMALLEST_FORCE_MN)
+        return Balance(self.out_of_balance[body.mesh.fixed_nodes].sum(axis=0), missing / scale)
 
 
 def find_equilibrium(
@@ -186,13 +223,15 @@ def find_equilibrium(
         raise ConvergenceError("The starting guess turns an element inside out.")
     potentials = [state.potential]
     for iteration in range(settings.most_iterations):
+        balance = state.balance(body, load)
         history.append(
             f"iteration {iteration}: residual {state.relative_residual:.2e}, "
-            f"misfit {1e3 * state.contact.misfit_mm:.3f} µm"
+            f"imbalance {balance.imbalance:.2e}, misfit {1e3 * state.contact.misfit_mm:.3f} µm"
         )
-        if state.relative_residual <= settings.residual_tolerance:
+        balanced = balance.imbalance <= settings.balance_tolerance
+        if state.relative_residual <= settings.residual_tolerance and balanced:
             if state.contact.misfit_mm <= allowed_mm:
-                return Equilibrium(state.displacement, state.contact, multipliers, iteration)
+                return Equilibrium(state.displacement, state.contact, multipliers, iteration, balance)
             multipliers = load.contact.augmented(state.contact)
             state = _Evaluation(body, load, state.displacement, multipliers, blocks)
             potentials = [state.potential]

@@ -61,6 +61,13 @@ class Deformation:
         Displacements. [mm]
     sed_kpa : array (n_times, n_elements)
         Stored strain energy density, element mean. [kPa]
+    depth_mm : array (n_times,)
+        How far the indenter has advanced since first touch. [mm]
+    reaction_mn : array (n_times, 3)
+        Force of the body on bone and nail, of the whole body also when half of it is solved. [mN]
+    force_imbalance : float
+        Largest difference at any time between the indenter's force and the reaction of the supports, over
+        that force.
     penetration_mm : float
         Deepest penetration at any time. [mm]
     newton_steps, factorisations : int
@@ -71,6 +78,9 @@ class Deformation:
     force_mn: FloatArray
     displacement_mm: FloatArray
     sed_kpa: FloatArray
+    depth_mm: FloatArray
+    reaction_mn: FloatArray
+    force_imbalance: float
     penetration_mm: float
     newton_steps: int
     factorisations: int
@@ -143,14 +153,30 @@ def press(
         StressHistory.unloaded(len(mesh.elements), table.shares.shape[1]),
     )
     whole_body = 2.0 if mesh.symmetry_nodes.size else 1.0
+    # Across the plane of symmetry the reactions of the two halves cancel.
+    both_halves = np.array([2.0, 2.0, 0.0]) if mesh.symmetry_nodes.size else np.ones(3)
     displacement = np.zeros((times.size, *mesh.nodes_mm.shape))
-    force, sed, deepest = np.zeros(times.size), np.zeros((times.size, len(mesh.elements))), 0.0
+    force, sed = np.zeros(times.size), np.zeros((times.size, len(mesh.elements)))
+    reaction, imbalance, deepest = np.zeros((times.size, 3)), 0.0, 0.0
     for n in range(1, times.size):
         found, sed[n] = _advance(body, contact, stimulus, solver, march, times[n], settings)
         displacement[n] = found.displacement_mm
         force[n] = whole_body * found.contact.force_mn.sum(axis=0) @ placement.axis
+        reaction[n] = both_halves * found.balance.reaction_mn
+        imbalance = max(imbalance, found.balance.imbalance)
         deepest = max(deepest, found.contact.penetration_mm)
-    return Deformation(times, force, displacement, sed, deepest, march.newton_steps, solver.renewals)
+    return Deformation(
+        times_ms=times,
+        force_mn=force,
+        displacement_mm=displacement,
+        sed_kpa=sed,
+        depth_mm=stimulus.depth_at(times),
+        reaction_mn=reaction,
+        force_imbalance=imbalance,
+        penetration_mm=deepest,
+        newton_steps=march.newton_steps,
+        factorisations=solver.renewals,
+    )
 
 
 def _advance(

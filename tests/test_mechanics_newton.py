@@ -1,0 +1,80 @@
+"""What an equilibrium must obey before it is returned: the supports take what the indenter gives."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fingerpad.errors import InputError
+from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.materials import Material, Prony
+from fingerpad.mechanics.newton import NewtonSettings
+from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mesh import block_mesh
+from fingerpad.stimulus import RampAndHold
+
+BALL = Sphere(curvature_per_m=500.0)
+SIX = [Line(), Cylinder(3.0), Bar(2.0, 0.3), BALL, FlatPunch(2.0, 0.3), Plate()]
+PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))
+RELAXING = tuple(Material.neo_hooke(shear, 0.45, PRONY) for shear in (40.0, 40.0, 20.0, 8.0))
+MOTION = RampAndHold(depth_mm=0.2, ramp_ms=50.0, hold_ms=500.0)
+
+
+def block(symmetric=True):
+    lines = np.array([0.0, 0.4, 0.8, 1.3, 2.0, 3.0])
+    both = np.concatenate([-lines[:0:-1], lines])
+    depth = np.array([0.0, 0.3, 0.6, 1.2, 2.0, 3.0])
+    return block_mesh(both, depth, lines if symmetric else both, layers=[0, 1, 2, 3, 3], symmetric=symmetric)
+
+
+def pressed(mesh, indenter, newton_settings, at_mm=(0.0, 0.0, 0.0)):
+    placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.array(at_mm), np.eye(3))
+    return press(mesh, RELAXING, indenter, placement, MOTION, PressSettings(3, 3, newton_settings))
+
+
+@pytest.mark.parametrize("indenter", SIX, ids=lambda body: type(body).__name__)
+def test_force_balance_and_penetration_hold_while_the_skin_is_pressed_and_relaxes(indenter):
+    """Within 1e-4 of the force and 0.5 % of the depth of the step, for every indenter, at every time."""
+    mesh = block()
+    done = pressed(mesh, indenter, NewtonSettings())
+    assert done.force_imbalance <= 1e-4
+    np.testing.assert_allclose(done.reaction_mn[1:, 1], done.force_mn[1:], rtol=1e-4)
+    np.testing.assert_allclose(done.reaction_mn[:, 0], 0.0, atol=1e-4 * done.force_mn.max())
+    assert not done.reaction_mn[:, 2].any()  # the other half takes the opposite
+    np.testing.assert_allclose(done.depth_mm, MOTION.depth_at(done.times_ms), rtol=1e-14)
+    assert (np.diff(done.force_mn[3:]) < 0).all()
+    assert 0.0 < done.penetration_mm <= 0.005 * MOTION.depth_mm
+    local = mesh.nodes_mm[mesh.skin_nodes] + done.displacement_mm[:, mesh.skin_nodes]
+    under = indenter.may_touch(mesh.nodes_mm[mesh.skin_nodes])
+    for points, depth_mm in zip(local[1:], done.depth_mm[1:], strict=True):
+        gap, _ = indenter.gap(points[under] - np.array([0.0, depth_mm, 0.0]))
+        assert gap.min() >= -0.005 * depth_mm
+
+
+def test_balance_is_met_where_the_residual_alone_would_pass_as_solved():
+    loose = NewtonSettings(residual_tolerance=0.05, balance_tolerance=1.0)
+    unbalanced = pressed(block(), BALL, loose)
+    assert unbalanced.force_imbalance > 1e-3
+    found = pressed(block(), BALL, replace(loose, balance_tolerance=1e-4))
+    assert found.force_imbalance <= 1e-4
+    assert found.newton_steps > unbalanced.newton_steps
+    # The number reported is that of the forces reported.
+    np.testing.assert_allclose(found.reaction_mn[1:, 1], found.force_mn[1:], rtol=1e-4)
+    differs = np.abs(unbalanced.reaction_mn[1:, :2] - np.outer(unbalanced.force_mn[1:], [0.0, 1.0]))
+    assert unbalanced.force_imbalance >= (differs.max(axis=1) / unbalanced.force_mn[1:]).max() * (1 - 1e-9)
+
+
+def test_balance_holds_beside_the_middle_of_a_whole_block():
+    """No symmetry helps: the reaction has three components, and they are those of the contact."""
+    done = pressed(block(symmetric=False), BALL, NewtonSettings(), at_mm=(0.5, 0.0, 0.3))
+    assert done.force_imbalance <= 1e-4
+    np.testing.assert_allclose(done.reaction_mn[1:, 1], done.force_mn[1:], rtol=1e-4)
+    sideways = np.abs(done.reaction_mn[-1, [0, 2]]) / done.force_mn[-1]
+    assert (sideways > 1e-3).all()
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-4, np.nan, "tight"])
+def test_balance_tolerance_is_a_number_above_zero(tolerance):
+    with pytest.raises(InputError, match="balance_tolerance must be"):
+        NewtonSettings(balance_tolerance=tolerance)
