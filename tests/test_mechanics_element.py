@@ -7,16 +7,32 @@ import numpy as np
 import pytest
 
 from fingerpad.mechanics.assembly import Sparsity, assemble
-from fingerpad.mechanics.element import deviatoric_norms, element_state, element_system
-from fingerpad.mechanics.materials import Material, MaterialTable
+from fingerpad.mechanics.element import element_state, element_system, relaxing_norms
+from fingerpad.mechanics.materials import (
+    Energy,
+    Hencky,
+    Hyperfoam,
+    Material,
+    MaterialTable,
+    Ogden,
+    Polynomial,
+)
 from fingerpad.mesh import Mesh, block_mesh
 from fingerpad.mesh_quality import jacobian_at_gauss
 
 NEO_HOOKE = Material.neo_hooke(shear_kpa=11.0, poisson=0.48)
-MOONEY = Material(c10=4.0, c01=1.5, bulk_linear=130.0)
-POLYNOMIAL = Material(c10=4.0, c01=1.5, c20=2.5, c11=0.7, c02=0.9, bulk_linear=130.0, bulk_cubic=400.0)
+MOONEY = Material(Polynomial(c10=4.0, c01=1.5, bulk_linear=130.0))
+POLYNOMIAL = Material(
+    Polynomial(c10=4.0, c01=1.5, c20=2.5, c11=0.7, c02=0.9, bulk_linear=130.0, bulk_cubic=400.0)
+)
+OGDEN = Material(Ogden(moduli_kpa=(3.0, 4.0, 5.0), exponents=(-2.0, 3.5, 1.5), bulk_kpa=260.0))
+HENCKY = Material(Hencky(shear_kpa=11.0, bulk_kpa=260.0))
+OWN = Material.from_energy("b / 2 * (exp(I1 - 3) - 1) + k / 2 * (J - 1)**2", b=11.0, k=260.0)
+FOAM = Material(Hyperfoam(moduli_kpa=(2.0, 3.0, 6.0), exponents=(-3.0, 7.0, 4.5), poisson=0.4))
 LAWS = pytest.mark.parametrize(
-    "material", [NEO_HOOKE, MOONEY, POLYNOMIAL], ids=["neo-hooke", "mooney", "polynomial"]
+    "material",
+    [NEO_HOOKE, MOONEY, POLYNOMIAL, OGDEN, HENCKY, OWN, FOAM],
+    ids=["neo-hooke", "mooney", "polynomial", "ogden", "hencky", "own", "foam"],
 )
 COMPLEX_STEP = 1e-30
 
@@ -66,21 +82,60 @@ def kernel_order():
     return [local_corners().index(sign) for sign in signs]
 
 
+def squared_stretches(right):
+    """Eigenvalues of a symmetric matrix by the cosine formula, complex entries allowed."""
+    mean = np.trace(right) / 3
+    deviator = right - mean * np.eye(3)
+    size = np.sqrt(np.trace(deviator @ deviator) / 6)
+    angle = np.arccos(np.linalg.det(deviator / size) / 2) / 3
+    first, last = (mean + 2 * size * np.cos(angle + turn) for turn in (0.0, 2 * np.pi / 3))
+    return np.array([first, 3 * mean - first - last, last])
+
+
+def slow_density(law, right, dilatation):
+    """W(C~, Jbar) of each law, written down once more; without U unless the law couples the two."""
+    first = np.trace(right)
+    x, y = first - 3, (first**2 - np.trace(right @ right)) / 2 - 3
+    if isinstance(law, Polynomial):
+        return law.c10 * x + law.c01 * y + law.c20 * x**2 + law.c11 * x * y + law.c02 * y**2
+    if isinstance(law, Energy):
+        return 11.0 / 2 * (np.exp(x) - 1)
+    stretches = np.sqrt(squared_stretches(right))
+    if isinstance(law, Hencky):
+        return law.shear_kpa * (np.log(stretches) ** 2).sum()
+    terms = zip(law.moduli_kpa, law.exponents, strict=True)
+    if isinstance(law, Ogden):
+        return sum(2 * mu / alpha**2 * ((stretches**alpha).sum() - 3) for mu, alpha in terms)
+    stretches, beta = stretches * dilatation ** (1 / 3), law.poisson / (1 - 2 * law.poisson)
+    return sum(
+        2 * mu / alpha**2 * ((stretches**alpha).sum() - 3 + (dilatation ** (-alpha * beta) - 1) / beta)
+        for mu, alpha in terms
+    )
+
+
+def slow_volumetric(law, dilatation):
+    """U(Jbar); nothing for the law that couples shape and volume."""
+    if isinstance(law, Hyperfoam):
+        return 0.0
+    if isinstance(law, Hencky):
+        return 0.5 * law.bulk_kpa * np.log(dilatation) ** 2
+    if isinstance(law, Polynomial):
+        return law.bulk_linear * (dilatation - 1) ** 2 + law.bulk_cubic * (dilatation - 1) ** 4
+    return 0.5 * 260.0 * (dilatation - 1) ** 2
+
+
 def slow_energy(material, nodes, displacement, s, history):
     """Pi_e from its definition; complex displacements allowed."""
-    isochoric, volume, present = 0.0, 0.0, 0.0
-    for (weight, gradient), row in zip(slow_points(nodes, displacement), kernel_order(), strict=True):
-        jacobian = np.linalg.det(gradient)
-        right = jacobian ** (-2 / 3) * gradient.T @ gradient
-        first = np.trace(right)
-        second = (first**2 - np.trace(right @ right)) / 2
-        x, y = first - 3, second - 3
-        energy = material.c10 * x + material.c01 * y
-        energy += material.c20 * x**2 + material.c11 * x * y + material.c02 * y**2
-        isochoric += weight * (s * energy - 0.5 * (symmetric(history[row]) * right).sum())
-        volume, present = volume + weight, present + weight * jacobian
-    change = present / volume - 1
-    return isochoric + volume * (material.bulk_linear * change**2 + material.bulk_cubic * change**4)
+    points = list(zip(slow_points(nodes, displacement), kernel_order(), strict=True))
+    volume = sum(weight for (weight, _), _ in points)
+    dilatation = sum(weight * np.linalg.det(gradient) for (weight, gradient), _ in points) / volume
+    relaxing_dilatation = dilatation if isinstance(material.law, Hyperfoam) else 1.0
+    total = volume * slow_volumetric(material.law, dilatation)
+    for (weight, gradient), row in points:
+        right = np.linalg.det(gradient) ** (-2 / 3) * gradient.T @ gradient
+        total += weight * s * slow_density(material.law, right, dilatation)
+        total -= weight * 0.5 * relaxing_dilatation ** (2 / 3) * (symmetric(history[row]) * right).sum()
+    return total
 
 
 def slow_force(material, nodes, displacement, s, history):
@@ -203,14 +258,13 @@ def test_inside_out_element_has_no_energy():
 @SHAPES
 @LAWS
 def test_instantaneous_stress_as_history_takes_the_place_of_the_energy(material, nodes):
-    """d(-1/2 H : C~) with H = -S0 is the deviatoric stress power, so both give the same forces."""
+    """d(-1/2 H : C) with H = -S0 is the power of the relaxing stress, so both give the same forces."""
     displacement, _, _ = random_state(nodes)
-    isochoric = replace(material, bulk_linear=1e-9, bulk_cubic=0.0)
-    law = MaterialTable.of([isochoric]).law[0]
+    law = MaterialTable.of([material]).law[0]
     stress, energies = np.empty((8, 6)), np.empty((8, 2))
     element_state(nodes, displacement, law, stress, energies)
-    _, by_energy, _ = kernel(isochoric, nodes, displacement)
-    _, by_history, _ = kernel(isochoric, nodes, displacement, s=0.0, history=-stress)
+    _, by_energy, _ = kernel(material, nodes, displacement)
+    _, by_history, _ = kernel(material, nodes, displacement, s=0.0, history=-stress)
     np.testing.assert_allclose(by_history, by_energy, rtol=0, atol=1e-12 * np.abs(by_energy).max())
 
 
@@ -219,8 +273,10 @@ def test_state_reports_weights_and_energies_that_add_up(material):
     displacement, _, _ = random_state(DISTORTED)
     law = MaterialTable.of([material]).law[0]
     energies = np.empty((8, 2))
-    volumetric = element_state(DISTORTED, displacement, law, np.empty((8, 6)), energies)
+    volumetric, pressure, dilatation = element_state(DISTORTED, displacement, law, np.empty((8, 6)), energies)
     volume = energies[:, 0].sum()
+    slope = slow_volumetric(material.law, dilatation + 1j * COMPLEX_STEP)
+    np.testing.assert_allclose([volumetric, pressure], [np.real(slope), np.imag(slope) / COMPLEX_STEP])
     total, _, _ = kernel(material, DISTORTED, displacement)
     np.testing.assert_allclose(energies[:, 0] @ energies[:, 1] + volume * volumetric, total, rtol=1e-13)
 
@@ -229,7 +285,7 @@ def test_norms_are_those_of_the_spatial_deviators():
     displacement, _, _ = random_state(DISTORTED)
     tensors = np.random.default_rng(2).normal(size=(3, 8, 6))
     norms = np.empty((3, 8))
-    deviatoric_norms(DISTORTED, displacement, tensors, norms)
+    relaxing_norms(DISTORTED, displacement, MaterialTable.of([NEO_HOOKE]).law[0], tensors, norms)
     points = zip(slow_points(DISTORTED, displacement), kernel_order(), strict=True)
     for (_, gradient), row in points:
         isochoric = np.linalg.det(gradient) ** (-1 / 3) * gradient

@@ -184,7 +184,7 @@ def test_elastic_body_does_not_change_in_the_hold():
 
 def stiffer(factor):
     """The elastic layers with their shear modulus, not their bulk modulus, times a factor."""
-    return tuple(replace(layer, c10=factor * layer.c10) for layer in LAYERS)
+    return tuple(replace(layer, law=replace(layer.law, c10=factor * layer.law.c10)) for layer in LAYERS)
 
 
 def test_slow_press_ends_elastic_with_long_term_and_fast_ramp_with_instantaneous_moduli():

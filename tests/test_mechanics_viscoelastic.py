@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fingerpad.mechanics.assembly import Sparsity, assemble
-from fingerpad.mechanics.materials import Material, MaterialTable, Prony
+from fingerpad.mechanics.materials import Material, MaterialTable, Polynomial, Prony
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
     StressHistory,
@@ -16,7 +16,7 @@ from fingerpad.mechanics.viscoelastic import (
 from fingerpad.mesh import block_mesh
 
 PRONY = Prony(shares=(0.25, 0.35), times_ms=(40.0, 900.0))
-SKIN = Material(c10=4.0, c01=1.5, c20=2.5, c11=0.7, c02=0.9, bulk_linear=130.0, prony=PRONY)
+SKIN = Material(Polynomial(c10=4.0, c01=1.5, c20=2.5, c11=0.7, c02=0.9, bulk_linear=130.0), prony=PRONY)
 CUBE = block_mesh([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], layers=[0])
 TABLE = MaterialTable.of([SKIN])
 SHARES, TIMES_MS = np.array(PRONY.shares), np.array(PRONY.times_ms)
@@ -55,8 +55,8 @@ def march(times_ms, displacements, table=TABLE):
 
 def elastic(factor):
     """The same tissue without relaxation, its coefficients times `factor`."""
-    coefficients = [factor * getattr(SKIN, name) for name in ("c10", "c01", "c20", "c11", "c02")]
-    return MaterialTable.of([Material(*coefficients, bulk_linear=SKIN.bulk_linear)])
+    coefficients = [factor * getattr(SKIN.law, name) for name in ("c10", "c01", "c20", "c11", "c02")]
+    return MaterialTable.of([Material(Polynomial(*coefficients, bulk_linear=SKIN.law.bulk_linear))])
 
 
 def test_moduli_go_from_instantaneous_to_long_term():
@@ -138,7 +138,7 @@ def test_stored_energy_of_a_held_shear_decays_from_instantaneous_to_long_term():
 def test_volumetric_energy_does_not_relax():
     displacement = 0.05 * CUBE.nodes_mm
     _, energies = march([FAST_MS, 100.0, SLOW_MS], [displacement] * 3)
-    np.testing.assert_allclose(energies, SKIN.bulk_linear * (1.05**3 - 1) ** 2, rtol=1e-10)
+    np.testing.assert_allclose(energies, SKIN.law.bulk_linear * (1.05**3 - 1) ** 2, rtol=1e-10)
 
 
 def test_springs_never_hold_less_than_nothing_nor_more_than_was_put_in():
@@ -161,3 +161,35 @@ def test_material_without_relaxation_is_elastic():
     forces, energies = march([1.0, 500.0], [shear(0.4)] * 2, table)
     np.testing.assert_array_equal(forces[0], forces[1])
     assert energies[0] == energies[1]
+
+
+FOAM = Material.hyperfoam((2.0, 3.0, 6.0), (-3.0, 7.0, 4.5), poisson=0.4, prony=PRONY)
+OGDEN = Material.ogden((3.0, 4.0, 5.0), (-2.0, 3.5, 1.5), poisson=0.45, prony=PRONY)
+SQUEEZED = CUBE.nodes_mm @ (np.diag([0.1, -0.15, 0.05]) + 0.2 * np.eye(3, k=1))
+
+
+@pytest.mark.parametrize("material", [FOAM, OGDEN], ids=["foam", "ogden"])
+def test_formulas_go_from_instantaneous_to_long_term(material):
+    relaxed, share = material.with_prony(Prony()), PRONY.long_term_share
+    (fast, slow), (_, stored) = march([FAST_MS, SLOW_MS], [SQUEEZED] * 2, MaterialTable.of([material]))
+    (long_term,), (energy,) = march([1.0], [SQUEEZED], MaterialTable.of([relaxed]))
+    np.testing.assert_allclose(slow, long_term, rtol=0, atol=1e-6 * np.abs(long_term).max())
+    np.testing.assert_allclose(stored, energy, rtol=1e-6)
+    if material is FOAM:  # shape and volume alike
+        np.testing.assert_allclose(fast, long_term / share, rtol=0, atol=1e-6 * np.abs(fast).max())
+
+
+def test_foam_relaxes_its_pressure_and_rubber_does_not():
+    swollen = 0.06 * CUBE.nodes_mm
+    for material, expected in ((FOAM, PRONY.long_term_share), (OGDEN, 1.0)):
+        (fast, slow), _ = march([FAST_MS, SLOW_MS], [swollen] * 2, MaterialTable.of([material]))
+        np.testing.assert_allclose(slow, expected * fast, rtol=0, atol=1e-6 * np.abs(fast).max())
+
+
+def test_held_foam_relaxes_by_its_prony_series():
+    """The Kirchhoff stress of a held foam is that at once times g(t), whatever its deformation."""
+    times = np.array([FAST_MS, 5.0, 60.0, 800.0])
+    forces, _ = march(times, [SQUEEZED] * 4, MaterialTable.of([FOAM]))
+    series = 1 - (SHARES * (1 - np.exp(-times[:, None] / TIMES_MS))).sum(axis=1)
+    expected = series[:, None, None] * forces[0]
+    np.testing.assert_allclose(forces, expected, rtol=0, atol=1e-6 * np.abs(forces[0]).max())

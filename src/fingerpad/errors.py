@@ -30,3 +30,7 @@ class ConvergenceError(FingerpadError, RuntimeError):
 
     def __str__(self) -> str:
         return "\n  ".join((super().__str__(), *self.history))
+
+
+class MaterialWarning(UserWarning):
+    """A material that can be used, but loses its stability within the range of stretches of a touch."""

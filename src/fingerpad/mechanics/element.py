@@ -9,6 +9,11 @@ s and H from the Prony series of the step (see `viscoelastic`; s = 1, H = 0 with
 pressure p = U'(Jbar) one number per element. A wedge is a brick with one edge collapsed (two pairs of equal
 nodes): its eight shape functions then add up to the six of the linear wedge.
 
+A law given by a formula (see `energy`) is evaluated in principal axes. If its energy mixes shape and volume,
+W(Jbar^(1/3) F~) takes the place of W and U, the whole stress relaxes, and C = Jbar^(2/3) C~ that of C~:
+
+    Pi_e = sum_q w_q [ s W(x, ln Jbar)_q - 1/2 H_q : C_q ],        x_a = ln lambdabar_a.
+
 Tensors are stored as xx, yy, zz, xy, yz, xz. All functions are compiled and single-threaded,
 so the answer does not depend on the number of threads.
 """
@@ -19,11 +24,14 @@ import numpy as np
 from numba import njit
 
 from fingerpad.checks import FloatArray
+from fingerpad.mechanics.energy import CARRIED, SECOND, differentiate
+from fingerpad.mechanics.materials import COUPLED, N_COEFFICIENTS, POLYNOMIAL
 
 N_NODES = 8
 N_POINTS = 8
 ROW = np.array([0, 1, 2, 0, 1, 0])
 COLUMN = np.array([0, 1, 2, 1, 2, 2])
+WITH_VOLUME = SECOND[:3, 3].copy()
 
 
 def _shape_derivatives() -> FloatArray:
@@ -101,20 +109,13 @@ def _push_forward(gradient, scale, reference, spatial):  # type: ignore[no-untyp
 
 
 @njit(cache=True, inline="always")
-def _elasticity(law, s, first, b, b2, stress, deviator, pressure, moduli):  # type: ignore[no-untyped-def]
-    """Write the 6x6 spatial (Kirchhoff) elasticity of one point.
+def _elasticity(stress, deviator, pressure, moduli):  # type: ignore[no-untyped-def]
+    """Write the part of a point's spatial (Kirchhoff) elasticity that needs no second derivatives.
 
     `stress` is the stress before the deviator is taken, T = s (g1 b + g2 b²) - h; `pressure` is p J.
-    c = P : c~ : P + 2/3 tr(T) (I_s - 1/3 1x1) - 2/3 (dev T x 1 + 1 x dev T) + p J (1x1 - 2 I_s).
+    c = P : c~ : P + 2/3 tr(T) (I_s - 1/3 1x1) - 2/3 (dev T x 1 + 1 x dev T) + p J (1x1 - 2 I_s),
+    of which c~ is left out. Only the upper triangle is written.
     """
-    trace_b2 = b2[0] + b2[1] + b2[2]
-    second = 0.5 * (first * first - trace_b2)
-    w2 = law[1] + law[3] * (first - 3.0) + 2.0 * law[4] * (second - 3.0)
-    w11, w12, w22 = 2.0 * law[2], law[3], 2.0 * law[4]
-    d1 = 4.0 * s * (w2 + w11 + 2.0 * first * w12 + first * first * w22)
-    d2 = -4.0 * s * (w12 + first * w22)
-    d3 = 4.0 * s * w22
-    d4 = -4.0 * s * w2
     trace = stress[0] + stress[1] + stress[2]
     for m in range(6):
         one_m = 1.0 if m < 3 else 0.0
@@ -126,11 +127,21 @@ def _elasticity(law, s, first, b, b2, stress, deviator, pressure, moduli):  # ty
             value = 2.0 / 3.0 * trace * (identity - one_m * one_n / 3.0)
             value -= 2.0 / 3.0 * (deviator[m] * one_n + one_m * deviator[n])
             moduli[m, n] = value + pressure * (one_m * one_n - 2.0 * identity)
+
+
+@njit(cache=True, inline="always")
+def _add_polynomial(law, s, first, b, b2, moduli):  # type: ignore[no-untyped-def]
+    """Add P : c~ : P of the polynomial, see `_add_second_derivatives`."""
+    trace_b2 = b2[0] + b2[1] + b2[2]
+    second = 0.5 * (first * first - trace_b2)
+    w2 = law[1] + law[3] * (first - 3.0) + 2.0 * law[4] * (second - 3.0)
+    w11, w12, w22 = 2.0 * law[2], law[3], 2.0 * law[4]
+    d1 = 4.0 * s * (w2 + w11 + 2.0 * first * w12 + first * first * w22)
+    d2 = -4.0 * s * (w12 + first * w22)
+    d3 = 4.0 * s * w22
+    d4 = -4.0 * s * w2
     if d1 != 0.0 or d2 != 0.0 or d3 != 0.0 or d4 != 0.0:  # all are zero for neo-Hooke
         _add_second_derivatives(d1, d2, d3, d4, first, b, b2, moduli)
-    for m in range(6):
-        for n in range(m):
-            moduli[m, n] = moduli[n, m]
 
 
 @njit(cache=True)
@@ -185,6 +196,131 @@ def _add_tangent(weight, moduli, stress, spherical, slopes, packed):  # type: ig
 
 INDEX = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 
+SWEEPS = 12
+"""Sweeps of Jacobi's method; four or five reach round-off."""
+
+
+@njit(cache=True)
+def _principal_axes(b, logs, axes):  # type: ignore[no-untyped-def]
+    """Write ln lambdabar_a and the axes n_a (rows) of the isochoric b~, by Jacobi's method."""
+    a = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            a[i, j] = b[INDEX[i, j]]
+            axes[i, j] = 1.0 if i == j else 0.0
+    for _ in range(SWEEPS):
+        off = a[0, 1] ** 2 + a[0, 2] ** 2 + a[1, 2] ** 2
+        if off <= 1e-32 * (a[0, 0] ** 2 + a[1, 1] ** 2 + a[2, 2] ** 2):
+            break
+        for i in range(2):
+            for j in range(i + 1, 3):
+                if a[i, j] == 0.0:
+                    continue
+                ratio = (a[j, j] - a[i, i]) / (2.0 * a[i, j])
+                tangent = 1.0 / (abs(ratio) + np.sqrt(1.0 + ratio * ratio))
+                if ratio < 0.0:
+                    tangent = -tangent
+                cosine = 1.0 / np.sqrt(1.0 + tangent * tangent)
+                sine = tangent * cosine
+                for k in range(3):
+                    first, second = a[k, i], a[k, j]
+                    a[k, i], a[k, j] = cosine * first - sine * second, sine * first + cosine * second
+                for k in range(3):
+                    first, second = a[i, k], a[j, k]
+                    a[i, k], a[j, k] = cosine * first - sine * second, sine * first + cosine * second
+                    first, second = axes[i, k], axes[j, k]
+                    axes[i, k], axes[j, k] = cosine * first - sine * second, sine * first + cosine * second
+    for i in range(3):
+        logs[i] = 0.5 * np.log(a[i, i])
+
+
+@njit(cache=True)
+def _formula_points(law, gradients, jacobians, dilatation, logs, axes, derivatives):  # type: ignore[no-untyped-def]
+    """Evaluate a formula at the points of one element, in the instantaneous state.
+
+    Writes `logs` (8, 4), `axes` (8, 3, 3) and `derivatives` (8, 15) of W; returns the volumetric energy.
+    Unless shape and volume are coupled, that is no part of W, but its derivatives are kept.
+    """
+    count, factor = int(law[10]), law[9]
+    results, b, b2 = np.empty((count + 1, CARRIED)), np.empty(6), np.empty(6)
+    volumetric = 0.0
+    if law[8] != COUPLED:
+        logs[0, :3], logs[0, 3] = 0.0, np.log(dilatation)
+        differentiate(law[N_COEFFICIENTS:], count, logs[0], results)
+        volumetric = results[count - 1, 0]
+    for q in range(N_POINTS):
+        _left_cauchy_green(gradients[q], jacobians[q], b, b2)
+        _principal_axes(b, logs[q], axes[q])
+        logs[q, 3] = np.log(dilatation)
+        differentiate(law[N_COEFFICIENTS:], count, logs[q], results)
+        derivatives[q] = factor * results[count - 1]
+        if law[8] != COUPLED:
+            derivatives[q, 0] -= factor * volumetric
+            derivatives[q, 4], derivatives[q, 14] = results[count - 1, 4], results[count - 1, 14]
+    return volumetric
+
+
+@njit(cache=True, inline="always")
+def _add_in_axes(values, axes, tensor):  # type: ignore[no-untyped-def]
+    """Add sum_a values_a n_a x n_a."""
+    for a in range(3):
+        for k in range(6):
+            tensor[k] += values[a] * axes[a, ROW[k]] * axes[a, COLUMN[k]]
+
+
+@njit(cache=True)
+def _add_principal(s, derivatives, logs, axes, moduli):  # type: ignore[no-untyped-def]
+    """Add P : c~ : P of a formula to the upper triangle, from h_ab = d²W/dx_a dx_b and beta_a = dW/dx_a.
+
+    Along the axes c~_aabb = h_ab - 2 beta_a delta_ab; between them, with l the squares of the stretches,
+    c~_abab = (beta_a l_b - beta_b l_a) / (l_a - l_b), or (h_aa - h_ab) / 2 - beta_a for equal stretches.
+    """
+    block, mean = np.empty((3, 3)), np.zeros(3)
+    for a in range(3):
+        for c in range(3):
+            block[a, c] = derivatives[SECOND[a, c]] - (2.0 * derivatives[1 + a] if a == c else 0.0)
+            mean[c] += block[a, c] / 3.0
+    total = (mean[0] + mean[1] + mean[2]) / 3.0
+    mixed = np.empty(6)
+    for a in range(3):
+        for c in range(3):
+            value = s * (block[a, c] - mean[a] - mean[c] + total)
+            for m in range(6):
+                left = value * axes[a, ROW[m]] * axes[a, COLUMN[m]]
+                for n in range(m, 6):
+                    moduli[m, n] += left * axes[c, ROW[n]] * axes[c, COLUMN[n]]
+    for a in range(2):
+        for c in range(a + 1, 3):
+            beta_a, beta_c = derivatives[1 + a], derivatives[1 + c]
+            difference = logs[a] - logs[c]
+            if abs(difference) < EQUAL_STRETCHES:
+                mean_square = 0.25 * (derivatives[SECOND[a, a]] + derivatives[SECOND[c, c]])
+                shear = mean_square - 0.5 * derivatives[SECOND[a, c]] - 0.5 * (beta_a + beta_c)
+            else:
+                square_a, square_c = np.exp(2.0 * logs[a]), np.exp(2.0 * logs[c])
+                shear = (beta_a * square_c - beta_c * square_a) / (square_a - square_c)
+            for k in range(6):
+                i, j = ROW[k], COLUMN[k]
+                mixed[k] = axes[a, i] * axes[c, j] + axes[a, j] * axes[c, i]
+            for m in range(6):
+                for n in range(m, 6):
+                    moduli[m, n] += s * shear * mixed[m] * mixed[n]
+
+
+EQUAL_STRETCHES = 1e-5
+"""Difference of logarithms below which two stretches count as equal; both formulas then err by 1e-10."""
+
+
+@njit(cache=True, inline="always")
+def frame_scale(law, jacobian, dilatation):  # type: ignore[no-untyped-def]
+    """Factor c of the frame that carries the relaxing stress, tau = c F S F' (without the pressure of U).
+
+    J^(-2/3), the isochoric frame; (Jbar/J)^(2/3) for laws whose whole stress relaxes.
+    """
+    if law[8] == COUPLED:
+        return (dilatation / jacobian) ** (2.0 / 3.0)
+    return jacobian ** (-2.0 / 3.0)
+
 
 @njit(cache=True)
 def _gradients(reference, displacement, weights, slopes, gradient):  # type: ignore[no-untyped-def]
@@ -224,7 +360,7 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
     ----------
     reference, displacement : array (8, 3)
         Nodes and their displacements. [mm]
-    law : array (8,)
+    law : array
         One row of `MaterialTable.law`.
     s : float
         Factor on the instantaneous energy in this step.
@@ -262,34 +398,77 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
                     slope += slopes[q, a, k] * inverse[k, i]
                 present[q, i, a] = slope
                 dilatation[i, a] += weights[q] * jacobians[q] * slope
-    change = present_volume / volume - 1.0
-    pressure = 2.0 * law[5] * change + 4.0 * law[6] * change**3
-    stiffness = (2.0 * law[5] + 12.0 * law[6] * change**2) / volume
-    potential = volume * (law[5] * change**2 + law[6] * change**4)
+    mean_jacobian = present_volume / volume
+    is_formula, is_coupled = law[8] != POLYNOMIAL, law[8] == COUPLED
+    if is_formula:
+        logs, axes = np.empty((N_POINTS, 4)), np.empty((N_POINTS, 3, 3))
+        derivatives, coupling = np.empty((N_POINTS, CARRIED)), np.zeros((3, N_NODES))
+        mixed = np.zeros(6)
+        volumetric = _formula_points(law, gradients, jacobians, mean_jacobian, logs, axes, derivatives)
+        pressure, stiffness = 0.0, 0.0  # first the sums of dW/d(ln Jbar) and of its own slope
+        for q in range(N_POINTS):
+            share = s if is_coupled else 1.0
+            slope, curvature = share * derivatives[q, 4], share * derivatives[q, 14]
+            if is_coupled:
+                _push_forward(
+                    gradients[q], frame_scale(law, jacobians[q], mean_jacobian), history[q], relaxed
+                )
+                trace = relaxed[0] + relaxed[1] + relaxed[2]
+                slope, curvature = slope - trace / 3.0, curvature - 2.0 / 9.0 * trace
+            pressure += weights[q] * slope / present_volume
+            stiffness += weights[q] * (curvature - slope) / present_volume**2
+        potential = volume * volumetric
+    else:
+        change = mean_jacobian - 1.0
+        pressure = 2.0 * law[5] * change + 4.0 * law[6] * change**3
+        stiffness = (2.0 * law[5] + 12.0 * law[6] * change**2) / volume
+        potential = volume * (law[5] * change**2 + law[6] * change**4)
 
     force[:] = 0.0
     for q in range(N_POINTS):
-        scale = jacobians[q] ** (-2.0 / 3.0)
-        first, second = _left_cauchy_green(gradients[q], jacobians[q], b, b2)
-        energy, w1, w2 = _energy(law, first, second)
-        _push_forward(gradients[q], scale, history[q], relaxed)
-        for k in range(6):
-            stress[k] = 2.0 * s * ((w1 + first * w2) * b[k] - w2 * b2[k]) - relaxed[k]
-        # -1/2 H : C~ is half the trace of the pushed-forward history.
-        potential += weights[q] * (s * energy - 0.5 * (relaxed[0] + relaxed[1] + relaxed[2]))
+        w = weights[q]
+        _push_forward(gradients[q], frame_scale(law, jacobians[q], mean_jacobian), history[q], relaxed)
+        if is_formula:
+            energy = derivatives[q, 0]
+            for k in range(6):
+                stress[k] = -relaxed[k]
+            _add_in_axes(s * derivatives[q, 1:4], axes[q], stress)
+        else:
+            first, second = _left_cauchy_green(gradients[q], jacobians[q], b, b2)
+            energy, w1, w2 = _energy(law, first, second)
+            for k in range(6):
+                stress[k] = 2.0 * s * ((w1 + first * w2) * b[k] - w2 * b2[k]) - relaxed[k]
+        # -1/2 H : C is half the trace of the pushed-forward history.
+        potential += w * (s * energy - 0.5 * (relaxed[0] + relaxed[1] + relaxed[2]))
         mean = (stress[0] + stress[1] + stress[2]) / 3.0
         for k in range(6):
             deviator[k] = stress[k] - (mean if k < 3 else 0.0)
         spherical = pressure * jacobians[q]
-        w = weights[q]
         for node in range(N_NODES):
             x, y, z = w * present[q, 0, node], w * present[q, 1, node], w * present[q, 2, node]
             force[node, 0] += (deviator[0] + spherical) * x + deviator[3] * y + deviator[5] * z
             force[node, 1] += deviator[3] * x + (deviator[1] + spherical) * y + deviator[4] * z
             force[node, 2] += deviator[5] * x + deviator[4] * y + (deviator[2] + spherical) * z
         if with_tangent:
-            _elasticity(law, s, first, b, b2, stress, deviator, spherical, moduli)
+            _elasticity(stress, deviator, spherical, moduli)
+            if is_formula:
+                _add_principal(s, derivatives[q], logs[q], axes[q], moduli)
+            else:
+                _add_polynomial(law, s, first, b, b2, moduli)
+            for m in range(6):
+                for n in range(m):
+                    moduli[m, n] = moduli[n, m]
             _add_tangent(w, moduli, deviator, spherical, present[q], packed)
+            if is_coupled:  # d²W / dx d(ln Jbar) acts like a stress, whose forces are the coupling
+                for k in range(6):
+                    mixed[k] = -2.0 / 3.0 * relaxed[k]
+                _add_in_axes(s * derivatives[q][WITH_VOLUME], axes[q], mixed)
+                mean = (mixed[0] + mixed[1] + mixed[2]) / 3.0
+                for i in range(3):
+                    for node in range(N_NODES):
+                        for j in range(3):
+                            component = mixed[INDEX[i, j]] - (mean if i == j else 0.0)
+                            coupling[i, node] += w / present_volume * component * present[q, j, node]
     if with_tangent:
         for i in range(3):
             for j in range(i, 3):
@@ -298,6 +477,9 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
                         value = (
                             packed[i, j, node, other] + stiffness * dilatation[i, other] * dilatation[j, node]
                         )
+                        if is_coupled:
+                            value += coupling[i, other] * dilatation[j, node]
+                            value += dilatation[i, other] * coupling[j, node]
                         tangent[other, node, i, j] = value
                         tangent[node, other, j, i] = value
     return potential
@@ -305,53 +487,75 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
 
 @njit(cache=True)
 def element_state(reference, displacement, law, instantaneous, energies):  # type: ignore[no-untyped-def]
-    """Instantaneous deviatoric stress and energies at the points of one element.
+    """Instantaneous relaxing stress and energies at the points of one element.
 
     Parameters
     ----------
     reference, displacement : array (8, 3)
         Nodes and their displacements. [mm]
-    law : array (8,)
+    law : array
         One row of `MaterialTable.law`.
     instantaneous : array (8, 6)
-        Overwritten with S0 = F~^-1 dev(tau0) F~^-T at each point. [kPa]
+        Overwritten with S0 = F~^-1 dev(tau0) F~^-T at each point (see `frame_scale`). [kPa]
     energies : array (8, 2)
-        Overwritten with the integration weight and the instantaneous energy W0. [mm³, kPa]
+        Overwritten with the integration weight and the instantaneous energy W0 that may relax. [mm³, kPa]
 
     Returns
     -------
-    float
-        Volumetric energy density U(Jbar). [kPa]
+    (float, float, float)
+        Volumetric energy density U(Jbar) and pressure U'(Jbar) [kPa], both 0 if the law couples shape and
+        volume and all stress is in S0; and Jbar.
     """
     weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
-    gradients = np.empty((N_POINTS, 3, 3))
-    inverse, b, b2, deviator = np.empty((3, 3)), np.empty(6), np.empty(6), np.empty(6)
+    gradients, jacobians, inverse = np.empty((N_POINTS, 3, 3)), np.empty(N_POINTS), np.empty((3, 3))
+    b, b2, deviator = np.empty(6), np.empty(6), np.empty(6)
+    is_formula, is_coupled = law[8] != POLYNOMIAL, law[8] == COUPLED
     volume = _gradients(reference, displacement, weights, slopes, gradients)
     present_volume = 0.0
     for q in range(N_POINTS):
-        jacobian = _invert(gradients[q], inverse)
-        present_volume += weights[q] * jacobian
-        first, second = _left_cauchy_green(gradients[q], jacobian, b, b2)
-        energy, w1, w2 = _energy(law, first, second)
-        for k in range(6):
-            deviator[k] = 2.0 * ((w1 + first * w2) * b[k] - w2 * b2[k])
+        jacobians[q] = _invert(gradients[q], inverse)
+        present_volume += weights[q] * jacobians[q]
+    mean_jacobian = present_volume / volume
+    change = mean_jacobian - 1.0
+    volumetric = law[5] * change**2 + law[6] * change**4
+    pressure = 2.0 * law[5] * change + 4.0 * law[6] * change**3
+    if is_formula:
+        logs, axes = np.empty((N_POINTS, 4)), np.empty((N_POINTS, 3, 3))
+        derivatives = np.empty((N_POINTS, CARRIED))
+        volumetric = _formula_points(law, gradients, jacobians, mean_jacobian, logs, axes, derivatives)
+        pressure = 0.0 if is_coupled else derivatives[0, 4] / mean_jacobian
+    for q in range(N_POINTS):
+        _invert(gradients[q], inverse)
+        if is_formula:
+            energy = derivatives[q, 0]
+            deviator[:] = 0.0
+            _add_in_axes(derivatives[q, 1:4], axes[q], deviator)
+        else:
+            first, second = _left_cauchy_green(gradients[q], jacobians[q], b, b2)
+            energy, w1, w2 = _energy(law, first, second)
+            for k in range(6):
+                deviator[k] = 2.0 * ((w1 + first * w2) * b[k] - w2 * b2[k])
         mean = (deviator[0] + deviator[1] + deviator[2]) / 3.0
         for k in range(3):
             deviator[k] -= mean
-        _push_forward(inverse, jacobian ** (2.0 / 3.0), deviator, instantaneous[q])
+            if is_coupled:  # not a deviator then
+                deviator[k] += derivatives[q, 4]
+        scale = 1.0 / frame_scale(law, jacobians[q], mean_jacobian)
+        _push_forward(inverse, scale, deviator, instantaneous[q])
         energies[q, 0], energies[q, 1] = weights[q], energy
-    change = present_volume / volume - 1.0
-    return law[5] * change**2 + law[6] * change**4
+    return volumetric, pressure, mean_jacobian
 
 
 @njit(cache=True)
-def deviatoric_norms(reference, displacement, tensors, norms):  # type: ignore[no-untyped-def]
-    """Norm of the spatial deviator F~ T F~' of reference tensors.
+def relaxing_norms(reference, displacement, law, tensors, norms):  # type: ignore[no-untyped-def]
+    """Squared norm of the spatial stress c F T F' of reference tensors, of its deviator if only that relaxes.
 
     Parameters
     ----------
     reference, displacement : array (8, 3)
         Nodes and their displacements. [mm]
+    law : array
+        One row of `MaterialTable.law`.
     tensors : array (n, 8, 6)
         Reference tensors at each point. [kPa]
     norms : array (n, 8)
@@ -360,12 +564,15 @@ def deviatoric_norms(reference, displacement, tensors, norms):  # type: ignore[n
     weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
     gradients = np.empty((N_POINTS, 3, 3))
     inverse, spatial = np.empty((3, 3)), np.empty(6)
-    _gradients(reference, displacement, weights, slopes, gradients)
+    volume = _gradients(reference, displacement, weights, slopes, gradients)
+    present_volume = 0.0
     for q in range(N_POINTS):
-        scale = _invert(gradients[q], inverse) ** (-2.0 / 3.0)
+        present_volume += weights[q] * _invert(gradients[q], inverse)
+    for q in range(N_POINTS):
+        scale = frame_scale(law, _invert(gradients[q], inverse), present_volume / volume)
         for n in range(tensors.shape[0]):
             _push_forward(gradients[q], scale, tensors[n, q], spatial)
-            mean = (spatial[0] + spatial[1] + spatial[2]) / 3.0
+            mean = 0.0 if law[8] == COUPLED else (spatial[0] + spatial[1] + spatial[2]) / 3.0
             total = 0.0
             for k in range(6):
                 component = spatial[k] - (mean if k < 3 else 0.0)

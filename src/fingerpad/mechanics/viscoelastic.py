@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 
 from fingerpad.checks import FloatArray
-from fingerpad.mechanics.element import N_POINTS, deviatoric_norms, element_state
+from fingerpad.mechanics.element import N_POINTS, element_state, relaxing_norms
 from fingerpad.mechanics.materials import MaterialTable
 
 
@@ -91,7 +91,7 @@ class StressHistory:
 @njit(cache=True)
 def _all_states(nodes, elements, displacement, layer, law, instantaneous, energies, volumetric):  # type: ignore[no-untyped-def]
     for e in range(elements.shape[0]):
-        volumetric[e] = element_state(
+        volumetric[e], _, _ = element_state(
             nodes[elements[e]], displacement[elements[e]], law[layer[e]], instantaneous[e], energies[e]
         )
 
@@ -106,7 +106,7 @@ def _stored_energy(  # type: ignore[no-untyped-def]
         tensors[0] = instantaneous[e]
         for term in range(n_terms):
             tensors[term + 1] = shares[layer[e], term] * instantaneous[e] - relaxed[term, e]
-        deviatoric_norms(nodes[elements[e]], displacement[elements[e]], tensors, norms)
+        relaxing_norms(nodes[elements[e]], displacement[elements[e]], law[layer[e]], tensors, norms)
         total, volume = 0.0, 0.0
         for q in range(N_POINTS):
             share = law[layer[e], 7]
