@@ -106,7 +106,7 @@ def test_seven_spheres_are_pressed_at_two_places_over_one_mesh(conditions):
     assert len(set(touches.values())) == 14
 
 
-@pytest.mark.parametrize("materials", ["trial1", "laboratory2014"])
+@pytest.mark.parametrize("materials", ["trial1", "gerling2014_fit"])
 def test_materials_of_the_conditions_reach_the_later_studies_but_not_the_trials(materials):
     conditions = Conditions("quick", materials=materials)
     tissues = named_tissues(materials)

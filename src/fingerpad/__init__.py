@@ -12,12 +12,21 @@ Examples
 __version__ = "0.1.0"
 
 from fingerpad.afferent import Afferent
-from fingerpad.errors import ConvergenceError, FingerpadError, InputError, StoreError
+from fingerpad.errors import ConvergenceError, FingerpadError, InputError, MaterialWarning, StoreError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import Grading
 from fingerpad.indentation import Touch, indent, touch_of
 from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
-from fingerpad.mechanics.materials import Material, Prony, Tissues
+from fingerpad.mechanics.materials import (
+    Energy,
+    Hencky,
+    Hyperfoam,
+    Material,
+    Ogden,
+    Polynomial,
+    Prony,
+    Tissues,
+)
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.population import Population
 from fingerpad.sampling import SkinResponse, SurfaceProfile
@@ -30,15 +39,21 @@ __all__ = [
     "ConvergenceError",
     "CurrentTraces",
     "Cylinder",
+    "Energy",
     "FingerpadError",
     "Fingertip",
     "FlatPunch",
     "Grading",
+    "Hencky",
     "HitRates",
+    "Hyperfoam",
     "InputError",
     "Line",
     "Material",
+    "MaterialWarning",
+    "Ogden",
     "Plate",
+    "Polynomial",
     "Population",
     "Prony",
     "RampAndHold",

@@ -211,7 +211,8 @@ def indent(
     stimulus : RampAndHold, optional
         The motion; the paper's by default.
     materials : str or Tissues
-        "trial1", "trial2", "trial3" (paper, section 2.2.1), "laboratory2014", or tissues of your own.
+        "trial1", "trial2", "trial3" (paper, section 2.2.1), "maeno1998", "wu2007", "gerling2014_fit", or
+        tissues of your own.
     resolution : {"quick", "standard", "paper"}
         How fine the mesh and the steps are.
     at_mm : (float, float)

@@ -1,4 +1,4 @@
-"""Sets of tissues by name: the paper's three trials and a later fit by the same laboratory."""
+"""Sets of tissues by name: the paper's three trials, and what other publications measured or fitted."""
 
 from __future__ import annotations
 
@@ -27,6 +27,11 @@ def _shear(shear: Published) -> Material:
     return Material.neo_hooke(shear.value, NU, skin_prony())
 
 
+def _foam(moduli: Published, exponents: Published) -> Material:
+    poisson = published.WU_HYPERFOAM_POISSON.value
+    return Material.hyperfoam(moduli.value, exponents.value, poisson, skin_prony())
+
+
 def trial_1() -> Tissues:
     """All layers linear elastic after Maeno, with a Prony series."""
     epidermis = _linear(published.MAENO_EPIDERMIS_YOUNG)
@@ -46,7 +51,20 @@ def trial_3() -> Tissues:
     return Tissues(epidermis, epidermis, *_hyperelastic())
 
 
-def laboratory_2014() -> Tissues:
+def maeno_1998() -> Tissues:
+    """Linear elastic layers after Maeno, without relaxation."""
+    return Tissues(*(layer.with_prony(Prony()) for layer in trial_1().layers))
+
+
+def wu_2007() -> Tissues:
+    """Wu's hyperfoams in dermis and subcutis, nearly a tenth as stiff as Maeno's, under a stiff epidermis."""
+    epidermis = _linear(published.WU_EPIDERMIS_YOUNG)
+    dermis = _foam(published.WU_SKIN_HYPERFOAM_MU, published.WU_SKIN_HYPERFOAM_ALPHA)
+    subcutis = _foam(published.WU_SUBCUTIS_HYPERFOAM_MU, published.WU_SUBCUTIS_HYPERFOAM_ALPHA)
+    return Tissues(epidermis, epidermis, dermis, subcutis)
+
+
+def gerling_2014_fit() -> Tissues:
     """Neo-Hookean fit of this fingertip, published later by the authors' laboratory."""
     epidermis = _shear(published.LABORATORY_EPIDERMIS_SHEAR)
     dermis, subcutis = _shear(published.LABORATORY_DERMIS_SHEAR), _shear(published.LABORATORY_SUBCUTIS_SHEAR)
@@ -62,7 +80,9 @@ TISSUES: dict[str, Callable[[], Tissues]] = {
     "trial1": trial_1,
     "trial2": trial_2,
     "trial3": trial_3,
-    "laboratory2014": laboratory_2014,
+    "maeno1998": maeno_1998,
+    "wu2007": wu_2007,
+    "gerling2014_fit": gerling_2014_fit,
 }
 
 
