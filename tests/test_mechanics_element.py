@@ -174,11 +174,8 @@ def test_energy_and_force_are_those_of_the_definition(material, nodes):
     np.testing.assert_allclose(force, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
-@SHAPES
-@LAWS
-def test_tangent_is_the_derivative_of_the_force_and_symmetric(material, nodes):
-    displacement, s, history = random_state(nodes)
-    _, _, tangent = kernel(material, nodes, displacement, s, history)
+def force_differences(material, nodes, displacement, s, history):
+    """Tangent by fourth-order differences of the force."""
     differences, step = np.empty((24, 24)), 1e-3
     for column in range(24):
         offset = np.zeros(24)
@@ -189,9 +186,37 @@ def test_tangent_is_the_derivative_of_the_force_and_symmetric(material, nodes):
             - kernel(material, nodes, displacement - k * offset, s, history)[1]
             for k in (1, 2)
         )
-        differences[:, column] = ((8 * one - two) / (12 * step)).ravel()  # fourth order
+        differences[:, column] = ((8 * one - two) / (12 * step)).ravel()
+    return differences
+
+
+@SHAPES
+@LAWS
+def test_tangent_is_the_derivative_of_the_force_and_symmetric(material, nodes):
+    displacement, s, history = random_state(nodes)
+    _, _, tangent = kernel(material, nodes, displacement, s, history)
+    differences = force_differences(material, nodes, displacement, s, history)
     np.testing.assert_allclose(tangent, differences, rtol=0, atol=1e-8 * np.abs(tangent).max())
     np.testing.assert_allclose(tangent, tangent.T, rtol=0, atol=1e-13 * np.abs(tangent).max())
+
+
+@LAWS
+@pytest.mark.parametrize("difference", [0.0, 1e-7, 1e-4], ids=["equal", "nearly equal", "apart"])
+def test_tangent_is_exact_where_stretches_are_equal(material, difference):
+    gradient = np.diag([1.3, 0.9, 0.9 + difference])
+    displacement = BRICK @ (gradient - np.eye(3))
+    _, _, tangent = kernel(material, BRICK, displacement)
+    differences = force_differences(material, BRICK, displacement, 1.0, np.zeros((8, 6)))
+    np.testing.assert_allclose(tangent, differences, rtol=0, atol=1e-8 * np.abs(tangent).max())
+
+
+@SHAPES
+@LAWS
+def test_all_laws_of_equal_moduli_are_one_law_at_rest(material, nodes):
+    shear, bulk = material.shear_modulus_kpa, material.bulk_modulus_kpa
+    neo_hooke = Material(Polynomial(c10=shear / 2, bulk_linear=bulk / 2))
+    tangent, expected = (kernel(law, nodes, np.zeros((8, 3)))[2] for law in (material, neo_hooke))
+    np.testing.assert_allclose(tangent, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
 def test_wedge_adds_up_to_the_tangent_of_its_six_nodes():
