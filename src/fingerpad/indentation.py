@@ -14,7 +14,7 @@ from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.indenters import Indenter
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.contact import Placement, place
 from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.press import PressSettings, press
 from fingerpad.mechanics.tissues import named_tissues
@@ -111,9 +111,7 @@ class Touch:
             If a step cannot be solved; nothing partial is returned.
         """
         mesh = self.mesh
-        x, z = self.at_mm
-        skin = mesh.nodes_mm[mesh.skin_nodes]
-        placement = place(self.indenter, skin, self.finger.skin_point(x, z), _rotation(self.tilt_deg))
+        placement = self.placement
         # One thread: vector sums would otherwise depend on the number of cores, and idle threads only spin.
         with threadpool_limits(limits=1):
             done = press(mesh, self.tissues.layers, self.indenter, placement, self.stimulus, self.settings)
@@ -126,13 +124,20 @@ class Touch:
             skin_displacement_mm=done.displacement_mm[:, mesh.skin_nodes],
             displacement_mm=done.displacement_mm[-1],
             sed_kpa=done.sed_kpa,
-            axis_x_mm=x,
+            axis_x_mm=self.at_mm[0],
             direction=placement.axis,
             force_imbalance=done.force_imbalance,
             penetration_mm=done.penetration_mm,
             newton_steps=done.newton_steps,
             factorisations=done.factorisations,
         )
+
+    @property
+    def placement(self) -> Placement:
+        """Where the indenter stands at first touch."""
+        skin = self.mesh.nodes_mm[self.mesh.skin_nodes]
+        at = self.finger.skin_point(*self.at_mm)
+        return place(self.indenter, skin, at, _rotation(self.tilt_deg))
 
     @property
     def mesh(self) -> Mesh:
