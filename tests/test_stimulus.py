@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fingerpad.errors import InputError
-from fingerpad.stimulus import RampAndHold
+from fingerpad.stimulus import ForceRampAndHold, RampAndHold
 
 
 def test_depth_rises_linearly_then_stays():
@@ -16,6 +16,16 @@ def test_depth_rises_linearly_then_stays():
     )
     assert motion.end_ms == 140.0
     assert motion.depth_at(np.zeros((2, 3))).shape == (2, 3)
+
+
+def test_force_rises_linearly_then_stays_and_is_solved_at_the_same_times_as_a_depth():
+    motion = ForceRampAndHold(force_mn=80.0, ramp_ms=40.0, hold_ms=100.0)
+    np.testing.assert_allclose(
+        motion.force_at([-5.0, 0.0, 10.0, 40.0, 140.0]), [0, 0, 20, 80, 80], rtol=1e-15
+    )
+    assert motion.end_ms == 140.0
+    depth = RampAndHold(depth_mm=1.0, ramp_ms=40.0, hold_ms=100.0)
+    np.testing.assert_array_equal(motion.times_ms(4, 5), depth.times_ms(4, 5))
 
 
 @given(

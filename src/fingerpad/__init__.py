@@ -31,7 +31,7 @@ from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.population import Population
 from fingerpad.sampling import SkinResponse, SurfaceProfile
 from fingerpad.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
-from fingerpad.stimulus import RampAndHold
+from fingerpad.stimulus import ForceRampAndHold, RampAndHold
 
 __all__ = [
     "Afferent",
@@ -43,6 +43,7 @@ __all__ = [
     "FingerpadError",
     "Fingertip",
     "FlatPunch",
+    "ForceRampAndHold",
     "Grading",
     "Hencky",
     "HitRates",

@@ -21,7 +21,7 @@ from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.mesh import Mesh, finger_mesh
 from fingerpad.parameters import fingertip as published
 from fingerpad.sampling import SkinResponse
-from fingerpad.stimulus import RampAndHold
+from fingerpad.stimulus import Motion, RampAndHold, Stimulus
 
 CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
 STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
@@ -45,8 +45,8 @@ class Touch:
         The finger.
     indenter : Indenter
         The rigid body.
-    stimulus : RampAndHold
-        Its motion.
+    stimulus : RampAndHold or ForceRampAndHold
+        Its motion, by depth or by force.
     tissues : Tissues
         Laws of the four layers.
     grading : Grading
@@ -68,7 +68,7 @@ class Touch:
 
     finger: Fingertip
     indenter: Indenter
-    stimulus: RampAndHold
+    stimulus: Stimulus
     tissues: Tissues
     grading: Grading
     settings: PressSettings = field(default_factory=PressSettings)
@@ -79,7 +79,7 @@ class Touch:
         for name, kind in (
             ("finger", Fingertip),
             ("indenter", Indenter),
-            ("stimulus", RampAndHold),
+            ("stimulus", Motion),
             ("tissues", Tissues),
             ("grading", Grading),
             ("settings", PressSettings),
@@ -95,10 +95,9 @@ class Touch:
             raise InputError(
                 f"tilt_deg must be 0 for {type(self.indenter).__name__}: got {self.tilt_deg:g} degrees."
             )
-        available = _CLEARANCE_TO_BONE * float(self.finger.depth_available_mm(x, z))
-        if self.stimulus.depth_mm > available:
+        if isinstance(self.stimulus, RampAndHold) and self.stimulus.depth_mm > self.deepest_mm:
             raise InputError(
-                f"depth_mm must stay below {available:.2f} mm at x = {x:g}, z = {z:g} mm, "
+                f"depth_mm must stay below {self.deepest_mm:.2f} mm at x = {x:g}, z = {z:g} mm, "
                 f"where the bone comes: got {self.stimulus.depth_mm:g} mm."
             )
 
@@ -107,6 +106,8 @@ class Touch:
 
         Raises
         ------
+        InputError
+            If a force pushes the indenter deeper than `deepest_mm`.
         ConvergenceError
             If a step cannot be solved; nothing partial is returned.
         """
@@ -114,7 +115,15 @@ class Touch:
         placement = self.placement
         # One thread: vector sums would otherwise depend on the number of cores, and idle threads only spin.
         with threadpool_limits(limits=1):
-            done = press(mesh, self.tissues.layers, self.indenter, placement, self.stimulus, self.settings)
+            done = press(
+                mesh,
+                self.tissues.layers,
+                self.indenter,
+                placement,
+                self.stimulus,
+                self.settings,
+                self.deepest_mm,
+            )
         return SkinResponse(
             mesh=mesh,
             times_ms=done.times_ms,
@@ -140,6 +149,11 @@ class Touch:
         return place(self.indenter, skin, at, _rotation(self.tilt_deg))
 
     @property
+    def deepest_mm(self) -> float:
+        """Depth that an indentation must not exceed: most of the way to the bone. [mm]"""
+        return _CLEARANCE_TO_BONE * float(self.finger.depth_available_mm(*self.at_mm))
+
+    @property
     def mesh(self) -> Mesh:
         """The undeformed finger of this touch."""
         return _mesh(self.finger, self.grading)
@@ -159,7 +173,7 @@ def _mesh(finger: Fingertip, grading: Grading) -> Mesh:
 def touch_of(
     finger: Fingertip,
     indenter: Indenter,
-    stimulus: RampAndHold | None = None,
+    stimulus: Stimulus | None = None,
     materials: str | Tissues = "trial3",
     resolution: str = "quick",
     at_mm: Sequence[float] = CONTACT_POINT_MM,
@@ -200,7 +214,7 @@ def touch_of(
 def indent(
     finger: Fingertip,
     indenter: Indenter,
-    stimulus: RampAndHold | None = None,
+    stimulus: Stimulus | None = None,
     materials: str | Tissues = "trial3",
     resolution: str = "quick",
     at_mm: Sequence[float] = CONTACT_POINT_MM,
@@ -213,8 +227,8 @@ def indent(
         The finger.
     indenter : Indenter
         `Line`, `Cylinder`, `Bar`, `Sphere`, `FlatPunch` or `Plate`.
-    stimulus : RampAndHold, optional
-        The motion; the paper's by default.
+    stimulus : RampAndHold or ForceRampAndHold, optional
+        The motion, by depth or by force; the paper's by default.
     materials : str or Tissues
         "trial1", "trial2", "trial3" (paper, section 2.2.1), "maeno1998", "wu2007", "gerling2014_fit", or
         tissues of your own.
@@ -226,7 +240,7 @@ def indent(
     Returns
     -------
     SkinResponse
-        Force, surface profile and strain energy density over time.
+        Force, depth, surface profile and strain energy density over time.
 
     Raises
     ------

@@ -1,4 +1,16 @@
-"""One equilibrium: Newton's method with a line search on the incremental potential, contact included."""
+"""One equilibrium: Newton's method with a line search on the incremental potential, contact included.
+
+At a given depth d of the indenter the unknowns are the displacements u, and the potential that falls is
+
+    Pi(u) = internal(u) + contact(u, d).
+
+Under a given force F the depth is unknown as well. Whenever u is nearly at rest, one Newton step on
+
+    Pi(u, d) = internal(u) + contact(u, d) - F d
+
+moves both; then u comes to rest again at the new depth. A line search over both would crawl: every skin node
+that the advancing indenter meets for the first time raises the potential.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +36,13 @@ REMEMBERED_POTENTIALS = 6
 FORCING, FORCING_RANGE = 0.1, (1e-4, 5e-3)
 """Tolerance of a linear solve over the residual. Looser ones let stiff contact overshoot: at 0.05 a press
 took three times the evaluations."""
+
+AT_REST = 1e-2
+"""Residual over contact force below which the depth is moved towards the given force."""
+DEPTH_FORCING = 1e-3
+"""Tolerance of the linear solve for the body's answer to the indenter's advance."""
+FIRST_DEPTH_MM, MOST_ADVANCE = 0.01, 4.0
+"""Where the search for the depth of a force begins, and the factor by which one step may change it. [mm]"""
 
 
 @dataclass(frozen=True)
@@ -87,17 +106,21 @@ class Load:
     contact : Contact
         The indenter.
     depth_mm : float
-        How far it has advanced since first touch. [mm]
+        How far it has advanced since first touch; under a given force, where its search begins. [mm]
     step : StepCoefficients
         Relaxation coefficients of the step.
     carried : array (n_elements, 8, 6)
         H, the history that the step starts from. [kPa]
+    force_mn : float, optional
+        Force along the indenter's axis on the body as it is meshed, half of it or whole; the depth is then
+        found. [mN]
     """
 
     contact: Contact
     depth_mm: float
     step: StepCoefficients
     carried: FloatArray
+    force_mn: float | None = None
 
 
 @dataclass(frozen=True)
@@ -127,6 +150,8 @@ class Equilibrium:
     ----------
     displacement_mm : array (n_nodes, 3)
         Displacements. [mm]
+    depth_mm : float
+        How far the indenter has advanced since first touch. [mm]
     contact : ContactState
         Contact there.
     multipliers_mn : array (n_candidates,)
@@ -138,6 +163,7 @@ class Equilibrium:
     """
 
     displacement_mm: FloatArray
+    depth_mm: float
     contact: ContactState
     multipliers_mn: FloatArray
     iterations: int
@@ -148,7 +174,13 @@ class _Evaluation:
     """Potential, residual and tangent at one trial configuration."""
 
     def __init__(
-        self, body: Body, load: Load, displacement: FloatArray, multipliers: FloatArray, blocks: FloatArray
+        self,
+        body: Body,
+        load: Load,
+        displacement: FloatArray,
+        depth_mm: float,
+        multipliers: FloatArray,
+        blocks: FloatArray,
     ):
         mesh, contact = body.mesh, load.contact
         force = np.empty_like(displacement)
@@ -158,7 +190,8 @@ class _Evaluation:
         )  # fmt: skip
         self.displacement = displacement
         positions = mesh.nodes_mm[contact.nodes] + displacement[contact.nodes]
-        self.contact = contact.state(positions, load.depth_mm, multipliers)
+        self.depth_mm = depth_mm
+        self.contact = contact.state(positions, depth_mm, multipliers)
         self.potential = internal + self.contact.potential
         np.negative(force, out=force)
         force[contact.nodes] += self.contact.force_mn
@@ -169,10 +202,14 @@ class _Evaluation:
         if np.isnan(internal):
             # Forces were left half summed, and could look balanced.
             self.relative_residual = np.inf
-        stiffness = self.contact.stiffness
+        self.stiffness = self.contact.stiffness
         if self.relative_residual < CURVATURE_BELOW_RESIDUAL:
-            stiffness = stiffness + contact.curvature_stiffness(self.contact, positions, load.depth_mm)
-        blocks[body.sparsity.diagonal[contact.nodes]] += stiffness
+            curvature = contact.curvature_stiffness(self.contact, positions, depth_mm)
+            self.stiffness = self.stiffness + curvature
+        blocks[body.sparsity.diagonal[contact.nodes]] += self.stiffness
+        wanted = load.force_mn
+        given = float(self.contact.force_mn.sum(axis=0) @ contact.placement.axis)
+        self.missing_force_mn = 0.0 if wanted is None else wanted - given
 
     def balance(self, body: Body, load: Load) -> Balance:
         """Compare the force of the indenter with what the supports take: nothing new is assembled."""
@@ -216,24 +253,33 @@ def find_equilibrium(
     """
     blocks = np.empty((body.sparsity.column.size, 3, 3))
     multipliers = multipliers_mn
-    allowed_mm = settings.penetration_tolerance * load.depth_mm
     history: list[str] = []
-    state = _Evaluation(body, load, guess_mm, multipliers, blocks)
+    state = _Evaluation(body, load, guess_mm, load.depth_mm, multipliers, blocks)
     if np.isnan(state.potential):
         raise ConvergenceError("The starting guess turns an element inside out.")
     potentials = [state.potential]
+    accepted_mn = settings.residual_tolerance * (load.force_mn or 0.0)
     for iteration in range(settings.most_iterations):
         balance = state.balance(body, load)
         history.append(
             f"iteration {iteration}: residual {state.relative_residual:.2e}, "
             f"imbalance {balance.imbalance:.2e}, misfit {1e3 * state.contact.misfit_mm:.3f} µm"
         )
+        if abs(state.missing_force_mn) > accepted_mn and state.relative_residual <= AT_REST:
+            try:
+                state = _advance_indenter(body, load, solver, state, multipliers, blocks)
+            except ConvergenceError as error:
+                raise ConvergenceError(str(error), tuple(history)) from error
+            potentials = [state.potential]
+            continue
         balanced = balance.imbalance <= settings.balance_tolerance
         if state.relative_residual <= settings.residual_tolerance and balanced:
-            if state.contact.misfit_mm <= allowed_mm:
-                return Equilibrium(state.displacement, state.contact, multipliers, iteration, balance)
+            if state.contact.misfit_mm <= settings.penetration_tolerance * state.depth_mm:
+                return Equilibrium(
+                    state.displacement, state.depth_mm, state.contact, multipliers, iteration, balance
+                )
             multipliers = load.contact.augmented(state.contact)
-            state = _Evaluation(body, load, state.displacement, multipliers, blocks)
+            state = _Evaluation(body, load, state.displacement, state.depth_mm, multipliers, blocks)
             potentials = [state.potential]
         forcing = float(np.clip(FORCING * state.relative_residual, *FORCING_RANGE))
         try:
@@ -244,6 +290,52 @@ def find_equilibrium(
         state = _line_search(body, load, state, direction, highest, multipliers, blocks, history)
         potentials.append(state.potential)
     raise ConvergenceError(f"No equilibrium after {settings.most_iterations} Newton steps.", tuple(history))
+
+
+def _advance_indenter(
+    body: Body,
+    load: Load,
+    solver: LinearSolver,
+    start: _Evaluation,
+    multipliers: FloatArray,
+    blocks: FloatArray,
+) -> _Evaluation:
+    """Newton step of displacements and depth together, towards the given force.
+
+    With r the residuals and K, b, c the second derivatives of the potential by uu, ud and dd, the exact step
+    lies in the plane of (x, 0) and t = (-y, 1), where K x = r_u and K y = b. The step along t minimises the
+    quadratic model after x, however loosely x and y are solved. The usual c - b'y for the stiffness along t
+    would not do: contact is so stiff that the two nearly cancel.
+    """
+    axis = load.contact.placement.axis
+    coupling = np.zeros_like(start.displacement)
+    coupling[load.contact.nodes] = -start.stiffness @ axis
+    b = coupling.ravel()[body.free]
+    c = float(axis @ start.stiffness.sum(axis=0) @ axis)
+    x = solver.solve(blocks, start.residual, FORCING_RANGE[1])
+    y = solver.solve(blocks, b, DEPTH_FORCING)
+
+    def tangent_times(direction: FloatArray) -> FloatArray:
+        full = np.zeros(start.displacement.size)
+        full[body.free] = direction
+        return (body.sparsity.matrix(blocks) @ full)[body.free]
+
+    slope = (start.missing_force_mn - b @ x) - y @ (start.residual - tangent_times(x))
+    stiffness = y @ tangent_times(y) - 2.0 * (b @ y) + c
+    if not stiffness > 0.0:
+        raise ConvergenceError("The indenter meets no resistance.")
+    # More and more skin resists an indenter that advances: a tangent from a light touch leads far too deep.
+    shallowest, deepest = start.depth_mm / MOST_ADVANCE, start.depth_mm * MOST_ADVANCE
+    advance = float(np.clip(start.depth_mm + slope / stiffness, shallowest, deepest)) - start.depth_mm
+    length = 1.0
+    while length >= SHORTEST_STEP:
+        displacement = start.displacement.copy()
+        displacement.ravel()[body.free] += length * (x - advance * y)
+        trial = _Evaluation(body, load, displacement, start.depth_mm + length * advance, multipliers, blocks)
+        if not np.isnan(trial.potential):
+            return trial
+        length /= 2
+    raise ConvergenceError("No step of the indenter towards the force leaves the elements whole.")
 
 
 def _line_search(
@@ -266,7 +358,7 @@ def _line_search(
     while length >= SHORTEST_STEP:
         displacement = start.displacement.copy()
         displacement.ravel()[body.free] += length * direction
-        trial = _Evaluation(body, load, displacement, multipliers, blocks)
+        trial = _Evaluation(body, load, displacement, start.depth_mm, multipliers, blocks)
         falls = trial.potential <= highest + SUFFICIENT_DECREASE * length * slope
         # Near the solution the fall of the potential drowns in round-off and the residual decides.
         if falls or trial.relative_residual < 0.9 * start.relative_residual:

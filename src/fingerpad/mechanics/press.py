@@ -7,13 +7,20 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fingerpad.checks import FloatArray, whole
-from fingerpad.errors import ConvergenceError
+from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.indenters import Indenter
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.contact import Contact, Placement
 from fingerpad.mechanics.linear import NO_NODES, LinearSolver, free_degrees_of_freedom, preconditioner
 from fingerpad.mechanics.materials import Material, MaterialTable
-from fingerpad.mechanics.newton import Body, Equilibrium, Load, NewtonSettings, find_equilibrium
+from fingerpad.mechanics.newton import (
+    FIRST_DEPTH_MM,
+    Body,
+    Equilibrium,
+    Load,
+    NewtonSettings,
+    find_equilibrium,
+)
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
     StressHistory,
@@ -21,7 +28,7 @@ from fingerpad.mechanics.viscoelastic import (
     stored_energy_density,
 )
 from fingerpad.mesh import Mesh
-from fingerpad.stimulus import RampAndHold
+from fingerpad.stimulus import ForceRampAndHold, Stimulus
 
 SMALLEST_CUT = 1.0 / 32
 
@@ -91,6 +98,8 @@ class _March:
     """State carried from step to step."""
 
     time_ms: float
+    depth_mm: float
+    depth_rate: float
     displacement: FloatArray
     velocity: FloatArray
     multipliers: FloatArray
@@ -103,8 +112,9 @@ def press(
     materials: tuple[Material, ...],
     indenter: Indenter,
     placement: Placement,
-    stimulus: RampAndHold,
+    stimulus: Stimulus,
     settings: PressSettings | None = None,
+    deepest_mm: float = np.inf,
 ) -> Deformation:
     """Solve a whole ramp and hold.
 
@@ -118,10 +128,12 @@ def press(
         The rigid body.
     placement : Placement
         Where it stands at first touch.
-    stimulus : RampAndHold
+    stimulus : RampAndHold or ForceRampAndHold
         Its motion.
     settings : PressSettings, optional
         Steps and tolerances.
+    deepest_mm : float
+        Depth that a force must not exceed. [mm]
 
     Returns
     -------
@@ -130,6 +142,8 @@ def press(
 
     Raises
     ------
+    InputError
+        If a force pushes the indenter deeper than `deepest_mm`.
     ConvergenceError
         If a step fails even when it is cut; the history tells each attempt.
     """
@@ -147,6 +161,8 @@ def press(
     times = stimulus.times_ms(settings.ramp_steps, settings.hold_steps)
     march = _March(
         0.0,
+        0.0,
+        0.0,
         np.zeros_like(mesh.nodes_mm),
         np.zeros_like(mesh.nodes_mm),
         np.zeros(contact.nodes.size),
@@ -157,10 +173,15 @@ def press(
     both_halves = np.array([2.0, 2.0, 0.0]) if mesh.symmetry_nodes.size else np.ones(3)
     displacement = np.zeros((times.size, *mesh.nodes_mm.shape))
     force, sed = np.zeros(times.size), np.zeros((times.size, len(mesh.elements)))
-    reaction, imbalance, deepest = np.zeros((times.size, 3)), 0.0, 0.0
+    depth, reaction, imbalance, deepest = np.zeros(times.size), np.zeros((times.size, 3)), 0.0, 0.0
     for n in range(1, times.size):
         found, sed[n] = _advance(body, contact, stimulus, solver, march, times[n], settings)
-        displacement[n] = found.displacement_mm
+        if found.depth_mm > deepest_mm and isinstance(stimulus, ForceRampAndHold):
+            raise InputError(
+                f"force_mn must not push the indenter deeper than {deepest_mm:.2f} mm: it is there after "
+                f"{times[n]:.4g} ms, at {stimulus.force_at(times[n]):.4g} of {stimulus.force_mn:g} mN."
+            )
+        displacement[n], depth[n] = found.displacement_mm, found.depth_mm
         force[n] = whole_body * found.contact.force_mn.sum(axis=0) @ placement.axis
         reaction[n] = both_halves * found.balance.reaction_mn
         imbalance = max(imbalance, found.balance.imbalance)
@@ -170,7 +191,7 @@ def press(
         force_mn=force,
         displacement_mm=displacement,
         sed_kpa=sed,
-        depth_mm=stimulus.depth_at(times),
+        depth_mm=depth,
         reaction_mn=reaction,
         force_imbalance=imbalance,
         penetration_mm=deepest,
@@ -182,7 +203,7 @@ def press(
 def _advance(
     body: Body,
     contact: Contact,
-    stimulus: RampAndHold,
+    stimulus: Stimulus,
     solver: LinearSolver,
     march: _March,
     until_ms: float,
@@ -204,10 +225,10 @@ def _advance(
             )
             share /= 2
             if share < SMALLEST_CUT:
-                depth_mm = stimulus.depth_at(march.time_ms)
+                less = "force" if isinstance(stimulus, ForceRampAndHold) else "depth"
                 raise ConvergenceError(
-                    f"The press stopped at {march.time_ms:.4g} ms, depth {depth_mm:.4g} mm: "
-                    "try a smaller depth, a finer mesh or more ramp steps.",
+                    f"The press stopped at {march.time_ms:.4g} ms, depth {march.depth_mm:.4g} mm: "
+                    f"try a smaller {less}, a finer mesh or more ramp steps.",
                     tuple(attempts),
                 ) from error
             continue
@@ -218,7 +239,7 @@ def _advance(
 def _one_step(
     body: Body,
     contact: Contact,
-    stimulus: RampAndHold,
+    stimulus: Stimulus,
     solver: LinearSolver,
     march: _March,
     target_ms: float,
@@ -227,8 +248,7 @@ def _one_step(
     """Solve one step and move `march` to its end."""
     mesh = body.mesh
     step_ms = target_ms - march.time_ms
-    step = StepCoefficients.of(body.table, step_ms)
-    load = Load(contact, float(stimulus.depth_at(target_ms)), step, march.history.carried(step, mesh.layer))
+    load = _load(body, contact, stimulus, march, target_ms)
     # Motion goes on as before inside a phase; at the end of the ramp it stops, and so does the guess.
     ramps = target_ms <= stimulus.ramp_ms
     guess = march.displacement + (step_ms * march.velocity if ramps else 0.0)
@@ -236,9 +256,11 @@ def _one_step(
     instantaneous, energies, volumetric = instantaneous_state(
         mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, body.table
     )
-    march.history = march.history.advanced(step, mesh.layer, instantaneous)
+    march.history = march.history.advanced(load.step, mesh.layer, instantaneous)
     march.velocity = (found.displacement_mm - march.displacement) / step_ms
     march.displacement, march.multipliers = found.displacement_mm, found.multipliers_mn
+    march.depth_rate = (found.depth_mm - march.depth_mm) / step_ms
+    march.depth_mm = found.depth_mm
     march.time_ms = target_ms
     march.newton_steps += found.iterations
     sed = stored_energy_density(
@@ -246,3 +268,17 @@ def _one_step(
         march.history, energies, volumetric,
     )  # fmt: skip
     return found, sed
+
+
+def _load(body: Body, contact: Contact, stimulus: Stimulus, march: _March, target_ms: float) -> Load:
+    """Indenter at the end of a step: at its depth, or with its force on the body as it is meshed."""
+    step_ms = target_ms - march.time_ms
+    step = StepCoefficients.of(body.table, step_ms)
+    carried = march.history.carried(step, body.mesh.layer)
+    if isinstance(stimulus, ForceRampAndHold):
+        parts = 2.0 if body.mesh.symmetry_nodes.size else 1.0
+        force_mn = float(stimulus.force_at(target_ms)) / parts
+        ramps = target_ms <= stimulus.ramp_ms
+        depth_mm = march.depth_mm + (step_ms * march.depth_rate if ramps else 0.0)
+        return Load(contact, depth_mm or FIRST_DEPTH_MM, step, carried, force_mn)
+    return Load(contact, float(stimulus.depth_at(target_ms)), step, carried)

@@ -1,0 +1,177 @@
+"""A given force: the depth is found, it is the one that depth control knows, and it creeps as it should."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fingerpad.errors import ConvergenceError, InputError
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import Grading
+from fingerpad.indentation import Touch
+from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.materials import Material, Prony
+from fingerpad.mechanics.newton import NewtonSettings
+from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.mesh import block_mesh
+from fingerpad.stimulus import ForceRampAndHold, RampAndHold
+from fingerpad.store import Store, touch_key
+
+BALL = Sphere(curvature_per_m=500.0)
+SIX = [Line(), Cylinder(3.0), Bar(2.0, 0.3), BALL, FlatPunch(2.0, 0.3), Plate()]
+ELASTIC = tuple(Material.neo_hooke(shear, 0.45) for shear in (40.0, 40.0, 20.0, 8.0))
+TIGHT = NewtonSettings(residual_tolerance=1e-6, penetration_tolerance=2e-4)
+STEPS = PressSettings(2, 1, TIGHT)
+
+
+def block(symmetric=True):
+    lines = np.array([0.0, 0.4, 0.8, 1.3, 2.0, 3.0])
+    both = np.concatenate([-lines[:0:-1], lines])
+    depth = np.array([0.0, 0.3, 0.6, 1.2, 2.0, 3.0])
+    return block_mesh(both, depth, lines if symmetric else both, layers=[0, 1, 2, 3, 3], symmetric=symmetric)
+
+
+def pressed(mesh, stimulus, indenter=BALL, materials=ELASTIC, settings=STEPS, **limits):
+    placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
+    return press(mesh, materials, indenter, placement, stimulus, settings, **limits)
+
+
+@pytest.mark.parametrize("indenter", SIX, ids=lambda body: type(body).__name__)
+def test_force_that_a_depth_needs_gives_that_depth_back(indenter):
+    """An elastic answer does not depend on the way there, so the whole field must come back."""
+    by_depth = pressed(block(), RampAndHold(0.2, 50.0, 100.0), indenter)
+    by_force = pressed(block(), ForceRampAndHold(by_depth.force_mn[-1], 50.0, 100.0), indenter)
+    np.testing.assert_allclose(by_force.depth_mm[-2:], 0.2, rtol=1e-3)
+    wanted = by_depth.force_mn[-1] * np.array([0.5, 1.0, 1.0])
+    np.testing.assert_allclose(by_force.force_mn[1:], wanted, rtol=1e-5)
+    scale = by_depth.sed_kpa.max()
+    np.testing.assert_allclose(by_force.sed_kpa[-1], by_depth.sed_kpa[-1], rtol=0, atol=2e-3 * scale)
+    assert by_force.force_imbalance <= 1e-4
+    assert by_force.penetration_mm <= 2e-4 * 0.2 * (1 + 1e-3)
+
+
+def test_force_is_that_on_the_whole_body_also_when_half_of_it_is_solved():
+    motion = ForceRampAndHold(20.0, 50.0, 100.0)
+    half, whole = pressed(block(), motion), pressed(block(symmetric=False), motion)
+    np.testing.assert_allclose(half.depth_mm, whole.depth_mm, rtol=2e-4)
+    np.testing.assert_allclose(half.force_mn[-1], 20.0, rtol=1e-5)
+    np.testing.assert_allclose(whole.force_mn[-1], 20.0, rtol=1e-5)
+
+
+def test_hertz_depth_of_a_force():
+    """d = (3 F / (4 E* sqrt(R)))^(2/3), on a block 50 contact radii thick as in the test at given depth."""
+    depth, radius, young, poisson = 0.01, 1.0, 100.0, 0.3
+    contact_radius = np.sqrt(radius * depth)
+    size, side = 0.25 * contact_radius, [0.25 * contact_radius * n for n in range(6)]
+    while side[-1] < 50 * contact_radius:
+        size *= 1.5
+        side.append(side[-1] + size)
+    side = np.array(side)
+    both = np.concatenate([-side[:0:-1], side])
+    mesh = block_mesh(both, side, side, layers=[2] * (side.size - 1), symmetric=True)
+    force = 4 / 3 * young / (1 - poisson**2) * np.sqrt(radius) * depth**1.5
+    steps = PressSettings(2, 1, NewtonSettings(penetration_tolerance=1e-3))
+    materials = (Material.linear_elastic(young, poisson),) * 4
+    done = pressed(mesh, ForceRampAndHold(force, 1.0, 1.0), Sphere(1000.0 / radius), materials, steps)
+    np.testing.assert_allclose(done.depth_mm[1:], depth * np.array([0.5 ** (2 / 3), 1.0, 1.0]), rtol=0.02)
+
+
+class GlueAlong(Plate):
+    """A plate that skin does not slide along x."""
+
+    @property
+    def grips(self):
+        return True
+
+
+def test_creep_in_uniaxial_strain_follows_the_closed_form():
+    """One element held at its sides: F / A = M * e with M(t) = K + 4/3 G(t), whose inverse creeps.
+
+    For one Prony term the creep compliance is J(t) = 1/M_e - (1/M_e - 1/M_0) exp(-t / T), T = tau M_0 / M_e,
+    with M_0 at once and M_e in the end, and a ramp of force integrates it.
+    """
+    shear, bulk, share, tau = 10.0, 20.0, 0.5, 60.0
+    material = Material.neo_hooke(shear, 2 / 7, Prony((share,), (tau,)))  # K = 2 G (1 + nu) / (3 (1 - 2 nu))
+    column = block_mesh([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], layers=[0], symmetric=True)
+    column = replace(column, symmetry_nodes=np.arange(8))  # no node moves along z, and none along x either
+    ramp, hold, force_per_area = 50.0, 400.0, 0.02
+    settings = PressSettings(20, 20, NewtonSettings(1e-7, 1e-5))
+    motion = ForceRampAndHold(2 * force_per_area, ramp, hold)  # "whole body": the mirror image carries half
+    done = pressed(column, motion, GlueAlong(), (material,) * 4, settings)
+    at_once, in_the_end = bulk + 4 / 3 * shear / (1 - share), bulk + 4 / 3 * shear
+    slow = tau * at_once / in_the_end
+
+    def ramped(time):
+        """Integral of J over the time since the ramp began."""
+        return time / in_the_end - (1 / in_the_end - 1 / at_once) * slow * (1 - np.exp(-time / slow))
+
+    since = np.maximum(done.times_ms - ramp, 0.0)
+    strain = force_per_area / ramp * (ramped(done.times_ms) - ramped(since))
+    np.testing.assert_allclose(done.depth_mm[1:], strain[1:], rtol=2e-3)
+    assert done.depth_mm[-1] > 1.2 * done.depth_mm[20]
+
+
+# Through a touch of the finger
+
+COARSE = Grading(
+    17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=6.0, stratum_corneum=1, living_epidermis=1, dermis=1, subcutis=1
+)
+
+
+def touch(stimulus, **changes):
+    arguments = {
+        "finger": Fingertip(),
+        "indenter": Sphere(curvature_per_m=287.0),
+        "stimulus": stimulus,
+        "tissues": named_tissues("trial3"),
+        "grading": COARSE,
+        "settings": PressSettings(2, 2),
+    }
+    return Touch(**(arguments | changes))
+
+
+def test_finger_creeps_under_a_constant_force_and_the_store_keeps_its_depth(tmp_path):
+    pressing = touch(ForceRampAndHold(force_mn=60.0))
+    skin = pressing.solve()
+    np.testing.assert_allclose(skin.force_mn, [0.0, 30.0, 60.0, 60.0, 60.0], rtol=1e-5)
+    assert (np.diff(skin.depth_mm) > 0).all()
+    assert skin.force_imbalance <= 1e-4
+    assert skin.penetration_mm <= 0.005 * skin.depth_mm[-1]
+    store = Store(tmp_path)
+    store.save(pressing, skin)
+    np.testing.assert_array_equal(store.load(pressing).depth_mm, skin.depth_mm)
+    keys = {
+        touch_key(touch(motion)) for motion in (ForceRampAndHold(60.0), ForceRampAndHold(61.0), RampAndHold())
+    }
+    assert len(keys) == 3
+
+
+def test_force_that_reaches_the_bone_is_refused_while_solving():
+    with pytest.raises(
+        InputError, match=r"force_mn must not push the indenter deeper than 0.15 mm"
+    ) as refusal:
+        pressed(block(), ForceRampAndHold(20.0, 50.0, 100.0), settings=PressSettings(4, 1), deepest_mm=0.15)
+    assert str(refusal.value).endswith("of 20 mN.")
+    finger = touch(ForceRampAndHold(60.0))
+    assert 1.5 < finger.deepest_mm < Fingertip().depth_available_mm(17.37, 0.0)
+
+
+def test_force_beyond_what_the_mesh_can_bear_is_an_error_that_says_less_force():
+    with pytest.raises(ConvergenceError, match="try a smaller force") as failure:
+        pressed(block(), ForceRampAndHold(1e6, 50.0, 100.0), settings=PressSettings(1, 1))
+    assert len(failure.value.history) >= 6
+
+
+@pytest.mark.parametrize("name", ["force_mn", "ramp_ms", "hold_ms"])
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "1 N", True])
+def test_impossible_forces_are_refused_in_one_sentence(name, value):
+    with pytest.raises(InputError, match=name) as refusal:
+        ForceRampAndHold(**({"force_mn": 1.0} | {name: value}))
+    assert str(refusal.value).endswith(".")
+
+
+def test_a_motion_is_needed():
+    with pytest.raises(InputError, match="stimulus must be of type Motion"):
+        touch(60.0)
