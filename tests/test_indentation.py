@@ -6,7 +6,7 @@ import pytest
 from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import Grading
-from fingerpad.indentation import Touch, grading_about, indent, settings_of
+from fingerpad.indentation import Touch, grading_about, indent, settings_of, touch_of
 from fingerpad.indenters import Bar, Cylinder, Line, Plate, Sphere
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.press import PressSettings
@@ -91,6 +91,15 @@ def test_indent_is_the_touch_that_its_arguments_describe():
     np.testing.assert_array_equal(whole.force_mn, spelt_out.force_mn)
     np.testing.assert_array_equal(whole.sed_kpa, spelt_out.sed_kpa)
     assert whole.axis_x_mm == 16.0
+
+
+def test_settings_of_your_own_replace_those_of_the_resolution():
+    adaptive = PressSettings(sed_tolerance=0.1)
+    assert touch_of(FINGER, BALL, settings=adaptive).settings == adaptive
+    assert touch_of(FINGER, BALL, resolution="standard").settings == settings_of("standard")
+    shallow = RampAndHold(depth_mm=0.1, ramp_ms=20.0, hold_ms=30.0)
+    times = indent(FINGER, BALL, shallow, settings=PressSettings(1, 1)).times_ms
+    assert times.tolist() == [0.0, 20.0, 50.0]
 
 
 def test_touches_are_values():

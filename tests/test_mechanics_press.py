@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.errors import ConvergenceError
+from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import Grading
 from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.mechanics import linear
+from fingerpad.mechanics import press as press_module
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import Contact, place
 from fingerpad.mechanics.linear import LinearSolver, free_degrees_of_freedom
@@ -228,6 +229,98 @@ def test_same_press_twice_is_the_same_to_the_last_bit():
     one, other = pressed(block(), RELAXING), pressed(block(), RELAXING)
     for name in ("times_ms", "force_mn", "displacement_mm", "sed_kpa"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+def coarse_block():
+    """A small block, the living epidermis its second layer, for presses of many steps."""
+    lines = np.array([0.0, 0.5, 1.1, 2.5])
+    both = np.concatenate([-lines[:0:-1], lines])
+    return block_mesh(both, [0.0, 0.3, 0.6, 1.3, 2.5], lines, layers=[0, 1, 2, 3], symmetric=True)
+
+
+FINE = NewtonSettings(residual_tolerance=1e-6, penetration_tolerance=2e-4)
+
+
+@pytest.fixture(scope="module")
+def very_fine():
+    """Times and SED of the epidermis in a relaxing block pressed in very many steps."""
+    mesh = coarse_block()
+    done = pressed(mesh, RELAXING, settings=PressSettings(60, 90, FINE))
+    return done.times_ms, done.sed_kpa[:, mesh.living_epidermis.ravel()]
+
+
+@pytest.mark.parametrize("tolerance", [0.04, 0.01])
+def test_error_of_sed_in_time_is_within_its_tolerance(very_fine, tolerance):
+    """At the steps and between them, in ramp and hold, of a body that relaxes."""
+    fine_times, truth = very_fine
+    mesh = coarse_block()
+    done = pressed(mesh, RELAXING, settings=PressSettings(sed_tolerance=tolerance))
+    sheet = done.sed_kpa[:, mesh.living_epidermis.ravel()].T
+    found = np.array([np.interp(fine_times, done.times_ms, trace) for trace in sheet]).T
+    error = np.abs(found - truth).max(axis=1) / truth.max()
+    assert error.max() < tolerance
+    assert error.max() > 0.02 * tolerance  # it is not met by needless steps
+    assert MOTION.ramp_ms in done.times_ms
+    assert done.times_ms[-1] == MOTION.end_ms
+
+
+def test_looser_tolerance_takes_fewer_steps_and_the_same_ones_each_time():
+    mesh = coarse_block()
+    loose, tight, again = (
+        pressed(mesh, RELAXING, settings=PressSettings(sed_tolerance=tolerance))
+        for tolerance in (0.1, 0.02, 0.02)
+    )
+    assert loose.times_ms.size < tight.times_ms.size
+    np.testing.assert_array_equal(tight.times_ms, again.times_ms)
+    np.testing.assert_array_equal(tight.sed_kpa, again.sed_kpa)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 1.0, -0.1, np.nan, "1 %"])
+def test_tolerance_of_sed_is_a_small_positive_number(tolerance):
+    with pytest.raises(InputError, match="sed_tolerance must be"):
+        PressSettings(sed_tolerance=tolerance)
+
+
+def test_adaptive_press_that_cannot_go_on_is_an_error_that_tells_its_history():
+    settings = PressSettings(sed_tolerance=0.1, newton=NewtonSettings(most_iterations=1))
+    with pytest.raises(ConvergenceError, match=r"The press stopped at 0 ms.* try a smaller depth") as failure:
+        pressed(coarse_block(), settings=settings)
+    assert all(line.startswith("step from 0 to") for line in failure.value.history)
+
+
+def test_moment_is_the_same_to_the_last_bit_after_a_step_from_it_failed(monkeypatch):
+    """Every step that fails, or is too long, leaves what it started from untouched."""
+    before, failed = {}, []
+
+    def arrays(moment):
+        found, history = moment.found, moment.history
+        return (
+            found.displacement_mm, found.multipliers_mn, found.contact.force_mn, moment.velocity_mm_per_ms,
+            history.instantaneous, history.relaxed, moment.sed_kpa,
+        )  # fmt: skip
+
+    step = press_module._Press.step
+
+    def watched(job, start, target_ms):
+        copies = before.setdefault(start.time_ms, [array.copy() for array in arrays(start)])
+        for array, copy in zip(arrays(start), copies, strict=True):
+            np.testing.assert_array_equal(array, copy)
+        try:
+            return step(job, start, target_ms)
+        except ConvergenceError:
+            failed.append(start.time_ms)
+            raise
+
+    monkeypatch.setattr(press_module._Press, "step", watched)
+    whole = pressed(coarse_block(), RELAXING, settings=PressSettings(1, 1, TIGHT))
+    assert not failed
+    before.clear()
+    too_few = replace(TIGHT, most_iterations=7)
+    cut = pressed(coarse_block(), RELAXING, settings=PressSettings(1, 1, too_few))
+    assert failed
+    np.testing.assert_allclose(
+        cut.force_mn, whole.force_mn, rtol=0.02
+    )  # steps of other lengths relax otherwise
 
 
 def test_press_without_pardiso_gives_the_same_answer(monkeypatch):

@@ -179,6 +179,7 @@ def touch_of(
     at_mm: Sequence[float] = CONTACT_POINT_MM,
     grading: Grading | None = None,
     tilt_deg: float = 0.0,
+    settings: PressSettings | None = None,
 ) -> Touch:
     """Describe a touch without solving it; arguments as in `indent`.
 
@@ -205,7 +206,7 @@ def touch_of(
         stimulus=stimulus or RampAndHold(),
         tissues=materials if isinstance(materials, Tissues) else named_tissues(materials),
         grading=grading or grading_about(indenter, resolution, x, z),
-        settings=settings_of(resolution),
+        settings=settings or settings_of(resolution),
         at_mm=(x, z),
         tilt_deg=tilt_deg,
     )
@@ -218,6 +219,7 @@ def indent(
     materials: str | Tissues = "trial3",
     resolution: str = "quick",
     at_mm: Sequence[float] = CONTACT_POINT_MM,
+    settings: PressSettings | None = None,
 ) -> SkinResponse:
     """Press an indenter into a finger.
 
@@ -236,6 +238,9 @@ def indent(
         How fine the mesh and the steps are.
     at_mm : (float, float)
         x and z of the indenter's axis on the finger; half of the finger is solved on the midline. [mm]
+    settings : PressSettings, optional
+        Steps and tolerances instead of those of `resolution`; `PressSettings(sed_tolerance=0.01)` chooses
+        steps that keep the error of SED in time below 1 % of its largest value.
 
     Returns
     -------
@@ -256,7 +261,7 @@ def indent(
     >>> print(f"{skin.surface_profile().deflection_mm.max():.1f} mm deep, {skin.force_mn[-1]:.0f} mN")
     0.3 mm deep, 32 mN
     """
-    return touch_of(finger, indenter, stimulus, materials, resolution, at_mm).solve()
+    return touch_of(finger, indenter, stimulus, materials, resolution, at_mm, settings=settings).solve()
 
 
 def settings_of(resolution: str) -> PressSettings:

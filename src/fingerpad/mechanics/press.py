@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fingerpad.checks import FloatArray, whole
+from fingerpad.checks import FloatArray, positive, whole
 from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.indenters import Indenter
 from fingerpad.mechanics.assembly import Sparsity
@@ -15,12 +16,14 @@ from fingerpad.mechanics.linear import NO_NODES, LinearSolver, free_degrees_of_f
 from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.newton import (
     FIRST_DEPTH_MM,
+    Balance,
     Body,
     Equilibrium,
     Load,
     NewtonSettings,
     find_equilibrium,
 )
+from fingerpad.mechanics.steps import Phase, adaptive_steps, steps_at
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
     StressHistory,
@@ -30,7 +33,9 @@ from fingerpad.mechanics.viscoelastic import (
 from fingerpad.mesh import Mesh
 from fingerpad.stimulus import ForceRampAndHold, Stimulus
 
-SMALLEST_CUT = 1.0 / 32
+PENETRATION_SHARE = 0.1
+"""Largest penetration over depth, as a share of the tolerance of SED: SED grows as the square of depth or
+faster, and what augmentation leaves open differs from step to step."""
 
 
 @dataclass(frozen=True)
@@ -40,18 +45,25 @@ class PressSettings:
     Parameters
     ----------
     ramp_steps, hold_steps : int
-        Steps in the two phases.
+        Steps in the two phases; with a tolerance of SED, the steps of this division that are tried first.
     newton : NewtonSettings
         Tolerances of each step.
+    sed_tolerance : float, optional
+        If given, steps are as long as this bound on the error of SED in time allows, between the steps too
+        when SED is taken as linear there. It is relative to the largest SED and holds in the living
+        epidermis, or everywhere in a mesh without one.
     """
 
     ramp_steps: int = 8
     hold_steps: int = 8
     newton: NewtonSettings = field(default_factory=NewtonSettings)
+    sed_tolerance: float | None = None
 
     def __post_init__(self) -> None:
         whole("ramp_steps", self.ramp_steps, at_least=1)
         whole("hold_steps", self.hold_steps, at_least=1)
+        if self.sed_tolerance is not None and positive("sed_tolerance", self.sed_tolerance) >= 1.0:
+            raise InputError(f"sed_tolerance must be below 1: got {self.sed_tolerance!r}.")
 
 
 @dataclass(frozen=True)
@@ -93,18 +105,81 @@ class Deformation:
     factorisations: int
 
 
-@dataclass
-class _March:
-    """State carried from step to step."""
+@dataclass(frozen=True)
+class _Moment:
+    """The press at one time: what the next step starts from."""
 
     time_ms: float
-    depth_mm: float
+    found: Equilibrium
+    velocity_mm_per_ms: FloatArray
     depth_rate: float
-    displacement: FloatArray
-    velocity: FloatArray
-    multipliers: FloatArray
     history: StressHistory
+    sed_kpa: FloatArray
+
+
+@dataclass
+class _Press:
+    """What stays the same over all steps, and a count of the work."""
+
+    body: Body
+    contact: Contact
+    stimulus: Stimulus
+    solver: LinearSolver
+    newton: NewtonSettings
     newton_steps: int = 0
+
+    def unloaded(self) -> _Moment:
+        """Return the moment before the first step."""
+        mesh, table = self.body.mesh, self.body.table
+        nowhere, no_force = np.zeros_like(mesh.nodes_mm), np.zeros(self.contact.nodes.size)
+        touch = self.contact.state(mesh.nodes_mm[self.contact.nodes], 0.0, no_force)
+        rest = Equilibrium(nowhere, 0.0, touch, no_force, 0, Balance(np.zeros(3), 0.0))
+        history = StressHistory.unloaded(len(mesh.elements), table.shares.shape[1])
+        return _Moment(0.0, rest, nowhere, 0.0, history, np.zeros(len(mesh.elements)))
+
+    def step(self, start: _Moment, target_ms: float) -> _Moment:
+        """Solve one step; `start` stays as it is, so a step that fails or is too long can be repeated."""
+        mesh, table = self.body.mesh, self.body.table
+        step_ms = target_ms - start.time_ms
+        load = self.load(start, target_ms)
+        # Motion goes on as before inside a phase; at the end of the ramp it stops, and so does the guess.
+        ramps = target_ms <= self.stimulus.ramp_ms
+        guess = start.found.displacement_mm + (step_ms * start.velocity_mm_per_ms if ramps else 0.0)
+        found = find_equilibrium(self.body, load, self.solver, guess, start.found.multipliers_mn, self.newton)
+        self.newton_steps += found.iterations
+        instantaneous, energies, volumetric = instantaneous_state(
+            mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, table
+        )
+        history = start.history.advanced(load.step, mesh.layer, instantaneous)
+        sed_kpa = stored_energy_density(
+            mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, table,
+            history, energies, volumetric,
+        )  # fmt: skip
+        velocity = (found.displacement_mm - start.found.displacement_mm) / step_ms
+        depth_rate = (found.depth_mm - start.found.depth_mm) / step_ms
+        return _Moment(target_ms, found, velocity, depth_rate, history, sed_kpa)
+
+    def load(self, start: _Moment, target_ms: float) -> Load:
+        """Indenter at the end of a step: at its depth, or with its force on the body as it is meshed."""
+        step_ms = target_ms - start.time_ms
+        step = StepCoefficients.of(self.body.table, step_ms)
+        carried = start.history.carried(step, self.body.mesh.layer)
+        if isinstance(self.stimulus, ForceRampAndHold):
+            parts = 2.0 if self.body.mesh.symmetry_nodes.size else 1.0
+            force_mn = float(self.stimulus.force_at(target_ms)) / parts
+            ramps = target_ms <= self.stimulus.ramp_ms
+            depth_mm = start.found.depth_mm + (step_ms * start.depth_rate if ramps else 0.0)
+            return Load(self.contact, depth_mm or FIRST_DEPTH_MM, step, carried, force_mn)
+        return Load(self.contact, float(self.stimulus.depth_at(target_ms)), step, carried)
+
+    def stopped(self, last: _Moment, attempts: tuple[str, ...]) -> ConvergenceError:
+        """Error for a press that gets no further than `last`."""
+        less = "force" if isinstance(self.stimulus, ForceRampAndHold) else "depth"
+        return ConvergenceError(
+            f"The press stopped at {last.time_ms:.4g} ms, depth {last.found.depth_mm:.4g} mm: "
+            f"try a smaller {less}, a finer mesh or more ramp steps.",
+            attempts,
+        )
 
 
 def press(
@@ -158,30 +233,26 @@ def press(
     body = Body(mesh, table, sparsity, free)
     solver = LinearSolver(sparsity, free, preconditioner(sparsity, free, mesh.nodes_mm))
 
-    times = stimulus.times_ms(settings.ramp_steps, settings.hold_steps)
-    march = _March(
-        0.0,
-        0.0,
-        0.0,
-        np.zeros_like(mesh.nodes_mm),
-        np.zeros_like(mesh.nodes_mm),
-        np.zeros(contact.nodes.size),
-        StressHistory.unloaded(len(mesh.elements), table.shares.shape[1]),
-    )
+    job = _Press(body, contact, stimulus, solver, _newton_settings(settings))
+    reached = []
+    for moment in _moments(job, settings):
+        if moment.found.depth_mm > deepest_mm and isinstance(stimulus, ForceRampAndHold):
+            raise InputError(
+                f"force_mn must not push the indenter deeper than {deepest_mm:.2f} mm: it is there after "
+                f"{moment.time_ms:.4g} ms, at {stimulus.force_at(moment.time_ms):.4g} of "
+                f"{stimulus.force_mn:g} mN."
+            )
+        # Without its history, which is as large as all else together.
+        reached.append((moment.time_ms, moment.found, moment.sed_kpa))
+    times = np.array([0.0, *(time_ms for time_ms, _, _ in reached)])
     whole_body = 2.0 if mesh.symmetry_nodes.size else 1.0
     # Across the plane of symmetry the reactions of the two halves cancel.
     both_halves = np.array([2.0, 2.0, 0.0]) if mesh.symmetry_nodes.size else np.ones(3)
     displacement = np.zeros((times.size, *mesh.nodes_mm.shape))
     force, sed = np.zeros(times.size), np.zeros((times.size, len(mesh.elements)))
     depth, reaction, imbalance, deepest = np.zeros(times.size), np.zeros((times.size, 3)), 0.0, 0.0
-    for n in range(1, times.size):
-        found, sed[n] = _advance(body, contact, stimulus, solver, march, times[n], settings)
-        if found.depth_mm > deepest_mm and isinstance(stimulus, ForceRampAndHold):
-            raise InputError(
-                f"force_mn must not push the indenter deeper than {deepest_mm:.2f} mm: it is there after "
-                f"{times[n]:.4g} ms, at {stimulus.force_at(times[n]):.4g} of {stimulus.force_mn:g} mN."
-            )
-        displacement[n], depth[n] = found.displacement_mm, found.depth_mm
+    for n, (_, found, sed_kpa) in enumerate(reached, start=1):
+        displacement[n], depth[n], sed[n] = found.displacement_mm, found.depth_mm, sed_kpa
         force[n] = whole_body * found.contact.force_mn.sum(axis=0) @ placement.axis
         reaction[n] = both_halves * found.balance.reaction_mn
         imbalance = max(imbalance, found.balance.imbalance)
@@ -195,90 +266,32 @@ def press(
         reaction_mn=reaction,
         force_imbalance=imbalance,
         penetration_mm=deepest,
-        newton_steps=march.newton_steps,
+        newton_steps=job.newton_steps,
         factorisations=solver.renewals,
     )
 
 
-def _advance(
-    body: Body,
-    contact: Contact,
-    stimulus: Stimulus,
-    solver: LinearSolver,
-    march: _March,
-    until_ms: float,
-    settings: PressSettings,
-) -> tuple[Equilibrium, FloatArray]:
-    """Go on to `until_ms`, in one step if it converges, else in halves, quarters ... of it."""
-    whole_step = until_ms - march.time_ms
-    share, attempts = 1.0, []
-    while True:
-        step_ms = min(share * whole_step, until_ms - march.time_ms)
-        last = march.time_ms + step_ms >= until_ms - 1e-9 * whole_step
-        target = until_ms if last else march.time_ms + step_ms
-        try:
-            found, sed = _one_step(body, contact, stimulus, solver, march, target, settings)
-        except ConvergenceError as error:
-            attempts.append(
-                f"step from {march.time_ms:.4g} to {target:.4g} ms: {error.args[0]} "
-                f"Last: {error.history[-1] if error.history else 'no iteration'}."
-            )
-            share /= 2
-            if share < SMALLEST_CUT:
-                less = "force" if isinstance(stimulus, ForceRampAndHold) else "depth"
-                raise ConvergenceError(
-                    f"The press stopped at {march.time_ms:.4g} ms, depth {march.depth_mm:.4g} mm: "
-                    f"try a smaller {less}, a finer mesh or more ramp steps.",
-                    tuple(attempts),
-                ) from error
-            continue
-        if last:
-            return found, sed
+def _newton_settings(settings: PressSettings) -> NewtonSettings:
+    """Tolerances of each step, tight enough for the bound on SED."""
+    if settings.sed_tolerance is None:
+        return settings.newton
+    penetration = min(settings.newton.penetration_tolerance, PENETRATION_SHARE * settings.sed_tolerance)
+    return replace(settings.newton, penetration_tolerance=penetration)
 
 
-def _one_step(
-    body: Body,
-    contact: Contact,
-    stimulus: Stimulus,
-    solver: LinearSolver,
-    march: _March,
-    target_ms: float,
-    settings: PressSettings,
-) -> tuple[Equilibrium, FloatArray]:
-    """Solve one step and move `march` to its end."""
-    mesh = body.mesh
-    step_ms = target_ms - march.time_ms
-    load = _load(body, contact, stimulus, march, target_ms)
-    # Motion goes on as before inside a phase; at the end of the ramp it stops, and so does the guess.
-    ramps = target_ms <= stimulus.ramp_ms
-    guess = march.displacement + (step_ms * march.velocity if ramps else 0.0)
-    found = find_equilibrium(body, load, solver, guess, march.multipliers, settings.newton)
-    instantaneous, energies, volumetric = instantaneous_state(
-        mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, body.table
+def _moments(job: _Press, settings: PressSettings) -> Iterator[_Moment]:
+    """Solved times after the unloaded one."""
+    stimulus, mesh, start = job.stimulus, job.body.mesh, job.unloaded()
+    times = stimulus.times_ms(settings.ramp_steps, settings.hold_steps)[1:]
+    if settings.sed_tolerance is None:
+        return steps_at(start, times, job.step, job.stopped)
+    first_hold_ms = times[settings.ramp_steps] - stimulus.ramp_ms
+    # A first step much longer than a relaxation would not see that the relaxation is curved.
+    relaxing = job.body.table.times_ms[job.body.table.shares > 0.0]
+    phases = (
+        Phase(stimulus.ramp_ms, first_ms=times[0], loading=True),
+        Phase(stimulus.end_ms, first_ms=relaxing.min(initial=first_hold_ms), loading=False),
     )
-    march.history = march.history.advanced(load.step, mesh.layer, instantaneous)
-    march.velocity = (found.displacement_mm - march.displacement) / step_ms
-    march.displacement, march.multipliers = found.displacement_mm, found.multipliers_mn
-    march.depth_rate = (found.depth_mm - march.depth_mm) / step_ms
-    march.depth_mm = found.depth_mm
-    march.time_ms = target_ms
-    march.newton_steps += found.iterations
-    sed = stored_energy_density(
-        mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, body.table,
-        march.history, energies, volumetric,
-    )  # fmt: skip
-    return found, sed
-
-
-def _load(body: Body, contact: Contact, stimulus: Stimulus, march: _March, target_ms: float) -> Load:
-    """Indenter at the end of a step: at its depth, or with its force on the body as it is meshed."""
-    step_ms = target_ms - march.time_ms
-    step = StepCoefficients.of(body.table, step_ms)
-    carried = march.history.carried(step, body.mesh.layer)
-    if isinstance(stimulus, ForceRampAndHold):
-        parts = 2.0 if body.mesh.symmetry_nodes.size else 1.0
-        force_mn = float(stimulus.force_at(target_ms)) / parts
-        ramps = target_ms <= stimulus.ramp_ms
-        depth_mm = march.depth_mm + (step_ms * march.depth_rate if ramps else 0.0)
-        return Load(contact, depth_mm or FIRST_DEPTH_MM, step, carried, force_mn)
-    return Load(contact, float(stimulus.depth_at(target_ms)), step, carried)
+    receptors = mesh.living_epidermis.ravel()
+    where = receptors if receptors.size else np.arange(len(mesh.elements))
+    return adaptive_steps(start, phases, settings.sed_tolerance, where, job.step, job.stopped)

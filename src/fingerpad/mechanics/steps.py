@@ -1,0 +1,279 @@
+"""Time steps of a press: at given times, cut where they fail, or as long as an error bound on SED allows.
+
+A step takes stress and energy as linear within itself, and that is all it does to the answer: without
+relaxation the equilibrium at its end does not depend on the way there, and a relaxed stress is an average of
+past stress with weights that sum to less than 1 (see `viscoelastic`). So the error of a whole press is that
+of its worst step, and the error of a step is that of linear interpolation,
+
+    e = h²/4 |w[t-, t, t+]|,    w[t-, t, t+] = (w[t, t+] - w[t-, t]) / (h- + h),
+
+with SED w, its divided differences over the last two steps, and their lengths h- and h. Where the step is
+shorter than the one before, h stands for h- too: SED may have a kink in the step, as where the indenter comes
+to touch, and a long step before it would hide it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from fingerpad.checks import FloatArray
+from fingerpad.errors import ConvergenceError
+
+SMALLEST_CUT = 1.0 / 32
+"""Shortest step that is tried, over the step asked for."""
+
+LENGTHEN_AFTER = 2
+"""Steps in a row that must converge after a cut before their length is doubled."""
+
+SMALLEST_SHARE = 1.0 / 4096
+"""Shortest adaptive step, over the phase that it belongs to."""
+
+SAFETY, SHORTEN, LENGTHEN = 0.85, 0.25, 2.0
+"""Aim below the tolerance, and bounds on how much one step's length may differ from the last one's."""
+
+
+class Moment(Protocol):
+    """A solved time; the next step starts from it and leaves it as it is."""
+
+    @property
+    def time_ms(self) -> float:
+        """Its time. [ms]"""
+        ...
+
+    @property
+    def sed_kpa(self) -> FloatArray:
+        """Strain energy density (n_elements,). [kPa]"""
+        ...
+
+
+Reached = TypeVar("Reached", bound=Moment)
+Step = Callable[[Reached, float], Reached]
+"""Solves from a moment to a time [ms]; raises ConvergenceError."""
+
+Stop = Callable[[Reached, tuple[str, ...]], ConvergenceError]
+"""Error for a press that gets no further than a moment, from the history of attempts."""
+
+
+def steps_at(
+    start: Reached, times_ms: Sequence[float] | FloatArray, step: Step[Reached], stop: Stop[Reached]
+) -> Iterator[Reached]:
+    """Reach each of the given times, in one step if it converges, else in halves, quarters ... of it.
+
+    After a cut the steps stay short, over the next times too, until some in a row converge.
+
+    Parameters
+    ----------
+    start : Moment
+        Where to begin.
+    times_ms : sequence of float
+        Increasing, after `start`. [ms]
+    step, stop : callable
+        Solve a step; make the final error.
+
+    Yields
+    ------
+    Moment
+        One per time.
+
+    Raises
+    ------
+    ConvergenceError
+        What `stop` makes, if a step fails at 1/32 of its length.
+    """
+    moment, share, converged = start, 1.0, 0
+    attempts: list[str] = []
+    for until_ms in times_ms:
+        whole_ms = until_ms - moment.time_ms
+        while moment.time_ms < until_ms:
+            target_ms = moment.time_ms + share * whole_ms
+            if target_ms >= until_ms - 1e-9 * whole_ms:
+                target_ms = float(until_ms)
+            try:
+                moment = step(moment, target_ms)
+            except ConvergenceError as error:
+                attempts.append(_attempt(moment, target_ms, error))
+                share, converged = share / 2, 0
+                if share < SMALLEST_CUT:
+                    raise stop(moment, tuple(attempts)) from error
+                continue
+            converged += 1
+            if share < 1.0 and converged == LENGTHEN_AFTER:
+                share, converged = 2 * share, 0
+            if share == 1.0:
+                attempts.clear()
+        yield moment
+
+
+def _attempt(moment: Moment, target_ms: float, error: ConvergenceError) -> str:
+    """One line of history for a step that did not converge."""
+    last = error.history[-1] if error.history else "no iteration"
+    return f"step from {moment.time_ms:.4g} to {target_ms:.4g} ms: {error.args[0]} Last: {last}."
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A part of the motion at constant speed, within which SED is smooth in time.
+
+    Parameters
+    ----------
+    end_ms : float
+        Its end, always reached exactly. [ms]
+    first_ms : float
+        Length of the first step to try. [ms]
+    loading : bool
+        Whether SED grows to the end. Errors then are relative to the largest SED expected there, by growth in
+        proportion to time: no step is small beside what it has reached from nothing.
+    """
+
+    end_ms: float
+    first_ms: float
+    loading: bool
+
+
+def adaptive_steps(
+    start: Reached,
+    phases: Sequence[Phase],
+    tolerance: float,
+    where: np.ndarray,
+    step: Step[Reached],
+    stop: Stop[Reached],
+) -> Iterator[Reached]:
+    """Choose steps so that the error of SED stays below a tolerance.
+
+    Parameters
+    ----------
+    start : Moment
+        Where to begin, without any load.
+    phases : sequence of Phase
+        What follows, one after the other.
+    tolerance : float
+        Largest error of SED, over the largest SED.
+    where : int array
+        Elements that count.
+    step, stop : callable
+        Solve a step; make the final error.
+
+    Yields
+    ------
+    Moment
+        One per step that meets the tolerance.
+
+    Raises
+    ------
+    ConvergenceError
+        What `stop` makes, if steps at their shortest neither converge nor meet the tolerance.
+    """
+    last, largest_kpa = start, 0.0
+    for phase in phases:
+        for moment in _adapt(last, phase, tolerance, largest_kpa, where, step, stop):
+            last, largest_kpa = moment, max(largest_kpa, _largest(moment, where))
+            yield moment
+
+
+def _largest(moment: Moment, where: np.ndarray) -> float:
+    return float(moment.sed_kpa[where].max(initial=0.0))
+
+
+def _adapt(
+    start: Reached,
+    phase: Phase,
+    tolerance: float,
+    largest_kpa: float,
+    where: np.ndarray,
+    step: Step[Reached],
+    stop: Stop[Reached],
+) -> Iterator[Reached]:
+    """Choose the steps of one phase.
+
+    The first two are equal and judged together: it takes three moments to see a curvature, and the speed
+    changes at the start of a phase.
+    """
+    whole_ms = phase.end_ms - start.time_ms
+    step_ms = min(phase.first_ms, whole_ms / 2)
+    before: Reached | None = None
+    moment, judged = start, False
+    attempts: list[str] = []
+    while moment.time_ms < phase.end_ms:
+        if step_ms < SMALLEST_SHARE * whole_ms:
+            raise stop(moment, tuple(attempts))
+        target_ms = _target(moment.time_ms, step_ms, phase.end_ms)
+        taken_ms = target_ms - moment.time_ms
+        try:
+            found = step(moment, target_ms)
+        except ConvergenceError as error:
+            attempts.append(_attempt(moment, target_ms, error))
+            step_ms = taken_ms / 2
+            continue
+        if before is None:
+            before, moment, step_ms = moment, found, taken_ms
+            continue
+        growth = whole_ms / (target_ms - start.time_ms) if phase.loading else 1.0
+        largest_kpa = max(largest_kpa, _largest(moment, where))
+        allowed_kpa = tolerance * max(largest_kpa, growth * _largest(found, where))
+        error_kpa = interpolation_error(before, moment, found, where, both=not judged)
+        step_ms = taken_ms * _change(error_kpa, allowed_kpa)
+        if error_kpa > allowed_kpa:
+            attempts.append(
+                f"step from {moment.time_ms:.4g} to {target_ms:.4g} ms: "
+                f"error of SED {error_kpa:.3g} kPa, allowed {allowed_kpa:.3g} kPa."
+            )
+            if not judged:
+                before, moment = None, start
+            continue
+        if not judged:
+            yield moment
+        yield found
+        before, moment, judged, attempts = moment, found, True, []
+
+
+def _target(time_ms: float, step_ms: float, end_ms: float) -> float:
+    """End of a step of about `step_ms`: the last two before the end are equal, none is a sliver."""
+    left_ms = end_ms - time_ms
+    if left_ms <= step_ms * (1 + 1e-9):
+        return end_ms
+    return time_ms + (left_ms / 2 if left_ms < 2 * step_ms else step_ms)
+
+
+def _change(error_kpa: float, allowed_kpa: float) -> float:
+    """Factor from a step's length to the next one's: the error grows as the square of the length."""
+    if error_kpa <= 0.0:
+        return LENGTHEN
+    return float(np.clip(SAFETY * np.sqrt(allowed_kpa / error_kpa), SHORTEN, LENGTHEN))
+
+
+def interpolation_error(
+    before: Moment, moment: Moment, after: Moment, where: np.ndarray, both: bool = False
+) -> float:
+    """Largest error of linear interpolation of SED from `moment` to `after`.
+
+    Parameters
+    ----------
+    before, moment, after : Moment
+        Three in a row.
+    where : int array
+        Elements that count.
+    both : bool
+        Whether the step from `before` to `moment` is judged too.
+
+    Returns
+    -------
+    float
+        The error. [kPa]
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace as M
+    >>> squares = [M(time_ms=t, sed_kpa=np.array([t * t])) for t in (0.0, 1.0, 3.0)]
+    >>> interpolation_error(*squares, where=np.array([0]))  # (3 - 1)² / 4
+    1.0
+    """
+    earlier_ms, later_ms = moment.time_ms - before.time_ms, after.time_ms - moment.time_ms
+    slope_before = (moment.sed_kpa[where] - before.sed_kpa[where]) / earlier_ms
+    slope_after = (after.sed_kpa[where] - moment.sed_kpa[where]) / later_ms
+    divided = np.abs(slope_after - slope_before) / (later_ms + min(earlier_ms, later_ms))
+    longest_ms = max(earlier_ms, later_ms) if both else later_ms
+    return float(longest_ms**2 / 4 * divided.max(initial=0.0))
