@@ -4,6 +4,7 @@ import re
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -18,6 +19,7 @@ def call(monkeypatch, capsys, tmp_path):
     """Run the command line in this process, in an empty folder; a study would fail the test."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(cli, "reproduce", pytest.fail)
+    monkeypatch.setattr(cli.mesh_refinement, "run", pytest.fail)
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["fingerpad", *arguments])
@@ -40,6 +42,16 @@ def test_help_names_every_option_and_resolution(call):
     assert "quick standard paper" in words
     for option in ("--resolution", "--out", "--jobs", "--seed"):
         assert option in words
+
+
+def test_refine_writes_its_page_numbers_and_figure(call, monkeypatch, tmp_path):
+    asked = []
+    monkeypatch.setattr(cli.mesh_refinement, "run", lambda *arguments: asked.append(arguments[:2]) or {})
+    monkeypatch.setattr(cli.refinement_report, "documents", lambda results: {"mesh_refinement.md": b"errors"})
+    status, said, _ = call("refine", "--out", "meshes", "--jobs", "3")
+    assert (status, asked) == (0, [(Path("meshes"), 3)])
+    assert said == f"Report: {Path('meshes') / 'mesh_refinement.md'}\n"
+    assert (tmp_path / "meshes" / "mesh_refinement.md").read_bytes() == b"errors"
 
 
 def test_without_a_command_the_help_is_shown(call):
@@ -65,6 +77,8 @@ def test_without_a_command_the_help_is_shown(call):
         (["reproduce", "--seed", "inf"], "'--seed': must be a whole number", "'inf'"),
         (["reproduce", "--seed", ""], "'--seed': must be a whole number", "''"),
         (["reproduce", "--seed"], "--seed", "requires an argument"),
+        (["refine", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
+        (["refine", "--resolution", "quick"], "No such option", "--resolution"),
         (["reproduce", "twice"], "unexpected extra argument", "twice"),
         (["reproduse"], "No such command", "'reproduse'"),
         (["--resolution", "quick"], "No such option", "--resolution"),

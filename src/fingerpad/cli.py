@@ -1,4 +1,4 @@
-"""The command line: `fingerpad reproduce`."""
+"""The command line: `fingerpad reproduce` and `fingerpad refine`."""
 
 from __future__ import annotations
 
@@ -17,11 +17,13 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as RichProgress
 
 from fingerpad import __version__
+from fingerpad.checks import whole
 from fingerpad.errors import FingerpadError, InputError
 from fingerpad.files import write_atomically
 from fingerpad.grading import RESOLUTIONS
+from fingerpad.report import mesh_refinement as refinement_report
 from fingerpad.report import write_report
-from fingerpad.studies import Reproduction, reproduce
+from fingerpad.studies import Reproduction, mesh_refinement, reproduce
 from fingerpad.studies.conditions import Conditions
 
 EXPECTED_TIME = {"quick": "about 3 minutes", "standard": "about 9 minutes", "paper": "more than a day"}
@@ -100,6 +102,26 @@ def reproduce_command(
     typer.echo(f"Report: {report}")
     typer.echo(f"Results: {out / 'results.json'}")
     typer.echo(f"Missed: {'; '.join(missed) if missed else 'nothing'}")
+
+
+@app.command("refine")
+def refine_command(
+    out: Annotated[
+        Path, typer.Option(help="Folder for tables, figure, numbers and stored indentations.")
+    ] = Path("refinement"),
+    jobs: Annotated[
+        int | None,
+        typer.Option(parser=_whole_number, metavar="INTEGER", help="Processes; one per core by default."),
+    ] = None,
+) -> None:
+    """Press bars and spheres into finer meshes, and report the error of the meshes of every resolution."""
+    processes = whole("jobs", jobs if jobs is not None else _cores(), at_least=1)
+    _make_writable(out)
+    with _interruptible():
+        results = mesh_refinement.run(out, processes, _Bars(Console(stderr=True)))
+        for name, content in refinement_report.documents(results).items():
+            write_atomically(out / name, content)
+    typer.echo(f"Report: {out / refinement_report.PAGE}")
 
 
 @contextmanager

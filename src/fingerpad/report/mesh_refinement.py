@@ -1,0 +1,199 @@
+"""Mesh refinement: strain energy density on all meshes, and tables of what their errors lead to."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from fingerpad.parameters import protocol
+from fingerpad.report.appearance import BLACK, BLUE, GREEN, ORANGE, new_figure, numbers, png
+from fingerpad.report.words import fixed, number
+
+BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
+PERCENT = 100.0
+LINES: dict[str, dict[str, Any]] = {
+    "coarse": {"color": GREEN, "linestyle": "", "marker": "v"},
+    "quick": {"color": ORANGE, "linestyle": "--", "marker": ""},
+    "standard": {"color": BLUE, "linestyle": "-", "marker": ""},
+    "fine": {"color": BLACK, "linestyle": "", "marker": "o", "markerfacecolor": "white"},
+}
+PHASES = ("ramp", "hold")
+RATES = ("dynamic", "static")
+
+
+PAGE, NUMBERS, FIGURE = "mesh_refinement.md", "mesh_refinement.json", "mesh_refinement.png"
+
+
+def documents(results: dict[str, Any]) -> dict[str, bytes]:
+    """Return the files that show a run: page, numbers and figure, by name.
+
+    Parameters
+    ----------
+    results : dict
+        From `studies.mesh_refinement.run`.
+
+    Returns
+    -------
+    dict of bytes
+    """
+    return {
+        PAGE: markdown(results).encode(),
+        NUMBERS: (json.dumps(results, indent=1, allow_nan=False) + "\n").encode(),
+        FIGURE: png(draw, results),
+    }
+
+
+def draw(results: Mapping[str, Any]) -> Figure:
+    """Draw strain energy density and firing rates against the bar's shift, on every mesh.
+
+    Parameters
+    ----------
+    results : dict
+        From `studies.mesh_refinement.run`.
+
+    Returns
+    -------
+    Figure
+    """
+    figure = new_figure(10.0, 7.5)
+    panels = figure.subplots(2, 2)
+    profiles = results["bars"]["profiles"]
+    columns = (
+        ("sed_ramp_kpa", "(a) energy density, end of the ramp", "[kPa]"),
+        ("sed_hold_kpa", "(b) energy density, end of the hold", "[kPa]"),
+        ("dynamic_rate_hz", "(c) dynamic firing rate", "[spikes/s]"),
+        ("static_rate_hz", "(d) static firing rate", "[spikes/s]"),
+    )
+    for axes, (name, title, unit) in zip(panels.ravel(), columns, strict=True):
+        axes.axvspan(-BAR_HALF_WIDTH_MM, BAR_HALF_WIDTH_MM, color="#f3f1ea", zorder=0)
+        for level, profile in profiles.items():
+            axes.plot(
+                numbers(profile["shift_mm"]),
+                numbers(profile[name]),
+                label=level,
+                markersize=5.0,
+                **LINES[level],
+            )
+        axes.set_title(f"{title} {unit}")
+        axes.set_xlabel("position of the bar, proximal positive [mm]")
+        axes.set_ylim(bottom=0.0)
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=len(profiles))
+    return figure
+
+
+def markdown(results: Mapping[str, Any]) -> str:
+    """Return the section of the verification page: the meshes and their errors, as tables.
+
+    Parameters
+    ----------
+    results : dict
+        From `studies.mesh_refinement.run`.
+
+    Returns
+    -------
+    str
+        Markdown without a title.
+    """
+    finest = results["levels"][-1]["name"]
+    parts = [
+        _table(
+            (
+                "mesh",
+                "under the bar along × across [mm]",
+                "nodes",
+                "under spheres [mm]",
+                "nodes",
+                "elements through corneum, living, dermis, subcutis",
+            ),
+            [_mesh(level) for level in results["levels"]],
+        ),
+        f"Bar, one receptor, against {finest}; strain energy density (SED) as a share of its largest value:",
+        _table(ERROR_COLUMNS, _error_rows(results["bars"], finest)),
+        f"Spheres, 18 receptors, against {finest}:",
+        _table(ERROR_COLUMNS, _error_rows(results["spheres"], finest)),
+        "Goodness of fit at the shifts of the row above, parameters unchanged:",
+        _table(
+            ("mesh", "weighted FSS", "on the finer mesh"),
+            [
+                (name, fixed(row["fss"], 3), fixed(row["fss_finest"], 3))
+                for name, row in _against(results["bars"], finest)
+            ],
+        ),
+        "Hit rates of Gradient Sum at the paper's noise, sphere at 0.0 mm, the same random numbers:",
+        _table(
+            (
+                "mesh",
+                *(f"{measure}, {curvature:g} /m" for measure, curvature in _measures(results["spheres"])),
+            ),
+            [
+                (name, *(fixed(PERCENT * rate, 1) + " %" for measure in rates for rate in rates[measure]))
+                for name, rates in results["spheres"]["hit_rates"].items()
+            ],
+        ),
+        "One change of the standard mesh at a time, bar shifted to the highest peak:",
+        _table(
+            ("change", "SED, ramp", "SED, hold", "force"),
+            [
+                (name, *(_signed(change[key]) for key in ("sed_ramp", "sed_hold", "force")))
+                for name, change in results["one_at_a_time"].items()
+            ],
+        ),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+ERROR_COLUMNS = (
+    "mesh", "against", "touches", "SED, ramp: max", "RMS", "SED, hold: max", "RMS",
+    "dynamic rate: max [spikes/s]", "RMS", "static rate: max [spikes/s]", "RMS",
+)  # fmt: skip
+
+
+def _mesh(level: Mapping[str, Any]) -> Sequence[str]:
+    sizes = [
+        f"{number(level[name]['size_x_mm'])} × {number(level[name]['size_z_mm'])}"
+        for name in ("bar", "sphere")
+    ]
+    nodes = [number(level[name]["nodes"]) for name in ("bar", "sphere")]
+    counts = ", ".join(str(count) for count in level["bar"]["counts"])
+    return level["name"], sizes[0], nodes[0], sizes[1], nodes[1], counts
+
+
+def _against(section: Mapping[str, Any], finest: str) -> list[tuple[str, Mapping[str, Any]]]:
+    """Pairs of meshes that were compared; the last one is at every touch."""
+    rows = [(name, {**row, "against": finest}) for name, row in section["errors"].items()]
+    return [*rows, ("quick", {**section["quick_to_standard"], "against": "standard"})]
+
+
+def _error_rows(section: Mapping[str, Any], finest: str) -> list[Sequence[str]]:
+    return [
+        (
+            name,
+            row["against"],
+            str(row["touches"]),
+            *(_share(row["sed"][phase][key]) for phase in PHASES for key in ("max", "rms")),
+            *(fixed(row["rate"][phase][key], 1) for phase in RATES for key in ("max", "rms")),
+        )
+        for name, row in _against(section, finest)
+    ]
+
+
+def _measures(section: Mapping[str, Any]) -> list[tuple[str, float]]:
+    rates = next(iter(section["hit_rates"].values()))
+    return [(measure, curvature) for measure in rates for curvature in section["comparisons_per_m"]]
+
+
+def _share(value: float) -> str:
+    return f"{fixed(PERCENT * value, 1)} %"
+
+
+def _signed(value: float) -> str:
+    return ("+" if value > 0.0 else "") + _share(value)
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a Markdown table."""
+    lines = [columns, ["---"] * len(columns), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)

@@ -1,0 +1,297 @@
+"""Mesh errors: what is pressed, how differences are summed up, and what the page says of them."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fingerpad.encoding import neighbour_pairs
+from fingerpad.errors import InputError
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import Grading
+from fingerpad.indentation import touch_of
+from fingerpad.indenters import Sphere
+from fingerpad.mechanics.press import PressSettings
+from fingerpad.mesh import finger_mesh
+from fingerpad.population import Population
+from fingerpad.reference import bar_firing_rates
+from fingerpad.report import mesh_refinement as report
+from fingerpad.stimulus import RampAndHold
+from fingerpad.studies import mesh_refinement, single_unit, sphere_discrimination
+from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.studies.mesh_errors import (
+    Reading,
+    compare,
+    differences,
+    goodness_of_fit,
+    hit_rates,
+    observed_order,
+    over_thickness,
+    read,
+)
+
+RESULTS = Path(__file__).parents[1] / "docs" / "verification" / "mesh_refinement.json"
+COARSE = Grading(RECEPTOR_X_MM, 1.0, 1.0, 1.0, 1.0, stratum_corneum=1, dermis=1, subcutis=1)
+
+
+def reading(sed_kpa, touches=None, rate_hz=None):
+    """One receptor per column; rates follow SED unless said otherwise."""
+    sed = np.atleast_2d(np.asarray(sed_kpa, dtype=float))
+    rate = 10.0 * sed if rate_hz is None else np.asarray(rate_hz, dtype=float)
+    return Reading(
+        touches=tuple(range(len(sed))) if touches is None else tuple(touches),
+        sed_kpa={"ramp": sed, "hold": 0.5 * sed},
+        rate_hz={"dynamic": rate, "static": 0.5 * rate},
+        latency_ms=np.full(sed.shape, 20.0),
+        force_mn=100.0 * sed[:, 0],
+    )
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    """A real answer of a very coarse finger, for its shape: tests put their own energies into it."""
+    touch = touch_of(Fingertip(), Sphere(287.0), RampAndHold(depth_mm=0.2), grading=COARSE)
+    return replace(touch, settings=PressSettings(1, 1)).solve()
+
+
+def skin_with(pressed, sed_kpa, mesh=None):
+    """Skin with a SED of our own, (n_times, n_elements)."""
+    return replace(pressed, sed_kpa=sed_kpa, mesh=mesh or pressed.mesh)
+
+
+# What is pressed
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.5, 2.0, 3.0])
+def test_a_refined_mesh_has_the_factor_in_every_direction(factor):
+    finger = Fingertip()
+    before = finger_mesh(finger, COARSE).shape
+    after = finger_mesh(finger, mesh_refinement.refined(COARSE, factor)).shape
+    # Around and along, numbers are rounded up to even ones on either side of the centre.
+    assert np.abs(np.array(after[:2]) - factor * np.array(before[:2])).max() <= 4
+    assert after[2] == 4 * np.ceil(factor)
+
+
+def test_refined_keeps_the_zones_and_a_factor_of_one_keeps_the_mesh():
+    grading = Conditions("standard").bar_grading()
+    assert mesh_refinement.refined(grading, 1.0) == grading
+    finer = mesh_refinement.refined(grading, 1.5)
+    assert (finer.centre_mm, finer.half_length_mm) == (grading.centre_mm, grading.half_length_mm)
+    assert finer.counts == (6, 2, 6, 6)
+    assert finer.size_x_mm == pytest.approx(0.1 / 1.5)
+    # Over the distance that one standard element took, sizes grow as much as before.
+    assert finer.growth**1.5 == pytest.approx(grading.growth)
+
+
+def test_quick_and_standard_are_the_meshes_of_the_studies():
+    levels = {level.name: level for level in mesh_refinement.LEVELS}
+    for name in ("quick", "standard"):
+        conditions = Conditions(name)
+        assert list(levels[name].bars().values()) == single_unit.touches(conditions)
+        assert levels[name].balls() == sphere_discrimination.touches(conditions)
+
+
+def test_similar_meshes_press_the_same_at_the_same_places():
+    levels = [level for level in mesh_refinement.LEVELS if level.resolution == "standard"]
+    standard = single_unit.touches(Conditions("standard"))
+    assert [level.factor for level in levels] == sorted(level.factor for level in levels)
+    for level in levels:
+        for shift, touch in level.bars().items():
+            assert replace(touch, grading=standard[shift].grading) == standard[shift]
+        assert set(mesh_refinement.CHOSEN_SPHERES) <= set(level.spheres)
+
+
+def test_each_single_change_moves_one_thing():
+    standard = single_unit.touches(Conditions("standard"))[mesh_refinement.PEAK_SHIFT]
+    for touch in mesh_refinement.single_changes().values():
+        assert touch != standard
+        assert replace(touch, grading=standard.grading) == standard
+    for counts in mesh_refinement.step_changes().values():
+        few, many = counts.values()
+        assert replace(few, settings=many.settings) == many
+        assert (few.settings.ramp_steps, many.settings.hold_steps) == mesh_refinement.STEPS
+
+
+# How differences are summed up
+
+
+def test_differences_are_those_of_a_small_table():
+    found = differences(np.array([1.0, 2.0, 6.0]), np.array([1.0, 4.0, 2.0]), unit=2.0)
+    assert found == {"max": 2.0, "rms": pytest.approx(np.sqrt(5.0 / 3.0)), "mean": pytest.approx(1.0 / 3.0)}
+    with pytest.raises(InputError, match="must match"):
+        differences(np.zeros(2), np.zeros(3))
+
+
+def test_a_receptor_reads_the_mean_over_the_living_epidermis(pressed):
+    mesh = finger_mesh(Fingertip(), replace(COARSE, living_epidermis=2))
+    by_depth = np.array([5.0, 1.0, 4.0, 7.0, 7.0])  # corneum, two sheets of living epidermis, the rest
+    skin = skin_with(pressed, np.tile(by_depth, (3, mesh.shape[0] * mesh.shape[1])), mesh)
+    place = [[RECEPTOR_X_MM, 0.0]]
+    assert skin.sed(place).sed_kpa[-1, 0] == pytest.approx(4.0)
+    assert over_thickness(skin, 2).sed(place).sed_kpa[-1, 0] == pytest.approx(2.5)
+    assert np.array_equal(over_thickness(skin, 1).sed_kpa, skin.sed_kpa)
+
+
+def test_reading_takes_both_ends_and_lets_the_afferent_answer(pressed):
+    over_time = np.array([0.0, 1.0, 0.9])[:, None] * np.ones(len(pressed.mesh.elements))
+    skins = {"silent": skin_with(pressed, 0.0 * over_time), "strong": skin_with(pressed, 2.0 * over_time)}
+    found = read(skins, np.array([[RECEPTOR_X_MM, 0.0], [RECEPTOR_X_MM, 1.0]]), sheets=1)
+    assert found.touches == ("silent", "strong")
+    np.testing.assert_allclose(found.sed_kpa["ramp"], [[0.0, 0.0], [2.0, 2.0]])
+    np.testing.assert_allclose(found.sed_kpa["hold"], [[0.0, 0.0], [1.8, 1.8]])
+    assert (found.rate_hz["dynamic"][1] > found.rate_hz["static"][1]).all()
+    assert (found.rate_hz["static"][1] > found.rate_hz["static"][0]).all()
+    assert found.force_mn.tolist() == [pressed.force_mn[-1]] * 2
+
+
+def test_comparison_uses_common_touches_and_the_peak_of_the_finer_mesh():
+    finer = reading([[2.0], [4.0]], touches=[3, 7])
+    coarser = reading([[9.0], [2.2], [3.8]], touches=[1, 3, 7])
+    found = compare(coarser, finer)
+    assert found["touches"] == 2
+    assert found["sed"]["ramp"] == {
+        "max": pytest.approx(0.05),
+        "rms": pytest.approx(0.05),
+        "mean": pytest.approx(0.0),
+    }
+    assert found["rate"]["dynamic"]["max"] == pytest.approx(2.0)
+    assert found["rate"]["static"]["max"] == pytest.approx(1.0)
+    assert found["force"]["rms"] == pytest.approx(0.05)
+    itself = compare(finer, finer)
+    assert itself["sed"]["hold"]["max"] == itself["rate"]["dynamic"]["rms"] == 0.0
+
+
+def test_rates_as_observed_fit_perfectly_at_any_shifts():
+    observed, shifts = bar_firing_rates(), [4, 20, 31]
+    perfect = reading(np.ones((3, 1)), touches=shifts)
+    rates = {
+        "dynamic": observed.dynamic_rate_hz[shifts, None],
+        "static": observed.static_rate_hz[shifts, None],
+    }
+    assert goodness_of_fit(replace(perfect, rate_hz=rates)) == 1.0
+    silent = {phase: 0.0 * rate for phase, rate in rates.items()}
+    assert goodness_of_fit(replace(perfect, rate_hz=silent)) == 0.0
+
+
+def test_hit_rates_share_their_random_numbers_and_grow_with_the_difference():
+    population = Population.grid(rows=1, columns=2)
+    neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
+    spheres = [(0.0, 287.0), (0.0, 365.0)]
+    weak, strong = (
+        reading(np.ones((2, 2)), spheres, rate_hz=[[50.0, 60.0], [50.0, other]]) for other in (62.0, 66.0)
+    )
+    found = [hit_rates(mesh, 0.0, (287.0, 365.0), neighbours) for mesh in (weak, weak, strong)]
+    assert set(found[0]) == {"dynamic", "static", "latency"}
+    assert found[0]["static"] == found[1]["static"]
+    assert 0.5 < found[0]["static"][0] < found[2]["static"][0]
+    assert found[0]["latency"][0] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 2.0, 3.7])
+@pytest.mark.parametrize("scale", [-0.3, 0.7])
+def test_order_and_limit_of_a_power_are_found(order, scale):
+    factors = np.array([0.5, 1.0, 1.5])
+    found, limit = observed_order(2.0 + scale * factors**-order, factors)
+    assert found == pytest.approx(order, rel=1e-8)
+    assert limit == pytest.approx(2.0, rel=1e-8)
+
+
+@pytest.mark.parametrize("values", [(1.0, 2.0, 1.0), (1.0, 1.1, 1.5), (1.0, 2.0, 2.0), (1.0, 1.0, 2.0)])
+def test_no_order_is_made_up_where_values_do_not_settle(values):
+    assert observed_order(values, (0.5, 1.0, 1.5)) is None
+
+
+def test_order_needs_three_rising_factors():
+    with pytest.raises(InputError, match="three increasing factors"):
+        observed_order((1.0, 2.0, 3.0), (1.0, 1.0, 2.0))
+
+
+# A whole run, and what is shown of it
+
+ERROR = 0.1
+"""Made-up error of the standard mesh; it falls with the square of the elements' size."""
+
+
+@pytest.fixture(scope="module")
+def results(pressed, tmp_path_factory):
+    """Results of a run whose skin is a formula, wide bumps below the indenter with a known error."""
+    mesh = pressed.mesh
+    # The same through the thickness, so that its mean over any sheets is the formula itself.
+    column = np.repeat(mesh.living_epidermis.ravel(), mesh.shape[2])
+    x, _, z = mesh.nodes_mm[mesh.elements].mean(axis=1)[column].T
+    over_time = np.array([0.0, 1.0, 0.9])[:, None]
+
+    class Formula:
+        def __init__(self, folder):
+            pass
+
+        def holds(self, touch):
+            return False
+
+        def load(self, touch):
+            sphere = isinstance(touch.indenter, Sphere)
+            size = touch.grading.size_x_mm / (0.25 if sphere else 0.1)
+            width = 1000.0 / touch.indenter.curvature_per_m if sphere else 3.0
+            bump = 5.0 / width * np.exp(-(((x - touch.at_mm[0]) / width) ** 2) - (z / width) ** 2)
+            return skin_with(pressed, over_time * bump * (1.0 + ERROR * size**2))
+
+    solved = []
+    few = (mesh_refinement.PEAK_SHIFT, 18)
+    levels = tuple(replace(level, shifts=few) for level in mesh_refinement.LEVELS)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mesh_refinement, "Store", Formula)
+        patch.setattr(mesh_refinement, "LEVELS", levels)
+        patch.setattr(mesh_refinement, "solve_missing", lambda touches, *rest: solved.extend(touches))
+        found = mesh_refinement.run(tmp_path_factory.mktemp("refinement"))
+    return found, solved, levels
+
+
+def test_a_run_presses_every_mesh_and_finds_the_known_error_and_order(results):
+    found, solved, levels = results
+    n_steps = 2 * len(mesh_refinement.STEPS)
+    n_touches = sum(len(level.shifts) + len(level.spheres) for level in levels)
+    assert len(solved) == n_touches + len(mesh_refinement.ONE_AT_A_TIME) + n_steps
+    fine = 1.0 + ERROR / 1.5**2
+    expected = {
+        "coarse": (1.0 + 4.0 * ERROR) / fine - 1.0,
+        "quick": (1.0 + 4.0 * ERROR) / fine - 1.0,  # 0.2 mm against 0.1 mm
+        "standard": (1.0 + ERROR) / fine - 1.0,
+    }
+    for name, error in expected.items():
+        assert found["bars"]["errors"][name]["sed"]["ramp"]["max"] == pytest.approx(error, rel=1e-6)
+    assert found["spheres"]["errors"]["standard"]["sed"]["hold"]["max"] == pytest.approx(expected["standard"])
+    for row in found["bars"]["orders"]:
+        assert row["order"] == pytest.approx(2.0, rel=1e-6)
+        assert row["limit_kpa"] == pytest.approx(row["sed_kpa"][-1] / fine, rel=1e-6)
+    halved = (1.0 + ERROR / 4.0) / (1.0 + ERROR) - 1.0
+    assert found["one_at_a_time"]["half the size along the finger"]["sed_ramp"] == pytest.approx(halved)
+    assert found["one_at_a_time"]["twice the elements through the dermis"]["sed_hold"] == pytest.approx(0.0)
+    assert found["steps"]["bar"]["sed"]["ramp"]["max"] == 0.0
+
+
+def test_pages_say_every_mesh_with_its_errors(results):
+    found = results[0]
+    files = report.documents(found)
+    assert json.loads(files[report.NUMBERS]) == found
+    assert files[report.FIGURE].startswith(b"\x89PNG")
+    page = files[report.PAGE].decode()
+    error = 100.0 * found["bars"]["errors"]["standard"]["sed"]["ramp"]["max"]
+    assert f"| standard | fine | 2 | {error:.1f} %" in page
+    rate = 100.0 * found["spheres"]["hit_rates"]["fine"]["static"][1]
+    assert f"{rate:.1f} %" in page
+    for name in mesh_refinement.ONE_AT_A_TIME:
+        assert f"| {name} |" in page
+    tables = [block.splitlines() for block in page.split("\n\n") if block.startswith("|")]
+    for table in tables:
+        assert len({line.count("|") for line in table}) == 1
+    assert len(tables) == 6
+
+
+def test_the_figure_draws_every_mesh_in_every_panel(results):
+    figure = report.draw(results[0])
+    for axes in figure.axes:
+        assert [line.get_label() for line in axes.get_lines()] == [
+            level.name for level in mesh_refinement.LEVELS
+        ]
