@@ -9,6 +9,7 @@ from fingerpad.grading import Grading
 from fingerpad.indentation import Touch, grading_about, indent, settings_of, touch_of
 from fingerpad.indenters import Bar, Cylinder, Line, Plate, Sphere
 from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.stimulus import RampAndHold
@@ -61,6 +62,32 @@ def test_response_holds_one_row_per_time(skin):
     assert skin.force_mn[0] == 0.0
     assert skin.force_mn[2] > skin.force_mn[1] > 0.0
     assert (np.diff(skin.force_mn[2:]) < 0).all()
+
+
+def test_all_that_is_known_of_a_touch_agrees_with_what_the_skin_keeps(skin):
+    touch = coarse_touch()
+    done, sheet = touch.deform(), touch.mesh.living_epidermis.ravel()
+    assert done.fields.elements.tolist() == list(range(len(touch.mesh.elements)))
+    np.testing.assert_array_equal(done.sed_kpa, skin.sed_kpa)
+    np.testing.assert_array_equal(done.fields.von_mises_kpa[-1], skin.von_mises_kpa)
+    for name, kept in skin.sheet.items():
+        np.testing.assert_array_equal(done.fields.quantity(name)[:, sheet], kept)
+    assert set(skin.sheet) | {"stored"} == set(QUANTITIES)
+    assert skin.energy_imbalance == done.energy.relative_imbalance > 0.0
+    # What presses on the skin is the force, all of it below the ball and along its radius.
+    area = np.array([touch.mesh.skin_area_of(touch.mesh.nodes_mm + moved) for moved in done.displacement_mm])
+    pressing = 2 * (done.contact.pressure_kpa * area).sum(axis=1)
+    assert (pressing >= done.force_mn).all()
+    np.testing.assert_allclose(pressing, done.force_mn, rtol=0.1)
+    assert (np.diff(done.contact.area_mm2[:3]) > 0.0).all()
+
+
+def test_quantities_that_may_drive_an_afferent_peak_below_the_indenter(skin):
+    x = np.linspace(12.0, 23.0, 45)
+    for name in QUANTITIES:
+        course = skin.sample(name, np.column_stack([x, np.zeros(45)]))
+        assert course.shape == (skin.times_ms.size, 45)
+        assert abs(x[course[2].argmax()] - 17.37) < 1.5
 
 
 def test_energy_is_greatest_below_the_indenter(skin):

@@ -39,7 +39,10 @@ def response(mesh, field=None, displacement=None, axis_x_mm=0.0):
         sed_kpa=sed,
         axis_x_mm=axis_x_mm,
         direction=np.array([0.0, 1.0, 0.0]),
+        sheet={"von_mises": 7.0 * sed[:, mesh.living_epidermis.ravel()]},
+        von_mises_kpa=np.zeros(len(mesh.elements)),
         force_imbalance=0.0,
+        energy_imbalance=0.0,
         penetration_mm=0.0,
         newton_steps=0,
         factorisations=0,
@@ -88,6 +91,20 @@ def test_smooth_field_is_read_within_the_error_of_its_mesh():
 def test_energy_never_falls_below_zero_beside_a_steep_front():
     skin = response(block(), lambda centre: np.where(centre[:, 0] > 0.0, 5.0, 0.0))
     assert (skin.sed(SITES).sed_kpa >= 0.0).all()
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_other_quantities_are_read_like_the_stored_energy(symmetric):
+    skin = response(block(symmetric), bump)
+    stored = skin.sample("stored", SITES)
+    np.testing.assert_array_equal(stored, skin.sed(SITES).sed_kpa)
+    np.testing.assert_allclose(skin.sample("von_mises", SITES), 7.0 * stored, rtol=1e-5)
+
+
+@pytest.mark.parametrize("quantity", ["heat", "", "work"])
+def test_quantity_that_the_skin_does_not_know_is_refused(quantity):
+    with pytest.raises(InputError, match="quantity must be one of stored, von_mises: got"):
+        response(block()).sample(quantity, SITES)
 
 
 def test_finger_is_read_on_its_volar_side_only():

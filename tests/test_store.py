@@ -19,6 +19,7 @@ from fingerpad.fingertip import Fingertip
 from fingerpad.grading import Grading
 from fingerpad.indentation import Touch
 from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.mechanics.materials import Prony
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import PressSettings
@@ -44,7 +45,7 @@ SIX = [
     for depth in (0.10, 0.12, 0.14, 0.16, 0.18, 0.20)
 ]
 ARRAYS = [field.name for field in fields(SkinResponse) if field.type == "FloatArray"]
-SINGLE = ("sed_kpa", "displacement_mm", "skin_displacement_mm")
+SINGLE = ("sed_kpa", "displacement_mm", "skin_displacement_mm", "von_mises_kpa")
 
 
 LIMIT_S = 120.0
@@ -224,8 +225,12 @@ def test_what_comes_back_is_what_went_in_rounded_to_single_precision(stored, ski
         went, came = getattr(skin, name), getattr(back, name)
         assert came.dtype == np.float64
         np.testing.assert_array_equal(came, went.astype(np.float32) if name in SINGLE else went)
-    for name in ("kinks_ms", "axis_x_mm", "penetration_mm", "newton_steps", "factorisations"):
+    for name in ("kinks_ms", "axis_x_mm", "penetration_mm", "energy_imbalance", "newton_steps"):
         assert getattr(back, name) == getattr(skin, name)
+    for name in QUANTITIES:
+        if name != "stored":
+            np.testing.assert_array_equal(back.sheet[name], skin.sheet[name].astype(np.float32))
+    assert set(back.sheet) == set(skin.sheet)
     assert back.mesh is TINY.mesh
     assert (skin.sed_kpa != back.sed_kpa).any()  # or rounding would not have been tested
 
@@ -293,8 +298,10 @@ DAMAGES = {
     "array": an_array_of_its_own,
     "folder": a_folder,
     "array missing": without("sed_kpa"),
-    "work missing": without("work"),
-    "work of other shape": with_array("work", np.zeros(2)),
+    "solution missing": without("solution"),
+    "solution of other shape": with_array("solution", np.zeros(2)),
+    "strain missing": without("compressive_strain"),
+    "strain of another sheet": with_array("compressive_strain", np.zeros((3, 7))),
     "times of other shape": with_array("times_ms", np.zeros((3, 1))),
     "one time too few": with_array("times_ms", np.array([0.0, 50.0])),
     "one force too few": with_array("force_mn", np.zeros(2)),

@@ -15,8 +15,9 @@ from fingerpad.fingertip import Fingertip
 from fingerpad.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.indenters import Indenter
 from fingerpad.mechanics.contact import Placement, place
+from fingerpad.mechanics.fields import QUANTITIES, von_mises
 from fingerpad.mechanics.materials import Tissues
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import Deformation, PressSettings, press
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.mesh import Mesh, finger_mesh
 from fingerpad.parameters import fingertip as published
@@ -112,18 +113,7 @@ class Touch:
             If a step cannot be solved; nothing partial is returned.
         """
         mesh = self.mesh
-        placement = self.placement
-        # One thread: vector sums would otherwise depend on the number of cores, and idle threads only spin.
-        with threadpool_limits(limits=1):
-            done = press(
-                mesh,
-                self.tissues.layers,
-                self.indenter,
-                placement,
-                self.stimulus,
-                self.settings,
-                self.deepest_mm,
-            )
+        done = self._press(mesh.living_epidermis.ravel())
         return SkinResponse(
             mesh=mesh,
             times_ms=done.times_ms,
@@ -134,12 +124,46 @@ class Touch:
             displacement_mm=done.displacement_mm[-1],
             sed_kpa=done.sed_kpa,
             axis_x_mm=self.at_mm[0],
-            direction=placement.axis,
+            direction=self.placement.axis,
+            sheet={name: done.fields.quantity(name) for name in QUANTITIES if name != "stored"},
+            von_mises_kpa=von_mises(done.stress_kpa),
             force_imbalance=done.force_imbalance,
+            energy_imbalance=done.energy.relative_imbalance,
             penetration_mm=done.penetration_mm,
             newton_steps=done.newton_steps,
             factorisations=done.factorisations,
         )
+
+    def deform(self) -> Deformation:
+        """Press and return everything that is known of every element and node over time.
+
+        For looking at one touch (`fingerpad.export`); `solve` keeps what the later stages need.
+
+        Returns
+        -------
+        Deformation
+            Of the nodes and elements of `mesh`.
+
+        Raises
+        ------
+        ConvergenceError
+            If a step cannot be solved; nothing partial is returned.
+        """
+        return self._press(np.arange(len(self.mesh.elements)))
+
+    def _press(self, watched: np.ndarray) -> Deformation:
+        # One thread: vector sums would otherwise depend on the number of cores, and idle threads only spin.
+        with threadpool_limits(limits=1):
+            return press(
+                self.mesh,
+                self.tissues.layers,
+                self.indenter,
+                self.placement,
+                self.stimulus,
+                self.settings,
+                self.deepest_mm,
+                watched,
+            )
 
     @property
     def placement(self) -> Placement:

@@ -89,19 +89,23 @@ class Mesh:
 
     @cached_property
     def skin_area_mm2(self) -> FloatArray:
-        """Undeformed area of the skin that belongs to each of `skin_nodes` [mm²].
+        """Undeformed area of the skin that belongs to each of `skin_nodes`. [mm²]"""
+        return self.skin_area_of(self.nodes_mm)
+
+    def skin_area_of(self, nodes_mm: FloatArray) -> FloatArray:
+        """Area of the skin that belongs to each of `skin_nodes` when the nodes are at `nodes_mm`. [mm²]
 
         The integral of each node's bilinear shape function over the faces of the mesh.
         """
         grid = self.skin_grid
         faces = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
-        area = np.zeros(len(self.nodes_mm))
+        area = np.zeros(len(nodes_mm))
         for point in CORNERS[:4, :2] / np.sqrt(3.0):
             signs = CORNERS[:4, :2]
             shape = 0.25 * (1.0 + signs[:, 0] * point[0]) * (1.0 + signs[:, 1] * point[1])
             along = 0.25 * signs[:, 0] * (1.0 + signs[:, 1] * point[1])
             around = 0.25 * signs[:, 1] * (1.0 + signs[:, 0] * point[0])
-            corners = self.nodes_mm[faces]
+            corners = nodes_mm[faces]
             tangents = (np.einsum("a,fad->fd", weights, corners) for weights in (along, around))
             patch = np.linalg.norm(np.cross(*tangents), axis=1)
             np.add.at(area, faces, patch[:, None] * shape)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,7 +12,7 @@ from scipy.interpolate import CloughTocher2DInterpolator
 from scipy.spatial import Delaunay
 from threadpoolctl import threadpool_limits
 
-from fingerpad.checks import FloatArray, float_array
+from fingerpad.checks import FloatArray, float_array, one_of
 from fingerpad.errors import InputError
 from fingerpad.mesh import Mesh
 from fingerpad.signals import SedTraces
@@ -63,9 +64,17 @@ class SkinResponse:
         Where the indenter's axis meets the midline. [mm]
     direction : array (3,)
         Unit direction of pressing.
+    sheet : dict of str to array (n_times, n_sheet)
+        What else may drive an afferent, by the names of `mechanics.fields.QUANTITIES` except "stored", in the
+        elements `mesh.living_epidermis` (flattened).
+    von_mises_kpa : array (n_elements,)
+        Equivalent stress after von Mises at the last time. [kPa]
     force_imbalance : float
         Largest difference at any time between the indenter's force and the reaction of bone and nail, over
         that force.
+    energy_imbalance : float
+        Largest difference at any time between the indenter's work and what was stored, dissipated and held
+        by the contact, over that work.
     penetration_mm : float
         Deepest penetration of the indenter by any node at any time. [mm]
     newton_steps, factorisations : int
@@ -82,7 +91,10 @@ class SkinResponse:
     sed_kpa: FloatArray
     axis_x_mm: float
     direction: FloatArray
+    sheet: Mapping[str, FloatArray]
+    von_mises_kpa: FloatArray
     force_imbalance: float
+    energy_imbalance: float
     penetration_mm: float
     newton_steps: int
     factorisations: int
@@ -125,27 +137,54 @@ class SkinResponse:
         InputError
             If `sites` is not an array of pairs, or a site is not on the volar skin.
         """
+        return SedTraces(self.times_ms, self.sample("stored", sites), np.array(self.kinks_ms))
+
+    def sample(self, quantity: str, sites: ArrayLike) -> FloatArray:
+        """Anything that may drive an afferent, in the living epidermis below points of the undeformed skin.
+
+        Read as `sed` reads the stored energy density, which is one of them.
+
+        Parameters
+        ----------
+        quantity : str
+            "stored", "instantaneous" or "work" (energy densities by their three definitions), "von_mises",
+            "compressive_stress" [all kPa] or "compressive_strain" (logarithmic).
+        sites : array (n_sites, 2)
+            x and z on the volar skin. [mm]
+
+        Returns
+        -------
+        array (n_times, n_sites)
+            Never negative.
+
+        Raises
+        ------
+        InputError
+            If the quantity is unknown, `sites` is not an array of pairs, or a site is not on the volar skin.
+        """
+        one_of("quantity", quantity, ("stored", *self.sheet))
         points = float_array("sites", sites, 2)
         if points.shape[1] != 2:
             raise InputError(f"sites needs two columns, x and z in mm: got shape {points.shape}.")
-        triangulation, elements = self._border
+        triangulation, rows = self._border
         outside = np.flatnonzero(triangulation.find_simplex(points) < 0)
         if outside.size:
             x, z = points[outside[0]]
             raise InputError(
                 f"sites must lie on the volar skin of the mesh: (x, z) = ({x:g}, {z:g}) mm does not."
             )
-        sed_kpa = self.sed_kpa[:, elements].T.astype(np.float64)
-        interpolate = CloughTocher2DInterpolator(triangulation, sed_kpa)
+        stored = self.sed_kpa[:, self.mesh.living_epidermis.ravel()]
+        values = (stored if quantity == "stored" else self.sheet[quantity])[:, rows]
+        interpolate = CloughTocher2DInterpolator(triangulation, values.T.astype(np.float64))
         if self.mesh.symmetry_nodes.size:
             # Diagonals of the triangles are not mirrored: without this, a site and its mirror image differ.
             points = np.column_stack([points[:, 0], np.abs(points[:, 1])])
-        # The cubic may dip below zero beside a steep front; an energy cannot.
-        return SedTraces(self.times_ms, np.maximum(interpolate(points).T, 0.0), np.array(self.kinks_ms))
+        # The cubic may dip below zero beside a steep front; none of the quantities can.
+        return np.maximum(interpolate(points).T, 0.0)
 
     @cached_property
     def _border(self) -> tuple[Delaunay, np.ndarray]:
-        """Triangulated (x, z) of the volar sheet of living epidermis, and its elements; both halves."""
+        """Triangulated (x, z) of the volar sheet of living epidermis, and its rows; both halves."""
         mesh = self.mesh
         elements = mesh.living_epidermis.ravel()
         if not elements.size:
@@ -155,12 +194,12 @@ class SkinResponse:
         # The upper face (last four nodes) looks towards the skin: volar where its normal has y < 0.
         normal = np.cross(corners[:, 6] - corners[:, 4], corners[:, 7] - corners[:, 5])
         volar = normal[:, 1] < 0.0
-        plane, elements = centre[volar][:, [0, 2]], elements[volar]
+        plane, rows = centre[volar][:, [0, 2]], np.flatnonzero(volar)
         if mesh.symmetry_nodes.size:
-            plane, elements = np.vstack([plane, plane * [1.0, -1.0]]), np.tile(elements, 2)
+            plane, rows = np.vstack([plane, plane * [1.0, -1.0]]), np.tile(rows, 2)
         triangulation = Delaunay(plane)
         # Its first search solves one 2x2 system per triangle, for each of which OpenBLAS would wake its
         # threads: on busy processors 8 ms a triangle, half a minute in all.
         with threadpool_limits(limits=1):
             triangulation.find_simplex(plane[:1])
-        return triangulation, elements
+        return triangulation, rows

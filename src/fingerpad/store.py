@@ -31,6 +31,7 @@ from fingerpad.checks import whole
 from fingerpad.errors import InputError, StoreError
 from fingerpad.files import write_atomically
 from fingerpad.indentation import Touch
+from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.sampling import SkinResponse
 
 MECHANICAL_SOURCES = (
@@ -52,9 +53,11 @@ _ARRAYS = (
     "skin_displacement_mm",
     "displacement_mm",
     "sed_kpa",
+    "von_mises_kpa",
     "direction",
 )
-_SINGLE_PRECISION = ("skin_displacement_mm", "displacement_mm", "sed_kpa")
+_SHEET = tuple(name for name in QUANTITIES if name != "stored")
+_SINGLE_PRECISION = ("skin_displacement_mm", "displacement_mm", "sed_kpa", "von_mises_kpa", *_SHEET)
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _LOOK_FOR_PARENT_S = 1.0
 
@@ -152,7 +155,7 @@ class Store:
         try:
             # Opened here, since np.load leaves the file open where the archive is damaged.
             with open(path, "rb") as opened, np.load(opened, allow_pickle=False) as file:
-                content = {name: file[name].astype(np.float64) for name in (*_ARRAYS, "work")}
+                content = {name: file[name].astype(np.float64) for name in (*_ARRAYS, *_SHEET, "solution")}
         except Exception as error:  # bytes that are not ours may fail in any way
             said = " ".join(str(error).split()).rstrip(".")
             raise StoreError(
@@ -161,12 +164,14 @@ class Store:
         for name, shape in _shapes(touch, content["times_ms"].size).items():
             if content[name].shape != shape or not np.isfinite(content[name]).all():
                 raise StoreError(f"The stored result {path} is damaged in {name}: delete it and run again.")
-        imbalance, penetration, newton_steps, factorisations = content.pop("work")
+        of_force, of_energy, penetration, newton_steps, factorisations = content.pop("solution")
         return SkinResponse(
             mesh=touch.mesh,
             kinks_ms=(touch.stimulus.ramp_ms,),
             axis_x_mm=touch.at_mm[0],
-            force_imbalance=float(imbalance),
+            sheet={name: content.pop(name) for name in _SHEET},
+            force_imbalance=float(of_force),
+            energy_imbalance=float(of_energy),
             penetration_mm=float(penetration),
             newton_steps=int(newton_steps),
             factorisations=int(factorisations),
@@ -184,24 +189,27 @@ def _shapes(touch: Touch, n_times: int) -> dict[str, tuple[int, ...]]:
         "sed_kpa": (n_times, len(mesh.elements)),
         "skin_displacement_mm": (n_times, mesh.skin_nodes.size, 3),
         "displacement_mm": mesh.nodes_mm.shape,
+        "von_mises_kpa": (len(mesh.elements),),
         "direction": (3,),
-        "work": (4,),
+        **dict.fromkeys(_SHEET, (n_times, mesh.living_epidermis.size)),
+        "solution": (5,),
     }
 
 
 def _packed(response: SkinResponse) -> bytes:
     """Content of a stored file."""
-    content: dict[str, Any] = {name: getattr(response, name) for name in _ARRAYS}
+    content: dict[str, Any] = {name: getattr(response, name) for name in _ARRAYS} | dict(response.sheet)
     for name in _SINGLE_PRECISION:
         content[name] = content[name].astype(np.float32)
-    work = [
+    solution = [
         response.force_imbalance,
+        response.energy_imbalance,
         response.penetration_mm,
         response.newton_steps,
         response.factorisations,
     ]
     buffer = io.BytesIO()
-    np.savez(buffer, **content, work=np.array(work, dtype=np.float64))
+    np.savez(buffer, **content, solution=np.array(solution, dtype=np.float64))
     return buffer.getvalue()
 
 

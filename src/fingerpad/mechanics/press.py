@@ -11,7 +11,23 @@ from fingerpad.checks import FloatArray, positive, whole
 from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.indenters import Indenter
 from fingerpad.mechanics.assembly import Sparsity
+from fingerpad.mechanics.balance import (
+    EnergyBalance,
+    Entry,
+    contact_energy,
+    dissipated_energy,
+    energy_balance,
+)
 from fingerpad.mechanics.contact import Contact, Placement
+from fingerpad.mechanics.fields import (
+    ElementFields,
+    FieldState,
+    SkinContact,
+    Watched,
+    cauchy_stress,
+    fields_over_time,
+    skin_contact,
+)
 from fingerpad.mechanics.linear import NO_NODES, LinearSolver, free_degrees_of_freedom, preconditioner
 from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.newton import (
@@ -87,6 +103,14 @@ class Deformation:
     force_imbalance : float
         Largest difference at any time between the indenter's force and the reaction of the supports, over
         that force.
+    stress_kpa : array (n_elements, 6)
+        Cauchy stress of all elements at the last time, as in `ElementFields`. [kPa]
+    fields : ElementFields
+        Stress, strain and energies over time of the elements that were watched.
+    contact : SkinContact
+        Pressure on the skin and area of contact over time.
+    energy : EnergyBalance
+        Where the work of the indenter went.
     penetration_mm : float
         Deepest penetration at any time. [mm]
     newton_steps, factorisations : int
@@ -100,6 +124,10 @@ class Deformation:
     depth_mm: FloatArray
     reaction_mn: FloatArray
     force_imbalance: float
+    stress_kpa: FloatArray
+    fields: ElementFields
+    contact: SkinContact
+    energy: EnergyBalance
     penetration_mm: float
     newton_steps: int
     factorisations: int
@@ -115,6 +143,8 @@ class _Moment:
     depth_rate: float
     history: StressHistory
     sed_kpa: FloatArray
+    fields: FieldState
+    ledger: tuple[Entry, ...]
 
 
 @dataclass
@@ -126,6 +156,7 @@ class _Press:
     stimulus: Stimulus
     solver: LinearSolver
     newton: NewtonSettings
+    watched: Watched
     newton_steps: int = 0
 
     def unloaded(self) -> _Moment:
@@ -135,7 +166,10 @@ class _Press:
         touch = self.contact.state(mesh.nodes_mm[self.contact.nodes], 0.0, no_force)
         rest = Equilibrium(nowhere, 0.0, touch, no_force, 0, Balance(np.zeros(3), 0.0))
         history = StressHistory.unloaded(len(mesh.elements), table.shares.shape[1])
-        return _Moment(0.0, rest, nowhere, 0.0, history, np.zeros(len(mesh.elements)))
+        unstrained = FieldState.unloaded(len(mesh.nodes_mm), len(self.watched.elements))
+        return _Moment(
+            0.0, rest, nowhere, 0.0, history, np.zeros(len(mesh.elements)), unstrained, (Entry(),)
+        )  # fmt: skip
 
     def step(self, start: _Moment, target_ms: float) -> _Moment:
         """Solve one step; `start` stays as it is, so a step that fails or is too long can be repeated."""
@@ -150,6 +184,10 @@ class _Press:
         instantaneous, energies, volumetric = instantaneous_state(
             mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, table
         )
+        spent = dissipated_energy(
+            mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, table, step_ms,
+            start.history, instantaneous, energies,
+        )  # fmt: skip
         history = start.history.advanced(load.step, mesh.layer, instantaneous)
         sed_kpa = stored_energy_density(
             mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, table,
@@ -157,7 +195,30 @@ class _Press:
         )  # fmt: skip
         velocity = (found.displacement_mm - start.found.displacement_mm) / step_ms
         depth_rate = (found.depth_mm - start.found.depth_mm) / step_ms
-        return _Moment(target_ms, found, velocity, depth_rate, history, sed_kpa)
+        fields = self.watched.after(
+            start.fields, found.displacement_mm, history, energies, volumetric, sed_kpa
+        )  # fmt: skip
+        stored = float(energies[:, :, 0].sum(axis=1) @ sed_kpa)
+        ledger = (*start.ledger, self.entry(start, target_ms, found, stored, spent))
+        return _Moment(target_ms, found, velocity, depth_rate, history, sed_kpa, fields, ledger)
+
+    def entry(
+        self, start: _Moment, target_ms: float, found: Equilibrium, stored_uj: float, spent_uj: float
+    ) -> Entry:
+        """Energies of the whole body at the end of a step, from those of the body as it is meshed."""
+        parts = 2.0 if self.body.mesh.symmetry_nodes.size else 1.0
+        last, before, now = start.ledger[-1], start.found.contact, found.contact
+        pressed_before = np.linalg.norm(before.force_mn, axis=1)
+        pressed_now = np.linalg.norm(now.force_mn, axis=1)
+        squeezed = contact_energy(before.gap_mm, pressed_before, now.gap_mm, pressed_now)
+        return Entry(
+            time_ms=target_ms,
+            depth_mm=found.depth_mm,
+            force_mn=parts * float(now.force_mn.sum(axis=0) @ self.contact.placement.axis),
+            stored_uj=parts * stored_uj,
+            dissipated_uj=last.dissipated_uj + parts * spent_uj,
+            contact_uj=last.contact_uj + parts * squeezed,
+        )
 
     def load(self, start: _Moment, target_ms: float) -> Load:
         """Indenter at the end of a step: at its depth, or with its force on the body as it is meshed."""
@@ -190,6 +251,7 @@ def press(
     stimulus: Stimulus,
     settings: PressSettings | None = None,
     deepest_mm: float = np.inf,
+    watched: np.ndarray | None = None,
 ) -> Deformation:
     """Solve a whole ramp and hold.
 
@@ -209,6 +271,8 @@ def press(
         Steps and tolerances.
     deepest_mm : float
         Depth that a force must not exceed. [mm]
+    watched : int array, optional
+        Elements whose stress and strain are kept over time; all by default.
 
     Returns
     -------
@@ -233,8 +297,11 @@ def press(
     body = Body(mesh, table, sparsity, free)
     solver = LinearSolver(sparsity, free, preconditioner(sparsity, free, mesh.nodes_mm))
 
-    job = _Press(body, contact, stimulus, solver, _newton_settings(settings))
-    reached = []
+    chosen = np.arange(len(mesh.elements)) if watched is None else watched
+    follow = Watched(chosen, mesh.nodes_mm, mesh.elements[chosen], mesh.layer[chosen], table)
+    job = _Press(body, contact, stimulus, solver, _newton_settings(settings), follow)
+    moment = job.unloaded()
+    reached, felt = [], [moment.fields.felt]
     for moment in _moments(job, settings):
         if moment.found.depth_mm > deepest_mm and isinstance(stimulus, ForceRampAndHold):
             raise InputError(
@@ -244,6 +311,7 @@ def press(
             )
         # Without its history, which is as large as all else together.
         reached.append((moment.time_ms, moment.found, moment.sed_kpa))
+        felt.append(moment.fields.felt)
     times = np.array([0.0, *(time_ms for time_ms, _, _ in reached)])
     whole_body = 2.0 if mesh.symmetry_nodes.size else 1.0
     # Across the plane of symmetry the reactions of the two halves cancel.
@@ -251,12 +319,15 @@ def press(
     displacement = np.zeros((times.size, *mesh.nodes_mm.shape))
     force, sed = np.zeros(times.size), np.zeros((times.size, len(mesh.elements)))
     depth, reaction, imbalance, deepest = np.zeros(times.size), np.zeros((times.size, 3)), 0.0, 0.0
+    pressed = np.zeros((times.size, mesh.skin_nodes.size))
+    rows = np.searchsorted(mesh.skin_nodes, contact.nodes)
     for n, (_, found, sed_kpa) in enumerate(reached, start=1):
         displacement[n], depth[n], sed[n] = found.displacement_mm, found.depth_mm, sed_kpa
         force[n] = whole_body * found.contact.force_mn.sum(axis=0) @ placement.axis
         reaction[n] = both_halves * found.balance.reaction_mn
         imbalance = max(imbalance, found.balance.imbalance)
         deepest = max(deepest, found.contact.penetration_mm)
+        pressed[n, rows] = np.linalg.norm(found.contact.force_mn, axis=1)
     return Deformation(
         times_ms=times,
         force_mn=force,
@@ -265,6 +336,10 @@ def press(
         depth_mm=depth,
         reaction_mn=reaction,
         force_imbalance=imbalance,
+        stress_kpa=cauchy_stress(mesh, table, displacement[-1], moment.history),
+        fields=fields_over_time(chosen, felt),
+        contact=skin_contact(mesh, displacement, pressed),
+        energy=energy_balance(moment.ledger, kinks_ms=(stimulus.ramp_ms,)).at(times),
         penetration_mm=deepest,
         newton_steps=job.newton_steps,
         factorisations=solver.renewals,

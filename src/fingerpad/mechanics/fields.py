@@ -1,0 +1,412 @@
+"""Stress, strain and energies of elements over time, for whoever asks more of a press than where nodes went.
+
+Everything is a mean over the element, since a brick with one pressure knows no more than that:
+
+- deformation: the mean gradient Fbar = 1/V sum_q w_q F_q, scaled so that its determinant is the element's
+  dilatation Jbar = v/V. One gradient for all strain measures keeps them compatible with each other; its
+  logarithm has the trace ln Jbar, and for a smooth field it differs from the mean of the points' strains only
+  by the square of the element's size.
+- stress: Cauchy, mean over the present volume, 1/v sum_q w_q tau_q with
+  tau_q = dev(F~ (S0 - sum S_i) F~')_q + p J_q 1, and p the element's one pressure.
+- energy density by three definitions: *stored* (what springs hold now), *instantaneous* (W0 + U, what they
+  would hold had nothing relaxed) and *work* (the integral of S : dE, with what was spent on the way).
+
+Tensors are stored as xx, yy, zz, xy, yz, xz; shear strains are those of the tensor, not the engineer's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from fingerpad.checks import FloatArray, one_of
+from fingerpad.mechanics.element import (
+    COLUMN,
+    N_NODES,
+    N_POINTS,
+    ROW,
+    _gradients,
+    _invert,
+    _push_forward,
+    element_state,
+    frame_scale,
+)
+from fingerpad.mechanics.materials import COUPLED, MaterialTable
+from fingerpad.mechanics.viscoelastic import StressHistory
+from fingerpad.mesh import Mesh
+
+TENSOR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
+"""Where the components of a 3x3 tensor stand among the six that are stored."""
+
+
+@dataclass(frozen=True)
+class ElementFields:
+    """What some elements feel, over time.
+
+    Parameters
+    ----------
+    elements : int array (n_elements,)
+        Numbers of the elements in their mesh.
+    gradient : array (n_times, n_elements, 3, 3)
+        Mean deformation gradient, its determinant the dilatation of the element.
+    stress_kpa : array (n_times, n_elements, 6)
+        Cauchy stress, mean over the present volume. [kPa]
+    stored_kpa, instantaneous_kpa, work_kpa : array (n_times, n_elements)
+        Strain energy density per reference volume by its three definitions. [kPa = µJ/mm³]
+
+    Examples
+    --------
+    One element, stretched to 1.21 times its length at constant volume, under a uniaxial tension of 6 kPa:
+
+    >>> stretched = np.diag([1.21, 1 / 1.1, 1 / 1.1]).reshape(1, 1, 3, 3)
+    >>> tension = np.array([[[6.0, 0, 0, 0, 0, 0]]])
+    >>> energy = np.array([[0.5]])
+    >>> felt = ElementFields(np.array([0]), stretched, tension, energy, energy, energy)
+    >>> felt.von_mises_kpa.tolist(), felt.compressive_strain.round(4).tolist()
+    ([[6.0]], [[0.0953]])
+    """
+
+    elements: np.ndarray
+    gradient: FloatArray
+    stress_kpa: FloatArray
+    stored_kpa: FloatArray
+    instantaneous_kpa: FloatArray
+    work_kpa: FloatArray
+
+    @property
+    def strain(self) -> FloatArray:
+        """Logarithmic (Hencky) strain 1/2 ln(F F') in the present frame, (n_times, n_elements, 6)."""
+        squares, axes = np.linalg.eigh(self.gradient @ self.gradient.swapaxes(-1, -2))
+        logarithm = (axes * 0.5 * np.log(squares)[..., None, :]) @ axes.swapaxes(-1, -2)
+        return logarithm[..., ROW, COLUMN]
+
+    @property
+    def green_lagrange_strain(self) -> FloatArray:
+        """Green-Lagrange strain 1/2 (F' F - 1) in the reference frame, (n_times, n_elements, 6)."""
+        strain = 0.5 * (self.gradient.swapaxes(-1, -2) @ self.gradient - np.eye(3))
+        return strain[..., ROW, COLUMN]
+
+    @property
+    def principal_strain(self) -> FloatArray:
+        """Principal logarithmic strains, smallest first, (n_times, n_elements, 3)."""
+        stretches = np.linalg.svd(self.gradient, compute_uv=False)[..., ::-1]
+        return np.log(stretches).astype(np.float64)
+
+    @property
+    def principal_stress_kpa(self) -> FloatArray:
+        """Principal Cauchy stresses, tension positive, smallest first, (n_times, n_elements, 3). [kPa]"""
+        return np.linalg.eigvalsh(self.stress_kpa[..., TENSOR]).astype(np.float64)
+
+    @property
+    def von_mises_kpa(self) -> FloatArray:
+        """Equivalent stress after von Mises, sqrt(3/2 s : s), (n_times, n_elements). [kPa]"""
+        return von_mises(self.stress_kpa)
+
+    @property
+    def pressure_kpa(self) -> FloatArray:
+        """Mean compressive stress, -tr(sigma)/3, (n_times, n_elements). [kPa]"""
+        return -self.stress_kpa[..., :3].mean(axis=-1)
+
+    @property
+    def compressive_strain(self) -> FloatArray:
+        """Largest compressive logarithmic strain; 0 where nothing is compressed, (n_times, n_elements)."""
+        return np.maximum(-self.principal_strain[..., 0], 0.0)
+
+    @property
+    def compressive_stress_kpa(self) -> FloatArray:
+        """Largest compressive stress; 0 where there is none, (n_times, n_elements). [kPa]"""
+        return np.maximum(-self.principal_stress_kpa[..., 0], 0.0)
+
+    def quantity(self, name: str) -> FloatArray:
+        """One number per time and element that may drive an afferent.
+
+        Parameters
+        ----------
+        name : str
+            One of `QUANTITIES`.
+
+        Returns
+        -------
+        array (n_times, n_elements)
+            In kPa, except strain.
+        """
+        return QUANTITIES[one_of("quantity", name, tuple(QUANTITIES))](self)
+
+
+QUANTITIES: dict[str, Callable[[ElementFields], FloatArray]] = {
+    "stored": lambda felt: felt.stored_kpa,
+    "instantaneous": lambda felt: felt.instantaneous_kpa,
+    "work": lambda felt: felt.work_kpa,
+    "von_mises": lambda felt: felt.von_mises_kpa,
+    "compressive_strain": lambda felt: felt.compressive_strain,
+    "compressive_stress": lambda felt: felt.compressive_stress_kpa,
+}
+"""What may drive an afferent, none of it negative: three energy densities, two stresses and a strain."""
+
+
+def von_mises(stress_kpa: FloatArray) -> FloatArray:
+    """Equivalent stress of tensors (..., 6), sqrt(3/2 s : s) with the deviator s. [kPa]
+
+    Examples
+    --------
+    >>> von_mises(np.array([0.0, 0.0, 0.0, 2.0, 0.0, 0.0])).round(4).item()  # pure shear: sqrt(3) times it
+    3.4641
+    """
+    mean = stress_kpa[..., :3].mean(axis=-1, keepdims=True)
+    normal = ((stress_kpa[..., :3] - mean) ** 2).sum(axis=-1)
+    return np.sqrt(1.5 * (normal + 2.0 * (stress_kpa[..., 3:] ** 2).sum(axis=-1)))
+
+
+class Felt(NamedTuple):
+    """What the watched elements feel at one time: `ElementFields` without the axis of time."""
+
+    gradient: FloatArray
+    stress_kpa: FloatArray
+    stored_kpa: FloatArray
+    instantaneous_kpa: FloatArray
+    work_kpa: FloatArray
+
+
+@dataclass(frozen=True)
+class FieldState:
+    """State of the watched elements at one time, with what the next step's work is counted from.
+
+    Parameters
+    ----------
+    felt : Felt
+        What the elements feel.
+    displacement_mm : array (n_nodes, 3)
+        Displacements of all nodes. [mm]
+    convected_kpa : array (n_elements, 8, 6)
+        S0 - sum S_i, the relaxing stress in the convected frame. [kPa]
+    pressure_kpa, dilatation : array (n_elements,)
+        U'(Jbar) and Jbar. [kPa, -]
+    """
+
+    felt: Felt
+    displacement_mm: FloatArray
+    convected_kpa: FloatArray
+    pressure_kpa: FloatArray
+    dilatation: FloatArray
+
+    @classmethod
+    def unloaded(cls, n_nodes: int, n_elements: int) -> FieldState:
+        """State of a body at rest."""
+        zeros = np.zeros(n_elements)
+        rest = Felt(np.tile(np.eye(3), (n_elements, 1, 1)), np.zeros((n_elements, 6)), zeros, zeros, zeros)
+        convected = np.zeros((n_elements, N_POINTS, 6))
+        return cls(rest, np.zeros((n_nodes, 3)), convected, zeros, np.ones(n_elements))
+
+
+def fields_over_time(elements: np.ndarray, felt: Sequence[Felt]) -> ElementFields:
+    """Stack what the watched elements feel at each time."""
+    return ElementFields(elements, *(np.stack(values) for values in zip(*felt, strict=True)))
+
+
+@dataclass(frozen=True)
+class Watched:
+    """Elements whose fields are followed through a press.
+
+    Parameters
+    ----------
+    elements : int array (n_elements,)
+        Their numbers.
+    nodes_mm : array (n_nodes, 3)
+        Reference nodes of the whole mesh. [mm]
+    corners : int array (n_elements, 8)
+        Their nodes.
+    layer : int array (n_elements,)
+        Their row of the material table.
+    table : MaterialTable
+        Laws.
+    """
+
+    elements: np.ndarray
+    nodes_mm: FloatArray
+    corners: np.ndarray
+    layer: np.ndarray
+    table: MaterialTable
+
+    def after(
+        self,
+        before: FieldState,
+        displacement_mm: FloatArray,
+        history: StressHistory,
+        energies: FloatArray,
+        volumetric_kpa: FloatArray,
+        stored_kpa: FloatArray,
+    ) -> FieldState:
+        """State at the end of a step.
+
+        Parameters
+        ----------
+        before : FieldState
+            State at its start.
+        displacement_mm : array (n_nodes, 3)
+            Displacements at its end. [mm]
+        history, energies, volumetric_kpa, stored_kpa
+            State, weights and energies W0, energy U and stored energy density of all elements of the mesh at
+            its end, as `viscoelastic` gives them.
+
+        Returns
+        -------
+        FieldState
+        """
+        chosen, n = self.elements, len(self.elements)
+        convected = history.instantaneous[chosen] - history.relaxed[:, chosen].sum(axis=0)
+        gradient, stress = np.empty((n, 3, 3)), np.empty((n, 6))
+        pressure, dilatation, work = np.empty(n), np.empty(n), np.empty(n)
+        _mean_fields(
+            self.nodes_mm, self.corners, displacement_mm, self.layer, self.table.law, convected,
+            pressure, dilatation, gradient, stress,
+        )  # fmt: skip
+        _isochoric_work(
+            self.nodes_mm, self.corners, self.layer, self.table.law, before.displacement_mm, displacement_mm,
+            before.dilatation, dilatation, before.convected_kpa, convected, work,
+        )  # fmt: skip
+        work += 0.5 * (before.pressure_kpa + pressure) * (dilatation - before.dilatation)
+        weights, isochoric = energies[chosen, :, 0], energies[chosen, :, 1]
+        instantaneous = (weights * isochoric).sum(axis=1) / weights.sum(axis=1) + volumetric_kpa[chosen]
+        felt = Felt(gradient, stress, stored_kpa[chosen], instantaneous, before.felt.work_kpa + work)
+        return FieldState(felt, displacement_mm, convected, pressure, dilatation)
+
+
+@dataclass(frozen=True)
+class SkinContact:
+    """Where and how hard the indenter presses, over time.
+
+    Parameters
+    ----------
+    pressure_kpa : array (n_times, n_skin_nodes)
+        Force on each node of `mesh.skin_nodes` over the present area that belongs to it. [kPa]
+    area_mm2, present_area_mm2 : array (n_times,)
+        Skin that belongs to pressed nodes, undeformed and as it is then; of the whole body also when half
+        of it is solved. [mm²]
+    """
+
+    pressure_kpa: FloatArray
+    area_mm2: FloatArray
+    present_area_mm2: FloatArray
+
+
+def skin_contact(mesh: Mesh, displacement_mm: FloatArray, pressed_mn: FloatArray) -> SkinContact:
+    """Pressure and area from the force on each node of the skin.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The undeformed body.
+    displacement_mm : array (n_times, n_nodes, 3)
+        Displacements. [mm]
+    pressed_mn : array (n_times, n_skin_nodes)
+        Forces on `mesh.skin_nodes`. [mN]
+
+    Returns
+    -------
+    SkinContact
+    """
+    present = np.array([mesh.skin_area_of(mesh.nodes_mm + moved) for moved in displacement_mm])
+    whole_body = 2.0 if mesh.symmetry_nodes.size else 1.0
+    touching = pressed_mn > 0.0
+    return SkinContact(
+        pressed_mn / present,
+        whole_body * (touching * mesh.skin_area_mm2).sum(axis=1),
+        whole_body * (touching * present).sum(axis=1),
+    )
+
+
+def cauchy_stress(
+    mesh: Mesh, table: MaterialTable, displacement_mm: FloatArray, history: StressHistory
+) -> FloatArray:
+    """Mean Cauchy stress of all elements of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The undeformed body.
+    table : MaterialTable
+        Laws.
+    displacement_mm : array (n_nodes, 3)
+        Displacements. [mm]
+    history : StressHistory
+        Relaxation up to then.
+
+    Returns
+    -------
+    array (n_elements, 6)
+        [kPa]
+    """
+    n = len(mesh.elements)
+    stress, gradient, pressure, dilatation = np.empty((n, 6)), np.empty((n, 3, 3)), np.empty(n), np.empty(n)
+    _mean_fields(
+        mesh.nodes_mm, mesh.elements, displacement_mm, mesh.layer, table.law,
+        history.instantaneous - history.relaxed.sum(axis=0), pressure, dilatation, gradient, stress,
+    )  # fmt: skip
+    return stress
+
+
+@njit(cache=True)
+def _mean_fields(  # type: ignore[no-untyped-def]
+    nodes, corners, displacement, layer, law, convected, pressure, dilatation, mean_gradient, stress
+):
+    """Write pressure U'(Jbar), Jbar, the scaled mean gradient and the mean Cauchy stress of all elements."""
+    weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
+    gradients, inverse, spatial = np.empty((N_POINTS, 3, 3)), np.empty((3, 3)), np.empty(6)
+    unused, unused_energies = np.empty((N_POINTS, 6)), np.empty((N_POINTS, 2))
+    for e in range(corners.shape[0]):
+        material, moved = law[layer[e]], displacement[corners[e]]
+        volume = _gradients(nodes[corners[e]], moved, weights, slopes, gradients)
+        _, pressure[e], dilatation[e] = element_state(
+            nodes[corners[e]], moved, material, unused, unused_energies
+        )
+        mean_gradient[e], stress[e], spherical = 0.0, 0.0, 0.0
+        for q in range(N_POINTS):
+            scale = frame_scale(material, _invert(gradients[q], inverse), dilatation[e])
+            _push_forward(gradients[q], scale, convected[e, q], spatial)
+            mean = (spatial[0] + spatial[1] + spatial[2]) / 3.0
+            spherical += weights[q] * mean
+            for k in range(6):
+                stress[e, k] += weights[q] * (spatial[k] - (mean if k < 3 else 0.0))
+            for i in range(3):
+                for j in range(3):
+                    mean_gradient[e, i, j] += weights[q] / volume * gradients[q, i, j]
+        present_volume = dilatation[e] * volume
+        # A law that couples shape and volume carries its pressure in the convected stress, others in U.
+        hydrostatic = pressure[e] + (spherical / present_volume if material[8] == COUPLED else 0.0)
+        for k in range(6):
+            stress[e, k] = stress[e, k] / present_volume + (hydrostatic if k < 3 else 0.0)
+        mean_gradient[e] *= (dilatation[e] / _invert(mean_gradient[e], inverse)) ** (1.0 / 3.0)
+
+
+@njit(cache=True)
+def _isochoric_work(  # type: ignore[no-untyped-def]
+    nodes, corners, layer, law, before, now, dilatation_before, dilatation_now,
+    convected_before, convected_now, work,
+):  # fmt: skip
+    """Write the element means of 1/2 (S_n + S_n+1) : 1/2 (C_n+1 - C_n), with C = c F'F of `frame_scale`.
+
+    By the trapezium over strain, not over time: for stress linear in strain it is exact in any step.
+    """
+    weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
+    old, new, inverse = np.empty((N_POINTS, 3, 3)), np.empty((N_POINTS, 3, 3)), np.empty((3, 3))
+    for e in range(corners.shape[0]):
+        material = law[layer[e]]
+        _gradients(nodes[corners[e]], before[corners[e]], weights, slopes, old)
+        volume = _gradients(nodes[corners[e]], now[corners[e]], weights, slopes, new)
+        total = 0.0
+        for q in range(N_POINTS):
+            scale_old = frame_scale(material, _invert(old[q], inverse), dilatation_before[e])
+            scale_new = frame_scale(material, _invert(new[q], inverse), dilatation_now[e])
+            for k in range(6):
+                i, j = ROW[k], COLUMN[k]
+                change = 0.0
+                for m in range(3):
+                    change += scale_new * new[q, m, i] * new[q, m, j]
+                    change -= scale_old * old[q, m, i] * old[q, m, j]
+                mean = 0.5 * (convected_before[e, q, k] + convected_now[e, q, k])
+                total += weights[q] * mean * 0.5 * change * (1.0 if k < 3 else 2.0)
+        work[e] = total / volume

@@ -1,0 +1,259 @@
+"""Where the work of the indenter goes: closed forms for one element, and whole presses that add up."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from fingerpad.fingertip import Fingertip
+from fingerpad.indentation import touch_of
+from fingerpad.indenters import FlatPunch, Plate, Sphere
+from fingerpad.mechanics.balance import (
+    DissipationCoefficients,
+    EnergyBalance,
+    contact_energy,
+    dissipated_energy,
+    indenter_work,
+)
+from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.element import SHAPE_DERIVATIVES
+from fingerpad.mechanics.materials import Hyperfoam, Material, MaterialTable, Prony
+from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.viscoelastic import StepCoefficients, StressHistory, instantaneous_state
+from fingerpad.mesh import block_mesh
+from fingerpad.mesh_quality import jacobian_at_gauss
+from fingerpad.stimulus import RampAndHold
+
+PRONY = Prony(shares=(0.25, 0.35), times_ms=(40.0, 900.0))
+CUBE = block_mesh([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], layers=[0])
+SHEAR_KPA = 11.0
+RELAXING = Material.neo_hooke(SHEAR_KPA, 0.48, PRONY, moduli="instantaneous")
+
+
+# The terms
+
+
+def test_work_of_a_force_is_exact_for_cubics_and_stops_at_kinks():
+    times = np.array([0.0, 2.0, 3.0, 5.0, 6.0, 9.0, 20.0])
+    depth = np.minimum(times, 5.0) / 5.0
+    force = np.where(times <= 5.0, depth**3, 1.0 - 0.02 * (times - 5.0))
+    work = indenter_work(times, depth, force, kinks_ms=(5.0,))
+    np.testing.assert_allclose(work, 0.25 * depth**4, rtol=1e-12)
+    smeared = indenter_work(times, depth, force, kinks_ms=())
+    assert abs(smeared[-1] - 0.25) > 1e-3
+
+
+def test_work_under_a_held_force_is_force_times_way():
+    times = np.array([0.0, 1.0, 2.0, 4.0, 8.0])
+    depth = 1.0 - np.exp(-times)
+    work = indenter_work(times, depth, np.full(5, 7.0), kinks_ms=())
+    np.testing.assert_allclose(work, 7.0 * depth, rtol=1e-12)
+
+
+def test_two_points_make_a_trapezium():
+    work = indenter_work(np.array([0.0, 1.0]), np.array([0.0, 2.0]), np.array([0.0, 3.0]), kinks_ms=())
+    assert work.tolist() == [0.0, 3.0]
+
+
+def test_contact_stores_only_while_it_presses():
+    gap = [np.array([0.3, -0.01, -0.02, 0.1]), np.array([-0.02, -0.03, 0.2, 0.2])]
+    force = [np.array([0.0, 1.0, 4.0, 0.0]), np.array([2.0, 3.0, 0.0, 0.0])]
+    # comes: 2/2 x 0.02; pressed further: (1 + 3)/2 x 0.02; leaves: 4/2 x -0.02; never touched: 0
+    np.testing.assert_allclose(contact_energy(gap[0], force[0], gap[1], force[1]), 0.02 + 0.04 - 0.04)
+
+
+@pytest.mark.parametrize("step_ms", [1e-4, 0.2, 5.0, 300.0, 1e5])
+def test_coefficients_are_the_integrals_of_the_branch_stress(step_ms):
+    """2/tau times the integral of (q e^{-t/tau} + d psi(t))², term by term."""
+    tau = PRONY.times_ms[0]
+    c = DissipationCoefficients.of(MaterialTable.of([RELAXING]), step_ms)
+
+    def decay(t):
+        return np.exp(-t / tau)
+
+    def grown(t):
+        return -tau / step_ms * np.expm1(-t / tau)
+
+    marks = [step_ms * share for share in (1e-3, 1e-2, 0.1)]
+    for found, integrand in (
+        (c.before, lambda t: decay(t) ** 2),
+        (c.mixed, lambda t: 2 * decay(t) * grown(t)),
+        (c.increment, lambda t: grown(t) ** 2),
+    ):
+        expected = 2 / tau * quad(integrand, 0.0, step_ms, points=marks, limit=500, epsabs=0, epsrel=1e-11)[0]
+        np.testing.assert_allclose(found[0, 0], expected, rtol=1e-8)
+
+
+# One element
+
+
+def sheared(amount):
+    return np.outer(CUBE.nodes_mm[:, 1], [amount, 0.0, 0.0])
+
+
+def spent(material, times_ms, displacements, mesh=CUBE):
+    """Energy dissipated up to each time of a prescribed motion."""
+    table = MaterialTable.of([material])
+    history = StressHistory.unloaded(len(mesh.elements), table.shares.shape[1])
+    total, before, sums = 0.0, 0.0, []
+    for time, displacement in zip(times_ms, displacements, strict=True):
+        step = StepCoefficients.of(table, time - before)
+        state = mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table
+        instantaneous, energies, _ = instantaneous_state(*state)
+        total += dissipated_energy(*state, time - before, history, instantaneous, energies)
+        history, before = history.advanced(step, mesh.layer, instantaneous), time
+        sums.append(total)
+    return np.array(sums)
+
+
+@pytest.mark.parametrize("ramp_steps", [1, 7])
+def test_one_relaxing_element_follows_the_closed_form(ramp_steps):
+    """Ramp of shear at the rate r, then hold: branch i carries s_i = g_i G r tau_i (1 - e^{-t/tau_i}), and
+
+    the energy spent in it is the integral of s_i²/(g_i G tau_i).
+    """
+    ramp_ms, amount = 60.0, 1e-4
+    ramp, hold = np.linspace(0.0, ramp_ms, ramp_steps + 1)[1:], np.array([61.0, 200.0, 5000.0])
+    times = np.concatenate([ramp, hold])
+    motion = [sheared(amount * min(time / ramp_ms, 1.0)) for time in times]
+    expected = np.zeros(times.size)
+    for share, tau in zip(PRONY.shares, PRONY.times_ms, strict=True):
+        scale = share * SHEAR_KPA * (amount / ramp_ms) ** 2 * tau
+        x = np.minimum(times, ramp_ms) / tau
+        in_ramp = tau * (x + 2 * np.expm1(-x) - 0.5 * np.expm1(-2 * x))
+        since = np.maximum(times - ramp_ms, 0.0) / tau
+        in_hold = -0.5 * tau * np.expm1(-ramp_ms / tau) ** 2 * np.expm1(-2 * since)
+        expected += scale * (in_ramp + in_hold)
+    np.testing.assert_allclose(spent(RELAXING, times, motion), expected, rtol=2e-6)
+
+
+def test_all_that_relaxes_is_spent():
+    """A sudden shear, held for ever: the branches lose their whole share of the instantaneous energy."""
+    found = spent(RELAXING, [1e-6, 1e6], [sheared(1e-4), sheared(1e-4)])
+    np.testing.assert_allclose(found[0], 0.0, atol=1e-6 * found[1])
+    np.testing.assert_allclose(found[1], sum(PRONY.shares) * 0.5 * SHEAR_KPA * 1e-8, rtol=1e-6)
+
+
+def test_spent_energy_is_that_of_a_slow_look_at_every_point():
+    """Any state of any law: distorted element, random history, coefficients by quadrature."""
+    rng = np.random.default_rng(4)
+    mesh = block_mesh([0.0, 1.0, 2.2], [0.0, 0.7], [0.0, 1.0], layers=[0])
+    moved = 0.1 * rng.uniform(-1.0, 1.0, mesh.nodes_mm.shape)
+    full = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
+    foam = Material(Hyperfoam((2.0, 3.0), (-3.0, 7.0), poisson=0.3), PRONY)
+    for material in (RELAXING, foam):
+        table = MaterialTable.of([material])
+        history = StressHistory(rng.normal(size=(2, 8, 6)), 0.2 * rng.normal(size=(2, 2, 8, 6)))
+        state = mesh.nodes_mm, mesh.elements, moved, mesh.layer, table
+        instantaneous, energies, _ = instantaneous_state(*state)
+        found = dissipated_energy(*state, 25.0, history, instantaneous, energies)
+        coefficients = DissipationCoefficients.of(table, 25.0)
+        expected = 0.0
+        for e in range(2):
+            gradients = slow_gradients(mesh, moved, e)
+            volumes = np.linalg.det(gradients)
+            dilatation = energies[e, :, 0] @ volumes / energies[e, :, 0].sum()
+            for q, gradient in enumerate(gradients):
+
+                def spatial(tensor, e=e, q=q, gradient=gradient, dilatation=dilatation, material=material):
+                    free = dilatation if material is foam else 1.0
+                    moved = gradient @ tensor[full] @ gradient.T * (free / np.linalg.det(gradient)) ** (2 / 3)
+                    return moved if material is foam else moved - np.trace(moved) / 3 * np.eye(3)
+
+                tau0, size = spatial(instantaneous[e, q]), energies[e, q]
+                for i, share in enumerate(PRONY.shares):
+                    start = spatial(share * history.instantaneous[e, q] - history.relaxed[i, e, q])
+                    grown = spatial(share * (instantaneous[e, q] - history.instantaneous[e, q]))
+                    squares = (
+                        coefficients.before[0, i] * (start * start).sum()
+                        + coefficients.mixed[0, i] * (start * grown).sum()
+                        + coefficients.increment[0, i] * (grown * grown).sum()
+                    )
+                    expected += size[0] * size[1] / (share * (tau0 * tau0).sum()) * squares
+        np.testing.assert_allclose(found, expected, rtol=1e-10)
+
+
+def slow_gradients(mesh, displacement, element):
+    corners, gradients = mesh.elements[element], []
+    for slopes in SHAPE_DERIVATIVES:
+        inverse = np.linalg.inv(mesh.nodes_mm[corners].T @ slopes)
+        gradients.append(np.eye(3) + displacement[corners].T @ slopes @ inverse)
+    return np.array(gradients)
+
+
+# Whole presses
+
+
+def block():
+    lines = np.array([0.0, 0.4, 0.8, 1.3, 2.0, 3.0])
+    both = np.concatenate([-lines[:0:-1], lines])
+    return block_mesh(both, [0.0, 0.3, 0.6, 1.2, 2.0, 3.0], lines, layers=[0, 1, 2, 3, 3], symmetric=True)
+
+
+def pressed(indenter, prony, ramp_steps=6, hold_steps=6, depth_mm=0.4):
+    mesh = block()
+    layers = tuple(Material.neo_hooke(shear, 0.45, prony) for shear in (40.0, 40.0, 20.0, 8.0))
+    placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
+    motion = RampAndHold(depth_mm=depth_mm, ramp_ms=50.0, hold_ms=500.0)
+    done = press(mesh, layers, indenter, placement, motion, PressSettings(ramp_steps, hold_steps))
+    return done, mesh
+
+
+BALL = Sphere(curvature_per_m=500.0)
+
+
+def test_an_elastic_press_dissipates_nothing_and_balances_with_second_order_in_its_steps():
+    imbalance = []
+    for steps in (3, 6, 12):
+        energy = pressed(FlatPunch(2.0, 0.3), Prony(), steps, 1)[0].energy
+        assert not energy.dissipated_uj.any()
+        imbalance.append(energy.relative_imbalance)
+    assert imbalance[-1] < 3e-4
+    assert imbalance[0] > 3.5 * imbalance[1] > 3.5**2 * imbalance[2]
+
+
+@pytest.mark.parametrize(
+    "indenter", [BALL, FlatPunch(2.0, 0.3), Plate()], ids=lambda body: type(body).__name__
+)
+def test_a_relaxing_press_balances(indenter):
+    """Tissue that loses 60 % of its stiffness turns a third of the work and more into heat: half a second."""
+    done, _ = pressed(indenter, PRONY)
+    energy = done.energy
+    assert energy.relative_imbalance < 0.002
+    assert energy.dissipated_uj[-1] > 0.35 * energy.external_uj[-1]
+    assert (np.diff(energy.dissipated_uj) > 0.0).all()
+    # The contact's springs hold little, and nothing but them and the tissue is at work in the hold.
+    assert (np.abs(energy.contact_uj) < 0.01 * energy.external_uj[-1]).all()
+    np.testing.assert_array_equal(np.diff(energy.external_uj[6:]), 0.0)
+
+
+def test_the_balance_of_a_shallow_press_is_that_of_linear_theory():
+    """What the loss rate of a linear law costs at finite strain (0.25 % at 13 %) goes with the strain."""
+    shallow = pressed(Plate(), PRONY, 12, 12, depth_mm=0.01)[0].energy
+    deep = pressed(Plate(), PRONY, 12, 12)[0].energy
+    assert shallow.relative_imbalance < 3e-4
+    assert 0.001 < deep.relative_imbalance < 0.004
+
+
+def test_terms_of_a_press_are_those_of_its_fields():
+    """Stored energy and, by another integral, the work of the whole body: sums over the elements."""
+    done, mesh = pressed(BALL, PRONY)
+    volume = 2.0 * jacobian_at_gauss(mesh).sum(axis=1)  # both halves
+    np.testing.assert_allclose(done.energy.stored_uj, done.sed_kpa @ volume, rtol=1e-12)
+    np.testing.assert_array_equal(done.sed_kpa, done.fields.stored_kpa)
+    given = done.energy.external_uj - done.energy.contact_uj
+    np.testing.assert_allclose(done.fields.work_kpa @ volume, given, rtol=0, atol=0.004 * given[-1])
+
+
+def test_a_quick_press_of_the_finger_balances():
+    """0.3 % measured, nearly all of it in the first of five steps: its curve has yet to show."""
+    touch = touch_of(Fingertip(), Sphere(curvature_per_m=287), RampAndHold(depth_mm=1.0))
+    skin = touch.solve()
+    assert 0.0 < skin.energy_imbalance < 0.004
+
+
+def test_balance_at_some_of_its_times():
+    energy = EnergyBalance(*np.arange(20.0).reshape(5, 4))
+    chosen = energy.at(np.array([0.0, 3.0]))
+    assert chosen.times_ms.tolist() == [0.0, 3.0]
+    assert chosen.contact_uj.tolist() == [16.0, 19.0]
+    assert EnergyBalance(*np.zeros((5, 2))).relative_imbalance == 0.0
