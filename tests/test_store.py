@@ -102,6 +102,8 @@ def changed(value, path, leaf):
 
 def nearest_other(leaf):
     """A value that differs by as little as its type allows."""
+    if leaf is None:  # an option that is not given
+        return 0.5
     if isinstance(leaf, bool):
         return not leaf
     if isinstance(leaf, int):

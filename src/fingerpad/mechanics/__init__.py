@@ -2,6 +2,6 @@
 
 Read in the order of the computation: `materials` (laws), `element` (one brick), `assembly` (all of them),
 `contact` (the rigid indenter), `linear` (the solver behind a Newton step), `newton` (one equilibrium),
-`steps` (how far to go at a time) and `press` (the whole ramp and hold). Beside them, `fields` tells what elements
-feel on the way and `balance` where the work of the indenter went.
+`steps` (how far to go at a time) and `press` (the whole ramp and hold). Beside them, `fields` tells what
+elements feel on the way and `balance` where the work of the indenter went.
 """
