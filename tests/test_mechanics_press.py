@@ -1,5 +1,6 @@
 """Whole presses: Hertz, balance of forces, symmetry, energy, limits in time, and failure."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -346,9 +347,9 @@ def test_step_that_fails_is_cut_and_the_answer_stays():
     ("indenter", "depth_mm", "settings"),
     [
         (BALL, 0.4, PressSettings(4, 3, NewtonSettings(most_iterations=1))),
-        (Plate(), 3.5, PressSettings(2, 1, NewtonSettings(most_iterations=8))),
+        (Plate(), 2.9, PressSettings(2, 1, NewtonSettings(most_iterations=8))),
     ],
-    ids=["too few iterations", "deeper than the block"],
+    ids=["too few iterations", "nearly through the block"],
 )
 def test_hopeless_press_is_an_error_that_tells_its_history(indenter, depth_mm, settings):
     with pytest.raises(ConvergenceError, match=r"The press stopped at .* try a smaller depth") as failure:
@@ -356,6 +357,38 @@ def test_hopeless_press_is_an_error_that_tells_its_history(indenter, depth_mm, s
     assert len(failure.value.history) >= 6  # the whole step and its cuts down to 1/32
     assert all(line.startswith("step from") for line in failure.value.history)
     assert failure.value.history[0] in str(failure.value)
+
+
+def test_hopeless_press_names_the_element_that_it_squeezes_most():
+    settings = PressSettings(2, 1, NewtonSettings(most_iterations=8))
+    with pytest.raises(ConvergenceError) as failure:
+        pressed(block(), indenter=Plate(), motion=RampAndHold(2.9, 50.0, 100.0), settings=settings)
+    assert re.search(
+        r"The press stopped at .* ms, depth .* mm, where element \d+ "
+        r"\(.+, about x = .*, y = .*, z = .* mm\) has \d+% of its volume at a point: try",
+        str(failure.value),
+    )
+
+
+@pytest.mark.parametrize(
+    ("indenter", "deepest"),
+    [(Plate(), "3"), (BALL, "3"), (FlatPunch(2.0, 0.3), "3")],
+    ids=lambda value: type(value).__name__ if not isinstance(value, str) else value,
+)
+def test_depth_that_reaches_the_bone_is_refused_before_anything_is_solved(indenter, deepest):
+    said = (
+        f"depth_mm must stay below {deepest} mm, where the {type(indenter).__name__} meets the bone: got 3.1"
+    )
+    with pytest.raises(InputError, match=re.escape(said)):
+        pressed(block(), indenter=indenter, motion=RampAndHold(3.1, 50.0, 100.0))
+
+
+def test_bad_mesh_is_refused_before_anything_is_solved():
+    mesh = replace(block(), bone_nodes=np.empty(0, dtype=np.int64))
+    with pytest.raises(InputError, match="nothing holds the body"):
+        pressed(mesh)
+    with pytest.raises(InputError, match="layer must be an index below 2"):
+        pressed(block(), materials=LAYERS[:2])
 
 
 class Astray:
@@ -373,10 +406,13 @@ def test_body_turned_inside_out_is_never_an_equilibrium():
     placement = place(Plate(), mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
     contact = Contact(Plate(), placement, mesh.skin_nodes, mesh.skin_area_mm2)
     load = Load(contact, 0.1, StepCoefficients.of(table, 1.0), np.zeros((1, 8, 6)))
-    with pytest.raises(ConvergenceError, match="line search"):
+    said = (
+        r"line search .* turns element 0 \(stratum corneum, about x = 0.5, y = 0.5, z = 0.5 mm\) inside out"
+    )
+    with pytest.raises(ConvergenceError, match=said):
         find_equilibrium(body, load, Astray(), np.zeros((8, 3)), np.zeros(4), NewtonSettings())
     inverted = mesh.nodes_mm * [0.0, -3.0, 0.0] + np.array([0.0, 3.0, 0.0])
-    with pytest.raises(ConvergenceError, match="starting guess"):
+    with pytest.raises(ConvergenceError, match=r"starting guess turns element 0 \(.*\) inside out"):
         find_equilibrium(body, load, Astray(), inverted, np.zeros(4), NewtonSettings())
     solver = LinearSolver(sparsity, body.free, linear.preconditioner(sparsity, body.free, mesh.nodes_mm))
     found = find_equilibrium(body, load, solver, np.zeros((8, 3)), np.zeros(4), NewtonSettings())

@@ -19,6 +19,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 from fingerpad.checks import FloatArray
 from fingerpad.errors import ConvergenceError
 from fingerpad.mechanics.assembly import Sparsity
+from fingerpad.mesh_quality import rigid_motions
 
 try:
     import pypardiso
@@ -141,7 +142,7 @@ class AggregationHierarchy:
 
     def __init__(self, sparsity: Sparsity, free: np.ndarray, nodes_mm: FloatArray):
         self._sparsity, self._free = sparsity, free
-        self._rigid = _rigid_motions(nodes_mm)[free]
+        self._rigid = rigid_motions(nodes_mm).reshape(-1, 6)[free]
 
     def renew(self, blocks: FloatArray) -> None:
         """Build the hierarchy for the tangent given by its blocks (n_blocks, 3, 3)."""
@@ -155,16 +156,6 @@ class AggregationHierarchy:
     def apply(self, residual: FloatArray) -> FloatArray:
         """One V-cycle for a residual (n_free,)."""
         return self._cycle @ residual
-
-
-def _rigid_motions(nodes_mm: FloatArray) -> FloatArray:
-    """Three translations and three rotations of the nodes, (3 n_nodes, 6)."""
-    x, y, z = (nodes_mm - nodes_mm.mean(axis=0)).T
-    zero, one = np.zeros_like(x), np.ones_like(x)
-    translations = [(one, zero, zero), (zero, one, zero), (zero, zero, one)]
-    rotations = [(-y, x, zero), (zero, -z, y), (z, zero, -x)]
-    motions = [np.stack(motion, axis=1).ravel() for motion in translations + rotations]
-    return np.stack(motions, axis=1)
 
 
 def preconditioner(sparsity: Sparsity, free: np.ndarray, nodes_mm: FloatArray) -> Preconditioner:

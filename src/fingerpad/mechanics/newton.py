@@ -26,6 +26,7 @@ from fingerpad.mechanics.linear import LinearSolver
 from fingerpad.mechanics.materials import MaterialTable
 from fingerpad.mechanics.viscoelastic import StepCoefficients
 from fingerpad.mesh import Mesh
+from fingerpad.mesh_quality import element_place, squeezed_most
 
 SMALLEST_FORCE_MN = 1e-6
 SUFFICIENT_DECREASE = 1e-4
@@ -256,7 +257,7 @@ def find_equilibrium(
     history: list[str] = []
     state = _Evaluation(body, load, guess_mm, load.depth_mm, multipliers, blocks)
     if np.isnan(state.potential):
-        raise ConvergenceError("The starting guess turns an element inside out.")
+        raise ConvergenceError(f"The starting guess turns {_folded(body, guess_mm)} inside out.")
     potentials = [state.potential]
     accepted_mn = settings.residual_tolerance * (load.force_mn or 0.0)
     for iteration in range(settings.most_iterations):
@@ -364,4 +365,10 @@ def _line_search(
         if falls or trial.relative_residual < 0.9 * start.relative_residual:
             return trial
         length /= 2
-    raise ConvergenceError("The line search found no better configuration.", tuple(history))
+    folds = f": it turns {_folded(body, displacement)} inside out" if np.isnan(trial.potential) else ""
+    raise ConvergenceError(f"The line search found no better configuration{folds}.", tuple(history))
+
+
+def _folded(body: Body, displacement: FloatArray) -> str:
+    """Name the element that a displacement turns inside out, the worst of them."""
+    return element_place(body.mesh, squeezed_most(body.mesh, displacement)[0])

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize import brentq
 
 from fingerpad.checks import FloatArray, positive, whole
 from fingerpad.errors import ConvergenceError, InputError
@@ -47,7 +48,9 @@ from fingerpad.mechanics.viscoelastic import (
     stored_energy_density,
 )
 from fingerpad.mesh import Mesh
-from fingerpad.stimulus import ForceRampAndHold, Stimulus
+from fingerpad.mesh_checks import check_mesh
+from fingerpad.mesh_quality import element_place, squeezed_most
+from fingerpad.stimulus import ForceRampAndHold, RampAndHold, Stimulus
 
 PENETRATION_SHARE = 0.1
 """Largest penetration over depth, as a share of the tolerance of SED: SED grows as the square of depth or
@@ -236,8 +239,13 @@ class _Press:
     def stopped(self, last: _Moment, attempts: tuple[str, ...]) -> ConvergenceError:
         """Error for a press that gets no further than `last`."""
         less = "force" if isinstance(self.stimulus, ForceRampAndHold) else "depth"
+        element, ratio = squeezed_most(self.body.mesh, last.found.displacement_mm)
+        squeezed = (
+            f", where {element_place(self.body.mesh, element)} has {ratio:.0%} of its volume at a point"
+        )
         return ConvergenceError(
-            f"The press stopped at {last.time_ms:.4g} ms, depth {last.found.depth_mm:.4g} mm: "
+            f"The press stopped at {last.time_ms:.4g} ms, depth {last.found.depth_mm:.4g} mm"
+            f"{squeezed if last.time_ms > 0.0 else ''}: "
             f"try a smaller {less}, a finer mesh or more ramp steps.",
             attempts,
         )
@@ -282,11 +290,15 @@ def press(
     Raises
     ------
     InputError
-        If a force pushes the indenter deeper than `deepest_mm`.
+        If the mesh fails `check_mesh`, a depth drives the indenter into the bone, or a force pushes it deeper
+        than `deepest_mm`.
     ConvergenceError
         If a step fails even when it is cut; the history tells each attempt.
     """
     settings = settings or PressSettings()
+    check_mesh(mesh, len(materials))
+    if isinstance(stimulus, RampAndHold):
+        _check_depth(mesh, indenter, placement, stimulus.depth_mm)
     table = MaterialTable.of(materials)
     undeformed = placement.to_local(mesh.nodes_mm[mesh.skin_nodes], depth_mm=0.0)
     candidates = indenter.may_touch(undeformed) & ~np.isin(mesh.skin_nodes, mesh.fixed_nodes)
@@ -343,6 +355,23 @@ def press(
         penetration_mm=deepest,
         newton_steps=job.newton_steps,
         factorisations=solver.renewals,
+    )
+
+
+def _check_depth(mesh: Mesh, indenter: Indenter, placement: Placement, depth_mm: float) -> None:
+    """Bone does not move, so no mesh survives an indenter that reaches it."""
+    bone_mm = mesh.nodes_mm[mesh.bone_nodes]
+
+    def clearance_mm(depth_mm: float) -> float:
+        return float(indenter.gap(placement.to_local(bone_mm, depth_mm))[0].min(initial=np.inf))
+
+    if clearance_mm(depth_mm) > 0.0:
+        return
+    reaches = clearance_mm(0.0) > 0.0
+    deepest_mm = brentq(clearance_mm, 0.0, depth_mm, xtol=1e-6) if reaches else 0.0
+    raise InputError(
+        f"depth_mm must stay below {deepest_mm:.4g} mm, where the {type(indenter).__name__} meets the bone: "
+        f"got {depth_mm:g} mm."
     )
 
 
