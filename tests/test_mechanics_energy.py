@@ -8,16 +8,9 @@ import pytest
 
 from fingerpad.errors import InputError, MaterialWarning
 from fingerpad.mechanics.energy import SECOND, translate
-from fingerpad.mechanics.materials import (
-    Energy,
-    Hencky,
-    Hyperfoam,
-    Material,
-    MaterialTable,
-    Ogden,
-    Polynomial,
-    instability,
-)
+from fingerpad.mechanics.laws import Energy, Hencky, Hyperfoam, Ogden, Polynomial
+from fingerpad.mechanics.materials import Material, MaterialTable
+from fingerpad.mechanics.stability import instability
 from fingerpad.parameters import tissues
 
 LOGS = np.array([0.21, -0.34, 0.13, 0.17])

@@ -1,0 +1,392 @@
+"""Strain energies of the tissues.
+
+    Polynomial   W = C10 (I1-3) + C01 (I2-3) + C20 (I1-3)² + C11 (I1-3)(I2-3) + C02 (I2-3)²
+                     + (J-1)²/D1 + (J-1)⁴/D2                              (paper, 2.2.1: polynomial N = 2)
+    Ogden        W = sum_i 2 mu_i/alpha_i² (lambdabar1^alpha_i + ... - 3) + K/2 (J-1)²
+    Hyperfoam    W = sum_i 2 mu_i/alpha_i² (lambda1^alpha_i + ... - 3 + (J^(-alpha_i beta) - 1)/beta)
+    Hencky       W = G (ln² lambdabar1 + ln² lambdabar2 + ln² lambdabar3) + K/2 ln² J
+    Energy       W = a formula of your own
+
+Invariants and barred stretches are those of the isochoric part of the deformation. Neo-Hooke and
+Mooney-Rivlin are the polynomial with coefficients zero. A "linear elastic" layer at finite strain is read as
+neo-Hooke with the same shear and bulk modulus (docs/decisions/linear-elastic.md) or, if asked for, as Hencky.
+The polynomial has its own compiled kernel; every other law is differentiated from its formula (see `energy`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from fingerpad.checks import FloatArray, finite, not_negative, positive
+from fingerpad.errors import InputError
+from fingerpad.mechanics.energy import CARRIED, SECOND, differentiate, translate
+
+
+class Law(Protocol):
+    """An isotropic strain energy."""
+
+    @property
+    def shear_modulus_kpa(self) -> float:
+        """Initial shear modulus. [kPa]"""
+        ...
+
+    @property
+    def bulk_modulus_kpa(self) -> float:
+        """Initial bulk modulus. [kPa]"""
+        ...
+
+    @property
+    def energy(self) -> Energy:
+        """The law as a formula."""
+        ...
+
+
+@dataclass(frozen=True)
+class Energy:
+    """A law of your own: its energy as a formula in the principal stretches or invariants.
+
+    A formula without a term that mixes J with a change of shape keeps its pressure while it relaxes; of any
+    other the whole stress relaxes (docs/decisions/relaxing-foams.md).
+
+    Parameters
+    ----------
+    formula : str
+        Energy per reference volume [kPa] from `lambda1` ... `lambda3`, `lambdabar1` ... `lambdabar3`, `I1`,
+        `I2`, `J` (see `mechanics.energy`), numbers, coefficients, + - * / **, log, exp and sqrt.
+    coefficients : tuple of (str, float)
+        Names and values.
+
+    Raises
+    ------
+    InputError
+        If the formula cannot be read, prefers a direction, is not free of stress at rest, or has an initial
+        shear or bulk modulus that is not above zero.
+
+    Examples
+    --------
+    >>> skin = Energy("b / 2 * (exp(I1 - 3) - 1) + k / 2 * (J - 1)**2", (("b", 12.0), ("k", 600.0)))
+    >>> round(skin.shear_modulus_kpa, 9), round(skin.bulk_modulus_kpa, 9)
+    (12.0, 600.0)
+    """
+
+    formula: str
+    coefficients: tuple[tuple[str, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        for logs in _PROBES:
+            if not np.isfinite(self.derivatives(logs)).all():
+                stretches = ", ".join(f"{value:.3g}" for value in np.exp(logs[:3] + logs[3] / 3))
+                raise InputError(f"The energy {self.formula!r} is not finite at the stretches {stretches}.")
+            values = [self.derivatives([*np.roll(logs[:3], turn), logs[3]])[0] for turn in range(3)]
+            values.append(self.derivatives([*logs[[1, 0, 2]], logs[3]])[0])
+            if np.ptp(values) > 1e-9 * max(1e-300, np.abs(values).max()):
+                raise InputError(
+                    f"The energy {self.formula!r} must not prefer a direction: it changes when the principal "
+                    "stretches are exchanged."
+                )
+        positive(f"the initial shear modulus of {self.formula!r}", self.shear_modulus_kpa, "kPa")
+        positive(f"the initial bulk modulus of {self.formula!r}", self.bulk_modulus_kpa, "kPa")
+        pressure = self.derivatives(np.zeros(4))[4]
+        if abs(pressure) > 1e-9 * self.bulk_modulus_kpa:
+            raise InputError(
+                f"The energy {self.formula!r} must be free of stress at rest: its mean stress there is "
+                f"{pressure:.3g} kPa."
+            )
+
+    @property
+    def energy(self) -> Energy:
+        """The law itself."""
+        return self
+
+    @cached_property
+    def program(self) -> FloatArray:
+        """Operations of the formula, (n_operations, 4)."""
+        return translate(self.formula, dict(self.coefficients))
+
+    def derivatives(self, logs: Sequence[float] | FloatArray) -> FloatArray:
+        """Energy, its 4 first and 10 second derivatives at ln lambdabar_1 ... 3 and ln J, (15,). [kPa]"""
+        results = np.empty((len(self.program) + 1, CARRIED))
+        differentiate(self.program.ravel(), len(self.program), np.asarray(logs, dtype=np.float64), results)
+        return results[len(self.program) - 1]
+
+    @property
+    def shear_modulus_kpa(self) -> float:
+        """Initial shear modulus. [kPa]"""
+        second = self.derivatives(np.zeros(4))
+        return 0.5 * float(second[SECOND[0, 0]] - second[SECOND[0, 1]])
+
+    @property
+    def bulk_modulus_kpa(self) -> float:
+        """Initial bulk modulus. [kPa]"""
+        return float(self.derivatives(np.zeros(4))[SECOND[3, 3]])
+
+    @cached_property
+    def is_coupled(self) -> bool:
+        """Whether shape and volume share a term of the energy."""
+        for logs in _PROBES:
+            second = self.derivatives(logs)
+            mixed = second[SECOND[:3, 3]]
+            if np.ptp(mixed) > 1e-9 * np.abs(second).max():
+                return True
+        return False
+
+
+_PROBES = np.array([[0.3, -0.1, -0.2, 0.1], [-0.4, 0.25, 0.15, -0.2], [0.05, 0.15, -0.2, 0.3]])
+"""Deformations at which a formula is looked at: ln lambdabar_1 ... 3 and ln J."""
+
+
+@dataclass(frozen=True)
+class Polynomial:
+    """Polynomial N = 2 in the isochoric invariants; neo-Hooke and Mooney-Rivlin among them.
+
+    Parameters
+    ----------
+    c10, c01, c20, c11, c02 : float
+        Coefficients of the isochoric energy. [kPa]
+    bulk_linear, bulk_cubic : float
+        1/D1 and 1/D2 of the volumetric energy; half the bulk modulus is 1/D1. [kPa]
+
+    Raises
+    ------
+    InputError
+        If a coefficient is not finite, or the initial shear or bulk modulus is not above zero.
+
+    Examples
+    --------
+    >>> Polynomial(c10=4.0, c01=1.0, bulk_linear=100.0).shear_modulus_kpa
+    10.0
+    """
+
+    c10: float
+    c01: float = 0.0
+    c20: float = 0.0
+    c11: float = 0.0
+    c02: float = 0.0
+    bulk_linear: float = 0.0
+    bulk_cubic: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("c10", "c01", "c20", "c11", "c02"):
+            finite(name, getattr(self, name), "kPa")
+        positive("initial shear modulus 2 (c10 + c01)", self.shear_modulus_kpa, "kPa")
+        positive("bulk_linear (1/D1)", self.bulk_linear, "kPa")
+        not_negative("bulk_cubic (1/D2)", self.bulk_cubic, "kPa")
+
+    @property
+    def shear_modulus_kpa(self) -> float:
+        """Initial shear modulus. [kPa]"""
+        return 2.0 * (self.c10 + self.c01)
+
+    @property
+    def bulk_modulus_kpa(self) -> float:
+        """Initial bulk modulus. [kPa]"""
+        return 2.0 * self.bulk_linear
+
+    @property
+    def energy(self) -> Energy:
+        """The law as a formula."""
+        names = tuple(item.name for item in fields(self))
+        return Energy(
+            "c10 * (I1 - 3) + c01 * (I2 - 3) + c20 * (I1 - 3)**2 + c11 * (I1 - 3) * (I2 - 3) "
+            "+ c02 * (I2 - 3)**2 + bulk_linear * (J - 1)**2 + bulk_cubic * (J - 1)**4",
+            tuple((name, float(getattr(self, name))) for name in names),
+        )
+
+
+@dataclass(frozen=True)
+class Ogden:
+    """Sum of up to three powers of the isochoric stretches.
+
+    Parameters
+    ----------
+    moduli_kpa : tuple of float
+        mu_i; their sum is the initial shear modulus. [kPa]
+    exponents : tuple of float
+        alpha_i, none of them 0.
+    bulk_kpa : float
+        Bulk modulus K. [kPa]
+
+    Raises
+    ------
+    InputError
+        If there are none or more than three terms, or a modulus is not above zero.
+
+    Examples
+    --------
+    >>> Ogden(moduli_kpa=(8.0, 2.0), exponents=(2.0, 8.0), bulk_kpa=240.0).shear_modulus_kpa
+    10.0
+    """
+
+    moduli_kpa: tuple[float, ...]
+    exponents: tuple[float, ...]
+    bulk_kpa: float
+
+    def __post_init__(self) -> None:
+        _take_terms(self)
+        positive("bulk_kpa", self.bulk_kpa, "kPa")
+
+    @property
+    def shear_modulus_kpa(self) -> float:
+        """Initial shear modulus. [kPa]"""
+        return sum(self.moduli_kpa)
+
+    @property
+    def bulk_modulus_kpa(self) -> float:
+        """Initial bulk modulus. [kPa]"""
+        return self.bulk_kpa
+
+    @property
+    def energy(self) -> Energy:
+        """The law as a formula."""
+        term = (
+            "2 * mu{0} / alpha{0}**2"
+            " * (lambdabar1**alpha{0} + lambdabar2**alpha{0} + lambdabar3**alpha{0} - 3)"
+        )
+        terms = (term.format(n) for n in range(1, len(self.exponents) + 1))
+        return Energy(
+            " + ".join((*terms, "bulk / 2 * (J - 1)**2")),
+            (*_named_terms(self.moduli_kpa, self.exponents), ("bulk", float(self.bulk_kpa))),
+        )
+
+
+@dataclass(frozen=True)
+class Hyperfoam:
+    """Storakers' compressible foam (1986), with one Poisson's ratio for all terms: the form of Wu's tissues.
+
+    Parameters
+    ----------
+    moduli_kpa : tuple of float
+        mu_i; their sum is the initial shear modulus. [kPa]
+    exponents : tuple of float
+        alpha_i, none of them 0.
+    poisson : float
+        nu; beta = nu / (1 - 2 nu).
+
+    Raises
+    ------
+    InputError
+        If there are none or more than three terms, the initial shear modulus is not above zero, or nu is out
+        of its range.
+
+    Examples
+    --------
+    >>> foam = Hyperfoam(moduli_kpa=(3.0,), exponents=(8.0,), poisson=0.4)
+    >>> round(foam.bulk_modulus_kpa, 9)  # 2 mu (1/3 + beta)
+    14.0
+    """
+
+    moduli_kpa: tuple[float, ...]
+    exponents: tuple[float, ...]
+    poisson: float
+
+    def __post_init__(self) -> None:
+        _take_terms(self)
+        check_poisson(self.poisson)
+
+    @property
+    def shear_modulus_kpa(self) -> float:
+        """Initial shear modulus. [kPa]"""
+        return sum(self.moduli_kpa)
+
+    @property
+    def bulk_modulus_kpa(self) -> float:
+        """Initial bulk modulus. [kPa]"""
+        return bulk_modulus(self.shear_modulus_kpa, self.poisson)
+
+    @property
+    def energy(self) -> Energy:
+        """The law as a formula."""
+        term = (
+            "2 * mu{0} / alpha{0}**2 * (lambda1**alpha{0} + lambda2**alpha{0} + lambda3**alpha{0} - 3"
+            " + (J**(-alpha{0} * beta) - 1) / beta)"
+        )
+        terms = (term.format(n) for n in range(1, len(self.exponents) + 1))
+        beta = self.poisson / (1 - 2 * self.poisson)
+        return Energy(
+            " + ".join(terms), (*_named_terms(self.moduli_kpa, self.exponents), ("beta", float(beta)))
+        )
+
+
+@dataclass(frozen=True)
+class Hencky:
+    """Quadratic in the logarithmic strain: Hooke's law between Kirchhoff stress and logarithmic strain.
+
+    Parameters
+    ----------
+    shear_kpa, bulk_kpa : float
+        G and K. [kPa]
+
+    Examples
+    --------
+    >>> Hencky(shear_kpa=27.0, bulk_kpa=600.0).energy.is_coupled
+    False
+    """
+
+    shear_kpa: float
+    bulk_kpa: float
+
+    def __post_init__(self) -> None:
+        positive("shear_kpa", self.shear_kpa, "kPa")
+        positive("bulk_kpa", self.bulk_kpa, "kPa")
+
+    @property
+    def shear_modulus_kpa(self) -> float:
+        """Initial shear modulus. [kPa]"""
+        return self.shear_kpa
+
+    @property
+    def bulk_modulus_kpa(self) -> float:
+        """Initial bulk modulus. [kPa]"""
+        return self.bulk_kpa
+
+    @property
+    def energy(self) -> Energy:
+        """The law as a formula."""
+        return Energy(
+            "shear * (log(lambdabar1)**2 + log(lambdabar2)**2 + log(lambdabar3)**2) + bulk / 2 * log(J)**2",
+            (("shear", float(self.shear_kpa)), ("bulk", float(self.bulk_kpa))),
+        )
+
+
+def _take_terms(law: Ogden | Hyperfoam) -> None:
+    name, moduli, exponents = type(law).__name__, tuple(law.moduli_kpa), tuple(law.exponents)
+    if not 1 <= len(moduli) <= 3 or len(moduli) != len(exponents):
+        raise InputError(
+            f"{name} needs one to three moduli and as many exponents: got {len(moduli)} and {len(exponents)}."
+        )
+    for modulus, exponent in zip(moduli, exponents, strict=True):
+        finite(f"each modulus of {name}", modulus, "kPa")
+        if finite(f"each exponent of {name}", exponent) == 0.0:
+            raise InputError(f"No exponent of {name} may be 0: leave out that term or take Hencky's law.")
+    positive(f"the initial shear modulus of {name}, the sum of its moduli", sum(moduli), "kPa")
+    object.__setattr__(law, "moduli_kpa", moduli)
+    object.__setattr__(law, "exponents", exponents)
+
+
+def _named_terms(moduli: Sequence[float], exponents: Sequence[float]) -> tuple[tuple[str, float], ...]:
+    pairs = enumerate(zip(moduli, exponents, strict=True), start=1)
+    return tuple(
+        named
+        for n, (modulus, exponent) in pairs
+        for named in ((f"mu{n}", float(modulus)), (f"alpha{n}", float(exponent)))
+    )
+
+
+def check_poisson(poisson: float) -> None:
+    """Raise `InputError` unless Poisson's ratio lies between 0 and 0.5."""
+    if not 0.0 < finite("poisson", poisson) < 0.5:
+        raise InputError(
+            f"poisson must lie between 0 and 0.5, both excluded: got {poisson!r}; "
+            "take 0.4999 for a tissue that hardly changes its volume."
+        )
+
+
+def bulk_modulus(shear_kpa: float, poisson: float) -> float:
+    """Bulk modulus K = 2 G (1 + nu) / (3 (1 - 2 nu)). [kPa]"""
+    check_poisson(poisson)
+    return 2 * shear_kpa * (1 + poisson) / (3 * (1 - 2 * poisson))
