@@ -262,6 +262,8 @@ def test_a_run_presses_every_mesh_and_finds_the_known_error_and_order(results):
     for name, error in expected.items():
         assert found["bars"]["errors"][name]["sed"]["ramp"]["max"] == pytest.approx(error, rel=1e-6)
     assert found["spheres"]["errors"]["standard"]["sed"]["hold"]["max"] == pytest.approx(expected["standard"])
+    between = found["bars"]["quick_to_standard"]["sed"]["ramp"]["max"]
+    assert between == pytest.approx((1.0 + 4.0 * ERROR) / (1.0 + ERROR) - 1.0, rel=1e-6)
     for row in found["bars"]["orders"]:
         assert row["order"] == pytest.approx(2.0, rel=1e-6)
         assert row["limit_kpa"] == pytest.approx(row["sed_kpa"][-1] / fine, rel=1e-6)
@@ -279,6 +281,9 @@ def test_pages_say_every_mesh_with_its_errors(results):
     page = files[report.PAGE].decode()
     error = 100.0 * found["bars"]["errors"]["standard"]["sed"]["ramp"]["max"]
     assert f"| standard | fine | 2 | {error:.1f} %" in page
+    rates = found["spheres"]["errors"]["standard"]["rate"]
+    shown = [f"{rates[phase][key]:.1f}" for phase in ("dynamic", "static") for key in ("max", "rms")]
+    assert f"% | {' | '.join(shown)} |" in page
     rate = 100.0 * found["spheres"]["hit_rates"]["fine"]["static"][1]
     assert f"{rate:.1f} %" in page
     for name in mesh_refinement.ONE_AT_A_TIME:
