@@ -264,7 +264,8 @@ def test_a_run_presses_every_mesh_and_finds_the_known_error_and_order(results):
     assert found["spheres"]["errors"]["standard"]["sed"]["hold"]["max"] == pytest.approx(expected["standard"])
     between = found["bars"]["quick_to_standard"]["sed"]["ramp"]["max"]
     assert between == pytest.approx((1.0 + 4.0 * ERROR) / (1.0 + ERROR) - 1.0, rel=1e-6)
-    for row in found["bars"]["orders"]:
+    assert [row["touch"] for row in found["bars"]["orders"]] == ["bar, shift 1.3 mm", "bar, shift 0.1 mm"]
+    for row in found["bars"]["orders"] + found["spheres"]["orders"]:
         assert row["order"] == pytest.approx(2.0, rel=1e-6)
         assert row["limit_kpa"] == pytest.approx(row["sed_kpa"][-1] / fine, rel=1e-6)
     halved = (1.0 + ERROR / 4.0) / (1.0 + ERROR) - 1.0
@@ -291,7 +292,10 @@ def test_pages_say_every_mesh_with_its_errors(results):
     tables = [block.splitlines() for block in page.split("\n\n") if block.startswith("|")]
     for table in tables:
         assert len({line.count("|") for line in table}) == 1
-    assert len(tables) == 6
+    assert len(tables) == 8
+    limit = found["bars"]["orders"][0]["limit_kpa"]
+    assert f"| 2.0 | {limit:.3f} | +{100.0 * ERROR:.1f} % |" in page
+    assert "| bar | 8 against 32 | 0.0 %" in page
 
 
 def test_the_figure_draws_every_mesh_in_every_panel(results):

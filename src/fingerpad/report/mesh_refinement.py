@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from fingerpad.parameters import protocol
 from fingerpad.report.appearance import BLACK, BLUE, GREEN, ORANGE, new_figure, numbers, png
-from fingerpad.report.words import fixed, number
+from fingerpad.report.words import ABSENT, fixed, number
 
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
 PERCENT = 100.0
@@ -114,6 +114,16 @@ def markdown(results: Mapping[str, Any]) -> str:
         _table(ERROR_COLUMNS, _error_rows(results["bars"], finest)),
         f"Spheres, 18 receptors, against {finest}:",
         _table(ERROR_COLUMNS, _error_rows(results["spheres"], finest)),
+        "Largest SED of a touch at the end of the ramp on the similar meshes, order of convergence and limit "
+        "(Richardson); no order where the values do not settle:",
+        _table(
+            ("touch", *_similar(results), "order", "limit [kPa]", "standard from the limit"),
+            [
+                _order_row(row, _similar(results))
+                for name in ("bars", "spheres")
+                for row in results[name]["orders"]
+            ],
+        ),
         "Goodness of fit at the shifts of the row above, parameters unchanged:",
         _table(
             ("mesh", "weighted FSS", "on the finer mesh"),
@@ -139,6 +149,14 @@ def markdown(results: Mapping[str, Any]) -> str:
             [
                 (name, *(_signed(change[key]) for key in ("sed_ramp", "sed_hold", "force")))
                 for name, change in results["one_at_a_time"].items()
+            ],
+        ),
+        "Few steps against many in ramp and in hold, on the quick mesh:",
+        _table(
+            ("touch", "steps", *ERROR_COLUMNS[3:]),
+            [
+                (name, f"{row['steps'][0]} against {row['steps'][1]}", *_errors(row))
+                for name, row in results["steps"].items()
             ],
         ),
     ]
@@ -173,11 +191,32 @@ def _error_rows(section: Mapping[str, Any], finest: str) -> list[Sequence[str]]:
             name,
             row["against"],
             str(row["touches"]),
-            *(_share(row["sed"][phase][key]) for phase in PHASES for key in ("max", "rms")),
-            *(fixed(row["rate"][phase][key], 1) for phase in RATES for key in ("max", "rms")),
+            *_errors(row),
         )
         for name, row in _against(section, finest)
     ]
+
+
+def _errors(row: Mapping[str, Any]) -> list[str]:
+    shares = [_share(row["sed"][phase][key]) for phase in PHASES for key in ("max", "rms")]
+    return shares + [fixed(row["rate"][phase][key], 1) for phase in RATES for key in ("max", "rms")]
+
+
+def _similar(results: Mapping[str, Any]) -> list[str]:
+    """Names of the meshes that differ by one factor."""
+    return [level["name"] for level in results["levels"] if level["resolution"] == "standard"]
+
+
+def _order_row(row: Mapping[str, Any], names: Sequence[str]) -> Sequence[str]:
+    limit = row["limit_kpa"]
+    standard = row["sed_kpa"][names.index("standard")]
+    return (
+        row["touch"],
+        *(fixed(value, 3) for value in row["sed_kpa"]),
+        fixed(row["order"], 1),
+        fixed(limit, 3),
+        _signed(standard / limit - 1.0) if limit else ABSENT,
+    )
 
 
 def _measures(section: Mapping[str, Any]) -> list[tuple[str, float]]:

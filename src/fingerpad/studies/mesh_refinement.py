@@ -27,7 +27,6 @@ from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.studies.mesh_errors import (
     Reading,
     compare,
-    differences,
     goodness_of_fit,
     hit_rates,
     observed_order,
@@ -292,23 +291,32 @@ def _bars(readings: Mapping[str, Reading]) -> dict[str, Any]:
         },
         "quick_to_standard": compare(readings["quick"], readings["standard"])
         | {"fss": goodness_of_fit(readings["quick"]), "fss_finest": goodness_of_fit(readings["standard"])},
-        "orders": _orders(readings, receptor=0),
+        "orders": _orders(readings),
     }
 
 
-def _orders(readings: Mapping[str, Reading], receptor: int) -> list[dict[str, Any]]:
-    """Order and limit of SED at the end of the ramp, touch by touch, on the three similar meshes."""
+def _orders(readings: Mapping[str, Reading]) -> list[dict[str, Any]]:
+    """Order and limit of each touch's largest SED at the end of the ramp, on the three similar meshes."""
     similar = [level for level in LEVELS if level.resolution == "standard"]
     rows = []
     for touch in readings[similar[-1].name].touches:
-        values = [float(readings[level.name].only([touch]).sed_kpa["ramp"][0, receptor]) for level in similar]
-        found = observed_order(values, [level.factor for level in similar])
+        sed = np.array([readings[level.name].only([touch]).sed_kpa["ramp"][0] for level in similar])
+        values = sed[:, sed[-1].argmax()]
+        found = observed_order(values.tolist(), [level.factor for level in similar])
         order, limit = found if found else (None, None)
-        rows.append(
-            {"touch": touch, "sed_kpa": values, "order": order, "limit_kpa": limit}
-            | ({"shift_mm": SHIFTS_MM[touch]} if isinstance(touch, int) else {})
-        )
+        rows.append({"touch": _named(touch), "sed_kpa": values, "order": order, "limit_kpa": limit})
     return rows
+
+
+def _named(touch: int | Sphere) -> str:
+    """Name of a touch in tables.
+
+    >>> _named(0), _named((0.0, 287.0))
+    ('bar, shift -3.5 mm', 'sphere 287 /m at 0 mm')
+    """
+    if isinstance(touch, int):
+        return f"bar, shift {SHIFTS_MM[touch]:g} mm"
+    return f"sphere {touch[1]:g} /m at {touch[0]:g} mm"
 
 
 def _balls(readings: Mapping[str, Reading], neighbours: np.ndarray) -> dict[str, Any]:
@@ -320,6 +328,7 @@ def _balls(readings: Mapping[str, Reading], neighbours: np.ndarray) -> dict[str,
             name: compare(reading, finest) for name, reading in readings.items() if reading is not finest
         },
         "quick_to_standard": compare(readings["quick"], readings["standard"]),
+        "orders": _orders(readings),
         "comparisons_per_m": CHOSEN_CURVATURES[1:],
         "hit_rates": {
             name: hit_rates(reading, 0.0, CHOSEN_CURVATURES, neighbours) for name, reading in readings.items()
@@ -350,6 +359,4 @@ def _one_at_a_time(standard: Reading, changed: Mapping[str, Reading]) -> dict[st
 def _steps(readings: Mapping[int, Reading]) -> dict[str, Any]:
     """Errors of few steps against many."""
     few, many = (readings[count] for count in STEPS)
-    return compare(few, many) | {
-        "latency": differences(few.measures()["latency"], many.measures()["latency"])
-    }
+    return compare(few, many) | {"steps": STEPS}
