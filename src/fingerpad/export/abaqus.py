@@ -1,0 +1,161 @@
+"""A job as an Abaqus input file: hybrid elements, Prony series, an analytical rigid surface."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fingerpad.export import cards
+from fingerpad.export.cards import INDENTER, SKIN, data
+from fingerpad.export.job import CONTACT_KPA_PER_MM, Job, Phase
+from fingerpad.files import write_atomically
+from fingerpad.mechanics.laws import Hyperfoam
+from fingerpad.mechanics.materials import Material
+
+FRICTIONLESS, REFERENCE = "FRICTIONLESS", "REFERENCE"
+
+UPPER_FACE = 2
+"""Face of a brick's last four, or a wedge's last three nodes: the skin's side of our elements."""
+
+
+def write_abaqus(path: Path, job: Job) -> Path:
+    """Write a job as an Abaqus input file.
+
+    Parameters
+    ----------
+    path : Path
+        File to write, by custom ending in .inp; replaced at once or not at all.
+    job : Job
+        What to press.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If Abaqus has no card for a law or indenter.
+    StoreError
+        If the file cannot be written.
+    """
+    write_atomically(Path(path), abaqus_deck(job).encode())
+    return Path(path)
+
+
+def abaqus_deck(job: Job) -> str:
+    """Text of an Abaqus/Standard input file.
+
+    Bricks are C3D8H and wedges C3D6H, constant pressure as in our own element; in layers of foam, whose shape
+    and volume are not separate, C3D8 and C3D6. The indenter is an exact rigid surface that is moved by its
+    reference node. Steps are *VISCO with our own increments, or *STATIC when nothing relaxes.
+
+    Parameters
+    ----------
+    job : Job
+        What to press.
+
+    Raises
+    ------
+    InputError
+        If Abaqus has no card for a law or indenter.
+
+    Examples
+    --------
+    >>> import fingerpad as fp
+    >>> from fingerpad.export.job import job_of
+    >>> deck = abaqus_deck(job_of(fp.touch_of(fp.Fingertip(), fp.Sphere(), materials="trial1")))
+    >>> [line for line in deck.splitlines() if line.startswith("*HYPERELASTIC")][0]
+    '*HYPERELASTIC, NEO HOOKE, MODULI=LONG TERM'
+    """
+    reference = len(job.mesh.nodes_mm) + 1
+    relaxes = any(job.materials[layer].prony.shares for layer in job.layer_names)
+    lines = ["*HEADING", job.summary[2], *cards.comments(["For Abaqus/Standard.", *job.summary])]
+    lines += cards.nodes(job.mesh.nodes_mm, 1, "BODY")
+    for layer, name in job.layer_names.items():
+        lines += _layer(job, layer, name)
+    lines += cards.support_sets(job)
+    lines += _skin(job)
+    lines += _rigid_surface(job, reference)
+    lines += [f"*SURFACE INTERACTION, NAME={FRICTIONLESS}", "1.", "*FRICTION", "0.",
+              "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", *data([CONTACT_KPA_PER_MM])]  # fmt: skip
+    kind = "NODE TO SURFACE" if job.indenter.grips else "SURFACE TO SURFACE"
+    lines += [f"*CONTACT PAIR, INTERACTION={FRICTIONLESS}, TYPE={kind}", f"{SKIN}, {INDENTER}"]
+    lines += [*cards.supports(job), f"{REFERENCE}, 4, 6"]
+    for phase in job.phases:
+        lines += _step(job, phase, relaxes)
+    return cards.text(lines)
+
+
+def _layer(job: Job, layer: int, name: str) -> list[str]:
+    """Cards of one layer's elements and its material."""
+    material = job.materials[layer]
+    hybrid = "" if isinstance(material.law, Hyperfoam) else "H"
+    lines = cards.body_elements(job, layer, f"C3D8{hybrid}", f"C3D6{hybrid}")
+    lines += [f"*SOLID SECTION, ELSET={name}, MATERIAL={name}", f"*MATERIAL, NAME={name}"]
+    return lines + _material(material)
+
+
+def _material(material: Material) -> list[str]:
+    shares, times = material.prony.shares, material.prony.times_ms
+    if not shares:
+        return cards.law(material, 1.0)
+    moduli = "LONG TERM" if material.moduli == "long_term" else "INSTANTANEOUS"
+    # A foam relaxes as a whole, and Abaqus then wants the same shares for shape and volume.
+    bulk = shares if isinstance(material.law, Hyperfoam) else (0.0,) * len(shares)
+    rows = [", ".join(map(cards.number, row)) for row in zip(shares, bulk, times, strict=True)]
+    return [*cards.law(material, 1.0, f", MODULI={moduli}"), "*VISCOELASTIC, TIME=PRONY", *rows]
+
+
+def _skin(job: Job) -> list[str]:
+    if not job.indenter.grips:
+        return cards.surface(SKIN, job.touching_elements + 1, UPPER_FACE)
+    skin, area = job.mesh.skin_nodes, job.mesh.skin_area_mm2
+    share = area[np.searchsorted(skin, job.touching_nodes)]
+    rows = (f"{node + 1}, {cards.number(mm2)}" for node, mm2 in zip(job.touching_nodes, share, strict=True))
+    return [f"*SURFACE, NAME={SKIN}, TYPE=NODE", *rows]
+
+
+def _rigid_surface(job: Job, reference: int) -> list[str]:
+    """Cards of the indenter: its outline in local axes, tied to a reference node at its tip."""
+    origin, outline = job.placement.origin_mm, job.outline
+    x, y, z = job.placement.rotation.T
+    lines = cards.nodes(origin[None], reference, REFERENCE)
+    if outline.revolved:
+        lines += [f"*SURFACE, TYPE=REVOLUTION, NAME={INDENTER}", *data([*origin, *(origin + y)])]
+    else:
+        # The generator is -z: Abaqus takes local y as the vector product of local x and the generator.
+        lines += [f"*SURFACE, TYPE=CYLINDER, NAME={INDENTER}", *data([*origin, *(origin + x)])]
+        lines += data(origin - z)
+    lines += [", ".join(["START", *map(cards.number, outline.corners[0])])]
+    for corner, centre in zip(outline.corners[1:], outline.centres, strict=True):
+        word, values = ("LINE", corner) if centre is None else ("CIRCL", (*corner, *centre))
+        lines.append(", ".join([word, *map(cards.number, values)]))
+    return [*lines, f"*RIGID BODY, ANALYTICAL SURFACE={INDENTER}, REF NODE={reference}"]
+
+
+def _step(job: Job, phase: Phase, relaxes: bool) -> list[str]:
+    """Cards of one step: our own increments, ramped motion, and what to write."""
+    length = phase.end_ms - phase.start_ms
+    step = cards.number(length / phase.steps)
+    time = f"{step}, {cards.number(length)}"
+    # *VISCO without CETOL keeps to its first increment; *STATIC is held to ours, and may take smaller ones.
+    procedure = ["*VISCO", time] if relaxes else ["*STATIC", f"{time}, {cards.number(length * 1e-6)}, {step}"]
+    moves = (
+        f"{REFERENCE}, {axis}, {axis}, {cards.number(phase.depth_mm * component)}"
+        for axis, component in enumerate(job.placement.axis, 1)
+    )
+    return [
+        f"*STEP, NLGEOM=YES, AMPLITUDE=RAMP, INC={100 * phase.steps}",
+        *procedure,
+        "*BOUNDARY", *moves,
+        "*OUTPUT, FIELD, FREQUENCY=1",
+        "*NODE OUTPUT", "U, RF",
+        "*ELEMENT OUTPUT", "S, LE, SENER, EVOL",
+        "*CONTACT OUTPUT", "CSTRESS, CDISP",
+        "*OUTPUT, HISTORY, FREQUENCY=1",
+        f"*NODE OUTPUT, NSET={REFERENCE}", "U, RF",
+        "*END STEP",
+    ]  # fmt: skip

@@ -1,0 +1,226 @@
+"""A job as a CalculiX input file: elastic, with the indenter divided into rigid facets.
+
+CalculiX has no analytical rigid surface, no Prony series for hyperelastic materials, and no element with a
+pressure of its own. Its plain C3D8 is several percent too stiff for skin on a coarse mesh; C3D8I, whose
+incompatible modes leave the volume free, agrees with our constant-pressure brick on the same nodes
+(tests/verification/test_oracles.py measures how closely).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fingerpad.checks import FloatArray, one_of
+from fingerpad.errors import InputError
+from fingerpad.export import cards
+from fingerpad.export.cards import INDENTER, SKIN
+from fingerpad.export.job import CONTACT_KPA_PER_MM, Job, Phase
+from fingerpad.files import write_atomically
+from fingerpad.mechanics.materials import Material
+from fingerpad.mesh import IntArray
+
+UPPER_FACE, OUTER_FACE = 2, 1
+"""Faces that touch: the skin's side of our elements, and the outer side of the indenter's."""
+
+ELEMENTS = {"C3D8": "C3D6", "C3D8I": "C3D6", "C3D20R": "C3D15"}
+"""Bricks that can be asked for, and the wedges that go with them."""
+
+MODULI = ("long_term", "instantaneous")
+SLOWEST_SHARE = 1.0 / 64
+"""Smallest increment that CalculiX may cut to, as a share of ours."""
+
+_BRICK_EDGES = (
+    (0, 1),
+    (1, 2),
+    (2, 3),
+    (3, 0),
+    (4, 5),
+    (5, 6),
+    (6, 7),
+    (7, 4),
+    (0, 4),
+    (1, 5),
+    (2, 6),
+    (3, 7),
+)
+_WEDGE_EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
+
+
+def write_calculix(path: Path, job: Job, elastic_moduli: str | None = None, element: str = "C3D8I") -> Path:
+    """Write a job as a CalculiX input file; arguments as in `calculix_deck`.
+
+    Parameters
+    ----------
+    path : Path
+        File to write, by custom ending in .inp; replaced at once or not at all.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If CalculiX has no card for a law or indenter.
+    StoreError
+        If the file cannot be written.
+    """
+    write_atomically(Path(path), calculix_deck(job, elastic_moduli, element).encode())
+    return Path(path)
+
+
+def calculix_deck(job: Job, elastic_moduli: str | None = None, element: str = "C3D8I") -> str:
+    """Text of a CalculiX input file.
+
+    Parameters
+    ----------
+    job : Job
+        What to press.
+    elastic_moduli : {"long_term", "instantaneous"}, optional
+        Which moduli to press with where a material relaxes, which CalculiX cannot do. Nothing then changes
+        during a hold, so steps without motion are left out.
+    element : {"C3D8I", "C3D8", "C3D20R"}
+        Which brick. The incompatible modes of C3D8I may keep a deep press from converging: C3D20R, with nodes
+        added in the middle of edges, goes on; its faces, not its nodes, then touch.
+
+    Raises
+    ------
+    InputError
+        If a material relaxes and `elastic_moduli` is not given, or there is no card for a law or indenter.
+
+    Examples
+    --------
+    >>> import fingerpad as fp
+    >>> from fingerpad.export.job import job_of
+    >>> job = job_of(fp.touch_of(fp.Fingertip(), fp.Sphere(), materials="trial1"))
+    >>> calculix_deck(job)
+    Traceback (most recent call last):
+    ...
+    fingerpad.errors.InputError: CalculiX cannot relax the hyperelastic layer stratum_corneum: give \
+elastic_moduli ("long_term" or "instantaneous"), or export for Abaqus or FEBio.
+    >>> deck = calculix_deck(job, elastic_moduli="long_term")
+    >>> [line for line in deck.splitlines() if line.startswith("*STATIC")]
+    ['*STATIC']
+    """
+    one_of("element", element, tuple(ELEMENTS))
+    points, bricks, wedges = _with_middle_nodes(job) if element == "C3D20R" else _of_mesh(job)
+    first = len(points) + 1
+    lines = cards.comments(["For CalculiX.", *job.summary, *_remarks(elastic_moduli)])
+    lines += cards.nodes(points, 1, "BODY")
+    for layer, name in job.layer_names.items():
+        lines += cards.body_elements(job, layer, element, ELEMENTS[element], (bricks, wedges))
+        lines += [f"*MATERIAL, NAME={name}", *_law(job.materials[layer], name, elastic_moduli)]
+        lines += [f"*SOLID SECTION, ELSET={name}, MATERIAL={name}"]
+    lines += cards.support_sets(job, *_held(job, points, bricks, wedges))
+    if job.indenter.grips:
+        lines += [f"*SURFACE, NAME={SKIN}, TYPE=NODE", *(str(node + 1) for node in job.touching_nodes)]
+    else:
+        lines += cards.surface(SKIN, job.touching_elements + 1, UPPER_FACE)
+    lines += _rigid_body(job, first)
+    # Nodes touch in our own contact; where nodes stand in the middle of edges, they share load unevenly.
+    by_nodes = job.indenter.grips or element != "C3D20R"
+    kind = "NODE TO SURFACE" if by_nodes else "SURFACE TO SURFACE"
+    lines += ["*SURFACE INTERACTION, NAME=FRICTIONLESS",
+              "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", *cards.data([CONTACT_KPA_PER_MM]),
+              f"*CONTACT PAIR, INTERACTION=FRICTIONLESS, TYPE={kind}", f"{SKIN}, {INDENTER}",
+              *cards.supports(job)]  # fmt: skip
+    depth = 0.0
+    for phase in job.phases:
+        if phase.depth_mm != depth:
+            lines += _step(job, phase)
+        depth = phase.depth_mm
+    return cards.text(lines)
+
+
+def _remarks(elastic_moduli: str | None) -> list[str]:
+    if elastic_moduli is None:
+        return []
+    return [f"Elastic, with {elastic_moduli} moduli: relaxation and the hold are left out."]
+
+
+def _law(material: Material, name: str, elastic_moduli: str | None) -> list[str]:
+    if not material.prony.shares:
+        return cards.law(material, 1.0)
+    if elastic_moduli is None:
+        raise InputError(
+            f"CalculiX cannot relax the hyperelastic layer {name}: give elastic_moduli "
+            '("long_term" or "instantaneous"), or export for Abaqus or FEBio.'
+        )
+    one_of("elastic_moduli", elastic_moduli, MODULI)
+    share = material.prony.long_term_share
+    return cards.law(
+        material, material.instantaneous_factor * (share if elastic_moduli == "long_term" else 1.0)
+    )
+
+
+def _of_mesh(job: Job) -> tuple[FloatArray, IntArray, IntArray]:
+    return job.mesh.nodes_mm, job.mesh.elements, job.wedges
+
+
+def _with_middle_nodes(job: Job) -> tuple[FloatArray, IntArray, IntArray]:
+    """Points, bricks (n, 20) and wedges (n, 15) with a node in the middle of each edge."""
+    mesh, is_wedge = job.mesh, job.is_wedge
+    brick_ends = mesh.elements[~is_wedge][:, _BRICK_EDGES]
+    wedge_ends = job.wedges[is_wedge][:, _WEDGE_EDGES]
+    ends = np.sort(np.concatenate([brick_ends.reshape(-1, 2), wedge_ends.reshape(-1, 2)]), axis=1)
+    edges, which = np.unique(ends, axis=0, return_inverse=True)
+    middle = len(mesh.nodes_mm) + which.ravel()
+    bricks = np.full((len(mesh.elements), 20), -1, dtype=np.int64)
+    wedges = np.full((len(mesh.elements), 15), -1, dtype=np.int64)
+    split = brick_ends.shape[0] * len(_BRICK_EDGES)
+    bricks[~is_wedge] = np.hstack([mesh.elements[~is_wedge], middle[:split].reshape(-1, len(_BRICK_EDGES))])
+    wedges[is_wedge] = np.hstack([job.wedges[is_wedge], middle[split:].reshape(-1, len(_WEDGE_EDGES))])
+    return np.concatenate([mesh.nodes_mm, mesh.nodes_mm[edges].mean(axis=1)]), bricks, wedges
+
+
+def _held(job: Job, points: FloatArray, bricks: IntArray, wedges: IntArray) -> tuple[IntArray, IntArray]:
+    """List fixed and symmetric nodes; in the middle of an edge, those of which both ends are."""
+    found = []
+    for held in (job.mesh.fixed_nodes, job.mesh.symmetry_nodes):
+        inside = np.zeros(len(points), dtype=bool)
+        inside[held] = True
+        for corners, edges in ((bricks[~job.is_wedge], _BRICK_EDGES), (wedges[job.is_wedge], _WEDGE_EDGES)):
+            middle = corners[:, corners.shape[1] - len(edges) :] if corners.shape[1] > 8 else corners[:, :0]
+            if middle.size:
+                inside[middle] |= inside[corners[:, edges]].all(axis=2)
+        found.append(np.flatnonzero(inside))
+    return found[0], found[1]
+
+
+def _rigid_body(job: Job, first: int) -> list[str]:
+    """Cards of the indenter, thin elements whose nodes all move alike; its material is never strained."""
+    rigid = job.rigid
+    number = len(job.mesh.elements) + 1
+    quads, triangles = rigid.solids(rigid.quads), rigid.solids(rigid.triangles)
+    lines = cards.nodes(rigid.nodes_mm, first, INDENTER)
+    numbers = number + np.arange(len(quads) + len(triangles))
+    lines += cards.elements("C3D8", INDENTER, numbers[: len(quads)], quads + first)
+    if len(triangles):
+        lines += cards.elements("C3D6", INDENTER, numbers[len(quads) :], triangles + first)
+    lines += ["*MATERIAL, NAME=RIGID", "*ELASTIC", "1000, 0.3"]
+    lines += [f"*SOLID SECTION, ELSET={INDENTER}, MATERIAL=RIGID"]
+    return lines + cards.surface(INDENTER, numbers, OUTER_FACE)
+
+
+def _step(job: Job, phase: Phase) -> list[str]:
+    """Cards of one step: increments at most as long as ours, ramped motion, results of every increment."""
+    length = phase.end_ms - phase.start_ms
+    step = length / phase.steps
+    moves = (
+        f"{INDENTER}, {axis}, {axis}, {cards.number(phase.depth_mm * component)}"
+        for axis, component in enumerate(job.placement.axis, 1)
+    )
+    lines = [
+        f"*STEP, NLGEOM, INC={100 * phase.steps}",
+        "*STATIC",
+        ", ".join(map(cards.number, (step, length, SLOWEST_SHARE * step, step))),
+        "*BOUNDARY", *moves,
+        f"*NODE PRINT, NSET={INDENTER}, TOTALS=ONLY, FREQUENCY=1", "RF",
+    ]  # fmt: skip
+    for name in job.layer_names.values():
+        # Energies are summed up from one printed increment to the next: FREQUENCY above 1 makes them wrong.
+        lines += [f"*EL PRINT, ELSET={name}, FREQUENCY=1", "ENER"]
+    return [*lines, "*NODE FILE, FREQUENCY=1", "U, RF", "*EL FILE, FREQUENCY=1", "S, ENER", "*END STEP"]

@@ -1,0 +1,280 @@
+"""A press as other solvers see it: solids, sets of nodes, the faces that may touch, and steps in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad import __version__
+from fingerpad.checks import FloatArray, float_array, increasing, instance
+from fingerpad.errors import InputError
+from fingerpad.export.outline import Outline, RigidMesh, outline_of, rigid_mesh
+from fingerpad.indentation import Touch
+from fingerpad.indenters import Indenter
+from fingerpad.mechanics.contact import Placement
+from fingerpad.mechanics.materials import Material
+from fingerpad.mesh import LAYERS, IntArray, Mesh
+from fingerpad.stimulus import RampAndHold
+from fingerpad.store import code_hash
+
+CONTACT_KPA_PER_MM = 50_000.0
+"""Penalty of the exported contact. Other solvers do not augment it as ours does: 50 kPa penetrate by 1 µm."""
+
+BESIDE_INDENTER_MM = 2.0
+"""How far beside the indenter, beyond its depth, the skin may still come to touch it. [mm]"""
+
+
+@dataclass(frozen=True)
+class Phase:
+    """Consecutive steps of equal length at constant speed.
+
+    Parameters
+    ----------
+    start_ms, end_ms : float
+        When it begins and ends. [ms]
+    steps : int
+        Its number of steps.
+    depth_mm : float
+        Depth at its end. [mm]
+    """
+
+    start_ms: float
+    end_ms: float
+    steps: int
+    depth_mm: float
+
+
+@dataclass(frozen=True)
+class Job:
+    """Everything that another solver needs to press the same body in the same way.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The body; its bone and nail are fixed.
+    materials : tuple of Material
+        One per layer of the mesh.
+    indenter : Indenter
+        The rigid body.
+    placement : Placement
+        Where it stands at first touch.
+    times_ms : array (n_times,)
+        Steps, from 0. [ms]
+    depths_mm : array (n_times,)
+        How far the indenter has advanced at each, from 0. [mm]
+
+    Raises
+    ------
+    InputError
+        If times do not increase from 0, depths do not match them, or a layer has no material.
+    """
+
+    mesh: Mesh
+    materials: tuple[Material, ...]
+    indenter: Indenter
+    placement: Placement
+    times_ms: FloatArray
+    depths_mm: FloatArray
+
+    def __post_init__(self) -> None:
+        instance("mesh", self.mesh, Mesh)
+        instance("indenter", self.indenter, Indenter)
+        times = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
+        depths = float_array("depths_mm", self.depths_mm, 1)
+        if times.size < 2 or times[0] != 0.0 or depths.shape != times.shape or depths[0] != 0.0:
+            raise InputError(
+                "times_ms and depths_mm must begin with 0 and go on together: "
+                f"got {times.size} times from {times[:1]} and {depths.size} depths from {depths[:1]}."
+            )
+        if depths.max() <= 0.0:
+            raise InputError(f"depths_mm must press somewhere: the deepest is {depths.max():g} mm.")
+        if len(self.materials) <= self.mesh.layer.max():
+            raise InputError(
+                f"materials needs one per layer: got {len(self.materials)} for layer {self.mesh.layer.max()}."
+            )
+        object.__setattr__(self, "times_ms", times)
+        object.__setattr__(self, "depths_mm", depths)
+
+    @property
+    def phases(self) -> tuple[Phase, ...]:
+        """Steps gathered where they are equally long and fast; hold steps that grow stay alone."""
+        found: list[Phase] = []
+        for n in range(1, self.times_ms.size):
+            start, end = float(self.times_ms[n - 1]), float(self.times_ms[n])
+            speed = (self.depths_mm[n] - self.depths_mm[n - 1]) / (end - start)
+            if found and self._continues(found[-1], end - start, speed):
+                start, steps = found[-1].start_ms, found.pop().steps + 1
+            else:
+                steps = 1
+            found.append(Phase(start, end, steps, float(self.depths_mm[n])))
+        return tuple(found)
+
+    def _continues(self, phase: Phase, step_ms: float, speed: float) -> bool:
+        before = float(np.interp(phase.start_ms, self.times_ms, self.depths_mm))
+        length = phase.end_ms - phase.start_ms
+        same_speed = np.isclose(speed * length, phase.depth_mm - before, rtol=1e-9, atol=1e-12)
+        return bool(same_speed and np.isclose(step_ms * phase.steps, length, rtol=1e-9))
+
+    @property
+    def layer_names(self) -> dict[int, str]:
+        """Names of the layers that have elements, fit for a set in a deck."""
+        return {int(index): LAYERS[index].replace(" ", "_") for index in np.unique(self.mesh.layer)}
+
+    @cached_property
+    def wedges(self) -> IntArray:
+        """Nodes of each wedge (n_elements, 6), lower triangle first; -1 where the element is a brick.
+
+        Raises
+        ------
+        InputError
+            If an element repeats nodes in another way than a brick with one collapsed side.
+        """
+        elements = self.mesh.elements
+        wedges = np.full((len(elements), 6), -1, dtype=np.int64)
+        lower, upper = elements[:, :4], elements[:, 4:]
+        for corner in range(4):
+            after = (corner + 1) % 4
+            collapsed = (lower[:, corner] == lower[:, after]) & (upper[:, corner] == upper[:, after])
+            kept = [n for n in range(4) if n != after]
+            wedges[collapsed] = np.concatenate([lower[:, kept], upper[:, kept]], axis=1)[collapsed]
+        is_wedge = wedges[:, 0] >= 0
+        nodes = np.where(is_wedge[:, None], np.pad(wedges, ((0, 0), (0, 2)), mode="edge"), elements)
+        different = (np.diff(np.sort(nodes, axis=1), axis=1) > 0).sum(axis=1) + 1
+        strange = np.flatnonzero(different != np.where(is_wedge, 6, 8))
+        if strange.size:
+            raise InputError(
+                f"Element {strange[0]} repeats nodes ({elements[strange[0]].tolist()}): only bricks and "
+                "bricks with one collapsed side, wedges, can be exported."
+            )
+        return wedges
+
+    @property
+    def is_wedge(self) -> np.ndarray:
+        """Which elements are wedges, bool (n_elements,)."""
+        return self.wedges[:, 0] >= 0
+
+    @cached_property
+    def reach_mm(self) -> float:
+        """A length beyond the whole body: half extent of what has no edge of its own. [mm]"""
+        return float(np.ptp(self.mesh.nodes_mm, axis=0).max() + 2 * self.depths_mm.max())
+
+    @property
+    def outline(self) -> Outline:
+        """Section of the indenter."""
+        return outline_of(self.indenter, self.reach_mm)
+
+    def _local(self, points_mm: FloatArray) -> FloatArray:
+        return self.placement.to_local(points_mm, depth_mm=0.0)
+
+    @cached_property
+    def rigid(self) -> RigidMesh:
+        """Facets of the indenter where it may touch, at first touch in the frame of the body."""
+        z = self._local(self.mesh.nodes_mm)[:, 2]
+        beyond = self.depths_mm.max() + BESIDE_INDENTER_MM
+        extent = float(z.min() - beyond), float(z.max() + beyond)
+        local = rigid_mesh(self.outline, -2.0 * self.depths_mm.max() - 0.1, extent)
+        nodes = self.placement.origin_mm + local.nodes_mm @ self.placement.rotation.T
+        return RigidMesh(nodes, local.quads, local.triangles)
+
+    @cached_property
+    def touching_elements(self) -> IntArray:
+        """Elements whose skin face may come to touch the indenter; all of an element that is gripped."""
+        mesh = self.mesh
+        top = np.arange(len(mesh.elements)).reshape(mesh.shape)[:, :, 0].ravel()
+        faces = mesh.elements[top, 4:]
+        local = self._local(mesh.nodes_mm[faces].reshape(-1, 3)).reshape(*faces.shape, 3)
+        if self.indenter.grips:
+            may = self.indenter.may_touch(local.reshape(-1, 3)).reshape(faces.shape).all(axis=1)
+        else:
+            across = np.abs(local[..., 0])
+            if self.outline.revolved:
+                across = np.hypot(local[..., 0], local[..., 2])
+            beyond = self.indenter.half_width_mm + self.depths_mm.max() + BESIDE_INDENTER_MM
+            normal = np.cross(local[:, 2] - local[:, 0], local[:, 3] - local[:, 1])
+            may = (across.min(axis=1) < beyond) & (normal[:, 1] < 0.0)
+        may &= ~np.isin(faces, mesh.fixed_nodes).all(axis=1)
+        if not may.any():
+            raise InputError(f"{type(self.indenter).__name__} never touches a face of the skin: move it.")
+        return top[may]
+
+    @property
+    def touching_nodes(self) -> IntArray:
+        """Free nodes of the faces that may touch."""
+        return np.setdiff1d(self.mesh.elements[self.touching_elements, 4:], self.mesh.fixed_nodes)
+
+    @property
+    def gripped_nodes(self) -> IntArray:
+        """Nodes that the indenter does not let slide along x."""
+        return self.touching_nodes if self.indenter.grips else np.empty(0, dtype=np.int64)
+
+    @property
+    def summary(self) -> tuple[str, ...]:
+        """What stands at the top of every deck."""
+        mesh, half = self.mesh, " of a body symmetric about z = 0 (forces are of this half)"
+        return (
+            f"Written by fingerpad {__version__}, mechanics {code_hash()}.",
+            "Units: mm, ms, kPa, mN (1 kPa mm2 = 1 mN); energy in microjoule.",
+            f"{type(self.indenter).__name__} pressed {self.depths_mm.max():g} mm deep into "
+            f"{len(mesh.nodes_mm)} nodes and {len(mesh.elements)} elements"
+            + (half if mesh.symmetry_nodes.size else "")
+            + ".",
+            f"{self.times_ms.size - 1} steps from 0 to {self.times_ms[-1]:g} ms.",
+        )
+
+
+def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike | None = None) -> Job:
+    """Describe a touch for other solvers.
+
+    Parameters
+    ----------
+    touch : Touch
+        What to export.
+    times_ms : array, optional
+        Steps to take; by default those of the touch's settings. Needed when a tolerance chooses them: a
+        response tells which it took. [ms]
+    depths_mm : array, optional
+        Depths at `times_ms`; needed when the touch is controlled by force: a response tells them too. [mm]
+
+    Returns
+    -------
+    Job
+
+    Raises
+    ------
+    InputError
+        If times or depths are needed and missing, or do not fit each other.
+
+    Examples
+    --------
+    >>> import fingerpad as fp
+    >>> job = job_of(fp.touch_of(fp.Fingertip(), fp.Sphere(), fp.RampAndHold(depth_mm=0.5)))
+    >>> [(phase.end_ms, phase.steps, phase.depth_mm) for phase in job.phases][:1]
+    [(50.0, 5, 0.5)]
+    """
+    instance("touch", touch, Touch)
+    stimulus, settings = touch.stimulus, touch.settings
+    if times_ms is None:
+        if settings.sed_tolerance is not None:
+            raise InputError(
+                "A tolerance chooses the steps of this touch while it is solved: give times_ms, for example "
+                "those of its response."
+            )
+        times_ms = stimulus.times_ms(settings.ramp_steps, settings.hold_steps)
+    if depths_mm is None:
+        if not isinstance(stimulus, RampAndHold):
+            raise InputError(
+                f"{type(stimulus).__name__} sets forces, and a deck moves its indenter: give times_ms "
+                "and depths_mm, those of its response."
+            )
+        depths_mm = stimulus.depth_at(times_ms)
+    return Job(
+        touch.mesh,
+        touch.tissues.layers,
+        touch.indenter,
+        touch.placement,
+        np.asarray(times_ms, dtype=float),
+        np.asarray(depths_mm, dtype=float),
+    )

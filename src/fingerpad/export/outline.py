@@ -1,0 +1,220 @@
+"""Rigid indenters for other solvers: an exact outline of lines and arcs, and facets that follow it.
+
+An outline is drawn in the indenter's own frame (see `fingerpad.indenters`): u is the distance from the axis
+of pressing, y the direction of pressing, and the tip is at (0, 0). Turned about y it makes a sphere or a
+punch, swept along z a cylinder, a bar or a plate. It runs so that the skin is on its left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from fingerpad.checks import FloatArray, positive
+from fingerpad.errors import InputError
+from fingerpad.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.mesh import IntArray
+
+Point = tuple[float, float]
+
+SHELL_SHARE = 0.1
+"""Thickness of the facets' solid elements, as a share of their distance from the middle of the body."""
+
+LARGEST_TURN_RAD = np.deg2rad(3.0)
+"""Largest angle that one facet spans along an arc: its middle is then 0.03 % of the radius too deep."""
+
+FACETS_AROUND = 96
+FACETS_ACROSS = 8
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Section of a rigid indenter.
+
+    Parameters
+    ----------
+    revolved : bool
+        Whether it turns about the axis of pressing; else it is swept along z.
+    corners : tuple of (float, float)
+        u and y where segments meet. [mm]
+    centres : tuple of (float, float) or None
+        For each segment the centre of its arc, or None for a straight line. [mm]
+
+    Examples
+    --------
+    >>> outline_of(Cylinder(diameter_mm=2.0), reach_mm=5.0).corners
+    ((-1.0, -1.0), (0.0, 0.0), (1.0, -1.0))
+    """
+
+    revolved: bool
+    corners: tuple[Point, ...]
+    centres: tuple[Point | None, ...]
+
+    def points(self, lowest_mm: float) -> FloatArray:
+        """Points along the outline, arcs divided finely, to just below y = `lowest_mm`, (n, 2). [mm]"""
+        points = [np.array([self.corners[0]])]
+        for (start, end), centre in zip(pairwise(self.corners), self.centres, strict=True):
+            points.append(_line(start, end) if centre is None else _arc(start, end, centre))
+        line = np.concatenate(points)
+        kept = np.flatnonzero(line[:, 1] >= lowest_mm)
+        return line[max(kept[0] - 1, 0) : kept[-1] + 2]
+
+
+def _line(start: Point, end: Point) -> FloatArray:
+    share = np.linspace(0.0, 1.0, 5)[1:, None]
+    return (1.0 - share) * np.array(start) + share * np.array(end)
+
+
+def _arc(start: Point, end: Point, centre: Point) -> FloatArray:
+    middle = np.array(centre)
+    first, last = (np.arctan2(*(np.array(point) - middle)[::-1]) for point in (start, end))
+    count = int(np.ceil(abs(last - first) / LARGEST_TURN_RAD))
+    angles = np.linspace(first, last, count + 1)[1:]
+    radius = np.linalg.norm(np.array(start) - middle)
+    return middle + radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def outline_of(indenter: Indenter, reach_mm: float) -> Outline:
+    """Outline of an indenter.
+
+    Parameters
+    ----------
+    indenter : Indenter
+        One of the package's own; a body of your own is only known by its gap.
+    reach_mm : float
+        Half extent of what has no edge of its own (plate), and height of straight sides. [mm]
+
+    Returns
+    -------
+    Outline
+
+    Raises
+    ------
+    InputError
+        If the indenter is none of those that can be drawn.
+
+    Examples
+    --------
+    >>> outline_of(Sphere(curvature_per_m=500), reach_mm=5.0)
+    Outline(revolved=True, corners=((0.0, 0.0), (2.0, -2.0)), centres=((0.0, -2.0),))
+    """
+    positive("reach_mm", reach_mm, "mm")
+    if isinstance(indenter, Sphere):
+        radius = indenter.radius_mm
+        return Outline(True, ((0.0, 0.0), (radius, -radius)), ((0.0, -radius),))
+    if isinstance(indenter, Cylinder):
+        radius = indenter.diameter_mm / 2
+        return Outline(False, ((-radius, -radius), (0.0, 0.0), (radius, -radius)), ((0.0, -radius),) * 2)
+    if isinstance(indenter, FlatPunch):
+        corners, centres = _rounded_side(indenter.diameter_mm / 2, indenter.fillet_mm, reach_mm)
+        return _without_empty_segments(True, ((0.0, 0.0), *corners), (None, *centres))
+    if isinstance(indenter, Bar):
+        corners, centres = _rounded_side(indenter.half_width_mm, indenter.fillet_mm, reach_mm)
+        mirrored = tuple((-u, y) for u, y in reversed(corners))
+        other = tuple(None if centre is None else (-centre[0], centre[1]) for centre in reversed(centres))
+        return _without_empty_segments(False, (*mirrored, *corners), (*other, None, *centres))
+    if isinstance(indenter, Plate | Line):
+        return Outline(False, ((-reach_mm, 0.0), (reach_mm, 0.0)), (None,))
+    raise InputError(
+        f"{type(indenter).__name__} cannot be exported, since only its gap is known: take Sphere, Cylinder, "
+        "Bar, FlatPunch, Plate or Line."
+    )
+
+
+def _rounded_side(
+    half_width: float, fillet: float, height: float
+) -> tuple[tuple[Point, ...], tuple[Point | None, ...]]:
+    """Corners and arcs of one side of a flat body: end of the flat, foot of the fillet, end of the side."""
+    corners = ((half_width - fillet, 0.0), (half_width, -fillet), (half_width, -fillet - height))
+    return corners, ((half_width - fillet, -fillet), None)
+
+
+def _without_empty_segments(
+    revolved: bool, corners: tuple[Point, ...], centres: tuple[Point | None, ...]
+) -> Outline:
+    """Outline without the segments of no length that a fillet of 0 or of the full half-width leaves."""
+    kept = [n for n, (start, end) in enumerate(pairwise(corners)) if start != end]
+    return Outline(revolved, (corners[0], *(corners[n + 1] for n in kept)), tuple(centres[n] for n in kept))
+
+
+@dataclass(frozen=True)
+class RigidMesh:
+    """Facets of a rigid indenter, each the outer face of a thin solid element.
+
+    Parameters
+    ----------
+    nodes_mm : array (n_nodes, 3)
+        The outer nodes, then as many inner ones in the same order, in the indenter's frame. [mm]
+    quads : int array (n_quads, 4)
+        Outer nodes, counter-clockwise seen from the skin.
+    triangles : int array (n_triangles, 3)
+        The same about the axis of a body of revolution.
+    """
+
+    nodes_mm: FloatArray
+    quads: IntArray
+    triangles: IntArray
+
+    def solids(self, faces: IntArray) -> IntArray:
+        """Bricks or wedges behind `faces`, their first nodes those of the outer face.
+
+        The order is turned round, since a solid's first face is counter-clockwise seen from its inside.
+        """
+        outer = np.concatenate([faces[:, :1], faces[:, :0:-1]], axis=1)
+        return np.concatenate([outer, outer + len(self.nodes_mm) // 2], axis=1)
+
+
+def rigid_mesh(outline: Outline, lowest_mm: float, z_mm: tuple[float, float]) -> RigidMesh:
+    """Divide an indenter into facets.
+
+    Parameters
+    ----------
+    outline : Outline
+        Its section.
+    lowest_mm : float
+        y down to which it is needed, negative. [mm]
+    z_mm : (float, float)
+        Extent of a swept body. [mm]
+
+    Returns
+    -------
+    RigidMesh
+
+    Examples
+    --------
+    >>> ball = rigid_mesh(outline_of(Sphere(curvature_per_m=500), 5.0), lowest_mm=-1.0, z_mm=(0.0, 1.0))
+    >>> ball.quads.shape[0] % 96, ball.triangles.shape
+    (0, (96, 3))
+    """
+    line = outline.points(lowest_mm)
+    if outline.revolved:
+        outer, quads, triangles = _revolved(line)
+    else:
+        outer, quads = _swept(line, np.linspace(*z_mm, FACETS_ACROSS + 1))
+        triangles = np.empty((0, 3), dtype=np.int64)
+    towards = np.array([0.0, line[:, 1].min() - 1.0, 0.0]) - outer
+    if not outline.revolved:
+        towards[:, 2] = 0.0
+    return RigidMesh(np.concatenate([outer, outer + SHELL_SHARE * towards]), quads, triangles)
+
+
+def _swept(line: FloatArray, z: FloatArray) -> tuple[FloatArray, IntArray]:
+    outer = np.concatenate([np.column_stack([line, np.full(len(line), depth)]) for depth in z])
+    ids = np.arange(outer.shape[0]).reshape(z.size, len(line))
+    # u runs to the right and z towards the reader's back: seen from the skin (+y) this order turns left.
+    quads = np.stack([ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]], axis=-1).reshape(-1, 4)
+    return outer, quads
+
+
+def _revolved(line: FloatArray) -> tuple[FloatArray, IntArray, IntArray]:
+    around = 2.0 * np.pi * np.arange(FACETS_AROUND) / FACETS_AROUND
+    u, y = line[1:, :1], line[1:, 1:]
+    rings = np.stack([u * np.sin(around), np.broadcast_to(y, (len(u), around.size)), u * np.cos(around)], -1)
+    outer = np.concatenate([[[0.0, line[0, 1], 0.0]], rings.reshape(-1, 3)])
+    ids = 1 + np.arange(len(u) * around.size).reshape(len(u), around.size)
+    after = np.roll(ids, -1, axis=1)
+    quads = np.stack([ids[:-1], ids[1:], after[1:], after[:-1]], axis=-1).reshape(-1, 4)
+    triangles = np.stack([np.zeros_like(ids[0]), ids[0], after[0]], axis=-1)
+    return outer, quads, triangles
