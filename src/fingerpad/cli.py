@@ -1,4 +1,4 @@
-"""The command line: `fingerpad reproduce` and `fingerpad refine`."""
+"""The command line: `fingerpad reproduce`, `fingerpad refine` and `fingerpad materials`."""
 
 from __future__ import annotations
 
@@ -23,8 +23,11 @@ from fingerpad.files import write_atomically
 from fingerpad.grading import RESOLUTIONS
 from fingerpad.report import mesh_refinement as refinement_report
 from fingerpad.report import write_report
+from fingerpad.report.material_sets import write_material_page
 from fingerpad.studies import Reproduction, mesh_refinement, reproduce
 from fingerpad.studies.conditions import Conditions
+from fingerpad.studies.material_sets import Effort
+from fingerpad.studies.material_study import MaterialStudy, study_materials
 
 EXPECTED_TIME = {"quick": "about 3 minutes", "standard": "about 9 minutes", "paper": "more than a day"}
 """On two cores, nothing stored yet."""
@@ -122,6 +125,47 @@ def refine_command(
         for name, content in refinement_report.documents(results).items():
             write_atomically(out / name, content)
     typer.echo(f"Report: {out / refinement_report.PAGE}")
+
+
+@app.command("materials")
+def materials_command(
+    resolution: Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTIONS)}.")] = "quick",
+    out: Annotated[
+        Path, typer.Option(help="Folder for page, figure, numbers and stored indentations.")
+    ] = Path("materials"),
+    jobs: Annotated[
+        int | None,
+        typer.Option(parser=_whole_number, metavar="INTEGER", help="Processes; one per core by default."),
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(parser=_whole_number, metavar="INTEGER", help="Seed of noise and search.")
+    ] = 0,
+    name: Annotated[
+        list[str] | None, typer.Option(help="A set to compare; may be given several times; all by default.")
+    ] = None,
+    shifted_bars: Annotated[
+        bool, typer.Option("--shifted-bars", help="Press the bar at all 36 shifts, not once.")
+    ] = False,
+) -> None:
+    """Compare sets of tissues on deflection, firing and discrimination."""
+    study = MaterialStudy(
+        Conditions(resolution=resolution, seed=seed),
+        out,
+        jobs if jobs is not None else _cores(),
+        Effort(shifted_bars=shifted_bars),
+        **({"names": tuple(name)} if name else {}),
+    )
+    _make_writable(out)
+    console = Console(stderr=True, quiet=not sys.stderr.isatty())
+    chosen = "".join(f' --name "{one}"' for one in name or ())
+    command = f"fingerpad materials --resolution {resolution}{' --shifted-bars' * shifted_bars}{chosen}"
+    with _interruptible():
+        results = study_materials(study, lambda part: console.print(f"done: {part}"))
+        numbers = out / "material_sets.json"
+        write_atomically(numbers, json.dumps(results, indent=1, allow_nan=False).encode())
+        page = write_material_page(results, out, command)
+    typer.echo(f"Page: {page}")
+    typer.echo(f"Results: {numbers}")
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from fingerpad.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.indentation import CONTACT_POINT_MM, grading_about, touch_of
 from fingerpad.indentation import Touch as Touch
 from fingerpad.indenters import Indenter
+from fingerpad.mechanics.materials import Tissues
 
 RECEPTOR_X_MM = CONTACT_POINT_MM[0]
 """Where the single receptor of the bar study lies, and the middle of the population. [mm]"""
@@ -37,15 +38,15 @@ class Conditions:
         How fine meshes and steps are.
     seed : int
         Seed of the observer's noise.
-    materials : str
-        Tissues of the single-unit and the population study, see `mechanics.tissues`.
+    materials : str or Tissues
+        Tissues of the single-unit and the population study: a name, see `mechanics.tissues`, or your own.
     finger : Fingertip
         The finger.
     """
 
     resolution: str = "standard"
     seed: int = 0
-    materials: str = "trial3"
+    materials: str | Tissues = "trial3"
     finger: Fingertip = field(default_factory=Fingertip)
 
     def __post_init__(self) -> None:
@@ -63,7 +64,7 @@ class Conditions:
         indenter: Indenter,
         x_mm: float,
         grading: Grading,
-        materials: str | None = None,
+        materials: str | Tissues | None = None,
         tilt_deg: float = 0.0,
     ) -> Touch:
         """One touch of the paper's protocol, 1.0 mm in 50 ms, held for 950 ms, on the midline at x."""
