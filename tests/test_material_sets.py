@@ -27,7 +27,7 @@ from fingerpad.studies.hyperfoam_fit import (
     polynomial_of_hyperfoam,
     polynomial_stress_terms,
 )
-from fingerpad.studies.material_candidates import candidates, layered, wu_polynomials
+from fingerpad.studies.material_candidates import candidates, deflection_candidates, layered, wu_polynomials
 from fingerpad.studies.material_sets import (
     Effort,
     Levels,
@@ -120,8 +120,8 @@ def test_unusable_laws_are_refused(call, said):
 
 
 def test_candidates_have_names_of_their_own_and_say_where_they_come_from():
-    every = candidates()
-    assert len({candidate.name for candidate in every}) == len(every) >= 12
+    every = (*candidates(), *deflection_candidates())
+    assert len({candidate.name for candidate in every}) == len(every) >= 30
     statuses = ("assumed", "recalled", "read")
     assert all(any(word in candidate.basis for word in statuses) for candidate in every)
 
@@ -362,17 +362,20 @@ class Coarse(Conditions):
     bar_grading = sphere_grading = deflection_grading
 
 
+def use_few(patch):
+    """Leave two inner layers and one candidate for the cylinder."""
+    few = {"Maeno": named_tissues("trial1"), "identified": named_tissues("trial3")}
+    patch.setattr(trial_order, "inner_layers", lambda: few)
+    patch.setattr(material_study, "deflection_candidates", lambda: deflection_candidates()[:1])
+
+
 @pytest.fixture(scope="module")
 def tiny(tmp_path_factory):
     folder = tmp_path_factory.mktemp("materials")
     effort = Effort(generations=2, population=4)
     study = MaterialStudy(Coarse("quick"), folder, 1, effort, names=("Trial 1", "Trial 3"))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            trial_order,
-            "inner_layers",
-            lambda: {"Maeno": named_tissues("trial1"), "identified": named_tissues("trial3")},
-        )
+        use_few(patch)
         return SimpleNamespace(study=study, folder=folder, results=study_materials(study))
 
 
@@ -398,11 +401,7 @@ def test_a_stiff_epidermis_spreads_the_deflection_at_equal_depth(tiny):
 
 def test_a_second_run_presses_nothing_and_says_the_same(tiny, monkeypatch):
     monkeypatch.setattr("fingerpad.store._compute", pytest.fail)
-    monkeypatch.setattr(
-        trial_order,
-        "inner_layers",
-        lambda: {"Maeno": named_tissues("trial1"), "identified": named_tissues("trial3")},
-    )
+    use_few(monkeypatch)
     again = study_materials(tiny.study)
     for results in (again, tiny.results):
         json.dumps(results, allow_nan=False)
@@ -416,6 +415,10 @@ def test_the_page_tells_every_set_and_its_numbers(tiny, tmp_path):
     for number, found in enumerate(tiny.results["sets"], start=1):
         assert f"| {number} | {found['name']} |" in text
         assert f"| {number} | {found['deflection']['r2']:.3f}".replace("-", "−") in text
+    (alone,) = tiny.results["deflection_only"]
+    assert (
+        f"| {alone['name']} | 20 | 25.4 | 2.373 | {alone['deflection']['r2']:.3f}".replace("-", "−") in text
+    )
     assert f"](images/{FIGURE})" in text
     assert tiny.results["manifest"]["date"] in text
 

@@ -13,7 +13,6 @@ from fingerpad.files import write_atomically
 from fingerpad.parameters import paper, psychophysics
 from fingerpad.report.appearance import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, png
 from fingerpad.report.words import fixed
-from fingerpad.studies.material_study import LARGEST_HIT_RATE_ERROR, LEAST_R2
 
 FIGURE = "material_sets.png"
 _SIGMA = psychophysics.NOISE_SIGMA.value
@@ -51,7 +50,7 @@ def draw(section: dict[str, Any]) -> Figure:
     _cloud(middle, rows, front, r2, sigma)
     _cloud(right, rows, front, fss, sigma)
     for axes in (left, middle):
-        axes.axvspan(LEAST_R2, 1.0, color=PALE, zorder=0)
+        axes.axvspan(section["targets"]["r2"], 1.0, color=PALE, zorder=0)
         axes.set_xlim(right=1.0)
         axes.set_xlabel("deflection: $R^2$ under the cylinder")
     left.axhline(_FSS, color=GREY, linewidth=1.0)
@@ -82,7 +81,7 @@ def page(results: Mapping[str, Any], command: str = "fingerpad materials") -> st
     str
         Markdown.
     """
-    manifest = results["manifest"]
+    manifest, targets = results["manifest"], results["targets"]
     bars = (
         "36 presses of the bar"
         if manifest["shifted_bars"]
@@ -98,7 +97,8 @@ def page(results: Mapping[str, Any], command: str = "fingerpad materials") -> st
         _met(results),
         f"![R², FSS and noise of every set](images/{FIGURE})",
         "Orange: no other set is at least as good on all three levels and better on one. Shaded: R² of "
-        f"{LEAST_R2} or more. Lines: the paper's {_FSS:g} and {_SIGMA:g}. Numbers are those of the table.",
+        f"{targets['r2']:g} or more. Lines: the paper's {_FSS:g} and {_SIGMA:g}. Numbers are those of the "
+        "table.",
         "## What was tried",
         _table(
             ("", "set", "epidermis", "dermis", "subcutis", "basis and status"),
@@ -125,10 +125,24 @@ def page(results: Mapping[str, Any], command: str = "fingerpad materials") -> st
         "at the end of the hold. FSS is in sample, over all 36 shifts, of the best free fit of four numbers. "
         "\"Noise needed\" is the sigma_1 that brings that afferent's hit rates closest to Goodwin's 0.58 and "
         f'0.95; hit rates are at the paper\'s {_SIGMA:g}. "Joint" is an afferent fitted to FSS less the root '
-        f"mean square error of the hit rates at {_SIGMA:g}. A level counts as met with R² of {LEAST_R2} or "
-        f"more (d), a joint FSS of {_FSS:g} or more (f), both joint hit rates within "
-        f"{LARGEST_HIT_RATE_ERROR:g} (p).",
+        f"mean square error of the hit rates at {_SIGMA:g}. A level counts as met with R² of "
+        f"{targets['r2']:g} or more (d), a joint FSS of {_FSS:g} or more (f), both joint hit rates within "
+        f"{targets['hit_rate_error']:g} of Goodwin's (p).",
         *_unsolved(results),
+        "## What deflection alone says",
+        _table(
+            ("set", "epidermis", "dermis", "subcutis", "R²", "force [mN]"),
+            [
+                (
+                    row["name"],
+                    *(f"{value:.4g}" for value in row["shear_kpa"].values()),
+                    fixed(row["deflection"]["r2"], 3),
+                    fixed(row["deflection"]["force_mn"], 0),
+                )
+                for row in results["deflection_only"]
+            ],
+        ),
+        "Pressed by the cylinder only; initial shear moduli in kPa, all assumed but Wu's (recalled).",
         "## Order of the trials",
         _order(results["order"]),
         "## Wu's tissues as polynomials",

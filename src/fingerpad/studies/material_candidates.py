@@ -21,14 +21,16 @@ DERMIS_KPA = published.SOFT_MIX_DERMIS_SHEAR.value
 SUBCUTIS_KPA = published.SOFT_MIX_SUBCUTIS_SHEAR.value
 
 INTERMEDIATE = (
-    ("softer epidermis", 20.0, DERMIS_KPA, SUBCUTIS_KPA, "Trial 3, epidermis alone varied"),
     ("epidermis x 4", 184.0, DERMIS_KPA, SUBCUTIS_KPA, "Trial 3, epidermis alone varied"),
+    ("middle of the valley", 350.0, DERMIS_KPA, 7.0, "between Trial 3 and the next, where R² stays high"),
+    ("stiff over stiff", 675.7, DERMIS_KPA, 11.5, "Trial 2's epidermis, Maeno's subcutis"),
     ("softer subcutis", 46.0, DERMIS_KPA, 2.373, "Trial 3, subcutis alone varied, to that of 2014"),
     ("half-way to 2014", 236.0, 35.9, 3.357, "logarithmic mean of Trial 3 and the laboratory's fit of 2014"),
-    ("Maeno under 2014", 1211.6, 27.03, 11.486, "epidermis of 2014 over Maeno's dermis and subcutis"),
-    ("stiff over stiff", 675.7, DERMIS_KPA, 11.5, "Trial 2's epidermis, Maeno's subcutis"),
 )
 """Neo-Hookean shear moduli of epidermis, dermis and subcutis [kPa], all assumed; and what they vary."""
+
+GRID_KPA = ((20.0, 46.0, 184.0, 675.7), (2.373, 4.75, 8.0, 11.5, 18.0))
+"""Shear moduli of epidermis and subcutis that are combined over Trial 3's dermis. [kPa]"""
 
 STIFFENING = 5.0
 """C20 over C10 in the set that stiffens."""
@@ -89,7 +91,6 @@ def candidates() -> tuple[MaterialSet, ...]:
     ['Trial 1', 'Trial 2', 'Trial 3', 'laboratory 2014']
     """
     wu = "polynomial N = 2 fitted by us to Wu's hyperfoams (recalled) in compression to 50 %"
-    foam_poisson = published.WU_HYPERFOAM_POISSON.value
     foams = named_tissues("wu2007")
     named = (
         MaterialSet("Trial 1", named_tissues("trial1"), "Maeno, recalled"),
@@ -108,16 +109,6 @@ def candidates() -> tuple[MaterialSet, ...]:
             f"Maeno's epidermis, recalled; inner layers {wu}, nu = {NU} in hyperfoam and polynomial",
         ),
         MaterialSet(
-            "Wu polynomial, curve of 0.40",
-            layered(SOFT_EPIDERMIS_KPA, *wu_polynomials(foam_poisson, NU)),
-            f"the same (recalled), hyperfoam at its own nu = {foam_poisson:g}, polynomial at {NU}",
-        ),
-        MaterialSet(
-            "Wu polynomial, nu 0.40",
-            layered(SOFT_EPIDERMIS_KPA, *wu_polynomials(foam_poisson, foam_poisson)),
-            f"the same (recalled), nu = {foam_poisson:g} in hyperfoam and polynomial",
-        ),
-        MaterialSet(
             "Wu hyperfoam",
             layered(SOFT_EPIDERMIS_KPA, foams.dermis, foams.subcutis),
             "Maeno's epidermis over Wu's hyperfoams themselves, recalled",
@@ -132,7 +123,35 @@ def candidates() -> tuple[MaterialSet, ...]:
         MaterialSet(name, layered(epidermis, dermis, subcutis), f"assumed: {basis}")
         for name, epidermis, dermis, subcutis, basis in INTERMEDIATE
     )
-    return (*named, *from_wu, *between, _stiffening(), _compressible())
+    return (*named, *from_wu, *between, _stiffening())
+
+
+def deflection_candidates() -> tuple[MaterialSet, ...]:
+    """List sets that are pressed by the cylinder alone: contrasts, compressibility, Wu's curve.
+
+    Examples
+    --------
+    >>> deflection_candidates()[0].name
+    'epidermis 20, subcutis 2.373'
+    """
+    epidermes, fats = GRID_KPA
+    grid = (
+        MaterialSet(
+            f"epidermis {epidermis:g}, subcutis {fat:g}", layered(epidermis, DERMIS_KPA, fat), "assumed"
+        )
+        for epidermis in epidermes
+        for fat in fats
+    )
+    foam_poisson = published.WU_HYPERFOAM_POISSON.value
+    wu = (
+        MaterialSet(
+            f"Wu polynomial, nu {poisson:g}, fitted to the foam of nu {curve:g}",
+            layered(SOFT_EPIDERMIS_KPA, *wu_polynomials(curve, poisson)),
+            "recalled",
+        )
+        for curve, poisson in ((foam_poisson, NU), (foam_poisson, foam_poisson))
+    )
+    return (*grid, *wu, _compressible())
 
 
 def _stiffening() -> MaterialSet:
@@ -152,4 +171,6 @@ def _compressible() -> MaterialSet:
         Material.neo_hooke(shear, poisson, skin_prony()) for shear in (DERMIS_KPA, SUBCUTIS_KPA)
     )
     basis = f"assumed: Trial 3 with nu = {poisson:g} in dermis and subcutis"
-    return MaterialSet("compressible", layered(SOFT_EPIDERMIS_KPA, dermis, subcutis), basis)
+    return MaterialSet(
+        f"Trial 3, nu {poisson:g} inside", layered(SOFT_EPIDERMIS_KPA, dermis, subcutis), basis
+    )

@@ -109,13 +109,8 @@ def touches(
     dict
         `("cylinder", diameter)`, `("bar", shift)` and `("sphere", curvature)`, the keys in mm, mm and 1/m.
     """
+    pressed = {("cylinder", Cylinder().diameter_mm): _cylinder_touch(candidate, conditions)}
     conditions = replace(conditions, materials=candidate.tissues)
-    cylinder = Cylinder()
-    pressed = {
-        ("cylinder", cylinder.diameter_mm): conditions.touch(
-            cylinder, RECEPTOR_X_MM, conditions.deflection_grading(cylinder)
-        )
-    }
     if shifted_bars:
         bars = zip(protocol.BAR_SHIFTS.value, single_unit.touches(conditions), strict=True)
         pressed |= {("bar", shift): touch for shift, touch in bars}
@@ -126,6 +121,21 @@ def touches(
     spheres = sphere_discrimination.touches(conditions)
     position = sphere_discrimination.POSITIONS_MM[0]
     return pressed | {("sphere", curvature): spheres[position, curvature] for curvature in SPHERES}
+
+
+def _cylinder_touch(candidate: MaterialSet, conditions: Conditions) -> Touch:
+    cylinder = Cylinder()
+    grading = conditions.deflection_grading(cylinder)
+    return conditions.touch(cylinder, RECEPTOR_X_MM, grading, candidate.tissues)
+
+
+def _described(candidate: MaterialSet) -> dict[str, Any]:
+    """Name, basis and initial shear moduli [kPa]."""
+    layers = ("living_epidermis", "dermis", "subcutis")
+    names = ("epidermis", "dermis", "subcutis")
+    moduli = (getattr(candidate.tissues, layer).shear_modulus_kpa for layer in layers)
+    shear = dict(zip(names, moduli, strict=True))
+    return {"name": candidate.name, "basis": candidate.basis, "shear_kpa": shear}
 
 
 def _wide_bar_grading(conditions: Conditions) -> Grading:
@@ -263,15 +273,7 @@ def evaluate(
         [responses["sphere", curvature].sed(sites) for curvature in SPHERES],
         conditions.seed,
     )
-    tissues = candidate.tissues
-    return {
-        "name": candidate.name,
-        "basis": candidate.basis,
-        "shear_kpa": {
-            "epidermis": tissues.living_epidermis.shear_modulus_kpa,
-            "dermis": tissues.dermis.shear_modulus_kpa,
-            "subcutis": tissues.subcutis.shear_modulus_kpa,
-        },
+    return _described(candidate) | {
         "deflection": deflection(cylinder),
         "sed_peak_kpa": levels.sed_peak_kpa,
         "firing": levels.judged(levels.search(effort, 0.0)),
@@ -346,6 +348,28 @@ def compare(
         if on_finished:
             on_finished(candidate.name)
     return rows
+
+
+def deflections(
+    candidates: Sequence[MaterialSet], conditions: Conditions, store: Store, jobs: int = 1
+) -> list[dict[str, Any]]:
+    """Judge candidates by the cylinder alone; arguments as in `compare`.
+
+    Returns
+    -------
+    list of dict
+        `name`, `basis`, `shear_kpa` and `deflection` of each.
+
+    Raises
+    ------
+    ConvergenceError
+        If a press cannot be solved.
+    StoreError
+        If a stored press is damaged.
+    """
+    pressed = {candidate.name: _cylinder_touch(candidate, conditions) for candidate in candidates}
+    solve_missing(list(pressed.values()), store, jobs)
+    return [_described(one) | {"deflection": deflection(store.load(pressed[one.name]))} for one in candidates]
 
 
 def pareto_front(rows: Sequence[Mapping[str, Any]]) -> list[str]:

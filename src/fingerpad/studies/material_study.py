@@ -18,8 +18,8 @@ from fingerpad.store import Store, code_hash, solve_missing
 from fingerpad.studies import trial_order
 from fingerpad.studies.conditions import Conditions
 from fingerpad.studies.hyperfoam_fit import polynomial_of_hyperfoam
-from fingerpad.studies.material_candidates import candidates
-from fingerpad.studies.material_sets import GOODWIN, Effort, compare, pareto_front
+from fingerpad.studies.material_candidates import candidates, deflection_candidates
+from fingerpad.studies.material_sets import GOODWIN, Effort, compare, deflections, pareto_front
 from fingerpad.studies.reproduction import STORE_FOLDER, plain
 
 LEAST_R2 = 0.96
@@ -80,12 +80,13 @@ def study_materials(study: MaterialStudy, on_finished: Callable[[str], None] | N
     Returns
     -------
     dict
-        Plain numbers, strings and lists: `sets`, `pareto`, `order`, `polynomials` and `manifest`.
+        Plain numbers, strings and lists: `sets`, `pareto`, `deflection_only`, `order`, `polynomials`,
+        `targets` and `manifest`.
 
     Raises
     ------
     ConvergenceError
-        If a press of the trials' order cannot be solved.
+        If a press by the cylinder alone, or of the trials' order, cannot be solved.
     StoreError
         If a stored press is damaged or the folder cannot be written.
     """
@@ -94,6 +95,9 @@ def study_materials(study: MaterialStudy, on_finished: Callable[[str], None] | N
     rows = compare(chosen, study.conditions, store, study.jobs, study.effort, on_finished)
     for row in rows:
         row["meets"] = meets(row)
+    alone = deflections(deflection_candidates(), study.conditions, store, study.jobs)
+    if on_finished:
+        on_finished("deflection alone")
     pressed = trial_order.touches(study.conditions)
     solve_missing(list(pressed.values()), store, study.jobs)
     order = trial_order.result({key: store.load(touch) for key, touch in pressed.items()})
@@ -103,8 +107,10 @@ def study_materials(study: MaterialStudy, on_finished: Callable[[str], None] | N
         {
             "sets": rows,
             "pareto": pareto_front(rows),
+            "deflection_only": alone,
             "order": order,
             "polynomials": polynomials(),
+            "targets": {"r2": LEAST_R2, "hit_rate_error": LARGEST_HIT_RATE_ERROR},
             "manifest": {
                 "date": datetime.now(UTC).date().isoformat(),
                 "version": __version__,
