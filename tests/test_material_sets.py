@@ -12,7 +12,7 @@ from fingerpad import cli
 from fingerpad.afferent import Afferent
 from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.grading import Grading
-from fingerpad.mechanics.materials import Hyperfoam, Polynomial
+from fingerpad.mechanics.laws import Hyperfoam, Polynomial
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.parameters import protocol
 from fingerpad.parameters import tissues as published
