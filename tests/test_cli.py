@@ -10,6 +10,10 @@ import pytest
 
 from fingerpad import __version__, cli
 from fingerpad.errors import ConvergenceError, FingerpadError, StoreError
+from fingerpad.fingertip import Fingertip
+from fingerpad.indentation import touch_of
+from fingerpad.indenters import Plate, Sphere
+from fingerpad.stimulus import RampAndHold
 
 COMMAND = [sys.executable, "-W", "error", "-m", "fingerpad"]
 
@@ -79,6 +83,18 @@ def test_without_a_command_the_help_is_shown(call):
         (["reproduce", "--seed"], "--seed", "requires an argument"),
         (["refine", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
         (["refine", "--resolution", "quick"], "No such option", "--resolution"),
+        (["export"], "Missing argument", "'folder'"),
+        (["export", "out", "--indenter", "cone"], "indenter must be one of sphere, cylinder, bar", "'cone'"),
+        (
+            ["export", "out", "--indenter", "bar", "--curvature", "287"],
+            "--curvature is that of a sphere",
+            "bar",
+        ),
+        (["export", "out", "--curvature", "round"], "'--curvature': must be a number", "'round'"),
+        (["export", "out", "--depth", "-1"], "depth_mm must be greater than 0", "-1"),
+        (["export", "out", "--materials", "steel"], "materials must be one of", "'steel'"),
+        (["export", "out", "--resolution", "fine"], "resolution must be one of", "'fine'"),
+        (["export", "out", "--format", "stl"], "format must be one of vtu", "'stl'"),
         (["reproduce", "twice"], "unexpected extra argument", "twice"),
         (["reproduse"], "No such command", "'reproduse'"),
         (["--resolution", "quick"], "No such option", "--resolution"),
@@ -155,6 +171,23 @@ def test_options_reach_the_run(call, monkeypatch, tmp_path):
     assert (default.conditions.resolution, default.conditions.seed) == ("standard", 0)
     assert default.jobs >= 1
     assert default.folder.resolve() == tmp_path / "reproduction"
+
+
+def test_options_reach_the_export(call, monkeypatch, tmp_path):
+    exported = []
+
+    def note(touch, folder, format_name):
+        exported.append((touch, folder, format_name))
+        return (folder / "touch.pvd",)
+
+    monkeypatch.setattr(cli, "export_touch", note)
+    given = ("--curvature", "340", "--depth", "0.5", "--materials", "trial1", "--resolution", "standard")
+    assert call("export", "a/b", *given) == (0, "Open: a/b/touch.pvd\n", "")
+    assert call("export", "c", "--indenter", "plate", "--format", "vtu")[0] == 0
+    (touch, folder, format_name), (default, _, _) = exported
+    assert touch == touch_of(Fingertip(), Sphere(340), RampAndHold(depth_mm=0.5), "trial1", "standard")
+    assert (folder.resolve(), format_name) == (tmp_path / "a" / "b", "vtu")
+    assert default == touch_of(Fingertip(), Plate(), RampAndHold(depth_mm=1.0), "trial3", "quick")
 
 
 def test_the_shell_sees_the_same_without_a_warning(tmp_path):

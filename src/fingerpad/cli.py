@@ -1,4 +1,4 @@
-"""The command line: `fingerpad reproduce`, `fingerpad refine` and `fingerpad materials`."""
+"""The command line: `fingerpad reproduce`, `refine`, `materials` and `export`."""
 
 from __future__ import annotations
 
@@ -17,13 +17,19 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as RichProgress
 
 from fingerpad import __version__
-from fingerpad.checks import whole
+from fingerpad.checks import one_of, whole
 from fingerpad.errors import FingerpadError, InputError
+from fingerpad.export.formats import FORMATS, export_touch
 from fingerpad.files import write_atomically
+from fingerpad.fingertip import Fingertip
 from fingerpad.grading import RESOLUTIONS
+from fingerpad.indentation import touch_of
+from fingerpad.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.report import mesh_refinement as refinement_report
 from fingerpad.report import write_report
 from fingerpad.report.material_sets import write_material_page
+from fingerpad.stimulus import RampAndHold
 from fingerpad.studies import Reproduction, mesh_refinement, reproduce
 from fingerpad.studies.conditions import Conditions
 from fingerpad.studies.material_sets import Effort
@@ -31,6 +37,16 @@ from fingerpad.studies.material_study import MaterialStudy, study_materials
 
 EXPECTED_TIME = {"quick": "about 3 minutes", "standard": "about 9 minutes", "paper": "more than a day"}
 """On two cores, nothing stored yet."""
+
+INDENTERS: dict[str, type[Indenter]] = {
+    "sphere": Sphere,
+    "cylinder": Cylinder,
+    "bar": Bar,
+    "line": Line,
+    "punch": FlatPunch,
+    "plate": Plate,
+}
+"""Bodies to export by name, in the paper's sizes."""
 
 app = typer.Typer(
     help="From a touch on a finite-element human fingertip to the spikes of SAI afferents to a percept.",
@@ -57,6 +73,14 @@ def _whole_number(text: str) -> int:
         return int(text)
     except ValueError as error:
         raise typer.BadParameter(f"must be a whole number: got {text!r}.") from error
+
+
+def _number(text: str) -> float:
+    """Read an option, and repeat what came where it cannot be read."""
+    try:
+        return float(text)
+    except ValueError as error:
+        raise typer.BadParameter(f"must be a number: got {text!r}.") from error
 
 
 @app.callback(invoke_without_command=True)
@@ -168,6 +192,37 @@ def materials_command(
     typer.echo(f"Results: {numbers}")
 
 
+@app.command("export")
+def export_command(
+    folder: Annotated[Path, typer.Argument(help="Where to write; made if need be.")],
+    indenter: Annotated[str, typer.Option(help=f"One of {', '.join(INDENTERS)}.")] = "sphere",
+    curvature: Annotated[
+        float | None,
+        typer.Option(parser=_number, metavar="NUMBER", help="Curvature of the sphere; 287 by default. [1/m]"),
+    ] = None,
+    depth: Annotated[
+        float, typer.Option(parser=_number, metavar="NUMBER", help="Depth of the hold. [mm]")
+    ] = 1.0,
+    materials: Annotated[str, typer.Option(help=f"One of {', '.join(TISSUES)}.")] = "trial3",
+    resolution: Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTIONS)}.")] = "quick",
+    format_name: Annotated[str, typer.Option("--format", help=f"One of {', '.join(FORMATS)}.")] = "vtu",
+) -> None:
+    """Press one indenter into the finger and write the touch for another program, ParaView by default."""
+    one_of("indenter", indenter, tuple(INDENTERS))
+    one_of("format", format_name, tuple(FORMATS))
+    if curvature is not None and indenter != "sphere":
+        raise InputError(f"--curvature is that of a sphere, and a {indenter} has none: leave it out.")
+    body = INDENTERS[indenter]() if curvature is None else Sphere(curvature)
+    touch = touch_of(Fingertip(), body, RampAndHold(depth_mm=depth), materials, resolution)
+    _make_writable(folder, "FOLDER")
+    try:
+        files = export_touch(touch, folder, format_name)
+    except KeyboardInterrupt as error:
+        typer.echo("fingerpad: stopped; what was written is whole, the rest is not there.", err=True)
+        raise typer.Exit(INTERRUPTED) from error
+    typer.echo(f"Open: {files[0]}")
+
+
 @contextmanager
 def _interruptible() -> Iterator[None]:
     try:
@@ -183,7 +238,7 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _make_writable(folder: Path) -> None:
+def _make_writable(folder: Path, name: str = "--out") -> None:
     """Make `folder` if need be, and see whether a file can be written into it."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -191,7 +246,7 @@ def _make_writable(folder: Path) -> None:
             pass
     except OSError as error:
         raise InputError(
-            f"--out must be a folder that can be written: {folder} cannot ({error.strerror})."
+            f"{name} must be a folder that can be written: {folder} cannot ({error.strerror})."
         ) from error
 
 

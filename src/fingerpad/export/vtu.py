@@ -1,0 +1,244 @@
+"""Deformation over time as VTU files and a PVD index, the form in which ParaView opens a time series.
+
+One VTU per time holds the undeformed points with the displacement as a vector (ParaView's "Warp By Vector"
+moves them), every field of the cells and the sets of nodes; the PVD names them with their times in ms. Bricks
+are VTK_HEXAHEDRON, collapsed ones VTK_WEDGE. The package `vtk` writes the files: the extra `fingerpad[vtk]`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from fingerpad.errors import InputError
+from fingerpad.files import write_atomically
+from fingerpad.mechanics.press import Deformation
+from fingerpad.mesh import Mesh
+
+HEXAHEDRON, WEDGE = 12, 13
+"""VTK's numbers of the two cells."""
+
+AXES = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
+"""Components of a tensor, in the order of ours and of ParaView's symmetric tensors."""
+
+
+def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[Path, ...]:
+    """Write a press for ParaView.
+
+    Cell data: layer; energy densities stored, instantaneous and work; Cauchy stress, logarithmic and
+    Green-Lagrange strain; their principal values; von Mises stress, pressure, largest compressive strain and
+    stress. Point data: displacement, contact pressure, and the sets skin, bone, nail, symmetry and midline
+    as masks. Field data: time, depth and force of the indenter.
+
+    Parameters
+    ----------
+    path : Path
+        The PVD file; the VTU files stand beside it, with its name and a number.
+    deformation : Deformation
+        A press in which all elements were watched, as by `Touch.deform`.
+    mesh : Mesh
+        The undeformed body that was pressed.
+
+    Returns
+    -------
+    tuple of Path
+        The PVD first, then one VTU per time.
+
+    Raises
+    ------
+    InputError
+        If VTK is not installed, or the deformation is not that of all elements of this mesh.
+    StoreError
+        If a file cannot be written; each is whole or absent, and the PVD comes last.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from fingerpad import Fingertip, Grading, Sphere, Touch, RampAndHold, named_tissues
+    >>> from fingerpad.mechanics.press import PressSettings
+    >>> coarse = Grading(17.37, 2.0, 2.0, 1.0, 1.0, 5.0, stratum_corneum=1, living_epidermis=1, dermis=1)
+    >>> motion, steps = RampAndHold(depth_mm=0.2), PressSettings(ramp_steps=1, hold_steps=1)
+    >>> touch = Touch(Fingertip(), Sphere(287), motion, named_tissues("trial3"), coarse, steps)
+    >>> with TemporaryDirectory() as folder:
+    ...     written = write_vtu_series(Path(folder) / "touch.pvd", touch.deform(), touch.mesh)
+    ...     [file.name for file in written]
+    ['touch.pvd', 'touch_0000.vtu', 'touch_0001.vtu', 'touch_0002.vtu']
+    """
+    vtk = _vtk()
+    path = Path(path)
+    if len(deformation.fields.elements) != len(mesh.elements):
+        raise InputError(
+            f"deformation must tell of all {len(mesh.elements)} elements of the mesh: it tells of "
+            f"{len(deformation.fields.elements)}; press with Touch.deform()."
+        )
+    cells, points = _cell_data(deformation, mesh), _point_data(deformation, mesh)
+    names = [f"{path.stem}_{number:04d}.vtu" for number in range(deformation.times_ms.size)]
+    grid = _grid(vtk, mesh)
+    _add(vtk, grid.GetCellData(), {"layer": mesh.layer.astype(np.int32)})
+    _add(vtk, grid.GetPointData(), _node_sets(mesh))
+    for number, name in enumerate(names):  # an array replaces the one of its name
+        _add(vtk, grid.GetCellData(), {key: values[number] for key, values in cells.items()})
+        _add(vtk, grid.GetPointData(), {key: values[number] for key, values in points.items()})
+        overall = {
+            "TimeValue": deformation.times_ms,
+            "depth_mm": deformation.depth_mm,
+            "force_mn": deformation.force_mn,
+        }
+        _add(vtk, grid.GetFieldData(), {key: values[[number]] for key, values in overall.items()})
+        write_atomically(path.with_name(name), _xml(vtk, grid))
+    write_atomically(path, _index(names, deformation))
+    return path, *(path.with_name(name) for name in names)
+
+
+def _vtk() -> Any:
+    """Return the few parts of VTK that writing needs; none of them draws."""
+    try:
+        from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+        from vtkmodules.vtkCommonCore import vtkPoints
+        from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkUnstructuredGrid
+        from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+    except ImportError as error:
+        raise InputError(
+            "VTU files need the package vtk, which is not installed: pip install 'fingerpad[vtk]'."
+        ) from error
+    return SimpleNamespace(
+        array=numpy_to_vtk,
+        ids=numpy_to_vtkIdTypeArray,
+        points=vtkPoints,
+        cells=vtkCellArray,
+        grid=vtkUnstructuredGrid,
+        writer=vtkXMLUnstructuredGridWriter,
+    )
+
+
+def _cell_data(deformation: Deformation, mesh: Mesh) -> dict[str, np.ndarray]:
+    """Fields of the cells by name, each (n_times, n_elements, ...)."""
+    felt = deformation.fields
+    order = np.argsort(felt.elements)
+    fields = {
+        "sed_stored_kpa": felt.stored_kpa,
+        "sed_instantaneous_kpa": felt.instantaneous_kpa,
+        "sed_work_kpa": felt.work_kpa,
+        "stress_kpa": felt.stress_kpa,
+        "strain": felt.strain,
+        "green_lagrange_strain": felt.green_lagrange_strain,
+        "principal_stress_kpa": felt.principal_stress_kpa,
+        "principal_strain": felt.principal_strain,
+        "von_mises_kpa": felt.von_mises_kpa,
+        "pressure_kpa": felt.pressure_kpa,
+        "compressive_strain": felt.compressive_strain,
+        "compressive_stress_kpa": felt.compressive_stress_kpa,
+    }
+    return {name: values[:, order] for name, values in fields.items()}
+
+
+def _point_data(deformation: Deformation, mesh: Mesh) -> dict[str, np.ndarray]:
+    """Fields of the points by name, each (n_times, n_nodes, ...)."""
+    pressure = np.zeros(deformation.displacement_mm.shape[:2])
+    pressure[:, mesh.skin_nodes] = deformation.contact.pressure_kpa
+    return {"displacement_mm": deformation.displacement_mm, "contact_pressure_kpa": pressure}
+
+
+def _node_sets(mesh: Mesh) -> dict[str, np.ndarray]:
+    """Return the sets of nodes as masks, 1 where a node belongs to it."""
+    sets = {
+        "skin": mesh.skin_nodes,
+        "bone": mesh.bone_nodes,
+        "nail": mesh.nail_nodes,
+        "symmetry": mesh.symmetry_nodes,
+        "midline": mesh.midline_nodes,
+    }
+    masks = {}
+    for name, nodes in sets.items():
+        masks[name] = np.zeros(len(mesh.nodes_mm), dtype=np.uint8)
+        masks[name][nodes] = 1
+    return masks
+
+
+def cells_of(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return VTK's cells of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Bricks, some of them with one side collapsed to an edge.
+
+    Returns
+    -------
+    offsets : int array (n_elements + 1,)
+        Where the nodes of each cell begin.
+    nodes : int array
+        Nodes of all cells, one after the other.
+    kinds : uint8 array (n_elements,)
+        `HEXAHEDRON` or `WEDGE`.
+
+    Raises
+    ------
+    InputError
+        If an element repeats nodes and is not a wedge.
+    """
+    # In a wedge, nodes a and b of the lower face are one, and so are the two above them.
+    lower, upper = mesh.elements[:, :4], mesh.elements[:, 4:]
+    repeated = lower == np.roll(lower, -1, axis=1)
+    distinct = np.array([len(set(nodes)) for nodes in mesh.elements.tolist()])
+    is_wedge = repeated.sum(axis=1) == 1
+    regular = np.where(is_wedge, distinct == 6, distinct == 8)
+    if not regular.all():
+        element = int(np.flatnonzero(~regular)[0])
+        raise InputError(
+            f"mesh must consist of bricks and of wedges with one side collapsed: element {element} has the "
+            f"nodes {mesh.elements[element].tolist()}."
+        )
+    cells = [
+        np.concatenate([below[~twice], above[~twice]])
+        for below, above, twice in zip(lower, upper, repeated, strict=True)
+    ]
+    offsets = np.concatenate([[0], np.cumsum([cell.size for cell in cells])])
+    return offsets, np.concatenate(cells), np.where(is_wedge, WEDGE, HEXAHEDRON).astype(np.uint8)
+
+
+def _grid(vtk: Any, mesh: Mesh) -> Any:
+    """Undeformed points and cells."""
+    offsets, nodes, kinds = cells_of(mesh)
+    points, cells, grid = vtk.points(), vtk.cells(), vtk.grid()
+    points.SetData(vtk.array(np.ascontiguousarray(mesh.nodes_mm), deep=True))
+    cells.SetData(vtk.ids(offsets, deep=True), vtk.ids(nodes, deep=True))
+    grid.SetPoints(points)
+    grid.SetCells(vtk.array(kinds, deep=True), cells)
+    return grid
+
+
+def _add(vtk: Any, data: Any, fields: dict[str, np.ndarray]) -> None:
+    """Attach arrays by name; numbers with a fraction go in single precision."""
+    for name, values in fields.items():
+        fraction = np.issubdtype(values.dtype, np.floating) and name != "TimeValue"
+        array = vtk.array(np.ascontiguousarray(values, dtype=np.float32 if fraction else None), deep=True)
+        array.SetName(name)
+        if array.GetNumberOfComponents() == len(AXES):
+            for component, axis in enumerate(AXES):
+                array.SetComponentName(component, axis)
+        data.AddArray(array)
+
+
+def _xml(vtk: Any, grid: Any) -> bytes:
+    """Content of a VTU file: XML with compressed, base64-encoded numbers."""
+    writer = vtk.writer()
+    writer.SetInputData(grid)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    return writer.GetOutputString().encode("ascii")
+
+
+def _index(names: list[str], deformation: Deformation) -> bytes:
+    """Content of a PVD file."""
+    lines = [
+        f'    <DataSet timestep="{time_ms:.17g}" part="0" file={quoteattr(name)}/>'
+        for time_ms, name in zip(deformation.times_ms, names, strict=True)
+    ]
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <!-- times in ms -->\n'
+    return "\n".join([f"{head}  <Collection>", *lines, "  </Collection>\n</VTKFile>\n"]).encode()

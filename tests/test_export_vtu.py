@@ -1,0 +1,171 @@
+"""What ParaView would see: files read back by VTK's own reader."""
+
+import sys
+import xml.etree.ElementTree as xml
+
+import numpy as np
+import pytest
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkFiltersGeneral import vtkCellValidator
+from vtkmodules.vtkFiltersVerdict import vtkCellSizeFilter
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+
+from fingerpad.errors import InputError, StoreError
+from fingerpad.export.formats import FORMATS, export_touch
+from fingerpad.export.vtu import HEXAHEDRON, WEDGE, cells_of, write_vtu_series
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import Grading
+from fingerpad.indentation import Touch
+from fingerpad.indenters import Sphere
+from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.mesh import Mesh, block_mesh
+from fingerpad.mesh_quality import jacobian_at_gauss
+from fingerpad.stimulus import RampAndHold
+
+TOUCH = Touch(
+    finger=Fingertip(),
+    indenter=Sphere(curvature_per_m=287),
+    stimulus=RampAndHold(depth_mm=0.3),
+    tissues=named_tissues("trial3"),
+    grading=Grading(17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=4.0, stratum_corneum=1, dermis=1, subcutis=1),
+    settings=PressSettings(ramp_steps=2, hold_steps=1),
+)
+WARPED = 16  # vtkCellValidator's flag for faces that are not quite plane
+
+
+@pytest.fixture(scope="module")
+def done():
+    return TOUCH.deform()
+
+
+@pytest.fixture(scope="module")
+def files(done, tmp_path_factory):
+    return write_vtu_series(tmp_path_factory.mktemp("series") / "a & b.pvd", done, TOUCH.mesh)
+
+
+def read(path):
+    reader = vtkXMLUnstructuredGridReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    return reader.GetOutput()
+
+
+def arrays(data):
+    return {data.GetArrayName(n): vtk_to_numpy(data.GetArray(n)) for n in range(data.GetNumberOfArrays())}
+
+
+def test_index_names_every_time_in_ms(done, files):
+    index, *steps = files
+    sets = xml.parse(index).getroot().findall("./Collection/DataSet")
+    assert (
+        [float(item.get("timestep")) for item in sets] == done.times_ms.tolist() == [0.0, 25.0, 50.0, 1000.0]
+    )
+    assert [index.parent / item.get("file") for item in sets] == steps
+    assert all(path.exists() for path in steps)
+
+
+def test_cells_are_bricks_and_wedges_of_the_right_volume_and_turned_the_right_way(files):
+    grid, mesh = read(files[0].with_name("a & b_0000.vtu")), TOUCH.mesh
+    assert (grid.GetNumberOfCells(), grid.GetNumberOfPoints()) == (len(mesh.elements), len(mesh.nodes_mm))
+    kinds = np.array([grid.GetCellType(n) for n in range(grid.GetNumberOfCells())])
+    repeats = np.array([len(set(nodes)) < 8 for nodes in mesh.elements.tolist()])
+    assert (kinds == np.where(repeats, WEDGE, HEXAHEDRON)).all()
+    assert repeats.any()
+    validator = vtkCellValidator()
+    validator.SetInputData(grid)
+    validator.Update()
+    state = vtk_to_numpy(validator.GetOutput().GetCellData().GetArray("ValidityState"))
+    assert set(state[repeats].tolist()) == {0}
+    assert set(state.tolist()) <= {0, WARPED}
+    sizes = vtkCellSizeFilter()
+    sizes.SetInputData(grid)
+    sizes.Update()
+    volume = vtk_to_numpy(sizes.GetOutput().GetCellData().GetArray("Volume"))
+    np.testing.assert_allclose(volume, jacobian_at_gauss(mesh).sum(axis=1), rtol=0.02)  # VTK: tetrahedra
+
+
+def test_fields_come_back_at_every_time(done, files):
+    mesh, felt = TOUCH.mesh, done.fields
+    for number, path in enumerate(files[1:]):
+        grid = read(path)
+        cells, points = arrays(grid.GetCellData()), arrays(grid.GetPointData())
+        expected = {
+            "layer": mesh.layer,
+            "sed_stored_kpa": done.sed_kpa[number],
+            "sed_instantaneous_kpa": felt.instantaneous_kpa[number],
+            "sed_work_kpa": felt.work_kpa[number],
+            "stress_kpa": felt.stress_kpa[number],
+            "strain": felt.strain[number],
+            "green_lagrange_strain": felt.green_lagrange_strain[number],
+            "principal_stress_kpa": felt.principal_stress_kpa[number],
+            "principal_strain": felt.principal_strain[number],
+            "von_mises_kpa": felt.von_mises_kpa[number],
+            "pressure_kpa": felt.pressure_kpa[number],
+            "compressive_strain": felt.compressive_strain[number],
+            "compressive_stress_kpa": felt.compressive_stress_kpa[number],
+        }
+        assert set(cells) == set(expected)
+        for name, values in expected.items():
+            np.testing.assert_array_equal(cells[name], values.astype(cells[name].dtype), err_msg=name)
+        np.testing.assert_array_equal(vtk_to_numpy(grid.GetPoints().GetData()), mesh.nodes_mm)
+        np.testing.assert_array_equal(points["displacement_mm"], done.displacement_mm[number].astype("f4"))
+        pressure = points["contact_pressure_kpa"]
+        np.testing.assert_array_equal(
+            pressure[mesh.skin_nodes], done.contact.pressure_kpa[number].astype("f4")
+        )
+        assert (pressure.max() > 0.0) == (number > 0)
+        for name in ("skin", "bone", "nail", "symmetry", "midline"):
+            chosen = np.unique(getattr(mesh, f"{name}_nodes"))
+            np.testing.assert_array_equal(np.flatnonzero(points[name]), chosen)
+        overall = arrays(grid.GetFieldData())
+        assert overall["TimeValue"].tolist() == [done.times_ms[number]]
+        assert overall["force_mn"] == done.force_mn[number].astype("f4")
+        names = [grid.GetCellData().GetArray("stress_kpa").GetComponentName(k) for k in range(6)]
+        assert names == ["XX", "YY", "ZZ", "XY", "YZ", "XZ"]
+
+
+def test_only_a_deformation_of_all_elements_is_written(done, tmp_path):
+    block = block_mesh([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], layers=[0])
+    with pytest.raises(InputError, match=r"all 1 elements of the mesh: it tells of .* Touch.deform"):
+        write_vtu_series(tmp_path / "other.pvd", done, block)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_element_that_is_neither_brick_nor_wedge_is_named():
+    block = block_mesh([0.0, 1.0, 2.0], [0.0, 1.0], [0.0, 1.0], layers=[0])
+    elements = block.elements.copy()
+    elements[1, 4] = elements[1, 0]
+    parts = {name: getattr(block, name) for name in Mesh.__dataclass_fields__}
+    with pytest.raises(InputError, match="element 1 has the nodes"):
+        cells_of(Mesh(**(parts | {"elements": elements})))
+
+
+def test_without_vtk_a_sentence_says_how_to_get_it(done, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "vtkmodules.vtkIOXML", None)
+    with pytest.raises(InputError, match=r"pip install 'fingerpad\[vtk\]'"):
+        write_vtu_series(tmp_path / "a.pvd", done, TOUCH.mesh)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_made_is_named(done, tmp_path):
+    (tmp_path / "note").write_text("mine")
+    with pytest.raises(StoreError, match="note"):
+        write_vtu_series(tmp_path / "note" / "a.pvd", done, TOUCH.mesh)
+
+
+def test_a_touch_is_exported_by_the_name_of_a_format(files, tmp_path):
+    written = export_touch(TOUCH, tmp_path, "vtu")
+    assert written[0] == tmp_path / "touch.pvd"
+    assert [path.read_bytes() for path in written[1:]] == [path.read_bytes() for path in files[1:]]
+    with pytest.raises(InputError, match="format must be one of vtu"):
+        export_touch(TOUCH, tmp_path, "stl")
+
+
+@pytest.mark.parametrize(("format_name", "file_name"), [("abaqus", "touch.inp"), ("febio", "touch.feb")])
+def test_decks_are_exported_without_a_press(monkeypatch, tmp_path, format_name, file_name):
+    monkeypatch.setattr(Touch, "deform", pytest.fail)
+    (written,) = export_touch(TOUCH, tmp_path, format_name)
+    assert written == tmp_path / file_name
+    assert written.stat().st_size > 10_000
+    assert format_name in FORMATS
