@@ -1,8 +1,9 @@
-# make reproduce   run the studies of the paper      (ARGS="..." goes to `fingerpad reproduce`)
-# make test        check style, types, imports and behaviour; stops at the first failure
-# make clean       remove what the two have made, the environment included
+# make reproduce     run the studies of the paper      (ARGS="..." goes to `fingerpad reproduce`)
+# make test          check style, types, imports and behaviour; stops at the first failure
+# make verification  run every verification case, slow ones too, and write docs/verification.md
+# make clean         remove what these have made, the environment included
 #
-# Both make their own environment in .venv; PYTHON names the interpreter it is made with.
+# All make their own environment in .venv; PYTHON names the interpreter it is made with.
 
 PYTHON ?= python3
 ARGS ?=
@@ -14,7 +15,7 @@ bin := .venv/bin
 export PYTHONNOUSERSITE := 1
 unexport PYTHONPATH
 
-.PHONY: reproduce test clean
+.PHONY: reproduce test verification clean
 .DEFAULT_GOAL := test
 
 reproduce: .venv/installed
@@ -26,6 +27,9 @@ test: .venv/installed-for-tests
 	$(bin)/mypy
 	$(bin)/lint-imports
 	$(bin)/pytest $(PYTEST_ARGS)
+
+verification: .venv/installed-for-tests
+	$(bin)/python -m tests.verification $(ARGS)
 
 .venv/installed: pyproject.toml | $(bin)/python
 	$(bin)/python -m pip install --quiet --disable-pip-version-check --editable .

@@ -1,0 +1,46 @@
+"""Run every case and write docs/verification.md: `python -m tests.verification`.
+
+With names of cases, run only those, and print their rows instead.
+"""
+
+import platform
+import sys
+import time
+from datetime import UTC, datetime
+
+import numpy
+import scipy
+
+import fingerpad
+
+from .cases import ORDERED
+from .page import PAGE, expectation, number, page_text
+from .pictures import draw_all
+
+
+def run_all(names: list[str]) -> int:
+    """Run cases, say what fails, and write the page if all cases ran."""
+    failed = 0
+    for case in ORDERED:
+        if names and case.name not in names:
+            continue
+        start = time.perf_counter()
+        for row in case.rows:
+            failed += not row.passes
+            if names or not row.passes:
+                verdict = "holds" if row.passes else "FAILS"
+                print(
+                    f"  {verdict} {row.quantity}: {number(row.got)}, expected {expectation(row)} {row.unit}"
+                )
+        print(f"{case.name}: {len(case.rows)} numbers, {time.perf_counter() - start:.1f} s", flush=True)
+    if not names:
+        versions = f"Python {platform.python_version()}, NumPy {numpy.__version__}, SciPy {scipy.__version__}"
+        day = datetime.now(UTC).date().isoformat()
+        stamp = f"Written on {day} by fingerpad {fingerpad.__version__}, {versions}."
+        PAGE.write_text(page_text(ORDERED, draw_all(), stamp), encoding="utf-8")
+        print(f"wrote {PAGE}")
+    return failed
+
+
+if __name__ == "__main__":
+    sys.exit(1 if run_all(sys.argv[1:]) else 0)

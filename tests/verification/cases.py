@@ -1,0 +1,20 @@
+"""All cases, in the order of the page."""
+
+from . import (
+    balance,
+    half_space,
+    kernel,
+    laws,
+    locking,
+    manufactured,
+    patches,
+    relaxation,
+    symmetry,
+)  # fmt: skip
+from .case import CASES
+
+THEMES = (
+    patches.THEME, kernel.THEME, laws.THEME, manufactured.THEME, locking.THEME, half_space.THEME,
+    relaxation.THEME, balance.THEME, symmetry.THEME,
+)  # fmt: skip
+ORDERED = sorted(CASES, key=lambda case: THEMES.index(case.theme))

@@ -1,0 +1,133 @@
+"""Pictures of the page, drawn from the same runs as its rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.collections import PolyCollection
+
+from . import half_space, locking, manufactured
+from .page import IMAGES
+
+BLUE, ORANGE, GREY = "#0072b2", "#d55e00", "#777777"
+
+
+def draw_all(folder: Path = IMAGES) -> dict[str, str]:
+    """Draw every picture into `folder`; Markdown by theme."""
+    folder.mkdir(parents=True, exist_ok=True)
+    drawn = {
+        manufactured.THEME: (orders, "verification_orders.png",
+                             "Errors of displacement and stress against element size, with slopes 2 and 1"),
+        locking.THEME: (cook, "verification_cook.png",
+                        "Cook's membrane: tip deflection, and mean stress on 8, 16 and 32 bricks a side"),
+        half_space.THEME: (contact, "verification_contact.png",
+                           "Pressure under a sphere and a cylinder, and SED below them, against Hertz"),
+    }  # fmt: skip
+    text = {}
+    for theme, (draw, name, caption) in drawn.items():
+        figure = draw()
+        figure.savefig(folder / name, dpi=110, metadata={"Software": None})
+        plt.close(figure)
+        text[theme] = f"![{caption}](images/{name})\n\n*{caption}.*"
+    return text
+
+
+def orders() -> plt.Figure:
+    """Errors of the manufactured solution."""
+    figure, axes = plt.subplots(1, 2, figsize=(8, 3.4), layout="constrained", sharey=True)
+    meshes = np.array([4, 8, 12])
+    for axis, poisson in zip(axes, (0.3, 0.49), strict=True):
+        found = np.array([manufactured.errors(n, poisson) for n in meshes])
+        for column, (what, colour, slope) in enumerate((("displacement", BLUE, 2), ("stress", ORANGE, 1))):
+            axis.loglog(1 / meshes, found[:, column], "o-", color=colour, label=what)
+            line = 0.7 * found[-1, column] * (meshes[-1] / meshes) ** slope
+            axis.loglog(1 / meshes, line, "--", color=GREY, lw=1)
+            axis.annotate(
+                f"slope {slope}", (1 / meshes[0], line[0]), textcoords="offset points", xytext=(-36, -14)
+            )
+        axis.set(title=f"nu = {poisson}", xlabel="element size [mm]")
+    axes[0].set_ylabel("relative error in L2")
+    axes[0].legend()
+    return figure
+
+
+def quadrilaterals(solid, displacement):
+    """Deformed outlines of the bricks at z = 0, (n, 4, 2)."""
+    mesh = solid.mesh
+    moved = mesh.nodes_mm + displacement
+    face = np.array([element[mesh.nodes_mm[element, 2] == 0.0] for element in mesh.elements])
+    outlines = moved[face, :2]
+    centred = outlines - outlines.mean(axis=1, keepdims=True)
+    turn = np.argsort(np.arctan2(centred[..., 1], centred[..., 0]), axis=1)
+    return np.take_along_axis(outlines, turn[..., None], axis=1)
+
+
+def cook() -> plt.Figure:
+    """Tip deflection and pressure of Cook's membrane."""
+    figure, axes = plt.subplots(1, 4, figsize=(11, 3.4), layout="constrained", width_ratios=[1.3, 1, 1, 1])
+    meshes = [4, 8, 16, 32]
+    axes[0].semilogx(meshes, [locking.cook_tip_mm(n) for n in meshes], "o-", color=BLUE, label="fingerpad")
+    axes[0].axhline(locking.COOK_REFERENCE_MM, color=GREY, ls="--", lw=1, label="reference, order 8")
+    axes[0].set(
+        xlabel="bricks a side", ylabel="tip deflection [mm]", xticks=meshes, xticklabels=meshes, ylim=(0, 7.5)
+    )
+    axes[0].minorticks_off()
+    axes[0].legend(loc="lower right")
+    for axis, n in zip(axes[1:], meshes[1:], strict=True):
+        solid, displacement = locking.cook(n)
+        picture = PolyCollection(
+            quadrilaterals(solid, displacement),
+            array=locking.pressure(solid, displacement),
+            cmap="RdBu_r",
+            clim=(-20, 20),
+        )
+        axis.add_collection(picture)
+        axis.autoscale()
+        axis.set(aspect="equal", title=f"{n} x {n}", xlabel="x [mm]")
+    figure.colorbar(picture, ax=axes[1:], label="mean stress [kPa]")
+    return figure
+
+
+def contact() -> plt.Figure:
+    """Pressure on the surface and energy density below."""
+    figure, axes = plt.subplots(1, 2, figsize=(8.5, 3.4), layout="constrained")
+    fine = np.linspace(0.0, 1.0, 200)
+    ball, roll = half_space.hertz_sphere(0.3), half_space.hertz_cylinder(0.3)
+    half_width = np.sqrt(4 * roll.force_mn * half_space.RADIUS_MM / (np.pi * half_space.reduced_modulus(0.3)))
+    for done, name, colour, reach, peak, distance in (
+        (
+            ball,
+            "sphere",
+            BLUE,
+            1.0,
+            3 * ball.force_mn / np.pi,
+            np.hypot(ball.skin_mm[:, 0], ball.skin_mm[:, 2]),
+        ),
+        (
+            roll,
+            "cylinder",
+            ORANGE,
+            half_width,
+            2 * roll.force_mn / (np.pi * half_width),
+            np.abs(roll.skin_mm[:, 0]),
+        ),
+    ):
+        pressure = done.nodal_force_mn / done.solid.mesh.skin_area_mm2
+        near = distance < 1.6 * reach
+        axes[0].plot(distance[near] / reach, pressure[near], ".", color=colour, label=name)
+        axes[0].plot(fine, peak * np.sqrt(1 - fine**2), "-", color=colour, lw=1)
+        depths = np.linspace(0.1, 3.0, 60) * reach
+        axes[1].plot(
+            depths / reach, [1e3 * done.sed_below(depth) for depth in depths], ".", ms=3, color=colour
+        )
+        expected = half_space.below(name, depths / reach, peak, 0.3)
+        axes[1].plot(depths / reach, 1e3 * expected, "-", color=colour, lw=1)
+    axes[0].set(xlabel="distance from the axis over contact radius", ylabel="pressure [kPa]")
+    axes[1].set(xlabel="depth over contact radius", ylabel="SED [Pa]")
+    axes[0].legend(title="dots: fingerpad; lines: Hertz")
+    return figure

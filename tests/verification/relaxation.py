@@ -1,0 +1,183 @@
+"""Relaxation against closed forms: one element, a generalised Maxwell solid, and a pressed block."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fingerpad.indenters import Sphere
+from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.materials import Material, Polynomial, Prony
+from fingerpad.mechanics.newton import NewtonSettings
+from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.viscoelastic import (
+    StepCoefficients,
+    StressHistory,
+    instantaneous_state,
+    stored_energy_density,
+)
+from fingerpad.mesh import block_mesh
+from fingerpad.stimulus import RampAndHold
+
+from .case import Row, at_most, case, near
+from .laws import CUBE
+from .solid import Solid
+
+THEME = "Relaxation"
+PRONY = Prony(shares=(0.25, 0.35), times_ms=(40.0, 900.0))
+SHARES, TIMES_MS = np.array(PRONY.shares), np.array(PRONY.times_ms)
+POLYNOMIAL = Polynomial(c10=4.0, c01=1.5, c20=2.5, c11=0.7, c02=0.9, bulk_linear=130.0)
+LAWS = {
+    "polynomial N = 2": Material(POLYNOMIAL, PRONY),
+    "Ogden N = 3": Material.ogden((3.0, 4.0, 5.0), (-2.0, 3.5, 1.5), 0.48, PRONY),
+    "hyperfoam N = 2": Material.hyperfoam((2.0, 6.0), (7.0, 4.5), 0.4, PRONY),
+    "Hencky": Material.linear_elastic(30.0, 0.45, PRONY, law="hencky"),
+}
+INSTANT_MS = 1e-6
+
+
+def shear(amount):
+    """Displacements of the cube in simple shear. [mm]"""
+    return np.outer(CUBE.nodes_mm[:, 1], [amount, 0.0, 0.0])
+
+
+def march(material, times_ms, displacements):
+    """Forces [mN] and stored energy [µJ] of the cube that is given displacements at times, from rest at 0."""
+    solid = Solid(CUBE, (material,) * 4)
+    history, forces, energies, before = StressHistory.unloaded(1, len(SHARES)), [], [], 0.0
+    for time, displacement in zip(times_ms, displacements, strict=True):
+        step = StepCoefficients.of(solid.table, time - before)
+        forces.append(solid.evaluate(displacement, step=step, history=history)[1])
+        place_of = CUBE.nodes_mm, CUBE.elements, displacement, CUBE.layer, solid.table
+        stress, points, volumetric = instantaneous_state(*place_of)
+        history, before = history.advanced(step, CUBE.layer, stress), time
+        energies.append(stored_energy_density(*place_of, history, points, volumetric)[0])
+    return np.array(forces), np.array(energies)
+
+
+def relaxation(times_ms):
+    """g(t) = 1 - sum g_i (1 - exp(-t / tau_i))."""
+    return 1 - (SHARES * (1 - np.exp(-np.asarray(times_ms)[..., None] / TIMES_MS))).sum(axis=-1)
+
+
+def ramped(times_ms, ramp_ms):
+    """Stress over its instantaneous value at the ramp's end: the convolution of g with a ramp and hold."""
+    since = np.asarray(times_ms)[:, None]
+    inside = np.minimum(since, ramp_ms)
+    lost = inside - TIMES_MS * (np.exp(-(since - inside) / TIMES_MS) - np.exp(-since / TIMES_MS))
+    return (inside[:, 0] - (SHARES * lost).sum(axis=1)) / ramp_ms
+
+
+@case(THEME, "One element held in shear", "Prony series, g(t) = 1 - sum g_i (1 - exp(-t/tau_i))")
+def held_element() -> list[Row]:
+    """A cube is sheared by 0.6 at once and held: shear force over its first value. Every nodal force follows
+    the same g(t), at finite strain and for every law."""
+    times = np.array([1.0, 7.0, 40.0, 300.0, 2000.0])
+    forces = {
+        name: march(material, [INSTANT_MS, *(INSTANT_MS + times)], [shear(0.6)] * 6)[0]
+        for name, material in LAWS.items()
+    }
+    top = CUBE.nodes_mm[:, 1] == 1.0
+    first = forces["polynomial N = 2"][:, top, 0].sum(axis=1)
+    rows = [
+        near(f"polynomial N = 2: share of the force after {time:g} ms", expected, got, 1e-6)
+        for time, expected, got in zip(times, relaxation(times), first[1:] / first[0], strict=True)
+    ]
+    for name, force in forces.items():
+        error = np.abs(force[1:] - relaxation(times)[:, None, None] * force[0]).max() / np.abs(force[0]).max()
+        rows.append(at_most(f"{name}: largest error of any nodal force, relative", 1e-6, error))
+    return rows
+
+
+@case(THEME, "Ramp and hold of a Maxwell solid", "Generalised Maxwell solid, springs and dashpots one by one")
+def maxwell_solid() -> list[Row]:
+    """A cube is sheared by 0.001 in 50 ms and held. Shear force, energy that the springs hold, and work less
+    that energy, which the dashpots must have turned into heat: h_i' = g' - h_i / tau_i, G_i h_i² / tau_i."""
+    final, ramp = 1e-3, 50.0
+    times = np.concatenate([np.linspace(0.5, 50.0, 100), 50 + np.geomspace(0.5, 1450.0, 100)])
+    amounts = final * np.minimum(times / ramp, 1.0)
+    material = LAWS["polynomial N = 2"]
+    forces, energies = march(material, times, [shear(amount) for amount in amounts])
+    force = forces[:, CUBE.nodes_mm[:, 1] == 1.0, 0].sum(axis=1)
+    stiffness = material.shear_modulus_kpa / PRONY.long_term_share
+    since, inside = times[:, None], np.minimum(times, ramp)[:, None]
+    springs = final / ramp * TIMES_MS * (np.exp(-(since - inside) / TIMES_MS) - np.exp(-since / TIMES_MS))
+    held = stiffness / 2 * (PRONY.long_term_share * amounts**2 + (SHARES * springs**2).sum(axis=1))
+    knots = np.concatenate([[0.0], force]), np.concatenate([[0.0], amounts])
+    work = np.concatenate([[0.0], np.cumsum(0.5 * (knots[0][1:] + knots[0][:-1]) * np.diff(knots[1]))])[1:]
+    # The heat of each dashpot up to t, in closed form while it is loaded and while it relaxes.
+    rate, loaded = final / ramp, np.minimum(times, ramp)[:, None]
+    x = np.exp(-loaded / TIMES_MS)
+    heat = rate**2 * TIMES_MS * (loaded - 2 * TIMES_MS * (1 - x) + TIMES_MS / 2 * (1 - x**2))
+    at_end = rate * TIMES_MS * (1 - x)
+    heat = heat + at_end**2 / 2 * (1 - np.exp(-2 * (since - loaded) / TIMES_MS))
+    heat = stiffness * (SHARES * heat).sum(axis=1)
+    rows = []
+    for time in (25.0, 50.0, times[-60], 1500.0):
+        n = int(np.abs(times - time).argmin())
+        factor = ramped(times[n : n + 1], ramp)[0]
+        label = f"after {times[n]:.3g} ms"
+        rows += [
+            near(f"shear force {label}", stiffness * final * factor, force[n], 1e-5, "mN"),
+            near(f"stored energy {label}", 1e6 * held[n], 1e6 * energies[n], 1e-5, "pJ"),
+            near(
+                f"work less stored energy {label}", 1e6 * heat[n], 1e6 * (work[n] - energies[n]), 1e-3, "pJ"
+            ),
+        ]
+    return rows
+
+
+@case(THEME, "Limits in time", "Definition of instantaneous and long-term moduli")
+def limits_in_time() -> list[Row]:
+    """The same cube, sheared by 0.6: forces at once and after 10^7 ms against elastic cubes with the
+    instantaneous and the long-term coefficients; largest difference, relative."""
+    names = ("c10", "c01", "c20", "c11", "c02")
+
+    def elastic(factor):
+        scaled = {name: factor * getattr(POLYNOMIAL, name) for name in names}
+        material = Material(Polynomial(bulk_linear=POLYNOMIAL.bulk_linear, **scaled))
+        return Solid(CUBE, (material,) * 4).evaluate(shear(0.6))[1]
+
+    (fast, slow), _ = march(LAWS["polynomial N = 2"], [INSTANT_MS, 1e7], [shear(0.6)] * 2)
+    rows = []
+    for name, got, factor, bound in (
+        ("at once", fast, 1 / PRONY.long_term_share, 1e-6),
+        ("after long", slow, 1.0, 1e-4),
+    ):
+        expected = elastic(factor)
+        rows.append(at_most(f"{name}: forces", bound, np.abs(got - expected).max() / np.abs(expected).max()))
+    return rows
+
+
+def pressed_block(poisson, hold_ms):
+    """Times of the hold [ms] and force over its first value: a sphere pressed 0.4 mm into a block at once."""
+    edges = np.array([0.0, 0.4, 0.8, 1.3, 2.0, 3.0])
+    both = np.concatenate([-edges[:0:-1], edges])
+    mesh = block_mesh(both, edges, edges, layers=[0, 1, 2, 3, 3], symmetric=True)
+    layers = tuple(Material.neo_hooke(shear, poisson, PRONY) for shear in (40.0, 40.0, 20.0, 8.0))
+    ball = Sphere(curvature_per_m=500.0)
+    placement = place(ball, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
+    settings = PressSettings(3, 12, NewtonSettings(residual_tolerance=1e-6, penetration_tolerance=2e-4))
+    done = press(mesh, layers, ball, placement, RampAndHold(0.4, 1e-3, hold_ms), settings)
+    hold = done.times_ms[3:] - 1e-3
+    return hold[1:], done.force_mn[4:] / done.force_mn[3]
+
+
+@case(THEME, "A pressed block relaxes by the same series", "Prony series; exact for an incompressible body")
+def relaxing_block() -> list[Row]:
+    """A sphere of 2 mm is pressed 0.4 mm into a block of three stiffnesses within a microsecond and held. All
+    stress of an incompressible body relaxes by g(t) and its shape stays; what is left falls with 1 - 2 nu."""
+    rows, errors = [], {}
+    for poisson, relative in ((0.49, 0.05), (0.499, 0.005)):
+        hold, share = pressed_block(poisson, 2000.0)
+        errors[poisson] = np.abs(share - relaxation(hold)).max()
+        rows += [
+            near(
+                f"nu = {poisson}: share of the force after {hold[i]:.3g} ms",
+                relaxation(hold[i]),
+                share[i],
+                relative,
+            )
+            for i in (int(np.abs(hold - 100.0).argmin()), -1)
+        ]
+    ratio = errors[0.499] / errors[0.49]
+    return [*rows, at_most("largest error at nu = 0.499 over that at nu = 0.49", 0.15, ratio)]

@@ -1,0 +1,70 @@
+"""The fast cases hold, and the committed page shows all cases, the rows that are measured, and no failure."""
+
+from dataclasses import replace
+
+import pytest
+
+from .case import at_least, at_most, equal, near
+from .cases import ORDERED, THEMES
+from .page import PAGE, allowance, case_text, expectation, page_text, rows_shown
+
+FAST = [case for case in ORDERED if not case.slow]
+SHOWN = rows_shown(PAGE.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("case", FAST, ids=lambda case: case.name)
+def test_every_number_holds(case):
+    assert case.rows
+    assert [row for row in case.rows if not row.passes] == []
+
+
+def test_the_page_shows_every_case_in_order():
+    assert list(SHOWN) == [case.name for case in ORDERED]
+    assert all(SHOWN.values())
+
+
+@pytest.mark.parametrize("case", ORDERED, ids=lambda case: case.name)
+def test_every_number_on_the_page_holds(case):
+    assert {cells[-1] for cells in SHOWN[case.name]} == {"holds"}
+
+
+@pytest.mark.parametrize("case", FAST, ids=lambda case: case.name)
+def test_the_page_shows_what_is_measured(case):
+    """Quantities, bounds and tolerances as they are; only the numbers got may differ in their last digits."""
+    measured = [(row.quantity, row.unit, allowance(row)) for row in case.rows]
+    assert [(cells[0], cells[1], cells[5]) for cells in SHOWN[case.name]] == measured
+    bounds = [(row.quantity, expectation(row)) for row in case.rows if "≤" in expectation(row)]
+    assert [(cells[0], cells[2]) for cells in SHOWN[case.name] if "≤" in cells[2]] == bounds
+
+
+def test_names_and_titles_of_cases_are_their_own():
+    assert len({case.name for case in ORDERED}) == len(ORDERED)
+    assert len({(case.theme, case.title) for case in ORDERED}) == len(ORDERED)
+    assert {case.theme for case in ORDERED} == set(THEMES)
+    assert all(case.about and case.source for case in ORDERED)
+
+
+@pytest.mark.parametrize(
+    ("row", "holds"),
+    [
+        (near("a", 2.0, 2.019, relative=0.01), True),
+        (near("a", -2.0, -2.021, relative=0.01), False),
+        (near("a", 2.0, float("nan"), relative=0.01), False),
+        (equal("a", 0.0, 0.1, absolute=0.1), True),
+        (equal("a", 0.0, -0.11, absolute=0.1), False),
+        (at_most("a", 1.0, 1.0), True),
+        (at_most("a", 1.0, 1.1), False),
+        (at_most("a", 1.0, float("nan")), False),
+        (at_least("a", 1.0, 0.9), False),
+        (at_least("a", 1.0, float("inf")), True),
+    ],
+)
+def test_judgement_of_a_row(row, holds):
+    assert row.passes is holds
+
+
+def test_a_failure_is_seen_on_a_page():
+    failing = replace(FAST[0], measure=lambda: [near("a", 1.0, 2.0, relative=0.1)])
+    shown = rows_shown(page_text([failing], {}, ""))
+    assert shown == {failing.name: [["a", "", "1", "2", "+100.00 %", "10 %", "**fails**"]]}
+    assert "| **fails** |" in case_text(failing)
