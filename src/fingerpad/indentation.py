@@ -14,7 +14,7 @@ from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.indenters import Indenter
-from fingerpad.mechanics.contact import Placement, place
+from fingerpad.mechanics.contact import Placement, check_friction, place
 from fingerpad.mechanics.fields import QUANTITIES, von_mises
 from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.press import Deformation, PressSettings, press
@@ -59,12 +59,14 @@ class Touch:
     tilt_deg : float
         Rotation of the indenter about z. At 0 it presses along y, perpendicular to the finger's long axis;
         a positive tilt turns the direction of pressing towards the proximal end. [degrees]
+    friction : float
+        Coulomb's coefficient between skin and indenter.
 
     Raises
     ------
     InputError
-        If the axis misses the finger, the depth reaches the bone, or an axis beside the midline meets
-        half a finger.
+        If the axis misses the finger, the depth reaches the bone, an axis beside the midline meets half a
+        finger, or friction is asked of a wire.
     """
 
     finger: Fingertip
@@ -75,6 +77,7 @@ class Touch:
     settings: PressSettings = field(default_factory=PressSettings)
     at_mm: tuple[float, float] = CONTACT_POINT_MM
     tilt_deg: float = 0.0
+    friction: float = 0.0
 
     def __post_init__(self) -> None:
         for name, kind in (
@@ -96,6 +99,7 @@ class Touch:
             raise InputError(
                 f"tilt_deg must be 0 for {type(self.indenter).__name__}: got {self.tilt_deg:g} degrees."
             )
+        check_friction(self.friction, self.indenter)
         if isinstance(self.stimulus, RampAndHold) and self.stimulus.depth_mm > self.deepest_mm:
             raise InputError(
                 f"depth_mm must stay below {self.deepest_mm:.2f} mm at x = {x:g}, z = {z:g} mm, "
@@ -163,6 +167,7 @@ class Touch:
                 self.settings,
                 self.deepest_mm,
                 watched,
+                self.friction,
             )
 
     @property
@@ -204,6 +209,7 @@ def touch_of(
     grading: Grading | None = None,
     tilt_deg: float = 0.0,
     settings: PressSettings | None = None,
+    friction: float = 0.0,
 ) -> Touch:
     """Describe a touch without solving it; arguments as in `indent`.
 
@@ -213,6 +219,8 @@ def touch_of(
         Mesh to use instead of the one that `resolution` grades about the indenter.
     tilt_deg : float
         Rotation of the indenter about z, see `Touch`. [degrees]
+    friction : float
+        Coulomb's coefficient between skin and indenter; the paper mentions none.
 
     Returns
     -------
@@ -233,6 +241,7 @@ def touch_of(
         settings=settings or settings_of(resolution),
         at_mm=(x, z),
         tilt_deg=tilt_deg,
+        friction=friction,
     )
 
 

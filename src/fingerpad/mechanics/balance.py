@@ -6,7 +6,8 @@ Each term is found in its own way, so that their balance tells whether the press
 
 - external: the force of the indenter over its path, integral of F dd;
 - stored: the energy that springs hold now, summed over the elements (`viscoelastic.stored_energy_density`);
-- dissipated: what flows in the dampers of the Prony series, at 2 e_i / tau_i for a branch that holds e_i;
+- dissipated: what flows in the dampers of the Prony series, at 2 e_i / tau_i for a branch that holds e_i, and
+  what friction turns into heat;
 - contact: what closed the springs of the penalty, -integral of lambda dg over pressed nodes.
 """
 
@@ -45,7 +46,7 @@ class EnergyBalance:
     stored_uj : array (n_times,)
         Energy in the springs of the tissue. [µJ]
     dissipated_uj : array (n_times,)
-        Energy that relaxation has turned into heat. [µJ]
+        Energy that relaxation and friction have turned into heat. [µJ]
     contact_uj : array (n_times,)
         Energy in the springs of the contact's penalty. [µJ]
 

@@ -1,4 +1,4 @@
-"""Frictionless contact of skin nodes with a rigid indenter: penalty with augmented multipliers.
+"""Contact of skin nodes with a rigid indenter: penalty with augmented multipliers, frictionless or not.
 
 A node that penetrates by -g is pushed out along the indenter's normal n with
 
@@ -7,18 +7,20 @@ A node that penetrates by -g is pushed out along the indenter's normal n with
 A being the node's tributary area in the undeformed skin, lambda_k its multiplier from earlier augmentations
 and <> the positive part (Laursen & Simo 1993). The exact stiffness is epsilon A n n' - lambda dn/dx. Its
 second part, the curvature of the indenter, makes the tangent indefinite while nodes still penetrate deeply,
-so it is taken along only near the solution, where it keeps Newton's method quadratic.
+so it is taken along only near the solution, where it keeps Newton's method quadratic. Friction adds a
+potential of its own (`fingerpad.mechanics.friction`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fingerpad.checks import FloatArray
+from fingerpad.checks import FloatArray, not_negative
 from fingerpad.errors import InputError
 from fingerpad.indenters import Indenter
+from fingerpad.mechanics.friction import Anchors, Friction, dragged, friction
 
 PENALTY_KPA_PER_MM = 15_000.0
 """Contact stiffness per area; skin pressures of 10-100 kPa then penetrate by a few microns. [kPa/mm]"""
@@ -81,6 +83,23 @@ def place(indenter: Indenter, skin_mm: FloatArray, at_mm: FloatArray, rotation: 
     return Placement(at_mm + advance * rotation[:, 1], rotation)
 
 
+def check_friction(friction: float, indenter: Indenter) -> float:
+    """Return the coefficient if it is not negative, and 0 for an indenter that grips the skin anyway.
+
+    Examples
+    --------
+    >>> from fingerpad.indenters import Plate
+    >>> check_friction(0.5, Plate())
+    0.5
+    """
+    if not_negative("friction", friction) > 0.0 and indenter.grips:
+        raise InputError(
+            f"friction must be 0 for {type(indenter).__name__}, under which skin does not slide along the "
+            f"finger at all: got {friction:g}."
+        )
+    return float(friction)
+
+
 @dataclass(frozen=True)
 class ContactState:
     """Contact at one configuration.
@@ -89,18 +108,33 @@ class ContactState:
     ----------
     gap_mm : array (n,)
         Signed gap of every candidate node. [mm]
+    normal : array (n, 3)
+        Outward normal of the indenter at every node.
+    pressed_mn : array (n,)
+        lambda, the normal force on each node. [mN]
     force_mn : array (n, 3)
-        Force of the indenter on each node. [mN]
+        Whole force of the indenter on each node: lambda n and friction. [mN]
     stiffness : array (n, 3, 3)
-        epsilon A n n' of the nodes in contact, without the curvature of the indenter. [mN/mm]
+        epsilon A n n' of the nodes in contact and that of friction, without the curvature of the indenter.
+        [mN/mm]
     potential : float
-        Energy of the penalty. [µJ]
+        Energy of the penalty and of friction. [µJ]
+    friction : Friction, optional
+        Friction in the indenter's frame, if there is any.
     """
 
     gap_mm: FloatArray
+    normal: FloatArray
+    pressed_mn: FloatArray
     force_mn: FloatArray
     stiffness: FloatArray
     potential: float
+    friction: Friction | None = None
+
+    @property
+    def friction_mn(self) -> FloatArray:
+        """Friction on each node, (n, 3). [mN]"""
+        return self.force_mn - self.pressed_mn[:, None] * self.normal
 
     @property
     def penetration_mm(self) -> float:
@@ -113,7 +147,7 @@ class ContactState:
 
         A pressed node may also hover above the surface: while the skin relaxes, its multiplier is too large.
         """
-        touching = (self.gap_mm < 0.0) | self.force_mn.any(axis=1)
+        touching = (self.gap_mm < 0.0) | (self.pressed_mn > 0.0)
         return float(np.abs(self.gap_mm[touching]).max(initial=0.0))
 
 
@@ -133,6 +167,8 @@ class Contact:
         Their tributary areas. [mm²]
     penalty : float
         epsilon. [kPa/mm]
+    friction : float
+        mu, Coulomb's coefficient.
     """
 
     indenter: Indenter
@@ -140,26 +176,82 @@ class Contact:
     nodes: np.ndarray
     area_mm2: FloatArray
     penalty: float = PENALTY_KPA_PER_MM
+    friction: float = 0.0
 
-    def state(self, positions_mm: FloatArray, depth_mm: float, multipliers_mn: FloatArray) -> ContactState:
-        """Contact of the nodes at `positions_mm` (n, 3) with multipliers (n,)."""
-        gap, local_normal = self.indenter.gap(self.placement.to_local(positions_mm, depth_mm))
-        normal = local_normal @ self.placement.rotation.T
-        stiffness = self.penalty * self.area_mm2
-        pressed = np.maximum(multipliers_mn - stiffness * gap, 0.0)
-        active = np.where(pressed > 0.0, stiffness, 0.0)
-        return ContactState(
+    @property
+    def stiffness(self) -> FloatArray:
+        """Penalty of every node, epsilon A, (n,). [mN/mm]"""
+        return self.penalty * self.area_mm2
+
+    def state(
+        self,
+        positions_mm: FloatArray,
+        depth_mm: float,
+        multipliers_mn: FloatArray,
+        anchors: Anchors | None = None,
+        before: Friction | None = None,
+    ) -> ContactState:
+        """Contact of the nodes at `positions_mm` (n, 3) with multipliers (n,), with friction if anchored."""
+        local = self.placement.to_local(positions_mm, depth_mm)
+        rotation = self.placement.rotation
+        gap, local_normal = self.indenter.gap(local)
+        normal = local_normal @ rotation.T
+        pressed = np.maximum(multipliers_mn - self.stiffness * gap, 0.0)
+        active = np.where(pressed > 0.0, self.stiffness, 0.0)
+        state = ContactState(
             gap_mm=gap,
+            normal=normal,
+            pressed_mn=pressed,
             force_mn=pressed[:, None] * normal,
             stiffness=active[:, None, None] * normal[:, :, None] * normal[:, None, :],
-            potential=float(0.5 * (pressed**2 / stiffness).sum()),
+            potential=float(0.5 * (pressed**2 / self.stiffness).sum()),
         )
+        if anchors is None:
+            return state
+        rubbed = friction(anchors, local, self.stiffness, before)
+        return replace(
+            state,
+            force_mn=state.force_mn + rubbed.force_mn @ rotation.T,
+            stiffness=state.stiffness + rotation @ rubbed.stiffness @ rotation.T,
+            potential=state.potential + rubbed.potential,
+            friction=rubbed,
+        )
+
+    def renewed(
+        self, start: Anchors, state: ContactState, positions_mm: FloatArray, depth_mm: float
+    ) -> Anchors:
+        """Anchors with the normals and limits of the contact found.
+
+        A node that was free at the start of the step is anchored where it would have met the indenter, had it
+        gone on as in the step before; if it would not have met it, where it is.
+        """
+        local = self.placement.to_local(positions_mm, depth_mm)
+        approach = (depth_mm - start.depth_before_mm) * start.approach
+        gap_before = np.maximum(self.indenter.gap(start.before_mm)[0], 0.0)
+        gap_after = self.indenter.gap(start.before_mm + approach)[0]
+        met = gap_after < 0.0
+        share = np.where(met, gap_before / np.where(met, gap_before - gap_after, 1.0), 1.0)
+        first_touch = np.where(met[:, None], start.before_mm + share[:, None] * approach, local)
+        return replace(
+            start,
+            anchor_mm=np.where(start.held[:, None], start.anchor_mm, first_touch),
+            normal=state.normal @ self.placement.rotation,
+            limit_mn=self.friction * state.pressed_mn,
+            pull_mn=start.pull_mn if state.friction is None else state.friction.pull_mn,
+        )
+
+    def carried(
+        self, anchors: Anchors, state: ContactState, positions_mm: FloatArray, depth_mm: float
+    ) -> Anchors:
+        """Anchors with which the next step starts."""
+        local = self.placement.to_local(positions_mm, depth_mm)
+        return dragged(anchors, local, self.stiffness, state.pressed_mn > 0.0, depth_mm)
 
     def curvature_stiffness(
         self, state: ContactState, positions_mm: FloatArray, depth_mm: float
     ) -> FloatArray:
         """Second part of the stiffness, -lambda dn/dx by central differences, (n, 3, 3). [mN/mm]"""
-        pressed = np.linalg.norm(state.force_mn, axis=1)
+        pressed = state.pressed_mn
         touching = np.flatnonzero(pressed)
         local = self.placement.to_local(positions_mm[touching], depth_mm)
         slope = np.empty((touching.size, 3, 3))
@@ -174,4 +266,4 @@ class Contact:
 
     def augmented(self, state: ContactState) -> FloatArray:
         """Multipliers after an augmentation: the pressures found. [mN]"""
-        return np.linalg.norm(state.force_mn, axis=1)
+        return state.pressed_mn

@@ -22,6 +22,7 @@ from fingerpad.checks import FloatArray, positive, whole
 from fingerpad.errors import ConvergenceError
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import Contact, ContactState
+from fingerpad.mechanics.friction import Anchors, Friction, rubbing_heat
 from fingerpad.mechanics.linear import LinearSolver
 from fingerpad.mechanics.materials import MaterialTable
 from fingerpad.mechanics.viscoelastic import StepCoefficients
@@ -115,6 +116,8 @@ class Load:
     force_mn : float, optional
         Force along the indenter's axis on the body as it is meshed, half of it or whole; the depth is then
         found. [mN]
+    anchors : Anchors, optional
+        Where the skin holds on to the indenter at the start of the step; without friction nothing.
     """
 
     contact: Contact
@@ -122,6 +125,7 @@ class Load:
     step: StepCoefficients
     carried: FloatArray
     force_mn: float | None = None
+    anchors: Anchors | None = None
 
 
 @dataclass(frozen=True)
@@ -161,6 +165,10 @@ class Equilibrium:
         Newton steps taken.
     balance : Balance
         Reaction of the supports.
+    anchors : Anchors, optional
+        Where the skin holds on to the indenter when the next step starts.
+    rubbed_uj : float
+        Energy that friction has turned into heat in this step. [µJ]
     """
 
     displacement_mm: FloatArray
@@ -169,6 +177,8 @@ class Equilibrium:
     multipliers_mn: FloatArray
     iterations: int
     balance: Balance
+    anchors: Anchors | None = None
+    rubbed_uj: float = 0.0
 
 
 class _Evaluation:
@@ -181,7 +191,9 @@ class _Evaluation:
         displacement: FloatArray,
         depth_mm: float,
         multipliers: FloatArray,
+        anchors: Anchors | None,
         blocks: FloatArray,
+        before: Friction | None = None,
     ):
         mesh, contact = body.mesh, load.contact
         force = np.empty_like(displacement)
@@ -191,8 +203,8 @@ class _Evaluation:
         )  # fmt: skip
         self.displacement = displacement
         positions = mesh.nodes_mm[contact.nodes] + displacement[contact.nodes]
-        self.depth_mm = depth_mm
-        self.contact = contact.state(positions, depth_mm, multipliers)
+        self.depth_mm, self.positions = depth_mm, positions
+        self.contact = contact.state(positions, depth_mm, multipliers, anchors, before)
         self.potential = internal + self.contact.potential
         np.negative(force, out=force)
         force[contact.nodes] += self.contact.force_mn
@@ -255,7 +267,9 @@ def find_equilibrium(
     blocks = np.empty((body.sparsity.column.size, 3, 3))
     multipliers = multipliers_mn
     history: list[str] = []
-    state = _Evaluation(body, load, guess_mm, load.depth_mm, multipliers, blocks)
+    # Whether friction is that of the contact found: its limit lags behind while Newton's method runs.
+    anchors, settled = load.anchors, load.anchors is None
+    state = _Evaluation(body, load, guess_mm, load.depth_mm, multipliers, anchors, blocks)
     if np.isnan(state.potential):
         raise ConvergenceError(f"The starting guess turns {_folded(body, guess_mm)} inside out.")
     potentials = [state.potential]
@@ -268,29 +282,60 @@ def find_equilibrium(
         )
         if abs(state.missing_force_mn) > accepted_mn and state.relative_residual <= AT_REST:
             try:
-                state = _advance_indenter(body, load, solver, state, multipliers, blocks)
+                state = _advance_indenter(body, load, solver, state, multipliers, anchors, blocks)
             except ConvergenceError as error:
                 raise ConvergenceError(str(error), tuple(history)) from error
-            potentials = [state.potential]
+            potentials, settled = [state.potential], load.anchors is None
             continue
         balanced = balance.imbalance <= settings.balance_tolerance
         if state.relative_residual <= settings.residual_tolerance and balanced:
-            if state.contact.misfit_mm <= settings.penetration_tolerance * state.depth_mm:
-                return Equilibrium(
-                    state.displacement, state.depth_mm, state.contact, multipliers, iteration, balance
-                )
-            multipliers = load.contact.augmented(state.contact)
-            state = _Evaluation(body, load, state.displacement, state.depth_mm, multipliers, blocks)
-            potentials = [state.potential]
+            close = state.contact.misfit_mm <= settings.penetration_tolerance * state.depth_mm
+            if close and settled:
+                return _found(load, state, multipliers, anchors, iteration, balance)
+            if not close:
+                multipliers = load.contact.augmented(state.contact)
+            if load.anchors is not None:
+                anchors = load.contact.renewed(load.anchors, state.contact, state.positions, state.depth_mm)
+            depth_mm = state.depth_mm
+            state = _Evaluation(body, load, state.displacement, depth_mm, multipliers, anchors, blocks)
+            potentials, settled = [state.potential], True
+            if close:
+                continue  # only friction was renewed: the body may still be at rest
         forcing = float(np.clip(FORCING * state.relative_residual, *FORCING_RANGE))
         try:
             direction = solver.solve(blocks, state.residual, forcing)
         except ConvergenceError as error:
             raise ConvergenceError(str(error), tuple(history)) from error
         highest = max(potentials[-REMEMBERED_POTENTIALS:])
-        state = _line_search(body, load, state, direction, highest, multipliers, blocks, history)
+        state = _line_search(body, load, state, direction, highest, multipliers, anchors, blocks, history)
         potentials.append(state.potential)
+        settled = load.anchors is None
     raise ConvergenceError(f"No equilibrium after {settings.most_iterations} Newton steps.", tuple(history))
+
+
+def _found(
+    load: Load,
+    state: _Evaluation,
+    multipliers: FloatArray,
+    anchors: Anchors | None,
+    iterations: int,
+    balance: Balance,
+) -> Equilibrium:
+    """Gather the equilibrium, its anchors ready for the next step."""
+    carried, heat_uj = None, 0.0
+    if anchors is not None:
+        carried = load.contact.carried(anchors, state.contact, state.positions, state.depth_mm)
+        heat_uj = rubbing_heat(load.anchors or anchors, anchors, carried)
+    return Equilibrium(
+        displacement_mm=state.displacement,
+        depth_mm=state.depth_mm,
+        contact=state.contact,
+        multipliers_mn=multipliers,
+        iterations=iterations,
+        balance=balance,
+        anchors=carried,
+        rubbed_uj=heat_uj,
+    )
 
 
 def _advance_indenter(
@@ -299,6 +344,7 @@ def _advance_indenter(
     solver: LinearSolver,
     start: _Evaluation,
     multipliers: FloatArray,
+    anchors: Anchors | None,
     blocks: FloatArray,
 ) -> _Evaluation:
     """Newton step of displacements and depth together, towards the given force.
@@ -332,7 +378,9 @@ def _advance_indenter(
     while length >= SHORTEST_STEP:
         displacement = start.displacement.copy()
         displacement.ravel()[body.free] += length * (x - advance * y)
-        trial = _Evaluation(body, load, displacement, start.depth_mm + length * advance, multipliers, blocks)
+        depth_mm = start.depth_mm + length * advance
+        before = start.contact.friction
+        trial = _Evaluation(body, load, displacement, depth_mm, multipliers, anchors, blocks, before)
         if not np.isnan(trial.potential):
             return trial
         length /= 2
@@ -346,6 +394,7 @@ def _line_search(
     direction: FloatArray,
     highest: float,
     multipliers: FloatArray,
+    anchors: Anchors | None,
     blocks: FloatArray,
     history: list[str],
 ) -> _Evaluation:
@@ -359,7 +408,8 @@ def _line_search(
     while length >= SHORTEST_STEP:
         displacement = start.displacement.copy()
         displacement.ravel()[body.free] += length * direction
-        trial = _Evaluation(body, load, displacement, start.depth_mm, multipliers, blocks)
+        before, depth_mm = start.contact.friction, start.depth_mm
+        trial = _Evaluation(body, load, displacement, depth_mm, multipliers, anchors, blocks, before)
         falls = trial.potential <= highest + SUFFICIENT_DECREASE * length * slope
         # Near the solution the fall of the potential drowns in round-off and the residual decides.
         if falls or trial.relative_residual < 0.9 * start.relative_residual:

@@ -19,7 +19,7 @@ from fingerpad.mechanics.balance import (
     dissipated_energy,
     energy_balance,
 )
-from fingerpad.mechanics.contact import Contact, Placement
+from fingerpad.mechanics.contact import Contact, Placement, check_friction
 from fingerpad.mechanics.fields import (
     ElementFields,
     FieldState,
@@ -29,6 +29,7 @@ from fingerpad.mechanics.fields import (
     fields_over_time,
     skin_contact,
 )
+from fingerpad.mechanics.friction import Anchors
 from fingerpad.mechanics.linear import NO_NODES, LinearSolver, free_degrees_of_freedom, preconditioner
 from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.newton import (
@@ -167,12 +168,19 @@ class _Press:
         mesh, table = self.body.mesh, self.body.table
         nowhere, no_force = np.zeros_like(mesh.nodes_mm), np.zeros(self.contact.nodes.size)
         touch = self.contact.state(mesh.nodes_mm[self.contact.nodes], 0.0, no_force)
-        rest = Equilibrium(nowhere, 0.0, touch, no_force, 0, Balance(np.zeros(3), 0.0))
+        rest = Equilibrium(nowhere, 0.0, touch, no_force, 0, Balance(np.zeros(3), 0.0), self.free_skin())
         history = StressHistory.unloaded(len(mesh.elements), table.shares.shape[1])
         unstrained = FieldState.unloaded(len(mesh.nodes_mm), len(self.watched.elements))
         return _Moment(
             0.0, rest, nowhere, 0.0, history, np.zeros(len(mesh.elements)), unstrained, (Entry(),)
         )  # fmt: skip
+
+    def free_skin(self) -> Anchors | None:
+        """Skin that does not yet hold on to the indenter, if there is friction."""
+        if self.contact.friction == 0.0:
+            return None
+        undeformed = self.body.mesh.nodes_mm[self.contact.nodes]
+        return Anchors.none_held(self.contact.placement.to_local(undeformed, depth_mm=0.0))
 
     def step(self, start: _Moment, target_ms: float) -> _Moment:
         """Solve one step; `start` stays as it is, so a step that fails or is too long can be repeated."""
@@ -211,15 +219,13 @@ class _Press:
         """Energies of the whole body at the end of a step, from those of the body as it is meshed."""
         parts = 2.0 if self.body.mesh.symmetry_nodes.size else 1.0
         last, before, now = start.ledger[-1], start.found.contact, found.contact
-        pressed_before = np.linalg.norm(before.force_mn, axis=1)
-        pressed_now = np.linalg.norm(now.force_mn, axis=1)
-        squeezed = contact_energy(before.gap_mm, pressed_before, now.gap_mm, pressed_now)
+        squeezed = contact_energy(before.gap_mm, before.pressed_mn, now.gap_mm, now.pressed_mn)
         return Entry(
             time_ms=target_ms,
             depth_mm=found.depth_mm,
             force_mn=parts * float(now.force_mn.sum(axis=0) @ self.contact.placement.axis),
             stored_uj=parts * stored_uj,
-            dissipated_uj=last.dissipated_uj + parts * spent_uj,
+            dissipated_uj=last.dissipated_uj + parts * (spent_uj + found.rubbed_uj),
             contact_uj=last.contact_uj + parts * squeezed,
         )
 
@@ -233,8 +239,11 @@ class _Press:
             force_mn = float(self.stimulus.force_at(target_ms)) / parts
             ramps = target_ms <= self.stimulus.ramp_ms
             depth_mm = start.found.depth_mm + (step_ms * start.depth_rate if ramps else 0.0)
-            return Load(self.contact, depth_mm or FIRST_DEPTH_MM, step, carried, force_mn)
-        return Load(self.contact, float(self.stimulus.depth_at(target_ms)), step, carried)
+            return Load(
+                self.contact, depth_mm or FIRST_DEPTH_MM, step, carried, force_mn, start.found.anchors
+            )
+        depth_mm = float(self.stimulus.depth_at(target_ms))
+        return Load(self.contact, depth_mm, step, carried, anchors=start.found.anchors)
 
     def stopped(self, last: _Moment, attempts: tuple[str, ...]) -> ConvergenceError:
         """Error for a press that gets no further than `last`."""
@@ -260,6 +269,7 @@ def press(
     settings: PressSettings | None = None,
     deepest_mm: float = np.inf,
     watched: np.ndarray | None = None,
+    friction: float = 0.0,
 ) -> Deformation:
     """Solve a whole ramp and hold.
 
@@ -281,6 +291,8 @@ def press(
         Depth that a force must not exceed. [mm]
     watched : int array, optional
         Elements whose stress and strain are kept over time; all by default.
+    friction : float
+        Coulomb's coefficient between skin and indenter.
 
     Returns
     -------
@@ -302,7 +314,8 @@ def press(
     table = MaterialTable.of(materials)
     undeformed = placement.to_local(mesh.nodes_mm[mesh.skin_nodes], depth_mm=0.0)
     candidates = indenter.may_touch(undeformed) & ~np.isin(mesh.skin_nodes, mesh.fixed_nodes)
-    contact = Contact(indenter, placement, mesh.skin_nodes[candidates], mesh.skin_area_mm2[candidates])
+    nodes, area_mm2 = mesh.skin_nodes[candidates], mesh.skin_area_mm2[candidates]
+    contact = Contact(indenter, placement, nodes, area_mm2, friction=check_friction(friction, indenter))
     gripped = contact.nodes if indenter.grips else NO_NODES
     free = free_degrees_of_freedom(len(mesh.nodes_mm), mesh.fixed_nodes, mesh.symmetry_nodes, gripped)
     sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
@@ -339,7 +352,7 @@ def press(
         reaction[n] = both_halves * found.balance.reaction_mn
         imbalance = max(imbalance, found.balance.imbalance)
         deepest = max(deepest, found.contact.penetration_mm)
-        pressed[n, rows] = np.linalg.norm(found.contact.force_mn, axis=1)
+        pressed[n, rows] = found.contact.pressed_mn
     return Deformation(
         times_ms=times,
         force_mn=force,

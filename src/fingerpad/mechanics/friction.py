@@ -1,0 +1,224 @@
+"""Coulomb friction of skin on a rigid indenter: a regularised law with a potential, its limit lagged.
+
+A node in contact is anchored where it first touched the indenter, at a in the indenter's frame. Its slip g
+from there, at x, costs
+
+    g = P (x - a),   P = I - n n',   s = |g|,
+    phi(s) = k s² / 2             while s <= L / k   (it sticks),
+           = L (s - L / (2 k))    beyond             (it slips),
+    f = -phi'(s) g / s,           |f| = min(k s, L) <= L = mu lambda,
+
+with the stiffness k = epsilon A of the normal contact, so that a sticking node yields by a micron or two. At
+the end of a step the anchor of a node that slipped is dragged along until |f| = k s (return mapping).
+
+Coulomb's law has no potential, since the limit L depends on the normal force lambda: its tangent is not
+symmetric. Here L, n and a stay as they are while Newton's method runs, which keeps the tangent symmetric and
+not indefinite; they are renewed between its runs until the equilibrium no longer feels it
+(docs/decisions/friction.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingerpad.checks import FloatArray
+
+
+@dataclass(frozen=True)
+class Anchors:
+    """Where each node of skin holds on to the indenter, and how strongly.
+
+    Parameters
+    ----------
+    anchor_mm : array (n, 3)
+        a, in the indenter's frame; meaningless where a node is not held. [mm]
+    normal : array (n, 3)
+        n, in the indenter's frame.
+    limit_mn : array (n,)
+        L, the largest friction. [mN]
+    pull_mn : array (n, 3)
+        t, where the search for the pull begins, see `friction`. [mN]
+    held : bool array (n,)
+        Nodes that were in contact at the end of the step before.
+    before_mm : array (n, 3)
+        Nodes at the end of the step before, in the indenter's frame of then. [mm]
+    depth_before_mm : float
+        Depth of the indenter then. [mm]
+    approach : array (n, 3)
+        Motion of the nodes in the indenter's frame in the step before, per depth gained.
+    """
+
+    anchor_mm: FloatArray
+    normal: FloatArray
+    limit_mn: FloatArray
+    pull_mn: FloatArray
+    held: np.ndarray
+    before_mm: FloatArray
+    depth_before_mm: float
+    approach: FloatArray
+
+    @classmethod
+    def none_held(cls, local_mm: FloatArray) -> Anchors:
+        """No contact yet: nodes `local_mm` (n, 3) in the frame of the indenter at first touch."""
+        n = len(local_mm)
+        zero, still = np.zeros((n, 3)), np.tile([0.0, -1.0, 0.0], (n, 1))
+        return cls(local_mm, zero, np.zeros(n), zero, np.zeros(n, dtype=bool), local_mm, 0.0, still)
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Friction at one configuration, in the indenter's frame.
+
+    Parameters
+    ----------
+    force_mn : array (n, 3)
+        Friction on each node. [mN]
+    stiffness : array (n, 3, 3)
+        Its tangent, or a stiffer one far from the solution; symmetric, without negative eigenvalues. [mN/mm]
+    potential : float
+        Sum of phi. [µJ]
+    slip_mm : array (n, 3)
+        g. [mm]
+    pull_mn : array (n, 3)
+        t, the pull towards which the linearised law leads, within the limit. [mN]
+    """
+
+    force_mn: FloatArray
+    stiffness: FloatArray
+    potential: float
+    slip_mm: FloatArray
+    pull_mn: FloatArray
+
+
+def friction(
+    anchors: Anchors, local_mm: FloatArray, stiffness: FloatArray, before: Friction | None = None
+) -> Friction:
+    """Friction on nodes that have slipped from their anchors.
+
+    Parameters
+    ----------
+    anchors : Anchors
+        a, n and L.
+    local_mm : array (n, 3)
+        x, nodes in the indenter's frame. [mm]
+    stiffness : array (n,)
+        k. [mN/mm]
+    before : Friction, optional
+        Friction one Newton step ago, for the same anchors.
+
+    Returns
+    -------
+    Friction
+
+    Notes
+    -----
+    With m = max(s, L / k) the law reads m t = L g, f = -t. Newton's method on g alone swings to and fro,
+    since a node that slips resists no further slip and overshoots its place of rest. Linearising the law for
+    g and t together, as for total variation (Chan, Golub & Mulet 1999), gives
+
+        t_new = (L g_new - t e'(g_new - g)) / m,   e = g / s, or 0 where it sticks,
+        stiffness = (L P - sym(t e')) / m,
+
+    with t kept within L. At the solution t = L e and the tangent is exact. A search that begins with t = 0
+    takes a stiffer tangent, that of the paraboloid that touches phi from above.
+
+    Examples
+    --------
+    A node pressed with 2 mN against a face with mu = 0.5 sticks at 0.001 mm and slips at 0.1 mm:
+
+    >>> from dataclasses import replace
+    >>> up, zero = np.array([[0.0, 1.0, 0.0]]), np.zeros((1, 3))
+    >>> anchors = replace(Anchors.none_held(zero), normal=up, limit_mn=np.array([0.5 * 2.0]))
+    >>> for slip_mm in (0.001, 0.1):
+    ...     there = np.array([[slip_mm, 0.0, 0.0]])
+    ...     print(friction(anchors, there, np.array([100.0])).force_mn[0, 0].round(6))
+    -0.1
+    -1.0
+    """
+    n, limit, k = anchors.normal, anchors.limit_mn, stiffness
+    g, s, m, e = _slip(anchors, local_mm, k)
+    pull = (limit / m)[:, None] * g
+    energy = np.where(k * s > limit, limit * (s - limit / (2.0 * k)), 0.5 * k * s**2)
+    t = anchors.pull_mn - n * (n * anchors.pull_mn).sum(axis=1)[:, None]
+    if before is not None:
+        _, _, m_before, e_before = _slip(anchors, before.slip_mm + anchors.anchor_mm, k)
+        further = (e_before * (g - before.slip_mm)).sum(axis=1)[:, None]
+        t = (limit[:, None] * g - before.pull_mn * further) / m_before[:, None]
+    length = np.linalg.norm(t, axis=1)
+    t = t * np.where(length > limit, limit / np.where(length > 0.0, length, 1.0), 1.0)[:, None]
+    projection = np.eye(3) - n[:, :, None] * n[:, None, :]
+    along = t[:, :, None] * e[:, None, :]
+    symmetric = 0.5 * (along + along.transpose(0, 2, 1))
+    tangent = (limit[:, None, None] * projection - symmetric) / m[:, None, None]
+    return Friction(-pull, tangent, float(energy.sum()), g, t)
+
+
+def _slip(
+    anchors: Anchors, local_mm: FloatArray, stiffness: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Slip g (n, 3), its length s, m = max(s, L / k) and its direction e, 0 where a node sticks."""
+    n, limit = anchors.normal, anchors.limit_mn
+    g = local_mm - anchors.anchor_mm
+    g = g - n * (n * g).sum(axis=1)[:, None]
+    s = np.linalg.norm(g, axis=1)
+    slips = stiffness * s > limit
+    # A node without a limit feels no friction, whatever m is.
+    m = np.where(limit > 0.0, np.maximum(s, limit / stiffness), 1.0)
+    return g, s, m, np.where(slips[:, None], g / np.where(s > 0.0, s, 1.0)[:, None], 0.0)
+
+
+def dragged(
+    anchors: Anchors, local_mm: FloatArray, stiffness: FloatArray, touching: np.ndarray, depth_mm: float
+) -> Anchors:
+    """Anchors with which the next step starts: of nodes that slip they follow, of nodes set free they go.
+
+    Parameters
+    ----------
+    anchors : Anchors
+        Those of the equilibrium found.
+    local_mm : array (n, 3)
+        x there, in the indenter's frame. [mm]
+    stiffness : array (n,)
+        k. [mN/mm]
+    touching : bool array (n,)
+        Nodes in contact there.
+    depth_mm : float
+        Depth of the indenter there. [mm]
+
+    Returns
+    -------
+    Anchors
+    """
+    pull = np.where(touching[:, None], -friction(anchors, local_mm, stiffness).force_mn, 0.0)
+    gained = depth_mm - anchors.depth_before_mm
+    return Anchors(
+        anchor_mm=local_mm - pull / stiffness[:, None],
+        normal=anchors.normal,
+        limit_mn=np.where(touching, anchors.limit_mn, 0.0),
+        pull_mn=pull,
+        held=touching,
+        before_mm=local_mm,
+        depth_before_mm=depth_mm,
+        approach=(local_mm - anchors.before_mm) / gained if gained > 0.0 else anchors.approach,
+    )
+
+
+def rubbing_heat(start: Anchors, found: Anchors, after: Anchors) -> float:
+    """Energy that friction turns into heat in a step: the mean limit over the way that anchors were dragged.
+
+    Parameters
+    ----------
+    start, found, after : Anchors
+        At the start of the step, of the equilibrium found, and dragged along for the next step.
+
+    Returns
+    -------
+    float
+        [µJ]
+    """
+    n = found.normal
+    way = after.anchor_mm - found.anchor_mm
+    way = np.linalg.norm(way - n * (n * way).sum(axis=1)[:, None], axis=1)
+    return float(0.5 * (start.limit_mn + found.limit_mn) @ way)
