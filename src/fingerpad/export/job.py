@@ -245,7 +245,7 @@ def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike
     Raises
     ------
     InputError
-        If times or depths are needed and missing, or do not fit each other.
+        If times or depths are needed and missing, or do not fit each other, or skin rubs on the indenter.
 
     Examples
     --------
@@ -256,6 +256,8 @@ def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike
     """
     instance("touch", touch, Touch)
     stimulus, settings = touch.stimulus, touch.settings
+    if touch.friction:
+        raise InputError(f"A deck's contact has no friction: set friction to 0, not {touch.friction:g}.")
     if times_ms is None:
         if settings.sed_tolerance is not None:
             raise InputError(
