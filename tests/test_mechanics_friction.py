@@ -308,5 +308,5 @@ def test_touches_of_other_friction_are_other_touches():
 
 
 def test_deck_that_would_leave_friction_out_is_refused():
-    with pytest.raises(InputError, match="no friction: set friction to 0, not 0.3"):
+    with pytest.raises(InputError, match=r"no friction: set friction to 0, not 0\.3"):
         job_of(touch_of(Fingertip(), Sphere(287.0), friction=0.3))

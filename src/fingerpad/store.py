@@ -41,6 +41,7 @@ MECHANICAL_SOURCES = (
     "indenters.py",
     "stimulus.py",
     "mesh.py",
+    "mesh_checks.py",
     "mesh_quality.py",
     "indentation.py",
     "mechanics",
