@@ -155,7 +155,11 @@ def refused(said, **changes):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        refused("trial1, trial2, trial3, maeno1998, wu2007, gerling2014_fit: got 'steel'", materials="steel"),
+        refused(
+            "trial1, trial2, trial3, trial2_wu, trial3_wu, three_levels, maeno1998, wu2007, gerling2014_fit: "
+            "got 'steel'",
+            materials="steel",
+        ),
         refused("materials must be one of", materials=None),
         refused("resolution must be one of quick, standard, paper: got 'fine'", resolution="fine"),
         refused("depth_mm must stay below", stimulus=RampAndHold(depth_mm=6.0)),

@@ -488,3 +488,19 @@ def test_polynomials_of_the_page_are_those_of_the_candidates():
     for layer, material in (("dermis", dermis), ("subcutis", subcutis)):
         law = material.law
         assert own[layer, 0.48].tolist() == [law.c10, law.c01, law.c20, law.c11, law.c02]
+
+
+def test_named_sets_are_the_candidates_to_four_digits():
+    every = {candidate.name: candidate.tissues for candidate in candidates()}
+    pairs = {
+        "trial3_wu": "Wu polynomial",
+        "trial2_wu": "Wu polynomial, stiff epidermis",
+        "three_levels": "middle of the valley",
+    }
+    for name, candidate in pairs.items():
+        for ours, theirs in zip(named_tissues(name).layers, every[candidate].layers, strict=True):
+            for coefficient in ("c10", "c01", "c20", "c11", "c02"):
+                expected = getattr(theirs.law, coefficient)
+                assert getattr(ours.law, coefficient) == pytest.approx(expected, abs=5.1e-5)
+            assert ours.poisson == pytest.approx(0.48)
+            assert ours.prony == theirs.prony

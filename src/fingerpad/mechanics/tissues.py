@@ -51,6 +51,28 @@ def trial_3() -> Tissues:
     return Tissues(epidermis, epidermis, *_hyperelastic())
 
 
+def trial_2_wu() -> Tissues:
+    """Trial 2 with Wu's hyperfoams rewritten as polynomials N = 2."""
+    epidermis = _linear(published.WU_EPIDERMIS_YOUNG)
+    return Tissues(epidermis, epidermis, *_wu_polynomials())
+
+
+def trial_3_wu() -> Tissues:
+    """Trial 3 with Wu's hyperfoams rewritten as polynomials N = 2: the paper's words taken literally."""
+    epidermis = _linear(published.MAENO_EPIDERMIS_YOUNG)
+    return Tissues(epidermis, epidermis, *_wu_polynomials())
+
+
+def three_levels() -> Tissues:
+    """Between the trials: deflection, firing and discrimination alike (docs/decisions)."""
+    epidermis = _shear(published.THREE_LEVELS_EPIDERMIS_SHEAR)
+    dermis, subcutis = (
+        _shear(published.THREE_LEVELS_DERMIS_SHEAR),
+        _shear(published.THREE_LEVELS_SUBCUTIS_SHEAR),
+    )
+    return Tissues(epidermis, epidermis, dermis, subcutis)
+
+
 def maeno_1998() -> Tissues:
     """Linear elastic layers after Maeno, without relaxation."""
     return Tissues(*(layer.with_prony(Prony()) for layer in trial_1().layers))
@@ -76,10 +98,25 @@ def _hyperelastic() -> tuple[Material, Material]:
     return _shear(published.SOFT_MIX_DERMIS_SHEAR), _shear(published.SOFT_MIX_SUBCUTIS_SHEAR)
 
 
+def _wu_polynomials() -> tuple[Material, Material]:
+    """Dermis and subcutis after Wu, nearly incompressible like the other layers."""
+    dermis, subcutis = (
+        Material.polynomial(c10, c01, c20, c11, c02, NU, skin_prony())
+        for c10, c01, c20, c11, c02 in (
+            published.WU_SKIN_POLYNOMIAL.value,
+            published.WU_SUBCUTIS_POLYNOMIAL.value,
+        )
+    )
+    return dermis, subcutis
+
+
 TISSUES: dict[str, Callable[[], Tissues]] = {
     "trial1": trial_1,
     "trial2": trial_2,
     "trial3": trial_3,
+    "trial2_wu": trial_2_wu,
+    "trial3_wu": trial_3_wu,
+    "three_levels": three_levels,
     "maeno1998": maeno_1998,
     "wu2007": wu_2007,
     "gerling2014_fit": gerling_2014_fit,

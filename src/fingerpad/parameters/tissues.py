@@ -46,6 +46,25 @@ WU_SUBCUTIS_HYPERFOAM_ALPHA = Published(
 )
 WU_HYPERFOAM_POISSON = Published("Poisson's ratio of the hyperfoams, Wu", 0.40, "1", _WU, "recalled")
 
+_WU_FITTED = (
+    "fitted by us to Wu's hyperfoam (recalled) at Poisson's ratio 0.48, in uniaxial compression to 50 %; "
+    "least squares with no negative coefficient"
+)
+WU_SKIN_POLYNOMIAL = Published(
+    "polynomial C10, C01, C20, C11, C02 of skin after Wu",
+    (0.5159, 0.0, 0.0, 0.0798, 0.0558),
+    "kPa",
+    _WU_FITTED,
+    "assumed",
+)
+WU_SUBCUTIS_POLYNOMIAL = Published(
+    "polynomial C10, C01, C20, C11, C02 of subcutis after Wu",
+    (0.2581, 0.0, 0.0, 0.0227, 0.0403),
+    "kPa",
+    _WU_FITTED,
+    "assumed",
+)
+
 LABORATORY_EPIDERMIS_SHEAR = Published(
     "neo-Hookean shear modulus of the epidermis, laboratory 2014", 1211.6, "kPa", _LABORATORY, "read"
 )
@@ -64,6 +83,17 @@ SOFT_MIX_DERMIS_SHEAR = Published(
 )
 SOFT_MIX_SUBCUTIS_SHEAR = Published(
     "neo-Hookean shear modulus of the subcutis, stand-in for Trial 3", 4.75, "kPa", _IDENTIFIED, "assumed"
+)
+
+_THREE_LEVELS = "identified by us from deflection, firing rates and hit rates at once: one value of many"
+THREE_LEVELS_EPIDERMIS_SHEAR = Published(
+    "neo-Hookean shear modulus of the epidermis, set for three levels", 350.0, "kPa", _THREE_LEVELS, "assumed"
+)
+THREE_LEVELS_DERMIS_SHEAR = Published(
+    "neo-Hookean shear modulus of the dermis, set for three levels", 25.4, "kPa", _THREE_LEVELS, "assumed"
+)
+THREE_LEVELS_SUBCUTIS_SHEAR = Published(
+    "neo-Hookean shear modulus of the subcutis, set for three levels", 7.0, "kPa", _THREE_LEVELS, "assumed"
 )
 
 SKIN_PRONY_SHARES = Published("Prony shares g_1..2 of skin, Wu", (0.148, 0.252), "1", _WU, "recalled")
