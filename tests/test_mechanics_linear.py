@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from fingerpad.errors import ConvergenceError
+from fingerpad.errors import ConvergenceError, InputError
+from fingerpad.mechanics import linear
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.linear import (
     AggregationHierarchy,
     LinearSolver,
     PardisoFactor,
+    SuperLuFactor,
+    choose_preconditioner,
     free_degrees_of_freedom,
     pypardiso,
 )
@@ -22,16 +25,16 @@ SPARSITY = Sparsity.of(BLOCK.elements, len(BLOCK.nodes_mm))
 FREE = free_degrees_of_freedom(len(BLOCK.nodes_mm), BLOCK.fixed_nodes, BLOCK.symmetry_nodes)
 
 
-def tangent(shift=0.0):
+def tangent(shift=0.0, poisson=0.45, mesh=BLOCK, sparsity=SPARSITY):
     """Blocks of a layered block's tangent; `shift` is taken from every diagonal entry."""
-    table = MaterialTable.of([Material.neo_hooke(shear, 0.45) for shear in (40.0, 40.0, 20.0, 5.0)])
-    nothing = np.zeros_like(BLOCK.nodes_mm)
-    blocks, force = np.empty((SPARSITY.column.size, 3, 3)), np.empty_like(nothing)
+    table = MaterialTable.of([Material.neo_hooke(shear, poisson) for shear in (40.0, 40.0, 20.0, 5.0)])
+    nothing = np.zeros_like(mesh.nodes_mm)
+    blocks, force = np.empty((sparsity.column.size, 3, 3)), np.empty_like(nothing)
     assemble(
-        BLOCK.nodes_mm, BLOCK.elements, nothing, BLOCK.layer, table.law, np.ones(4),
-        np.zeros((len(BLOCK.elements), 8, 6)), SPARSITY.position, True, force, blocks,
+        mesh.nodes_mm, mesh.elements, nothing, mesh.layer, table.law, np.ones(4),
+        np.zeros((len(mesh.elements), 8, 6)), sparsity.position, True, force, blocks,
     )  # fmt: skip
-    blocks[SPARSITY.diagonal] -= shift * np.eye(3)
+    blocks[sparsity.diagonal] -= shift * np.eye(3)
     return blocks
 
 
@@ -48,6 +51,7 @@ PRECONDITIONERS = pytest.mark.parametrize(
     "make",
     [
         pytest.param(lambda: PardisoFactor(SPARSITY, FREE), id="pardiso", marks=needs_pardiso),
+        pytest.param(lambda: SuperLuFactor(SPARSITY, FREE), id="superlu"),
         pytest.param(lambda: AggregationHierarchy(SPARSITY, FREE, BLOCK.nodes_mm), id="aggregation"),
     ],
 )
@@ -148,3 +152,80 @@ def test_body_that_nothing_holds_is_refused():
     solver = LinearSolver(SPARSITY, everything, PardisoFactor(SPARSITY, everything))
     with pytest.raises(ConvergenceError):
         solver.solve(tangent(), np.ones(everything.size), 1e-8)
+
+
+@pytest.mark.parametrize(
+    "make", [pytest.param(PardisoFactor, id="pardiso", marks=needs_pardiso), pytest.param(SuperLuFactor)]
+)
+@pytest.mark.parametrize("poisson", [0.48, 0.499, 0.4999])
+def test_factor_serves_a_body_that_is_nearly_incompressible(make, poisson):
+    blocks, residual = tangent(poisson=poisson), residual_of()
+    solver = LinearSolver(SPARSITY, FREE, make(SPARSITY, FREE))
+    solution = solver.solve(blocks, residual, 1e-8)
+    exact = direct(blocks, residual)
+    np.testing.assert_allclose(solution, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
+    assert solver.iterations <= 4
+
+
+def test_multigrid_serves_up_to_its_limit_and_slows_down_beyond():
+    mesh = block_mesh(
+        np.arange(13.0), np.arange(9.0), np.arange(7.0), [0, 0, 1, 1, 2, 2, 3, 3], symmetric=True
+    )
+    sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
+    free = free_degrees_of_freedom(len(mesh.nodes_mm), mesh.fixed_nodes, mesh.symmetry_nodes)
+    residual, iterations = np.random.default_rng(0).normal(size=free.size), []
+    for poisson in (0.45, linear.MULTIGRID_POISSON, linear.DIRECT_POISSON):
+        solver = LinearSolver(sparsity, free, AggregationHierarchy(sparsity, free, mesh.nodes_mm))
+        solver.solve(tangent(poisson=poisson, mesh=mesh, sparsity=sparsity), residual, 1e-6)
+        iterations.append(solver.iterations)
+    assert iterations[1] < 2.5 * iterations[0]
+    assert iterations[2] > 4 * iterations[1]
+
+
+def chosen(poisson):
+    return choose_preconditioner(SPARSITY, FREE, BLOCK.nodes_mm, poisson)
+
+
+@needs_pardiso
+def test_pardiso_is_chosen_where_mkl_is():
+    for poisson in (0.3, 0.485, 0.4999):
+        preconditioner, reason = chosen(poisson)
+        assert isinstance(preconditioner, PardisoFactor)
+        assert reason == "PARDISO's factor: MKL is here, and it serves any Poisson's ratio up to 0.4999."
+
+
+def test_superlu_is_chosen_for_a_small_mesh_without_mkl(monkeypatch):
+    monkeypatch.setattr(linear, "pypardiso", None)
+    preconditioner, reason = chosen(0.4999)
+    assert isinstance(preconditioner, SuperLuFactor)
+    assert reason == "SuperLU's factor: no MKL here, and 175 nodes are within its 20000."
+
+
+def test_multigrid_is_chosen_for_a_large_mesh_without_mkl_within_its_reach(monkeypatch):
+    monkeypatch.setattr(linear, "pypardiso", None)
+    monkeypatch.setattr(linear, "SUPERLU_NODES", 100)
+    preconditioner, reason = chosen(Material.neo_hooke(7.0, 0.485).poisson)
+    assert isinstance(preconditioner, AggregationHierarchy)
+    assert reason == (
+        "pyamg's multigrid: no MKL here, 175 nodes are above SuperLU's 100, and Poisson's ratio 0.485 is "
+        "within 0.485."
+    )
+    with pytest.raises(
+        InputError, match=r"must not exceed 0.485 here: got 0.486, 175 nodes are above .* use a"
+    ):
+        chosen(0.486)
+
+
+@pytest.mark.parametrize("mkl", [pytest.param(True, marks=needs_pardiso), False])
+def test_ratio_beyond_every_solver_is_refused_with_what_to_do(monkeypatch, mkl):
+    if not mkl:
+        monkeypatch.setattr(linear, "pypardiso", None)
+    chosen(Material.neo_hooke(7.0, 0.4999).poisson)
+    with pytest.raises(InputError, match=r"must not exceed 0.4999: got 0.49995; use 0.4999, where"):
+        chosen(0.49995)
+
+
+def test_singular_tangent_is_refused_by_superlu():
+    blocks = np.zeros_like(tangent())
+    with pytest.raises(ConvergenceError, match="SuperLU could not factor"):
+        SuperLuFactor(SPARSITY, FREE).renew(blocks)

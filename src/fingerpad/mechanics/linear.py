@@ -1,9 +1,9 @@
 """The linear system behind a Newton step: conjugate gradients around a factor that is kept.
 
-A tangent changes little from one Newton step to the next, so one single-precision sparse factor serves as
-preconditioner for many of them; conjugate gradients (SciPy) restore double precision. The factor is renewed
-when the iterations grow. MKL's PARDISO does the factoring where pypardiso has it; elsewhere smoothed
-aggregation (pyamg) takes its place behind the same two methods.
+A tangent changes little from one Newton step to the next, so one sparse factor serves as preconditioner for
+many of them; conjugate gradients (SciPy) restore double precision. The factor is renewed when the iterations
+grow. MKL's PARDISO does the factoring, in single precision, where pypardiso has it; elsewhere SuperLU (SciPy)
+does, or smoothed aggregation (pyamg) takes its place in meshes that are too large for SuperLU.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, cg
+from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from fingerpad.checks import FloatArray
-from fingerpad.errors import ConvergenceError
+from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mesh_quality import rigid_motions
 
@@ -28,6 +28,13 @@ except ImportError:  # no MKL wheel for this processor
 
 RENEW_AFTER_ITERATIONS = 16
 MOST_ITERATIONS = 400
+DIRECT_POISSON, MULTIGRID_POISSON = 0.4999, 0.485
+"""Largest Poisson's ratio with a factor, and with multigrid, whose iterations grow beyond (see
+docs/decisions/linear-solver.md)."""
+
+SUPERLU_NODES = 20_000
+"""Largest mesh for SuperLU: one of its factors then takes about 1 GB and a quarter of a minute."""
+
 NO_NODES = np.empty(0, dtype=np.int64)
 
 
@@ -127,6 +134,42 @@ class PardisoFactor:
             raise ConvergenceError(f"PARDISO could not finish phase {phase}: error {error.value}.")
 
 
+class SuperLuFactor:
+    """Double-precision factor from SciPy's SuperLU.
+
+    Parameters
+    ----------
+    sparsity : Sparsity
+        Block pattern of the tangent.
+    free : int array (n_free,)
+        Degrees of freedom that move.
+    """
+
+    def __init__(self, sparsity: Sparsity, free: np.ndarray):
+        self._sparsity, self._free = sparsity, free
+
+    def renew(self, blocks: FloatArray) -> None:
+        """Factor the tangent given by its blocks (n_blocks, 3, 3).
+
+        Raises
+        ------
+        ConvergenceError
+            If the matrix is singular.
+        """
+        matrix = self._sparsity.matrix(blocks).tocsr()[self._free][:, self._free].tocsc()
+        try:
+            # A symmetric ordering and pivots on the diagonal: other settings fill the factor ten times over.
+            self._factor = splu(
+                matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+            )
+        except RuntimeError as error:
+            raise ConvergenceError(f"SuperLU could not factor the tangent: {error}.") from error
+
+    def apply(self, residual: FloatArray) -> FloatArray:
+        """Solve with the factor for a residual (n_free,)."""
+        return self._factor.solve(residual)
+
+
 class AggregationHierarchy:
     """Smoothed aggregation multigrid from pyamg, with the rigid motions as near null space.
 
@@ -158,11 +201,56 @@ class AggregationHierarchy:
         return self._cycle @ residual
 
 
-def preconditioner(sparsity: Sparsity, free: np.ndarray, nodes_mm: FloatArray) -> Preconditioner:
-    """Best preconditioner that this machine has: PARDISO's factor, else pyamg's hierarchy."""
+def choose_preconditioner(
+    sparsity: Sparsity, free: np.ndarray, nodes_mm: FloatArray, poisson: float
+) -> tuple[Preconditioner, str]:
+    """Choose the preconditioner for a body, and say why.
+
+    Parameters
+    ----------
+    sparsity : Sparsity
+        Block pattern of the tangent.
+    free : int array (n_free,)
+        Degrees of freedom that move.
+    nodes_mm : array (n_nodes, 3)
+        Reference nodes. [mm]
+    poisson : float
+        Poisson's ratio of the least compressible material.
+
+    Returns
+    -------
+    (Preconditioner, str)
+        The preconditioner and the reason for it in a sentence.
+
+    Raises
+    ------
+    InputError
+        If the material is beyond the reach of every solver that this machine has for this mesh.
+    """
+    # Materials are told apart by their moduli, from which the ratio comes back with the last digits changed.
+    if poisson > DIRECT_POISSON + 1e-9:
+        raise InputError(
+            f"Poisson's ratio must not exceed {DIRECT_POISSON}: got {poisson:.7g}; use {DIRECT_POISSON}, "
+            "where a force is within 0.05 % of that of tissue that keeps its volume."
+        )
+    n_nodes = len(nodes_mm)
     if pypardiso is not None:
-        return PardisoFactor(sparsity, free)
-    return AggregationHierarchy(sparsity, free, nodes_mm)
+        reason = f"PARDISO's factor: MKL is here, and it serves any Poisson's ratio up to {DIRECT_POISSON}."
+        return PardisoFactor(sparsity, free), reason
+    if n_nodes <= SUPERLU_NODES:
+        reason = f"SuperLU's factor: no MKL here, and {n_nodes} nodes are within its {SUPERLU_NODES}."
+        return SuperLuFactor(sparsity, free), reason
+    too_large = f"{n_nodes} nodes are above SuperLU's {SUPERLU_NODES}"
+    if poisson > MULTIGRID_POISSON + 1e-9:
+        raise InputError(
+            f"Poisson's ratio must not exceed {MULTIGRID_POISSON} here: got {poisson:.6g}, {too_large}, and "
+            "this machine has no MKL (pypardiso); use a smaller ratio, a coarser mesh or an x86-64 one."
+        )
+    reason = (
+        f"pyamg's multigrid: no MKL here, {too_large}, and Poisson's ratio {poisson:.4g} is within "
+        f"{MULTIGRID_POISSON}."
+    )
+    return AggregationHierarchy(sparsity, free, nodes_mm), reason
 
 
 @dataclass

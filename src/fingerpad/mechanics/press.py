@@ -30,7 +30,12 @@ from fingerpad.mechanics.fields import (
     skin_contact,
 )
 from fingerpad.mechanics.friction import Anchors
-from fingerpad.mechanics.linear import NO_NODES, LinearSolver, free_degrees_of_freedom, preconditioner
+from fingerpad.mechanics.linear import (
+    NO_NODES,
+    LinearSolver,
+    choose_preconditioner,
+    free_degrees_of_freedom,
+)
 from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.newton import (
     FIRST_DEPTH_MM,
@@ -119,6 +124,8 @@ class Deformation:
         Deepest penetration at any time. [mm]
     newton_steps, factorisations : int
         Work done.
+    linear_solver : str
+        Which one was chosen, and why.
     """
 
     times_ms: FloatArray
@@ -135,6 +142,7 @@ class Deformation:
     penetration_mm: float
     newton_steps: int
     factorisations: int
+    linear_solver: str
 
 
 @dataclass(frozen=True)
@@ -302,7 +310,8 @@ def press(
     Raises
     ------
     InputError
-        If the mesh fails `check_mesh`, a depth drives the indenter into the bone, or a force pushes it deeper
+        If the mesh fails `check_mesh`, a material is less compressible than a solver of this machine can
+        take, a depth drives the indenter into the bone, or a force pushes it deeper
         than `deepest_mm`.
     ConvergenceError
         If a step fails even when it is cut; the history tells each attempt.
@@ -320,7 +329,9 @@ def press(
     free = free_degrees_of_freedom(len(mesh.nodes_mm), mesh.fixed_nodes, mesh.symmetry_nodes, gripped)
     sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
     body = Body(mesh, table, sparsity, free)
-    solver = LinearSolver(sparsity, free, preconditioner(sparsity, free, mesh.nodes_mm))
+    poisson = max(materials[layer].poisson for layer in np.unique(mesh.layer))
+    approximate, reason = choose_preconditioner(sparsity, free, mesh.nodes_mm, poisson)
+    solver = LinearSolver(sparsity, free, approximate)
 
     chosen = np.arange(len(mesh.elements)) if watched is None else watched
     follow = Watched(chosen, mesh.nodes_mm, mesh.elements[chosen], mesh.layer[chosen], table)
@@ -368,6 +379,7 @@ def press(
         penetration_mm=deepest,
         newton_steps=job.newton_steps,
         factorisations=solver.renewals,
+        linear_solver=reason,
     )
 
 
