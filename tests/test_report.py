@@ -225,24 +225,43 @@ def _nail() -> dict:
     taper = np.sqrt(1.0 - (along / 31.78) ** 6)
     y = -np.cos(angle) * np.where(angle < np.pi / 2, 10.0, 4.5) * taper
     z = 9.8 * np.sin(angle) * taper
-    sed = 3.0 * np.exp(-np.hypot(along - 17.4, np.hypot(y + 9.85, z)) / 1.5) + 0.02 * np.exp(
-        -((angle - 2.3) ** 2) / 0.05
-    )
+
+    def stress(x, y, z):
+        return 20.0 * np.exp(-np.hypot(x - 17.4, np.hypot(y + 9.85, z)) / 1.5) + 0.4 * (y > 2.0)
+
+    x_faces, y_faces, z_faces = (values[:-1, :-1] for values in (along, y, z))
     columns, rows = np.meshgrid(np.arange(0.0, 30.0, 1.0), np.arange(-9.0, 3.0, 1.0), indexing="ij")
     corners_x = columns.ravel()[:, None] + [0.0, 1.0, 1.0, 0.0]
     corners_y = rows.ravel()[:, None] + [0.0, 0.0, 1.0, 1.0]
+    nail = np.array([[[17.0, 3.0, 0.0], [17.0, 2.5, 5.0]], [[17.0, 2.5, 5.0], [28.0, 1.0, 5.0]]])
+    distance = np.arange(-1.75, 5.0, 0.5)
+    course = [[0.2, 0.4 + 0.1 * np.exp(-abs(d)), 0.6] if abs(d) > 0.3 else [None] * 3 for d in distance]
     return {
         "x_mm": along.tolist(),
         "y_mm": y.tolist(),
         "z_mm": z.tolist(),
-        "sed_kpa": sed.tolist(),
-        "ratio": 3.2,
-        "text": "Skin at the border holds 3.2 times what skin as far from the sphere holds elsewhere.",
-        "section": {
+        "von_mises_kpa": stress(x_faces, y_faces, z_faces).tolist(),
+        "nail_mm": nail.tolist(),
+        "ratio": 1.8,
+        "ratio_range": [1.5, 3.9],
+        "ratio_energy": 1.5,
+        "border_kpa": 0.8,
+        "text": "Skin at the border bears 1.8 times what skin beside it bears.",
+        "profile": {
+            "distance_mm": distance.tolist(),
+            "surface_kpa": course,
+            "living_epidermis_kpa": course,
+        },
+        "middle": {
             "x_mm": corners_x.tolist(),
             "y_mm": corners_y.tolist(),
-            "sed_kpa": (3.0 * np.exp(-np.hypot(columns - 17.0, rows + 9.0) / 2.0)).ravel().tolist(),
-            "displaced": True,
+            "von_mises_kpa": stress(columns, rows, 0.0).ravel().tolist(),
+        },
+        "across": {
+            "x_mm": 22.0,
+            "y_mm": corners_y[:12].tolist(),
+            "z_mm": corners_y[:12].tolist(),
+            "von_mises_kpa": np.linspace(0.0, 0.8, 12).tolist(),
         },
     }
 
@@ -520,22 +539,41 @@ def test_figure_7_shows_rates_far_below_chance():
 
 def test_figure_9_shows_each_place_from_the_side_it_is_seen_from():
     section = _nail()
-    below, above, side, cut = nail.draw(section).axes[:4]
-    cells = 19 * 2 * 16  # closed all around: joined along the volar and along the dorsal midline
-    assert [axes.collections[0].get_array().size for axes in (below, above, side)] == [cells] * 3
+    below, side, middle, above, across, profile = nail.draw(section).axes[:6]
+    half = 19 * 15
+    sizes = [axes.collections[0].get_array().size for axes in (below, side, above)]
+    assert sizes == [2 * half, half, 2 * half]
     seen = [np.ma.getdata(axes.collections[0].get_array()) for axes in (below, above)]
     # The pad, with the peak under the sphere, is nearest to the eye below and farthest from it above.
-    assert seen[0].argmax() > cells / 2 > seen[1].argmax()
+    assert seen[0].argmax() > half > seen[1].argmax()
     corners = np.array([path.vertices[:4] for path in side.collections[0].get_paths()])
     assert corners[..., 1].min() == pytest.approx(-10.0)
-    assert len(cut.collections[0].get_paths()) == len(section["section"]["sed_kpa"])
+    assert len(middle.collections[0].get_paths()) == len(section["middle"]["von_mises_kpa"])
+    assert len(across.collections[0].get_paths()) == 2 * len(section["across"]["von_mises_kpa"])
+    assert [line.get_label() for line in profile.get_lines()[:2]] == [
+        "surface of the skin",
+        "living epidermis",
+    ]
 
 
-def test_figure_9_scales_every_view_alike():
+def test_figure_9_has_one_scale_for_the_whole_finger_and_one_for_the_nail():
     section = _nail()
-    scales = [axes.collections[0].norm for axes in nail.draw(section).axes[:4]]
-    assert len({(scale.vmin, scale.vmax) for scale in scales}) == 1
-    assert scales[0].vmax == max(np.max(section["sed_kpa"]), np.max(section["section"]["sed_kpa"]))
+    panels = nail.draw(section).axes[:5]
+    scales = [axes.collections[0].norm for axes in panels]
+    wide, near = (
+        {(scale.vmin, scale.vmax) for scale in scales[:3]},
+        {(scale.vmin, scale.vmax) for scale in scales[3:]},
+    )
+    peak = max(np.max(section["von_mises_kpa"]), np.max(section["middle"]["von_mises_kpa"]))
+    assert wide == {(peak / 1e4, peak)}
+    assert near == {(0.0, section["border_kpa"])}
+
+
+def test_figure_9_draws_the_nail_on_both_halves():
+    above = nail.draw(_nail()).axes[3]
+    edges = [np.array(lines.get_segments()) for lines in above.collections[1:]]
+    np.testing.assert_array_equal(edges[0] * [1.0, -1.0], edges[1])
+    assert edges[0][0].tolist() == [[17.0, 0.0], [17.0, 5.0]]
 
 
 def test_colours_of_trials_differ_in_grey_and_lines_differ_without_colour():

@@ -34,7 +34,7 @@ PARAMETERS = {
 MEASURED = ("started", "wall_s", "peak_memory_mb", "stages")
 """Parts of the manifest that no two runs share."""
 
-INDENTATIONS = 6 + 36 + 14
+INDENTATIONS = 6 + 36 + 14 + 1
 
 
 def run(folder, *options):
@@ -179,8 +179,12 @@ def test_population_and_nail_are_maps(first):
     for name in ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms"):
         assert np.shape(population[name]) == shape
     assert np.shape(population["receptors_mm"]) == (18, 2)
-    assert np.shape(nail["sed_kpa"]) == np.shape(nail["x_mm"]) == np.shape(nail["z_mm"])
+    along, around = np.shape(nail["x_mm"])
+    assert np.shape(nail["von_mises_kpa"]) == (along - 1, around - 1)
     assert nail["border_kpa"] > nail["far_kpa"] > 0.0
+    # Figure 9: stress at the border of the nail stands out from the skin beside it in every section.
+    low, high = nail["ratio_range"]
+    assert 1.3 < low <= nail["ratio"] <= high
 
 
 def test_the_manifest_says_how_to_repeat_it(first):
@@ -190,7 +194,7 @@ def test_the_manifest_says_how_to_repeat_it(first):
     assert 100.0 < manifest["peak_memory_mb"] < 4000.0
     assert 1.0 < manifest["wall_s"] <= first.wall_s
     stages = manifest["stages"]
-    assert [stage.get("computed") for stage in stages] == [6, 36, 14, None]
+    assert [stage.get("computed") for stage in stages] == [6, 36, 14, 1, None]
     assert sum(stage["wall_s"] for stage in stages) <= manifest["wall_s"] + 0.1
     assert all(mesh["smallest_gauss_jacobian_mm3"] > 0 for mesh in manifest["meshes"].values())
 
@@ -287,7 +291,7 @@ def test_a_second_run_takes_everything_from_the_store(first, second, stamps):
     assert (second.status, second.errors) == (0, "")
     folder = first.folder / STORE_FOLDER
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == stamps
-    assert [stage.get("computed") for stage in second.results["manifest"]["stages"]] == [0, 0, 0, None]
+    assert [stage.get("computed") for stage in second.results["manifest"]["stages"]] == [0, 0, 0, 0, None]
     assert second.wall_s < first.wall_s / 3
 
 
@@ -309,4 +313,4 @@ def test_another_seed_changes_what_the_observer_draws_and_nothing_else(first, ot
         rates, rates_theirs = drawn["gradient_sum"][measure], drawn_theirs["gradient_sum"][measure]
         assert rates_theirs["hit_rate"] != rates["hit_rate"]
         np.testing.assert_allclose(rates_theirs["hit_rate"], rates["hit_rate"], rtol=0, atol=0.1)
-    assert [stage.get("computed") for stage in other_seed.results["manifest"]["stages"]] == [0, 0, 0, None]
+    assert [stage.get("computed") for stage in other_seed.results["manifest"]["stages"]] == [0, 0, 0, 0, None]

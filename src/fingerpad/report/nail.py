@@ -1,4 +1,4 @@
-"""Figure 9: strain energy density in the skin all over the finger, and in the section through its middle."""
+"""Figure 9: stress of the skin all over the finger, and how it rises at the border of the nail."""
 
 from __future__ import annotations
 
@@ -7,20 +7,21 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import LogNorm
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from fingerpad.checks import FloatArray
-from fingerpad.report.appearance import GREY, PALE, new_figure, numbers, say_nothing_to_draw
+from fingerpad.report.appearance import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, numbers
 from fingerpad.report.words import number
 
-DECADES = 5.0
-LABEL = "strain energy density [kPa]"
+DECADES = 4.0
+LABEL = "von Mises stress [kPa]"
+NEAR_NAIL = "von Mises stress about the nail [kPa]"
 
 
 def draw(section: dict[str, Any]) -> Figure:
-    """Draw Figure 9: the skin from three sides and the section through the middle, all to one scale.
+    """Draw Figure 9: the pressed finger to a logarithmic scale, and the nail's border to a linear one.
 
     Parameters
     ----------
@@ -31,77 +32,85 @@ def draw(section: dict[str, Any]) -> Figure:
     -------
     Figure
     """
-    figure = new_figure(11.0, 6.2)
-    panels = figure.subplots(2, 2, height_ratios=(20.0, 15.0), sharex=True, sharey="row")
-    x, y, z, sed = (numbers(section[key]) for key in ("x_mm", "y_mm", "z_mm", "sed_kpa"))
-    cut = section.get("section")
-    scale = _scale(np.concatenate([sed.ravel(), numbers(cut["sed_kpa"]) if cut else []]))
-    whole_x, whole_y, whole_z = (_both_halves(x, x), _both_halves(y, y), _both_halves(z, -z))
-    faces = _cell_means(_both_halves(sed, sed))
-    _seen(panels[0, 0], whole_x, whole_z, -whole_y, faces, scale)
-    _seen(panels[0, 1], whole_x, whole_z, whole_y, faces, scale)
-    _seen(panels[1, 0], whole_x, whole_y, whole_z, faces, scale)
-    titles = ("(a) skin from below: the pad", "(b) skin from above: the nail", "(c) skin from the side")
-    for axes, title, upright in zip(
-        panels.flat, titles, ("z, lateral", "z, lateral", "y, dorsal"), strict=False
-    ):
+    figure = new_figure(13.0, 7.0)
+    panels = figure.subplots(2, 3)
+    x, y, z = (numbers(section[key]) for key in ("x_mm", "y_mm", "z_mm"))
+    faces = numbers(section["von_mises_kpa"])
+    middle, across = section["middle"], section["across"]
+    inside = numbers(middle["von_mises_kpa"])
+    wide = _logarithmic(np.concatenate([faces.ravel(), inside]))
+    near = Normalize(0.0, section["border_kpa"] or 1.0)
+    nail = numbers(section["nail_mm"])
+    outlines = {name: _corners(values) for name, values in (("x", x), ("y", y), ("z", z))}
+    both = [{**outlines, "z": sign * outlines["z"]} for sign in (1.0, -1.0)]
+    stress = faces.ravel()
+
+    _seen(panels[0, 0], both, ("x", "z"), -outlines["y"], stress, wide)
+    _seen(panels[0, 1], both[:1], ("x", "y"), outlines["z"], stress, wide)
+    _paint(panels[0, 2], np.stack([numbers(middle["x_mm"]), numbers(middle["y_mm"])], axis=-1), inside, wide)
+    _seen(panels[1, 0], both, ("x", "z"), outlines["y"], stress, near)
+    for sign in (1.0, -1.0):
+        _border(panels[1, 0], nail[..., [0, 2]] * [1.0, sign])
+    _border(panels[0, 1], nail[..., [0, 1]])
+    cut = np.stack([numbers(across["z_mm"]), numbers(across["y_mm"])], axis=-1)
+    cut_stress = numbers(across["von_mises_kpa"])
+    _paint(panels[1, 1], np.concatenate([cut, cut * [-1.0, 1.0]]), np.tile(cut_stress, 2), near)
+    _profiles(panels[1, 2], section["profile"])
+
+    titles = (
+        ("(a) skin from below: the pad", "x, distal [mm]", "z, lateral [mm]"),
+        ("(b) skin from the side", "x, distal [mm]", "y, dorsal [mm]"),
+        ("(c) middle section, z = 0", "x, distal [mm]", "y, dorsal [mm]"),
+        ("(d) skin from above: the nail", "x, distal [mm]", "z, lateral [mm]"),
+        (f"(e) section across, x = {number(across['x_mm'])} mm", "z, lateral [mm]", "y, dorsal [mm]"),
+        ("(f) across the border of the nail", "distance from the nail [mm]", LABEL),
+    )
+    for axes, (title, right, up) in zip(panels.flat, titles, strict=True):
         axes.set_title(title)
-        axes.set_ylabel(f"{upright} [mm]")
-    _cut_open(panels[1, 1], cut, scale)
-    for axes in panels[1]:
-        axes.set_xlabel("x, distal [mm]")
-    figure.colorbar(panels[0, 0].collections[0], ax=panels, label=LABEL, extend="min", pad=0.02, aspect=40)
+        axes.set_xlabel(right)
+        axes.set_ylabel(up)
+    figure.colorbar(
+        panels[0, 0].collections[0], ax=panels[0, :], label=LABEL, extend="min", pad=0.02, aspect=25
+    )
+    figure.colorbar(
+        panels[1, 0].collections[0], ax=panels[1, :2], label=NEAR_NAIL, extend="max", pad=0.02, aspect=25
+    )
     return figure
 
 
-def _scale(sed: FloatArray) -> LogNorm:
+def _logarithmic(stress: FloatArray) -> LogNorm:
     """Colours over a fixed number of decades below the peak; what is weaker shares the darkest."""
-    known = sed[np.isfinite(sed)]
+    known = stress[np.isfinite(stress)]
     peak = known.max() if known.size and known.max() > 0.0 else 1.0
     return LogNorm(vmin=peak / 10.0**DECADES, vmax=peak, clip=True)
 
 
-def _both_halves(half: FloatArray, mirrored: FloatArray) -> FloatArray:
-    """Half a finger and its mirror image as one closed grid, joined along both midlines."""
-    return np.concatenate([mirrored[:, ::-1], half, mirrored[:, -1:]], axis=1)
-
-
 def _corners(grid: FloatArray) -> FloatArray:
-    """Values at the four corners of each cell of a grid, (n_cells, 4)."""
+    """Values at the four corners of each face of a grid, (n_faces, 4)."""
     around = (grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:])
     return np.stack(around, axis=-1).reshape(-1, 4)
 
 
-def _cell_means(grid: FloatArray) -> FloatArray:
-    return _corners(grid).mean(axis=1)
-
-
 def _seen(
-    axes: Axes, right: FloatArray, up: FloatArray, near: FloatArray, sed: FloatArray, scale: LogNorm
+    axes: Axes,
+    halves: list[dict[str, FloatArray]],
+    plane: tuple[str, str],
+    near: FloatArray,
+    stress: FloatArray,
+    scale: Normalize,
 ) -> None:
     """Draw the skin as seen from far away: what is nearer to the eye is drawn later and hides the rest."""
-    order = np.argsort(_cell_means(near), kind="stable")
-    outlines = np.stack([_corners(right), _corners(up)], axis=-1)[order]
-    _paint(axes, outlines, sed[order], scale)
+    outlines = np.concatenate([np.stack([half[plane[0]], half[plane[1]]], axis=-1) for half in halves])
+    order = np.argsort(np.tile(near.mean(axis=1), len(halves)), kind="stable")
+    _paint(axes, outlines[order], np.tile(stress, len(halves))[order], scale)
 
 
-def _cut_open(axes: Axes, section: dict[str, Any] | None, scale: LogNorm) -> None:
-    if not section:
-        say_nothing_to_draw(axes, "no section in these results")
-        return
-    outlines = np.stack([numbers(section["x_mm"]), numbers(section["y_mm"])], axis=-1)
-    _paint(axes, outlines, numbers(section["sed_kpa"]), scale)
-    state = "deformed" if section.get("displaced") else "undeformed"
-    axes.set_title(f"(d) section through the middle, z = 0, {state}")
-    axes.set_ylabel("y, dorsal [mm]")
-
-
-def _paint(axes: Axes, outlines: FloatArray, sed: FloatArray, scale: LogNorm) -> None:
+def _paint(axes: Axes, outlines: FloatArray, stress: FloatArray, scale: Normalize) -> None:
     # A lighter ground than the darkest colour keeps the outline of the finger visible.
     axes.set_facecolor(PALE)
     polygons = PolyCollection(
         list(outlines),
-        array=np.ma.masked_invalid(sed),
+        array=np.ma.masked_invalid(stress),
         cmap=colormaps["inferno"].with_extremes(bad=GREY),
         norm=scale,
         edgecolors="face",
@@ -113,14 +122,37 @@ def _paint(axes: Axes, outlines: FloatArray, sed: FloatArray, scale: LogNorm) ->
     axes.grid(visible=False)
 
 
+def _border(axes: Axes, edges: FloatArray) -> None:
+    """Draw the outline of the nail."""
+    axes.add_collection(LineCollection(list(edges), colors="white", linewidths=1.2))
+
+
+def _profiles(axes: Axes, profile: dict[str, Any]) -> None:
+    """Stress over distance from the nail: median and middle 80 % of the sections that cross its border."""
+    distance = numbers(profile["distance_mm"])
+    for key, name, colour, style in (
+        ("surface_kpa", "surface of the skin", ORANGE, "-"),
+        ("living_epidermis_kpa", "living epidermis", BLUE, "--"),
+    ):
+        low, median, high = numbers(profile[key]).T
+        axes.fill_between(distance, low, high, color=colour, alpha=0.2, linewidth=0.0)
+        axes.plot(distance, median, style, color=colour, label=name)
+    axes.axvline(0.0, color=BLACK, linewidth=0.8)
+    axes.set_ylim(bottom=0.0)
+    axes.text(0.02, 0.02, "under the nail", transform=axes.transAxes, color=GREY)
+    axes.legend(loc="upper right")
+
+
 def caption(section: dict[str, Any]) -> str:
     """Say what Figure 9 shows and what the paper found."""
-    ratio = section.get("ratio")
+    low, high = section["ratio_range"]
     return (
-        "Strain energy density under the standard sphere: (a-c) in the living epidermis all over the "
-        "finger, one half computed and drawn with its mirror image; (d) in all tissues of the middle "
-        f"section. The scale is logarithmic over {number(DECADES)} decades; weaker places are black. The "
-        "paper shows high stresses at the border of the nail."
-        + (f" Ratio at the border of the nail: {number(ratio)}." if ratio is not None else "")
-        + (f" {section['text']}" if section.get("text") else "")
+        "Von Mises stress under the standard sphere at the end of the hold, on the deformed finger: (a, b) "
+        "in the outermost elements of the skin and (c) in the middle section, logarithmic over "
+        f"{number(DECADES)} decades; (d) the back of the finger and (e) the section with the highest ratio, "
+        "on a linear scale that ends at the highest stress at the border of the nail (its outline in white); "
+        "(f) median and middle 80 % of all sections that cross that border. One half is computed and drawn "
+        "with its mirror image. The paper shows high stresses at the border of the nail. "
+        f"Ratio of the border to the skin 2 to 3 mm away: {number(section['ratio'])} "
+        f"({number(low)} to {number(high)}). {section['text']}"
     )

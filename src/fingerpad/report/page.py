@@ -102,7 +102,7 @@ CHAPTERS = (
     Chapter(
         "nail",
         "The border of the nail",
-        (Drawing(9, "figure_9_nail", "Strain energy density all over the finger", nail.draw, nail.caption),),
+        (Drawing(9, "figure_9_nail", "Stress at the border of the nail", nail.draw, nail.caption),),
         _no_tables,
     ),
     Chapter("inputs", "What this rests on", (), tables.inputs),

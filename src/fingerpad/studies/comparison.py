@@ -222,14 +222,16 @@ def _percept(found: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _nail(found: Mapping[str, Any]) -> list[dict[str, Any]]:
+    low, high = found["ratio_range"]
     return [
         _row(
-            "Energy density at the border of the nail over that of the dorsal skin away from it (Figure 9)",
+            "Von Mises stress of the skin at the border of the nail over that 2 to 3 mm away (Figure 9)",
             "high concentrations (figure)",
             f"{found['ratio']:.1f} times",
             "",
             MATERIALS + "; width of the nail assumed",
             None,
-            f"{found['border_kpa']:.2g} kPa at the border; the paper gives no number",
+            f"{low:.1f} to {high:.1f} over the sections, {found['border_kpa']:.2g} kPa at most; energy "
+            f"density in the living epidermis {found['ratio_energy']:.1f} times; the paper gives no number",
         )
     ]

@@ -111,6 +111,9 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
     spheres = sphere_discrimination.touches(conditions)
     sphere_responses = _pressed("spheres", spheres, store, run.jobs, progress, stages)
 
+    nail = {"nail": nail_border.touch(conditions)}
+    nail_response = _pressed("nail", nail, store, run.jobs, progress, stages)["nail"]
+
     with _timed("fit and discrimination", 3, progress, stages) as advance:
         recordings = single_unit.Recordings(single_unit.receptor_sed(list(bar_responses.values())))
         best, folds = single_unit.fit(recordings)
@@ -124,7 +127,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
             "single_unit": single_unit.result(recordings, best, folds),
             "discrimination": discrimination,
             "population": sphere_discrimination.population_map(standard, afferent),
-            "nail": nail_border.result(standard),
+            "nail": nail_border.result(nail_response),
         }
         advance()
     results["comparison"] = comparison(results)
