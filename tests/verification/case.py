@@ -84,7 +84,9 @@ class Case:
     theme, title, about, source : str
         Chapter of the page, heading, what is done, and where the known answer comes from.
     slow : bool
-        Whether only the page runs it, and not every test run.
+        Whether the page runs it, and not every test run.
+    runs : str
+        Where a slow case runs, as the page says it.
     measure : callable
         Does the work; returns rows.
     """
@@ -95,6 +97,7 @@ class Case:
     about: str
     source: str
     slow: bool
+    runs: str
     measure: Callable[[], list[Row]]
 
     @cached_property
@@ -106,12 +109,14 @@ class Case:
 CASES: list[Case] = []
 
 
-def case(theme: str, title: str, source: str, slow: bool = False) -> Callable:
+def case(
+    theme: str, title: str, source: str, slow: bool = False, runs: str = "slow: run for this page only"
+) -> Callable:
     """Register a function as a case; its docstring says what is done."""
 
     def register(measure: Callable[[], list[Row]]) -> Callable[[], list[Row]]:
         about = " ".join((measure.__doc__ or "").split())
-        CASES.append(Case(measure.__name__, theme, title, about, source, slow, measure))
+        CASES.append(Case(measure.__name__, theme, title, about, source, slow, runs, measure))
         return measure
 
     return register

@@ -7,6 +7,7 @@ from . import (
     laws,
     locking,
     manufactured,
+    oracles,
     patches,
     relaxation,
     symmetry,
@@ -15,6 +16,6 @@ from .case import CASES
 
 THEMES = (
     patches.THEME, kernel.THEME, laws.THEME, manufactured.THEME, locking.THEME, half_space.THEME,
-    relaxation.THEME, balance.THEME, symmetry.THEME,
+    relaxation.THEME, balance.THEME, symmetry.THEME, oracles.THEME,
 )  # fmt: skip
 ORDERED = sorted(CASES, key=lambda case: THEMES.index(case.theme))

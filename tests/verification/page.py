@@ -61,7 +61,7 @@ def case_text(case: Case) -> str:
     """Heading, story and table of one case."""
     lines = [f"### {case.title}", "", f"{case.about}", "", f"*Source: {case.source}.* `{case.name}`", ""]
     if case.slow:
-        lines[4] += ", slow: run for this page only"
+        lines[4] += f", {case.runs}"
     lines += [
         "| quantity | unit | expected | got | difference | tolerance | verdict |",
         "|---|---|---|---|---|---|---|",

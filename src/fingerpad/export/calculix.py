@@ -8,6 +8,7 @@ incompatible modes leave the volume free, agrees with our constant-pressure bric
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from fingerpad.export import cards
 from fingerpad.export.cards import INDENTER, SKIN
 from fingerpad.export.job import CONTACT_KPA_PER_MM, Job, Phase
 from fingerpad.files import write_atomically
+from fingerpad.mechanics.laws import Hyperfoam, Law
 from fingerpad.mechanics.materials import Material
 from fingerpad.mesh import IntArray
 
@@ -142,6 +144,7 @@ def _remarks(elastic_moduli: str | None) -> list[str]:
 
 
 def _law(material: Material, name: str, elastic_moduli: str | None) -> list[str]:
+    material = replace(material, law=_in_two_terms(material.law))
     if not material.prony.shares:
         return cards.law(material, 1.0)
     if elastic_moduli is None:
@@ -154,6 +157,13 @@ def _law(material: Material, name: str, elastic_moduli: str | None) -> list[str]
     return cards.law(
         material, material.instantaneous_factor * (share if elastic_moduli == "long_term" else 1.0)
     )
+
+
+def _in_two_terms(law: Law) -> Law:
+    """Halve the one term of a foam: CalculiX 2.20 reads a foam of N=1 wrongly, and says nothing."""
+    if not isinstance(law, Hyperfoam) or len(law.exponents) > 1:
+        return law
+    return replace(law, moduli_kpa=(law.moduli_kpa[0] / 2,) * 2, exponents=law.exponents * 2)
 
 
 def _of_mesh(job: Job) -> tuple[FloatArray, IntArray, IntArray]:

@@ -1,0 +1,163 @@
+"""Other solvers on the same exported job: CalculiX runs our deck, FElupe the same mesh by its own elements.
+
+Both need what fingerpad itself does not, so `test_oracles.py` runs these cases apart from the others.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from fingerpad.export import cards
+from fingerpad.export.calculix import calculix_deck
+from fingerpad.mechanics.laws import Polynomial
+from fingerpad.mechanics.materials import Material
+
+from . import calculix
+from .case import Row, at_most, case, near
+from .oracle_block import LIVING_EPIDERMIS, job, ours
+
+THEME = "Other solvers"
+CALCULIX = "CalculiX 2.20 (Dhondt), Debian package calculix-ccx, on the deck of `calculix_deck`"
+FELUPE = "FElupe 11 (Dutzler), SolidBodyNearlyIncompressible and a penalty at the nodes"
+
+RUNS = "run where the other solver is installed, in continuous integration always"
+
+FORCE_TOLERANCE, FIELD_BOUND = 0.01, 0.03
+
+
+def compared(force_mn: np.ndarray, sed_kpa: np.ndarray) -> list[Row]:
+    """Rows of a comparison: force at every step, field of SED at the end everywhere and below the sphere."""
+    mesh, mine = job().mesh, ours()
+    steps = job().times_ms.size
+    rows = [
+        near(f"force at {depth:.1f} mm", force, got, FORCE_TOLERANCE, "mN")
+        for depth, force, got in zip(job().depths_mm[1:], force_mn, mine.force_mn[1:steps], strict=True)
+    ]
+    difference = mine.sed_kpa[steps - 1] - sed_kpa
+    below = mesh.layer == LIVING_EPIDERMIS
+    return [
+        *rows,
+        near("largest SED", sed_kpa.max(), mine.sed_kpa[steps - 1].max(), FIELD_BOUND, "kPa"),
+        at_most("largest difference of SED over the largest SED", FIELD_BOUND, _share(difference, sed_kpa)),
+        at_most(
+            "the same in the living epidermis alone", FIELD_BOUND, _share(difference[below], sed_kpa[below])
+        ),
+    ]
+
+
+def _share(difference: np.ndarray, field: np.ndarray) -> float:
+    return float(np.abs(difference).max() / field.max())
+
+
+@case(THEME, "FElupe, layered block under a sphere", FELUPE, slow=True, runs=RUNS)
+def felupe_block() -> list[Row]:
+    """Neo-Hookean layers with nu = 0.48 and Trial 1's moduli under a sphere of 3.5 mm radius, 0.8 mm deep.
+
+    FElupe's brick has one pressure like ours and contact is at the nodes in both, so mesh and element are the
+    same and only tolerances of Newton's method and of contact are left.
+    """
+    from . import felupe_press  # GPL: only tests import it
+
+    force, sed = felupe_press.press(job())
+    return compared(2.0 * force, sed)
+
+
+@case(THEME, "CalculiX, layered block under a sphere", CALCULIX, slow=True, runs=RUNS)
+def calculix_block() -> list[Row]:
+    """The same job as an exported deck.
+
+    Fair because the nodes, the trilinear shape, the law and the contact at nodes are the same. What differs
+    is the remedy against locking: incompatible modes (C3D8I) there, one pressure per element here. Plain C3D8
+    would lock and be stiffer by percents. CalculiX sums energies up over its increments by the trapezoidal
+    rule, so eight are taken, and printed each.
+    """
+    element = job().mesh.layer
+    with tempfile.TemporaryDirectory() as folder:
+        found = calculix.run(
+            calculix_deck(job(), element="C3D8I"),
+            Path(folder),
+            len(element),
+            tuple(job().layer_names.values()),
+        )
+    np.testing.assert_allclose(found.times_ms, job().times_ms[1:])
+    return compared(2.0 * found.force_mn @ job().placement.axis, found.sed_kpa[-1])
+
+
+LAWS = {
+    "neo-Hooke": Material.neo_hooke(20.0, 0.45),
+    "Mooney-Rivlin": Material.mooney_rivlin(6.0, 4.0, 0.45),
+    "polynomial": Material(Polynomial(6.0, 4.0, 2.0, 1.0, 0.5, bulk_linear=90.0)),
+    "polynomial with D2": Material(Polynomial(6.0, 4.0, 2.0, 1.0, 0.5, bulk_linear=90.0, bulk_cubic=40.0)),
+    "Ogden N=1": Material.ogden((8.0,), (3.0,), 0.45),
+    "Ogden N=2": Material.ogden((8.0, 2.0), (2.0, 6.0), 0.45),
+    "Ogden N=3": Material.ogden((8.0, 2.0, 1.0), (2.0, 6.0, -2.0), 0.45),
+    "foam N=1": Material.hyperfoam((4.0,), (4.0,), 0.3),
+    "foam N=3": Material.hyperfoam((4.0, 2.0, 1.0), (4.0, 6.0, 2.0), 0.4),
+}
+GRADIENT = np.array([[1.3, 0.2, 0.0], [0.0, 0.9, 0.1], [0.0, 0.0, 0.95]])
+CORNERS = np.array(
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float
+)
+INCREMENTS = 100
+
+
+@case(THEME, "CalculiX, one element of every law", CALCULIX, slow=True, runs=RUNS)
+def calculix_laws() -> list[Row]:
+    """A cube per law deformed by the same gradient, J = 1.11, in 100 increments: energy density at the end.
+
+    Decks avoid two traps: where a D is 0, CalculiX puts a stiffness of its own into a polynomial or Ogden law
+    without a word, so they write 1e20; and a foam of one term is read wrongly, so they halve it into two.
+    """
+    energies = cube_energies()
+    strain = np.log(np.linalg.svd(GRADIENT, compute_uv=False))
+    logs = [*(strain - strain.mean()), strain.sum()]
+    return [
+        near(name, energy, material.law.energy.derivatives(logs)[0], 1e-4, "kPa")
+        for (name, material), energy in zip(LAWS.items(), energies, strict=True)
+    ]
+
+
+def law_card(material: Material) -> list[str]:
+    """Card of a law as it stands in an exported deck."""
+    deck = calculix_deck(replace(job(), materials=(material,) * len(job().materials))).splitlines()
+    start = deck.index("*MATERIAL, NAME=dermis") + 1
+    return deck[start : deck.index("*SOLID SECTION, ELSET=dermis, MATERIAL=dermis")]
+
+
+@lru_cache(maxsize=1)
+def cube_energies() -> np.ndarray:
+    """Energies by CalculiX of one cube per law under `GRADIENT`; a free cube beside them stays at rest."""
+    lines, moves = [], ["*BOUNDARY"]
+    displacement = CORNERS @ (GRADIENT - np.eye(3)).T
+    names = [f"LAW{n}" for n in range(len(LAWS))]
+    for n, (name, material) in enumerate(zip([*names, "FREE"], [*LAWS.values(), None], strict=True)):
+        first = 1 + 8 * n
+        lines += cards.nodes(CORNERS + np.array([3.0 * n, 0.0, 0.0]), first, f"N{name}")
+        lines += cards.elements("C3D8", name, np.array([n + 1]), first + np.arange(8)[None])
+        law = law_card(material) if material else ["*ELASTIC", "1, 0.3"]
+        lines += [f"*MATERIAL, NAME={name}", *law, f"*SOLID SECTION, ELSET={name}, MATERIAL={name}"]
+        if material:
+            moves += [
+                f"{first + node}, {axis + 1}, {axis + 1}, {cards.number(value)}"
+                for (node, axis), value in np.ndenumerate(displacement)
+            ]
+    lines += [
+        f"*NSET, NSET={cards.INDENTER}",
+        f"{first}",
+        "*BOUNDARY",
+        f"{first}, 1, 3",
+        f"{first + 1}, 1, 3",
+    ]
+    lines += [f"{first + 2}, 1, 3", f"{first + 3}, 1, 3"]
+    lines += [f"*STEP, NLGEOM, INC={2 * INCREMENTS}", "*STATIC, DIRECT", f"{1 / INCREMENTS}, 1.", *moves]
+    lines += [f"*NODE PRINT, NSET={cards.INDENTER}, TOTALS=ONLY", "RF"]
+    for name in names:
+        lines += [f"*EL PRINT, ELSET={name}", "ENER"]
+    with tempfile.TemporaryDirectory() as folder:
+        found = calculix.run(cards.text([*lines, "*END STEP"]), Path(folder), len(names), tuple(names))
+    return found.sed_kpa[-1]

@@ -1,0 +1,67 @@
+"""CalculiX and FElupe on our job: run where they are installed, and required where CI says so.
+
+`.ci/run` installs CalculiX and sets FINGERPAD_REQUIRE_ORACLES; `make test` on a machine without it says in
+the list of skipped tests how to get it.
+"""
+
+import importlib.util
+import os
+import re
+
+import pytest
+
+from fingerpad.export.calculix import calculix_deck
+
+from . import calculix, oracles
+from .case import CASES
+from .oracle_block import job
+
+REQUIRED = os.environ.get("FINGERPAD_REQUIRE_ORACLES", "") not in ("", "0")
+MISSING = {
+    "calculix": None if calculix.PROGRAM else "CalculiX is not installed: apt-get install calculix-ccx",
+    "felupe": None if importlib.util.find_spec("felupe") else "FElupe is not installed: pip install felupe",
+}
+
+
+@pytest.mark.parametrize(
+    "case", [case for case in CASES if case.theme == oracles.THEME], ids=lambda c: c.name
+)
+def test_another_solver_agrees(case):
+    missing = MISSING[case.name.split("_")[0]]
+    if missing and REQUIRED:
+        pytest.fail(f"{missing} (FINGERPAD_REQUIRE_ORACLES asks for it)")
+    if missing:
+        pytest.skip(missing)
+    assert [row for row in case.rows if not row.passes] == []
+    assert case.rows
+
+
+def test_the_deck_that_calculix_runs_is_the_job():
+    """Fixed and moving nodes, steps and materials of the oracle's deck, since agreement rests on them."""
+    deck = calculix_deck(job(), element="C3D8I")
+    assert deck.count("*STEP") == 1
+    assert re.search(r"^5, 40, ", deck, re.M)
+    assert len(re.findall(r"^\*HYPERELASTIC, NEO HOOKE$", deck, re.M)) == 4
+    assert "INDENTER, 2, 2, 0.8" in deck
+
+
+def test_printed_results_are_read_by_time_and_element(tmp_path):
+    """Means over the points of an element, sets after one another, totals of the indenter."""
+    printed = """
+ total force (fx,fy,fz) for set INDENTER and time  0.5000000E+01
+
+        1.000000E+00  2.000000E+00 -3.000000E-01
+
+ internal energy density (elem, integ.pnt.,eigenvalue) for set A and time  0.5000000E+01
+
+         1   1  1.000000E+00
+         1   2  3.000000E+00
+
+ internal energy density (elem, integ.pnt.,eigenvalue) for set B and time  0.5000000E+01
+
+         3   1  5.000000E+00
+"""
+    found = calculix.read(printed, n_elements=3, sets=("a", "b"))
+    assert found.times_ms.tolist() == [5.0]
+    assert found.force_mn.tolist() == [[1.0, 2.0, -0.3]]
+    assert found.sed_kpa.tolist() == [[2.0, 0.0, 5.0]]
