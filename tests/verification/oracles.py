@@ -27,25 +27,27 @@ FELUPE = "FElupe 11 (Dutzler), SolidBodyNearlyIncompressible and a penalty at th
 
 RUNS = "run where the other solver is installed, in continuous integration always"
 
-FORCE_TOLERANCE, FIELD_BOUND = 0.01, 0.03
+SAME_ELEMENT, OTHER_ELEMENT = (0.003, 0.005), (0.01, 0.03)
+"""Tolerances of force and of SED, as shares: for the same element, and for another on the same nodes."""
 
 
-def compared(force_mn: np.ndarray, sed_kpa: np.ndarray) -> list[Row]:
+def compared(force_mn: np.ndarray, sed_kpa: np.ndarray, tolerances: tuple[float, float]) -> list[Row]:
     """Rows of a comparison: force at every step, field of SED at the end everywhere and below the sphere."""
+    of_force, of_field = tolerances
     mesh, mine = job().mesh, ours()
     steps = job().times_ms.size
     rows = [
-        near(f"force at {depth:.1f} mm", force, got, FORCE_TOLERANCE, "mN")
+        near(f"force at {depth:.1f} mm", force, got, of_force, "mN")
         for depth, force, got in zip(job().depths_mm[1:], force_mn, mine.force_mn[1:steps], strict=True)
     ]
     difference = mine.sed_kpa[steps - 1] - sed_kpa
     below = mesh.layer == LIVING_EPIDERMIS
     return [
         *rows,
-        near("largest SED", sed_kpa.max(), mine.sed_kpa[steps - 1].max(), FIELD_BOUND, "kPa"),
-        at_most("largest difference of SED over the largest SED", FIELD_BOUND, _share(difference, sed_kpa)),
+        near("largest SED", sed_kpa.max(), mine.sed_kpa[steps - 1].max(), of_field, "kPa"),
+        at_most("largest difference of SED over the largest SED", of_field, _share(difference, sed_kpa)),
         at_most(
-            "the same in the living epidermis alone", FIELD_BOUND, _share(difference[below], sed_kpa[below])
+            "the same in the living epidermis alone", of_field, _share(difference[below], sed_kpa[below])
         ),
     ]
 
@@ -64,7 +66,7 @@ def felupe_block() -> list[Row]:
     from . import felupe_press  # GPL: only tests import it
 
     force, sed = felupe_press.press(job())
-    return compared(2.0 * force, sed)
+    return compared(2.0 * force, sed, SAME_ELEMENT)
 
 
 @case(THEME, "CalculiX, layered block under a sphere", CALCULIX, slow=True, runs=RUNS)
@@ -85,7 +87,7 @@ def calculix_block() -> list[Row]:
             tuple(job().layer_names.values()),
         )
     np.testing.assert_allclose(found.times_ms, job().times_ms[1:])
-    return compared(2.0 * found.force_mn @ job().placement.axis, found.sed_kpa[-1])
+    return compared(2.0 * found.force_mn @ job().placement.axis, found.sed_kpa[-1], OTHER_ELEMENT)
 
 
 LAWS = {
