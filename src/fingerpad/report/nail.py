@@ -139,7 +139,9 @@ def _profiles(axes: Axes, profile: dict[str, Any]) -> None:
         axes.plot(distance, median, style, color=colour, label=name)
     axes.axvline(0.0, color=BLACK, linewidth=0.8)
     axes.set_ylim(bottom=0.0)
-    axes.text(0.02, 0.02, "under the nail", transform=axes.transAxes, color=GREY)
+    axes.text(
+        -0.1, 0.02, "under the nail", transform=axes.get_xaxis_transform(), color=GREY, ha="right", size=8
+    )
     axes.legend(loc="upper right")
 
 
