@@ -13,10 +13,11 @@ from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.mechanics import linear
 from fingerpad.mechanics import press as press_module
 from fingerpad.mechanics.assembly import Sparsity, assemble
+from fingerpad.mechanics.configuration import Body, Load
 from fingerpad.mechanics.contact import Contact, place
 from fingerpad.mechanics.linear import LinearSolver, SuperLuFactor, free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material, MaterialTable, Prony
-from fingerpad.mechanics.newton import Body, Load, NewtonSettings, find_equilibrium
+from fingerpad.mechanics.newton import NewtonSettings, find_equilibrium
 from fingerpad.mechanics.press import PressSettings, press
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.mechanics.viscoelastic import StepCoefficients

@@ -14,25 +14,20 @@ that the advancing indenter meets for the first time raises the potential.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from fingerpad.checks import FloatArray, positive, whole
 from fingerpad.errors import ConvergenceError
-from fingerpad.mechanics.assembly import Sparsity, assemble
-from fingerpad.mechanics.contact import Contact, ContactState
-from fingerpad.mechanics.friction import Anchors, Friction, rubbing_heat
+from fingerpad.mechanics.configuration import Balance, Body, Configuration, Lagging, Load, evaluate
+from fingerpad.mechanics.contact import ContactState
+from fingerpad.mechanics.friction import Anchors, rubbing_heat
 from fingerpad.mechanics.linear import LinearSolver
-from fingerpad.mechanics.materials import MaterialTable
-from fingerpad.mechanics.viscoelastic import StepCoefficients
-from fingerpad.mesh import Mesh
 from fingerpad.mesh_quality import element_place, squeezed_most
 
-SMALLEST_FORCE_MN = 1e-6
 SUFFICIENT_DECREASE = 1e-4
 SHORTEST_STEP = 1.0 / 64
-CURVATURE_BELOW_RESIDUAL = 0.1
 REMEMBERED_POTENTIALS = 6
 
 FORCING, FORCING_RANGE = 0.1, (1e-4, 5e-3)
@@ -78,76 +73,6 @@ class NewtonSettings:
 
 
 @dataclass(frozen=True)
-class Body:
-    """The discretised tissue with what its equations need.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Nodes, bricks and node sets.
-    table : MaterialTable
-        Laws, one row per layer.
-    sparsity : Sparsity
-        Pattern of the tangent.
-    free : int array (n_free,)
-        Degrees of freedom that move.
-    """
-
-    mesh: Mesh
-    table: MaterialTable
-    sparsity: Sparsity
-    free: np.ndarray
-
-
-@dataclass(frozen=True)
-class Load:
-    """What acts on the body in one time step.
-
-    Parameters
-    ----------
-    contact : Contact
-        The indenter.
-    depth_mm : float
-        How far it has advanced since first touch; under a given force, where its search begins. [mm]
-    step : StepCoefficients
-        Relaxation coefficients of the step.
-    carried : array (n_elements, 8, 6)
-        H, the history that the step starts from. [kPa]
-    force_mn : float, optional
-        Force along the indenter's axis on the body as it is meshed, half of it or whole; the depth is then
-        found. [mN]
-    anchors : Anchors, optional
-        Where the skin holds on to the indenter at the start of the step; without friction nothing.
-    """
-
-    contact: Contact
-    depth_mm: float
-    step: StepCoefficients
-    carried: FloatArray
-    force_mn: float | None = None
-    anchors: Anchors | None = None
-
-
-@dataclass(frozen=True)
-class Balance:
-    """The force of the indenter against the reaction of everything that holds the body.
-
-    Bone and nail hold every direction. The plane of symmetry holds z, and a strip of skin that does not slide
-    is held along x by the indenter; these two count as supports in the direction that they hold.
-
-    Parameters
-    ----------
-    reaction_mn : array (3,)
-        Force of the body on bone and nail. [mN]
-    imbalance : float
-        Contact force minus the force on all supports, over the contact force along the indenter's axis.
-    """
-
-    reaction_mn: FloatArray
-    imbalance: float
-
-
-@dataclass(frozen=True)
 class Equilibrium:
     """A converged configuration.
 
@@ -181,59 +106,6 @@ class Equilibrium:
     rubbed_uj: float = 0.0
 
 
-class _Evaluation:
-    """Potential, residual and tangent at one trial configuration."""
-
-    def __init__(
-        self,
-        body: Body,
-        load: Load,
-        displacement: FloatArray,
-        depth_mm: float,
-        multipliers: FloatArray,
-        anchors: Anchors | None,
-        blocks: FloatArray,
-        before: Friction | None = None,
-    ):
-        mesh, contact = body.mesh, load.contact
-        force = np.empty_like(displacement)
-        internal = assemble(
-            mesh.nodes_mm, mesh.elements, displacement, mesh.layer, body.table.law, load.step.s, load.carried,
-            body.sparsity.position, True, force, blocks,
-        )  # fmt: skip
-        self.displacement = displacement
-        positions = mesh.nodes_mm[contact.nodes] + displacement[contact.nodes]
-        self.depth_mm, self.positions = depth_mm, positions
-        self.contact = contact.state(positions, depth_mm, multipliers, anchors, before)
-        self.potential = internal + self.contact.potential
-        np.negative(force, out=force)
-        force[contact.nodes] += self.contact.force_mn
-        self.out_of_balance = force
-        self.residual = force.ravel()[body.free]
-        pressed = float(np.linalg.norm(self.contact.force_mn.sum(axis=0)))
-        self.relative_residual = float(np.linalg.norm(self.residual)) / max(pressed, SMALLEST_FORCE_MN)
-        if np.isnan(internal):
-            # Forces were left half summed, and could look balanced.
-            self.relative_residual = np.inf
-        self.stiffness = self.contact.stiffness
-        if self.relative_residual < CURVATURE_BELOW_RESIDUAL:
-            curvature = contact.curvature_stiffness(self.contact, positions, depth_mm)
-            self.stiffness = self.stiffness + curvature
-        blocks[body.sparsity.diagonal[contact.nodes]] += self.stiffness
-        wanted = load.force_mn
-        given = float(self.contact.force_mn.sum(axis=0) @ contact.placement.axis)
-        self.missing_force_mn = 0.0 if wanted is None else wanted - given
-
-    def balance(self, body: Body, load: Load) -> Balance:
-        """Compare the force of the indenter with what the supports take: nothing new is assembled."""
-        taken = self.out_of_balance.copy()
-        taken.ravel()[body.free] = 0.0
-        given = self.contact.force_mn.sum(axis=0)
-        missing = float(np.linalg.norm(given - taken.sum(axis=0)))
-        scale = max(float(given @ load.contact.placement.axis), SMALLEST_FORCE_MN)
-        return Balance(self.out_of_balance[body.mesh.fixed_nodes].sum(axis=0), missing / scale)
-
-
 def find_equilibrium(
     body: Body,
     load: Load,
@@ -264,161 +136,152 @@ def find_equilibrium(
     ConvergenceError
         If no equilibrium is found; its history has one line per Newton step.
     """
-    blocks = np.empty((body.sparsity.column.size, 3, 3))
-    multipliers = multipliers_mn
-    history: list[str] = []
-    # Whether friction is that of the contact found: its limit lags behind while Newton's method runs.
-    anchors, settled = load.anchors, load.anchors is None
-    state = _Evaluation(body, load, guess_mm, load.depth_mm, multipliers, anchors, blocks)
-    if np.isnan(state.potential):
-        raise ConvergenceError(f"The starting guess turns {_folded(body, guess_mm)} inside out.")
-    potentials = [state.potential]
-    accepted_mn = settings.residual_tolerance * (load.force_mn or 0.0)
-    for iteration in range(settings.most_iterations):
-        balance = state.balance(body, load)
-        history.append(
-            f"iteration {iteration}: residual {state.relative_residual:.2e}, "
-            f"imbalance {balance.imbalance:.2e}, misfit {1e3 * state.contact.misfit_mm:.3f} µm"
+    search = _Search(body, load, solver, Lagging(multipliers_mn, load.anchors))
+    try:
+        return search.run(guess_mm, settings)
+    except ConvergenceError as error:
+        raise ConvergenceError(error.args[0], tuple(search.history)) from error
+
+
+@dataclass
+class _Search:
+    """One search for an equilibrium: what stays, what lags behind Newton's method, and how it went."""
+
+    body: Body
+    load: Load
+    solver: LinearSolver
+    lagging: Lagging
+    blocks: FloatArray = field(init=False)
+    history: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.blocks = np.empty((self.body.sparsity.column.size, 3, 3))
+
+    def run(self, guess_mm: FloatArray, settings: NewtonSettings) -> Equilibrium:
+        """Repeat Newton steps, and renew what lags behind whenever the body is at rest."""
+        load, rubs = self.load, self.load.anchors is not None
+        now = evaluate(self.body, load, guess_mm, load.depth_mm, self.lagging, self.blocks)
+        if not now.whole:
+            raise ConvergenceError(f"The starting guess turns {self.folded(guess_mm)} inside out.")
+        potentials = [now.potential_uj]
+        # Whether the limits of friction are those of the contact found.
+        settled = not rubs
+        for iteration in range(settings.most_iterations):
+            balance = now.balance(self.body, load)
+            self.history.append(
+                f"iteration {iteration}: residual {now.relative_residual:.2e}, "
+                f"imbalance {balance.imbalance:.2e}, misfit {1e3 * now.contact.misfit_mm:.3f} µm"
+            )
+            accepted_mn = settings.residual_tolerance * (load.force_mn or 0.0)
+            if abs(now.missing_force_mn(load)) > accepted_mn and now.relative_residual <= AT_REST:
+                now = self.advance_indenter(now)
+                potentials, settled = [now.potential_uj], not rubs
+                continue
+            balanced = balance.imbalance <= settings.balance_tolerance
+            if now.relative_residual <= settings.residual_tolerance and balanced:
+                close = now.contact.misfit_mm <= settings.penetration_tolerance * now.depth_mm
+                if close and settled:
+                    return self.found(now, iteration, balance)
+                self.lagging = self.renewed(now, augmented=not close)
+                displacement, depth_mm = now.displacement_mm, now.depth_mm
+                now = evaluate(self.body, load, displacement, depth_mm, self.lagging, self.blocks)
+                potentials, settled = [now.potential_uj], True
+                if close:
+                    continue  # only friction was renewed: the body may still be at rest
+            forcing = float(np.clip(FORCING * now.relative_residual, *FORCING_RANGE))
+            direction = self.solver.solve(self.blocks, now.residual_mn, forcing)
+            now = self.line_search(now, direction, max(potentials[-REMEMBERED_POTENTIALS:]))
+            potentials.append(now.potential_uj)
+            settled = not rubs
+        raise ConvergenceError(f"No equilibrium after {settings.most_iterations} Newton steps.")
+
+    def renewed(self, now: Configuration, augmented: bool) -> Lagging:
+        """Multipliers and anchors of the contact found."""
+        contact, anchors = self.load.contact, self.load.anchors
+        multipliers = contact.augmented(now.contact) if augmented else self.lagging.multipliers_mn
+        if anchors is not None:
+            anchors = contact.renewed(anchors, now.contact, now.positions_mm, now.depth_mm)
+        return Lagging(multipliers, anchors)
+
+    def found(self, now: Configuration, iterations: int, balance: Balance) -> Equilibrium:
+        """Gather the equilibrium, its anchors ready for the next step."""
+        carried, heat_uj = None, 0.0
+        if self.load.anchors is not None and self.lagging.anchors is not None:
+            anchors = self.lagging.anchors
+            carried = self.load.contact.carried(anchors, now.contact, now.positions_mm, now.depth_mm)
+            heat_uj = rubbing_heat(self.load.anchors, anchors, carried)
+        return Equilibrium(
+            displacement_mm=now.displacement_mm,
+            depth_mm=now.depth_mm,
+            contact=now.contact,
+            multipliers_mn=self.lagging.multipliers_mn,
+            iterations=iterations,
+            balance=balance,
+            anchors=carried,
+            rubbed_uj=heat_uj,
         )
-        if abs(state.missing_force_mn) > accepted_mn and state.relative_residual <= AT_REST:
-            try:
-                state = _advance_indenter(body, load, solver, state, multipliers, anchors, blocks)
-            except ConvergenceError as error:
-                raise ConvergenceError(str(error), tuple(history)) from error
-            potentials, settled = [state.potential], load.anchors is None
-            continue
-        balanced = balance.imbalance <= settings.balance_tolerance
-        if state.relative_residual <= settings.residual_tolerance and balanced:
-            close = state.contact.misfit_mm <= settings.penetration_tolerance * state.depth_mm
-            if close and settled:
-                return _found(load, state, multipliers, anchors, iteration, balance)
-            if not close:
-                multipliers = load.contact.augmented(state.contact)
-            if load.anchors is not None:
-                anchors = load.contact.renewed(load.anchors, state.contact, state.positions, state.depth_mm)
-            depth_mm = state.depth_mm
-            state = _Evaluation(body, load, state.displacement, depth_mm, multipliers, anchors, blocks)
-            potentials, settled = [state.potential], True
-            if close:
-                continue  # only friction was renewed: the body may still be at rest
-        forcing = float(np.clip(FORCING * state.relative_residual, *FORCING_RANGE))
-        try:
-            direction = solver.solve(blocks, state.residual, forcing)
-        except ConvergenceError as error:
-            raise ConvergenceError(str(error), tuple(history)) from error
-        highest = max(potentials[-REMEMBERED_POTENTIALS:])
-        state = _line_search(body, load, state, direction, highest, multipliers, anchors, blocks, history)
-        potentials.append(state.potential)
-        settled = load.anchors is None
-    raise ConvergenceError(f"No equilibrium after {settings.most_iterations} Newton steps.", tuple(history))
 
+    def moved(self, start: Configuration, step: FloatArray, advance_mm: float = 0.0) -> Configuration:
+        """Go by a step of the free degrees of freedom and of the indenter."""
+        displacement = start.displacement_mm.copy()
+        displacement.ravel()[self.body.free] += step
+        depth_mm, before = start.depth_mm + advance_mm, start.contact.friction
+        return evaluate(self.body, self.load, displacement, depth_mm, self.lagging, self.blocks, before)
 
-def _found(
-    load: Load,
-    state: _Evaluation,
-    multipliers: FloatArray,
-    anchors: Anchors | None,
-    iterations: int,
-    balance: Balance,
-) -> Equilibrium:
-    """Gather the equilibrium, its anchors ready for the next step."""
-    carried, heat_uj = None, 0.0
-    if anchors is not None:
-        carried = load.contact.carried(anchors, state.contact, state.positions, state.depth_mm)
-        heat_uj = rubbing_heat(load.anchors or anchors, anchors, carried)
-    return Equilibrium(
-        displacement_mm=state.displacement,
-        depth_mm=state.depth_mm,
-        contact=state.contact,
-        multipliers_mn=multipliers,
-        iterations=iterations,
-        balance=balance,
-        anchors=carried,
-        rubbed_uj=heat_uj,
-    )
+    def line_search(self, start: Configuration, direction: FloatArray, highest_uj: float) -> Configuration:
+        """Go along `direction`, halving until the potential falls below the highest remembered one.
 
+        Nodes that come into contact raise the potential for a step or two before the next steps push them
+        out again; a memory of some steps lets them (Grippo, Lampariello & Lucidi 1986).
+        """
+        slope = -float(direction @ start.residual_mn)
+        length = 1.0
+        while length >= SHORTEST_STEP:
+            trial = self.moved(start, length * direction)
+            falls = trial.potential_uj <= highest_uj + SUFFICIENT_DECREASE * length * slope
+            # Near the solution the fall of the potential drowns in round-off and the residual decides.
+            if falls or trial.relative_residual < 0.9 * start.relative_residual:
+                return trial
+            length /= 2
+        folds = "" if trial.whole else f": it turns {self.folded(trial.displacement_mm)} inside out"
+        raise ConvergenceError(f"The line search found no better configuration{folds}.")
 
-def _advance_indenter(
-    body: Body,
-    load: Load,
-    solver: LinearSolver,
-    start: _Evaluation,
-    multipliers: FloatArray,
-    anchors: Anchors | None,
-    blocks: FloatArray,
-) -> _Evaluation:
-    """Newton step of displacements and depth together, towards the given force.
+    def advance_indenter(self, start: Configuration) -> Configuration:
+        """Newton step of displacements and depth together, towards the given force.
 
-    With r the residuals and K, b, c the second derivatives of the potential by uu, ud and dd, the exact step
-    lies in the plane of (x, 0) and t = (-y, 1), where K x = r_u and K y = b. The step along t minimises the
-    quadratic model after x, however loosely x and y are solved. The usual c - b'y for the stiffness along t
-    would not do: contact is so stiff that the two nearly cancel.
-    """
-    axis = load.contact.placement.axis
-    coupling = np.zeros_like(start.displacement)
-    coupling[load.contact.nodes] = -start.stiffness @ axis
-    b = coupling.ravel()[body.free]
-    c = float(axis @ start.stiffness.sum(axis=0) @ axis)
-    x = solver.solve(blocks, start.residual, FORCING_RANGE[1])
-    y = solver.solve(blocks, b, DEPTH_FORCING)
+        With r the residuals and K, b, c the second derivatives of the potential by uu, ud and dd, the exact
+        step lies in the plane of (x, 0) and t = (-y, 1), where K x = r_u and K y = b. The step along t
+        minimises the quadratic model after x, however loosely x and y are solved. The usual c - b'y for the
+        stiffness along t would not do: contact is so stiff that the two nearly cancel.
+        """
+        axis, free = self.load.contact.placement.axis, self.body.free
+        coupling = np.zeros_like(start.displacement_mm)
+        coupling[self.load.contact.nodes] = -start.contact_stiffness @ axis
+        b = coupling.ravel()[free]
+        c = float(axis @ start.contact_stiffness.sum(axis=0) @ axis)
+        x = self.solver.solve(self.blocks, start.residual_mn, FORCING_RANGE[1])
+        y = self.solver.solve(self.blocks, b, DEPTH_FORCING)
 
-    def tangent_times(direction: FloatArray) -> FloatArray:
-        full = np.zeros(start.displacement.size)
-        full[body.free] = direction
-        return (body.sparsity.matrix(blocks) @ full)[body.free]
+        def tangent_times(direction: FloatArray) -> FloatArray:
+            full = np.zeros(start.displacement_mm.size)
+            full[free] = direction
+            return (self.body.sparsity.matrix(self.blocks) @ full)[free]
 
-    slope = (start.missing_force_mn - b @ x) - y @ (start.residual - tangent_times(x))
-    stiffness = y @ tangent_times(y) - 2.0 * (b @ y) + c
-    if not stiffness > 0.0:
-        raise ConvergenceError("The indenter meets no resistance.")
-    # More and more skin resists an indenter that advances: a tangent from a light touch leads far too deep.
-    shallowest, deepest = start.depth_mm / MOST_ADVANCE, start.depth_mm * MOST_ADVANCE
-    advance = float(np.clip(start.depth_mm + slope / stiffness, shallowest, deepest)) - start.depth_mm
-    length = 1.0
-    while length >= SHORTEST_STEP:
-        displacement = start.displacement.copy()
-        displacement.ravel()[body.free] += length * (x - advance * y)
-        depth_mm = start.depth_mm + length * advance
-        before = start.contact.friction
-        trial = _Evaluation(body, load, displacement, depth_mm, multipliers, anchors, blocks, before)
-        if not np.isnan(trial.potential):
-            return trial
-        length /= 2
-    raise ConvergenceError("No step of the indenter towards the force leaves the elements whole.")
+        force = start.missing_force_mn(self.load) - b @ x - y @ (start.residual_mn - tangent_times(x))
+        stiffness = y @ tangent_times(y) - 2.0 * (b @ y) + c
+        if not stiffness > 0.0:
+            raise ConvergenceError("The indenter meets no resistance.")
+        # More and more skin resists an indenter that advances: a tangent from a light touch leads too deep.
+        shallowest, deepest = start.depth_mm / MOST_ADVANCE, start.depth_mm * MOST_ADVANCE
+        advance = float(np.clip(start.depth_mm + force / stiffness, shallowest, deepest)) - start.depth_mm
+        length = 1.0
+        while length >= SHORTEST_STEP:
+            trial = self.moved(start, length * (x - advance * y), length * advance)
+            if trial.whole:
+                return trial
+            length /= 2
+        raise ConvergenceError("No step of the indenter towards the force leaves the elements whole.")
 
-
-def _line_search(
-    body: Body,
-    load: Load,
-    start: _Evaluation,
-    direction: FloatArray,
-    highest: float,
-    multipliers: FloatArray,
-    anchors: Anchors | None,
-    blocks: FloatArray,
-    history: list[str],
-) -> _Evaluation:
-    """Go along `direction`, halving until the potential falls below the highest remembered one.
-
-    Nodes that come into contact raise the potential for a step or two before the next steps push them
-    out again; a memory of some steps lets them (Grippo, Lampariello & Lucidi 1986).
-    """
-    slope = -float(direction @ start.residual)
-    length = 1.0
-    while length >= SHORTEST_STEP:
-        displacement = start.displacement.copy()
-        displacement.ravel()[body.free] += length * direction
-        before, depth_mm = start.contact.friction, start.depth_mm
-        trial = _Evaluation(body, load, displacement, depth_mm, multipliers, anchors, blocks, before)
-        falls = trial.potential <= highest + SUFFICIENT_DECREASE * length * slope
-        # Near the solution the fall of the potential drowns in round-off and the residual decides.
-        if falls or trial.relative_residual < 0.9 * start.relative_residual:
-            return trial
-        length /= 2
-    folds = f": it turns {_folded(body, displacement)} inside out" if np.isnan(trial.potential) else ""
-    raise ConvergenceError(f"The line search found no better configuration{folds}.", tuple(history))
-
-
-def _folded(body: Body, displacement: FloatArray) -> str:
-    """Name the element that a displacement turns inside out, the worst of them."""
-    return element_place(body.mesh, squeezed_most(body.mesh, displacement)[0])
+    def folded(self, displacement_mm: FloatArray) -> str:
+        """Name the element that a displacement turns inside out, the worst of them."""
+        return element_place(self.body.mesh, squeezed_most(self.body.mesh, displacement_mm)[0])

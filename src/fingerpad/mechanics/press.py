@@ -19,6 +19,7 @@ from fingerpad.mechanics.balance import (
     dissipated_energy,
     energy_balance,
 )
+from fingerpad.mechanics.configuration import Balance, Body, Load
 from fingerpad.mechanics.contact import Contact, Placement, check_friction
 from fingerpad.mechanics.fields import (
     ElementFields,
@@ -37,15 +38,7 @@ from fingerpad.mechanics.linear import (
     free_degrees_of_freedom,
 )
 from fingerpad.mechanics.materials import Material, MaterialTable
-from fingerpad.mechanics.newton import (
-    FIRST_DEPTH_MM,
-    Balance,
-    Body,
-    Equilibrium,
-    Load,
-    NewtonSettings,
-    find_equilibrium,
-)
+from fingerpad.mechanics.newton import FIRST_DEPTH_MM, Equilibrium, NewtonSettings, find_equilibrium
 from fingerpad.mechanics.steps import Phase, adaptive_steps, steps_at
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,

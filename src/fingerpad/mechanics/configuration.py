@@ -1,0 +1,231 @@
+"""One trial configuration: potential, out-of-balance forces and tangent of a body below an indenter.
+
+The incremental potential of a step is that of the tissue, in which the history of relaxation is fixed, and
+that of the contact, in which the multipliers are, and with friction the anchors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingerpad.checks import FloatArray
+from fingerpad.mechanics.assembly import Sparsity, assemble
+from fingerpad.mechanics.contact import Contact, ContactState
+from fingerpad.mechanics.friction import Anchors, Friction
+from fingerpad.mechanics.materials import MaterialTable
+from fingerpad.mechanics.viscoelastic import StepCoefficients
+from fingerpad.mesh import Mesh
+
+SMALLEST_FORCE_MN = 1e-6
+"""Below it residuals are no longer taken relative to the force of contact. [mN]"""
+
+CURVATURE_BELOW_RESIDUAL = 0.1
+"""Residual over contact force below which the indenter's curvature is part of the tangent."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """The discretised tissue with what its equations need.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Nodes, bricks and node sets.
+    table : MaterialTable
+        Laws, one row per layer.
+    sparsity : Sparsity
+        Pattern of the tangent.
+    free : int array (n_free,)
+        Degrees of freedom that move.
+    """
+
+    mesh: Mesh
+    table: MaterialTable
+    sparsity: Sparsity
+    free: np.ndarray
+
+
+@dataclass(frozen=True)
+class Load:
+    """What acts on the body in one time step.
+
+    Parameters
+    ----------
+    contact : Contact
+        The indenter.
+    depth_mm : float
+        How far it has advanced since first touch; under a given force, where its search begins. [mm]
+    step : StepCoefficients
+        Relaxation coefficients of the step.
+    carried : array (n_elements, 8, 6)
+        H, the history that the step starts from. [kPa]
+    force_mn : float, optional
+        Force along the indenter's axis on the body as it is meshed, half of it or whole; the depth is then
+        found. [mN]
+    anchors : Anchors, optional
+        Where the skin holds on to the indenter at the start of the step; without friction nothing.
+    """
+
+    contact: Contact
+    depth_mm: float
+    step: StepCoefficients
+    carried: FloatArray
+    force_mn: float | None = None
+    anchors: Anchors | None = None
+
+
+@dataclass(frozen=True)
+class Balance:
+    """The force of the indenter against the reaction of everything that holds the body.
+
+    Bone and nail hold every direction. The plane of symmetry holds z, and a strip of skin that does not slide
+    is held along x by the indenter; these two count as supports in the direction that they hold.
+
+    Parameters
+    ----------
+    reaction_mn : array (3,)
+        Force of the body on bone and nail. [mN]
+    imbalance : float
+        Contact force minus the force on all supports, over the contact force along the indenter's axis.
+    """
+
+    reaction_mn: FloatArray
+    imbalance: float
+
+
+@dataclass(frozen=True)
+class Lagging:
+    """What lags behind Newton's method and is renewed between its runs.
+
+    Parameters
+    ----------
+    multipliers_mn : array (n_candidates,)
+        Normal contact forces of earlier augmentations. [mN]
+    anchors : Anchors, optional
+        Where the skin holds on to the indenter, and how strongly; without friction nothing.
+    """
+
+    multipliers_mn: FloatArray
+    anchors: Anchors | None = None
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A trial configuration; its tangent is in the blocks that `evaluate` was given.
+
+    Parameters
+    ----------
+    displacement_mm : array (n_nodes, 3)
+        Displacements. [mm]
+    depth_mm : float
+        How far the indenter has advanced. [mm]
+    positions_mm : array (n_candidates, 3)
+        Where the candidates for contact are. [mm]
+    contact : ContactState
+        Contact there.
+    contact_stiffness : array (n_candidates, 3, 3)
+        Its part of the tangent. [mN/mm]
+    potential_uj : float
+        Incremental potential, NaN if an element is turned inside out. [µJ]
+    out_of_balance_mn : array (n_nodes, 3)
+        Contact forces minus internal forces; on nodes that are held, what their supports take. [mN]
+    residual_mn : array (n_free,)
+        The same of the free degrees of freedom. [mN]
+    relative_residual : float
+        Norm of the residual over the contact force.
+    """
+
+    displacement_mm: FloatArray
+    depth_mm: float
+    positions_mm: FloatArray
+    contact: ContactState
+    contact_stiffness: FloatArray
+    potential_uj: float
+    out_of_balance_mn: FloatArray
+    residual_mn: FloatArray
+    relative_residual: float
+
+    @property
+    def whole(self) -> bool:
+        """Whether no element is turned inside out."""
+        return not np.isnan(self.potential_uj)
+
+    def balance(self, body: Body, load: Load) -> Balance:
+        """Compare the force of the indenter with what the supports take: nothing new is assembled."""
+        taken = self.out_of_balance_mn.copy()
+        taken.ravel()[body.free] = 0.0
+        given = self.contact.force_mn.sum(axis=0)
+        missing = float(np.linalg.norm(given - taken.sum(axis=0)))
+        scale = max(float(given @ load.contact.placement.axis), SMALLEST_FORCE_MN)
+        return Balance(self.out_of_balance_mn[body.mesh.fixed_nodes].sum(axis=0), missing / scale)
+
+    def missing_force_mn(self, load: Load) -> float:
+        """Force that the indenter still lacks, 0 at a given depth. [mN]"""
+        if load.force_mn is None:
+            return 0.0
+        return load.force_mn - float(self.contact.force_mn.sum(axis=0) @ load.contact.placement.axis)
+
+
+def evaluate(
+    body: Body,
+    load: Load,
+    displacement_mm: FloatArray,
+    depth_mm: float,
+    lagging: Lagging,
+    blocks: FloatArray,
+    before: Friction | None = None,
+) -> Configuration:
+    """Potential, out-of-balance forces and tangent of one configuration.
+
+    Parameters
+    ----------
+    body, load : Body, Load
+        The tissue and what acts on it.
+    displacement_mm : array (n_nodes, 3)
+        Displacements. [mm]
+    depth_mm : float
+        How far the indenter has advanced. [mm]
+    lagging : Lagging
+        Multipliers and anchors.
+    blocks : array (n_blocks, 3, 3)
+        Overwritten with the tangent. [mN/mm]
+    before : Friction, optional
+        Friction one Newton step ago, for the same anchors.
+
+    Returns
+    -------
+    Configuration
+    """
+    mesh, contact = body.mesh, load.contact
+    force = np.empty_like(displacement_mm)
+    internal = assemble(
+        mesh.nodes_mm, mesh.elements, displacement_mm, mesh.layer, body.table.law, load.step.s, load.carried,
+        body.sparsity.position, True, force, blocks,
+    )  # fmt: skip
+    positions = mesh.nodes_mm[contact.nodes] + displacement_mm[contact.nodes]
+    touch = contact.state(positions, depth_mm, lagging.multipliers_mn, lagging.anchors, before)
+    np.negative(force, out=force)
+    force[contact.nodes] += touch.force_mn
+    residual = force.ravel()[body.free]
+    pressed = float(np.linalg.norm(touch.force_mn.sum(axis=0)))
+    relative_residual = float(np.linalg.norm(residual)) / max(pressed, SMALLEST_FORCE_MN)
+    if np.isnan(internal):
+        # Forces were left half summed, and could look balanced.
+        relative_residual = np.inf
+    stiffness = touch.stiffness
+    if relative_residual < CURVATURE_BELOW_RESIDUAL:
+        stiffness = stiffness + contact.curvature_stiffness(touch, positions, depth_mm)
+    blocks[body.sparsity.diagonal[contact.nodes]] += stiffness
+    return Configuration(
+        displacement_mm=displacement_mm,
+        depth_mm=depth_mm,
+        positions_mm=positions,
+        contact=touch,
+        contact_stiffness=stiffness,
+        potential_uj=internal + touch.potential,
+        out_of_balance_mn=force,
+        residual_mn=residual,
+        relative_residual=relative_residual,
+    )
