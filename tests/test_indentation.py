@@ -8,8 +8,10 @@ from fingerpad.fingertip import Fingertip
 from fingerpad.grading import Grading
 from fingerpad.indentation import Touch, grading_about, indent, settings_of, touch_of
 from fingerpad.indenters import Bar, Cylinder, Line, Plate, Sphere
+from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.fields import QUANTITIES
+from fingerpad.mechanics.materials import Material, MaterialTable, Tissues
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.stimulus import RampAndHold
@@ -80,6 +82,23 @@ def test_all_that_is_known_of_a_touch_agrees_with_what_the_skin_keeps(skin):
     assert (pressing >= done.force_mn).all()
     np.testing.assert_allclose(pressing, done.force_mn, rtol=0.1)
     assert (np.diff(done.contact.area_mm2[:3]) > 0.0).all()
+
+
+def test_the_nail_takes_its_share_of_the_reaction():
+    """Internal forces of an elastic finger at the nodes of the nail, assembled anew."""
+    elastic = Tissues(*(Material.neo_hooke(shear, 0.48) for shear in (30.0, 30.0, 20.0, 8.0)))
+    touch = coarse_touch(tissues=elastic)
+    mesh, done, table = touch.mesh, touch.deform(), MaterialTable.of(elastic.layers)
+    sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
+    force, blocks = np.empty_like(mesh.nodes_mm), np.empty((sparsity.column.size, 3, 3))
+    assemble(
+        mesh.nodes_mm, mesh.elements, done.displacement_mm[-1], mesh.layer, table.law, np.ones(4),
+        np.zeros((len(mesh.elements), 8, 6)), sparsity.position, False, force, blocks,
+    )  # fmt: skip
+    expected = [-2.0, -2.0, 0.0] * force[mesh.nail_nodes].sum(axis=0)  # both halves, whose z cancels
+    np.testing.assert_allclose(done.nail_reaction_mn[-1], expected, rtol=1e-9, atol=1e-12)
+    assert 0.0 < done.nail_reaction_mn[-1, 1] < 0.1 * done.reaction_mn[-1, 1]
+    assert not done.nail_reaction_mn[0].any()
 
 
 def test_quantities_that_may_drive_an_afferent_peak_below_the_indenter(skin):

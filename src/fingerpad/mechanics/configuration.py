@@ -87,11 +87,14 @@ class Balance:
     ----------
     reaction_mn : array (3,)
         Force of the body on bone and nail. [mN]
+    nail_mn : array (3,)
+        Its part on the nail. [mN]
     imbalance : float
         Contact force minus the force on all supports, over the contact force along the indenter's axis.
     """
 
     reaction_mn: FloatArray
+    nail_mn: FloatArray
     imbalance: float
 
 
@@ -159,7 +162,11 @@ class Configuration:
         given = self.contact.force_mn.sum(axis=0)
         missing = float(np.linalg.norm(given - taken.sum(axis=0)))
         scale = max(float(given @ load.contact.placement.axis), SMALLEST_FORCE_MN)
-        return Balance(self.out_of_balance_mn[body.mesh.fixed_nodes].sum(axis=0), missing / scale)
+        reaction, nail = (
+            self.out_of_balance_mn[nodes].sum(axis=0)
+            for nodes in (body.mesh.fixed_nodes, body.mesh.nail_nodes)
+        )
+        return Balance(reaction, nail, missing / scale)
 
     def missing_force_mn(self, load: Load) -> float:
         """Force that the indenter still lacks, 0 at a given depth. [mN]"""

@@ -102,6 +102,8 @@ class Deformation:
         How far the indenter has advanced since first touch. [mm]
     reaction_mn : array (n_times, 3)
         Force of the body on bone and nail, of the whole body also when half of it is solved. [mN]
+    nail_reaction_mn : array (n_times, 3)
+        Its part on the nail. [mN]
     force_imbalance : float
         Largest difference at any time between the indenter's force and the reaction of the supports, over
         that force.
@@ -127,6 +129,7 @@ class Deformation:
     sed_kpa: FloatArray
     depth_mm: FloatArray
     reaction_mn: FloatArray
+    nail_reaction_mn: FloatArray
     force_imbalance: float
     stress_kpa: FloatArray
     fields: ElementFields
@@ -169,7 +172,9 @@ class _Press:
         mesh, table = self.body.mesh, self.body.table
         nowhere, no_force = np.zeros_like(mesh.nodes_mm), np.zeros(self.contact.nodes.size)
         touch = self.contact.state(mesh.nodes_mm[self.contact.nodes], 0.0, no_force)
-        rest = Equilibrium(nowhere, 0.0, touch, no_force, 0, Balance(np.zeros(3), 0.0), self.free_skin())
+        rest = Equilibrium(
+            nowhere, 0.0, touch, no_force, 0, Balance(np.zeros(3), np.zeros(3), 0.0), self.free_skin()
+        )
         history = StressHistory.unloaded(len(mesh.elements), table.shares.shape[1])
         unstrained = FieldState.unloaded(len(mesh.nodes_mm), len(self.watched.elements))
         return _Moment(
@@ -347,13 +352,15 @@ def press(
     both_halves = np.array([2.0, 2.0, 0.0]) if mesh.symmetry_nodes.size else np.ones(3)
     displacement = np.zeros((times.size, *mesh.nodes_mm.shape))
     force, sed = np.zeros(times.size), np.zeros((times.size, len(mesh.elements)))
-    depth, reaction, imbalance, deepest = np.zeros(times.size), np.zeros((times.size, 3)), 0.0, 0.0
+    reaction, nail_reaction = np.zeros((times.size, 3)), np.zeros((times.size, 3))
+    depth, imbalance, deepest = np.zeros(times.size), 0.0, 0.0
     pressed = np.zeros((times.size, mesh.skin_nodes.size))
     rows = np.searchsorted(mesh.skin_nodes, contact.nodes)
     for n, (_, found, sed_kpa) in enumerate(reached, start=1):
         displacement[n], depth[n], sed[n] = found.displacement_mm, found.depth_mm, sed_kpa
         force[n] = whole_body * found.contact.force_mn.sum(axis=0) @ placement.axis
         reaction[n] = both_halves * found.balance.reaction_mn
+        nail_reaction[n] = both_halves * found.balance.nail_mn
         imbalance = max(imbalance, found.balance.imbalance)
         deepest = max(deepest, found.contact.penetration_mm)
         pressed[n, rows] = found.contact.pressed_mn
@@ -364,6 +371,7 @@ def press(
         sed_kpa=sed,
         depth_mm=depth,
         reaction_mn=reaction,
+        nail_reaction_mn=nail_reaction,
         force_imbalance=imbalance,
         stress_kpa=cauchy_stress(mesh, table, displacement[-1], moment.history),
         fields=fields_over_time(chosen, felt),
