@@ -176,15 +176,17 @@ def test_options_reach_the_run(call, monkeypatch, tmp_path):
 def test_options_reach_the_export(call, monkeypatch, tmp_path):
     exported = []
 
-    def note(touch, folder, format_name):
-        exported.append((touch, folder, format_name))
+    def note(touch, folder, format_name, elastic_moduli):
+        exported.append((touch, folder, format_name, elastic_moduli))
         return (folder / "touch.pvd",)
 
     monkeypatch.setattr(cli, "export_touch", note)
     given = ("--curvature", "340", "--depth", "0.5", "--materials", "trial1", "--resolution", "standard")
     assert call("export", "a/b", *given) == (0, "Open: a/b/touch.pvd\n", "")
     assert call("export", "c", "--indenter", "plate", "--format", "vtu")[0] == 0
-    (touch, folder, format_name), (default, _, _) = exported
+    assert call("export", "d", "--format", "calculix", "--elastic-moduli", "long_term")[0] == 0
+    (touch, folder, format_name, _), (default, _, _, relaxing), (*_, elastic) = exported
+    assert (relaxing, elastic) == (None, "long_term")
     assert touch == touch_of(Fingertip(), Sphere(340), RampAndHold(depth_mm=0.5), "trial1", "standard")
     assert (folder.resolve(), format_name) == (tmp_path / "a" / "b", "vtu")
     assert default == touch_of(Fingertip(), Plate(), RampAndHold(depth_mm=1.0), "trial3", "quick")

@@ -15,6 +15,7 @@ from fingerpad.errors import InputError
 from fingerpad.export.abaqus import abaqus_deck, write_abaqus
 from fingerpad.export.calculix import calculix_deck, write_calculix
 from fingerpad.export.febio import febio_deck, write_febio
+from fingerpad.export.formats import export_touch
 from fingerpad.export.job import Job, job_of
 from fingerpad.export.outline import outline_of, rigid_mesh
 from fingerpad.fingertip import Fingertip
@@ -229,7 +230,7 @@ ABAQUS = {  # Abaqus Keywords Reference Manual 6.14: parameters used of each key
     "HYPERFOAM": {"N", "MODULI"}, "VISCOELASTIC": {"TIME"}, "SURFACE": {"NAME", "TYPE"},
     "RIGID BODY": {"ANALYTICAL SURFACE", "REF NODE"}, "SURFACE INTERACTION": {"NAME"}, "FRICTION": set(),
     "SURFACE BEHAVIOR": {"PRESSURE-OVERCLOSURE"}, "CONTACT PAIR": {"INTERACTION", "TYPE"},
-    "BOUNDARY": set(), "STEP": {"NLGEOM", "AMPLITUDE", "INC"}, "VISCO": set(), "STATIC": set(),
+    "BOUNDARY": set(), "STEP": {"NLGEOM", "AMPLITUDE", "INC", "UNSYMM"}, "VISCO": set(), "STATIC": set(),
     "OUTPUT": {"FIELD", "HISTORY", "FREQUENCY"}, "NODE OUTPUT": {"NSET"}, "ELEMENT OUTPUT": set(),
     "CONTACT OUTPUT": set(), "END STEP": set(),
 }  # fmt: skip
@@ -237,7 +238,7 @@ CALCULIX = {  # CalculiX CrunchiX User's Manual 2.20
     "NODE": {"NSET"}, "ELEMENT": {"TYPE", "ELSET"}, "NSET": {"NSET"}, "SOLID SECTION": {"ELSET", "MATERIAL"},
     "MATERIAL": {"NAME"}, "ELASTIC": set(), "HYPERFOAM": {"N"},
     "HYPERELASTIC": {"NEO HOOKE", "MOONEY-RIVLIN", "POLYNOMIAL", "OGDEN", "N"},
-    "SURFACE": {"NAME", "TYPE"}, "SURFACE INTERACTION": {"NAME"},
+    "SURFACE": {"NAME", "TYPE"}, "SURFACE INTERACTION": {"NAME"}, "FRICTION": set(),
     "SURFACE BEHAVIOR": {"PRESSURE-OVERCLOSURE"}, "CONTACT PAIR": {"INTERACTION", "TYPE"},
     "BOUNDARY": set(), "STEP": {"NLGEOM", "INC"}, "STATIC": set(),
     "NODE PRINT": {"NSET", "TOTALS", "FREQUENCY"}, "EL PRINT": {"ELSET", "FREQUENCY"},
@@ -261,6 +262,7 @@ def test_every_line_is_one_that_the_manual_knows(write):
     known = ABAQUS if write is abaqus_deck else CALCULIX
     relaxing = NEO_HOOKE.with_prony(PRONY) if write is abaqus_deck else NEO_HOOKE
     jobs = [block_job(indenter) for indenter in [*INDENTERS, Line(2.5)]]
+    jobs.append(replace(block_job(), friction=0.4))
     for job in [*jobs, *(block_job(material=law) for law in LAWS), block_job(material=relaxing)]:
         deck = write(job)
         assert max(map(len, deck.splitlines())) <= 256
@@ -474,6 +476,26 @@ def test_facets_lie_on_the_indenter_and_look_at_the_skin(indenter):
         size = faces.shape[1]
         edges = [solids[:, n] - solids[:, 0] for n in (1, size - 1, size)]
         assert (np.einsum("nd,nd->n", np.cross(edges[0], edges[1]), edges[2]) > 0.0).all()
+
+
+def test_skin_rubs_where_it_shall():
+    """Coulomb's coefficient in each deck, with a tangent that may lose its symmetry; none otherwise."""
+    for friction in (0.0, 0.4):
+        job = replace(block_job(), friction=friction)
+        abaqus = read_cards(abaqus_deck(job))
+        assert numbers(only(abaqus, "FRICTION")[1]) == [friction]
+        assert {given.get("UNSYMM") for given, _ in of(abaqus, "STEP")} == {"YES" if friction else None}
+        calculix = of(read_cards(calculix_deck(job)), "FRICTION")
+        assert [numbers(data)[0] for _, data in calculix] == ([friction] if friction else [])
+        febio = read_febio(job)
+        assert float(febio.find("Contact/contact/fric_coeff").text) == friction
+        symmetric = (
+            febio.find("Contact/contact/symmetric_stiffness").text,
+            febio.find("Control/solver")[0].text,
+        )
+        assert symmetric == (("0", "non-symmetric") if friction else ("1", "symmetric"))
+    with pytest.raises(InputError, match="friction must"):
+        replace(job, friction=-0.1)
 
 
 def test_a_line_holds_the_skin_that_it_grips():
@@ -712,6 +734,21 @@ def test_a_job_says_what_is_wrong_with_it():
         abaqus_deck(replace(job, mesh=replace(job.mesh, elements=broken)))
 
 
+@pytest.mark.parametrize(
+    ("format_name", "moduli", "suffix"),
+    [("abaqus", None, "inp"), ("calculix", "long_term", "inp"), ("febio", None, "feb")],
+)
+def test_a_touch_is_exported_by_name(tmp_path, format_name, moduli, suffix):
+    touch = fp.touch_of(Fingertip(), BALL, fp.RampAndHold(depth_mm=0.4), "trial1", grading=COARSE)
+    (path,) = export_touch(touch, tmp_path, format_name, moduli)
+    assert path == tmp_path / f"touch.{suffix}"
+    decks = {"abaqus": abaqus_deck, "febio": febio_deck, "calculix": lambda job: calculix_deck(job, moduli)}
+    assert path.read_text() == decks[format_name](job_of(touch))
+    if format_name != "calculix":
+        with pytest.raises(InputError, match=f"elastic_moduli is for calculix, and {format_name} relaxes"):
+            export_touch(touch, tmp_path, format_name, "long_term")
+
+
 def test_a_touch_becomes_a_job_and_files(tmp_path):
     touch = fp.touch_of(
         Fingertip(),
@@ -736,6 +773,8 @@ def test_a_touch_becomes_a_job_and_files(tmp_path):
         assert "fingerpad" in text[:400]
         assert "mm, ms, kPa, mN" in text[:400]
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["deck"]
+    assert job.friction == 0.0
+    assert job_of(replace(touch, friction=0.3)).friction == 0.3
     by_force = replace(touch, stimulus=fp.ForceRampAndHold(force_mn=100.0))
     with pytest.raises(InputError, match="ForceRampAndHold sets forces, and a deck moves its indenter"):
         job_of(by_force)

@@ -206,6 +206,10 @@ def export_command(
     materials: Annotated[str, typer.Option(help=f"One of {', '.join(TISSUES)}.")] = "trial3",
     resolution: Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTIONS)}.")] = "quick",
     format_name: Annotated[str, typer.Option("--format", help=f"One of {', '.join(FORMATS)}.")] = "vtu",
+    elastic_moduli: Annotated[
+        str | None,
+        typer.Option(help="For calculix, which cannot relax tissue: long_term or instantaneous."),
+    ] = None,
 ) -> None:
     """Press one indenter into the finger and write the touch for another program, ParaView by default."""
     one_of("indenter", indenter, tuple(INDENTERS))
@@ -216,7 +220,7 @@ def export_command(
     touch = touch_of(Fingertip(), body, RampAndHold(depth_mm=depth), materials, resolution)
     _make_writable(folder, "FOLDER")
     try:
-        files = export_touch(touch, folder, format_name)
+        files = export_touch(touch, folder, format_name, elastic_moduli)
     except KeyboardInterrupt as error:
         typer.echo("fingerpad: stopped; what was written is whole, the rest is not there.", err=True)
         raise typer.Exit(INTERRUPTED) from error

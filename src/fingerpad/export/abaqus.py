@@ -13,7 +13,7 @@ from fingerpad.files import write_atomically
 from fingerpad.mechanics.laws import Hyperfoam
 from fingerpad.mechanics.materials import Material
 
-FRICTIONLESS, REFERENCE = "FRICTIONLESS", "REFERENCE"
+CONTACT, REFERENCE = "CONTACT", "REFERENCE"
 
 UPPER_FACE = 2
 """Face of a brick's last four, or a wedge's last three nodes: the skin's side of our elements."""
@@ -79,10 +79,10 @@ def abaqus_deck(job: Job) -> str:
     lines += cards.support_sets(job)
     lines += _skin(job)
     lines += _rigid_surface(job, reference)
-    lines += [f"*SURFACE INTERACTION, NAME={FRICTIONLESS}", "1.", "*FRICTION", "0.",
+    lines += [f"*SURFACE INTERACTION, NAME={CONTACT}", "1.", "*FRICTION", cards.number(job.friction),
               "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", *data([CONTACT_KPA_PER_MM])]  # fmt: skip
     kind = "NODE TO SURFACE" if job.indenter.grips else "SURFACE TO SURFACE"
-    lines += [f"*CONTACT PAIR, INTERACTION={FRICTIONLESS}, TYPE={kind}", f"{SKIN}, {INDENTER}"]
+    lines += [f"*CONTACT PAIR, INTERACTION={CONTACT}, TYPE={kind}", f"{SKIN}, {INDENTER}"]
     lines += [*cards.supports(job), f"{REFERENCE}, 4, 6"]
     for phase in job.phases:
         lines += _step(job, phase, relaxes)
@@ -147,8 +147,9 @@ def _step(job: Job, phase: Phase, relaxes: bool) -> list[str]:
         f"{REFERENCE}, {axis}, {axis}, {cards.number(phase.depth_mm * component)}"
         for axis, component in enumerate(job.placement.axis, 1)
     )
+    unsymmetric = ", UNSYMM=YES" if job.friction else ""
     return [
-        f"*STEP, NLGEOM=YES, AMPLITUDE=RAMP, INC={100 * phase.steps}",
+        f"*STEP, NLGEOM=YES, AMPLITUDE=RAMP, INC={100 * phase.steps}{unsymmetric}",
         *procedure,
         "*BOUNDARY", *moves,
         "*OUTPUT, FIELD, FREQUENCY=1",

@@ -125,9 +125,11 @@ elastic_moduli ("long_term" or "instantaneous"), or export for Abaqus or FEBio.
     # Nodes touch in our own contact; where nodes stand in the middle of edges, they share load unevenly.
     by_nodes = job.indenter.grips or element != "C3D20R"
     kind = "NODE TO SURFACE" if by_nodes else "SURFACE TO SURFACE"
-    lines += ["*SURFACE INTERACTION, NAME=FRICTIONLESS",
-              "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", *cards.data([CONTACT_KPA_PER_MM]),
-              f"*CONTACT PAIR, INTERACTION=FRICTIONLESS, TYPE={kind}", f"{SKIN}, {INDENTER}",
+    lines += ["*SURFACE INTERACTION, NAME=CONTACT", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"]
+    lines += cards.data([CONTACT_KPA_PER_MM])
+    if job.friction:  # a sticking node yields by the same stiffness as a pressed one, as in our own contact
+        lines += ["*FRICTION", *cards.data([job.friction, CONTACT_KPA_PER_MM])]
+    lines += [f"*CONTACT PAIR, INTERACTION=CONTACT, TYPE={kind}", f"{SKIN}, {INDENTER}",
               *cards.supports(job)]  # fmt: skip
     depth = 0.0
     for phase in job.phases:

@@ -135,7 +135,8 @@ def _control(root: xml.Element, job: Job) -> None:
     _add_all(
         solver,
         {
-            "symmetric_stiffness": "symmetric",
+            # Friction makes the tangent unsymmetric.
+            "symmetric_stiffness": "non-symmetric" if job.friction else "symmetric",
             "max_refs": 30,
             "reform_each_time_step": 1,
             "dtol": DISPLACEMENT_TOLERANCE,
@@ -306,9 +307,9 @@ def _contact(root: xml.Element, job: Job) -> None:
             "auto_penalty": 0,
             "two_pass": 0,
             "search_radius": 2.0 * float(job.depths_mm.max()),
-            "symmetric_stiffness": 1,
+            "symmetric_stiffness": 0 if job.friction else 1,
             "tension": 0,
-            "fric_coeff": 0,
+            "fric_coeff": job.friction,
         },
     )
 

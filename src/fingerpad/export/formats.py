@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fingerpad.checks import one_of
+from fingerpad.errors import InputError
 from fingerpad.export.abaqus import write_abaqus
 from fingerpad.export.calculix import write_calculix
 from fingerpad.export.febio import write_febio
@@ -22,8 +23,8 @@ def _abaqus(touch: Touch, folder: Path) -> tuple[Path, ...]:
     return (write_abaqus(folder / "touch.inp", job_of(touch)),)
 
 
-def _calculix(touch: Touch, folder: Path) -> tuple[Path, ...]:
-    return (write_calculix(folder / "touch.inp", job_of(touch)),)
+def _calculix(touch: Touch, folder: Path, elastic_moduli: str | None = None) -> tuple[Path, ...]:
+    return (write_calculix(folder / "touch.inp", job_of(touch), elastic_moduli),)
 
 
 def _febio(touch: Touch, folder: Path) -> tuple[Path, ...]:
@@ -39,7 +40,9 @@ FORMATS: dict[str, Callable[[Touch, Path], tuple[Path, ...]]] = {
 """Writers by name: each takes a touch and a folder and returns its files, the one to open first."""
 
 
-def export_touch(touch: Touch, folder: Path, format_name: str) -> tuple[Path, ...]:
+def export_touch(
+    touch: Touch, folder: Path, format_name: str, elastic_moduli: str | None = None
+) -> tuple[Path, ...]:
     """Write a touch for another program.
 
     Parameters
@@ -50,6 +53,8 @@ def export_touch(touch: Touch, folder: Path, format_name: str) -> tuple[Path, ..
         Where the files shall be; made as needed.
     format_name : str
         One of `FORMATS`.
+    elastic_moduli : {"long_term", "instantaneous"}, optional
+        For "calculix", which cannot relax: the moduli to press with.
 
     Returns
     -------
@@ -61,4 +66,9 @@ def export_touch(touch: Touch, folder: Path, format_name: str) -> tuple[Path, ..
     InputError
         If the format is unknown or cannot hold this touch.
     """
-    return FORMATS[one_of("format", format_name, tuple(FORMATS))](touch, Path(folder))
+    one_of("format", format_name, tuple(FORMATS))
+    if format_name == "calculix":
+        return _calculix(touch, Path(folder), elastic_moduli)
+    if elastic_moduli is not None:
+        raise InputError(f"elastic_moduli is for calculix, and {format_name} relaxes tissue: leave it out.")
+    return FORMATS[format_name](touch, Path(folder))

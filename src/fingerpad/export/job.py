@@ -14,7 +14,7 @@ from fingerpad.errors import InputError
 from fingerpad.export.outline import Outline, RigidMesh, outline_of, rigid_mesh
 from fingerpad.indentation import Touch
 from fingerpad.indenters import Indenter
-from fingerpad.mechanics.contact import Placement
+from fingerpad.mechanics.contact import Placement, check_friction
 from fingerpad.mechanics.materials import Material
 from fingerpad.mesh import LAYERS, IntArray, Mesh
 from fingerpad.stimulus import RampAndHold
@@ -65,11 +65,14 @@ class Job:
         Steps, from 0. [ms]
     depths_mm : array (n_times,)
         How far the indenter has advanced at each, from 0. [mm]
+    friction : float
+        Coulomb's coefficient between skin and indenter.
 
     Raises
     ------
     InputError
-        If times do not increase from 0, depths do not match them, or a layer has no material.
+        If times do not increase from 0, depths do not match them, a layer has no material, or friction is not
+        a coefficient.
     """
 
     mesh: Mesh
@@ -78,6 +81,7 @@ class Job:
     placement: Placement
     times_ms: FloatArray
     depths_mm: FloatArray
+    friction: float = 0.0
 
     def __post_init__(self) -> None:
         instance("mesh", self.mesh, Mesh)
@@ -95,6 +99,7 @@ class Job:
             raise InputError(
                 f"materials needs one per layer: got {len(self.materials)} for layer {self.mesh.layer.max()}."
             )
+        check_friction(self.friction, self.indenter)
         object.__setattr__(self, "times_ms", times)
         object.__setattr__(self, "depths_mm", depths)
 
@@ -245,7 +250,7 @@ def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike
     Raises
     ------
     InputError
-        If times or depths are needed and missing, or do not fit each other, or skin rubs on the indenter.
+        If times or depths are needed and missing, or do not fit each other.
 
     Examples
     --------
@@ -256,8 +261,6 @@ def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike
     """
     instance("touch", touch, Touch)
     stimulus, settings = touch.stimulus, touch.settings
-    if touch.friction:
-        raise InputError(f"A deck's contact has no friction: set friction to 0, not {touch.friction:g}.")
     if times_ms is None:
         if settings.sed_tolerance is not None:
             raise InputError(
@@ -279,4 +282,5 @@ def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike
         touch.placement,
         np.asarray(times_ms, dtype=float),
         np.asarray(depths_mm, dtype=float),
+        touch.friction,
     )
