@@ -34,6 +34,9 @@ PARAMETERS = {
 MEASURED = ("started", "wall_s", "peak_memory_mb", "stages")
 """Parts of the manifest that no two runs share."""
 
+BALANCE = 0.02
+"""Largest error of the balance of energy at quick resolution: five steps for a ramp."""
+
 INDENTATIONS = 6 + 36 + 14 + 1
 
 
@@ -196,6 +199,9 @@ def test_the_manifest_says_how_to_repeat_it(first):
     stages = manifest["stages"]
     assert [stage.get("computed") for stage in stages] == [6, 36, 14, 1, None]
     assert sum(stage["wall_s"] for stage in stages) <= manifest["wall_s"] + 0.1
+    for stage in stages[:-1]:
+        assert 0.0 < stage["largest_force_imbalance"] <= 1e-4
+        assert 0.0 < stage["largest_energy_imbalance"] < BALANCE
     assert all(mesh["smallest_gauss_jacobian_mm3"] > 0 for mesh in manifest["meshes"].values())
 
 

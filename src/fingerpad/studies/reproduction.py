@@ -154,7 +154,11 @@ def _pressed(
     with _timed(name, missing, progress, stages) as advance:
         stages[-1]["indentations"] = len(touches)
         stages[-1]["computed"] = solve_missing(list(touches.values()), store, jobs, lambda seconds: advance())
-        return {key: store.load(touch) for key, touch in touches.items()}
+        responses = {key: store.load(touch) for key, touch in touches.items()}
+    # Whether forces and energies of every press add up, at their worst.
+    stages[-1]["largest_force_imbalance"] = max(skin.force_imbalance for skin in responses.values())
+    stages[-1]["largest_energy_imbalance"] = max(skin.energy_imbalance for skin in responses.values())
+    return responses
 
 
 @contextmanager
