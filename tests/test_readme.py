@@ -27,7 +27,7 @@ def test_python_on_a_page_runs_and_prints(block: str, capsys: pytest.CaptureFixt
 
 
 def test_the_readme_shows_python() -> None:
-    assert README.count("```python\n") == 1
+    assert README.count("```python\n") == 2
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

@@ -27,6 +27,7 @@ from fingerpad.mechanics.materials import (
     Prony,
     Tissues,
 )
+from fingerpad.mechanics.press import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.population import Population
 from fingerpad.sampling import SkinResponse, SurfaceProfile
@@ -56,6 +57,7 @@ __all__ = [
     "Plate",
     "Polynomial",
     "Population",
+    "PressSettings",
     "Prony",
     "RampAndHold",
     "ResponseMap",
