@@ -15,9 +15,9 @@ from fingerpad.mechanics.fields import (
     Watched,
     cauchy_stress,
     fields_over_time,
-    skin_contact,
 )
 from fingerpad.mechanics.materials import Hencky, Hyperfoam, Material, MaterialTable, Prony
+from fingerpad.mechanics.skin_contact import skin_contact
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
     StressHistory,

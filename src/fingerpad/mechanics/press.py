@@ -24,11 +24,9 @@ from fingerpad.mechanics.contact import Contact, Placement, check_friction
 from fingerpad.mechanics.fields import (
     ElementFields,
     FieldState,
-    SkinContact,
     Watched,
     cauchy_stress,
     fields_over_time,
-    skin_contact,
 )
 from fingerpad.mechanics.friction import Anchors
 from fingerpad.mechanics.linear import (
@@ -39,6 +37,7 @@ from fingerpad.mechanics.linear import (
 )
 from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.newton import FIRST_DEPTH_MM, Equilibrium, NewtonSettings, find_equilibrium
+from fingerpad.mechanics.skin_contact import SkinContact, skin_contact
 from fingerpad.mechanics.steps import Phase, adaptive_steps, steps_at
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
