@@ -15,6 +15,7 @@ from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import Contact, ContactState
 from fingerpad.mechanics.friction import Anchors, Friction
 from fingerpad.mechanics.materials import MaterialTable
+from fingerpad.mechanics.mixed import Pressures, exchange_pressure
 from fingerpad.mechanics.viscoelastic import StepCoefficients
 from fingerpad.mesh import Mesh
 
@@ -39,12 +40,15 @@ class Body:
         Pattern of the tangent.
     free : int array (n_free,)
         Degrees of freedom that move.
+    is_mixed : bool
+        Whether Newton's method treats pressure as an unknown of its own (see `mixed`).
     """
 
     mesh: Mesh
     table: MaterialTable
     sparsity: Sparsity
     free: np.ndarray
+    is_mixed: bool = False
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,8 @@ class Load:
         found. [mN]
     anchors : Anchors, optional
         Where the skin holds on to the indenter at the start of the step; without friction nothing.
+    pressure_kpa : array (n_elements,), optional
+        Pressures at the start of the step, for a mixed method. [kPa]
     """
 
     contact: Contact
@@ -74,6 +80,7 @@ class Load:
     carried: FloatArray
     force_mn: float | None = None
     anchors: Anchors | None = None
+    pressure_kpa: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -138,6 +145,8 @@ class Configuration:
         The same of the free degrees of freedom. [mN]
     relative_residual : float
         Norm of the residual over the contact force.
+    pressures : Pressures, optional
+        Of the elements, for a mixed method.
     """
 
     displacement_mm: FloatArray
@@ -149,6 +158,7 @@ class Configuration:
     out_of_balance_mn: FloatArray
     residual_mn: FloatArray
     relative_residual: float
+    pressures: Pressures | None = None
 
     @property
     def whole(self) -> bool:
@@ -183,6 +193,7 @@ def evaluate(
     lagging: Lagging,
     blocks: FloatArray,
     before: Friction | None = None,
+    pressure_kpa: FloatArray | None = None,
 ) -> Configuration:
     """Potential, out-of-balance forces and tangent of one configuration.
 
@@ -200,6 +211,8 @@ def evaluate(
         Overwritten with the tangent. [mN/mm]
     before : Friction, optional
         Friction one Newton step ago, for the same anchors.
+    pressure_kpa : array (n_elements,), optional
+        Pressures in the tangent of a mixed method; those that belong to the displacements by default. [kPa]
 
     Returns
     -------
@@ -211,6 +224,13 @@ def evaluate(
         mesh.nodes_mm, mesh.elements, displacement_mm, mesh.layer, body.table.law, load.step.s, load.carried,
         body.sparsity.position, True, force, blocks,
     )  # fmt: skip
+    pressures = None
+    if body.is_mixed and not np.isnan(internal):
+        where = (mesh.nodes_mm, mesh.elements, displacement_mm)
+        pressures = Pressures.of(*where, mesh.layer, body.table.law)
+        if pressure_kpa is not None:
+            change = pressure_kpa - pressures.pressure_kpa
+            exchange_pressure(*where, change, body.sparsity.position, blocks)
     positions = mesh.nodes_mm[contact.nodes] + displacement_mm[contact.nodes]
     touch = contact.state(positions, depth_mm, lagging.multipliers_mn, lagging.anchors, before)
     np.negative(force, out=force)
@@ -235,4 +255,5 @@ def evaluate(
         out_of_balance_mn=force,
         residual_mn=residual,
         relative_residual=relative_residual,
+        pressures=pressures,
     )

@@ -94,6 +94,8 @@ class Equilibrium:
         Where the skin holds on to the indenter when the next step starts.
     rubbed_uj : float
         Energy that friction has turned into heat in this step. [µJ]
+    pressure_kpa : array (n_elements,), optional
+        Pressures for the next step of a mixed method. [kPa]
     """
 
     displacement_mm: FloatArray
@@ -104,6 +106,7 @@ class Equilibrium:
     balance: Balance
     anchors: Anchors | None = None
     rubbed_uj: float = 0.0
+    pressure_kpa: FloatArray | None = None
 
 
 def find_equilibrium(
@@ -160,7 +163,15 @@ class _Search:
     def run(self, guess_mm: FloatArray, settings: NewtonSettings) -> Equilibrium:
         """Repeat Newton steps, and renew what lags behind whenever the body is at rest."""
         load, rubs = self.load, self.load.anchors is not None
-        now = evaluate(self.body, load, guess_mm, load.depth_mm, self.lagging, self.blocks)
+        now = evaluate(
+            self.body,
+            load,
+            guess_mm,
+            load.depth_mm,
+            self.lagging,
+            self.blocks,
+            pressure_kpa=load.pressure_kpa,
+        )
         if not now.whole:
             raise ConvergenceError(f"The starting guess turns {self.folded(guess_mm)} inside out.")
         potentials = [now.potential_uj]
@@ -219,14 +230,19 @@ class _Search:
             balance=balance,
             anchors=carried,
             rubbed_uj=heat_uj,
+            pressure_kpa=None if now.pressures is None else now.pressures.pressure_kpa,
         )
 
     def moved(self, start: Configuration, step: FloatArray, advance_mm: float = 0.0) -> Configuration:
         """Go by a step of the free degrees of freedom and of the indenter."""
         displacement = start.displacement_mm.copy()
         displacement.ravel()[self.body.free] += step
-        depth_mm, before = start.depth_mm + advance_mm, start.contact.friction
-        return evaluate(self.body, self.load, displacement, depth_mm, self.lagging, self.blocks, before)
+        depth_mm, before, pressure = start.depth_mm + advance_mm, start.contact.friction, None
+        if start.pressures is not None:
+            pressure = start.pressures.after(self.body.mesh.elements, displacement - start.displacement_mm)
+        return evaluate(
+            self.body, self.load, displacement, depth_mm, self.lagging, self.blocks, before, pressure
+        )
 
     def line_search(self, start: Configuration, direction: FloatArray, highest_uj: float) -> Configuration:
         """Go along `direction`, halving until the potential falls below the highest remembered one.

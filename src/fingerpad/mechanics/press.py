@@ -36,6 +36,7 @@ from fingerpad.mechanics.linear import (
     free_degrees_of_freedom,
 )
 from fingerpad.mechanics.materials import Material, MaterialTable
+from fingerpad.mechanics.mixed import MIXED_POISSON
 from fingerpad.mechanics.newton import FIRST_DEPTH_MM, Equilibrium, NewtonSettings, find_equilibrium
 from fingerpad.mechanics.skin_contact import SkinContact, skin_contact
 from fingerpad.mechanics.steps import Phase, adaptive_steps, steps_at
@@ -245,10 +246,13 @@ class _Press:
             ramps = target_ms <= self.stimulus.ramp_ms
             depth_mm = start.found.depth_mm + (step_ms * start.depth_rate if ramps else 0.0)
             return Load(
-                self.contact, depth_mm or FIRST_DEPTH_MM, step, carried, force_mn, start.found.anchors
-            )
-        depth_mm = float(self.stimulus.depth_at(target_ms))
-        return Load(self.contact, depth_mm, step, carried, anchors=start.found.anchors)
+                self.contact, depth_mm or FIRST_DEPTH_MM, step, carried, force_mn,
+                start.found.anchors, start.found.pressure_kpa,
+            )  # fmt: skip
+        return Load(
+            self.contact, float(self.stimulus.depth_at(target_ms)), step, carried,
+            anchors=start.found.anchors, pressure_kpa=start.found.pressure_kpa,
+        )  # fmt: skip
 
     def stopped(self, last: _Moment, attempts: tuple[str, ...]) -> ConvergenceError:
         """Error for a press that gets no further than `last`."""
@@ -325,8 +329,8 @@ def press(
     gripped = contact.nodes if indenter.grips else NO_NODES
     free = free_degrees_of_freedom(len(mesh.nodes_mm), mesh.fixed_nodes, mesh.symmetry_nodes, gripped)
     sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
-    body = Body(mesh, table, sparsity, free)
     poisson = max(materials[layer].poisson for layer in np.unique(mesh.layer))
+    body = Body(mesh, table, sparsity, free, is_mixed=poisson > MIXED_POISSON)
     approximate, reason = choose_preconditioner(sparsity, free, mesh.nodes_mm, poisson)
     solver = LinearSolver(sparsity, free, approximate)
 
