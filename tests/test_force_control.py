@@ -60,24 +60,6 @@ def test_force_is_that_on_the_whole_body_also_when_half_of_it_is_solved():
     np.testing.assert_allclose(whole.force_mn[-1], 20.0, rtol=1e-5)
 
 
-def test_hertz_depth_of_a_force():
-    """d = (3 F / (4 E* sqrt(R)))^(2/3), on a block 50 contact radii thick as in the test at given depth."""
-    depth, radius, young, poisson = 0.01, 1.0, 100.0, 0.3
-    contact_radius = np.sqrt(radius * depth)
-    size, side = 0.25 * contact_radius, [0.25 * contact_radius * n for n in range(6)]
-    while side[-1] < 50 * contact_radius:
-        size *= 1.5
-        side.append(side[-1] + size)
-    side = np.array(side)
-    both = np.concatenate([-side[:0:-1], side])
-    mesh = block_mesh(both, side, side, layers=[2] * (side.size - 1), symmetric=True)
-    force = 4 / 3 * young / (1 - poisson**2) * np.sqrt(radius) * depth**1.5
-    steps = PressSettings(2, 1, NewtonSettings(penetration_tolerance=1e-3))
-    materials = (Material.linear_elastic(young, poisson),) * 4
-    done = pressed(mesh, ForceRampAndHold(force, 1.0, 1.0), Sphere(1000.0 / radius), materials, steps)
-    np.testing.assert_allclose(done.depth_mm[1:], depth * np.array([0.5 ** (2 / 3), 1.0, 1.0]), rtol=0.02)
-
-
 def test_creep_in_uniaxial_strain_follows_the_closed_form(monkeypatch):
     """One element held at its sides: F / A = M * e with M(t) = K + 4/3 G(t), whose inverse creeps.
 

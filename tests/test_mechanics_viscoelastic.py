@@ -59,24 +59,6 @@ def elastic(factor):
     return MaterialTable.of([Material(Polynomial(*coefficients, bulk_linear=SKIN.law.bulk_linear))])
 
 
-def test_moduli_go_from_instantaneous_to_long_term():
-    displacement = shear(0.6)
-    (fast, slow), _ = march([FAST_MS, SLOW_MS], [displacement] * 2)
-    (instantaneous,), _ = march([1.0], [displacement], elastic(1 / PRONY.long_term_share))
-    (long_term,), _ = march([1.0], [displacement], elastic(1.0))
-    np.testing.assert_allclose(fast, instantaneous, rtol=0, atol=1e-6 * np.abs(fast).max())
-    np.testing.assert_allclose(slow, long_term, rtol=0, atol=1e-4 * np.abs(slow).max())
-
-
-def test_hold_after_a_step_is_the_prony_sum():
-    """Shear held from time 0 on, at finite strain: every force component follows the same g(t)."""
-    displacement, times = shear(0.6), np.array([1.0, 7.0, 40.0, 300.0, 2000.0])
-    forces, _ = march([FAST_MS, *(FAST_MS + times)], [displacement] * 6)
-    relaxation = 1 - (SHARES * (1 - np.exp(-times[:, None] / TIMES_MS))).sum(axis=1)
-    expected = relaxation[:, None, None] * forces[0]
-    np.testing.assert_allclose(forces[1:], expected, rtol=0, atol=1e-6 * np.abs(forces[0]).max())
-
-
 def ramp_factor(times_ms, ramp_ms):
     """S(t) / S0(end of ramp) for S0 that rises linearly and is then held: convolution of g with the ramp."""
     since = np.asarray(times_ms)[:, None]
@@ -102,26 +84,6 @@ def test_steps_of_any_size_give_the_same_exact_ramp_and_hold(times_ms):
         history, before = history.advanced(step, layer, stress), time
         np.testing.assert_allclose(relaxed, ramp_factor([time], 50.0)[0] * end, rtol=1e-11)
         np.testing.assert_allclose(stress - history.relaxed.sum(axis=0), relaxed, rtol=1e-11)
-
-
-def test_small_shear_ramp_and_hold_follow_the_linear_theory():
-    """Force and stored energy of a generalised Maxwell solid, its springs one by one.
-
-    A branch's spring shear follows h' = g' - h / tau: h = g' tau (1 - exp(-t / tau)) in the ramp, then it
-    decays; the springs hold G0 (g_inf g² + sum g_i h_i²) / 2.
-    """
-    final, ramp = 1e-3, 50.0
-    times = np.concatenate([np.linspace(5.0, 50.0, 10), [60.0, 100.0, 400.0, 1500.0]])
-    amounts = final * np.minimum(times / ramp, 1.0)
-    forces, energies = march(times, [shear(amount) for amount in amounts])
-    instantaneous = SKIN.shear_modulus_kpa / PRONY.long_term_share
-    top = CUBE.nodes_mm[:, 1] == 1.0
-    stress = forces[:, top, 0].sum(axis=1)
-    np.testing.assert_allclose(stress, instantaneous * final * ramp_factor(times, ramp), rtol=3e-6)
-    since, inside = times[:, None], np.minimum(times, ramp)[:, None]
-    spring = final / ramp * TIMES_MS * (np.exp(-(since - inside) / TIMES_MS) - np.exp(-since / TIMES_MS))
-    springs = PRONY.long_term_share * amounts**2 + (SHARES * spring**2).sum(axis=1)
-    np.testing.assert_allclose(energies, instantaneous * springs / 2, rtol=3e-6)
 
 
 def test_stored_energy_of_a_held_shear_decays_from_instantaneous_to_long_term():

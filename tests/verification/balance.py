@@ -139,3 +139,19 @@ def energy_adds_up() -> list[Row]:
         at_most(f"{name}: imbalance over work", 0.01, ordinary(name).energy.relative_imbalance)
         for name in INDENTERS
     ]
+
+
+@case(
+    THEME,
+    "Energy balance with many steps",
+    "External work = stored + dissipated + in the penalty's springs",
+    slow=True,
+)
+def energy_balance_many_steps() -> list[Row]:
+    """The same with 24 + 12 steps and tight contact."""
+    tight = PressSettings(24, 12, NewtonSettings(residual_tolerance=1e-6, penetration_tolerance=1e-3))
+    return [
+        at_most(f"{name}: imbalance over work", 0.005,
+                pressed(block(), indenter, RELAXING, settings=tight).energy.relative_imbalance)
+        for name, indenter in INDENTERS.items()
+    ]  # fmt: skip

@@ -14,12 +14,21 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from fingerpad.indenters import Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.configuration import Body, Load
+from fingerpad.mechanics.contact import Contact, place
+from fingerpad.mechanics.fields import cauchy_stress, skin_contact
+from fingerpad.mechanics.linear import LinearSolver, choose_preconditioner, free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material
-from fingerpad.mechanics.newton import NewtonSettings
+from fingerpad.mechanics.newton import NewtonSettings, find_equilibrium
 from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.viscoelastic import (
+    StepCoefficients,
+    StressHistory,
+    instantaneous_state,
+    stored_energy_density,
+)
 from fingerpad.mesh import Mesh, block_mesh
-from fingerpad.stimulus import RampAndHold
+from fingerpad.stimulus import ForceRampAndHold, RampAndHold
 
 from .case import Row, case, near
 from .solid import Solid
@@ -55,6 +64,7 @@ def round_mesh(radii, depths, sectors) -> Mesh:
     return replace(
         mesh,
         nodes_mm=nodes,
+        full=False,
         elements=number[mesh.elements],
         skin_grid=number[mesh.skin_grid],
         bone_nodes=np.unique(number[mesh.bone_nodes]),
@@ -64,20 +74,22 @@ def round_mesh(radii, depths, sectors) -> Mesh:
 
 
 def plane_mesh(sides, depths) -> Mesh:
-    """A slice of 1 mm in plane strain: no node moves along z."""
+    """A slice of 1 mm, one brick thick."""
     both = np.concatenate([-sides[:0:-1], sides])
-    mesh = block_mesh(both, depths, [0.0, 1.0], layers=[2] * (len(depths) - 1), symmetric=True)
-    return replace(mesh, symmetry_nodes=np.arange(len(mesh.nodes_mm)))
+    return block_mesh(both, depths, [0.0, 1.0], layers=[2] * (len(depths) - 1))
 
 
 @dataclass(frozen=True)
 class Pressed:
-    """A finished press of a uniform elastic block; all forces are of the solved half, or of the slice."""
+    """The end of a press of a uniform block; the force is that on the solved half, or on the slice."""
 
     solid: Solid
     displacement_mm: np.ndarray
+    depth_mm: float
     force_mn: float
     sed_kpa: np.ndarray
+    stress_kpa: np.ndarray
+    pressure_kpa: np.ndarray
 
     @property
     def nodal_force_mn(self):
@@ -90,25 +102,78 @@ class Pressed:
         return self.solid.mesh.nodes_mm[self.solid.mesh.skin_nodes]
 
     def sed_below(self, depth_mm):
-        """SED of the elements that touch the axis, at a depth between their centres. [kPa]"""
+        """SED on the axis at a depth. [kPa]"""
+        return self._below(depth_mm, self.sed_kpa)
+
+    def stress_below(self, depth_mm):
+        """Vertical stress on the axis at a depth. [kPa]"""
+        return -self._below(depth_mm, -self.stress_kpa[:, 1])
+
+    def _below(self, depth_mm, field):
+        """A positive field of the elements that touch the axis, at a depth between their centres."""
         mesh = self.solid.mesh
         corners = mesh.nodes_mm[mesh.elements]
         beside = np.abs(corners[:, :, 0]).min(axis=1) + np.abs(corners[:, :, 2]).min(axis=1)
         under = np.flatnonzero(beside < 1e-9)
         centre = corners[under, :, 1].mean(axis=1)
         levels = np.unique(centre.round(9))
-        mean = [self.sed_kpa[under[np.isclose(centre, level)]].mean() for level in levels]
+        mean = [field[under[np.isclose(centre, level)]].mean() for level in levels]
         return np.exp(np.interp(np.log(depth_mm), np.log(levels), np.log(mean)))
 
 
-def pressed(mesh, indenter, depth_mm, poisson) -> Pressed:
-    """Press a uniform block."""
+def pressed(mesh, indenter, depth_mm, poisson, force_mn=None) -> Pressed:
+    """Press a uniform block to a depth, or by a force on the whole of it."""
     material = Material.linear_elastic(YOUNG_KPA, poisson)
     placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
-    done = press(mesh, (material,) * 4, indenter, placement, RampAndHold(depth_mm, 1.0, 1.0),
-                 PressSettings(1, 1, TIGHT))  # fmt: skip
+    motion = RampAndHold(depth_mm, 1.0, 1.0) if force_mn is None else ForceRampAndHold(force_mn, 1.0, 1.0)
+    done = press(mesh, (material,) * 4, indenter, placement, motion, PressSettings(1, 1, TIGHT))
     return Pressed(
-        Solid(mesh, (material,) * 4), done.displacement_mm[-1], done.force_mn[-1] / 2, done.sed_kpa[-1]
+        solid=Solid(mesh, (material,) * 4),
+        displacement_mm=done.displacement_mm[-1],
+        depth_mm=done.depth_mm[-1],
+        force_mn=done.force_mn[-1] / 2,
+        sed_kpa=done.sed_kpa[-1],
+        stress_kpa=done.stress_kpa,
+        pressure_kpa=done.contact.pressure_kpa[-1],
+    )
+
+
+def pressed_slice(mesh, indenter, depth_mm, poisson) -> Pressed:
+    """Press a uniform slice in plane strain, which a press cannot hold: no node moves along z.
+
+    The product's contact, Newton's method and linear solver do the work.
+    """
+    material = Material.linear_elastic(YOUNG_KPA, poisson)
+    solid = Solid(mesh, (material,) * 4)
+    skin = mesh.nodes_mm[mesh.skin_nodes]
+    placement = place(indenter, skin, np.zeros(3), np.eye(3))
+    chosen = indenter.may_touch(placement.to_local(skin, 0.0))
+    contact = Contact(indenter, placement, mesh.skin_nodes[chosen], mesh.skin_area_mm2[chosen])
+    everywhere = np.arange(len(mesh.nodes_mm))
+    gripped = contact.nodes if indenter.grips else everywhere[:0]
+    free = free_degrees_of_freedom(everywhere.size, mesh.fixed_nodes, everywhere, gripped)
+    approximate, _ = choose_preconditioner(solid.sparsity, free, mesh.nodes_mm, poisson)
+    solver = LinearSolver(solid.sparsity, free, approximate)
+    step = StepCoefficients.of(solid.table, 1.0)
+    history = StressHistory.unloaded(len(mesh.elements), solid.table.shares.shape[1])
+    load = Load(contact, depth_mm, step, history.carried(step, mesh.layer))
+    found = find_equilibrium(
+        Body(mesh, solid.table, solid.sparsity, free), load, solver, np.zeros_like(mesh.nodes_mm),
+        np.zeros(contact.nodes.size), TIGHT,
+    )  # fmt: skip
+    where = mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, solid.table
+    stress, energies, volumetric = instantaneous_state(*where)
+    history = replace(history, instantaneous=stress)
+    on_skin = np.zeros((1, len(skin)))
+    on_skin[0, chosen] = found.contact.pressed_mn
+    return Pressed(
+        solid=solid,
+        displacement_mm=found.displacement_mm,
+        depth_mm=depth_mm,
+        force_mn=found.contact.pressed_mn.sum(),
+        sed_kpa=stored_energy_density(*where, history, energies, volumetric),
+        stress_kpa=cauchy_stress(mesh, solid.table, found.displacement_mm, history),
+        pressure_kpa=skin_contact(mesh, found.displacement_mm[None], on_skin).pressure_kpa[0],
     )
 
 
@@ -147,7 +212,7 @@ def hertz_sphere(poisson, fine=0.125, sectors=8):
 
 
 def sphere_rows(poisson):
-    """Force, contact radius, peak pressure and SED below a sphere against Hertz and Huber."""
+    """Force, contact radius, peak pressure, stress and SED below a sphere against Hertz and Huber."""
     done = hertz_sphere(poisson)
     force = 2 / 3 * reduced_modulus(poisson) * np.sqrt(RADIUS_MM) * (CONTACT_MM**2 / RADIUS_MM) ** 1.5
     forces = done.nodal_force_mn
@@ -160,10 +225,20 @@ def sphere_rows(poisson):
         near(f"nu = {poisson}: contact radius, from the second moment", CONTACT_MM, radius, 0.03, "mm"),
         near(
             f"nu = {poisson}: pressure at the centre",
-            peak, forces[centre] / done.solid.mesh.skin_area_mm2[centre], 0.05, "kPa",
+            peak, done.pressure_kpa[centre], 0.05, "kPa",
         ),
     ]  # fmt: skip
     for depth in (0.5, 1.0, 2.0):
+        down = -peak / (1 + depth**2)
+        rows.append(
+            near(
+                f"nu = {poisson}: vertical stress {depth} mm below",
+                down,
+                done.stress_below(depth),
+                0.05,
+                "kPa",
+            )
+        )
         expected = below("sphere", depth, peak, poisson)
         rows.append(
             near(f"nu = {poisson}: SED {depth} mm below", expected, done.sed_below(depth), 0.05, "kPa")
@@ -171,30 +246,43 @@ def sphere_rows(poisson):
     return rows
 
 
+@lru_cache(maxsize=1)
+def sphere_by_force():
+    """The same sphere pressed by the force that Hertz expects for a contact radius of 1 mm, nu = 0.3."""
+    edges = lines(0.125, 1.5, 100.0, 1.4)
+    force = 4 / 3 * reduced_modulus(0.3) * CONTACT_MM**3 / RADIUS_MM
+    return pressed(round_mesh(edges, edges, 8), Sphere(1000.0 / RADIUS_MM), None, 0.3, force_mn=force)
+
+
 @lru_cache(maxsize=2)
 def hertz_cylinder(poisson, fine=0.1):
     """Cylinder of 50 mm radius on a slice in plane strain, contact about 1 mm to either side."""
     edges = lines(fine, 1.5, 200.0, 1.3)
-    return pressed(plane_mesh(edges, edges), Cylinder(2 * RADIUS_MM), 0.05, poisson)
+    return pressed_slice(plane_mesh(edges, edges), Cylinder(2 * RADIUS_MM), 0.05, poisson)
 
 
 def cylinder_rows(poisson):
-    """Contact width, peak pressure and SED below a cylinder, all from the force that was found."""
+    """Contact width, peak pressure, stress and SED below a cylinder, all from the force that was found."""
     done = hertz_cylinder(poisson)
     forces, x = done.nodal_force_mn, done.skin_mm[:, 0]
     half_width = np.sqrt(4 * done.force_mn * RADIUS_MM / (np.pi * reduced_modulus(poisson)))
     peak = 2 * done.force_mn / (np.pi * half_width)
     found = 2 * np.sqrt((forces * x**2).sum() / forces.sum())
     centre = np.flatnonzero(x == 0.0)
-    pressure = forces[centre].sum() / done.solid.mesh.skin_area_mm2[centre].sum()
+    pressure = done.pressure_kpa[centre].mean()
     rows = [
         near(f"nu = {poisson}: half-width, from the second moment", half_width, found, 0.02, "mm"),
         near(f"nu = {poisson}: pressure at the centre", peak, pressure, 0.03, "kPa"),
     ]
     for share in (0.5, 1.0, 2.0):
+        down = -peak / np.sqrt(1 + share**2)
+        got = done.stress_below(share * half_width)
+        rows.append(
+            near(f"nu = {poisson}: vertical stress {share} half-widths below", down, got, 0.02, "kPa")
+        )
         expected = below("cylinder", share, peak, poisson)
         got = done.sed_below(share * half_width)
-        rows.append(near(f"nu = {poisson}: SED {share} half-widths below", expected, got, 0.05, "kPa"))
+        rows.append(near(f"nu = {poisson}: SED {share} half-widths below", expected, got, 0.02, "kPa"))
     return rows
 
 
@@ -236,14 +324,13 @@ def punch_rows():
     poisson, depth_mm = 0.3, 0.002
     done = punch()
     force = reduced_modulus(poisson) * depth_mm  # of half the punch
-    forces = done.nodal_force_mn
     distance = np.hypot(done.skin_mm[:, 0], done.skin_mm[:, 2])
     centre = np.flatnonzero(distance == 0.0)[0]
     mean = 2 * force / np.pi
     rows = [
         near("force of half the punch, E* a d", force, done.force_mn, 0.03, "mN"),
         near("pressure at the centre, F / (2 pi a²)", mean / 2,
-             forces[centre] / done.solid.mesh.skin_area_mm2[centre], 0.05, "kPa"),
+             done.pressure_kpa[centre], 0.05, "kPa"),
     ]  # fmt: skip
     down = done.displacement_mm[done.solid.mesh.skin_nodes, 1]
     midline = np.flatnonzero(done.skin_mm[:, 2] == 0.0)
@@ -259,7 +346,7 @@ def punch_rows():
 def line_load():
     """The product's line of 50 µm on a slice in plane strain, 5 µm deep."""
     sides = lines(0.025, 0.3, 400.0, 1.2)
-    return pressed(plane_mesh(sides, lines(0.05, 2.0, 400.0, 1.2)), Line(), 0.005, 0.3)
+    return pressed_slice(plane_mesh(sides, lines(0.05, 2.0, 400.0, 1.2)), Line(), 0.005, 0.3)
 
 
 SPHERE_SOURCE = "Hertz 1882; stresses on the axis by Huber 1904; Johnson 1985, ch. 3-4"
@@ -275,6 +362,22 @@ def sphere() -> list[Row]:
 def sphere_nearly_incompressible() -> list[Row]:
     """The same at nu = 0.48, as in the finger."""
     return sphere_rows(0.48)
+
+
+@case(THEME, "Sphere at the limit of incompressibility", SPHERE_SOURCE)
+def sphere_at_the_limit() -> list[Row]:
+    """The same at nu = 0.4999, the nearest to 0.5 that the product promises with its direct factor."""
+    return sphere_rows(0.4999)
+
+
+@case(THEME, "Sphere pressed by force", SPHERE_SOURCE)
+def sphere_force_control() -> list[Row]:
+    """The first sphere again, given the force on it instead of its depth, 4/3 E* a³ / R."""
+    done, force = sphere_by_force(), 2 / 3 * reduced_modulus(0.3) * CONTACT_MM**3 / RADIUS_MM
+    return [
+        near("force of half the sphere", force, done.force_mn, 1e-4, "mN"),
+        near("depth, (3 F / (4 E* √R))^(2/3)", CONTACT_MM**2 / RADIUS_MM, done.depth_mm, 0.02, "mm"),
+    ]
 
 
 @case(THEME, "Cylinder", "Hertz 1882; McEwen 1949; Johnson 1985, ch. 4")

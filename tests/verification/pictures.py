@@ -117,9 +117,8 @@ def contact() -> plt.Figure:
             np.abs(roll.skin_mm[:, 0]),
         ),
     ):
-        pressure = done.nodal_force_mn / done.solid.mesh.skin_area_mm2
         near = distance < 1.6 * reach
-        axes[0].plot(distance[near] / reach, pressure[near], ".", color=colour, label=name)
+        axes[0].plot(distance[near] / reach, done.pressure_kpa[near], ".", color=colour, label=name)
         axes[0].plot(fine, peak * np.sqrt(1 - fine**2), "-", color=colour, lw=1)
         depths = np.linspace(0.1, 3.0, 60) * reach
         axes[1].plot(
