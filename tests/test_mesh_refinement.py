@@ -103,13 +103,18 @@ def test_similar_meshes_press_the_same_at_the_same_places():
         assert set(mesh_refinement.CHOSEN_SPHERES) <= set(level.spheres)
 
 
-def test_each_single_change_moves_one_thing():
-    standard = single_unit.touches(Conditions("standard"))[mesh_refinement.PEAK_SHIFT]
-    for touch in mesh_refinement.single_changes().values():
-        assert touch != standard
-        assert replace(touch, grading=standard.grading) == standard
-    for counts in mesh_refinement.step_changes().values():
+def test_each_single_change_moves_only_the_mesh_or_only_the_steps():
+    standard = {
+        "bar": single_unit.touches(Conditions("standard"))[mesh_refinement.PEAK_SHIFT],
+        "sphere": sphere_discrimination.touches(Conditions("standard"))[0.0, 287.0],
+    }
+    for name, touches in mesh_refinement.single_changes().items():
+        for touch in touches.values():
+            assert touch != standard[name]
+            assert replace(touch, grading=standard[name].grading) == standard[name]
+    for name, counts in mesh_refinement.step_changes().items():
         few, many = counts.values()
+        assert few.indenter == standard[name].indenter
         assert replace(few, settings=many.settings) == many
         assert (few.settings.ramp_steps, many.settings.hold_steps) == mesh_refinement.STEPS
 
@@ -252,7 +257,7 @@ def test_a_run_presses_every_mesh_and_finds_the_known_error_and_order(results):
     found, solved, levels = results
     n_steps = 2 * len(mesh_refinement.STEPS)
     n_touches = sum(len(level.shifts) + len(level.spheres) for level in levels)
-    assert len(solved) == n_touches + len(mesh_refinement.ONE_AT_A_TIME) + n_steps
+    assert len(solved) == n_touches + sum(map(len, mesh_refinement.ONE_AT_A_TIME.values())) + n_steps
     fine = 1.0 + ERROR / 1.5**2
     expected = {
         "coarse": (1.0 + 4.0 * ERROR) / fine - 1.0,
@@ -269,8 +274,12 @@ def test_a_run_presses_every_mesh_and_finds_the_known_error_and_order(results):
         assert row["order"] == pytest.approx(2.0, rel=1e-6)
         assert row["limit_kpa"] == pytest.approx(row["sed_kpa"][-1] / fine, rel=1e-6)
     halved = (1.0 + ERROR / 4.0) / (1.0 + ERROR) - 1.0
-    assert found["one_at_a_time"]["half the size along the finger"]["sed_ramp"] == pytest.approx(halved)
-    assert found["one_at_a_time"]["twice the elements through the dermis"]["sed_hold"] == pytest.approx(0.0)
+    changes = found["one_at_a_time"]
+    assert changes["bar"]["half the size along the finger"]["sed_ramp"] == pytest.approx(halved)
+    for name in ("bar", "sphere"):
+        assert changes[name]["twice the elements through dermis and subcutis"]["sed_hold"] == pytest.approx(
+            0.0
+        )
     assert found["steps"]["bar"]["sed"]["ramp"]["max"] == 0.0
 
 
@@ -287,8 +296,9 @@ def test_pages_say_every_mesh_with_its_errors(results):
     assert f"% | {' | '.join(shown)} |" in page
     rate = 100.0 * found["spheres"]["hit_rates"]["fine"]["static"][1]
     assert f"{rate:.1f} %" in page
-    for name in mesh_refinement.ONE_AT_A_TIME:
-        assert f"| {name} |" in page
+    for name, changes in mesh_refinement.ONE_AT_A_TIME.items():
+        for change in changes:
+            assert f"| {name} | {change} |" in page
     tables = [block.splitlines() for block in page.split("\n\n") if block.startswith("|")]
     for table in tables:
         assert len({line.count("|") for line in table}) == 1

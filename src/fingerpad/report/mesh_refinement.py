@@ -143,12 +143,13 @@ def markdown(results: Mapping[str, Any]) -> str:
                 for name, rates in results["spheres"]["hit_rates"].items()
             ],
         ),
-        "One change of the standard mesh at a time, bar shifted to the highest peak:",
+        "One change of the standard mesh at a time; bar shifted to the highest peak, standard sphere:",
         _table(
-            ("change", "SED, ramp", "SED, hold", "force"),
+            ("touch", "change", "largest SED, ramp", "hold", "force"),
             [
-                (name, *(_signed(change[key]) for key in ("sed_ramp", "sed_hold", "force")))
-                for name, change in results["one_at_a_time"].items()
+                (name, change, *(_signed(does[key]) for key in ("sed_ramp", "sed_hold", "force")))
+                for name, changes in results["one_at_a_time"].items()
+                for change, does in changes.items()
             ],
         ),
         "Few steps against many in ramp and in hold, on the quick mesh:",

@@ -99,16 +99,24 @@ LEVELS = (
 )
 """From coarse to fine. All but quick are similar to each other, so that they show an order of convergence."""
 
-ONE_AT_A_TIME: dict[str, dict[str, Any]] = {
-    "half the size along the finger": {"size_x_mm": 0.05},
-    "half the size across the finger": {"size_z_mm": 0.25},
-    "twice the elements through the epidermis": {"stratum_corneum": 8, "living_epidermis": 2},
-    "twice the elements through the dermis": {"dermis": 8},
-    "twice the elements through the subcutis": {"subcutis": 8},
-    "twice the elements through dermis and subcutis": {"dermis": 8, "subcutis": 8},
-    "half the growth and the largest size": {"growth": 1.3**0.5, "largest_mm": 1.5},
+_EPIDERMIS = {"stratum_corneum": 8, "living_epidermis": 2}
+ONE_AT_A_TIME: dict[str, dict[str, dict[str, Any]]] = {
+    "bar": {
+        "half the size along the finger": {"size_x_mm": 0.05},
+        "half the size across the finger": {"size_z_mm": 0.25},
+        "twice the elements through the epidermis": _EPIDERMIS,
+        "twice the elements through the dermis": {"dermis": 8},
+        "twice the elements through the subcutis": {"subcutis": 8},
+        "twice the elements through dermis and subcutis": {"dermis": 8, "subcutis": 8},
+        "half the growth and the largest size": {"growth": 1.3**0.5, "largest_mm": 1.5},
+    },
+    "sphere": {
+        "two thirds of the size along and across": {"size_x_mm": 0.25 / 1.5, "size_z_mm": 0.25 / 1.5},
+        "twice the elements through the epidermis": _EPIDERMIS,
+        "twice the elements through dermis and subcutis": {"dermis": 8, "subcutis": 8},
+    },
 }
-"""Changes of the standard mesh under the bar, each on its own."""
+"""Changes of the standard meshes, each on its own, under the bar at its highest peak and the first sphere."""
 
 STEPS = (8, 32)
 """Steps in ramp and in hold that are compared, on the quick mesh."""
@@ -159,25 +167,31 @@ def _at_factor(touch: Touch, factor: float) -> Touch:
     return touch if factor == 1.0 else replace(touch, grading=refined(touch.grading, factor))
 
 
-def single_changes() -> dict[str, Touch]:
-    """Return the bar at its highest peak on standard meshes that differ in one thing."""
-    touch = single_unit.touches(Conditions("standard"))[PEAK_SHIFT]
+def single_changes() -> dict[str, dict[str, Touch]]:
+    """Return bar and sphere on standard meshes that differ from the preset in one thing."""
+    presets = _examples(Conditions("standard"))
     return {
-        name: replace(touch, grading=replace(touch.grading, **change))
-        for name, change in ONE_AT_A_TIME.items()
+        name: {
+            change: replace(touch, grading=replace(touch.grading, **values))
+            for change, values in ONE_AT_A_TIME[name].items()
+        }
+        for name, touch in presets.items()
     }
 
 
 def step_changes() -> dict[str, dict[int, Touch]]:
-    """Return the bar at its highest peak and the standard sphere on quick meshes, by number of steps."""
-    quick = Conditions("quick")
-    pressed = {
-        "bar": single_unit.touches(quick)[PEAK_SHIFT],
-        "sphere": sphere_discrimination.touches(quick)[CHOSEN_SPHERES[0]],
-    }
+    """Return bar and sphere on quick meshes, by number of steps."""
     return {
         name: {count: replace(touch, settings=PressSettings(count, count)) for count in STEPS}
-        for name, touch in pressed.items()
+        for name, touch in _examples(Conditions("quick")).items()
+    }
+
+
+def _examples(conditions: Conditions) -> dict[str, Touch]:
+    """Return the bar at its highest peak and the standard sphere."""
+    return {
+        "bar": single_unit.touches(conditions)[PEAK_SHIFT],
+        "sphere": sphere_discrimination.touches(conditions)[CHOSEN_SPHERES[0]],
     }
 
 
@@ -211,7 +225,7 @@ def run(folder: Path, jobs: int = 1, progress: Progress | None = None) -> dict[s
     groups: dict[str, list[Touch]] = {
         name: [*bars.values(), *balls.values()] for name, (bars, balls) in pressed.items()
     }
-    groups["one at a time"] = list(changes.values())
+    groups["one at a time"] = [touch for each in changes.values() for touch in each.values()]
     groups["steps"] = [touch for counts in steps.values() for touch in counts.values()]
     for name, touches in groups.items():
         with progress.stage(name, sum(not store.holds(touch) for touch in touches)) as advance:
@@ -226,7 +240,11 @@ def run(folder: Path, jobs: int = 1, progress: Progress | None = None) -> dict[s
 
     bars = {name: reading(touches, receptor) for name, (touches, _) in pressed.items()}
     balls = {name: reading(touches, population.positions_mm) for name, (_, touches) in pressed.items()}
-    changed = {name: reading({PEAK_SHIFT: touch}, receptor) for name, touch in changes.items()}
+    receptors = {"bar": receptor, "sphere": population.positions_mm}
+    standard = {
+        "bar": bars["standard"].only([PEAK_SHIFT]),
+        "sphere": balls["standard"].only(CHOSEN_SPHERES[:1]),
+    }
     neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
     return plain(
         {
@@ -234,14 +252,15 @@ def run(folder: Path, jobs: int = 1, progress: Progress | None = None) -> dict[s
             "levels": [_described(level) for level in LEVELS],
             "bars": _bars(bars),
             "spheres": _balls(balls, neighbours),
-            "one_at_a_time": _one_at_a_time(bars["standard"].only([PEAK_SHIFT]), changed),
+            "one_at_a_time": {
+                name: {
+                    change: _changed(standard[name], reading({0: touch}, receptors[name]))
+                    for change, touch in each.items()
+                }
+                for name, each in changes.items()
+            },
             "steps": {
-                name: _steps(
-                    {
-                        count: reading({0: touch}, receptor if name == "bar" else population.positions_mm)
-                        for count, touch in counts.items()
-                    }
-                )
+                name: _steps({count: reading({0: touch}, receptors[name]) for count, touch in counts.items()})
                 for name, counts in steps.items()
             },
         }
@@ -344,15 +363,14 @@ def _balls(readings: Mapping[str, Reading], neighbours: np.ndarray) -> dict[str,
     }
 
 
-def _one_at_a_time(standard: Reading, changed: Mapping[str, Reading]) -> dict[str, Any]:
-    """Return what each change does at the peak, as a share of it."""
+def _changed(standard: Reading, changed: Reading) -> dict[str, float]:
+    """Return what a change does to the largest SED and to the force, as shares of them."""
     return {
-        name: {
-            "sed_ramp": float(reading.sed_kpa["ramp"][0, 0] / standard.sed_kpa["ramp"][0, 0]) - 1.0,
-            "sed_hold": float(reading.sed_kpa["hold"][0, 0] / standard.sed_kpa["hold"][0, 0]) - 1.0,
-            "force": float(reading.force_mn[0] / standard.force_mn[0]) - 1.0,
-        }
-        for name, reading in changed.items()
+        **{
+            f"sed_{phase}": float(changed.sed_kpa[phase].max() / sed.max()) - 1.0
+            for phase, sed in standard.sed_kpa.items()
+        },
+        "force": float(changed.force_mn[0] / standard.force_mn[0]) - 1.0,
     }
 
 
