@@ -81,7 +81,7 @@ def case_text(case: Case) -> str:
     return "\n".join(lines)
 
 
-def page_text(cases: list[Case], pictures: dict[str, str], stamp: str) -> str:
+def page_text(cases: list[Case], pictures: dict[str, str], stamp: str, closing: str = "") -> str:
     """The whole page.
 
     Parameters
@@ -92,6 +92,8 @@ def page_text(cases: list[Case], pictures: dict[str, str], stamp: str) -> str:
         Markdown of the pictures of a theme.
     stamp : str
         Date and versions.
+    closing : str
+        Markdown of a last section, without cases.
     """
     rows = [row for case in cases for row in case.rows]
     held = sum(row.passes for row in rows)
@@ -110,6 +112,7 @@ def page_text(cases: list[Case], pictures: dict[str, str], stamp: str) -> str:
         if theme in pictures:
             parts.append(pictures[theme] + "\n")
         parts += [case_text(case) + "\n" for case in cases if case.theme == theme]
+    parts.append("\n" + closing)
     return "\n".join(parts).rstrip() + "\n"
 
 
@@ -121,6 +124,8 @@ def rows_shown(text: str) -> dict[str, list[list[str]]]:
         if found := re.match(r"\*Source: .*\* `(\w+)`", line):
             name = found[1]
             shown[name] = []
+        elif line.startswith("## "):
+            name = ""  # tables of a section without cases are its own
         elif name and line.startswith("| ") and not line.startswith("| quantity"):
             shown[name].append([cell.strip() for cell in line.strip("|").split("|")])
     return shown

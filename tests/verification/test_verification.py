@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from .case import at_least, at_most, equal, near
 from .cases import ORDERED, THEMES
 from .page import PAGE, allowance, case_text, expectation, page_text, rows_shown
+from .refinement import PICTURE, section, stored_results
 
 FAST = [case for case in ORDERED if not case.slow]
 SHOWN = rows_shown(PAGE.read_text(encoding="utf-8"))
@@ -35,6 +37,30 @@ def test_the_page_shows_what_is_measured(case):
     assert [(cells[0], cells[1], cells[5]) for cells in SHOWN[case.name]] == measured
     bounds = [(row.quantity, expectation(row)) for row in case.rows if "≤" in expectation(row)]
     assert [(cells[0], cells[2]) for cells in SHOWN[case.name] if "≤" in cells[2]] == bounds
+
+
+def test_the_page_ends_with_the_stored_refinement_which_belongs_to_no_case():
+    text = PAGE.read_text(encoding="utf-8")
+    assert text.endswith("\n" + section().rstrip() + "\n")
+    assert PICTURE.exists()
+    assert rows_shown(page_text(FAST[:1], {}, "", section())) == rows_shown(page_text(FAST[:1], {}, ""))
+
+
+def test_stored_errors_are_those_of_the_stored_profiles():
+    """Largest differences of SED and rates again from the profiles, so that none on the page is stale."""
+    bars = stored_results()["bars"]
+    finest = bars["profiles"]["fine"]
+    columns = [("sed", "ramp", "sed_ramp_kpa"), ("sed", "hold", "sed_hold_kpa"),
+               ("rate", "dynamic", "dynamic_rate_hz"), ("rate", "static", "static_rate_hz")]  # fmt: skip
+    for name, errors in bars["errors"].items():
+        profile = bars["profiles"][name]
+        rows = [profile["shift_mm"].index(shift) for shift in finest["shift_mm"]]
+        assert errors["touches"] == len(rows)
+        for kind, phase, column in columns:
+            finer = np.array(finest[column])
+            unit = finer.max() if kind == "sed" else 1.0
+            largest = np.abs(np.array(profile[column])[rows] - finer).max() / unit
+            assert errors[kind][phase]["max"] == pytest.approx(largest, rel=1e-12)
 
 
 def test_names_and_titles_of_cases_are_their_own():

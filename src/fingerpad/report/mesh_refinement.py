@@ -117,18 +117,26 @@ def markdown(results: Mapping[str, Any]) -> str:
         "Largest SED of a touch at the end of the ramp on the similar meshes, order of convergence and limit "
         "(Richardson); no order where the values do not settle:",
         _table(
-            ("touch", *_similar(results), "order", "limit [kPa]", "standard from the limit"),
-            [
-                _order_row(row, _similar(results))
-                for name in ("bars", "spheres")
-                for row in results[name]["orders"]
-            ],
+            (
+                "touch",
+                *(f"{name} [kPa]" for name in _similar(results)),
+                "order",
+                "limit [kPa]",
+                "standard less limit",
+            ),
+            [row for name in ("bars", "spheres") for row in _order_rows(results[name], _similar(results))],
         ),
-        "Goodness of fit at the shifts of the row above, parameters unchanged:",
+        "Goodness of fit at the common shifts, parameters unchanged:",
         _table(
-            ("mesh", "weighted FSS", "on the finer mesh"),
+            ("mesh", "against", "touches", "weighted FSS", "on the finer mesh"),
             [
-                (name, fixed(row["fss"], 3), fixed(row["fss_finest"], 3))
+                (
+                    name,
+                    row["against"],
+                    str(row["touches"]),
+                    fixed(row["fss"], 3),
+                    fixed(row["fss_finest"], 3),
+                )
                 for name, row in _against(results["bars"], finest)
             ],
         ),
@@ -208,16 +216,21 @@ def _similar(results: Mapping[str, Any]) -> list[str]:
     return [level["name"] for level in results["levels"] if level["resolution"] == "standard"]
 
 
-def _order_row(row: Mapping[str, Any], names: Sequence[str]) -> Sequence[str]:
-    limit = row["limit_kpa"]
-    standard = row["sed_kpa"][names.index("standard")]
-    return (
-        row["touch"],
-        *(fixed(value, 3) for value in row["sed_kpa"]),
-        fixed(row["order"], 1),
-        fixed(limit, 3),
-        _signed(standard / limit - 1.0) if limit else ABSENT,
-    )
+def _order_rows(section: Mapping[str, Any], names: Sequence[str]) -> list[Sequence[str]]:
+    """Rows of the orders; the distance from the limit is a share of the largest SED on the finest mesh."""
+    peak = max(row["sed_kpa"][-1] for row in section["orders"])
+    return [
+        (
+            row["touch"],
+            *(fixed(value, 3) for value in row["sed_kpa"]),
+            fixed(row["order"], 1),
+            fixed(row["limit_kpa"], 3),
+            ABSENT
+            if row["limit_kpa"] is None
+            else _signed((row["sed_kpa"][names.index("standard")] - row["limit_kpa"]) / peak),
+        )
+        for row in section["orders"]
+    ]
 
 
 def _measures(section: Mapping[str, Any]) -> list[tuple[str, float]]:
@@ -230,7 +243,15 @@ def _share(value: float) -> str:
 
 
 def _signed(value: float) -> str:
-    return ("+" if value > 0.0 else "") + _share(value)
+    """Share with its sign; nothing is neither above nor below nothing.
+
+    >>> _signed(0.034), _signed(-0.052), _signed(-0.0001)
+    ('+3.4 %', '−5.2 %', '0.0 %')
+    """
+    text = _share(value)
+    if not any(digit in text for digit in "123456789"):
+        return _share(0.0)
+    return text if value < 0.0 else f"+{text}"
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
