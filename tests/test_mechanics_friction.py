@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from fingerpad.errors import InputError
-from fingerpad.export.job import job_of
 from fingerpad.fingertip import Fingertip
 from fingerpad.indentation import touch_of
 from fingerpad.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
@@ -307,8 +306,3 @@ def test_wire_has_no_friction_to_choose():
 def test_touches_of_other_friction_are_other_touches():
     touches = [touch_of(Fingertip(), Sphere(287.0), friction=coefficient) for coefficient in (0.0, 0.3)]
     assert touch_key(touches[0]) != touch_key(touches[1])
-
-
-def test_deck_that_would_leave_friction_out_is_refused():
-    with pytest.raises(InputError, match=r"no friction: set friction to 0, not 0\.3"):
-        job_of(touch_of(Fingertip(), Sphere(287.0), friction=0.3))
