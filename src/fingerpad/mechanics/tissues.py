@@ -64,11 +64,11 @@ def trial_3_wu() -> Tissues:
 
 
 def three_levels() -> Tissues:
-    """Between the trials: deflection, firing and discrimination alike (docs/decisions)."""
-    epidermis = _shear(published.THREE_LEVELS_EPIDERMIS_SHEAR)
+    """Trial 3 whose dermis and subcutis stiffen: serves deflection, firing and discrimination alike."""
+    epidermis = _linear(published.MAENO_EPIDERMIS_YOUNG)
     dermis, subcutis = (
-        _shear(published.THREE_LEVELS_DERMIS_SHEAR),
-        _shear(published.THREE_LEVELS_SUBCUTIS_SHEAR),
+        Material.polynomial(c10, 0.0, published.STIFFENING_RATIO.value * c10, 0.0, 0.0, NU, skin_prony())
+        for c10 in (published.SOFT_MIX_DERMIS_SHEAR.value / 2, published.SOFT_MIX_SUBCUTIS_SHEAR.value / 2)
     )
     return Tissues(epidermis, epidermis, dermis, subcutis)
 

@@ -85,15 +85,12 @@ SOFT_MIX_SUBCUTIS_SHEAR = Published(
     "neo-Hookean shear modulus of the subcutis, stand-in for Trial 3", 4.75, "kPa", _IDENTIFIED, "assumed"
 )
 
-_THREE_LEVELS = "identified by us from deflection, firing rates and hit rates at once: one value of many"
-THREE_LEVELS_EPIDERMIS_SHEAR = Published(
-    "neo-Hookean shear modulus of the epidermis, set for three levels", 350.0, "kPa", _THREE_LEVELS, "assumed"
-)
-THREE_LEVELS_DERMIS_SHEAR = Published(
-    "neo-Hookean shear modulus of the dermis, set for three levels", 25.4, "kPa", _THREE_LEVELS, "assumed"
-)
-THREE_LEVELS_SUBCUTIS_SHEAR = Published(
-    "neo-Hookean shear modulus of the subcutis, set for three levels", 7.0, "kPa", _THREE_LEVELS, "assumed"
+STIFFENING_RATIO = Published(
+    "C20 over C10 of dermis and subcutis in the set for three levels",
+    5.0,
+    "1",
+    "identified by us from deflection, firing rates and hit rates at once: one value of those that serve all",
+    "assumed",
 )
 
 SKIN_PRONY_SHARES = Published("Prony shares g_1..2 of skin, Wu", (0.148, 0.252), "1", _WU, "recalled")

@@ -32,9 +32,6 @@ INTERMEDIATE = (
 GRID_KPA = ((20.0, 46.0, 184.0, 675.7), (2.373, 4.75, 8.0, 11.5, 18.0))
 """Shear moduli of epidermis and subcutis that are combined over Trial 3's dermis. [kPa]"""
 
-STIFFENING = 5.0
-"""C20 over C10 in the set that stiffens."""
-
 
 def layered(epidermis_kpa: float, dermis: float | Material, subcutis: float | Material) -> Tissues:
     """Tissues from shear moduli [kPa] or laws of dermis and subcutis, relaxing as in the paper's trials.
@@ -123,7 +120,13 @@ def candidates() -> tuple[MaterialSet, ...]:
         MaterialSet(name, layered(epidermis, dermis, subcutis), f"assumed: {basis}")
         for name, epidermis, dermis, subcutis, basis in INTERMEDIATE
     )
-    return (*named, *from_wu, *between, _stiffening())
+    ratio = published.STIFFENING_RATIO.value
+    stiffening = MaterialSet(
+        "stiffening",
+        named_tissues("three_levels"),
+        f"assumed: Trial 3 with C20 = {ratio:g} C10 in dermis and subcutis",
+    )
+    return (*named, *from_wu, *between, stiffening)
 
 
 def deflection_candidates() -> tuple[MaterialSet, ...]:
@@ -152,16 +155,6 @@ def deflection_candidates() -> tuple[MaterialSet, ...]:
         for curve, poisson in ((foam_poisson, NU), (foam_poisson, foam_poisson))
     )
     return (*grid, *wu, _compressible())
-
-
-def _stiffening() -> MaterialSet:
-    """Trial 3 whose dermis and subcutis stiffen: the same initial moduli, and C20 beside C10."""
-    dermis, subcutis = (
-        Material.polynomial(shear / 2, 0.0, STIFFENING * shear / 2, 0.0, 0.0, NU, skin_prony())
-        for shear in (DERMIS_KPA, SUBCUTIS_KPA)
-    )
-    basis = f"assumed: Trial 3 with C20 = {STIFFENING:g} C10 in dermis and subcutis"
-    return MaterialSet("stiffening", layered(SOFT_EPIDERMIS_KPA, dermis, subcutis), basis)
 
 
 def _compressible() -> MaterialSet:
