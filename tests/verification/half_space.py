@@ -16,11 +16,12 @@ from scipy.optimize import brentq
 from fingerpad.indenters import Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
 from fingerpad.mechanics.configuration import Body, Load
 from fingerpad.mechanics.contact import Contact, place
-from fingerpad.mechanics.fields import cauchy_stress, skin_contact
+from fingerpad.mechanics.fields import cauchy_stress
 from fingerpad.mechanics.linear import LinearSolver, choose_preconditioner, free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.newton import NewtonSettings, find_equilibrium
 from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.skin_contact import skin_contact
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
     StressHistory,
