@@ -83,6 +83,16 @@ def test_coefficients_are_the_integrals_of_the_branch_stress(step_ms):
         np.testing.assert_allclose(found[0, 0], expected, rtol=1e-8)
 
 
+def test_short_steps_have_the_coefficient_of_long_ones():
+    """The series below x = 0.01 against the formula in longer numbers, to more digits than a quadrature has."""
+    tau = PRONY.times_ms[0]
+    for x in (2e-3, 5e-3, 9.9e-3, 1.01e-2):
+        found = DissipationCoefficients.of(MaterialTable.of([RELAXING]), x * tau).increment[0, 0]
+        long = np.longdouble(x)
+        expected = (2 * long + 4 * np.expm1(-long) - np.expm1(-2 * long)) / long**2
+        np.testing.assert_allclose(found, float(expected), rtol=1e-11)
+
+
 # One element
 
 
