@@ -84,7 +84,7 @@ def test_coefficients_are_the_integrals_of_the_branch_stress(step_ms):
 
 
 def test_short_steps_have_the_coefficient_of_long_ones():
-    """The series below x = 0.01 against the formula in longer numbers, to more digits than a quadrature has."""
+    """The series below x = 0.01 against the formula in longer numbers: more digits than quadrature has."""
     tau = PRONY.times_ms[0]
     for x in (2e-3, 5e-3, 9.9e-3, 1.01e-2):
         found = DissipationCoefficients.of(MaterialTable.of([RELAXING]), x * tau).increment[0, 0]
