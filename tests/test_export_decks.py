@@ -498,6 +498,25 @@ def test_skin_rubs_where_it_shall():
         replace(job, friction=-0.1)
 
 
+@pytest.mark.parametrize("tilt_deg", [0.0, -20.0, 20.0])
+def test_facets_reach_as_far_as_the_skin(tilt_deg):
+    """At the tip the skin slopes, and a sphere is touched on its side; facets cover what the skin passes."""
+    touch = fp.touch_of(
+        Fingertip(),
+        Sphere(200.0),
+        fp.RampAndHold(depth_mm=0.4),
+        grading=COARSE,
+        at_mm=(26.5, 0.0),
+        tilt_deg=tilt_deg,
+    )
+    job = job_of(touch)
+    skin = job.placement.to_local(job.mesh.nodes_mm[job.mesh.skin_nodes], 0.4)
+    inside = skin[job.indenter.gap(skin)[0] < 0.0]
+    assert len(inside) > 0
+    facets = job.placement.to_local(job.rigid.nodes_mm[: len(job.rigid.nodes_mm) // 2], 0.0)
+    assert facets[:, 1].min() <= inside[:, 1].min()
+
+
 def test_a_line_holds_the_skin_that_it_grips():
     job = block_job(Line(2.5))
     for write in (abaqus_deck, calculix_deck):

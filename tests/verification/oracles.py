@@ -14,18 +14,21 @@ import numpy as np
 
 from fingerpad.export import cards
 from fingerpad.export.calculix import calculix_deck
-from fingerpad.export.job import Job
+from fingerpad.export.job import Job, job_of
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import Grading
+from fingerpad.indentation import Touch
 from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.laws import Polynomial
-from fingerpad.mechanics.materials import Material
+from fingerpad.mechanics.materials import Material, Tissues
 from fingerpad.mechanics.press import PressSettings, press
 from fingerpad.mesh import block_mesh
 from fingerpad.stimulus import RampAndHold
 
 from . import calculix
 from .case import Row, at_most, case, near
-from .oracle_block import LIVING_EPIDERMIS, YOUNG_KPA, job, ours
+from .oracle_block import LIVING_EPIDERMIS, POISSON, YOUNG_KPA, job, ours
 
 THEME = "Other solvers"
 CALCULIX = "CalculiX 2.20 (Dhondt), Debian package calculix-ccx, on the deck of `calculix_deck`"
@@ -133,6 +136,36 @@ def calculix_indenters() -> list[Row]:
         with tempfile.TemporaryDirectory() as folder:
             found = calculix.run(calculix_deck(pressed), Path(folder), len(mesh.elements), ())
         rows.append(near(name, 2.0 * found.force_mn[-1] @ placement.axis, got, COARSE_MESH, "mN"))
+    return rows
+
+
+@case(THEME, "CalculiX, the tip of a finger", CALCULIX, slow=True, runs=RUNS)
+def calculix_finger() -> list[Row]:
+    """A coarse finger of Trial 1's moduli, a sphere 0.4 mm deep on the slope of its tip: force at the end.
+
+    Wedges (C3D6) lie among the bricks that may touch. Tilted by -20 degrees, the sphere meets the skin with its
+    side, not with its pole.
+    """
+    finger = Fingertip()
+    grading = Grading(
+        centre_mm=27.0, half_length_mm=3.0, half_width_mm=2.5, size_x_mm=0.8, size_z_mm=0.8, growth=1.3,
+        stratum_corneum=1, living_epidermis=1, dermis=2, subcutis=3, largest_mm=3.0,
+    )  # fmt: skip
+    tissues = Tissues(*(Material.linear_elastic(young, POISSON) for young in YOUNG_KPA))
+    motion = RampAndHold(depth_mm=0.4, ramp_ms=10.0, hold_ms=1.0)
+    rows = []
+    for tilt_deg in (0.0, -20.0):
+        touch = Touch(
+            finger, Sphere(curvature_per_m=200.0), motion, tissues, grading,
+            PressSettings(ramp_steps=2, hold_steps=1), at_mm=(26.5, 0.0), tilt_deg=tilt_deg,
+        )  # fmt: skip
+        exported = job_of(touch, times_ms=[0.0, 5.0, 10.0])
+        with tempfile.TemporaryDirectory() as folder:
+            found = calculix.run(calculix_deck(exported), Path(folder), len(exported.mesh.elements), ())
+        force = 2.0 * found.force_mn[-1] @ touch.placement.axis
+        rows.append(
+            near(f"tilted by {tilt_deg:g} degrees", force, touch.solve().force_mn[2], COARSE_MESH, "mN")
+        )
     return rows
 
 

@@ -26,6 +26,9 @@ CONTACT_KPA_PER_MM = 50_000.0
 BESIDE_INDENTER_MM = 2.0
 """How far beside the indenter, beyond its depth, the skin may still come to touch it. [mm]"""
 
+BESIDE_FACETS_MM = 0.1
+"""How far beyond the undeformed skin that it passes through the facets of an indenter go on. [mm]"""
+
 
 @dataclass(frozen=True)
 class Phase:
@@ -177,10 +180,14 @@ class Job:
     @cached_property
     def rigid(self) -> RigidMesh:
         """Facets of the indenter where it may touch, at first touch in the frame of the body."""
-        z = self._local(self.mesh.nodes_mm)[:, 2]
-        beyond = self.depths_mm.max() + BESIDE_INDENTER_MM
-        extent = float(z.min() - beyond), float(z.max() + beyond)
-        local = rigid_mesh(self.outline, -2.0 * self.depths_mm.max() - 0.1, extent)
+        deepest = float(self.depths_mm.max())
+        skin = self.placement.to_local(self.mesh.nodes_mm[self.mesh.skin_nodes], deepest)
+        # Undeformed skin reaches further up the sides of the indenter than skin that gives way.
+        reached = skin[self.indenter.gap(skin)[0] < BESIDE_FACETS_MM]
+        lowest = min(-2.0 * deepest, float(reached[:, 1].min(initial=0.0))) - BESIDE_FACETS_MM
+        beyond = deepest + BESIDE_INDENTER_MM
+        extent = float(skin[:, 2].min() - beyond), float(skin[:, 2].max() + beyond)
+        local = rigid_mesh(self.outline, lowest, extent)
         nodes = self.placement.origin_mm + local.nodes_mm @ self.placement.rotation.T
         return RigidMesh(nodes, local.quads, local.triangles)
 
