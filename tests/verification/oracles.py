@@ -143,8 +143,8 @@ def calculix_indenters() -> list[Row]:
 def calculix_finger() -> list[Row]:
     """A coarse finger of Trial 1's moduli, a sphere 0.4 mm deep on the slope of its tip: force at the end.
 
-    Wedges (C3D6) lie among the bricks that may touch. Tilted by -20 degrees, the sphere meets the skin with its
-    side, not with its pole.
+    Wedges (C3D6) lie among the bricks that may touch. Tilted by -20 degrees, the sphere meets the skin with
+    its side, not with its pole.
     """
     finger = Fingertip()
     grading = Grading(
