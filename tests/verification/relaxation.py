@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.interpolate import interp1d
 
 from fingerpad.indenters import Sphere
 from fingerpad.mechanics.contact import place
@@ -18,6 +19,7 @@ from fingerpad.mechanics.viscoelastic import (
 from fingerpad.mesh import block_mesh
 from fingerpad.stimulus import RampAndHold
 
+from . import balance
 from .case import Row, at_most, case, near
 from .laws import CUBE
 from .solid import Solid
@@ -181,3 +183,31 @@ def relaxing_block() -> list[Row]:
         ]
     ratio = errors[0.499] / errors[0.49]
     return [*rows, at_most("largest error at nu = 0.499 over that at nu = 0.49", 0.15, ratio)]
+
+
+@case(THEME, "Steps in time by a bound on SED", "120 even and growing steps; the tolerance itself", slow=True)
+def chosen_steps() -> list[Row]:
+    """A relaxing layered block pressed 0.3 mm deep by steps that a tolerance on SED chooses, linear in
+    between: largest difference from 40 + 80 steps at any of their times in the living epidermis, over its
+    largest SED. Under a sphere on elements as coarse as these (0.4 mm), a node that first meets it within a
+    step bends SED there, which no earlier step can tell: the bound then holds up to a quarter of itself."""
+    fine = PressSettings(40, 80, NewtonSettings(residual_tolerance=1e-6, penetration_tolerance=2e-4))
+    rows = []
+    for name, bound in (("plate", 1.0), ("sphere", 1.25)):
+        for tolerance in (0.05, 0.01):
+            error = error_of_steps(name, fine, PressSettings(sed_tolerance=tolerance))
+            rows.append(
+                at_most(f"{name}, tolerance {tolerance}: error over tolerance", bound, error / tolerance)
+            )
+    return rows
+
+
+def error_of_steps(name, fine, chosen):
+    """Largest difference of SED over time between two choices of steps, over its largest value."""
+    receptors = balance.block().living_epidermis.ravel()
+    truth, done = (
+        balance.pressed(balance.block(), balance.INDENTERS[name], balance.RELAXING, settings=settings)
+        for settings in (fine, chosen)
+    )
+    between = interp1d(done.times_ms, done.sed_kpa[:, receptors], axis=0)(truth.times_ms)
+    return np.abs(between - truth.sed_kpa[:, receptors]).max() / truth.sed_kpa[:, receptors].max()
