@@ -12,8 +12,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from fingerpad.mechanics.fields import TENSOR, cauchy_stress
+from fingerpad.mechanics.fields import cauchy_stress
 from fingerpad.mechanics.materials import Material
+from fingerpad.mechanics.tensors import INDEX
 from fingerpad.mechanics.viscoelastic import StressHistory, instantaneous_state
 from fingerpad.mesh import block_mesh
 
@@ -126,7 +127,7 @@ def errors(n, poisson):
     exact_stress = cauchy(piola(exact_f, bulk), exact_f)
     at_points_error = norm(stress - exact_stress, volume) / norm(exact_stress, volume)
 
-    mean_stress = cauchy_stress(mesh, solid.table, found, at_rest_from(solid, found))[:, TENSOR]
+    mean_stress = cauchy_stress(mesh, solid.table, found, at_rest_from(solid, found))[:, INDEX]
     weight = volume * j
     exact_mean = np.einsum("eq,eqij->eij", weight, exact_stress) / weight.sum(axis=1)[:, None, None]
     size = weight.sum(axis=1)[:, None]

@@ -22,8 +22,9 @@ from numba import njit
 from scipy.interpolate import CubicSpline
 
 from fingerpad.checks import FloatArray
-from fingerpad.mechanics.element import N_NODES, N_POINTS, _gradients, _invert, _push_forward, frame_scale
+from fingerpad.mechanics.element import N_NODES, N_POINTS, frame_scale, gradients_at_points
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
+from fingerpad.mechanics.tensors import invert, push_forward
 from fingerpad.mechanics.viscoelastic import StressHistory
 
 FEW_STEPS = 3
@@ -246,10 +247,12 @@ def _dissipated(  # type: ignore[no-untyped-def]
     total = 0.0
     for e in range(elements.shape[0]):
         material = layer[e]
-        volume = _gradients(nodes[elements[e]], displacement[elements[e]], weights, slopes, gradients)
+        volume = gradients_at_points(
+            nodes[elements[e]], displacement[elements[e]], weights, slopes, gradients
+        )
         present_volume = 0.0
         for q in range(N_POINTS):
-            jacobians[q] = _invert(gradients[q], inverse)
+            jacobians[q] = invert(gradients[q], inverse)
             present_volume += weights[q] * jacobians[q]
         for q in range(N_POINTS):
             scale = frame_scale(law[material], jacobians[q], present_volume / volume)
@@ -257,7 +260,7 @@ def _dissipated(  # type: ignore[no-untyped-def]
             for term in range(n_terms):
                 tensors[term + 2] = relaxed[term, e, q]
             for n in range(n_terms + 2):
-                _push_forward(gradients[q], scale, tensors[n], spatial[n])
+                push_forward(gradients[q], scale, tensors[n], spatial[n])
                 if law[material, 8] != COUPLED:  # only the deviator relaxes then
                     mean = (spatial[n, 0] + spatial[n, 1] + spatial[n, 2]) / 3.0
                     for k in range(3):

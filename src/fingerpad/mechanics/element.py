@@ -26,11 +26,19 @@ from numba import njit
 from fingerpad.checks import FloatArray
 from fingerpad.mechanics.energy import CARRIED, SECOND, differentiate
 from fingerpad.mechanics.materials import COUPLED, N_COEFFICIENTS, POLYNOMIAL
+from fingerpad.mechanics.tensors import (
+    COLUMN,
+    INDEX,
+    ROW,
+    add_in_axes,
+    invert,
+    left_cauchy_green,
+    principal_axes,
+    push_forward,
+)
 
 N_NODES = 8
 N_POINTS = 8
-ROW = np.array([0, 1, 2, 0, 1, 0])
-COLUMN = np.array([0, 1, 2, 1, 2, 2])
 WITH_VOLUME = SECOND[:3, 3].copy()
 
 
@@ -53,59 +61,11 @@ SHAPE_DERIVATIVES = _shape_derivatives()
 
 
 @njit(cache=True, inline="always")
-def _invert(matrix, inverse):  # type: ignore[no-untyped-def]
-    """Write the inverse of a 3x3 matrix and return its determinant."""
-    a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
-    d, e, f = matrix[1, 0], matrix[1, 1], matrix[1, 2]
-    g, h, i = matrix[2, 0], matrix[2, 1], matrix[2, 2]
-    minor_a, minor_b, minor_c = e * i - f * h, f * g - d * i, d * h - e * g
-    determinant = a * minor_a + b * minor_b + c * minor_c
-    scale = 1.0 / determinant
-    inverse[0, 0], inverse[0, 1], inverse[0, 2] = minor_a, c * h - b * i, b * f - c * e
-    inverse[1, 0], inverse[1, 1], inverse[1, 2] = minor_b, a * i - c * g, c * d - a * f
-    inverse[2, 0], inverse[2, 1], inverse[2, 2] = minor_c, b * g - a * h, a * e - b * d
-    for row in range(3):
-        for column in range(3):
-            inverse[row, column] *= scale
-    return determinant
-
-
-@njit(cache=True, inline="always")
-def _left_cauchy_green(gradient, jacobian, b, b2):  # type: ignore[no-untyped-def]
-    """Isochoric b~ = J^(-2/3) F F' and its square; return the invariants I1 and I2."""
-    scale = jacobian ** (-2.0 / 3.0)
-    for k in range(6):
-        f, g = gradient[ROW[k]], gradient[COLUMN[k]]
-        b[k] = scale * (f[0] * g[0] + f[1] * g[1] + f[2] * g[2])
-    b2[0] = b[0] * b[0] + b[3] * b[3] + b[5] * b[5]
-    b2[1] = b[3] * b[3] + b[1] * b[1] + b[4] * b[4]
-    b2[2] = b[5] * b[5] + b[4] * b[4] + b[2] * b[2]
-    b2[3] = b[0] * b[3] + b[3] * b[1] + b[5] * b[4]
-    b2[4] = b[3] * b[5] + b[1] * b[4] + b[4] * b[2]
-    b2[5] = b[0] * b[5] + b[3] * b[4] + b[5] * b[2]
-    first = b[0] + b[1] + b[2]
-    second = 0.5 * (first * first - b2[0] - b2[1] - b2[2])
-    return first, second
-
-
-@njit(cache=True, inline="always")
 def _energy(law, first, second):  # type: ignore[no-untyped-def]
     """Isochoric energy W and its first derivatives W1, W2 at the invariants."""
     x, y = first - 3.0, second - 3.0
     energy = law[0] * x + law[1] * y + law[2] * x * x + law[3] * x * y + law[4] * y * y
     return energy, law[0] + 2.0 * law[2] * x + law[3] * y, law[1] + law[3] * x + 2.0 * law[4] * y
-
-
-@njit(cache=True, inline="always")
-def _push_forward(gradient, scale, reference, spatial):  # type: ignore[no-untyped-def]
-    """Write scale F T F' of a symmetric reference tensor T."""
-    for k in range(6):
-        f, g = gradient[ROW[k]], gradient[COLUMN[k]]
-        spatial[k] = scale * (
-            f[0] * (reference[0] * g[0] + reference[3] * g[1] + reference[5] * g[2])
-            + f[1] * (reference[3] * g[0] + reference[1] * g[1] + reference[4] * g[2])
-            + f[2] * (reference[5] * g[0] + reference[4] * g[1] + reference[2] * g[2])
-        )
 
 
 @njit(cache=True, inline="always")
@@ -194,46 +154,6 @@ def _add_tangent(weight, moduli, stress, spherical, slopes, packed):  # type: ig
                     )
 
 
-INDEX = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
-
-SWEEPS = 12
-"""Sweeps of Jacobi's method; four or five reach round-off."""
-
-
-@njit(cache=True)
-def _principal_axes(b, logs, axes):  # type: ignore[no-untyped-def]
-    """Write ln lambdabar_a and the axes n_a (rows) of the isochoric b~, by Jacobi's method."""
-    a = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            a[i, j] = b[INDEX[i, j]]
-            axes[i, j] = 1.0 if i == j else 0.0
-    for _ in range(SWEEPS):
-        off = a[0, 1] ** 2 + a[0, 2] ** 2 + a[1, 2] ** 2
-        if off <= 1e-32 * (a[0, 0] ** 2 + a[1, 1] ** 2 + a[2, 2] ** 2):
-            break
-        for i in range(2):
-            for j in range(i + 1, 3):
-                if a[i, j] == 0.0:
-                    continue
-                ratio = (a[j, j] - a[i, i]) / (2.0 * a[i, j])
-                tangent = 1.0 / (abs(ratio) + np.sqrt(1.0 + ratio * ratio))
-                if ratio < 0.0:
-                    tangent = -tangent
-                cosine = 1.0 / np.sqrt(1.0 + tangent * tangent)
-                sine = tangent * cosine
-                for k in range(3):
-                    first, second = a[k, i], a[k, j]
-                    a[k, i], a[k, j] = cosine * first - sine * second, sine * first + cosine * second
-                for k in range(3):
-                    first, second = a[i, k], a[j, k]
-                    a[i, k], a[j, k] = cosine * first - sine * second, sine * first + cosine * second
-                    first, second = axes[i, k], axes[j, k]
-                    axes[i, k], axes[j, k] = cosine * first - sine * second, sine * first + cosine * second
-    for i in range(3):
-        logs[i] = 0.5 * np.log(a[i, i])
-
-
 @njit(cache=True)
 def _formula_points(law, gradients, jacobians, dilatation, logs, axes, derivatives):  # type: ignore[no-untyped-def]
     """Evaluate a formula at the points of one element, in the instantaneous state.
@@ -249,8 +169,8 @@ def _formula_points(law, gradients, jacobians, dilatation, logs, axes, derivativ
         differentiate(law[N_COEFFICIENTS:], count, logs[0], results)
         volumetric = results[count - 1, 0]
     for q in range(N_POINTS):
-        _left_cauchy_green(gradients[q], jacobians[q], b, b2)
-        _principal_axes(b, logs[q], axes[q])
+        left_cauchy_green(gradients[q], jacobians[q], b, b2)
+        principal_axes(b, logs[q], axes[q])
         logs[q, 3] = np.log(dilatation)
         differentiate(law[N_COEFFICIENTS:], count, logs[q], results)
         derivatives[q] = factor * results[count - 1]
@@ -258,14 +178,6 @@ def _formula_points(law, gradients, jacobians, dilatation, logs, axes, derivativ
             derivatives[q, 0] -= factor * volumetric
             derivatives[q, 4], derivatives[q, 14] = results[count - 1, 4], results[count - 1, 14]
     return volumetric
-
-
-@njit(cache=True, inline="always")
-def _add_in_axes(values, axes, tensor):  # type: ignore[no-untyped-def]
-    """Add sum_a values_a n_a x n_a."""
-    for a in range(3):
-        for k in range(6):
-            tensor[k] += values[a] * axes[a, ROW[k]] * axes[a, COLUMN[k]]
 
 
 @njit(cache=True)
@@ -323,7 +235,7 @@ def frame_scale(law, jacobian, dilatation):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gradients(reference, displacement, weights, slopes, gradient):  # type: ignore[no-untyped-def]
+def gradients_at_points(reference, displacement, weights, slopes, gradient):  # type: ignore[no-untyped-def]
     """Write gradients of the shape functions and of the deformation at all points of one element.
 
     Writes `weights` (8,), `slopes` dN/dX (8, 8, 3) and `gradient` F (8, 3, 3); returns the reference volume.
@@ -336,7 +248,7 @@ def _gradients(reference, displacement, weights, slopes, gradient):  # type: ign
             for i in range(3):
                 for j in range(3):
                     jacobian[i, j] += reference[a, i] * SHAPE_DERIVATIVES[q, a, j]
-        weights[q] = _invert(jacobian, inverse)
+        weights[q] = invert(jacobian, inverse)
         volume += weights[q]
         for i in range(3):
             for j in range(3):
@@ -384,10 +296,10 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
     b, b2, relaxed, stress, deviator = np.empty(6), np.empty(6), np.empty(6), np.empty(6), np.empty(6)
     moduli, packed, dilatation = np.empty((6, 6)), np.zeros((3, 3, N_NODES, N_NODES)), np.zeros((3, N_NODES))
 
-    volume = _gradients(reference, displacement, weights, slopes, gradients)
+    volume = gradients_at_points(reference, displacement, weights, slopes, gradients)
     present_volume = 0.0
     for q in range(N_POINTS):
-        jacobians[q] = _invert(gradients[q], inverse)
+        jacobians[q] = invert(gradients[q], inverse)
         if not jacobians[q] > 0.0:
             return np.nan
         present_volume += weights[q] * jacobians[q]
@@ -410,9 +322,7 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
             share = s if is_coupled else 1.0
             slope, curvature = share * derivatives[q, 4], share * derivatives[q, 14]
             if is_coupled:
-                _push_forward(
-                    gradients[q], frame_scale(law, jacobians[q], mean_jacobian), history[q], relaxed
-                )
+                push_forward(gradients[q], frame_scale(law, jacobians[q], mean_jacobian), history[q], relaxed)
                 trace = relaxed[0] + relaxed[1] + relaxed[2]
                 slope, curvature = slope - trace / 3.0, curvature - 2.0 / 9.0 * trace
             pressure += weights[q] * slope / present_volume
@@ -427,14 +337,14 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
     force[:] = 0.0
     for q in range(N_POINTS):
         w = weights[q]
-        _push_forward(gradients[q], frame_scale(law, jacobians[q], mean_jacobian), history[q], relaxed)
+        push_forward(gradients[q], frame_scale(law, jacobians[q], mean_jacobian), history[q], relaxed)
         if is_formula:
             energy = derivatives[q, 0]
             for k in range(6):
                 stress[k] = -relaxed[k]
-            _add_in_axes(s * derivatives[q, 1:4], axes[q], stress)
+            add_in_axes(s * derivatives[q, 1:4], axes[q], stress)
         else:
-            first, second = _left_cauchy_green(gradients[q], jacobians[q], b, b2)
+            first, second = left_cauchy_green(gradients[q], jacobians[q], b, b2)
             energy, w1, w2 = _energy(law, first, second)
             for k in range(6):
                 stress[k] = 2.0 * s * ((w1 + first * w2) * b[k] - w2 * b2[k]) - relaxed[k]
@@ -462,7 +372,7 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
             if is_coupled:  # d²W / dx d(ln Jbar) acts like a stress, whose forces are the coupling
                 for k in range(6):
                     mixed[k] = -2.0 / 3.0 * relaxed[k]
-                _add_in_axes(s * derivatives[q][WITH_VOLUME], axes[q], mixed)
+                add_in_axes(s * derivatives[q][WITH_VOLUME], axes[q], mixed)
                 mean = (mixed[0] + mixed[1] + mixed[2]) / 3.0
                 for i in range(3):
                     for node in range(N_NODES):
@@ -510,10 +420,10 @@ def element_state(reference, displacement, law, instantaneous, energies):  # typ
     gradients, jacobians, inverse = np.empty((N_POINTS, 3, 3)), np.empty(N_POINTS), np.empty((3, 3))
     b, b2, deviator = np.empty(6), np.empty(6), np.empty(6)
     is_formula, is_coupled = law[8] != POLYNOMIAL, law[8] == COUPLED
-    volume = _gradients(reference, displacement, weights, slopes, gradients)
+    volume = gradients_at_points(reference, displacement, weights, slopes, gradients)
     present_volume = 0.0
     for q in range(N_POINTS):
-        jacobians[q] = _invert(gradients[q], inverse)
+        jacobians[q] = invert(gradients[q], inverse)
         present_volume += weights[q] * jacobians[q]
     mean_jacobian = present_volume / volume
     change = mean_jacobian - 1.0
@@ -525,13 +435,13 @@ def element_state(reference, displacement, law, instantaneous, energies):  # typ
         volumetric = _formula_points(law, gradients, jacobians, mean_jacobian, logs, axes, derivatives)
         pressure = 0.0 if is_coupled else derivatives[0, 4] / mean_jacobian
     for q in range(N_POINTS):
-        _invert(gradients[q], inverse)
+        invert(gradients[q], inverse)
         if is_formula:
             energy = derivatives[q, 0]
             deviator[:] = 0.0
-            _add_in_axes(derivatives[q, 1:4], axes[q], deviator)
+            add_in_axes(derivatives[q, 1:4], axes[q], deviator)
         else:
-            first, second = _left_cauchy_green(gradients[q], jacobians[q], b, b2)
+            first, second = left_cauchy_green(gradients[q], jacobians[q], b, b2)
             energy, w1, w2 = _energy(law, first, second)
             for k in range(6):
                 deviator[k] = 2.0 * ((w1 + first * w2) * b[k] - w2 * b2[k])
@@ -541,7 +451,7 @@ def element_state(reference, displacement, law, instantaneous, energies):  # typ
             if is_coupled:  # not a deviator then
                 deviator[k] += derivatives[q, 4]
         scale = 1.0 / frame_scale(law, jacobians[q], mean_jacobian)
-        _push_forward(inverse, scale, deviator, instantaneous[q])
+        push_forward(inverse, scale, deviator, instantaneous[q])
         energies[q, 0], energies[q, 1] = weights[q], energy
     return volumetric, pressure, mean_jacobian
 
@@ -564,14 +474,14 @@ def relaxing_norms(reference, displacement, law, tensors, norms):  # type: ignor
     weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
     gradients = np.empty((N_POINTS, 3, 3))
     inverse, spatial = np.empty((3, 3)), np.empty(6)
-    volume = _gradients(reference, displacement, weights, slopes, gradients)
+    volume = gradients_at_points(reference, displacement, weights, slopes, gradients)
     present_volume = 0.0
     for q in range(N_POINTS):
-        present_volume += weights[q] * _invert(gradients[q], inverse)
+        present_volume += weights[q] * invert(gradients[q], inverse)
     for q in range(N_POINTS):
-        scale = frame_scale(law, _invert(gradients[q], inverse), present_volume / volume)
+        scale = frame_scale(law, invert(gradients[q], inverse), present_volume / volume)
         for n in range(tensors.shape[0]):
-            _push_forward(gradients[q], scale, tensors[n, q], spatial)
+            push_forward(gradients[q], scale, tensors[n, q], spatial)
             mean = 0.0 if law[8] == COUPLED else (spatial[0] + spatial[1] + spatial[2]) / 3.0
             total = 0.0
             for k in range(6):

@@ -24,23 +24,11 @@ import numpy as np
 from numba import njit
 
 from fingerpad.checks import FloatArray, one_of
-from fingerpad.mechanics.element import (
-    COLUMN,
-    N_NODES,
-    N_POINTS,
-    ROW,
-    _gradients,
-    _invert,
-    _push_forward,
-    element_state,
-    frame_scale,
-)
+from fingerpad.mechanics.element import N_NODES, N_POINTS, element_state, frame_scale, gradients_at_points
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
+from fingerpad.mechanics.tensors import COLUMN, INDEX, ROW, invert, push_forward
 from fingerpad.mechanics.viscoelastic import StressHistory
 from fingerpad.mesh import Mesh
-
-TENSOR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
-"""Where the components of a 3x3 tensor stand among the six that are stored."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +87,7 @@ class ElementFields:
     @property
     def principal_stress_kpa(self) -> FloatArray:
         """Principal Cauchy stresses, tension positive, smallest first, (n_times, n_elements, 3). [kPa]"""
-        return np.linalg.eigvalsh(self.stress_kpa[..., TENSOR]).astype(np.float64)
+        return np.linalg.eigvalsh(self.stress_kpa[..., INDEX]).astype(np.float64)
 
     @property
     def von_mises_kpa(self) -> FloatArray:
@@ -315,14 +303,14 @@ def _mean_fields(  # type: ignore[no-untyped-def]
     unused, unused_energies = np.empty((N_POINTS, 6)), np.empty((N_POINTS, 2))
     for e in range(corners.shape[0]):
         material, moved = law[layer[e]], displacement[corners[e]]
-        volume = _gradients(nodes[corners[e]], moved, weights, slopes, gradients)
+        volume = gradients_at_points(nodes[corners[e]], moved, weights, slopes, gradients)
         _, pressure[e], dilatation[e] = element_state(
             nodes[corners[e]], moved, material, unused, unused_energies
         )
         mean_gradient[e], stress[e], spherical = 0.0, 0.0, 0.0
         for q in range(N_POINTS):
-            scale = frame_scale(material, _invert(gradients[q], inverse), dilatation[e])
-            _push_forward(gradients[q], scale, convected[e, q], spatial)
+            scale = frame_scale(material, invert(gradients[q], inverse), dilatation[e])
+            push_forward(gradients[q], scale, convected[e, q], spatial)
             mean = (spatial[0] + spatial[1] + spatial[2]) / 3.0
             spherical += weights[q] * mean
             for k in range(6):
@@ -335,7 +323,7 @@ def _mean_fields(  # type: ignore[no-untyped-def]
         hydrostatic = pressure[e] + (spherical / present_volume if material[8] == COUPLED else 0.0)
         for k in range(6):
             stress[e, k] = stress[e, k] / present_volume + (hydrostatic if k < 3 else 0.0)
-        mean_gradient[e] *= (dilatation[e] / _invert(mean_gradient[e], inverse)) ** (1.0 / 3.0)
+        mean_gradient[e] *= (dilatation[e] / invert(mean_gradient[e], inverse)) ** (1.0 / 3.0)
 
 
 @njit(cache=True)
@@ -351,12 +339,12 @@ def _isochoric_work(  # type: ignore[no-untyped-def]
     old, new, inverse = np.empty((N_POINTS, 3, 3)), np.empty((N_POINTS, 3, 3)), np.empty((3, 3))
     for e in range(corners.shape[0]):
         material = law[layer[e]]
-        _gradients(nodes[corners[e]], before[corners[e]], weights, slopes, old)
-        volume = _gradients(nodes[corners[e]], now[corners[e]], weights, slopes, new)
+        gradients_at_points(nodes[corners[e]], before[corners[e]], weights, slopes, old)
+        volume = gradients_at_points(nodes[corners[e]], now[corners[e]], weights, slopes, new)
         total = 0.0
         for q in range(N_POINTS):
-            scale_old = frame_scale(material, _invert(old[q], inverse), dilatation_before[e])
-            scale_new = frame_scale(material, _invert(new[q], inverse), dilatation_now[e])
+            scale_old = frame_scale(material, invert(old[q], inverse), dilatation_before[e])
+            scale_new = frame_scale(material, invert(new[q], inverse), dilatation_now[e])
             for k in range(6):
                 i, j = ROW[k], COLUMN[k]
                 change = 0.0

@@ -25,9 +25,10 @@ import numpy as np
 from numba import njit
 
 from fingerpad.checks import FloatArray
-from fingerpad.mechanics.element import N_NODES, N_POINTS, _gradients, _invert
+from fingerpad.mechanics.element import N_NODES, N_POINTS, gradients_at_points
 from fingerpad.mechanics.energy import CARRIED, differentiate
 from fingerpad.mechanics.materials import COUPLED, N_COEFFICIENTS, POLYNOMIAL
+from fingerpad.mechanics.tensors import invert
 
 MIXED_POISSON = 0.49
 """Poisson's ratio above which it pays: a Newton step takes a quarter more time. There a block takes 15 of
@@ -99,11 +100,13 @@ def _pressures(nodes, elements, displacement, layer, law, pressure, slope):  # t
     weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
     gradients, inverse, present = np.empty((N_POINTS, 3, 3)), np.empty((3, 3)), np.empty((N_NODES, 3))
     for e in range(elements.shape[0]):
-        volume = _gradients(nodes[elements[e]], displacement[elements[e]], weights, slopes, gradients)
+        volume = gradients_at_points(
+            nodes[elements[e]], displacement[elements[e]], weights, slopes, gradients
+        )
         present_volume = 0.0
         slope[e] = 0.0
         for q in range(N_POINTS):
-            jacobian = _invert(gradients[q], inverse)
+            jacobian = invert(gradients[q], inverse)
             present_volume += weights[q] * jacobian
             _present_gradients(slopes[q], inverse, present)
             slope[e] += weights[q] * jacobian * present  # dv, first
@@ -135,9 +138,9 @@ def exchange_pressure(nodes, elements, displacement, change, position, blocks): 
     for e in range(elements.shape[0]):
         if change[e] == 0.0:
             continue
-        _gradients(nodes[elements[e]], displacement[elements[e]], weights, slopes, gradients)
+        gradients_at_points(nodes[elements[e]], displacement[elements[e]], weights, slopes, gradients)
         for q in range(N_POINTS):
-            factor = change[e] * weights[q] * _invert(gradients[q], inverse)
+            factor = change[e] * weights[q] * invert(gradients[q], inverse)
             _present_gradients(slopes[q], inverse, g)
             for a in range(N_NODES):
                 for b in range(N_NODES):
