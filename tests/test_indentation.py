@@ -175,8 +175,8 @@ def refused(said, **changes):
     ("arguments", "said"),
     [
         refused(
-            "trial1, trial2, trial3, trial2_wu, trial3_wu, three_levels, maeno1998, wu2007, gerling2014_fit: "
-            "got 'steel'",
+            "trial1, trial2, trial3, trial2_wu, trial3_wu, trial3_stiffening, maeno1998, wu2007, "
+            "gerling2014_fit: got 'steel'",
             materials="steel",
         ),
         refused("materials must be one of", materials=None),

@@ -490,13 +490,13 @@ def test_polynomials_of_the_page_are_those_of_the_candidates():
         assert own[layer, 0.48].tolist() == [law.c10, law.c01, law.c20, law.c11, law.c02]
 
 
-def test_the_set_for_three_levels_is_trial_3_that_stiffens():
+def test_the_stiffening_set_is_trial_3_with_another_coefficient():
     for stiffens, plain in zip(
-        named_tissues("three_levels").layers, named_tissues("trial3").layers, strict=True
+        named_tissues("trial3_stiffening").layers, named_tissues("trial3").layers, strict=True
     ):
         assert stiffens.shear_modulus_kpa == pytest.approx(plain.shear_modulus_kpa)
         assert stiffens.bulk_modulus_kpa == pytest.approx(plain.bulk_modulus_kpa)
-    ratios = [layer.law.c20 / layer.law.c10 for layer in named_tissues("three_levels").layers]
+    ratios = [layer.law.c20 / layer.law.c10 for layer in named_tissues("trial3_stiffening").layers]
     assert ratios == pytest.approx([0.0, 0.0, 5.0, 5.0])
 
 

@@ -265,7 +265,7 @@ def indent(
     stimulus : RampAndHold or ForceRampAndHold, optional
         The motion, by depth or by force; the paper's by default.
     materials : str or Tissues
-        "trial1", "trial2", "trial3" (paper, section 2.2.1), "trial2_wu", "trial3_wu", "three_levels",
+        "trial1", "trial2", "trial3" (paper, section 2.2.1), "trial2_wu", "trial3_wu", "trial3_stiffening",
         "maeno1998", "wu2007", "gerling2014_fit", or tissues of your own.
     resolution : {"quick", "standard", "paper"}
         How fine the mesh and the steps are.

@@ -63,8 +63,8 @@ def trial_3_wu() -> Tissues:
     return Tissues(epidermis, epidermis, *_wu_polynomials())
 
 
-def three_levels() -> Tissues:
-    """Trial 3 whose dermis and subcutis stiffen: serves deflection, firing and discrimination alike."""
+def trial_3_stiffening() -> Tissues:
+    """Trial 3 whose dermis and subcutis stiffen, the initial moduli being the same."""
     epidermis = _linear(published.MAENO_EPIDERMIS_YOUNG)
     dermis, subcutis = (
         Material.polynomial(c10, 0.0, published.STIFFENING_RATIO.value * c10, 0.0, 0.0, NU, skin_prony())
@@ -116,7 +116,7 @@ TISSUES: dict[str, Callable[[], Tissues]] = {
     "trial3": trial_3,
     "trial2_wu": trial_2_wu,
     "trial3_wu": trial_3_wu,
-    "three_levels": three_levels,
+    "trial3_stiffening": trial_3_stiffening,
     "maeno1998": maeno_1998,
     "wu2007": wu_2007,
     "gerling2014_fit": gerling_2014_fit,

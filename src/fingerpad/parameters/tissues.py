@@ -86,10 +86,10 @@ SOFT_MIX_SUBCUTIS_SHEAR = Published(
 )
 
 STIFFENING_RATIO = Published(
-    "C20 over C10 of dermis and subcutis in the set for three levels",
+    "C20 over C10 of dermis and subcutis in the stiffening Trial 3",
     5.0,
     "1",
-    "identified by us from deflection, firing rates and hit rates at once: one value of those that serve all",
+    "tried by us: deflection hardly sees it, firing rates and hit rates do",
     "assumed",
 )
 

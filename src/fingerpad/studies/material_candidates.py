@@ -123,7 +123,7 @@ def candidates() -> tuple[MaterialSet, ...]:
     ratio = published.STIFFENING_RATIO.value
     stiffening = MaterialSet(
         "stiffening",
-        named_tissues("three_levels"),
+        named_tissues("trial3_stiffening"),
         f"assumed: Trial 3 with C20 = {ratio:g} C10 in dermis and subcutis",
     )
     return (*named, *from_wu, *between, stiffening)
