@@ -18,8 +18,8 @@ FIGURE = "material_sets.png"
 _SIGMA = psychophysics.NOISE_SIGMA.value
 _FSS = paper.FSS_OUT_OF_SAMPLE.value
 ONE_BAR = (
-    "The bar was pressed once and read at shifted sites: pressed at all 36 shifts (`--shifted-bars`), two sets "
-    "changed their FSS by -0.01 and +0.05, so that a set so close to the mark may lie on its other side."
+    "The bar was pressed once and read at shifted sites: pressed at all 36 shifts (`--shifted-bars`), two "
+    "sets changed their FSS by -0.01 and +0.05, so that a set so close to the mark may lie on its other side."
 )
 _LETTERS = {"deflection": "d", "firing": "f", "discrimination": "p"}
 _REGIONS = {"near_mm": "within 0.5 mm", "far_mm": "0.5 to 5 mm"}
