@@ -100,7 +100,7 @@ def pressed(poisson, motion):
 )
 def test_newton_steps_hardly_grow_towards_incompressibility_and_the_answer_stays(monkeypatch, motion):
     mixed = pressed(0.4999, motion)
-    assert mixed.newton_steps < 2 * pressed(0.48, motion).newton_steps
+    assert mixed.newton_steps < 1.3 * pressed(0.48, motion).newton_steps
     monkeypatch.setattr(press_module, "MIXED_POISSON", 0.5)
     plain = pressed(0.4999, motion)
     assert mixed.newton_steps < plain.newton_steps / 2

@@ -101,6 +101,11 @@ UNFIT = {
         "An element may repeat nodes only as a wedge, a brick with one side collapsed to an edge: element 0 "
         "(stratum corneum, about",
     ),
+    "pyramid": (
+        {"elements": changed(BLOCK.elements, (0, [5, 6, 7]), BLOCK.elements[0, 4])},
+        "An element may repeat nodes only as a wedge, a brick with one side collapsed to an edge: element 0 "
+        "(stratum corneum, about",
+    ),
     "node in no element": (
         {"nodes_mm": np.vstack([BLOCK.nodes_mm, [[7.0, 8.0, 9.0]]])},
         "Every node must belong to an element: node 36 (x = 7, y = 8, z = 9 mm) does not, one of 1 such",

@@ -46,6 +46,7 @@ def response(mesh, field=None, displacement=None, axis_x_mm=0.0):
         penetration_mm=0.0,
         newton_steps=0,
         factorisations=0,
+        linear_solver="none",
     )
 
 

@@ -227,7 +227,14 @@ def test_what_comes_back_is_what_went_in_rounded_to_single_precision(stored, ski
         went, came = getattr(skin, name), getattr(back, name)
         assert came.dtype == np.float64
         np.testing.assert_array_equal(came, went.astype(np.float32) if name in SINGLE else went)
-    for name in ("kinks_ms", "axis_x_mm", "penetration_mm", "energy_imbalance", "newton_steps"):
+    for name in (
+        "kinks_ms",
+        "axis_x_mm",
+        "penetration_mm",
+        "energy_imbalance",
+        "newton_steps",
+        "linear_solver",
+    ):
         assert getattr(back, name) == getattr(skin, name)
     for name in QUANTITIES:
         if name != "stored":
@@ -301,6 +308,7 @@ DAMAGES = {
     "folder": a_folder,
     "array missing": without("sed_kpa"),
     "solution missing": without("solution"),
+    "linear solver missing": without("linear_solver"),
     "solution of other shape": with_array("solution", np.zeros(2)),
     "strain missing": without("compressive_strain"),
     "strain of another sheet": with_array("compressive_strain", np.zeros((3, 7))),

@@ -136,6 +136,7 @@ class Touch:
             penetration_mm=done.penetration_mm,
             newton_steps=done.newton_steps,
             factorisations=done.factorisations,
+            linear_solver=done.linear_solver,
         )
 
     def deform(self) -> Deformation:

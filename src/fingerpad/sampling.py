@@ -79,6 +79,8 @@ class SkinResponse:
         Deepest penetration of the indenter by any node at any time. [mm]
     newton_steps, factorisations : int
         Work that the solution took.
+    linear_solver : str
+        Which linear solver was chosen, and why.
     """
 
     mesh: Mesh
@@ -98,6 +100,7 @@ class SkinResponse:
     penetration_mm: float
     newton_steps: int
     factorisations: int
+    linear_solver: str
 
     def surface_profile(self, time_index: int = -1) -> SurfaceProfile:
         """Deflection along the midline of the volar skin (paper, section 2.2.1).

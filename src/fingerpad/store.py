@@ -158,6 +158,7 @@ class Store:
             # Opened here, since np.load leaves the file open where the archive is damaged.
             with open(path, "rb") as opened, np.load(opened, allow_pickle=False) as file:
                 content = {name: file[name].astype(np.float64) for name in (*_ARRAYS, *_SHEET, "solution")}
+                linear_solver = str(file["linear_solver"])
         except Exception as error:  # bytes that are not ours may fail in any way
             said = " ".join(str(error).split()).rstrip(".")
             raise StoreError(
@@ -177,6 +178,7 @@ class Store:
             penetration_mm=float(penetration),
             newton_steps=int(newton_steps),
             factorisations=int(factorisations),
+            linear_solver=linear_solver,
             **content,
         )
 
@@ -211,6 +213,7 @@ def _packed(response: SkinResponse) -> bytes:
         response.factorisations,
     ]
     buffer = io.BytesIO()
+    content["linear_solver"] = np.array(response.linear_solver)
     np.savez(buffer, **content, solution=np.array(solution, dtype=np.float64))
     return buffer.getvalue()
 

@@ -158,6 +158,7 @@ def _pressed(
     # Whether forces and energies of every press add up, at their worst.
     stages[-1]["largest_force_imbalance"] = max(skin.force_imbalance for skin in responses.values())
     stages[-1]["largest_energy_imbalance"] = max(skin.energy_imbalance for skin in responses.values())
+    stages[-1]["linear_solvers"] = sorted({skin.linear_solver for skin in responses.values()})
     return responses
 
 
