@@ -1,9 +1,9 @@
 """Time steps of a press: at given times, cut where they fail, or as long as an error bound on SED allows.
 
-A step takes stress and energy as linear within itself, and that is all it does to the answer: without
-relaxation the equilibrium at its end does not depend on the way there, and a relaxed stress is an average of
-past stress with weights that sum to less than 1 (see `viscoelastic`). So the error of a whole press is that
-of its worst step, and the error of a step is that of linear interpolation,
+Without friction a step takes stress and energy as linear within itself, and that is all it does to the
+answer: without relaxation the equilibrium at its end does not depend on the way there, and a relaxed stress
+is an average of past stress with weights that sum to less than 1 (see `viscoelastic`). So the error of a
+whole press is that of its worst step, and the error of a step is that of linear interpolation,
 
     e = h²/4 |w[t-, t, t+]|,    w[t-, t, t+] = (w[t, t+] - w[t-, t]) / (h- + h),
 
