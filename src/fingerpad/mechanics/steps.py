@@ -32,6 +32,10 @@ LENGTHEN_AFTER = 2
 SMALLEST_SHARE = 1.0 / 4096
 """Shortest adaptive step, over the phase that it belongs to."""
 
+SMOOTH_SHARE = 0.5
+"""Share of the tolerance that the estimated error may take. The rest is for kinks of SED within a step, where
+a node comes to touch: an estimate made for curves tells only a part of their error."""
+
 SAFETY, SHORTEN, LENGTHEN = 0.85, 0.25, 2.0
 """Aim below the tolerance, and bounds on how much one step's length may differ from the last one's."""
 
@@ -213,7 +217,7 @@ def _adapt(
             continue
         growth = whole_ms / (target_ms - start.time_ms) if phase.loading else 1.0
         largest_kpa = max(largest_kpa, _largest(moment, where))
-        allowed_kpa = tolerance * max(largest_kpa, growth * _largest(found, where))
+        allowed_kpa = SMOOTH_SHARE * tolerance * max(largest_kpa, growth * _largest(found, where))
         error_kpa = interpolation_error(before, moment, found, where, both=not judged)
         step_ms = taken_ms * _change(error_kpa, allowed_kpa)
         if error_kpa > allowed_kpa:
