@@ -87,7 +87,8 @@ def _deflection(found: Mapping[str, Any]) -> list[dict[str, Any]]:
                     "",
                     MATERIALS,
                     sign * excess > 0,
-                    "our stand-ins need not give the paper's order; see docs/decisions",
+                    "on an axis that points down, as skin that yields does, this is the paper's order: "
+                    "docs/decisions/order-of-the-trials.md",
                 )
             )
     return rows
