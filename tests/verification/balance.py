@@ -56,7 +56,11 @@ def ordinary(name):
     return pressed(block(), INDENTERS[name], RELAXING)
 
 
-@case(THEME, "What the indenter gives, bone and nail take", "Newton's third law; the target of issue 3: 1e-4")
+@case(
+    THEME,
+    "What the indenter gives, bone and nail take",
+    "Newton's third law; our own bound, 1e-4, which every press checks",
+)
 def force_balance() -> list[Row]:
     """A relaxing layered block under every indenter, ramp and hold, default settings: largest difference at
     any time between contact force and reaction of the supports, over the contact force; the product checks
@@ -79,7 +83,7 @@ def reaction_by_hand() -> list[Row]:
     return rows
 
 
-@case(THEME, "Penetration", "The target of issue 3: below 0.5 % of the depth")
+@case(THEME, "Penetration", "Our own bound: below 0.5 % of the depth")
 def penetration() -> list[Row]:
     """The presses of the first case: deepest penetration of any skin node at any time over the depth."""
     return [
@@ -127,9 +131,7 @@ def relaxing_stores_less() -> list[Row]:
     ]
 
 
-@case(
-    THEME, "Stored and dissipated energy add up to the work", "Conservation of energy; the target of issue 3"
-)
+@case(THEME, "Stored and dissipated energy add up to the work", "Conservation of energy")
 def energy_adds_up() -> list[Row]:
     """The presses of the first case, which turn a third of the work into heat. Work by cubic splines of force
     over depth, energy stored in the tissue, heat from the branches of the Prony series by their exponentials,
