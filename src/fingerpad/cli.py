@@ -35,7 +35,7 @@ from fingerpad.studies.conditions import Conditions
 from fingerpad.studies.material_sets import Effort
 from fingerpad.studies.material_study import MaterialStudy, study_materials
 
-EXPECTED_TIME = {"quick": "about 3 minutes", "standard": "about 9 minutes", "paper": "more than a day"}
+EXPECTED_TIME = {"quick": "about 3 minutes", "standard": "about 10 minutes", "paper": "more than a day"}
 """On two cores, nothing stored yet."""
 
 INDENTERS: dict[str, type[Indenter]] = {
