@@ -148,6 +148,13 @@ def test_without_vtk_a_sentence_says_how_to_get_it(done, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_without_vtk_nothing_is_pressed(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "vtkmodules.vtkIOXML", None)
+    monkeypatch.setattr(Touch, "deform", lambda touch: pytest.fail("the touch was solved for nothing"))
+    with pytest.raises(InputError, match="needs? the package vtk"):
+        export_touch(TOUCH, tmp_path, "vtu")
+
+
 def test_a_folder_that_cannot_be_made_is_named(done, tmp_path):
     (tmp_path / "note").write_text("mine")
     with pytest.raises(StoreError, match="note"):

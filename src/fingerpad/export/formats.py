@@ -11,11 +11,12 @@ from fingerpad.export.abaqus import write_abaqus
 from fingerpad.export.calculix import write_calculix
 from fingerpad.export.febio import write_febio
 from fingerpad.export.job import job_of
-from fingerpad.export.vtu import write_vtu_series
+from fingerpad.export.vtu import load_vtk, write_vtu_series
 from fingerpad.indentation import Touch
 
 
 def _vtu(touch: Touch, folder: Path) -> tuple[Path, ...]:
+    load_vtk()  # first, since solving takes its time
     return write_vtu_series(folder / "touch.pvd", touch.deform(), touch.mesh)
 
 

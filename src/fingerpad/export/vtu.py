@@ -68,7 +68,7 @@ def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[
     ...     [file.name for file in written]
     ['touch.pvd', 'touch_0000.vtu', 'touch_0001.vtu', 'touch_0002.vtu']
     """
-    vtk = _vtk()
+    vtk = load_vtk()
     path = Path(path)
     if len(deformation.fields.elements) != len(mesh.elements):
         raise InputError(
@@ -94,8 +94,14 @@ def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[
     return path, *(path.with_name(name) for name in names)
 
 
-def _vtk() -> Any:
-    """Return the few parts of VTK that writing needs; none of them draws."""
+def load_vtk() -> Any:
+    """Return the few parts of VTK that writing needs; none of them draws.
+
+    Raises
+    ------
+    InputError
+        If VTK is not installed.
+    """
     try:
         from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
         from vtkmodules.vtkCommonCore import vtkPoints
