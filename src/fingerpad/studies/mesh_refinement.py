@@ -45,8 +45,10 @@ EVERY_SPHERE: tuple[Sphere, ...] = tuple(
     for curvature in sphere_discrimination.CURVATURES
 )
 
-CHOSEN_SHIFTS = tuple(SHIFTS_MM.index(shift) for shift in (-1.9, -1.5, -0.9, 0.9, 1.3, 1.7))
-"""Shifts for meshes that take minutes a press: flanks and peak of strain energy density at both edges."""
+CHOSEN_SHIFTS = tuple(
+    SHIFTS_MM.index(shift) for shift in (-2.5, -1.9, -1.5, -1.3, -1.1, -0.9, -0.1, 0.9, 1.1, 1.3, 1.5, 1.7)
+)
+"""Shifts for meshes that take minutes a press: flanks and peak at both edges, centre and far side."""
 
 CHOSEN_CURVATURES = (protocol.STANDARD_CURVATURE.value, *psychophysics.GOODWIN_CURVATURES.value)
 CHOSEN_SPHERES: tuple[Sphere, ...] = tuple((0.0, curvature) for curvature in CHOSEN_CURVATURES)
