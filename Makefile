@@ -1,6 +1,7 @@
 # make reproduce     run the studies of the paper      (ARGS="..." goes to `fingerpad reproduce`)
 # make test          check style, types, imports and behaviour; stops at the first failure
 # make verification  run every verification case, slow ones too, and write docs/verification.md
+# make benchmarks    run benchmarks, some by ARGS="sphere growth", and write benchmarks/README.md (no part of the tests)
 # make clean         remove what these have made, the environment included
 #
 # All make their own environment in .venv; PYTHON names the interpreter it is made with.
@@ -15,7 +16,7 @@ bin := .venv/bin
 export PYTHONNOUSERSITE := 1
 unexport PYTHONPATH
 
-.PHONY: reproduce test verification clean
+.PHONY: reproduce test verification benchmarks clean
 .DEFAULT_GOAL := test
 
 reproduce: .venv/installed
@@ -30,6 +31,9 @@ test: .venv/installed-for-tests
 
 verification: .venv/installed-for-tests
 	$(bin)/python -m tests.verification $(ARGS)
+
+benchmarks: .venv/installed-for-tests
+	$(bin)/python -m benchmarks $(ARGS)
 
 .venv/installed: pyproject.toml | $(bin)/python
 	$(bin)/python -m pip install --quiet --disable-pip-version-check --editable .
@@ -47,4 +51,4 @@ $(bin)/python:
 
 clean:
 	rm -rf .venv build dist reproduction .mypy_cache .ruff_cache .hypothesis .import_linter_cache
-	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	find src tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,88 @@
+"""What fingerpad is meant to reach on two cores: one line per number, judged by what a script measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Target:
+    """A bound on a measured number.
+
+    Parameters
+    ----------
+    key : str
+        Under which a script reports it.
+    benchmark : str
+        The script.
+    job : str
+        What is measured.
+    limit : float
+        The bound.
+    unit : str
+        Its unit, "x" for a ratio, empty for a plain number.
+    at_least : bool
+        Whether the number must reach the bound instead of staying below it.
+    """
+
+    key: str
+    benchmark: str
+    job: str
+    limit: float
+    unit: str
+    at_least: bool = False
+
+    def met_by(self, measured: float) -> bool:
+        """Whether a measured number keeps to the bound."""
+        return measured >= self.limit if self.at_least else measured <= self.limit
+
+    @property
+    def bound(self) -> str:
+        """The bound in words.
+
+        Examples
+        --------
+        >>> Target("ratio", "peers", "against it", 10.0, "x", at_least=True).bound
+        '≥ 10 x'
+        """
+        limit = f"{self.limit:,}" if isinstance(self.limit, int) else f"{self.limit:g}"
+        return f"{'≥' if self.at_least else '≤'} {limit} {self.unit}".rstrip()
+
+
+_PAPER = "paper size, full model, ramp and hold, residual 1e-5"
+_SPHERE = "`standard`, half model, one sphere, ramp and hold"
+_STANDARD = "`fingerpad reproduce --resolution standard`, everything, cold store"
+_QUICK = "`fingerpad reproduce --resolution quick`, everything, cold store"
+_GROWTH = "growth with nodes, 20k to 500k, exponent"
+_BLOCK = "layered block of 21,500 nodes"
+
+TARGETS = (
+    Target("paper_size_s", "paper_size", f"{_PAPER}: time", 180.0, "s"),
+    Target("paper_size_stretch_s", "paper_size", f"{_PAPER}: time, stretch", 120.0, "s"),
+    Target("paper_size_gb", "paper_size", f"{_PAPER}: memory", 4.0, "GB"),
+    Target(
+        "paper_size_nodes", "paper_size", "paper size, full model: nodes", 232_000, "nodes", at_least=True
+    ),
+    Target("paper_size_speedup", "paper_size", "paper size, 2 threads against 1", 1.7, "x", at_least=True),
+    Target("sphere_s", "sphere", f"{_SPHERE}: time", 12.0, "s"),
+    Target("sphere_gb", "sphere", f"{_SPHERE}: memory", 1.0, "GB"),
+    Target("reproduce_standard_s", "reproduction", f"{_STANDARD}: time", 480.0, "s"),
+    Target("reproduce_standard_gb", "reproduction", f"{_STANDARD}: memory", 3.0, "GB"),
+    Target("reproduce_quick_s", "reproduction", f"{_QUICK}: time", 90.0, "s"),
+    Target("import_s", "startup", "`import fingerpad`, kernels compiled", 0.5, "s"),
+    Target("growth_time_exponent", "growth", f"{_GROWTH} of time", 1.15, ""),
+    # "Linear" is read as an exponent of at most 1.05; the memory of Python itself flatters small meshes.
+    Target("growth_memory_exponent", "growth", f"{_GROWTH} of memory", 1.05, ""),
+    Target("afferents_s", "population", "100,000 afferents, 1 s, exact spikes", 1.0, "s"),
+    Target("gradient_sum_s", "population", "Gradient Sum, 7 spheres x 100 x 100 x 100", 0.1, "s"),
+    Target("felupe_ratio", "peers", f"{_BLOCK}: times faster than FElupe", 10.0, "x", at_least=True),
+    Target("felupe_force_percent", "peers", f"{_BLOCK}: force against FElupe", 1.0, "%"),
+    Target("felupe_sed_percent", "peers", f"{_BLOCK}: SED against FElupe", 3.0, "%"),
+    Target("calculix_ratio", "peers", f"{_BLOCK}: times faster than CalculiX", 40.0, "x", at_least=True),
+    Target("calculix_force_percent", "peers", f"{_BLOCK}: force against CalculiX", 1.0, "%"),
+    Target("calculix_sed_percent", "peers", f"{_BLOCK}: SED against CalculiX", 3.0, "%"),
+    Target(
+        "brian2_ratio", "peers", "100,000 LIF afferents: times faster than Brian2", 5.0, "x", at_least=True
+    ),
+    Target("brian2_timing_ratio", "peers", "spike timing: our error over Brian2's", 1.0, "x"),
+)

@@ -1,0 +1,105 @@
+"""The tables of benchmarks/README.md are what the scripts measured; people run the scripts."""
+
+import importlib
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks.__main__ import BENCHMARKS, run
+from benchmarks.measuring import FailedRunError, Spread, run_job
+from benchmarks.measuring import run as run_command
+from benchmarks.page import PAGE, rewritten, targets_table
+from benchmarks.results import Report, Table, read_all, write
+from benchmarks.targets import TARGETS, Target
+
+TEXT = PAGE.read_text(encoding="utf-8")
+MACHINE = {
+    "processor": "abacus", "cores": 2, "memory_gb": 4.0, "system": "none", "python": "3.11", "packages": {},
+    "commit": "0", "uncommitted": False, "load_before": 0.0, "date": "today",
+}  # fmt: skip
+
+
+def test_page_shows_what_was_measured():
+    assert rewritten(TEXT, read_all()) == TEXT, "run `make benchmarks ARGS=--page`"
+
+
+def test_every_target_has_a_row_and_every_report_a_section():
+    rows = [line for line in TEXT.splitlines() if line.startswith("| ")]
+    for target in TARGETS:
+        assert any(f"| {target.job} | {target.bound} |" in row for row in rows), target.key
+    sections = re.findall(r"<!-- begin (\w+) -->", TEXT)
+    assert sections == ["targets", *dict.fromkeys(sections[1:])]
+    assert set(sections[1:]) == set(BENCHMARKS)
+
+
+@pytest.mark.parametrize("name", BENCHMARKS)
+def test_every_benchmark_can_be_measured_and_names_its_targets(name):
+    assert callable(importlib.import_module(f"benchmarks.{name}").measure)
+    if (report := read_all().get(name)) is not None:
+        assert report.measured.keys() == {target.key for target in TARGETS if target.benchmark == name}
+
+
+def test_reports_name_neither_folder_nor_host():
+    for path in (PAGE.parent / "results").glob("*.json"):
+        assert not re.search(r"/(home|tmp|root|work|Users)/", path.read_text(encoding="utf-8")), path.name
+
+
+def test_report_survives_the_disk_and_reaches_the_page(tmp_path):
+    table = Table("Seconds:", ["mesh", "s"], [["coarse", 1.5], ["none", None]])
+    report = Report("sphere", "A sphere", "One press.", [table], {"sphere_s": 12.5}, ["A note."], MACHINE)
+    write(report, tmp_path)
+    found = read_all(tmp_path)
+    text = rewritten(TEXT, found)
+    for expected in ("| coarse | 1.5 |", "| none |  |", "- A note.", "commit 0; load before it 0.0; today."):
+        assert expected in text
+    row = next(line for line in targets_table(found).splitlines() if "| ≤ 12 s |" in line)
+    assert "12.5 s | **no** | `sphere` |" in row
+
+
+def test_targets_are_bounds_from_above_or_below():
+    time, ratio = Target("a", "b", "c", 2.0, "s"), Target("a", "b", "c", 2.0, "x", at_least=True)
+    assert [time.met_by(value) for value in (1.9, 2.1)] == [True, False]
+    assert [ratio.met_by(value) for value in (1.9, 2.1)] == [False, True]
+
+
+def test_reports_refuse_a_number_without_target_and_a_row_of_other_length():
+    with pytest.raises(ValueError, match="got \\['speed'\\] besides"):
+        Report("sphere", "", "", [], {"speed": 1.0}, machine=MACHINE)
+    with pytest.raises(ValueError, match="needs 2 cells"):
+        Table("", ["a", "b"], [[1]])
+
+
+def test_a_run_is_measured_with_its_children():
+    spin = "import time; kept = b'1' * 150_000_000\nwhile time.process_time() < 0.6: pass"
+    parent = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {spin!r}]); print('[1, 2]')"
+    measured = run_command([sys.executable, "-c", parent], threads=1)
+    assert measured.answer == [1, 2]
+    assert 150.0 < measured.peak_mb < 300.0
+    assert 0.4 < measured.cpu_s < measured.wall_s + 0.1
+
+
+def test_a_job_runs_with_the_threads_it_is_given():
+    code = "import os; print(os.environ['NUMBA_NUM_THREADS'] + os.environ['OMP_NUM_THREADS'])"
+    assert run_command([sys.executable, "-c", code], threads=2).answer == 22
+    assert run_job("measuring", "doubled", threads=1, number=4).answer == {"doubled": 8}
+
+
+def test_a_failed_run_says_what_failed():
+    with pytest.raises(FailedRunError, match=r"status 1:\n(.|\n)*ZeroDivisionError"):
+        run_command([sys.executable, "-c", "1 / 0"], threads=1)
+
+
+def test_spread_is_median_and_range():
+    spread = Spread.of([4.0, 1.0, 2.0])
+    assert (spread.median, spread.smallest, spread.largest) == (2.0, 1.0, 4.0)
+
+
+def test_unknown_benchmark_is_refused(capsys):
+    assert run(["spheres"]) == 2
+    assert "spheres is none of sphere" in capsys.readouterr().err
+
+
+def test_continuous_integration_runs_no_benchmark():
+    assert "benchmarks" not in (Path(__file__).parents[1] / ".ci" / "run").read_text()
