@@ -1,8 +1,8 @@
 """Run a job in a process of its own, and tell how long it took and how much memory it needed.
 
 A fresh process owes nothing to the one before: its peak of memory is its own, and the number of threads,
-which libraries read once, is what it was asked for. A job is a function of a benchmark that times what it means
-by itself, so that starting Python and importing do not count, and returns a dict of plain values.
+which libraries read once, is what it was asked for. A job is a function of a benchmark that times what it
+means by itself, so that starting Python and importing do not count, and returns a dict of plain values.
 """
 
 from __future__ import annotations
