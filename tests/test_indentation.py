@@ -1,12 +1,14 @@
 """One touch from arguments to skin: what it must obey, and what it refuses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import Grading
-from fingerpad.indentation import Touch, grading_about, indent, settings_of, touch_of
+from fingerpad.indentation import THIN_SIZE_MM, Touch, grading_about, indent, settings_of, touch_of
 from fingerpad.indenters import Bar, Cylinder, Line, Plate, Sphere
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import place
@@ -164,6 +166,12 @@ def test_mesh_is_fine_wherever_an_indenter_touches_first(indenter):
     beside = grading_about(indenter, "standard", 17.37, 2.0)
     assert beside.full
     assert beside.half_width_mm >= 2.0 + min(indenter.half_width_mm, 2.0)
+
+
+def test_a_wire_at_the_papers_size_keeps_the_papers_pad():
+    plain, wire = (grading_about(indenter, "paper", 17.37) for indenter in (Cylinder(), Line()))
+    assert replace(wire, core_half_length_mm=0.0, core_size_mm=0.0) == plain
+    assert wire.core_size_mm == THIN_SIZE_MM <= Line().half_width_mm < wire.core_half_length_mm
 
 
 def refused(said, **changes):

@@ -7,7 +7,7 @@ import pytest
 
 from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading, graded_lines, resolution_grading
+from fingerpad.grading import Grading, graded_lines, lines_along, resolution_grading
 from fingerpad.mesh import LAYERS, Mesh, block_mesh, finger_lines, finger_mesh
 from fingerpad.mesh_quality import jacobian_at_gauss, scaled_jacobian
 
@@ -237,6 +237,21 @@ def test_graded_lines_keep_their_growth_their_limit_and_their_end(fine, length, 
     assert (steps[:n_fine] <= size + 1e-12).all()
 
 
+@pytest.mark.parametrize("length", [3.3, 6.0, 6.01, 17.2])
+def test_a_core_is_finer_and_the_fine_zone_stays(length):
+    grading = Grading(CONTACT_X, 6.0, 1.0, 0.1, 0.1, core_half_length_mm=0.1, core_size_mm=0.025)
+    lines = lines_along(grading, length)
+    steps = np.diff(lines)
+    np.testing.assert_allclose(steps[:4], 0.025)
+    assert steps.min() > 0.0249
+    assert steps[lines[1:] < 6.0].max() < 0.1 + 1e-12
+    assert np.median(steps[(lines[:-1] > 0.5) & (lines[1:] < 6.0)]) == pytest.approx(0.1)
+    assert (steps[1:] / steps[:-1]).max() <= 1.3 + 1e-9
+    assert lines[0] == 0.0
+    assert lines[-1] == length
+    assert steps.size % 2 == 0
+
+
 def test_what_cannot_be_meshed_is_refused():
     with pytest.raises(InputError, match="centre_mm must lie between"):
         finger_mesh(FINGER, resolution_grading("quick", 40.0))
@@ -246,6 +261,9 @@ def test_what_cannot_be_meshed_is_refused():
         Grading(10.0, 1.0, 1.0, 0.2, 0.2, growth=1.5)
     with pytest.raises(InputError, match="dermis must be a whole number"):
         Grading(10.0, 1.0, 1.0, 0.2, 0.2, dermis=0)
+    for core in ((0.1, 0.0), (0.0, 0.1), (1.0, 0.1), (0.1, 0.2), (-0.1, 0.1)):
+        with pytest.raises(InputError, match="core_half_length_mm and core_size_mm must both be 0"):
+            Grading(10.0, 1.0, 1.0, 0.2, 0.2, core_half_length_mm=core[0], core_size_mm=core[1])
     with pytest.raises(InputError, match="y_edges starting at the skin"):
         block_mesh([0, 1], [1, 2], [0, 1], layers=[0])
     with pytest.raises(InputError, match="for each interval of y_edges"):

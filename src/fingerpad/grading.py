@@ -33,11 +33,14 @@ class Grading:
         Number of elements through each layer.
     full : bool
         Both halves of the finger, or only z >= 0.
+    core_half_length_mm, core_size_mm : float
+        Part of the fine zone with elements that are smaller still along the finger, under a wire: extent to
+        either side of its middle, and their size. Both 0 for none. [mm]
 
     Raises
     ------
     InputError
-        If a value is out of its range.
+        If a value is out of its range, or the core is not a part of the fine zone with smaller elements.
     """
 
     centre_mm: float
@@ -52,6 +55,8 @@ class Grading:
     dermis: int = 4
     subcutis: int = 4
     full: bool = False
+    core_half_length_mm: float = 0.0
+    core_size_mm: float = 0.0
 
     def __post_init__(self) -> None:
         finite("centre_mm", self.centre_mm, "mm")
@@ -61,6 +66,14 @@ class Grading:
             raise InputError(f"growth must be above 1 and at most 1.3: got {self.growth!r}.")
         for name in ("stratum_corneum", "living_epidermis", "dermis", "subcutis"):
             whole(name, getattr(self, name), 1)
+        core = self.core_half_length_mm, self.core_size_mm
+        if core != (0.0, 0.0) and not (
+            0.0 < core[0] < self.half_length_mm and 0.0 < core[1] < self.size_x_mm
+        ):
+            raise InputError(
+                f"core_half_length_mm and core_size_mm must both be 0, or lie between 0 and "
+                f"{self.half_length_mm:g} and {self.size_x_mm:g} mm: got {core[0]!r} and {core[1]!r}."
+            )
 
     @property
     def counts(self) -> tuple[int, int, int, int]:
@@ -100,6 +113,38 @@ def resolution_grading(
     length, width = max(half_length_mm, 6.0), max(half_width_mm, 5.0)
     pad = replace(zone, half_length_mm=length, half_width_mm=width)
     return replace(pad, size_x_mm=0.1, size_z_mm=0.1, full=True)
+
+
+def lines_along(grading: Grading, length: float) -> FloatArray:
+    """Lines from the middle of the fine zone to one end of the finger.
+
+    Parameters
+    ----------
+    grading : Grading
+        Sizes and zones along the finger.
+    length : float
+        Where the last line lies. [mm]
+
+    Returns
+    -------
+    array (n_steps + 1,)
+        Lines, from 0, an even number of steps. [mm]
+
+    Examples
+    --------
+    >>> wire = Grading(17.0, 0.5, 1.0, 0.2, 0.2, 0.2, core_half_length_mm=0.1, core_size_mm=0.1)
+    >>> lines_along(wire, 1.3).round(3).tolist()
+    [0.0, 0.1, 0.215, 0.348, 0.5, 0.7, 0.9, 1.1, 1.3]
+    """
+    fine, size = grading.half_length_mm, grading.size_x_mm
+    growth, largest = grading.growth, grading.largest_mm
+    if not grading.core_size_mm:
+        return graded_lines(fine, size, length, growth, largest)
+    if length < fine + size:  # the finger ends with its fine zone, not with slivers beyond it
+        fine = length
+    core = graded_lines(grading.core_half_length_mm, grading.core_size_mm, fine, growth, size)
+    beyond = graded_lines(0.0, size, length - fine, growth, largest)
+    return np.concatenate([core, fine + beyond[1:]])
 
 
 def graded_lines(fine: float, size: float, length: float, growth: float, largest: float) -> FloatArray:

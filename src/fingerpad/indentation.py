@@ -310,7 +310,11 @@ def grading_about(indenter: Indenter, resolution: str, x_mm: float, z_mm: float 
     grading = resolution_grading(resolution, x_mm, half_length_mm=reach, half_width_mm=abs(z_mm) + reach)
     if indenter.half_width_mm < grading.size_x_mm:
         # A wire needs elements of its own size below it; a few of them, from which the mesh grows.
-        grading = replace(grading, size_x_mm=THIN_SIZE_MM, half_length_mm=4 * THIN_SIZE_MM)
+        few_mm = 4 * THIN_SIZE_MM
+        if resolution == "paper":  # whose fine zone is the whole pad
+            grading = replace(grading, core_half_length_mm=few_mm, core_size_mm=THIN_SIZE_MM)
+        else:
+            grading = replace(grading, half_length_mm=few_mm, size_x_mm=THIN_SIZE_MM)
     return replace(grading, full=True) if z_mm != 0.0 else grading
 
 

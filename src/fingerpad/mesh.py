@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from fingerpad.checks import FloatArray, float_array, increasing, whole
 from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading, graded_lines
+from fingerpad.grading import Grading, graded_lines, lines_along
 
 IntArray = NDArray[np.int64]
 
@@ -298,16 +298,14 @@ def finger_lines(finger: Fingertip, grading: Grading) -> GridLines:
     if not 0.0 < centre < x[-1]:
         raise InputError(f"centre_mm must lie between 0 and {x[-1]:.2f} mm: got {centre}.")
     middle = np.interp(centre, x, arc)
-    growth, largest = grading.growth, grading.largest_mm
-    proximal, distal = (
-        graded_lines(grading.half_length_mm, grading.size_x_mm, length, growth, largest)
-        for length in (middle, arc[-1] - middle)
-    )
+    proximal, distal = (lines_along(grading, length) for length in (middle, arc[-1] - middle))
     along = np.concatenate([middle - proximal[::-1], middle + distal[1:]])
     along[0] = 0.0
     angle = np.linspace(0.0, np.pi, _ARC_POINTS)
     girth = _arc_length(_skin(finger, np.interp([centre], x, station), angle))
-    lines = graded_lines(grading.half_width_mm, grading.size_z_mm, girth[-1], growth, largest)
+    lines = graded_lines(
+        grading.half_width_mm, grading.size_z_mm, girth[-1], grading.growth, grading.largest_mm
+    )
     around = np.interp(lines, girth, angle)
     if grading.full:
         around = np.concatenate([-around[:0:-1], around])

@@ -158,6 +158,7 @@ def refined(grading: Grading, factor: float) -> Grading:
         grading,
         size_x_mm=grading.size_x_mm / factor,
         size_z_mm=grading.size_z_mm / factor,
+        core_size_mm=grading.core_size_mm / factor,
         largest_mm=grading.largest_mm / factor,
         # A coarser mesh would outgrow what a grading allows to neighbours.
         growth=min(grading.growth ** (1.0 / factor), 1.3),
