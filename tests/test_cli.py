@@ -8,12 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from fingerpad import __version__, cli
+from fingerpad import __version__, cli, indenters, studies
 from fingerpad.errors import ConvergenceError, FingerpadError, StoreError
+from fingerpad.export import formats
 from fingerpad.fingertip import Fingertip
+from fingerpad.grading import RESOLUTIONS
 from fingerpad.indentation import touch_of
-from fingerpad.indenters import Plate, Sphere
+from fingerpad.indenters import Indenter, Plate, Sphere
+from fingerpad.mechanics.tissues import TISSUES
+from fingerpad.report import mesh_refinement as report
 from fingerpad.stimulus import RampAndHold
+from fingerpad.studies import mesh_refinement
 
 COMMAND = [sys.executable, "-W", "error", "-m", "fingerpad"]
 
@@ -22,8 +27,8 @@ COMMAND = [sys.executable, "-W", "error", "-m", "fingerpad"]
 def call(monkeypatch, capsys, tmp_path):
     """Run the command line in this process, in an empty folder; a study would fail the test."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(cli, "reproduce", pytest.fail)
-    monkeypatch.setattr(cli.mesh_refinement, "run", pytest.fail)
+    monkeypatch.setattr(studies, "reproduce", pytest.fail)
+    monkeypatch.setattr(mesh_refinement, "run", pytest.fail)
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["fingerpad", *arguments])
@@ -48,10 +53,17 @@ def test_help_names_every_option_and_resolution(call):
         assert option in words
 
 
+def test_the_help_names_what_the_modules_know():
+    assert cli.RESOLUTIONS == RESOLUTIONS
+    assert tuple(TISSUES) == cli.MATERIALS
+    assert tuple(formats.FORMATS) == cli.FORMATS
+    assert all(issubclass(getattr(indenters, name), Indenter) for name in cli.INDENTERS.values())
+
+
 def test_refine_writes_its_page_numbers_and_figure(call, monkeypatch, tmp_path):
     asked = []
-    monkeypatch.setattr(cli.mesh_refinement, "run", lambda *arguments: asked.append(arguments[:2]) or {})
-    monkeypatch.setattr(cli.refinement_report, "documents", lambda results: {"mesh_refinement.md": b"errors"})
+    monkeypatch.setattr(mesh_refinement, "run", lambda *arguments: asked.append(arguments[:2]) or {})
+    monkeypatch.setattr(report, "documents", lambda results: {"mesh_refinement.md": b"errors"})
     status, said, _ = call("refine", "--out", "meshes", "--jobs", "3")
     assert (status, asked) == (0, [(Path("meshes"), 3)])
     assert said == f"Report: {Path('meshes') / 'mesh_refinement.md'}\n"
@@ -137,7 +149,7 @@ def test_failures_of_a_run_are_said_without_a_traceback(call, monkeypatch, tmp_p
     def fail(*_):
         raise failure
 
-    monkeypatch.setattr(cli, "reproduce", fail)
+    monkeypatch.setattr(studies, "reproduce", fail)
     status, said, errors = call("reproduce", "--out", "run")
     assert (status, said, errors) == (2, "", f"fingerpad: {failure}\n")
     assert list((tmp_path / "run").iterdir()) == []
@@ -147,7 +159,7 @@ def test_an_interrupted_run_says_how_it_goes_on(call, monkeypatch):
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "reproduce", stop)
+    monkeypatch.setattr(studies, "reproduce", stop)
     status, said, errors = call("reproduce")
     assert (status, said) == (128 + signal.SIGINT, "")
     assert (
@@ -162,7 +174,7 @@ def test_options_reach_the_run(call, monkeypatch, tmp_path):
         runs.append(run)
         raise FingerpadError("Enough.")
 
-    monkeypatch.setattr(cli, "reproduce", note)
+    monkeypatch.setattr(studies, "reproduce", note)
     call("reproduce", "--resolution", "paper", "--out", "a/b", "--jobs", "3", "--seed", "7")
     call("reproduce")
     given, default = runs
@@ -180,7 +192,7 @@ def test_options_reach_the_export(call, monkeypatch, tmp_path):
         exported.append((touch, folder, format_name, elastic_moduli))
         return (folder / "touch.pvd",)
 
-    monkeypatch.setattr(cli, "export_touch", note)
+    monkeypatch.setattr(formats, "export_touch", note)
     given = ("--curvature", "340", "--depth", "0.5", "--materials", "trial1", "--resolution", "standard")
     assert call("export", "a/b", *given) == (0, "Open: a/b/touch.pvd\n", "")
     assert call("export", "c", "--indenter", "plate", "--format", "vtu")[0] == 0

@@ -450,7 +450,7 @@ def test_the_command_hands_over_what_was_asked_and_writes_three_files(tiny, tmp_
         on_finished("Trial 3")
         return tiny.results
 
-    monkeypatch.setattr(cli, "study_materials", study)
+    monkeypatch.setattr(material_study, "study_materials", study)
     out = tmp_path / "out"
     words = [
         "materials",

@@ -1,5 +1,6 @@
 """The package as a user meets it: what it exports, explains and weighs at import."""
 
+import ast
 import dataclasses
 import importlib
 import inspect
@@ -66,6 +67,50 @@ def test_import_chooses_no_plotting_backend_and_warns_of_nothing() -> None:
         [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stdout.strip(), done.stderr) == (0, "False", "")
+
+
+HEAVY = (
+    "numpy", "scipy", "numba", "llvmlite", "matplotlib", "jinja2", "typer", "rich", "pypardiso", "pyamg",
+    "threadpoolctl", "vtkmodules",
+)  # fmt: skip
+"""Libraries that take from a tenth to several tenths of a second to load."""
+
+
+@pytest.mark.parametrize(
+    ("code", "needed"),
+    [
+        ("import fingerpad", set()),
+        ("import fingerpad; fingerpad.InputError, fingerpad.__version__, dir(fingerpad)", set()),
+        ("import fingerpad.cli", {"typer"}),
+        ("from fingerpad import Fingertip, SedTraces", {"numpy", "scipy"}),
+    ],
+    ids=["package", "errors", "command line", "values"],
+)
+def test_an_import_loads_no_library_that_it_does_not_use(code, needed):
+    loaded = f"{code}\nimport sys\nprint(*(name for name in {HEAVY} if name in sys.modules))"
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", loaded], capture_output=True, text=True, check=True
+    )
+    assert set(done.stdout.split()) == needed
+
+
+def test_the_three_lists_of_public_names_agree():
+    tree = ast.parse(Path(fingerpad.__file__).read_text(encoding="utf-8"))
+    typed = {
+        statement.module.removeprefix("fingerpad."): tuple(alias.name for alias in statement.names)
+        for block in tree.body
+        if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING"
+        for statement in block.body
+        if isinstance(statement, ast.ImportFrom)
+    }
+    assert typed == fingerpad._HOMES
+    assert fingerpad.__all__ == sorted(name for names in typed.values() for name in names)
+
+
+def test_names_are_listed_before_they_are_loaded_and_others_are_not_there():
+    assert set(fingerpad.__all__) < set(dir(fingerpad))
+    with pytest.raises(AttributeError, match="module 'fingerpad' has no attribute 'Fingertap'"):
+        fingerpad.Fingertap  # noqa: B018
 
 
 DECISIONS = Path(__file__).parents[1] / "docs" / "decisions"

@@ -7,32 +7,41 @@ Examples
 >>> response = fp.Population.grid(density_per_cm2=100).respond(skin)
 >>> len(response.spikes)
 18
+
+Notes
+-----
+The public names are loaded when they are first used, so that this import takes hundredths of a second. Below
+they stand three times: for people and type checkers, for `import *`, and for the loading.
 """
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-from fingerpad.afferent import Afferent
-from fingerpad.errors import ConvergenceError, FingerpadError, InputError, MaterialWarning, StoreError
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
-from fingerpad.indentation import Touch, indent, touch_of
-from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
-from fingerpad.mechanics.materials import (
-    Energy,
-    Hencky,
-    Hyperfoam,
-    Material,
-    Ogden,
-    Polynomial,
-    Prony,
-    Tissues,
-)
-from fingerpad.mechanics.press import PressSettings
-from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.population import Population
-from fingerpad.sampling import SkinResponse, SurfaceProfile
-from fingerpad.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
-from fingerpad.stimulus import ForceRampAndHold, RampAndHold
+if TYPE_CHECKING:
+    from fingerpad.afferent import Afferent
+    from fingerpad.errors import ConvergenceError, FingerpadError, InputError, MaterialWarning, StoreError
+    from fingerpad.fingertip import Fingertip
+    from fingerpad.grading import Grading
+    from fingerpad.indentation import Touch, indent, touch_of
+    from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+    from fingerpad.mechanics.materials import (
+        Energy,
+        Hencky,
+        Hyperfoam,
+        Material,
+        Ogden,
+        Polynomial,
+        Prony,
+        Tissues,
+    )
+    from fingerpad.mechanics.press import PressSettings
+    from fingerpad.mechanics.tissues import named_tissues
+    from fingerpad.population import Population
+    from fingerpad.sampling import SkinResponse, SurfaceProfile
+    from fingerpad.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
+    from fingerpad.stimulus import ForceRampAndHold, RampAndHold
 
 __all__ = [
     "Afferent",
@@ -73,3 +82,47 @@ __all__ = [
     "named_tissues",
     "touch_of",
 ]
+
+_HOMES = {
+    "afferent": ("Afferent",),
+    "errors": ("ConvergenceError", "FingerpadError", "InputError", "MaterialWarning", "StoreError"),
+    "fingertip": ("Fingertip",),
+    "grading": ("Grading",),
+    "indentation": ("Touch", "indent", "touch_of"),
+    "indenters": ("Bar", "Cylinder", "FlatPunch", "Line", "Plate", "Sphere"),
+    "mechanics.materials": (
+        "Energy",
+        "Hencky",
+        "Hyperfoam",
+        "Material",
+        "Ogden",
+        "Polynomial",
+        "Prony",
+        "Tissues",
+    ),
+    "mechanics.press": ("PressSettings",),
+    "mechanics.tissues": ("named_tissues",),
+    "population": ("Population",),
+    "sampling": ("SkinResponse", "SurfaceProfile"),
+    "signals": ("CurrentTraces", "HitRates", "ResponseMap", "SedTraces", "SpikeTrains"),
+    "stimulus": ("ForceRampAndHold", "RampAndHold"),
+}
+"""Public names by the module that defines them."""
+
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+
+# Hidden from type checkers, to which it would mean that any name is there.
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        """Fetch a public name when it is first used: Numba and SciPy take most of a second to load."""
+        if name not in _HOME:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+        globals()[name] = value
+        return value
+
+
+def __dir__() -> list[str]:
+    """Names of the module, those not fetched yet included."""
+    return sorted({*globals(), *__all__})

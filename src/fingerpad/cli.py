@@ -9,44 +9,44 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.progress import Progress as RichProgress
 
 from fingerpad import __version__
-from fingerpad.checks import one_of, whole
 from fingerpad.errors import FingerpadError, InputError
-from fingerpad.export.formats import FORMATS, export_touch
 from fingerpad.files import write_atomically
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import RESOLUTIONS
-from fingerpad.indentation import touch_of
-from fingerpad.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
-from fingerpad.mechanics.tissues import TISSUES
-from fingerpad.report import mesh_refinement as refinement_report
-from fingerpad.report import write_report
-from fingerpad.report.material_sets import write_material_page
-from fingerpad.stimulus import RampAndHold
-from fingerpad.studies import Reproduction, mesh_refinement, reproduce
-from fingerpad.studies.conditions import Conditions
-from fingerpad.studies.material_sets import Effort
-from fingerpad.studies.material_study import MaterialStudy, study_materials
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+# What a command runs is imported where it runs: help and version need none of it and come at once.
 
 EXPECTED_TIME = {"quick": "about 3 minutes", "standard": "about 10 minutes", "paper": "more than a day"}
 """On two cores, nothing stored yet."""
 
-INDENTERS: dict[str, type[Indenter]] = {
-    "sphere": Sphere,
-    "cylinder": Cylinder,
-    "bar": Bar,
-    "line": Line,
-    "punch": FlatPunch,
-    "plate": Plate,
+RESOLUTIONS = ("quick", "standard", "paper")
+INDENTERS = {
+    "sphere": "Sphere",
+    "cylinder": "Cylinder",
+    "bar": "Bar",
+    "line": "Line",
+    "punch": "FlatPunch",
+    "plate": "Plate",
 }
-"""Bodies to export by name, in the paper's sizes."""
+MATERIALS = (
+    "trial1",
+    "trial2",
+    "trial3",
+    "trial2_wu",
+    "trial3_wu",
+    "trial3_stiffening",
+    "maeno1998",
+    "wu2007",
+    "gerling2014_fit",
+)
+FORMATS = ("vtu", "abaqus", "calculix", "febio")
+"""What options may be, as the help names them; indenters with their class. The modules behind them decide."""
 
 app = typer.Typer(
     help="From a touch on a finite-element human fingertip to the spikes of SAI afferents to a percept.",
@@ -111,6 +111,12 @@ def reproduce_command(
     ] = 0,
 ) -> None:
     """Press, fire, fit and discriminate as in Gerling et al. 2014, and report beside the paper's numbers."""
+    from rich.console import Console
+
+    from fingerpad.report import write_report
+    from fingerpad.studies import Reproduction, reproduce
+    from fingerpad.studies.conditions import Conditions
+
     conditions = Conditions(resolution=resolution, seed=seed)
     run = Reproduction(conditions, out, jobs if jobs is not None else _cores())
     _make_writable(out)
@@ -142,13 +148,19 @@ def refine_command(
     ] = None,
 ) -> None:
     """Press bars and spheres into finer meshes, and report the error of the meshes of every resolution."""
+    from rich.console import Console
+
+    from fingerpad.checks import whole
+    from fingerpad.report import mesh_refinement as report
+    from fingerpad.studies import mesh_refinement
+
     processes = whole("jobs", jobs if jobs is not None else _cores(), at_least=1)
     _make_writable(out)
     with _interruptible():
         results = mesh_refinement.run(out, processes, _Bars(Console(stderr=True)))
-        for name, content in refinement_report.documents(results).items():
+        for name, content in report.documents(results).items():
             write_atomically(out / name, content)
-    typer.echo(f"Report: {out / refinement_report.PAGE}")
+    typer.echo(f"Report: {out / report.PAGE}")
 
 
 @app.command("materials")
@@ -172,6 +184,13 @@ def materials_command(
     ] = False,
 ) -> None:
     """Compare sets of tissues on deflection, firing and discrimination."""
+    from rich.console import Console
+
+    from fingerpad.report.material_sets import write_material_page
+    from fingerpad.studies.conditions import Conditions
+    from fingerpad.studies.material_sets import Effort
+    from fingerpad.studies.material_study import MaterialStudy, study_materials
+
     study = MaterialStudy(
         Conditions(resolution=resolution, seed=seed),
         out,
@@ -203,7 +222,7 @@ def export_command(
     depth: Annotated[
         float, typer.Option(parser=_number, metavar="NUMBER", help="Depth of the hold. [mm]")
     ] = 1.0,
-    materials: Annotated[str, typer.Option(help=f"One of {', '.join(TISSUES)}.")] = "trial3",
+    materials: Annotated[str, typer.Option(help=f"One of {', '.join(MATERIALS)}.")] = "trial3",
     resolution: Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTIONS)}.")] = "quick",
     format_name: Annotated[str, typer.Option("--format", help=f"One of {', '.join(FORMATS)}.")] = "vtu",
     elastic_moduli: Annotated[
@@ -212,11 +231,19 @@ def export_command(
     ] = None,
 ) -> None:
     """Press one indenter into the finger and write the touch for another program, ParaView by default."""
+    from fingerpad import indenters
+    from fingerpad.checks import one_of
+    from fingerpad.export.formats import export_touch
+    from fingerpad.fingertip import Fingertip
+    from fingerpad.indentation import touch_of
+    from fingerpad.stimulus import RampAndHold
+
     one_of("indenter", indenter, tuple(INDENTERS))
-    one_of("format", format_name, tuple(FORMATS))
+    one_of("format", format_name, FORMATS)
     if curvature is not None and indenter != "sphere":
         raise InputError(f"--curvature is that of a sphere, and a {indenter} has none: leave it out.")
-    body = INDENTERS[indenter]() if curvature is None else Sphere(curvature)
+    shape = {} if curvature is None else {"curvature_per_m": curvature}
+    body = getattr(indenters, INDENTERS[indenter])(**shape)
     touch = touch_of(Fingertip(), body, RampAndHold(depth_mm=depth), materials, resolution)
     _make_writable(folder, "FOLDER")
     try:
@@ -263,7 +290,16 @@ class _Bars:
     @contextmanager
     def stage(self, name: str, total: int) -> Iterator[Callable[[], None]]:
         """Show one stage with its expected time."""
-        bars = RichProgress(
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            TextColumn,
+            TimeElapsedColumn,
+            TimeRemainingColumn,
+        )
+
+        bars = Progress(
             TextColumn(f"{name:<24}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
             TextColumn("left"), TimeRemainingColumn(),
             console=self._console, disable=not self._console.is_terminal,
