@@ -57,6 +57,11 @@ class Run:
     peak_mb: float
 
     @property
+    def cores(self) -> float:
+        """Cores that it kept busy, on average over its whole life."""
+        return self.cpu_s / self.wall_s
+
+    @property
     def answer(self) -> dict[str, Any]:
         """Last line of the output, read as JSON."""
         return json.loads(self.printed.splitlines()[-1])

@@ -5,14 +5,18 @@ import re
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from benchmarks import growth, profiles
 from benchmarks.__main__ import BENCHMARKS, run
 from benchmarks.measuring import FailedRunError, Spread, run_job
 from benchmarks.measuring import run as run_command
 from benchmarks.page import PAGE, rewritten, targets_table
+from benchmarks.pressing import touch_of_sphere
 from benchmarks.results import Report, Table, read_all, write
 from benchmarks.targets import TARGETS, Target
+from fingerpad.mesh import finger_lines
 
 TEXT = PAGE.read_text(encoding="utf-8")
 MACHINE = {
@@ -103,3 +107,32 @@ def test_unknown_benchmark_is_refused(capsys):
 
 def test_continuous_integration_runs_no_benchmark():
     assert "benchmarks" not in (Path(__file__).parents[1] / ".ci" / "run").read_text()
+
+
+def test_sizes_of_the_study_of_growth_span_the_target():
+    nodes = []
+    for factor, layers in growth.SIZES:
+        touch = touch_of_sphere("standard", factor, layers)
+        lines = finger_lines(touch.finger, touch.grading)
+        nodes.append(lines.along_mm.size * lines.around_rad.size * lines.through.size)
+        assert lines.through.size == sum(layers) + 1
+    assert nodes == sorted(nodes)
+    assert nodes[0] < 20_000
+    assert nodes[-1] > 500_000
+
+
+def test_exponent_of_growth_is_that_of_a_power_law_through_noise():
+    nodes = np.array([2e4, 5e4, 1e5, 5e5])
+    assert growth.exponent(nodes, 3.0 * nodes**1.1 * [1.01, 0.99, 0.99, 1.01]) == pytest.approx(1.1, abs=0.01)
+
+
+def test_a_press_tells_its_time_size_and_result():
+    found = run_job("pressing", "press", threads=2, resolution="quick")
+    expected = {"nodes": 8290, "elements": 7128, "steps": 10}
+    assert {name: found.answer[name] for name in expected} == expected
+    assert 0.0 < found.answer["solve_s"] < found.wall_s
+    assert 50.0 < found.answer["before_mb"] < found.peak_mb
+
+
+def test_a_profile_names_functions_not_folders():
+    assert profiles.place("/a/b/press.py", 3, "step") == "`press.py: step`"

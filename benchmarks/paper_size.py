@@ -1,0 +1,63 @@
+"""The paper's size: one sphere into the whole finger at about 282,000 nodes, on one and two threads."""
+
+from __future__ import annotations
+
+from benchmarks.measuring import run_job
+from benchmarks.pressing import COLUMNS, PRESSED, work
+from benchmarks.results import Report, Table
+
+RESOLUTION = "paper"
+
+
+def measure(resolution: str = RESOLUTION) -> Report:
+    """Press once on two threads and once on one.
+
+    Parameters
+    ----------
+    resolution : str
+        Another one tries the script; its numbers answer no target.
+    """
+    run_job("pressing", "press", 2, resolution="quick")  # compiles kernels, if that is still to be done
+    runs = {threads: run_job("pressing", "press", threads, resolution=resolution) for threads in (2, 1)}
+    rows = []
+    for threads, run in runs.items():
+        found = run.answer
+        taken = [found["solve_s"], run.cores, run.peak_mb]
+        rows.append([threads, *work(found), *taken, found["force_mn"], found["sed_kpa"]])
+    both, one = runs[2].answer, runs[1].answer
+    same = both["force_mn"] == one["force_mn"] and both["sed_kpa"] == one["sed_kpa"]
+    return Report(
+        name="paper_size",
+        title="The paper's full-size finger",
+        about=(
+            f"{PRESSED} in {both['steps']} steps, each to a residual of 1e-5 of the contact force. The whole "
+            "finger, no symmetry used; one run each."
+        ),
+        tables=[
+            Table(
+                f"`touch_of(Fingertip(), Sphere(287), resolution='{resolution}').solve()`:",
+                [
+                    "threads",
+                    *COLUMNS,
+                    "solve, s",
+                    "cores used",
+                    "memory, MB",
+                    "force, mN",
+                    "largest SED, kPa",
+                ],
+                rows,
+            )
+        ],
+        measured={
+            "paper_size_s": both["solve_s"],
+            "paper_size_stretch_s": both["solve_s"],
+            "paper_size_gb": runs[2].peak_mb / 1000.0,
+            "paper_size_nodes": both["nodes"],
+            "paper_size_speedup": one["solve_s"] / both["solve_s"],
+        },
+        notes=[
+            f"Force and largest SED on one and two threads are {'the same bits' if same else 'not equal'}.",
+            "The time is that of `solve`, with meshing and loading of compiled kernels, without imports.",
+            both["linear_solver"],
+        ],
+    )

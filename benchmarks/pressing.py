@@ -1,0 +1,98 @@
+"""The press that most benchmarks measure: one sphere, ramp and hold, into a finger of some resolution."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import psutil
+
+if TYPE_CHECKING:  # a benchmark is listed and reported without importing what it measures
+    from fingerpad.indentation import Touch
+    from fingerpad.sampling import SkinResponse
+
+CURVATURE_PER_M = 287.0
+PRESSED = f"A sphere of {CURVATURE_PER_M:g} per m pressed 1.0 mm deep, ramp of 50 ms and hold of 950 ms"
+COLUMNS = ("nodes", "elements", "Newton steps", "factors")
+"""Headings of what `work` tells."""
+
+BASE_GROWTH = 1.25
+"""Ratio of neighbouring elements where the factor of refinement is 1; the finer, the closer to 1."""
+
+
+def press(
+    resolution: str, refinement: float | None = None, layers: tuple[int, int, int, int] = (4, 1, 4, 4)
+) -> dict[str, Any]:
+    """Press the sphere as the paper does: 1.0 mm within 50 ms, then hold for 950 ms.
+
+    Parameters
+    ----------
+    resolution : str
+        "quick", "standard" or "paper": mesh and steps.
+    refinement : float, optional
+        Divides all sizes of elements on the skin of that mesh.
+    layers : (int, int, int, int)
+        With a refinement, the elements through stratum corneum, living epidermis, dermis and subcutis.
+
+    Returns
+    -------
+    dict
+        Seconds of `Touch.solve`, meshing included; memory before it, size, work and two results.
+    """
+    touch = touch_of_sphere(resolution, refinement, layers)
+    before_mb = psutil.Process().memory_info().rss / 1e6
+    started = perf_counter()
+    skin = touch.solve()
+    return {"solve_s": perf_counter() - started, "before_mb": before_mb, **summary(skin)}
+
+
+def touch_of_sphere(
+    resolution: str, refinement: float | None = None, layers: tuple[int, int, int, int] = (4, 1, 4, 4)
+) -> Touch:
+    """Describe the press; arguments as in `press`.
+
+    Examples
+    --------
+    >>> touch_of_sphere("standard", 2.0, (8, 2, 8, 8)).grading.size_x_mm
+    0.125
+    """
+    from fingerpad import Fingertip, Sphere, touch_of
+
+    touch = touch_of(Fingertip(), Sphere(curvature_per_m=CURVATURE_PER_M), resolution=resolution)
+    if refinement is None:
+        return touch
+    coarse, (corneum, living, dermis, subcutis) = touch.grading, layers
+    return replace(
+        touch,
+        grading=replace(
+            coarse,
+            size_x_mm=coarse.size_x_mm / refinement,
+            size_z_mm=coarse.size_z_mm / refinement,
+            largest_mm=coarse.largest_mm / refinement,
+            growth=BASE_GROWTH ** (1.0 / refinement),
+            stratum_corneum=corneum,
+            living_epidermis=living,
+            dermis=dermis,
+            subcutis=subcutis,
+        ),
+    )
+
+
+def work(found: dict[str, Any]) -> list[int]:
+    """Size of the mesh and work of a press that `press` tells of."""
+    return [found[name] for name in ("nodes", "elements", "newton_steps", "factorisations")]
+
+
+def summary(skin: SkinResponse) -> dict[str, Any]:
+    """Size and work of a press, and two of its results, by which runs can be told to agree."""
+    return {
+        "nodes": len(skin.mesh.nodes_mm),
+        "elements": len(skin.mesh.elements),
+        "steps": skin.times_ms.size - 1,
+        "newton_steps": skin.newton_steps,
+        "factorisations": skin.factorisations,
+        "linear_solver": skin.linear_solver,
+        "force_mn": float(skin.force_mn[-1]),
+        "sed_kpa": float(skin.sed_kpa.max()),
+    }
