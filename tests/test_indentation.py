@@ -95,7 +95,7 @@ def test_the_nail_takes_its_share_of_the_reaction():
     force, blocks = np.empty_like(mesh.nodes_mm), np.empty((sparsity.column.size, 3, 3))
     assemble(
         mesh.nodes_mm, mesh.elements, done.displacement_mm[-1], mesh.layer, table.law, np.ones(4),
-        np.zeros((len(mesh.elements), 8, 6)), sparsity.position, False, force, blocks,
+        np.zeros((len(mesh.elements), 8, 6)), sparsity, False, force, blocks,
     )  # fmt: skip
     expected = [-2.0, -2.0, 0.0] * force[mesh.nail_nodes].sum(axis=0)  # both halves, whose z cancels
     np.testing.assert_allclose(done.nail_reaction_mn[-1], expected, rtol=1e-9, atol=1e-12)

@@ -64,7 +64,7 @@ def marched(material, displacements, times_ms, mesh=MESH):
         step = StepCoefficients.of(table, step_ms)
         assemble(
             mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table.law, step.s,
-            history.carried(step, mesh.layer), sparsity.position, False, force, blocks,
+            history.carried(step, mesh.layer), sparsity, False, force, blocks,
         )  # fmt: skip
         state = mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table
         instantaneous, energies, volumetric = instantaneous_state(*state)

@@ -38,7 +38,7 @@ def march(times_ms, displacements, table=TABLE):
         force = np.empty_like(displacement)
         assemble(
             CUBE.nodes_mm, CUBE.elements, displacement, CUBE.layer, table.law, step.s,
-            history.carried(step, CUBE.layer), sparsity.position, False, force, blocks,
+            history.carried(step, CUBE.layer), sparsity, False, force, blocks,
         )  # fmt: skip
         stress, points, volumetric = instantaneous_state(
             CUBE.nodes_mm, CUBE.elements, displacement, CUBE.layer, table

@@ -57,7 +57,7 @@ class Solid:
         blocks = np.empty((self.sparsity.column.size, 3, 3))
         potential = assemble(
             mesh.nodes_mm, mesh.elements, displacement, mesh.layer, self.table.law, step.s,
-            history.carried(step, mesh.layer), self.sparsity.position, with_tangent, force, blocks,
+            history.carried(step, mesh.layer), self.sparsity, with_tangent, force, blocks,
         )  # fmt: skip
         return potential, force, blocks
 

@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 from scipy import sparse
 
 from fingerpad.checks import FloatArray
+from fingerpad.mechanics.chunks import Chunks
 from fingerpad.mechanics.element import N_NODES, element_system
 
 
 @dataclass(frozen=True)
 class Sparsity:
-    """Block pattern of the tangent and where each element adds to it.
+    """Block pattern of the tangent, where each element adds to it, and which ones may add at the same time.
 
     Parameters
     ----------
@@ -26,26 +27,30 @@ class Sparsity:
         Block to which a pair of element nodes adds.
     diagonal : int array (n_nodes,)
         Block of each node with itself.
+    chunks : Chunks
+        Elements that threads add up at the same time.
     """
 
     row_start: np.ndarray
     column: np.ndarray
     position: np.ndarray
     diagonal: np.ndarray
+    chunks: Chunks
 
     @classmethod
     def of(cls, elements: np.ndarray, n_nodes: int) -> Sparsity:
         """Pattern of a mesh of `elements` (n_elements, 8)."""
-        keys = (elements[:, :, None] * n_nodes + elements[:, None, :]).ravel()
-        blocks, position = np.unique(keys, return_inverse=True)
-        row, column = np.divmod(blocks, n_nodes)
-        row_start = np.searchsorted(row, np.arange(n_nodes + 1))
-        return cls(
-            row_start.astype(np.int32),
-            column.astype(np.int32),
-            position.reshape(-1, N_NODES, N_NODES).astype(np.int64),
-            np.flatnonzero(row == column),
+        shape, corners = (len(elements), n_nodes), elements.ravel()
+        has = sparse.csr_matrix(
+            (np.ones(corners.size, dtype=bool), corners, np.arange(0, corners.size + 1, N_NODES)), shape=shape
         )
+        shared = has.T.tocsr() @ has  # pairs of nodes that have an element in common
+        shared.sort_indices()
+        row_start, column = shared.indptr.astype(np.int32), shared.indices.astype(np.int32)
+        position = np.empty((len(elements), N_NODES, N_NODES), dtype=np.int32)
+        _find_positions(elements, row_start, column, position)
+        diagonal = np.flatnonzero(np.repeat(np.arange(n_nodes), np.diff(row_start)) == column)
+        return cls(row_start, column, position, diagonal, Chunks.of(elements, n_nodes))
 
     def matrix(self, blocks: FloatArray) -> sparse.bsr_matrix:
         """Tangent as a block matrix that shares `blocks` (n_blocks, 3, 3)."""
@@ -54,8 +59,31 @@ class Sparsity:
 
 
 @njit(cache=True)
-def assemble(nodes, elements, displacement, layer, law, s, history, position, with_tangent, force, blocks):  # type: ignore[no-untyped-def]
-    """Add up all elements.
+def _find_positions(elements, row_start, column, position):  # type: ignore[no-untyped-def]
+    """Write the block to which every pair of nodes of every element adds."""
+    for e in range(elements.shape[0]):
+        for a in range(N_NODES):
+            for b in range(N_NODES):
+                block = row_start[elements[e, a]]
+                while column[block] != elements[e, b]:
+                    block += 1
+                position[e, a, b] = block
+
+
+def assemble(
+    nodes: FloatArray,
+    elements: np.ndarray,
+    displacement: FloatArray,
+    layer: np.ndarray,
+    law: FloatArray,
+    s: FloatArray,
+    history: FloatArray,
+    sparsity: Sparsity,
+    with_tangent: bool,
+    force: FloatArray,
+    blocks: np.ndarray,
+) -> float:
+    """Add up all elements, on as many threads as Numba is set to; the result does not depend on it.
 
     Parameters
     ----------
@@ -63,19 +91,19 @@ def assemble(nodes, elements, displacement, layer, law, s, history, position, wi
         Reference nodes and displacements. [mm]
     elements, layer : int array (n_elements, 8), (n_elements,)
         Connectivity and row of the material table.
-    law : array (n_layers, 8)
+    law : array (n_layers, n)
         `MaterialTable.law`.
     s : array (n_layers,)
         `StepCoefficients.s`.
     history : array (n_elements, 8, 6)
         H of the step. [kPa]
-    position : int array (n_elements, 8, 8)
-        `Sparsity.position`.
+    sparsity : Sparsity
+        Pattern of the tangent.
     with_tangent : bool
         Whether `blocks` is written.
     force : array (n_nodes, 3)
         Overwritten with the internal force. [mN]
-    blocks : array (n_blocks, 3, 3)
+    blocks : float64 or float32 array (n_blocks, 3, 3)
         Overwritten with the tangent if wanted. [mN/mm]
 
     Returns
@@ -83,13 +111,44 @@ def assemble(nodes, elements, displacement, layer, law, s, history, position, wi
     float
         Incremental potential; NaN if an element is turned inside out. [µJ]
     """
+    chunks, potentials = sparsity.chunks, np.empty(sparsity.chunks.first.size)
+    _add_colours(
+        nodes, elements, displacement, layer, law, s, history, sparsity.position, with_tangent,
+        force, blocks, chunks.first, chunks.last, chunks.colour_start, potentials,
+    )  # fmt: skip
+    return float(potentials.sum())
+
+
+@njit(cache=True, parallel=True)
+def _add_colours(  # type: ignore[no-untyped-def]
+    nodes, elements, displacement, layer, law, s, history, position, with_tangent,
+    force, blocks, first, last, colour_start, potentials,
+):  # fmt: skip
+    """Add up colour after colour, the chunks of a colour at the same time; one potential per chunk."""
     force[:] = 0.0
     if with_tangent:
-        blocks[:] = 0.0
+        for block in prange(blocks.shape[0]):
+            for i in range(3):
+                for j in range(3):
+                    blocks[block, i, j] = 0.0
+    for colour in range(colour_start.size - 1):
+        for chunk in prange(colour_start[colour], colour_start[colour + 1]):
+            potentials[chunk] = _add_chunk(
+                nodes, elements, displacement, layer, law, s, history, position, with_tangent,
+                force, blocks, first[chunk], last[chunk],
+            )  # fmt: skip
+
+
+@njit(cache=True)
+def _add_chunk(  # type: ignore[no-untyped-def]
+    nodes, elements, displacement, layer, law, s, history, position, with_tangent,
+    force, blocks, first, last,
+):  # fmt: skip
+    """Add elements from `first` up to `last` and return their potential; stop at one that is inside out."""
     element_force, element_tangent = np.empty((8, 3)), np.empty((8, 8, 3, 3))
     reference, moved = np.empty((8, 3)), np.empty((8, 3))
     potential = 0.0
-    for e in range(elements.shape[0]):
+    for e in range(first, last):
         for a in range(8):
             for i in range(3):
                 reference[a, i] = nodes[elements[e, a], i]

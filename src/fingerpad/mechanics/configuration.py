@@ -222,7 +222,7 @@ def evaluate(
     force = np.empty_like(displacement_mm)
     internal = assemble(
         mesh.nodes_mm, mesh.elements, displacement_mm, mesh.layer, body.table.law, load.step.s, load.carried,
-        body.sparsity.position, True, force, blocks,
+        body.sparsity, True, force, blocks,
     )  # fmt: skip
     pressures = None
     if body.is_mixed and not np.isnan(internal):
