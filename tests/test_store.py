@@ -403,7 +403,12 @@ def contents(store):
 
 def test_each_missing_touch_is_computed_once_and_reported(stored, monkeypatch):
     solved, solve = [], Touch.solve
-    monkeypatch.setattr(Touch, "solve", lambda touch: (solved.append(touch), solve(touch))[1])
+
+    def noted(touch, threads):
+        solved.append(touch)
+        return solve(touch, threads)
+
+    monkeypatch.setattr(Touch, "solve", noted)
     seconds: list[float] = []
     deeper = replace(TINY, stimulus=RampAndHold(depth_mm=0.11))
     assert solve_missing([deeper, TINY, deeper, TINY], stored, 1, seconds.append) == 1

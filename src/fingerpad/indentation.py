@@ -23,6 +23,7 @@ from fingerpad.mesh import Mesh, finger_mesh
 from fingerpad.parameters import fingertip as published
 from fingerpad.sampling import SkinResponse
 from fingerpad.stimulus import Motion, RampAndHold, Stimulus
+from fingerpad.threads import compiled_threads
 
 CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
 STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
@@ -106,18 +107,23 @@ class Touch:
                 f"where the bone comes: got {self.stimulus.depth_mm:g} mm."
             )
 
-    def solve(self) -> SkinResponse:
+    def solve(self, threads: int | None = None) -> SkinResponse:
         """Press and return the answer of the skin.
+
+        Parameters
+        ----------
+        threads : int, optional
+            Threads to use, all by default; the answer has the same bits on any number of them.
 
         Raises
         ------
         InputError
-            If a force pushes the indenter deeper than `deepest_mm`.
+            If a force pushes the indenter deeper than `deepest_mm`, or there are not so many threads.
         ConvergenceError
             If a step cannot be solved; nothing partial is returned.
         """
         mesh = self.mesh
-        done = self._press(mesh.living_epidermis.ravel())
+        done = self._press(mesh.living_epidermis.ravel(), threads)
         return SkinResponse(
             mesh=mesh,
             times_ms=done.times_ms,
@@ -139,10 +145,15 @@ class Touch:
             linear_solver=done.linear_solver,
         )
 
-    def deform(self) -> Deformation:
+    def deform(self, threads: int | None = None) -> Deformation:
         """Press and return everything that is known of every element and node over time.
 
         For looking at one touch (`fingerpad.export`); `solve` keeps what the later stages need.
+
+        Parameters
+        ----------
+        threads : int, optional
+            As in `solve`.
 
         Returns
         -------
@@ -154,11 +165,11 @@ class Touch:
         ConvergenceError
             If a step cannot be solved; nothing partial is returned.
         """
-        return self._press(np.arange(len(self.mesh.elements)))
+        return self._press(np.arange(len(self.mesh.elements)), threads)
 
-    def _press(self, watched: np.ndarray) -> Deformation:
-        # One thread: vector sums would otherwise depend on the number of cores, and idle threads only spin.
-        with threadpool_limits(limits=1):
+    def _press(self, watched: np.ndarray, threads: int | None) -> Deformation:
+        # Libraries get one thread, since their sums depend on the number of threads; our loops' do not.
+        with compiled_threads(threads), threadpool_limits(limits=1):
             return press(
                 self.mesh,
                 self.tissues.layers,

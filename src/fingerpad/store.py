@@ -33,6 +33,7 @@ from fingerpad.files import write_atomically
 from fingerpad.indentation import Touch
 from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.sampling import SkinResponse
+from fingerpad.threads import available_threads
 
 MECHANICAL_SOURCES = (
     "units.py",
@@ -44,6 +45,7 @@ MECHANICAL_SOURCES = (
     "mesh_checks.py",
     "mesh_quality.py",
     "indentation.py",
+    "threads.py",
     "mechanics",
 )
 """Source files and folders on which the stored numbers depend."""
@@ -218,13 +220,13 @@ def _packed(response: SkinResponse) -> bytes:
     return buffer.getvalue()
 
 
-def _compute(touch: Touch, path: Path) -> float:
+def _compute(touch: Touch, path: Path, threads: int | None = None) -> float:
     """Solve one touch and store it at `path`; return the seconds it took.
 
     The path is given, not found again: a worker would hash the sources as they are by then.
     """
     started = time.perf_counter()
-    write_atomically(path, _packed(touch.solve()))
+    write_atomically(path, _packed(touch.solve(threads)))
     return time.perf_counter() - started
 
 
@@ -269,13 +271,15 @@ def _in_turn(touches: Mapping[Path, Touch]) -> Iterator[float]:
 
 
 def _in_processes(touches: Mapping[Path, Touch], jobs: int) -> Iterator[float]:
+    processes = min(jobs, len(touches))
+    threads = max(1, available_threads() // processes)
     with (
         _environment(_ONE_THREAD),
-        ProcessPoolExecutor(
-            min(jobs, len(touches)), get_context("spawn"), _end_with_parent, (os.getpid(),)
-        ) as pool,
+        ProcessPoolExecutor(processes, get_context("spawn"), _end_with_parent, (os.getpid(),)) as pool,
     ):
-        waiting: set[Future[float]] = {pool.submit(_compute, touch, path) for path, touch in touches.items()}
+        waiting: set[Future[float]] = {
+            pool.submit(_compute, touch, path, threads) for path, touch in touches.items()
+        }
         try:
             while waiting:
                 done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
@@ -292,7 +296,7 @@ def _in_processes(touches: Mapping[Path, Touch], jobs: int) -> Iterator[float]:
 
 @contextmanager
 def _environment(variables: dict[str, str]) -> Iterator[None]:
-    """Environment that new processes start with: one core each, since there is one process per core."""
+    """Environment that new processes start with: one thread each for the libraries."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:
