@@ -42,7 +42,7 @@ def _layer() -> str:
 
 def available_threads() -> int:
     """Threads that compiled loops may use in this process, one per core unless NUMBA_NUM_THREADS is set."""
-    return int(numba.config.NUMBA_NUM_THREADS)
+    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 
 
 @contextmanager
