@@ -17,8 +17,9 @@ from fingerpad.indentation import touch_of
 from fingerpad.indenters import Indenter, Plate, Sphere
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.report import mesh_refinement as report
+from fingerpad.report import paper_size as paper_report
 from fingerpad.stimulus import RampAndHold
-from fingerpad.studies import mesh_refinement
+from fingerpad.studies import mesh_refinement, paper_size
 
 COMMAND = [sys.executable, "-W", "error", "-m", "fingerpad"]
 
@@ -29,6 +30,7 @@ def call(monkeypatch, capsys, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(studies, "reproduce", pytest.fail)
     monkeypatch.setattr(mesh_refinement, "run", pytest.fail)
+    monkeypatch.setattr(paper_size, "run", pytest.fail)
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["fingerpad", *arguments])
@@ -60,14 +62,24 @@ def test_the_help_names_what_the_modules_know():
     assert all(issubclass(getattr(indenters, name), Indenter) for name in cli.INDENTERS.values())
 
 
-def test_refine_writes_its_page_numbers_and_figure(call, monkeypatch, tmp_path):
+@pytest.mark.parametrize(
+    ("chosen", "study", "name"),
+    [
+        ((), mesh_refinement, "mesh_refinement.md"),
+        (("--against", "fine"), mesh_refinement, "mesh_refinement.md"),
+        (("--against", "paper"), paper_size, "paper_size.md"),
+    ],
+    ids=["default", "fine", "paper"],
+)
+def test_refine_writes_its_page_numbers_and_figure(call, monkeypatch, tmp_path, chosen, study, name):
     asked = []
-    monkeypatch.setattr(mesh_refinement, "run", lambda *arguments: asked.append(arguments[:2]) or {})
-    monkeypatch.setattr(report, "documents", lambda results: {"mesh_refinement.md": b"errors"})
-    status, said, _ = call("refine", "--out", "meshes", "--jobs", "3")
+    page = {mesh_refinement: report, paper_size: paper_report}[study]
+    monkeypatch.setattr(study, "run", lambda *arguments: asked.append(arguments[:2]) or {})
+    monkeypatch.setattr(page, "documents", lambda results: {name: b"errors"})
+    status, said, _ = call("refine", "--out", "meshes", "--jobs", "3", *chosen)
     assert (status, asked) == (0, [(Path("meshes"), 3)])
-    assert said == f"Report: {Path('meshes') / 'mesh_refinement.md'}\n"
-    assert (tmp_path / "meshes" / "mesh_refinement.md").read_bytes() == b"errors"
+    assert said == f"Report: {Path('meshes') / name}\n"
+    assert (tmp_path / "meshes" / name).read_bytes() == b"errors"
 
 
 def test_without_a_command_the_help_is_shown(call):
@@ -94,6 +106,7 @@ def test_without_a_command_the_help_is_shown(call):
         (["reproduce", "--seed", ""], "'--seed': must be a whole number", "''"),
         (["reproduce", "--seed"], "--seed", "requires an argument"),
         (["refine", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
+        (["refine", "--against", "coarse"], "against must be one of fine, paper", "'coarse'"),
         (["refine", "--resolution", "quick"], "No such option", "--resolution"),
         (["export"], "Missing argument", "'folder'"),
         (["export", "out", "--indenter", "cone"], "indenter must be one of sphere, cylinder, bar", "'cone'"),

@@ -46,7 +46,9 @@ MATERIALS = (
     "gerling2014_fit",
 )
 FORMATS = ("vtu", "abaqus", "calculix", "febio")
-"""What options may be, as the help names them; indenters with their class. The modules behind them decide."""
+REFINEMENTS = {"fine": "mesh_refinement", "paper": "paper_size"}
+"""What options may be, as the help names them; indenters with their class, finer meshes with
+their study and report. The modules behind them decide."""
 
 app = typer.Typer(
     help="From a touch on a finite-element human fingertip to the spikes of SAI afferents to a percept.",
@@ -139,6 +141,10 @@ def reproduce_command(
 
 @app.command("refine")
 def refine_command(
+    against: Annotated[
+        str,
+        typer.Option(help="fine: smaller by 1.5 in every direction; paper: the paper's size of mesh."),
+    ] = "fine",
     out: Annotated[
         Path, typer.Option(help="Folder for tables, figure, numbers and stored indentations.")
     ] = Path("refinement"),
@@ -148,18 +154,22 @@ def refine_command(
     ] = None,
 ) -> None:
     """Press bars and spheres into finer meshes, and report the error of the meshes of every resolution."""
+    from importlib import import_module
+
     from rich.console import Console
 
-    from fingerpad.checks import whole
-    from fingerpad.report import mesh_refinement as report
-    from fingerpad.studies import mesh_refinement
+    from fingerpad.checks import one_of, whole
 
+    one_of("against", against, tuple(REFINEMENTS))
+    study, report = (
+        import_module(f"fingerpad.{part}.{REFINEMENTS[against]}") for part in ("studies", "report")
+    )
     processes = whole("jobs", jobs if jobs is not None else _cores(), at_least=1)
     _make_writable(out)
     with _interruptible():
-        results = mesh_refinement.run(out, processes, _Bars(Console(stderr=True)))
-        for name, content in report.documents(results).items():
-            write_atomically(out / name, content)
+        results = study.run(out, processes, _Bars(Console(stderr=True)))
+        for file, content in report.documents(results).items():
+            write_atomically(out / file, content)
     typer.echo(f"Report: {out / report.PAGE}")
 
 

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from fingerpad.files import write_atomically
 from fingerpad.parameters import paper, psychophysics
 from fingerpad.report.appearance import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, png
+from fingerpad.report.markdown import table
 from fingerpad.report.words import fixed
 
 FIGURE = "material_sets.png"
@@ -105,13 +106,13 @@ def page(results: Mapping[str, Any], command: str = "fingerpad materials") -> st
         f"{targets['r2']:g} or more. Lines: the paper's {_FSS:g} and {_SIGMA:g}. Numbers are those of the "
         "table.",
         "## What was tried",
-        _table(
+        table(
             ("", "set", "epidermis", "dermis", "subcutis", "basis and status"),
             [_moduli(number, row) for number, row in enumerate(results["sets"], start=1)],
         ),
         "Initial shear moduli in kPa. All layers relax by the same Prony series (recalled).",
         "## What each level says",
-        _table(
+        table(
             (
                 "",
                 "R²",
@@ -135,7 +136,7 @@ def page(results: Mapping[str, Any], command: str = "fingerpad materials") -> st
         f"{targets['hit_rate_error']:g} of Goodwin's (p).",
         *_unsolved(results),
         "## What deflection alone says",
-        _table(
+        table(
             ("set", "epidermis", "dermis", "subcutis", "R²", "force [mN]"),
             [
                 (
@@ -151,7 +152,7 @@ def page(results: Mapping[str, Any], command: str = "fingerpad materials") -> st
         "## Order of the trials",
         _order(results["order"]),
         "## Wu's tissues as polynomials",
-        _table(
+        table(
             ("layer", "nu", "fitted up to", "C10, C01, C20, C11, C02 [kPa]", "rms error / largest stress"),
             [
                 (
@@ -237,7 +238,7 @@ def _order(order: Mapping[str, Any]) -> str:
             fixed(found["force_ratio"], 2),
         )
 
-    observed = _table(
+    observed = table(
         ("inner layers and epidermis", *(f"{region} [mm]" for region in _REGIONS.values())),
         [
             (name, *(fixed(found[region], 3) for region in _REGIONS))
@@ -250,8 +251,8 @@ def _order(order: Mapping[str, Any]) -> str:
         *(f"{region}, same force [mm]" for region in _REGIONS.values()),
         "force ratio at 1 mm",
     )
-    stiff = _table(columns, [(name, *cells(found)) for name, found in order["stiff_epidermis"].items()])
-    inner = _table(columns, [(name, *cells(found)) for name, found in order["inner_layers"].items()])
+    stiff = table(columns, [(name, *cells(found)) for name, found in order["stiff_epidermis"].items()])
+    inner = table(columns, [(name, *cells(found)) for name, found in order["inner_layers"].items()])
     return "\n\n".join(
         (
             "Mean deflection under the cylinder above the observed one, 1 mm deep:",
@@ -262,11 +263,6 @@ def _order(order: Mapping[str, Any]) -> str:
             inner,
         )
     )
-
-
-def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [columns, ["---"] * len(columns), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def write_material_page(results: Mapping[str, Any], folder: Path, command: str) -> Path:

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 
 from fingerpad.parameters import protocol
 from fingerpad.report.appearance import BLACK, BLUE, GREEN, ORANGE, new_figure, numbers, png
+from fingerpad.report.markdown import PERCENT, share, signed, table
 from fingerpad.report.words import ABSENT, fixed, number
 
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
-PERCENT = 100.0
 LINES: dict[str, dict[str, Any]] = {
     "coarse": {"color": GREEN, "linestyle": "", "marker": "v"},
     "quick": {"color": ORANGE, "linestyle": "--", "marker": ""},
@@ -99,7 +99,7 @@ def markdown(results: Mapping[str, Any]) -> str:
     """
     finest = results["levels"][-1]["name"]
     parts = [
-        _table(
+        table(
             (
                 "mesh",
                 "under the bar along × across [mm]",
@@ -111,12 +111,12 @@ def markdown(results: Mapping[str, Any]) -> str:
             [_mesh(level) for level in results["levels"]],
         ),
         f"Bar, one receptor, against {finest}; strain energy density (SED) as a share of its largest value:",
-        _table(ERROR_COLUMNS, _error_rows(results["bars"], finest)),
+        table(ERROR_COLUMNS, _error_rows(results["bars"], finest)),
         f"Spheres, 18 receptors, against {finest}:",
-        _table(ERROR_COLUMNS, _error_rows(results["spheres"], finest)),
+        table(ERROR_COLUMNS, _error_rows(results["spheres"], finest)),
         "Largest SED of a touch at the end of the ramp on the similar meshes, order of convergence and limit "
         "(Richardson); no order where the values do not settle:",
-        _table(
+        table(
             (
                 "touch",
                 *(f"{name} [kPa]" for name in _similar(results)),
@@ -127,7 +127,7 @@ def markdown(results: Mapping[str, Any]) -> str:
             [row for name in ("bars", "spheres") for row in _order_rows(results[name], _similar(results))],
         ),
         "Goodness of fit at the common shifts, parameters unchanged:",
-        _table(
+        table(
             ("mesh", "against", "touches", "weighted FSS", "on the finer mesh"),
             [
                 (
@@ -141,7 +141,7 @@ def markdown(results: Mapping[str, Any]) -> str:
             ],
         ),
         "Hit rates of Gradient Sum at the paper's noise, sphere at 0.0 mm, the same random numbers:",
-        _table(
+        table(
             (
                 "mesh",
                 *(f"{measure}, {curvature:g} /m" for measure, curvature in _measures(results["spheres"])),
@@ -152,19 +152,19 @@ def markdown(results: Mapping[str, Any]) -> str:
             ],
         ),
         "One change of the standard mesh at a time; bar shifted to the highest peak, standard sphere:",
-        _table(
+        table(
             ("touch", "change", "largest SED, ramp", "hold", "force"),
             [
-                (name, change, *(_signed(does[key]) for key in ("sed_ramp", "sed_hold", "force")))
+                (name, change, *(signed(does[key]) for key in ("sed_ramp", "sed_hold", "force")))
                 for name, changes in results["one_at_a_time"].items()
                 for change, does in changes.items()
             ],
         ),
         "Few steps against many in ramp and in hold, on the quick mesh:",
-        _table(
+        table(
             ("touch", "steps", *ERROR_COLUMNS[3:]),
             [
-                (name, f"{row['steps'][0]} against {row['steps'][1]}", *_errors(row))
+                (name, f"{row['steps'][0]} against {row['steps'][1]}", *errors(row))
                 for name, row in results["steps"].items()
             ],
         ),
@@ -200,14 +200,15 @@ def _error_rows(section: Mapping[str, Any], finest: str) -> list[Sequence[str]]:
             name,
             row["against"],
             str(row["touches"]),
-            *_errors(row),
+            *errors(row),
         )
         for name, row in _against(section, finest)
     ]
 
 
-def _errors(row: Mapping[str, Any]) -> list[str]:
-    shares = [_share(row["sed"][phase][key]) for phase in PHASES for key in ("max", "rms")]
+def errors(row: Mapping[str, Any]) -> list[str]:
+    """Return the cells of `ERROR_COLUMNS` after the third, from what `mesh_errors.compare` found."""
+    shares = [share(row["sed"][phase][key]) for phase in PHASES for key in ("max", "rms")]
     return shares + [fixed(row["rate"][phase][key], 1) for phase in RATES for key in ("max", "rms")]
 
 
@@ -227,7 +228,7 @@ def _order_rows(section: Mapping[str, Any], names: Sequence[str]) -> list[Sequen
             fixed(row["limit_kpa"], 3),
             ABSENT
             if row["limit_kpa"] is None
-            else _signed((row["sed_kpa"][names.index("standard")] - row["limit_kpa"]) / peak),
+            else signed((row["sed_kpa"][names.index("standard")] - row["limit_kpa"]) / peak),
         )
         for row in section["orders"]
     ]
@@ -236,25 +237,3 @@ def _order_rows(section: Mapping[str, Any], names: Sequence[str]) -> list[Sequen
 def _measures(section: Mapping[str, Any]) -> list[tuple[str, float]]:
     rates = next(iter(section["hit_rates"].values()))
     return [(measure, curvature) for measure in rates for curvature in section["comparisons_per_m"]]
-
-
-def _share(value: float) -> str:
-    return f"{fixed(PERCENT * value, 1)} %"
-
-
-def _signed(value: float) -> str:
-    """Share with its sign; nothing is neither above nor below nothing.
-
-    >>> _signed(0.034), _signed(-0.052), _signed(-0.0001)
-    ('+3.4 %', '−5.2 %', '0.0 %')
-    """
-    text = _share(value)
-    if not any(digit in text for digit in "123456789"):
-        return _share(0.0)
-    return text if value < 0.0 else f"+{text}"
-
-
-def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a Markdown table."""
-    lines = [columns, ["---"] * len(columns), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)

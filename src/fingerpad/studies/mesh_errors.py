@@ -175,7 +175,8 @@ def compare(reading: Reading, reference: Reading) -> dict[str, Any]:
     -------
     dict
         Number of common touches; `differences` of "sed", by phase, as shares of the reference's largest SED;
-        of "rate", by phase [spikes/s]; and of "force" as shares of the reference's largest.
+        of "rate", by phase [spikes/s]; of "latency" as far as an observer waits [ms]; and of "force" as
+        shares of the reference's largest.
     """
     common = [touch for touch in reference.touches if touch in reading.touches]
     ours, finer = reading.only(common), reference.only(common)
@@ -186,7 +187,30 @@ def compare(reading: Reading, reference: Reading) -> dict[str, Any]:
             for phase in finer.sed_kpa
         },
         "rate": {phase: differences(ours.rate_hz[phase], finer.rate_hz[phase]) for phase in finer.rate_hz},
+        "latency": differences(ours.measures()["latency"], finer.measures()["latency"]),
         "force": differences(ours.force_mn, finer.force_mn, float(finer.force_mn.max())),
+    }
+
+
+def largest_changes(before: Reading, after: Reading) -> dict[str, float]:
+    """Return what a change of the mesh does to the largest SED and to the force, as shares of them.
+
+    Parameters
+    ----------
+    before, after : Reading
+        One touch on two meshes.
+
+    Returns
+    -------
+    dict
+        "sed_ramp", "sed_hold" and "force".
+    """
+    return {
+        **{
+            f"sed_{phase}": float(after.sed_kpa[phase].max() / sed.max()) - 1.0
+            for phase, sed in before.sed_kpa.items()
+        },
+        "force": float(after.force_mn[0] / before.force_mn[0]) - 1.0,
     }
 
 

@@ -29,6 +29,7 @@ from fingerpad.studies.mesh_errors import (
     compare,
     goodness_of_fit,
     hit_rates,
+    largest_changes,
     observed_order,
     read,
 )
@@ -257,7 +258,7 @@ def run(folder: Path, jobs: int = 1, progress: Progress | None = None) -> dict[s
             "spheres": _balls(balls, neighbours),
             "one_at_a_time": {
                 name: {
-                    change: _changed(standard[name], reading({0: touch}, receptors[name]))
+                    change: largest_changes(standard[name], reading({0: touch}, receptors[name]))
                     for change, touch in each.items()
                 }
                 for name, each in changes.items()
@@ -363,17 +364,6 @@ def _balls(readings: Mapping[str, Reading], neighbours: np.ndarray) -> dict[str,
             }
             for name in ("quick", "standard")
         },
-    }
-
-
-def _changed(standard: Reading, changed: Reading) -> dict[str, float]:
-    """Return what a change does to the largest SED and to the force, as shares of them."""
-    return {
-        **{
-            f"sed_{phase}": float(changed.sed_kpa[phase].max() / sed.max()) - 1.0
-            for phase, sed in standard.sed_kpa.items()
-        },
-        "force": float(changed.force_mn[0] / standard.force_mn[0]) - 1.0,
     }
 
 
