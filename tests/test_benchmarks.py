@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import growth, profiles
+from benchmarks import growth, installing, peer_block, peer_neurons, profiles
 from benchmarks.__main__ import BENCHMARKS, run
 from benchmarks.measuring import FailedRunError, Spread, run_job
 from benchmarks.measuring import run as run_command
@@ -17,6 +17,7 @@ from benchmarks.pressing import touch_of_sphere
 from benchmarks.results import Report, Table, read_all, write
 from benchmarks.targets import TARGETS, Target
 from fingerpad.mesh import finger_lines
+from fingerpad.signals import SpikeTrains
 
 TEXT = PAGE.read_text(encoding="utf-8")
 MACHINE = {
@@ -136,3 +137,86 @@ def test_a_press_tells_its_time_size_and_result():
 
 def test_a_profile_names_functions_not_folders():
     assert profiles.place("/a/b/press.py", 3, "step") == "`press.py: step`"
+
+
+def test_block_of_the_peers_is_layered_and_comes_back_from_its_file(tmp_path):
+    nodes = {}
+    for size in peer_block.SIZES:
+        job = peer_block.read_job(peer_block.write_block(tmp_path / f"{size}.npz", size))
+        mesh = job.mesh
+        nodes[size] = len(mesh.nodes_mm)
+        assert np.ptp(mesh.nodes_mm, axis=0).tolist() == [14.0, 5.0, 12.0]
+        assert mesh.full
+        volumes_mm3 = np.abs(
+            np.linalg.det(mesh.nodes_mm[mesh.elements[:, [1, 3, 4]]] - mesh.nodes_mm[mesh.elements[:, :1]])
+        )
+        thicknesses_mm = np.bincount(mesh.layer, volumes_mm3) / (14.0 * 12.0)
+        assert thicknesses_mm[:2].sum() == pytest.approx(0.471)
+        assert thicknesses_mm[2:] == pytest.approx([1.153, 3.376])
+        assert job.indenter.radius_mm == pytest.approx(3.0)
+        assert job.depths_mm == pytest.approx(np.linspace(0.0, 1.0, 11))
+    assert nodes["small"] == pytest.approx(5_800, rel=0.02)
+    assert nodes["large"] == pytest.approx(21_500, rel=0.02)
+
+
+def test_lines_of_the_block_grow_by_one_ratio_from_the_size_of_the_core():
+    steps = np.diff(peer_block.lines(13, 7, 7.0))[20:]
+    assert steps[:13] == pytest.approx(2.5 / 13)
+    ratios = steps[13:] / steps[12:-1]
+    assert ratios == pytest.approx(ratios[0])
+    assert 1.0 < ratios[0] < 1.5
+
+
+def test_region_of_comparison_is_skin_near_the_axis(tmp_path):
+    mesh = peer_block.read_job(peer_block.write_block(tmp_path / "block.npz", "small")).mesh
+    region = peer_block.below_the_sphere(mesh)
+    assert set(mesh.layer[region]) == {1, 2}
+    middle = mesh.nodes_mm[mesh.elements].mean(axis=1)
+    away = np.hypot(middle[:, 0], middle[:, 2])
+    assert (
+        away[region].max()
+        < 2.0
+        < away[np.setdiff1d(np.flatnonzero(np.isin(mesh.layer, (1, 2))), region)].min()
+    )
+
+
+def test_spikes_are_paired_by_train_and_number(tmp_path):
+    mine = SpikeTrains.from_lists([[1.0, 2.0, 3.0], [9.0], [], [5.0, 6.0]])
+    theirs = SpikeTrains.from_lists([[1.5, 2.0], [9.0, 10.0], [4.0], [4.0, 6.0]])
+    assert peer_neurons.paired_differences_ms(mine, theirs).tolist() == [0.5, 0.0, 0.0, -1.0, 0.0]
+    for name, trains in (("mine", mine), ("theirs", theirs)):
+        np.savez(tmp_path / f"{name}.npz", times_ms=trains.times_ms, offsets=trains.offsets)
+    found = peer_neurons.timing(str(tmp_path / "mine.npz"), str(tmp_path / "theirs.npz"), every=1)
+    assert found == {
+        "rms_ms": pytest.approx(np.sqrt(1.25 / 5)),
+        "largest_ms": 1.0,
+        "same_count_percent": 25.0,
+    }
+
+
+def test_afferents_of_the_peers_fire_and_runge_kutta_nears_their_exact_spikes(tmp_path):
+    currents = str(peer_neurons.write_currents(tmp_path / "currents.npz", afferents=40))
+    fired = peer_neurons.fire(currents, str(tmp_path / "spikes.npz"))
+    assert fired["spikes"] > 40 * 20
+    checked = peer_neurons.check(currents, every=20)
+    coarse, middle, fine = checked["differences_ms"]
+    assert checked["afferents"] == 2
+    assert middle < 0.2 * coarse
+    assert fine < 0.2 * middle < 0.01
+
+
+def test_environments_of_peers_are_made_once(tmp_path):
+    peer = tmp_path / "felupe"
+    (peer / "bin").mkdir(parents=True)
+    (peer / "bin" / "python").touch()
+    (peer / "requirements.txt").write_text("\n".join(installing.REQUIREMENTS["felupe"]))
+    assert installing.environment_of("felupe", tmp_path) == peer / "bin" / "python"
+
+
+def test_a_peer_that_cannot_be_installed_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
+    with pytest.raises(installing.MissingPeerError, match="felupe could not be installed with pip"):
+        installing.environment_of("felupe", tmp_path)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(installing.MissingPeerError, match="package calculix-ccx"):
+        installing.calculix()

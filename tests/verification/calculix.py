@@ -39,7 +39,12 @@ def run(deck: str, folder: Path, n_elements: int, sets: tuple[str, ...]) -> Foun
     (folder / "job.inp").write_text(deck)
     environment = {**os.environ, "OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", "2")}
     done = subprocess.run(
-        [PROGRAM, "-i", "job"], cwd=folder, env=environment, capture_output=True, text=True, timeout=LONGEST_S
+        [PROGRAM or "ccx", "-i", "job"],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=LONGEST_S,
     )
     assert "Job finished" in done.stdout, "\n".join(done.stdout.splitlines()[-15:])
     return read((folder / "job.dat").read_text(), n_elements, sets)

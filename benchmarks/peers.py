@@ -1,0 +1,239 @@
+"""fingerpad beside other programs, in one run: FElupe and CalculiX on a layered block, Brian2 on neurons."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from benchmarks.installing import calculix, environment_of
+from benchmarks.measuring import Run, run, run_job
+from benchmarks.results import Report, Table
+
+THREADS = 2
+SIZES = ("small", "large")
+AFFERENTS = 100_000
+
+BRIAN2_RUNS = (("cython", 0.1, 1), ("standalone", 0.1, 1), ("standalone", 0.01, 100))
+"""How Brian2 runs, its step in ms, and which share of the afferents it fires: one of so many."""
+
+OURS, FELUPE, CALCULIX = "fingerpad", "FElupe", "CalculiX"
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A press of one program.
+
+    Parameters
+    ----------
+    solve_s, peak_mb, cores : float
+        Time, memory and cores kept busy.
+    iterations : int
+        Newton iterations.
+    force_mn : array (n_increments,)
+        Force of the sphere. [mN]
+    sed_kpa : array (n_elements,)
+        Strain energy density at the end, element means. [kPa]
+    version : str
+        Of the program.
+    """
+
+    solve_s: float
+    peak_mb: float
+    cores: float
+    iterations: int
+    force_mn: np.ndarray
+    sed_kpa: np.ndarray
+    version: str
+
+
+def ours(block: Path, folder: Path, threads: int) -> Solution:
+    """Press the block with fingerpad."""
+    done = run_job("peer_block", "press_block", threads, block=str(block), found=str(folder / "ours.npz"))
+    return _solution(done, folder / "ours.npz", "fingerpad")
+
+
+def felupe(block: Path, folder: Path, threads: int) -> Solution:
+    """Press the block with FElupe, in its own environment."""
+    done = run_job(
+        "peer_felupe", "press_block", threads, environment_of("felupe"),
+        block=str(block), found=str(folder / "felupe.npz"),
+    )  # fmt: skip
+    return _solution(done, folder / "felupe.npz", done.answer["version"])
+
+
+def _solution(done: Run, found: Path, version: str) -> Solution:
+    with np.load(found) as stored:
+        force_mn, sed_kpa = stored["force_mn"], stored["sed_kpa"]
+    told = done.answer
+    spent = told["solve_s"], done.peak_mb, done.cores, told["newton_steps"]
+    return Solution(*spent, force_mn, sed_kpa, version)
+
+
+def calculix_solution(block: Path, folder: Path, threads: int) -> Solution:
+    """Press the block with CalculiX, from the deck that `fingerpad export` would write."""
+    from tests.verification.calculix import read
+
+    program = calculix()
+    deck = run_job("peer_block", "write_deck", 1, block=str(block), deck=str(folder / "job.inp")).answer
+    done = run([program, "-i", "job"], threads, folder=folder)
+    found = read((folder / "job.dat").read_text(), deck["elements"], tuple(deck["sets"]))
+    told = re.search(r"Version (\S+)", run([program, "-v"], 1, folder=folder).printed)
+    iterations = sum(int(row.split()[3]) for row in (folder / "job.sta").read_text().splitlines()[2:])
+    return Solution(
+        done.wall_s, done.peak_mb, done.cores, iterations,
+        found.force_mn[:, 1], found.sed_kpa[-1], f"CalculiX {told[1] if told else ''}".strip(),
+    )  # fmt: skip
+
+
+def compared(mine: Solution, theirs: Solution, region: np.ndarray) -> tuple[float, float]:
+    """Largest differences in percent: of force at any increment, and of SED in a region over its largest.
+
+    Examples
+    --------
+    >>> mine = Solution(1.0, 1.0, 1.0, 1, np.array([1.0, 2.02]), np.array([4.0, 1.1, 9.0]), "")
+    >>> theirs = Solution(1.0, 1.0, 1.0, 1, np.array([1.0, 2.0]), np.array([4.0, 1.0, 1.0]), "")
+    >>> [round(percent, 9) for percent in compared(mine, theirs, np.array([0, 1]))]
+    [1.0, 2.5]
+    """
+    force = np.abs(mine.force_mn / theirs.force_mn - 1.0).max()
+    difference = np.abs(mine.sed_kpa[region] - theirs.sed_kpa[region]).max()
+    return 100.0 * float(force), 100.0 * float(difference / theirs.sed_kpa[region].max())
+
+
+def blocks(sizes: Sequence[str], threads: int) -> tuple[list[list[Any]], dict[str, float]]:
+    """Press every block with every program.
+
+    Returns
+    -------
+    list of lists, dict
+        Rows of the table, and the numbers that have targets: those of the last block.
+    """
+    from benchmarks.peer_block import below_the_sphere, read_job, write_block
+
+    rows: list[list[Any]] = []
+    measured: dict[str, float] = {}
+    for size in sizes:
+        with TemporaryDirectory() as name:
+            folder = Path(name)
+            block = write_block(folder / "block.npz", size)
+            mesh = read_job(block).mesh
+            region = below_the_sphere(mesh)
+            ours(block, folder, threads)  # compiles kernels, if that is still to be done
+            mine = ours(block, folder, threads)
+            others = {
+                FELUPE: felupe(block, folder, threads),
+                CALCULIX: calculix_solution(block, folder, threads),
+            }
+            rows.append(_row(mesh, mine) + [None] * 3)
+            for program, theirs in others.items():
+                force, sed = compared(mine, theirs, region)
+                ratio = theirs.solve_s / mine.solve_s
+                rows.append([*_row(mesh, theirs), ratio, force, sed])
+                key = program.lower()
+                measured[f"{key}_ratio"] = ratio
+                measured[f"{key}_force_percent"], measured[f"{key}_sed_percent"] = force, sed
+    return rows, measured
+
+
+def _row(mesh: Any, solution: Solution) -> list[Any]:
+    spent = [solution.solve_s, solution.cores, solution.peak_mb]
+    return [len(mesh.nodes_mm), solution.version, solution.iterations, *spent, float(solution.force_mn[-1])]
+
+
+def neurons(afferents: int, threads: int) -> tuple[list[list[Any]], dict[str, float], str]:
+    """Fire the same afferents with fingerpad and Brian2.
+
+    Returns
+    -------
+    list of lists, dict, str
+        Rows of the table, numbers that have targets, and what checks our spike times.
+    """
+    from benchmarks.peer_neurons import STEPS_MS, write_currents
+
+    python = environment_of("brian2")
+    with TemporaryDirectory() as name:
+        currents = str(write_currents(Path(name) / "currents.npz", afferents))
+        found, theirs = str(Path(name) / "ours.npz"), str(Path(name) / "theirs.npz")
+        mine = run_job("peer_neurons", "fire", threads, currents=currents, found=found).answer
+        checked = run_job("peer_neurons", "check", 1, currents=currents, every=max(afferents // 20, 1)).answer
+        rows: list[list[Any]] = [
+            ["fingerpad", None, afferents, mine["solve_s"], None, mine["spikes"], None, None, None]
+        ]
+        ratios, errors_ms = [], []
+        for mode, step_ms, every in BRIAN2_RUNS:
+            fired = run_job(
+                "peer_brian2", "fire", threads, python,
+                currents=currents, found=theirs, step_ms=step_ms, mode=mode, cores=threads, every=every,
+            ).answer  # fmt: skip
+            off = run_job("peer_neurons", "timing", 1, ours=found, theirs=theirs, every=every).answer
+            ratios.append(fired["solve_s"] * every / mine["solve_s"])
+            errors_ms.append(off["largest_ms"])
+            told = [f"{fired['version']}, {mode}", step_ms, -(-afferents // every), fired["solve_s"]]
+            differences = [off["rms_ms"], off["largest_ms"], off["same_count_percent"]]
+            rows.append([*told, ratios[-1], fired["spikes"], *differences])
+    exact_ms = checked["differences_ms"]
+    left = ", ".join(f"{off:.2g} ms at {step:g} ms" for off, step in zip(exact_ms, STEPS_MS, strict=True))
+    note = (
+        f"Our spike times, checked by Runge-Kutta on {checked['afferents']} of the afferents: they differ by "
+        f"at most {left}. That falls "
+        f"with the step, as Runge-Kutta's delay of up to a step for each spike does."
+    )
+    everyone = [n for n, (_, _, every) in enumerate(BRIAN2_RUNS) if every == 1]
+    measured = {
+        "brian2_ratio": min(ratios[n] for n in everyone),
+        # What is left at the smallest step is Runge-Kutta's own error: ours is at most that.
+        "brian2_timing_ratio": exact_ms[-1] / min(errors_ms[n] for n in everyone),
+    }
+    return rows, measured, note
+
+
+def measure(sizes: Sequence[str] = SIZES, afferents: int = AFFERENTS, threads: int = THREADS) -> Report:
+    """Run every program on the same jobs; with CalculiX on the large block this takes half an hour."""
+    of_block, block_numbers = blocks(sizes, threads)
+    of_neurons, neuron_numbers, note = neurons(afferents, threads)
+    return Report(
+        name="peers",
+        title="Beside other programs",
+        about=(
+            "A layered block, 14 x 12 x 5 mm, under a rigid frictionless sphere of 3 mm radius, 1.0 mm in "
+            "ten equal increments, neo-Hookean layers with nu = 0.48; and 100,000 leaky integrate-and-fire "
+            f"afferents for 1 s. Every program reads the same file and may use {threads} threads."
+        ),
+        tables=[
+            Table(
+                "Block. Differences are the largest of force at any increment, and of SED in living "
+                "epidermis and dermis within 2 mm of the axis, as a share of its largest:",
+                [
+                    "nodes", "program", "iterations", "s", "cores used", "memory, MB", "force, mN",
+                    "times our time", "force, %", "SED, %",
+                ],
+                of_block,
+            ),
+            Table(
+                "Afferents. Differences are those of spikes of the same number in the same train:",
+                [
+                    "program", "step, ms", "afferents", "s", "times our time, for as many", "spikes",
+                    "timing, RMS, ms", "largest, ms", "same number of spikes, %",
+                ],
+                of_neurons,
+            ),
+        ],
+        measured=block_numbers | neuron_numbers,
+        notes=[
+            "Times are without imports and compiling. Of CalculiX they are those of its whole process, which "
+            "reads and writes files, but not of our writing of its deck.",
+            "Solvers keep the tolerances that they come with, FElupe gets 1e-6; ours is 1e-5 of the force of "
+            "contact.",
+            "FElupe has our element, mean dilatation, and a penalty at the nodes; it solves with PARDISO. "
+            "CalculiX has incompatible modes (C3D8I), the closest it has, and solves with SPOOLES.",
+            note,
+            "Brian2 notes spikes at its steps and begins the rest a step early, which adds up from spike to "
+            "spike; the target takes its fastest way at 0.1 ms.",
+        ],
+    )  # fmt: skip
