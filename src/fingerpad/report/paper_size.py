@@ -71,7 +71,9 @@ def draw(results: Mapping[str, Any]) -> Figure:
     _errors_of_profiles(panels[0, 1], results["deflection"])
     _bars(panels[1, 0], results["bars"])
     _hit_rates(panels[1, 1], results["spheres"])
-    figure.legend(*panels[1, 0].get_legend_handles_labels(), loc="outside lower center", ncols=len(LINES))
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    known = dict(zip(labels, handles, strict=True))
+    figure.legend(known.values(), known.keys(), loc="outside lower center", ncols=len(known))
     return figure
 
 
@@ -102,7 +104,7 @@ def _errors_of_profiles(axes: Axes, section: Mapping[str, Any]) -> None:
 def _bars(axes: Axes, section: Mapping[str, Any]) -> None:
     for name, profile in section["profiles"].items():
         values = numbers(profile["sed_ramp_kpa"])
-        axes.plot(numbers(section["shift_mm"]), values, label=name, **LINES[name])
+        axes.plot(numbers(section["shift_mm"]), values, label=name, **LINES[name] | {"linestyle": ""})
     axes.set_title("(c) energy density under the bar, end of the ramp [kPa]")
     axes.set_xlabel("position of the bar, proximal positive [mm]")
     axes.set_ylim(bottom=0.0)
@@ -110,15 +112,16 @@ def _bars(axes: Axes, section: Mapping[str, Any]) -> None:
 
 def _hit_rates(axes: Axes, section: Mapping[str, Any]) -> None:
     for name, positions in section["hit_rates"].items():
-        for position, rates in positions.items():
+        rates = positions["0"]
+        for measure, alpha in (("static", 1.0), ("dynamic", 0.4)):
             axes.plot(
                 numbers(section["comparisons_per_m"]),
-                PERCENT * numbers(rates["static"]),
+                PERCENT * numbers(rates[measure]),
                 label=name,
-                alpha=1.0 if float(position) == 0.0 else 0.5,
+                alpha=alpha,
                 **LINES[name],
             )
-    axes.set_title("(d) hit rates, static; pale: sphere shifted by 0.2 mm [%]")
+    axes.set_title("(d) hit rates at 0.0 mm, static; pale: dynamic [%]")
     axes.set_xlabel("curvature of the comparison [1/m]")
 
 
