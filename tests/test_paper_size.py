@@ -1,5 +1,6 @@
 """Quick and standard against the paper's size: what is pressed, and what is made of a known difference."""
 
+import copy
 import json
 from dataclasses import replace
 
@@ -207,6 +208,33 @@ def test_pages_say_every_mesh_with_its_errors(results):
     assert len(tables) == 8
     for lines in tables:
         assert len({line.count("|") for line in lines}) == 1
+
+
+def test_the_summary_holds_the_worst_of_every_touch(results):
+    found = copy.deepcopy(results[0])
+    found["deflection"]["errors"]["standard"]["trial 2, line"]["profile"]["max"] = 0.123
+    rows = dict(line.strip("| ").split(" | ", 1) for line in report.summary(found).splitlines())
+    deepest = max(found["deflection"]["deflection_mm"]["paper"]["trial 1, line"])
+    assert rows["skin, six deflections [µm]"] == f"{200 * deepest:.0f} | 123"
+    for quantity in ("their force", "energy density at the receptor, bar"):
+        assert rows[quantity] == "20.0 % | 5.0 %"
+    rates = [
+        max(
+            row["rate"]["dynamic"]["max"]
+            for row in (found["bars"]["errors"][name], *found["spheres"]["errors"][name].values())
+        )
+        for name in ("quick", "standard")
+    ]
+    assert rows["dynamic rate, bar and spheres [spikes/s]"] == " | ".join(f"{rate:.1f}" for rate in rates)
+    hits = found["spheres"]["hit_rates"]
+    points = [
+        max(
+            abs(np.subtract(hits[name][position]["static"], hits["paper"][position]["static"])).max()
+            for position in ("0", "0.2")
+        )
+        for name in ("quick", "standard")
+    ]
+    assert rows["hit rate, static [points]"] == " | ".join(f"{100 * point:.1f}" for point in points)
 
 
 def test_the_figure_draws_every_mesh(results):

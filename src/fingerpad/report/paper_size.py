@@ -125,6 +125,66 @@ def _hit_rates(axes: Axes, section: Mapping[str, Any]) -> None:
     axes.set_xlabel("curvature of the comparison [1/m]")
 
 
+def summary(results: Mapping[str, Any]) -> str:
+    """Return one table of how far each mesh is from the paper's size, over all touches.
+
+    Parameters
+    ----------
+    results : dict
+        From `studies.paper_size.run`.
+
+    Returns
+    -------
+    str
+        A table in Markdown, as it stands on the page of the decision.
+    """
+    columns = {name: _summed(results, name) for name in results["meshes"] if name != REFERENCE}
+    quantities = next(iter(columns.values()))
+    fss = results["bars"]["fss"]
+    return table(
+        ("largest difference from the paper's size", *columns),
+        [
+            *((quantity, *(column[quantity] for column in columns.values())) for quantity in quantities),
+            (
+                f"weighted FSS of the bar's shifts; {fixed(fss[REFERENCE], 3)} at the paper's size",
+                *(fixed(fss[name], 3) for name in columns),
+            ),
+        ],
+    )
+
+
+def _summed(results: Mapping[str, Any], name: str) -> dict[str, str]:
+    """Largest differences of one mesh, by quantity."""
+    deflection = results["deflection"]["errors"][name].values()
+    bar, spheres = results["bars"]["errors"][name], results["spheres"]["errors"][name].values()
+    found = {
+        "skin, six deflections [µm]": fixed(UM_PER_MM * max(row["profile"]["max"] for row in deflection), 0),
+        "their force": share(max(abs(row["force"]) for row in deflection)),
+        "energy density at the receptor, bar": share(bar["sed"]["ramp"]["max"]),
+        "the same at 18 receptors under spheres": share(max(row["sed"]["ramp"]["max"] for row in spheres)),
+    }
+    for rate in RATES[::-1]:
+        largest = max(row["rate"][rate]["max"] for row in (bar, *spheres))
+        found[f"{rate} rate, bar and spheres [spikes/s]"] = fixed(largest, 1)
+    found["first spike, bar and spheres [ms]"] = fixed(
+        max(row["latency"]["max"] for row in (bar, *spheres)), 1
+    )
+    for measure in ("static", "dynamic"):
+        found[f"hit rate, {measure} [points]"] = fixed(
+            PERCENT * _farthest(results["spheres"], name, measure), 1
+        )
+    return found
+
+
+def _farthest(spheres: Mapping[str, Any], name: str, measure: str) -> float:
+    """Largest difference of a hit rate from that at the paper's size, over comparisons and positions."""
+    ours, theirs = (
+        numbers([rates[measure] for rates in spheres["hit_rates"][mesh].values()])
+        for mesh in (name, REFERENCE)
+    )
+    return float(abs(ours - theirs).max())
+
+
 def markdown(results: Mapping[str, Any]) -> str:
     """Return the section of the verification page: the preset, the meshes and their errors, as tables.
 
