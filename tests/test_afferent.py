@@ -1,10 +1,12 @@
 import time
+import tracemalloc
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fingerpad.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.blocks import BLOCK
 from fingerpad.errors import InputError
 from fingerpad.parameters import neuron
 from fingerpad.signals import SedTraces
@@ -102,6 +104,22 @@ def test_a_drive_gives_what_its_traces_give_and_a_fit_can_afford_it():
         afferent.rates(prepared)
         durations.append(time.perf_counter() - start)
     assert min(durations) < 2e-3
+
+
+def test_many_receptors_never_stand_on_all_knots_at_once():
+    times = np.append(np.linspace(0.0, 50.0, 9), 50.0 + np.geomspace(2.0, 950.0, 12))
+    sed = SedTraces(times, np.outer(np.minimum(times, 50.0), np.linspace(0.0, 0.02, 24 * BLOCK)), [50.0])
+    Afferent().spikes(sed.part(slice(0, 2)))  # compile
+    tracemalloc.start()
+    spikes = Afferent().spikes(sed)
+    peak_bytes = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    knots = drive(sed.part(slice(0, 1))).times_ms.size
+    assert len(spikes[24 * BLOCK - 1]) > 10
+    assert peak_bytes < 0.8 * knots * sed.n_sites * np.dtype(float).itemsize
+    alone = Afferent().spikes(sed.part(slice(23 * BLOCK, 23 * BLOCK + 1)))[0]
+    assert alone.size > 10
+    assert_array_equal(spikes[23 * BLOCK], alone)
 
 
 @pytest.mark.parametrize(

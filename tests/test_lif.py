@@ -1,5 +1,6 @@
 import math
 import time
+from decimal import Decimal, localcontext
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from fingerpad import blocks
+from fingerpad.blocks import BLOCK
 from fingerpad.errors import InputError
 from fingerpad.lif import LeakyIntegrateAndFire
 from fingerpad.signals import CurrentTraces
@@ -238,6 +241,39 @@ def test_every_column_is_a_neuron_of_its_own():
     for site, train in enumerate(together):
         alone = NEURON.spikes(CurrentTraces(current.times_ms, current.current_ma[:, [site]]))
         assert_array_equal(alone.times_ms, train)
+
+
+def test_many_neurons_fire_as_each_does_alone_on_any_number_of_threads(monkeypatch):
+    current = bumpy_current(2 * BLOCK + 3)
+    answers = []
+    for threads in (1, 3):
+        monkeypatch.setattr(blocks, "available_threads", lambda threads=threads: threads)
+        answers.append(NEURON.spikes(current))
+    one, several = answers
+    assert_array_equal(one.times_ms, several.times_ms)
+    assert_array_equal(one.offsets, several.offsets)
+    for neuron in (0, BLOCK - 1, BLOCK, 2 * BLOCK + 2):
+        alone = NEURON.spikes(CurrentTraces(current.times_ms, current.current_ma[:, [neuron]]))
+        assert_array_equal(alone.times_ms, one[neuron])
+
+
+def test_spike_times_are_exact_to_the_round_off_of_the_potential():
+    """Against the crossing of the closed form itself, bisected with fifty digits."""
+    first, slope = 2e-6, 3e-9
+    spike = NEURON.spikes(CurrentTraces([0.0, 200.0], [[first], [first + 200.0 * slope]]))[0][0]
+    with localcontext(prec=50):
+        tau, capacitance, threshold = Decimal(TAU), Decimal(CAPACITANCE), Decimal(THRESHOLD)
+        m = (Decimal(first + 200.0 * slope) - Decimal(first)) / 200
+
+        def above(s):
+            gone = 1 - (-s / tau).exp()
+            return tau / capacitance * (Decimal(first) * gone + m * (s - tau * gone)) - threshold
+
+        low, high = Decimal(0), Decimal(200)
+        while high - low > Decimal("1e-25"):
+            middle = (low + high) / 2
+            low, high = (low, middle) if above(middle) >= 0 else (middle, high)
+    assert_allclose(spike, float(high), rtol=1e-14)
 
 
 def test_a_thousand_afferents_take_a_fraction_of_a_second():

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.interpolate import PchipInterpolator
 
 from fingerpad.errors import InputError
 from fingerpad.lif import LeakyIntegrateAndFire
@@ -150,3 +151,29 @@ def test_two_times_are_enough_and_kinks_at_the_ends_change_nothing():
 def test_what_cannot_be_used_is_refused(wrong, message):
     with pytest.raises(InputError, match=message):
         wrong()
+
+
+def test_the_fast_evaluation_is_that_of_the_interpolants_themselves():
+    """SciPy evaluates value and derivative one after the other; the kernel writes both at once."""
+    rng = np.random.default_rng(11)
+    times = np.array([0.0, 3.0, 20.0, 50.0, 51.0, 90.0, 400.0])
+    sed = SedTraces(times, rng.uniform(0.0, 4.0, (7, 5)), kinks_ms=[50.0])
+    fast = drive(sed)
+    for first, last in ((0, 3), (3, 6)):
+        plain = PchipInterpolator(times[first : last + 1], sed.sed_kpa[first : last + 1], axis=0)
+        # The first knot of all stands twice, before and after the onset; the kink ends one phase, begins one.
+        at = np.flatnonzero((fast.times_ms >= times[first]) & (fast.times_ms <= times[last]))
+        at = at[1:-1] if first == 0 else at[1:]
+        assert_allclose(fast.sed_kpa[at], plain(fast.times_ms[at]), rtol=1e-14)
+        assert_allclose(fast.rate_kpa_per_ms[at], abs(plain(fast.times_ms[at], nu=1)), rtol=1e-13, atol=1e-17)
+    assert (fast.times_ms == 50.0).sum() == 2
+
+
+def test_a_part_of_traces_or_of_their_drive_is_that_of_its_sites():
+    sed = SedTraces([0.0, 50.0, 90.0], [[0.0] * 3, [1.0, 2.0, 3.0], [1.0, 1.0, 2.0]], kinks_ms=[50.0])
+    assert_array_equal(sed.part(slice(1, 3)).sed_kpa, sed.sed_kpa[:, 1:])
+    assert_array_equal(sed.part(slice(1, 3)).kinks_ms, sed.kinks_ms)
+    part, whole = drive(sed).part(slice(2, 3)), drive(sed.part(slice(2, 3)))
+    assert_array_equal(part.rate_kpa_per_ms, whole.rate_kpa_per_ms)
+    assert_array_equal(part.sed_kpa, whole.sed_kpa)
+    assert part.n_sites == 1

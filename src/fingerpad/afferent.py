@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
+from fingerpad.blocks import in_blocks
 from fingerpad.checks import FloatArray, float_array
 from fingerpad.errors import InputError
 from fingerpad.lif import LeakyIntegrateAndFire
@@ -140,7 +141,11 @@ class Afferent:
         SpikeTrains
             One train per site.
         """
-        return self.membrane.spikes(self.transduction.current(sed))
+
+        def trains(sites: slice) -> SpikeTrains:
+            return self.membrane.spikes(self.transduction.current(sed.part(sites)))
+
+        return SpikeTrains.joined(in_blocks(trains, sed.n_sites))
 
     def rates(
         self,

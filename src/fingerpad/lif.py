@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from fingerpad.blocks import in_blocks
 from fingerpad.checks import FloatArray, positive
 from fingerpad.signals import CurrentTraces, SpikeTrains
 
@@ -83,7 +84,12 @@ class LeakyIntegrateAndFire:
         SpikeTrains
             One train per site; nothing is added after the last knot.
         """
-        return SpikeTrains(*_exact_trains(current.times_ms, _by_site(current), *self._constants()))
+
+        def trains(neurons: slice) -> SpikeTrains:
+            by_neuron = _by_neuron(current.current_ma[:, neurons])
+            return SpikeTrains(*_exact_trains(current.times_ms, by_neuron, *self._constants()))
+
+        return SpikeTrains.joined(in_blocks(trains, current.n_sites))
 
     def spikes_runge_kutta(self, current: CurrentTraces, step_ms: float = 0.001) -> SpikeTrains:
         """Spike times by the paper's scheme: fourth-order Runge-Kutta with a fixed step.
@@ -110,7 +116,7 @@ class LeakyIntegrateAndFire:
         """
         step = positive("step_ms", step_ms, "ms")
         return SpikeTrains(
-            *_runge_kutta_trains(current.times_ms, _by_site(current), *self._constants(), step)
+            *_runge_kutta_trains(current.times_ms, _by_neuron(current.current_ma), *self._constants(), step)
         )
 
     def _constants(self) -> tuple[float, float, float, float]:
@@ -122,29 +128,35 @@ class LeakyIntegrateAndFire:
         )
 
 
-def _by_site(current: CurrentTraces) -> FloatArray:
+def _by_neuron(current_ma: FloatArray) -> FloatArray:
     # A neuron runs through its own row: neighbours in time must be neighbours in memory.
-    return np.ascontiguousarray(current.current_ma.T)
+    return np.ascontiguousarray(current_ma.T)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
+def _gone(elapsed: float, tau: float) -> float:
+    """Share of the potential that has leaked after `elapsed`: g."""
+    return -math.expm1(-elapsed / tau)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def _potential(
-    elapsed: float, start: float, current: float, slope: float, tau: float, capacitance: float
+    elapsed: float, gone: float, start: float, current: float, slope: float, tau: float, capacitance: float
 ) -> float:
     """Solve Eq. 5 in closed form, `elapsed` after the potential was `start` and the current `current`."""
-    gone = -math.expm1(-elapsed / tau)
     return start * (1.0 - gone) + tau / capacitance * (current * gone + slope * (elapsed - tau * gone))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _growth(potential: float, current: float, tau: float, capacitance: float) -> float:
     """Right side of Eq. 5."""
     return -potential / tau + current / capacitance
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _refine(
     high: float,
+    reached: float,
     start: float,
     current: float,
     slope: float,
@@ -152,29 +164,37 @@ def _refine(
     capacitance: float,
     threshold: float,
 ) -> float:
-    """Time of the only crossing within (0, high]: Newton, or bisection where Newton leaves the bracket."""
+    """Time of the only crossing within (0, high], where the potential has `reached` the threshold.
+
+    Newton, or bisection where Newton leaves the bracket. After a step ds Newton's error is |u''/2u'| ds^2:
+    once that is round-off, another step would only follow the round-off of the potential.
+    """
     low = 0.0
-    reach = _potential(high, start, current, slope, tau, capacitance) - start
-    guess = high * min(1.0, (threshold - start) / reach)
+    guess = high * min(1.0, (threshold - start) / (reached - start))
     for _ in range(_MOST_REFINEMENTS):
-        potential = _potential(guess, start, current, slope, tau, capacitance)
+        potential = _potential(guess, _gone(guess, tau), start, current, slope, tau, capacitance)
         if potential < threshold:
             low = guess
         else:
             high = guess
-        newton = guess - (potential - threshold) / _growth(
-            potential, current + slope * guess, tau, capacitance
-        )
-        following = newton if low < newton < high else 0.5 * (low + high)
+        growth = _growth(potential, current + slope * guess, tau, capacitance)
+        bend = slope / capacitance - growth / tau
+        step = (threshold - potential) / growth
+        if low < guess + step < high and abs(bend * step) * abs(step) <= 2.0 * _ROUND_OFF * high * abs(
+            growth
+        ):
+            return guess + step
+        following = guess + step if low < guess + step < high else 0.5 * (low + high)
         if abs(following - guess) <= _ROUND_OFF * high:
             return following
         guess = following
     return guess
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _advance(
     length: float,
+    gone: float,
     start: float,
     current: float,
     slope: float,
@@ -182,21 +202,25 @@ def _advance(
     capacitance: float,
     threshold: float,
 ) -> tuple[float, float]:
-    """Time of the first crossing within (0, length], or never, and the potential at `length`."""
-    potential = _potential(length, start, current, slope, tau, capacitance)
+    """Time of the first crossing within (0, length], or never, and the potential at `length`.
+
+    `gone` is that of `length`, which most neurons share: its exponential is dearer than all the rest.
+    """
+    potential = _potential(length, gone, start, current, slope, tau, capacitance)
     if potential >= threshold:
-        return _refine(length, start, current, slope, tau, capacitance, threshold), potential
-    rises = _growth(start, current, tau, capacitance)
-    falls = _growth(potential, current + slope * length, tau, capacitance)
-    if rises > 0.0 and falls < 0.0:
+        return _refine(length, potential, start, current, slope, tau, capacitance, threshold), potential
+    # Eq. 5 times C tau, whose sign is all that matters here: rises at the start and falls at the end.
+    if tau * current > capacitance * start and tau * (current + slope * length) < capacitance * potential:
         # du/ds = b + (rises - b) e^(-s/tau) with b = tau m/C < 0: the potential peaks where that is 0.
+        rises = _growth(start, current, tau, capacitance)
         top = min(length, tau * math.log1p(-rises * capacitance / (tau * slope)))
-        if _potential(top, start, current, slope, tau, capacitance) >= threshold:
-            return _refine(top, start, current, slope, tau, capacitance, threshold), potential
+        highest = _potential(top, _gone(top, tau), start, current, slope, tau, capacitance)
+        if highest >= threshold:
+            return _refine(top, highest, start, current, slope, tau, capacitance, threshold), potential
     return _NEVER, potential
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _exact_trains(
     times: FloatArray,
     currents: FloatArray,
@@ -207,6 +231,9 @@ def _exact_trains(
 ) -> tuple[FloatArray, np.ndarray]:
     """Spike times of all neurons, one after the other, and where each one's begin."""
     n_neurons = currents.shape[0]
+    gone = np.empty(times.size - 1)
+    for knot in range(times.size - 1):
+        gone[knot] = _gone(times[knot + 1] - times[knot], tau)
     found = np.empty(64 * (n_neurons + 1))
     offsets = np.zeros(n_neurons + 1, dtype=np.int64)
     count = 0
@@ -222,8 +249,10 @@ def _exact_trains(
             slope = (current[knot + 1] - current[knot]) / (end - times[knot])
             while begin < end:
                 present = current[knot] + slope * (begin - times[knot])
+                length = end - begin
+                left = gone[knot] if begin == times[knot] else _gone(length, tau)
                 crossing, later = _advance(
-                    end - begin, potential, present, slope, tau, capacitance, threshold
+                    length, left, potential, present, slope, tau, capacitance, threshold
                 )
                 if crossing == _NEVER:
                     potential = later
@@ -239,7 +268,7 @@ def _exact_trains(
     return found[:count], offsets
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _current_at(time: float, knot: int, times: FloatArray, current: FloatArray) -> tuple[float, int]:
     """Return the current at `time` and the knot before it, searched onward from `knot`."""
     while knot < times.size - 2 and times[knot + 1] <= time:
@@ -248,7 +277,7 @@ def _current_at(time: float, knot: int, times: FloatArray, current: FloatArray) 
     return current[knot] + share * (current[knot + 1] - current[knot]), knot
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _runge_kutta_trains(
     times: FloatArray,
     currents: FloatArray,

@@ -85,6 +85,12 @@ class SedTraces:
         """Number of receptor sites."""
         return self.sed_kpa.shape[1]
 
+    def part(self, sites: slice) -> SedTraces:
+        """Traces of some of the sites."""
+        if sites == slice(0, self.n_sites):
+            return self
+        return SedTraces(self.times_ms, self.sed_kpa[:, sites], self.kinks_ms)
+
 
 @dataclass(frozen=True)
 class CurrentTraces:
@@ -165,6 +171,22 @@ class SpikeTrains:
         arrays = [np.asarray(train, dtype=np.float64) for train in trains]
         offsets = np.concatenate([[0], np.cumsum([array.size for array in arrays])])
         return cls(np.concatenate(arrays) if arrays else np.empty(0), offsets)
+
+    @classmethod
+    def joined(cls, parts: Sequence[SpikeTrains]) -> SpikeTrains:
+        """Trains of several groups of afferents, one group after the other.
+
+        Examples
+        --------
+        >>> halves = SpikeTrains.from_lists([[1.0], []]), SpikeTrains.from_lists([[4.0, 5.0]])
+        >>> [train.tolist() for train in SpikeTrains.joined(halves)]
+        [[1.0], [], [4.0, 5.0]]
+        """
+        if len(parts) == 1:
+            return parts[0]
+        counts = [np.diff(part.offsets) for part in parts]
+        offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]) if parts else np.zeros(1)
+        return cls(np.concatenate([part.times_ms for part in parts]) if parts else np.empty(0), offsets)
 
     def __len__(self) -> int:
         return self.offsets.size - 1

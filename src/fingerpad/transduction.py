@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numba import njit
 from scipy.interpolate import PchipInterpolator, PPoly
 
 from fingerpad.checks import FloatArray, finite, float_array, positive, whole
@@ -55,6 +56,17 @@ class Drive:
                 "Drive needs one row of sed_kpa and of rate_kpa_per_ms per knot: "
                 f"got {self.sed_kpa.shape} and {self.rate_kpa_per_ms.shape} for {self.times_ms.size} knots."
             )
+
+    @property
+    def n_sites(self) -> int:
+        """Number of receptor sites."""
+        return self.sed_kpa.shape[1]
+
+    def part(self, sites: slice) -> Drive:
+        """Drive of some of the sites."""
+        if sites == slice(0, self.n_sites):
+            return self
+        return Drive(self.times_ms, self.sed_kpa[:, sites], self.rate_kpa_per_ms[:, sites])
 
 
 @dataclass(frozen=True)
@@ -163,17 +175,42 @@ def drive(
     knots = [_knots(phase.x, pieces, shortest_piece_ms) for phase in phases]
     if difference_step_ms is not None:
         return _difference(phases, knots, positive("difference_step_ms", difference_step_ms, "ms"))
-    onset, onset_sed = sed.times_ms[:1], sed.sed_kpa[:1]
-    return Drive(
-        np.concatenate([onset, *knots]),
-        np.concatenate([onset_sed, *(phase(times) for phase, times in zip(phases, knots, strict=True))]),
-        np.concatenate(
-            [
-                np.zeros_like(onset_sed),
-                *(np.abs(phase(times, nu=1)) for phase, times in zip(phases, knots, strict=True)),
-            ]
-        ),
-    )
+    times = np.concatenate([sed.times_ms[:1], *knots])
+    values, rates = np.empty((2, times.size, sed.n_sites))
+    values[0], rates[0] = sed.sed_kpa[0], 0.0
+    first = 1
+    for phase, phase_knots in zip(phases, knots, strict=True):
+        rows = slice(first, first + phase_knots.size)
+        _evaluate(phase.c, phase.x, phase_knots, values[rows], rates[rows])
+        first = rows.stop
+    return Drive(times, values, rates)
+
+
+@njit(cache=True, nogil=True)
+def _evaluate(coefficients, breaks, times, values, rates):  # type: ignore[no-untyped-def]
+    """Write a piecewise cubic and the absolute value of its derivative at increasing times within `breaks`.
+
+    As SciPy does it, to the last bit, but both at once and on all sites side by side.
+
+    Parameters
+    ----------
+    coefficients : array (4, n_breaks - 1, n_sites)
+        Of the third to the zeroth power of the time since the break before.
+    breaks, times : array (n_breaks,), (n_times,)
+        Where the pieces meet, and where values are wanted. [ms]
+    values, rates : array (n_times, n_sites)
+        Overwritten.
+    """
+    piece = 0
+    for row in range(times.size):
+        while piece < breaks.size - 2 and breaks[piece + 1] <= times[row]:
+            piece += 1
+        s = times[row] - breaks[piece]
+        for site in range(coefficients.shape[2]):
+            c3, c2 = coefficients[0, piece, site], coefficients[1, piece, site]
+            c1, c0 = coefficients[2, piece, site], coefficients[3, piece, site]
+            values[row, site] = c0 + c1 * s + c2 * (s * s) + c3 * (s * s * s)
+            rates[row, site] = abs(c1 + c2 * s * 2.0 + c3 * (s * s) * 3.0)
 
 
 def _phases(sed: SedTraces) -> list[PPoly]:
