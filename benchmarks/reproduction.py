@@ -27,7 +27,7 @@ def reproduce(resolution: str) -> tuple[Run, list[dict[str, Any]]]:
     with TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "fingerpad", "reproduce", "--resolution", resolution]
         done = run([*command, "--out", folder, "--jobs", str(JOBS)], threads=JOBS)
-        stages = json.loads((Path(folder) / "results.json").read_text(encoding="utf-8"))["stages"]
+        stages = json.loads((Path(folder) / "results.json").read_text(encoding="utf-8"))["manifest"]["stages"]
     return done, stages
 
 

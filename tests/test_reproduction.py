@@ -197,9 +197,10 @@ def test_the_manifest_says_how_to_repeat_it(first):
     assert 100.0 < manifest["peak_memory_mb"] < 4000.0
     assert 1.0 < manifest["wall_s"] <= first.wall_s
     stages = manifest["stages"]
-    assert [stage.get("computed") for stage in stages] == [6, 36, 14, 1, None]
+    assert [stage.get("computed") for stage in stages] == [None, 1, 6, 36, 14, None]
+    assert stages[0]["wall_s"] > 0.5 * manifest["wall_s"]
     assert sum(stage["wall_s"] for stage in stages) <= manifest["wall_s"] + 0.1
-    for stage in stages[:-1]:
+    for stage in stages[1:-1]:
         assert 0.0 < stage["largest_force_imbalance"] <= 1e-4
         assert 0.0 < stage["largest_energy_imbalance"] < BALANCE
         assert all("'s factor: " in reason for reason in stage["linear_solvers"])
@@ -298,7 +299,14 @@ def test_a_second_run_takes_everything_from_the_store(first, second, stamps):
     assert (second.status, second.errors) == (0, "")
     folder = first.folder / STORE_FOLDER
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == stamps
-    assert [stage.get("computed") for stage in second.results["manifest"]["stages"]] == [0, 0, 0, 0, None]
+    assert [stage.get("computed") for stage in second.results["manifest"]["stages"]] == [
+        None,
+        0,
+        0,
+        0,
+        0,
+        None,
+    ]
     assert second.wall_s < first.wall_s / 3
 
 
@@ -320,4 +328,11 @@ def test_another_seed_changes_what_the_observer_draws_and_nothing_else(first, ot
         rates, rates_theirs = drawn["gradient_sum"][measure], drawn_theirs["gradient_sum"][measure]
         assert rates_theirs["hit_rate"] != rates["hit_rate"]
         np.testing.assert_allclose(rates_theirs["hit_rate"], rates["hit_rate"], rtol=0, atol=0.1)
-    assert [stage.get("computed") for stage in other_seed.results["manifest"]["stages"]] == [0, 0, 0, 0, None]
+    assert [stage.get("computed") for stage in other_seed.results["manifest"]["stages"]] == [
+        None,
+        0,
+        0,
+        0,
+        0,
+        None,
+    ]

@@ -103,16 +103,25 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
     store, conditions = Store(run.folder / STORE_FOLDER), run.conditions
     stages: list[dict[str, Any]] = []
 
-    deflection = _pressed(
-        "skin deflection", skin_deflection.touches(conditions), store, run.jobs, progress, stages
-    )
-    bars = dict(enumerate(single_unit.touches(conditions)))
-    bar_responses = _pressed("bar, 36 shifts", bars, store, run.jobs, progress, stages)
     spheres = sphere_discrimination.touches(conditions)
-    sphere_responses = _pressed("spheres", spheres, store, run.jobs, progress, stages)
-
-    nail = {"nail": nail_border.touch(conditions)}
-    nail_response = _pressed("nail", nail, store, run.jobs, progress, stages)["nail"]
+    wanted: dict[str, Mapping[Any, Touch]] = {
+        # The longest indentations first: short ones fill the end, and hardly a core waits for another.
+        "nail": {"nail": nail_border.touch(conditions)},
+        "skin deflection": skin_deflection.touches(conditions),
+        "bar, 36 shifts": dict(enumerate(single_unit.touches(conditions))),
+        "spheres": spheres,
+    }
+    missing = {
+        name: sum(not store.holds(touch) for touch in touches.values()) for name, touches in wanted.items()
+    }
+    with _timed("indentations", sum(missing.values()), progress, stages) as advance:
+        everything = [touch for touches in wanted.values() for touch in touches.values()]
+        solve_missing(everything, store, run.jobs, lambda seconds: advance())
+    responses = {name: _loaded(name, touches, store, stages) for name, touches in wanted.items()}
+    for stage in stages[1:]:
+        stage["computed"] = missing[stage["name"]]
+    deflection, bar_responses = responses["skin deflection"], responses["bar, 36 shifts"]
+    sphere_responses, nail_response = responses["spheres"], responses["nail"]["nail"]
 
     with _timed("fit and discrimination", 3, progress, stages) as advance:
         recordings = single_unit.Recordings(single_unit.receptor_sed(list(bar_responses.values())))
@@ -141,24 +150,19 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
     return plain(results)
 
 
-def _pressed(
-    name: str,
-    touches: Mapping[Key, Touch],
-    store: Store,
-    jobs: int,
-    progress: Progress,
-    stages: list[dict[str, Any]],
+def _loaded(
+    name: str, touches: Mapping[Key, Touch], store: Store, stages: list[dict[str, Any]]
 ) -> dict[Key, SkinResponse]:
-    """Compute what is missing and load everything of one stage."""
-    missing = sum(not store.holds(touch) for touch in touches.values())
-    with _timed(name, missing, progress, stages) as advance:
-        stages[-1]["indentations"] = len(touches)
-        stages[-1]["computed"] = solve_missing(list(touches.values()), store, jobs, lambda seconds: advance())
+    """Read the indentations of one study, all of which are there."""
+    with _timed(name, 0, NoProgress(), stages):
         responses = {key: store.load(touch) for key, touch in touches.items()}
-    # Whether forces and energies of every press add up, at their worst.
-    stages[-1]["largest_force_imbalance"] = max(skin.force_imbalance for skin in responses.values())
-    stages[-1]["largest_energy_imbalance"] = max(skin.energy_imbalance for skin in responses.values())
-    stages[-1]["linear_solvers"] = sorted({skin.linear_solver for skin in responses.values()})
+    stages[-1] |= {
+        "indentations": len(touches),
+        # Whether forces and energies of every press add up, at their worst.
+        "largest_force_imbalance": max(skin.force_imbalance for skin in responses.values()),
+        "largest_energy_imbalance": max(skin.energy_imbalance for skin in responses.values()),
+        "linear_solvers": sorted({skin.linear_solver for skin in responses.values()}),
+    }
     return responses
 
 
