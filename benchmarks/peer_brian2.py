@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 
-def fire(currents: str, found: str, step_ms: float, mode: str, cores: int, every: int = 1) -> dict[str, Any]:
+def fire(currents: str, found: str, step_ms: float, mode: str, cores: int) -> dict[str, Any]:
     """Fire afferents and keep their spikes.
 
     Parameters
@@ -26,8 +26,6 @@ def fire(currents: str, found: str, step_ms: float, mode: str, cores: int, every
         Compiled step by step for Python, or as one C++ program with OpenMP, Brian2's fastest.
     cores : int
         Threads of the C++ program.
-    every : int
-        Fire every so manieth afferent.
 
     Returns
     -------
@@ -38,7 +36,7 @@ def fire(currents: str, found: str, step_ms: float, mode: str, cores: int, every
 
     with np.load(currents) as stored:
         tau_ms, capacitance_mf, threshold_mv, refractory_ms = stored["membrane"].tolist()
-        knots_ms, course, strength_ma = stored["knots_ms"], stored["course"], stored["strength_ma"][::every]
+        knots_ms, course, strength_ma = stored["knots_ms"], stored["course"], stored["strength_ma"]
     steps = round(knots_ms[-1] / step_ms)
     if mode == "standalone":
         brian2.set_device("cpp_standalone", build_on_run=False)

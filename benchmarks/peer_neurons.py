@@ -18,8 +18,8 @@ KNOTS_MS = (0.0, 50.0, 60.0, 1000.0)
 COURSE = (0.0, 1.0, 0.5, 0.4)
 """Ramp, fall at its end and slow relaxation in the hold, as a share of the largest current."""
 
-WEAKEST_MA, STRONGEST_MA = 1e-6, 1e-5
-"""Largest current of the first and last afferent: the first is silent in the hold, the last fires at 80/s."""
+STRONGEST_MA = 8e-6
+"""Largest current of the last afferent, which fires 60 times in 1 s; strengths rise evenly from 0. [mA]"""
 
 STEPS_MS = (1e-2, 1e-3, 1e-4)
 """Steps of Runge-Kutta by which the exact spike times are checked. [ms]"""
@@ -32,7 +32,7 @@ def write_currents(path: Path, afferents: int) -> Path:
         membrane=(TIME_CONSTANT_MS, CAPACITANCE_MF, THRESHOLD_MV, REFRACTORY_MS),
         knots_ms=KNOTS_MS,
         course=COURSE,
-        strength_ma=np.linspace(WEAKEST_MA, STRONGEST_MA, afferents),
+        strength_ma=np.linspace(0.0, STRONGEST_MA, afferents),
     )
     return path
 
@@ -101,15 +101,13 @@ def paired_differences_ms(one: SpikeTrains, other: SpikeTrains) -> np.ndarray:
     return other.times_ms[second] - one.times_ms[first]
 
 
-def timing(ours: str, theirs: str, every: int) -> dict[str, float]:
+def timing(ours: str, theirs: str) -> dict[str, float]:
     """Compare spikes of another program with ours.
 
     Parameters
     ----------
     ours, theirs : str
-        Files with spikes; ours of all afferents, theirs of every so manieth.
-    every : int
-        Which afferents the other program fired.
+        Files with spikes.
 
     Returns
     -------
@@ -117,7 +115,7 @@ def timing(ours: str, theirs: str, every: int) -> dict[str, float]:
         Root mean square and largest difference of spikes of the same number [ms], and in how many trains the
         number of spikes is the same [%].
     """
-    mine, other = _read(ours, every), _read(theirs, 1)
+    mine, other = _read(ours), _read(theirs)
     differences = paired_differences_ms(mine, other)
     same = np.diff(mine.offsets) == np.diff(other.offsets)
     return {
@@ -127,7 +125,6 @@ def timing(ours: str, theirs: str, every: int) -> dict[str, float]:
     }
 
 
-def _read(path: str, every: int) -> SpikeTrains:
+def _read(path: str) -> SpikeTrains:
     with np.load(path) as stored:
-        trains = np.split(stored["times_ms"], stored["offsets"][1:-1])
-    return SpikeTrains.from_lists(trains[::every])
+        return SpikeTrains(stored["times_ms"], stored["offsets"])

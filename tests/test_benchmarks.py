@@ -132,6 +132,8 @@ def test_a_press_tells_its_time_size_and_result():
     expected = {"nodes": 8290, "elements": 7128, "steps": 10}
     assert {name: found.answer[name] for name in expected} == expected
     assert 0.0 < found.answer["solve_s"] < found.wall_s
+    assert found.answer["newton_steps"] >= found.answer["factorisations"] > 0
+    assert found.answer["force_mn"] == pytest.approx(162.4, rel=1e-3)
     assert 50.0 < found.answer["before_mb"] < found.peak_mb
 
 
@@ -186,7 +188,7 @@ def test_spikes_are_paired_by_train_and_number(tmp_path):
     assert peer_neurons.paired_differences_ms(mine, theirs).tolist() == [0.5, 0.0, 0.0, -1.0, 0.0]
     for name, trains in (("mine", mine), ("theirs", theirs)):
         np.savez(tmp_path / f"{name}.npz", times_ms=trains.times_ms, offsets=trains.offsets)
-    found = peer_neurons.timing(str(tmp_path / "mine.npz"), str(tmp_path / "theirs.npz"), every=1)
+    found = peer_neurons.timing(str(tmp_path / "mine.npz"), str(tmp_path / "theirs.npz"))
     assert found == {
         "rms_ms": pytest.approx(np.sqrt(1.25 / 5)),
         "largest_ms": 1.0,
@@ -205,7 +207,8 @@ def test_afferents_of_the_peers_fire_and_runge_kutta_nears_their_exact_spikes(tm
     assert fine < 0.2 * middle < 0.01
 
 
-def test_environments_of_peers_are_made_once(tmp_path):
+def test_environments_of_peers_are_made_once(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))  # making one would fail
     peer = tmp_path / "felupe"
     (peer / "bin").mkdir(parents=True)
     (peer / "bin" / "python").touch()
