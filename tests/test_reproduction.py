@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from fingerpad import __version__
+from fingerpad.compilation import NOTICE
 from fingerpad.parameters import all_published
 from fingerpad.studies.reproduction import STORE_FOLDER
 
@@ -98,7 +99,8 @@ def other_seed(first, tmp_path_factory):
 
 
 def test_it_ends_well_and_says_where_the_results_are_and_what_was_missed(first):
-    assert (first.status, first.errors) == (0, "")
+    assert first.status == 0
+    assert first.errors in ("", f"{NOTICE}\n")  # the kernels may be compiled only now
     report, results, missed = first.said.splitlines()
     assert report == f"Report: {first.folder / 'report.html'}"
     assert results == f"Results: {first.folder / 'results.json'}"

@@ -126,8 +126,8 @@ def reproduce_command(
     if console.is_terminal:
         console.print(
             f"Reproducing at {resolution} resolution with {run.jobs} process(es): "
-            f"{EXPECTED_TIME[resolution]} on two cores. The first run also compiles the kernels, about a "
-            "minute. Stop it at any time; it goes on from the last finished indentation."
+            f"{EXPECTED_TIME[resolution]} on two cores. "
+            "Stop it at any time; it goes on from the last finished indentation."
         )
     with _interruptible():
         results = reproduce(run, _Bars(console))

@@ -10,10 +10,12 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from fingerpad.checks import FloatArray, finite, instance, one_of
+from fingerpad.compilation import announce_compilation
 from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.indenters import Indenter
+from fingerpad.mechanics import assembly
 from fingerpad.mechanics.contact import Placement, check_friction, place
 from fingerpad.mechanics.fields import QUANTITIES, von_mises
 from fingerpad.mechanics.materials import Tissues
@@ -31,6 +33,9 @@ STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
 
 THIN_SIZE_MM = 0.025
 """Elements along the finger below a wire: two across the strip that it pushes. [mm]"""
+
+SLOWEST_KERNEL = assembly._add_colours
+"""Of all that a press compiles, most of a minute is spent on this."""
 
 LARGEST_TILT_DEG = 45.0
 _LONGEST_REACH_MM = 5.0
@@ -168,6 +173,7 @@ class Touch:
         return self._press(np.arange(len(self.mesh.elements)), threads)
 
     def _press(self, watched: np.ndarray, threads: int | None) -> Deformation:
+        announce_compilation(SLOWEST_KERNEL)
         # Libraries get one thread, since their sums depend on the number of threads; our loops' do not.
         with compiled_threads(threads), threadpool_limits(limits=1):
             return press(

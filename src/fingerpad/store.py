@@ -28,9 +28,10 @@ from typing import Any
 import numpy as np
 
 from fingerpad.checks import whole
+from fingerpad.compilation import LOGGER, announce_compilation
 from fingerpad.errors import InputError, StoreError
 from fingerpad.files import write_atomically
-from fingerpad.indentation import Touch
+from fingerpad.indentation import SLOWEST_KERNEL, Touch
 from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.sampling import SkinResponse
 from fingerpad.threads import available_threads
@@ -271,11 +272,12 @@ def _in_turn(touches: Mapping[Path, Touch]) -> Iterator[float]:
 
 
 def _in_processes(touches: Mapping[Path, Touch], jobs: int) -> Iterator[float]:
+    announce_compilation(SLOWEST_KERNEL)
     processes = min(jobs, len(touches))
     threads = max(1, available_threads() // processes)
     with (
         _environment(_ONE_THREAD),
-        ProcessPoolExecutor(processes, get_context("spawn"), _end_with_parent, (os.getpid(),)) as pool,
+        ProcessPoolExecutor(processes, get_context("spawn"), _begin, (os.getpid(),)) as pool,
     ):
         waiting: set[Future[float]] = {
             pool.submit(_compute, touch, path, threads) for path, touch in touches.items()
@@ -307,6 +309,12 @@ def _environment(variables: dict[str, str]) -> Iterator[None]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
+
+
+def _begin(parent: int) -> None:
+    """Set up a worker, which has nothing to say: its parent has told already what is compiled."""
+    LOGGER.disabled = True
+    _end_with_parent(parent)
 
 
 def _end_with_parent(parent: int) -> None:
