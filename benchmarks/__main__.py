@@ -16,7 +16,17 @@ from benchmarks.results import aligned, read_all, write
 from fingerpad.files import write_atomically
 
 # Short ones first; `peers` installs other programs, and CalculiX alone runs for a quarter of an hour.
-BENCHMARKS = ("sphere", "profiles", "paper_size", "solvers", "growth", "reproduction", "peers")
+BENCHMARKS = (
+    "startup",
+    "population",
+    "sphere",
+    "profiles",
+    "paper_size",
+    "solvers",
+    "growth",
+    "reproduction",
+    "peers",
+)
 
 
 def run(names: Sequence[str]) -> int:
