@@ -65,7 +65,7 @@ def press_with(resolution: str, solver: str) -> dict[str, Any]:
         with_nodes = (nodes_mm,) if solver == "AggregationHierarchy" else ()
         return getattr(linear, solver)(sparsity, free, *with_nodes), WORDS[solver]
 
-    module.choose_preconditioner, module.LinearSolver = choose, Timed  # type: ignore[misc]
+    vars(module).update(choose_preconditioner=choose, LinearSolver=Timed)
     touch = touch_of_sphere(resolution)
     started = perf_counter()
     skin = touch.solve()
