@@ -78,6 +78,15 @@ class Mesh:
                 value.setflags(write=False)
 
     @cached_property
+    def grid(self) -> IntArray:
+        """Nodes in grid order, (n_along + 1, n_around + 1, n_through + 1), through from the skin downwards.
+
+        The nodes of one place on the skin are numbered in a row; pole and seam appear more than once.
+        """
+        through = np.arange(self.shape[2] + 1)
+        return self.skin_grid[:, :, None] + through
+
+    @cached_property
     def skin_nodes(self) -> IntArray:
         """Nodes of the skin, each once, increasing."""
         return np.unique(self.skin_grid)

@@ -153,8 +153,8 @@ def pressed_slice(mesh, indenter, depth_mm, poisson) -> Pressed:
     everywhere = np.arange(len(mesh.nodes_mm))
     gripped = contact.nodes if indenter.grips else everywhere[:0]
     free = free_degrees_of_freedom(everywhere.size, mesh.fixed_nodes, everywhere, gripped)
-    approximate, _ = choose_preconditioner(solid.sparsity, free, mesh.nodes_mm, poisson)
-    solver = LinearSolver(solid.sparsity, free, approximate)
+    approximate, _ = choose_preconditioner(solid.sparsity, free, mesh, poisson)
+    solver = LinearSolver(approximate)
     step = StepCoefficients.of(solid.table, 1.0)
     history = StressHistory.unloaded(len(mesh.elements), solid.table.shares.shape[1])
     load = Load(contact, depth_mm, step, history.carried(step, mesh.layer))

@@ -52,6 +52,15 @@ class Sparsity:
         diagonal = np.flatnonzero(np.repeat(np.arange(n_nodes), np.diff(row_start)) == column)
         return cls(row_start, column, position, diagonal, Chunks.of(elements, n_nodes))
 
+    def entries(self, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Row and column of every entry (n_blocks, 3, 3) among the free degrees of freedom, -1 if held."""
+        n_nodes = len(self.row_start) - 1
+        number = np.full((n_nodes, 3), -1, dtype=np.int32)
+        number.ravel()[free] = np.arange(free.size)
+        shape = (self.column.size, 3, 3)
+        row = np.repeat(number, np.diff(self.row_start), axis=0)
+        return np.broadcast_to(row[:, :, None], shape), np.broadcast_to(number[self.column][:, None], shape)
+
     def matrix(self, blocks: FloatArray) -> sparse.bsr_matrix:
         """Tangent as a block matrix that shares `blocks` (n_blocks, 3, 3)."""
         size = 3 * (len(self.row_start) - 1)

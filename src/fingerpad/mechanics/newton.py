@@ -278,13 +278,8 @@ class _Search:
         x = self.solver.solve(self.blocks, start.residual_mn, FORCING_RANGE[1])
         y = self.solver.solve(self.blocks, b, DEPTH_FORCING)
 
-        def tangent_times(direction: FloatArray) -> FloatArray:
-            full = np.zeros(start.displacement_mm.size)
-            full[free] = direction
-            return (self.body.sparsity.matrix(self.blocks) @ full)[free]
-
-        force = start.missing_force_mn(self.load) - b @ x - y @ (start.residual_mn - tangent_times(x))
-        stiffness = y @ tangent_times(y) - 2.0 * (b @ y) + c
+        force = start.missing_force_mn(self.load) - b @ x - y @ (start.residual_mn - self.solver.multiply(x))
+        stiffness = y @ self.solver.multiply(y) - 2.0 * (b @ y) + c
         if not stiffness > 0.0:
             raise ConvergenceError("The indenter meets no resistance.")
         # More and more skin resists an indenter that advances: a tangent from a light touch leads too deep.

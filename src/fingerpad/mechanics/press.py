@@ -331,8 +331,8 @@ def press(
     sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
     poisson = max(materials[layer].poisson for layer in np.unique(mesh.layer))
     body = Body(mesh, table, sparsity, free, is_mixed=poisson > MIXED_POISSON)
-    approximate, reason = choose_preconditioner(sparsity, free, mesh.nodes_mm, poisson)
-    solver = LinearSolver(sparsity, free, approximate)
+    approximate, reason = choose_preconditioner(sparsity, free, mesh, poisson)
+    solver = LinearSolver(approximate)
 
     chosen = np.arange(len(mesh.elements)) if watched is None else watched
     follow = Watched(chosen, mesh.nodes_mm, mesh.elements[chosen], mesh.layer[chosen], table)

@@ -29,7 +29,7 @@ from fingerpad.studies.comparison import comparison
 from fingerpad.studies.conditions import Conditions, Touch
 
 STORE_FOLDER = "indentations"
-PACKAGES = ("numpy", "scipy", "numba", "matplotlib", "pypardiso", "pyamg")
+PACKAGES = ("numpy", "scipy", "numba", "matplotlib", "pypardiso")
 STANDARD_SPHERE = (sphere_discrimination.POSITIONS_MM[0], sphere_discrimination.CURVATURES[0])
 BYTES_PER_KIB = 1024
 

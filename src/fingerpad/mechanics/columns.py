@@ -1,0 +1,343 @@
+"""A sparse matrix on a structured grid, stored by columns of nodes: the layout in which products are fast.
+
+A mesh is a grid along x around x through, and its nodes are numbered column by column: node k of column c,
+counted from the skin, has number c m + k, with m nodes in a column. Neighbouring nodes lie in neighbouring
+columns, at the same depth or one above or below. So the matrix is a list of pairs of neighbouring columns
+(c, d), each with three diagonals of 3 x 3 blocks, and
+
+    y_c[a, k] = sum over d, s, b of  A_cd[s, a, b, k]  x_d[b, k + s - 1],      s = 0, 1, 2.
+
+The depth k runs fastest in memory, so that one machine instruction serves many of them. Single precision: the
+matrix steers an iteration whose goal is measured in double precision elsewhere.
+
+Columns are coloured so that neighbours differ, and sorted by colour. Within a colour a Gauss-Seidel sweep may
+visit columns in any order, on any number of threads, and gives the same bits; the sorting lets it run through
+memory from one end to the other, which halves its time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from fingerpad.checks import FloatArray
+
+SingleArray = NDArray[np.float32]
+
+LANES = 8
+"""Depths are padded to a multiple of this: the single-precision numbers of one 256-bit register."""
+
+
+@dataclass(frozen=True)
+class ColumnGraph:
+    """Which columns are neighbours.
+
+    Parameters
+    ----------
+    start : int array (n_columns + 1,)
+        First pair of every column.
+    neighbour : int array (n_pairs,)
+        The other column, increasing within a column; a column is its own neighbour.
+    """
+
+    start: np.ndarray
+    neighbour: np.ndarray
+
+    @classmethod
+    def of(cls, pairs: np.ndarray, n_columns: int) -> ColumnGraph:
+        """Graph of pairs given as sorted, unique numbers c n_columns + d."""
+        column, neighbour = np.divmod(pairs, n_columns)
+        start = np.searchsorted(column, np.arange(n_columns + 1))
+        return cls(start.astype(np.int32), neighbour.astype(np.int32))
+
+    @property
+    def n_columns(self) -> int:
+        """Number of columns."""
+        return self.start.size - 1
+
+    @property
+    def column(self) -> np.ndarray:
+        """First column of every pair, (n_pairs,)."""
+        return np.repeat(np.arange(self.n_columns), np.diff(self.start))
+
+    @property
+    def own(self) -> np.ndarray:
+        """Pair of every column with itself, (n_columns,)."""
+        return np.flatnonzero(self.column == self.neighbour)
+
+    def sorted(self, order: np.ndarray) -> ColumnGraph:
+        """Return the same graph with columns in another order (n_columns,)."""
+        place = np.argsort(order)
+        pairs = place[self.column] * self.n_columns + place[self.neighbour]
+        return ColumnGraph.of(np.sort(pairs), self.n_columns)
+
+    def zeros(self, depth: int) -> SingleArray:
+        """Matrix (n_pairs, 3, 3, 3, lanes) of zeros for columns of `depth` nodes."""
+        return np.zeros((self.neighbour.size, 3, 3, 3, lanes(depth)), dtype=np.float32)
+
+    def entries(self, number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Row and column of every entry of a matrix in a numbering of its unknowns.
+
+        Parameters
+        ----------
+        number : int array (n_columns, 3, depth)
+            Number of every unknown; -1 for those that are held.
+
+        Returns
+        -------
+        (int array, int array)
+            Each like the matrix; -1 for held unknowns and for entries beyond the ends of a column.
+        """
+        width = lanes(number.shape[2])
+        padded = np.full((*number.shape[:2], width + 2), -1, dtype=np.int32)
+        padded[:, :, 1 : 1 + number.shape[2]] = number
+        shape = (self.neighbour.size, 3, 3, 3, width)
+        row = np.broadcast_to(padded[self.column][:, None, :, None, 1:-1], shape)
+        shifted = np.stack([padded[:, :, s : s + width] for s in range(3)], axis=1)
+        column = np.broadcast_to(shifted[self.neighbour][:, :, None, :, :], shape)
+        return row, column
+
+
+@njit(cache=True)
+def colours(start, neighbour):  # type: ignore[no-untyped-def]
+    """Give every column the smallest colour that no neighbour before it has, (n_columns,)."""
+    colour = np.empty(start.size - 1, dtype=np.int32)
+    for c in range(colour.size):
+        taken = np.uint64(0)
+        for pair in range(start[c], start[c + 1]):
+            if neighbour[pair] < c:
+                taken |= np.uint64(1) << np.uint64(colour[neighbour[pair]])
+        colour[c] = 0
+        while (taken >> np.uint64(colour[c])) & np.uint64(1):
+            colour[c] += 1
+    return colour
+
+
+def lanes(depth: int) -> int:
+    """Return the padded number of nodes in a column."""
+    return -(-depth // LANES) * LANES
+
+
+def to_columns(values: FloatArray, order: np.ndarray, depth: int) -> SingleArray:
+    """Vector (n_columns, 3, lanes + 2) of nodal values (n_nodes, 3): a zero, the nodes, zeros.
+
+    `order` (n_columns,) has the place of each column among the nodes.
+    """
+    columns = np.zeros((order.size, 3, lanes(depth) + 2), dtype=np.float32)
+    columns[:, :, 1 : depth + 1] = values.reshape(-1, depth, 3)[order].swapaxes(1, 2)
+    return columns
+
+
+def to_nodes(columns: SingleArray, order: np.ndarray, depth: int) -> FloatArray:
+    """Nodal values (n_nodes, 3) of a vector (n_columns, 3, lanes + 2)."""
+    values = np.empty((order.size, depth, 3))
+    values[order] = columns[:, :, 1 : depth + 1].swapaxes(1, 2)
+    return values.reshape(-1, 3)
+
+
+@njit(cache=True, parallel=True)
+def take_blocks(row_start, column, blocks, order, place, start, neighbour, depth, free, matrix):  # type: ignore[no-untyped-def]
+    """Copy a tangent of 3 x 3 blocks (see `assembly.Sparsity`) into a matrix, zero where unknowns are held.
+
+    Parameters
+    ----------
+    row_start, column, blocks : array
+        Block rows, their columns, and the blocks (n_blocks, 3, 3).
+    order, place : int array (n_columns,)
+        Which column of the nodes each column of the matrix is, and the inverse of that.
+    start, neighbour : int array
+        `ColumnGraph`.
+    depth : int
+        Nodes in a column.
+    free : array (n_columns, 3, lanes + 2)
+        1 for unknowns that move, 0 for others.
+    matrix : array (n_pairs, 3, 3, 3, lanes)
+        Overwritten; zero beyond the ends of the columns, as it was.
+    """
+    for c in prange(order.size):
+        for k in range(depth):
+            node = order[c] * depth + k
+            pair, last = start[c], -1
+            for block in range(row_start[node], row_start[node + 1]):
+                among_nodes = column[block] // depth
+                if among_nodes != last:
+                    pair, last = start[c], among_nodes
+                    while neighbour[pair] != place[among_nodes]:
+                        pair += 1
+                below = column[block] - among_nodes * depth
+                s = below - k + 1
+                for a in range(3):
+                    for b in range(3):
+                        moves = free[c, a, k + 1] * free[neighbour[pair], b, below + 1]
+                        matrix[pair, s, a, b, k] = moves * blocks[block, a, b]
+
+
+@njit(cache=True, inline="always")
+def _subtract_product(first, last, neighbour, matrix, x, r):  # type: ignore[no-untyped-def]
+    """Subtract the products of some pairs of one column from r (3, lanes)."""
+    for pair in range(first, last):
+        d = neighbour[pair]
+        for s in range(3):
+            for a in range(3):
+                for k in range(r.shape[1]):
+                    r[a, k] -= (
+                        matrix[pair, s, a, 0, k] * x[d, 0, k + s]
+                        + matrix[pair, s, a, 1, k] * x[d, 1, k + s]
+                        + matrix[pair, s, a, 2, k] * x[d, 2, k + s]
+                    )
+
+
+@njit(cache=True, inline="always")
+def _solve_column(depth, lower, inverse, c, r):  # type: ignore[no-untyped-def]
+    """Replace r (3, lanes) by T^-1 r, with the factors of column c."""
+    x, y, z = r[0, 0], r[1, 0], r[2, 0]
+    for k in range(1, depth):
+        x, y, z = (
+            r[0, k] - (lower[c, k, 0] * x + lower[c, k, 1] * y + lower[c, k, 2] * z),
+            r[1, k] - (lower[c, k, 3] * x + lower[c, k, 4] * y + lower[c, k, 5] * z),
+            r[2, k] - (lower[c, k, 6] * x + lower[c, k, 7] * y + lower[c, k, 8] * z),
+        )
+        r[0, k], r[1, k], r[2, k] = x, y, z
+    for k in range(depth - 1, -1, -1):
+        u, v, w = r[0, k], r[1, k], r[2, k]
+        u, v, w = (
+            inverse[c, k, 0] * u + inverse[c, k, 1] * v + inverse[c, k, 2] * w,
+            inverse[c, k, 3] * u + inverse[c, k, 4] * v + inverse[c, k, 5] * w,
+            inverse[c, k, 6] * u + inverse[c, k, 7] * v + inverse[c, k, 8] * w,
+        )
+        if k < depth - 1:
+            u -= lower[c, k + 1, 0] * x + lower[c, k + 1, 3] * y + lower[c, k + 1, 6] * z
+            v -= lower[c, k + 1, 1] * x + lower[c, k + 1, 4] * y + lower[c, k + 1, 7] * z
+            w -= lower[c, k + 1, 2] * x + lower[c, k + 1, 5] * y + lower[c, k + 1, 8] * z
+        x, y, z = u, v, w
+        r[0, k], r[1, k], r[2, k] = x, y, z
+
+
+@njit(cache=True, inline="always")
+def _invert(d, inverse):  # type: ignore[no-untyped-def]
+    """Inverse of a symmetric 3 x 3 matrix; a held unknown, whose row is zero, gets an inverse of 1."""
+    for a in range(3):
+        if d[a, a] == 0.0:
+            d[a, a] = 1.0
+    xx = d[1, 1] * d[2, 2] - d[1, 2] * d[1, 2]
+    xy = d[0, 2] * d[1, 2] - d[0, 1] * d[2, 2]
+    xz = d[0, 1] * d[1, 2] - d[0, 2] * d[1, 1]
+    determinant = d[0, 0] * xx + d[0, 1] * xy + d[0, 2] * xz
+    inverse[0, 0], inverse[0, 1], inverse[0, 2] = xx, xy, xz
+    inverse[1, 0], inverse[1, 1] = xy, d[0, 0] * d[2, 2] - d[0, 2] * d[0, 2]
+    inverse[1, 2] = d[0, 1] * d[0, 2] - d[0, 0] * d[1, 2]
+    inverse[2, 0], inverse[2, 1], inverse[2, 2] = xz, inverse[1, 2], d[0, 0] * d[1, 1] - d[0, 1] * d[0, 1]
+    for a in range(3):
+        for b in range(3):
+            inverse[a, b] /= determinant
+
+
+@njit(cache=True, parallel=True)
+def factor_columns(own, matrix, depth, lower, inverse):  # type: ignore[no-untyped-def]
+    """Factor the part T of a matrix that stays within a column, block tridiagonal.
+
+    T = (1 + M) D (1 + M)' with D_0 = T_00, M_k = T_k,k-1 D_k-1^-1, D_k = T_kk - M_k T_k,k-1'.
+
+    Parameters
+    ----------
+    own : int array (n_columns,)
+        `ColumnGraph.own`.
+    matrix : array (n_pairs, 3, 3, 3, lanes)
+        The matrix.
+    depth : int
+        Nodes in a column.
+    lower, inverse : array (n_columns, depth, 9)
+        Overwritten with M and D^-1, row by row.
+    """
+    for c in prange(own.size):
+        d, m, before = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+        for k in range(depth):
+            for a in range(3):
+                for b in range(3):
+                    d[a, b] = matrix[own[c], 1, a, b, k]
+            if k > 0:
+                for a in range(3):
+                    for b in range(3):
+                        m[a, b] = 0.0
+                        for e in range(3):
+                            m[a, b] += matrix[own[c], 0, a, e, k] * before[e, b]
+                        lower[c, k, 3 * a + b] = m[a, b]
+                for a in range(3):
+                    for b in range(3):
+                        for e in range(3):
+                            d[a, b] -= m[a, e] * matrix[own[c], 0, b, e, k]
+            _invert(d, before)
+            for a in range(3):
+                for b in range(3):
+                    inverse[c, k, 3 * a + b] = before[a, b]
+
+
+@njit(cache=True, parallel=True, fastmath={"contract"})
+def multiply(start, neighbour, matrix, x, product):  # type: ignore[no-untyped-def]
+    """Write the product A x; vectors (n_columns, 3, lanes + 2)."""
+    width = matrix.shape[4]
+    for c in prange(start.size - 1):
+        r = np.zeros((3, width), dtype=np.float32)
+        _subtract_product(start[c], start[c + 1], neighbour, matrix, x, r)
+        for a in range(3):
+            for k in range(width):
+                product[c, a, k + 1] = -r[a, k]
+
+
+@njit(cache=True, parallel=True, fastmath={"contract"})
+def sweep_forward(colour_start, start, own, neighbour, matrix, depth, lower, inverse, right, x, residual):  # type: ignore[no-untyped-def]
+    """Gauss-Seidel sweep over the columns from x = 0, and the residual that it leaves.
+
+    With A = L + T + L' by the order of the columns: (T + L) x = right, and so right - A x = -L' x.
+
+    Parameters
+    ----------
+    colour_start : int array (n_colours + 1,)
+        First column of every colour.
+    start, own, neighbour, matrix, depth
+        The matrix.
+    lower, inverse : array (n_columns, depth, 9)
+        From `factor_columns`.
+    right : array (n_columns, 3, lanes + 2)
+        Right-hand side.
+    x, residual : array (n_columns, 3, lanes + 2)
+        Overwritten.
+    """
+    width = matrix.shape[4]
+    for colour in range(colour_start.size - 1):
+        for c in prange(colour_start[colour], colour_start[colour + 1]):
+            r = np.empty((3, width), dtype=np.float32)
+            for a in range(3):
+                for k in range(width):
+                    r[a, k] = right[c, a, k + 1]
+            _subtract_product(start[c], own[c], neighbour, matrix, x, r)
+            _solve_column(depth, lower, inverse, c, r)
+            for a in range(3):
+                for k in range(depth):
+                    x[c, a, k + 1] = r[a, k]
+    for c in prange(start.size - 1):
+        r = np.zeros((3, width), dtype=np.float32)
+        _subtract_product(own[c] + 1, start[c + 1], neighbour, matrix, x, r)
+        for a in range(3):
+            for k in range(width):
+                residual[c, a, k + 1] = r[a, k]
+
+
+@njit(cache=True, parallel=True, fastmath={"contract"})
+def sweep_backward(colour_start, start, neighbour, matrix, depth, lower, inverse, right, x):  # type: ignore[no-untyped-def]
+    """Gauss-Seidel sweep over the columns in the opposite order; parameters as in `sweep_forward`."""
+    width = matrix.shape[4]
+    for colour in range(colour_start.size - 2, -1, -1):
+        for c in prange(colour_start[colour], colour_start[colour + 1]):
+            r = np.empty((3, width), dtype=np.float32)
+            for a in range(3):
+                for k in range(width):
+                    r[a, k] = right[c, a, k + 1]
+            _subtract_product(start[c], start[c + 1], neighbour, matrix, x, r)
+            _solve_column(depth, lower, inverse, c, r)
+            for a in range(3):
+                for k in range(depth):
+                    x[c, a, k + 1] += r[a, k]

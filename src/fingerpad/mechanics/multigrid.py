@@ -1,0 +1,420 @@
+"""Geometric multigrid on the structured grid of a finger or a block.
+
+The grid is coarsened along and around, never through: a column of nodes keeps its depth. What a coarse grid
+cannot see, smoothing must remove, and Gauss-Seidel sweeps over whole columns (see `columns`) remove all that
+varies with depth, where elements are thin. Lines are merged only where they are close together, up to the
+distance that the finest lines of the coarse grid have: a graded mesh becomes more even with every level.
+
+Coarse matrices are Galerkin products, A_C = P' A P, with P linear along the grid lines. P acts on whole
+columns, so A_C is a weighted sum of the column pairs of A. One cycle sweeps forward before the correction
+from the next coarser level, which on the coarsest comes from a factor, and backward after it: a symmetric
+operator, as conjugate gradients need.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, prange
+
+from fingerpad.checks import FloatArray
+from fingerpad.mechanics.assembly import Sparsity
+from fingerpad.mechanics.columns import (
+    ColumnGraph,
+    SingleArray,
+    colours,
+    factor_columns,
+    multiply,
+    sweep_backward,
+    sweep_forward,
+    take_blocks,
+    to_columns,
+    to_nodes,
+)
+from fingerpad.mechanics.factors import MakeFactor
+
+MERGED_OVER_FINEST = 4.0
+"""Largest distance of two lines that become one step, over the smallest distance on the grid."""
+
+COARSEST_COLUMNS = 100
+"""A grid with fewer columns is not coarsened: its factor costs less than a level."""
+
+WORTHWHILE = 0.8
+"""Largest ratio of columns, coarse over fine, for which a level pays."""
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """Interpolation from the columns of a coarse grid to those of a fine one, and the product P' A P.
+
+    Parameters
+    ----------
+    parent, weight : array (n_fine, 4)
+        Coarse columns around each fine one, and their weights, which add up to 1.
+    child_start, child, child_weight : array
+        The same seen from the coarse columns: their fine columns and weights.
+    graph : ColumnGraph
+        Neighbours on the coarse grid.
+    part_start, part, part_weight : array
+        For each coarse pair of columns the fine pairs whose weighted sum it is.
+    """
+
+    parent: np.ndarray
+    weight: SingleArray
+    child_start: np.ndarray
+    child: np.ndarray
+    child_weight: SingleArray
+    graph: ColumnGraph
+    part_start: np.ndarray
+    part: np.ndarray
+    part_weight: SingleArray
+
+    @classmethod
+    def of(cls, graph: ColumnGraph, parent: np.ndarray, weight: FloatArray) -> Transfer:
+        """Transfer for a fine grid with neighbours `graph`."""
+        n_coarse = int(parent.max()) + 1
+        fine, corner = np.nonzero(weight)
+        child_start, child, child_weight = _grouped(
+            parent[fine, corner], fine, weight[fine, corner], n_coarse
+        )
+        first, second = parent[graph.column], parent[graph.neighbour]
+        share = weight[graph.column][:, :, None] * weight[graph.neighbour][:, None, :]
+        pair, i, j = np.nonzero(share)
+        keys = first[pair, i] * n_coarse + second[pair, j]
+        coarse_pairs, target = np.unique(keys, return_inverse=True)
+        part_start, part, part_weight = _grouped(target, pair, share[pair, i, j], coarse_pairs.size)
+        return cls(
+            parent=parent.astype(np.int32),
+            weight=weight.astype(np.float32),
+            child_start=child_start,
+            child=child,
+            child_weight=child_weight,
+            graph=ColumnGraph.of(coarse_pairs, n_coarse),
+            part_start=part_start,
+            part=part,
+            part_weight=part_weight,
+        )
+
+
+def _grouped(
+    group: np.ndarray, member: np.ndarray, weight: FloatArray, n_groups: int
+) -> tuple[np.ndarray, np.ndarray, SingleArray]:
+    """Members and weights of every group, one after the other, and where each group starts."""
+    order = np.argsort(group, kind="stable")
+    start = np.searchsorted(group[order], np.arange(n_groups + 1))
+    return start.astype(np.int32), member[order].astype(np.int32), weight[order].astype(np.float32)
+
+
+def kept_lines(steps_mm: FloatArray, finest_mm: float) -> np.ndarray:
+    """Lines of a coarse grid: two steps become one where together they are short.
+
+    Parameters
+    ----------
+    steps_mm : array (n,)
+        Distances of successive lines. [mm]
+    finest_mm : float
+        Smallest distance of lines on the grid, in any direction. [mm]
+
+    Returns
+    -------
+    int array
+        Numbers of the lines kept, the first and the last among them.
+
+    Examples
+    --------
+    >>> kept_lines(np.array([4.0, 2.0, 1.0, 1.0, 1.0, 1.0, 3.0]), finest_mm=1.0).tolist()
+    [0, 1, 3, 5, 7]
+    """
+    kept = [0]
+    while kept[-1] < steps_mm.size:
+        line = kept[-1]
+        short = (
+            line + 1 < steps_mm.size and steps_mm[line] + steps_mm[line + 1] <= MERGED_OVER_FINEST * finest_mm
+        )
+        kept.append(line + 2 if short else line + 1)
+    return np.array(kept)
+
+
+def _between(steps_mm: FloatArray, kept: np.ndarray) -> tuple[np.ndarray, FloatArray]:
+    """For every line the two kept lines around it, (n, 2), and their weights."""
+    place = np.concatenate([[0.0], np.cumsum(steps_mm)])
+    before = np.clip(np.searchsorted(kept, np.arange(place.size), side="right") - 1, 0, kept.size - 2)
+    low, high = place[kept[before]], place[kept[before + 1]]
+    share = (place - low) / (high - low)
+    return np.stack([before, before + 1], axis=1), np.stack([1.0 - share, share], axis=1)
+
+
+@dataclass(frozen=True)
+class ColumnGrid:
+    """The columns of one level at the crossings of its lines.
+
+    Parameters
+    ----------
+    columns : int array (n_along, n_around)
+        Number of the column at each crossing; the pole and the seam of a finger appear repeatedly.
+    along_mm, around_mm : array (n_along - 1,), (n_around - 1,)
+        Distances of successive lines. [mm]
+    """
+
+    columns: np.ndarray
+    along_mm: FloatArray
+    around_mm: FloatArray
+
+    @property
+    def n_columns(self) -> int:
+        """Number of columns."""
+        return int(self.columns.max()) + 1
+
+    def renumbered(self, order: np.ndarray) -> ColumnGrid:
+        """Return the same with columns sorted by `order` (n_columns,)."""
+        place = np.empty_like(order)
+        place[order] = np.arange(order.size)
+        return ColumnGrid(place[self.columns], self.along_mm, self.around_mm)
+
+    def coarser(self) -> tuple[ColumnGrid, np.ndarray, np.ndarray, FloatArray] | None:
+        """Coarse grid, the fine column that each of its columns is, and parents and weights for `Transfer`.
+
+        None if the grid is small already, or not much smaller when coarsened.
+        """
+        if self.n_columns < COARSEST_COLUMNS:
+            return None
+        finest_mm = float(min(self.along_mm.min(), self.around_mm.min()))
+        along, around = kept_lines(self.along_mm, finest_mm), kept_lines(self.around_mm, finest_mm)
+        chosen, number = np.unique(self.columns[np.ix_(along, around)], return_inverse=True)
+        if chosen.size > WORTHWHILE * self.n_columns:
+            return None
+        number = number.reshape(along.size, around.size)
+        (i, weight_i), (j, weight_j) = _between(self.along_mm, along), _between(self.around_mm, around)
+        parent = number[i[:, None, :, None], j[None, :, None, :]].reshape(-1, 4)
+        weight = (weight_i[:, None, :, None] * weight_j[None, :, None, :]).reshape(-1, 4)
+        # A column at the pole or the seam comes from the same place under each of its lines.
+        _, first = np.unique(self.columns, return_index=True)
+        distances = (
+            np.add.reduceat(h, k[:-1]) for h, k in ((self.along_mm, along), (self.around_mm, around))
+        )
+        return ColumnGrid(number, *distances), chosen, parent[first], weight[first]
+
+
+@njit(cache=True, parallel=True, fastmath={"contract"})
+def _galerkin(part_start, part, part_weight, fine, coarse):  # type: ignore[no-untyped-def]
+    """Write every coarse pair as the weighted sum of its fine ones; matrices (n_pairs, numbers of a pair)."""
+    for pair in prange(part_start.size - 1):
+        coarse[pair] = 0.0
+        for n in range(part_start[pair], part_start[pair + 1]):
+            weight, source = part_weight[n], part[n]
+            for k in range(fine.shape[1]):
+                coarse[pair, k] += weight * fine[source, k]
+
+
+@njit(cache=True, parallel=True)
+def _hold(start, neighbour, free, matrix):  # type: ignore[no-untyped-def]
+    """Set rows and columns of held unknowns to zero."""
+    for c in prange(start.size - 1):
+        for pair in range(start[c], start[c + 1]):
+            for s in range(3):
+                for a in range(3):
+                    for b in range(3):
+                        for k in range(matrix.shape[4]):
+                            matrix[pair, s, a, b, k] *= free[c, a, k + 1] * free[neighbour[pair], b, k + s]
+
+
+@njit(cache=True, parallel=True, fastmath={"contract"})
+def _restrict(child_start, child, child_weight, fine, free, coarse):  # type: ignore[no-untyped-def]
+    """Set coarse to P' fine, zero where held; vectors (n_columns, numbers of a column)."""
+    for c in prange(child_start.size - 1):
+        coarse[c] = 0.0
+        for n in range(child_start[c], child_start[c + 1]):
+            for k in range(fine.shape[1]):
+                coarse[c, k] += child_weight[n] * fine[child[n], k]
+        for k in range(fine.shape[1]):
+            coarse[c, k] *= free[c, k]
+
+
+@njit(cache=True, parallel=True, fastmath={"contract"})
+def _add_prolonged(parent, weight, coarse, free, fine):  # type: ignore[no-untyped-def]
+    """Add P coarse to fine, nothing where held; vectors (n_columns, numbers of a column)."""
+    for c in prange(parent.shape[0]):
+        for k in range(fine.shape[1]):
+            value = np.float32(0.0)
+            for n in range(4):
+                value += weight[c, n] * coarse[parent[c, n], k]
+            fine[c, k] += free[c, k] * value
+
+
+class _Level:
+    """One grid: its matrix, the factors of its columns, and the vectors of a cycle."""
+
+    def __init__(self, graph: ColumnGraph, colour_start: np.ndarray, free: SingleArray, depth: int):
+        self.graph, self.colour_start, self.free, self.depth = graph, colour_start, free, depth
+        self.own = graph.own.astype(np.int32)
+        self.matrix = graph.zeros(depth)
+        self.right, self.x, self.residual = (np.zeros_like(free) for _ in range(3))
+        self.lower, self.inverse = (np.zeros((self.own.size, depth, 9), dtype=np.float32) for _ in range(2))
+
+    def factor(self) -> None:
+        """Factor the columns of a new matrix."""
+        factor_columns(self.own, self.matrix, self.depth, self.lower, self.inverse)
+
+    def sweep_forward(self) -> None:
+        """Write `x` and `residual` for `right`."""
+        sweep_forward(
+            self.colour_start, self.graph.start, self.own, self.graph.neighbour, self.matrix, self.depth,
+            self.lower, self.inverse, self.right, self.x, self.residual,
+        )  # fmt: skip
+
+    def sweep_backward(self) -> None:
+        """Improve `x`."""
+        sweep_backward(
+            self.colour_start, self.graph.start, self.graph.neighbour, self.matrix, self.depth,
+            self.lower, self.inverse, self.right, self.x,
+        )  # fmt: skip
+
+
+def _by_colour(graph: ColumnGraph) -> tuple[np.ndarray, np.ndarray]:
+    """Order of the columns by colour, and the first column of every colour in that order."""
+    colour = colours(graph.start, graph.neighbour)
+    order = np.argsort(colour, kind="stable")
+    return order, np.searchsorted(colour[order], np.arange(colour.max() + 2))
+
+
+class Multigrid:
+    """Product of the tangent, and its approximate inverse by one V-cycle.
+
+    Parameters
+    ----------
+    sparsity : Sparsity
+        Block pattern of the tangent.
+    free : int array (n_free,)
+        Degrees of freedom that move.
+    nodes_mm : array (n_nodes, 3)
+        Reference nodes. [mm]
+    grid : int array (n_along, n_around, depth)
+        Nodes in grid order, `Mesh.grid`.
+    factor : callable
+        Makes the factor of the coarsest matrix.
+    """
+
+    patience = 3
+
+    def __init__(
+        self,
+        sparsity: Sparsity,
+        free: np.ndarray,
+        nodes_mm: FloatArray,
+        grid: np.ndarray,
+        factor: MakeFactor,
+    ):
+        self._sparsity, self._free, self._depth = sparsity, free, grid.shape[2]
+        depth, skin = self._depth, nodes_mm[grid[:, :, 0]]
+        columns = ColumnGrid(
+            grid[:, :, 0] // depth,
+            np.linalg.norm(np.diff(skin, axis=0), axis=2).mean(axis=1),
+            np.linalg.norm(np.diff(skin, axis=1), axis=2).mean(axis=0),
+        )
+        row = np.repeat(np.arange(len(nodes_mm)), np.diff(sparsity.row_start)) // depth
+        graph = ColumnGraph.of(
+            np.unique(row * columns.n_columns + sparsity.column // depth), columns.n_columns
+        )
+        self._order, colour_start = _by_colour(graph)
+        graph, columns = graph.sorted(self._order), columns.renumbered(self._order)
+        self._place = np.argsort(self._order)
+        moves = np.zeros((len(nodes_mm), 3))
+        moves.ravel()[free] = 1.0
+        moving = to_columns(moves, self._order, depth)
+        self._levels = [_Level(graph, colour_start, moving, depth)]
+        self._transfers: list[Transfer] = []
+        while (coarse := columns.coarser()) is not None:
+            columns, chosen, parent, weight = coarse
+            order, colour_start = _by_colour(Transfer.of(graph, parent, weight).graph)
+            columns, parent = columns.renumbered(order), np.argsort(order)[parent]
+            self._transfers.append(Transfer.of(graph, parent, weight))
+            graph, moving = self._transfers[-1].graph, moving[chosen[order]]
+            self._levels.append(_Level(graph, colour_start, moving, depth))
+        self._coarsest = moving[:, :, 1 : depth + 1] > 0.0
+        number = np.full(self._coarsest.shape, -1, dtype=np.int64)
+        number[self._coarsest] = np.arange(self._coarsest.sum())
+        self._factor = factor(*graph.entries(number))
+
+    @property
+    def columns_of_levels(self) -> tuple[int, ...]:
+        """Number of columns of each level, finest first."""
+        return tuple(level.own.size for level in self._levels)
+
+    def follow(self, blocks: FloatArray) -> None:
+        """Take a new tangent, blocks (n_blocks, 3, 3), on the finest level; others stay as they are."""
+        finest = self._levels[0]
+        take_blocks(
+            self._sparsity.row_start, self._sparsity.column, blocks, self._order, self._place,
+            finest.graph.start, finest.graph.neighbour, self._depth, finest.free, finest.matrix,
+        )  # fmt: skip
+        finest.factor()
+
+    def renew(self, blocks: FloatArray) -> None:
+        """Take a new tangent on all levels."""
+        self.follow(blocks)
+        for n, transfer in enumerate(self._transfers):
+            fine, coarse = self._levels[n], self._levels[n + 1]
+            _galerkin(
+                transfer.part_start, transfer.part, transfer.part_weight,
+                _rows(fine.matrix), _rows(coarse.matrix),
+            )  # fmt: skip
+            _hold(coarse.graph.start, coarse.graph.neighbour, coarse.free, coarse.matrix)
+            coarse.factor()
+        self._factor.renew(self._levels[-1].matrix)
+
+    def enter(self, values: FloatArray) -> SingleArray:
+        """Vector of this module, flat, of values of the free degrees of freedom (n_free,)."""
+        nodal = np.zeros(3 * (len(self._sparsity.row_start) - 1))
+        nodal[self._free] = values
+        return to_columns(nodal.reshape(-1, 3), self._order, self._depth).ravel()
+
+    def leave(self, vector: SingleArray) -> FloatArray:
+        """Values of the free degrees of freedom (n_free,) of a flat vector."""
+        columns = vector.reshape(self._levels[0].x.shape)
+        return to_nodes(columns, self._order, self._depth).ravel()[self._free]
+
+    def multiply(self, direction: SingleArray) -> SingleArray:
+        """Product of the tangent last taken and a flat vector."""
+        finest = self._levels[0]
+        product = np.zeros_like(finest.x)
+        multiply(
+            finest.graph.start,
+            finest.graph.neighbour,
+            finest.matrix,
+            direction.reshape(finest.x.shape),
+            product,
+        )
+        return product.ravel()
+
+    def apply(self, residual: SingleArray) -> SingleArray:
+        """Approximate solution for a residual, both flat."""
+        finest = self._levels[0]
+        finest.right[:] = residual.reshape(finest.x.shape)
+        self._cycle(0)
+        return finest.x.ravel().copy()
+
+    def _cycle(self, n: int) -> None:
+        """Solve approximately for `right` of level n, into its `x`."""
+        level = self._levels[n]
+        if n == len(self._transfers):
+            inner = level.x[:, :, 1 : self._depth + 1]
+            right = level.right[:, :, 1 : self._depth + 1][self._coarsest]
+            inner[self._coarsest] = self._factor.solve(right)
+            return
+        coarse, transfer = self._levels[n + 1], self._transfers[n]
+        level.sweep_forward()
+        _restrict(
+            transfer.child_start, transfer.child, transfer.child_weight, _rows(level.residual),
+            _rows(coarse.free), _rows(coarse.right),
+        )  # fmt: skip
+        self._cycle(n + 1)
+        _add_prolonged(
+            transfer.parent, transfer.weight, _rows(coarse.x), _rows(level.free), _rows(level.x)
+        )  # fmt: skip
+        level.sweep_backward()
+
+
+def _rows(values: SingleArray) -> SingleArray:
+    """Return the same numbers with one axis for all that belongs to a column or a pair."""
+    return values.reshape(len(values), -1)

@@ -1,0 +1,249 @@
+"""Multigrid by columns against dense algebra, its convergence, and presses with it and without."""
+
+import numpy as np
+import pytest
+from numba import get_num_threads, set_num_threads
+
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import resolution_grading
+from fingerpad.indenters import Sphere
+from fingerpad.mechanics import linear, multigrid
+from fingerpad.mechanics.assembly import Sparsity, assemble
+from fingerpad.mechanics.columns import to_columns, to_nodes
+from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.factors import SuperLuFactor
+from fingerpad.mechanics.linear import LinearSolver, free_degrees_of_freedom
+from fingerpad.mechanics.materials import Material, MaterialTable, Prony
+from fingerpad.mechanics.multigrid import Multigrid
+from fingerpad.mechanics.newton import NewtonSettings
+from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mesh import block_mesh, finger_mesh
+from fingerpad.stimulus import RampAndHold
+
+SMALL = block_mesh(
+    np.arange(7.0), [0.0, 0.3, 0.5, 1.5], np.array([0.0, 0.5, 1.0, 1.5, 2.5, 3.5]), [0, 2, 3], symmetric=True
+)
+QUICK = resolution_grading("quick", 17.37)
+COARSE = QUICK.__class__(17.37, 2.0, 2.0, 1.0, 1.0, stratum_corneum=1, dermis=1, subcutis=2)
+MESHES = {
+    "block": SMALL,
+    "half finger": finger_mesh(Fingertip(), COARSE),
+    "whole finger": finger_mesh(Fingertip(), COARSE.__class__(**{**COARSE.__dict__, "full": True})),
+}
+
+
+def system(mesh, poisson=0.45, stretch=0.02):
+    """Sparsity, free degrees of freedom and tangent of a mesh that is slightly and unevenly stretched."""
+    sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
+    free = free_degrees_of_freedom(len(mesh.nodes_mm), mesh.fixed_nodes, mesh.symmetry_nodes)
+    table = MaterialTable.of([Material.neo_hooke(shear, poisson) for shear in (400.0, 80.0, 20.0, 5.0)])
+    displacement = stretch * np.sin(mesh.nodes_mm[:, ::-1])
+    blocks, force = np.empty((sparsity.column.size, 3, 3)), np.empty_like(displacement)
+    assemble(
+        mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table.law, np.ones(4),
+        np.zeros((len(mesh.elements), 8, 6)), sparsity, True, force, blocks,
+    )  # fmt: skip
+    return sparsity, free, blocks
+
+
+def made(mesh, poisson=0.45, stretch=0.02):
+    sparsity, free, blocks = system(mesh, poisson, stretch)
+    hierarchy = Multigrid(sparsity, free, mesh.nodes_mm, mesh.grid, SuperLuFactor)
+    hierarchy.renew(blocks)
+    return hierarchy, sparsity, free, blocks
+
+
+def dense(level):
+    """Matrix of a level, entry by entry; 1 on the diagonal of held unknowns."""
+    n = level.x[:, :, 1 : level.depth + 1].size
+    matrix = np.zeros((n, n))
+    for pair in range(level.graph.neighbour.size):
+        c, d = level.graph.column[pair], level.graph.neighbour[pair]
+        for s in range(3):
+            for k in range(level.depth):
+                if 0 <= k + s - 1 < level.depth:
+                    for a in range(3):
+                        for b in range(3):
+                            row, column = (
+                                (c * 3 + a) * level.depth + k,
+                                (d * 3 + b) * level.depth + k + s - 1,
+                            )
+                            matrix[row, column] = level.matrix[pair, s, a, b, k]
+    held = np.flatnonzero(np.diag(matrix) == 0.0)
+    matrix[held, held] = 1.0
+    return matrix
+
+
+def inner(level, vector):
+    return vector[:, :, 1 : level.depth + 1].ravel()
+
+
+def put(level, vector, values):
+    vector[:, :, 1 : level.depth + 1] = (
+        values.reshape(-1, 3, level.depth) * (level.free[:, :, 1 : level.depth + 1])
+    )
+
+
+@pytest.mark.parametrize("mesh", MESHES.values(), ids=MESHES.keys())
+def test_product_is_that_of_the_blocks(mesh):
+    hierarchy, sparsity, free, blocks = made(mesh)
+    direction = np.random.default_rng(0).normal(size=free.size)
+    full = np.zeros(mesh.nodes_mm.size)
+    full[free] = direction
+    expected = (sparsity.matrix(blocks) @ full)[free]
+    found = hierarchy.leave(hierarchy.multiply(hierarchy.enter(direction)))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("mesh", MESHES.values(), ids=MESHES.keys())
+def test_neighbouring_columns_differ_in_colour_and_columns_are_sorted_by_it(mesh):
+    hierarchy = made(mesh)[0]
+    for level in hierarchy._levels:
+        colour = np.searchsorted(level.colour_start, np.arange(level.own.size), side="right")
+        differs = colour[level.graph.column] != colour[level.graph.neighbour]
+        assert (differs | (level.graph.column == level.graph.neighbour)).all()
+        np.testing.assert_array_equal(level.graph.column[level.own], np.arange(level.own.size))
+
+
+def test_vector_comes_back_from_columns():
+    values, order = np.random.default_rng(0).normal(size=(12, 3)).astype(np.float32), np.array([2, 0, 1])
+    columns = to_columns(values, order, 4)
+    np.testing.assert_array_equal(columns[0, 1, 1:5], values[8:12, 1])
+    assert not columns[:, :, 0].any()
+    assert not columns[:, :, 5:].any()
+    np.testing.assert_array_equal(to_nodes(columns, order, 4), values)
+
+
+def test_sweeps_solve_with_the_triangles_of_the_matrix(monkeypatch):
+    """Forward (T + L) x = r leaves r - A x; backward adds (T + L')^-1 (r - A x)."""
+    monkeypatch.setattr(multigrid, "COARSEST_COLUMNS", 10)
+    hierarchy = made(SMALL)[0]
+    for level in hierarchy._levels[:2]:
+        matrix, size = dense(level), 3 * level.depth
+        column = np.arange(len(matrix)) // size
+        put(level, level.right, np.random.default_rng(1).normal(size=len(matrix)))
+        level.sweep_forward()
+        right = inner(level, level.right)
+        expected = np.linalg.solve(matrix * (column[:, None] >= column), right)
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(inner(level, level.x), expected, rtol=0, atol=1e-4 * scale)
+        left = right - matrix @ expected
+        np.testing.assert_allclose(inner(level, level.residual), left, rtol=0, atol=1e-4 * np.abs(left).max())
+        level.sweep_backward()
+        expected = expected + np.linalg.solve(matrix * (column[:, None] <= column), left)
+        np.testing.assert_allclose(inner(level, level.x), expected, rtol=0, atol=1e-4 * scale)
+
+
+@pytest.mark.parametrize("mesh", MESHES.values(), ids=MESHES.keys())
+def test_coarse_matrix_is_the_galerkin_product(monkeypatch, mesh):
+    monkeypatch.setattr(multigrid, "COARSEST_COLUMNS", 10)
+    hierarchy = made(mesh)[0]
+    fine, coarse, transfer = hierarchy._levels[0], hierarchy._levels[1], hierarchy._transfers[0]
+    depth = fine.depth
+    by_column = np.zeros((fine.own.size, coarse.own.size))
+    np.add.at(by_column, (np.arange(fine.own.size)[:, None], transfer.parent), transfer.weight)
+    np.testing.assert_allclose(by_column.sum(axis=1), 1.0, rtol=1e-6)
+    interpolation = np.kron(by_column, np.eye(3 * depth))
+    interpolation *= (inner(fine, fine.free) > 0)[:, None] & (inner(coarse, coarse.free) > 0)
+    expected = interpolation.T @ dense(fine) @ interpolation
+    expected[np.diag(np.diag(expected) == 0.0)] = 1.0
+    np.testing.assert_allclose(dense(coarse), expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+def test_interpolation_is_exact_for_linear_functions(monkeypatch):
+    monkeypatch.setattr(multigrid, "COARSEST_COLUMNS", 10)
+    hierarchy = made(SMALL)[0]
+    transfer, depth = hierarchy._transfers[0], SMALL.grid.shape[2]
+    skin = SMALL.nodes_mm[hierarchy._order * depth]
+    kept = np.zeros((transfer.graph.n_columns, 3))
+    is_kept = transfer.weight.max(axis=1) == 1.0
+    kept[transfer.parent[is_kept, transfer.weight[is_kept].argmax(axis=1)]] = skin[is_kept]
+    assert transfer.graph.n_columns < len(skin)
+    np.testing.assert_allclose(
+        (transfer.weight[:, :, None] * kept[transfer.parent]).sum(axis=1), skin, atol=1e-6
+    )
+
+
+@pytest.mark.parametrize("mesh", MESHES.values(), ids=MESHES.keys())
+def test_cycle_is_symmetric_and_positive(monkeypatch, mesh):
+    monkeypatch.setattr(multigrid, "COARSEST_COLUMNS", 10)
+    hierarchy, _, free, _ = made(mesh)
+    assert len(hierarchy.columns_of_levels) > 1
+    x, y = np.random.default_rng(0).normal(size=(2, free.size))
+    cycled_x, cycled_y = (hierarchy.leave(hierarchy.apply(hierarchy.enter(v))) for v in (x, y))
+    assert cycled_x @ y == pytest.approx(
+        x @ cycled_y, abs=1e-5 * np.linalg.norm(cycled_x) * np.linalg.norm(y)
+    )
+    assert cycled_x @ x > 0.0
+
+
+def iterations(mesh, poisson=0.45):
+    hierarchy, _, free, blocks = made(mesh, poisson, stretch=0.0)
+    solver = LinearSolver(hierarchy)
+    solver.solve(blocks, np.random.default_rng(0).normal(size=free.size), 1e-4)
+    return solver.iterations
+
+
+def test_iterations_do_not_grow_with_the_mesh():
+    found = []
+    for n in (16, 32):
+        edges = np.linspace(0.0, 8.0, n + 1)
+        mesh = block_mesh(edges, [0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0], edges, [0, 0, 1, 2, 3, 3])
+        found.append(iterations(mesh))
+    assert found[0] <= 16
+    assert found[1] <= found[0]
+
+
+def test_iterations_stay_few_on_the_finger_up_to_the_largest_ratio():
+    mesh = finger_mesh(Fingertip(), QUICK)
+    found = [iterations(mesh, poisson) for poisson in (0.45, 0.485, linear.MULTIGRID_POISSON)]
+    assert found[0] <= 15
+    assert found[1] <= 27
+    assert found[2] <= 46
+
+
+def test_same_bits_on_any_number_of_threads():
+    mesh, before, found = MESHES["whole finger"], get_num_threads(), []
+    direction = np.random.default_rng(0).normal(size=3 * len(mesh.nodes_mm))
+    try:
+        for threads in {1, before}:
+            set_num_threads(threads)
+            hierarchy, _, free, _ = made(mesh)
+            found.append(hierarchy.apply(hierarchy.enter(direction[free])))
+    finally:
+        set_num_threads(before)
+    for other in found[1:]:
+        np.testing.assert_array_equal(other, found[0])
+
+
+@pytest.mark.parametrize("mkl", [True, False])
+def test_press_equals_that_of_a_factor_in_every_step(monkeypatch, mkl):
+    """The plain path: a new double-precision factor for every Newton step."""
+    edges = np.linspace(-4.0, 4.0, 13)
+    mesh = block_mesh(edges, [0.0, 0.2, 0.4, 0.8, 1.6, 3.0], edges[6:], [0, 1, 2, 2, 3], symmetric=True)
+    relaxing = Prony((0.3,), (20.0,))
+    materials = [Material.neo_hooke(shear, 0.48, relaxing) for shear in (400.0, 80.0, 20.0, 5.0)]
+    sphere = Sphere(curvature_per_m=287)
+    placement = place(sphere, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
+    settings = PressSettings(2, 2, NewtonSettings(residual_tolerance=1e-9, penetration_tolerance=1e-3))
+
+    def pressed():
+        return press(mesh, materials, sphere, placement, RampAndHold(0.4, 50, 200), settings)
+
+    if not mkl:
+        monkeypatch.setattr(linear, "pypardiso", None)
+    monkeypatch.setattr(linear, "MULTIGRID_NODES", 100)
+    monkeypatch.setattr(multigrid, "COARSEST_COLUMNS", 10)
+    fast = pressed()
+    assert fast.linear_solver.startswith("geometric multigrid on 4 levels")
+    monkeypatch.setattr(linear, "MULTIGRID_NODES", 10**9)
+    monkeypatch.setattr(linear, "pypardiso", None)
+    monkeypatch.setattr(linear.KeptFactor, "patience", -(10**9))
+    plain = pressed()
+    assert plain.factorisations == plain.newton_steps
+    np.testing.assert_allclose(fast.force_mn, plain.force_mn, rtol=1e-6)
+    for name in ("displacement_mm", "sed_kpa"):
+        expected = getattr(plain, name)
+        np.testing.assert_allclose(
+            getattr(fast, name), expected, rtol=0, atol=1e-6 * np.abs(expected).max(), err_msg=name
+        )
