@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -16,39 +16,65 @@ JOBS = 2
 RESOLUTIONS = ("quick", "standard")
 
 
-def reproduce(resolution: str) -> tuple[Run, list[dict[str, Any]]]:
+def reproduce(resolution: str) -> tuple[Run, dict[str, float]]:
     """Run the command into an empty folder.
 
     Returns
     -------
-    Run, list of dict
-        What it took, and its stages with their seconds, as the command tells them.
+    Run, dict
+        What it took, and the seconds of its parts.
     """
     with TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "fingerpad", "reproduce", "--resolution", resolution]
         done = run([*command, "--out", folder, "--jobs", str(JOBS)], threads=JOBS)
-        stages = json.loads((Path(folder) / "results.json").read_text(encoding="utf-8"))["manifest"]["stages"]
-    return done, stages
+        manifest = json.loads((Path(folder) / "results.json").read_text(encoding="utf-8"))["manifest"]
+    return done, seconds_of_parts(manifest, done.wall_s)
+
+
+def seconds_of_parts(manifest: Mapping[str, Any], whole_s: float) -> dict[str, float]:
+    """Seconds of each part of a reproduction.
+
+    Parameters
+    ----------
+    manifest : mapping
+        As `fingerpad reproduce` writes it: stages, of which those with indentations read what is stored.
+    whole_s : float
+        Time of the whole command. [s]
+
+    Returns
+    -------
+    dict
+        Seconds by part.
+
+    Examples
+    --------
+    >>> stages = [{"name": "fit", "wall_s": 2.0}, {"name": "bars", "wall_s": 1.0, "indentations": 36}]
+    >>> seconds_of_parts({"wall_s": 4.0, "stages": stages}, whole_s=9.0)
+    {'fit': 2.0, 'reading what is stored': 1.0, 'the rest of the study': 1.0,
+     'imports, figures and report': 5.0}
+    """
+    work = {stage["name"]: stage["wall_s"] for stage in manifest["stages"] if "indentations" not in stage}
+    reading_s = sum(stage["wall_s"] for stage in manifest["stages"] if "indentations" in stage)
+    return {
+        **work,
+        "reading what is stored": reading_s,
+        "the rest of the study": manifest["wall_s"] - sum(work.values()) - reading_s,
+        "imports, figures and report": whole_s - manifest["wall_s"],
+    }
 
 
 def measure(resolutions: Sequence[str] = RESOLUTIONS) -> Report:
     """Reproduce at every resolution, each from nothing."""
     run_job("pressing", "press", JOBS, resolution="quick")  # compiles kernels, if that is still to be done
     found = {resolution: reproduce(resolution) for resolution in resolutions}
-    names = list(dict.fromkeys(stage["name"] for _, stages in found.values() for stage in stages))
-    spent = {
-        resolution: {stage["name"]: stage["wall_s"] for stage in stages}
-        for resolution, (_, stages) in found.items()
-    }
-    rows: list[list[Any]] = [[name, *(spent[one].get(name) for one in resolutions)] for name in names]
+    parts = list(dict.fromkeys(part for _, spent in found.values() for part in spent))
+    rows: list[list[Any]] = [[part, *(spent.get(part) for _, spent in found.values())] for part in parts]
     rows.append(["the whole command, s", *(done.wall_s for done, _ in found.values())])
     rows.append(["cores used", *(done.cores for done, _ in found.values())])
     rows.append(["memory, MB", *(done.peak_mb for done, _ in found.values())])
-    measured = {}
-    for resolution, (done, _) in found.items():
-        measured[f"reproduce_{resolution}_s"] = done.wall_s
-        if resolution == "standard":
-            measured["reproduce_standard_gb"] = done.peak_mb / 1000.0
+    measured = {f"reproduce_{resolution}_s": done.wall_s for resolution, (done, _) in found.items()}
+    if "standard" in found:
+        measured["reproduce_standard_gb"] = found["standard"][0].peak_mb / 1000.0
     return Report(
         name="reproduction",
         title="The whole reproduction",
@@ -56,7 +82,7 @@ def measure(resolutions: Sequence[str] = RESOLUTIONS) -> Report:
             "`fingerpad reproduce --jobs 2` into an empty folder: all presses, fits, observers, figures and "
             "the report. One run each; the time is that of the whole command, imports included."
         ),
-        tables=[Table("Seconds of each stage, as the command tells them:", ["stage", *resolutions], rows)],
+        tables=[Table("Seconds of each part:", ["part", *resolutions], rows)],
         measured=measured,
         notes=[
             "Memory is the sum over the command and its processes; what they share counts for each of them."
