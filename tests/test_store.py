@@ -199,7 +199,7 @@ def test_key_changes_with_the_sources_of_mechanics_and_with_no_others(monkeypatc
 
 
 def test_every_source_that_mechanics_imports_counts_for_the_key():
-    """Apart from what cannot alter a solved number: checks, errors, the results' class and published values.
+    """Apart from what cannot alter a solved number: checks, errors, a notice, the class of results, inputs.
 
     Published values reach a touch as its own fields, which are in the key already.
     """
@@ -214,7 +214,7 @@ def test_every_source_that_mechanics_imports_counts_for_the_key():
     }
     counted = {name.removesuffix(".py") for name in store_module.MECHANICAL_SOURCES}
     assert imported & counted
-    assert imported - counted <= {"checks", "errors", "mesh_checks", "parameters", "sampling"}
+    assert imported - counted <= {"checks", "compilation", "errors", "mesh_checks", "parameters", "sampling"}
 
 
 # What is stored
