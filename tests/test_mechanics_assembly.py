@@ -14,7 +14,7 @@ from scipy import sparse
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import resolution_grading
 from fingerpad.mechanics.assembly import Sparsity, assemble
-from fingerpad.mechanics.chunks import FEWEST_ELEMENTS, MANY_CHUNKS, Chunks
+from fingerpad.mechanics.chunks import FEWEST_ELEMENTS, MANY_CHUNKS, coloured_chunks
 from fingerpad.mechanics.element import element_system
 from fingerpad.mechanics.materials import Hyperfoam, Material, MaterialTable, Ogden, Polynomial
 from fingerpad.mesh import block_mesh, finger_mesh
@@ -133,22 +133,20 @@ def test_element_inside_out_makes_the_potential_nan():
 
 def check_chunks(elements, n_nodes):
     """Every element is in one chunk, and chunks of one colour share no node."""
-    chunks = Chunks.of(elements, n_nodes)
-    order = np.concatenate([np.arange(*ends) for ends in zip(chunks.first, chunks.last, strict=True)])
+    colours = coloured_chunks(elements, n_nodes)
+    order = np.concatenate([np.arange(*ends) for chunks in colours for ends in chunks])
     np.testing.assert_array_equal(np.sort(order), np.arange(len(elements)))
-    for colour in range(chunks.colour_start.size - 1):
-        ends = range(chunks.colour_start[colour], chunks.colour_start[colour + 1])
-        nodes = [np.unique(elements[chunks.first[chunk] : chunks.last[chunk]]) for chunk in ends]
-        together = np.concatenate(nodes)
-        assert np.unique(together).size == together.size
-    return chunks
+    for chunks in colours:
+        nodes = np.concatenate([np.unique(elements[first:last]) for first, last in chunks])
+        assert np.unique(nodes).size == nodes.size
+    return colours
 
 
 @MESHES
 def test_chunks_of_one_colour_share_no_node(name):
-    chunks = check_chunks(mesh(name).elements, len(mesh(name).nodes_mm))
-    assert 1 < chunks.first.size <= MANY_CHUNKS
-    assert chunks.colour_start.size - 1 <= 8  # few colours, so that every thread has its share of each
+    colours = check_chunks(mesh(name).elements, len(mesh(name).nodes_mm))
+    assert 1 < sum(len(chunks) for chunks in colours) <= MANY_CHUNKS
+    assert len(colours) <= 8  # few colours, so that every thread has its share of each
 
 
 @settings(max_examples=30, deadline=None)

@@ -73,7 +73,7 @@ def test_exchanged_pressure_acts_on_the_second_derivative_of_volume():
     displacement, step, change = crumpled(), 1e-5 * crumpled(seed=4), np.array([2.0, -3.0, 5.0, 0.0])
     sparsity = Sparsity.of(BLOCK.elements, len(BLOCK.nodes_mm))
     blocks = np.zeros((sparsity.column.size, 3, 3))
-    exchange_pressure(BLOCK.nodes_mm, BLOCK.elements, displacement, change, sparsity.position, blocks)
+    exchange_pressure(BLOCK.nodes_mm, BLOCK.elements, displacement, change, sparsity, blocks)
     force = np.zeros_like(displacement)
     for sign in (1.0, -1.0):
         volume_slope = (

@@ -155,3 +155,19 @@ def test_held_foam_relaxes_by_its_prony_series():
     series = 1 - (SHARES * (1 - np.exp(-times[:, None] / TIMES_MS))).sum(axis=1)
     expected = series[:, None, None] * forces[0]
     np.testing.assert_allclose(forces, expected, rtol=0, atol=1e-6 * np.abs(forces[0]).max())
+
+
+def test_history_is_that_of_its_formula():
+    """H and S_i against the two lines of the module's head, written for whole arrays."""
+    rng, n = np.random.default_rng(5), 700
+    layer = rng.integers(0, 2, n)
+    step = StepCoefficients(*(rng.uniform(0.1, 1.0, size) for size in ((2,), (2, 3), (2, 3), (2, 3))))
+    before = StressHistory(rng.normal(size=(n, 8, 6)), rng.normal(size=(3, n, 8, 6)))
+    now = rng.normal(size=(n, 8, 6))
+    new, old, decay = (of.T[:, layer, None, None] for of in (step.new, step.old, step.decay))
+    carried = (old * before.instantaneous + decay * before.relaxed).sum(axis=0)
+    np.testing.assert_allclose(before.carried(step, layer), carried, rtol=0, atol=1e-14)
+    advanced = before.advanced(step, layer, now)
+    wanted = new * now + old * before.instantaneous + decay * before.relaxed
+    np.testing.assert_allclose(advanced.relaxed, wanted, rtol=0, atol=1e-14)
+    assert advanced.instantaneous is now

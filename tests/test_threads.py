@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import threading
 
 import numba
 import numpy as np
@@ -10,37 +11,28 @@ import pytest
 
 import fingerpad as fp
 from fingerpad.errors import InputError
-from fingerpad.threads import available_threads, compiled_threads
+from fingerpad.threads import available_threads, compiled_threads, worker_threads
 
 needs_two_threads = pytest.mark.skipif(available_threads() < 2, reason="this machine has one core")
 
 LOOPS = """
-import os, sys, threading
+import os, threading
 import numpy as np
+from numba import njit, prange
 from fingerpad.errors import FingerpadError
-from fingerpad.mechanics.assembly import Sparsity, assemble
-from fingerpad.mechanics.materials import Material, MaterialTable
-from fingerpad.mesh import block_mesh
 from fingerpad.threads import compiled_threads
 
-lines = np.linspace(0.0, 1.0, 9)
-mesh = block_mesh(lines, lines, lines, layers=[0] * 8)
-sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
-law = MaterialTable.of([Material.neo_hooke(1.0, 0.4)]).law
-
-def assembled():
-    force, blocks = np.zeros_like(mesh.nodes_mm), np.empty((sparsity.column.size, 3, 3))
-    assemble(
-        mesh.nodes_mm, mesh.elements, force.copy(), mesh.layer, law, np.ones(1),
-        np.zeros((len(mesh.elements), 8, 6)), sparsity, True, force, blocks,
-    )
+@njit(parallel=True)
+def halve(numbers):
+    for n in prange(numbers.size):
+        numbers[n] /= 2.0
 
 def several():
-    for _ in range(100):
+    for _ in range(1000):
         with compiled_threads():
-            assembled()
+            halve(np.ones(10000))
 """
-"""What the processes below begin with: a block, and its assembly a hundred times over."""
+"""What the processes below begin with: one of Numba's own parallel loops, a thousand times over."""
 
 SIDE_BY_SIDE = """
 together = [threading.Thread(target=several) for _ in range(2)]
@@ -114,6 +106,24 @@ def test_number_of_threads_is_checked(threads):
     for action in (touch.solve, touch.deform):
         with pytest.raises(InputError, match="threads must"):
             action(threads=threads)
+
+
+@needs_two_threads
+def test_work_is_shared_out_and_answers_come_in_order():
+    """Each of the first two chunks waits for the other, so one thread alone would never be done."""
+    meeting = threading.Barrier(2, timeout=20.0)
+
+    def work(first, last):
+        if first < 2:
+            meeting.wait()
+        return last, threading.get_ident()
+
+    with compiled_threads(2), worker_threads() as each:
+        answers = each(work, [(0, 5), (1, 6), (2, 7), (3, 8)])
+    assert [last for last, _ in answers] == [5, 6, 7, 8]
+    assert len({thread for _, thread in answers}) == 2
+    with compiled_threads(1), worker_threads() as each:
+        assert each(lambda *_: threading.get_ident(), [(0, 1), (1, 2)]) == 2 * [threading.get_ident()]
 
 
 @needs_two_threads

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import starmap
+from typing import Any
 
 import numba
 
@@ -89,3 +92,33 @@ def compiled_threads(threads: int | None = None) -> Iterator[int]:
             yield numba.get_num_threads()
         finally:
             numba.set_num_threads(before)
+
+
+Work = Callable[[int, int], Any]
+"""Compiled work on consecutive numbers, from the first up to but not including the last."""
+
+
+@contextmanager
+def worker_threads() -> Iterator[Callable[[Work, Sequence[tuple[int, int]]], list[Any]]]:
+    """Share work out to as many threads as compiled loops may use.
+
+    The work must release Python's lock (nogil=True), and no two chunks of one call may write to the same
+    place. A thread that is done with a chunk takes the next one, so none waits for a slower one.
+
+    Yields
+    ------
+    callable
+        Called with the work and its chunks (first, last); returns the answers in the order of the chunks.
+
+    Examples
+    --------
+    >>> with worker_threads() as each:
+    ...     each(lambda first, last: last - first, [(0, 4), (4, 9)])
+    [4, 5]
+    """
+    threads = numba.get_num_threads()
+    if threads == 1:
+        yield lambda work, chunks: list(starmap(work, chunks))
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        yield lambda work, chunks: list(pool.map(work, *zip(*chunks, strict=True)))

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from scipy import sparse
 
 from fingerpad.checks import FloatArray
-from fingerpad.mechanics.chunks import Chunks
+from fingerpad.mechanics.chunks import Chunk, coloured_chunks, even_chunks
 from fingerpad.mechanics.element import N_NODES, element_system
+from fingerpad.threads import worker_threads
 
 
 @dataclass(frozen=True)
@@ -27,15 +28,15 @@ class Sparsity:
         Block to which a pair of element nodes adds.
     diagonal : int array (n_nodes,)
         Block of each node with itself.
-    chunks : Chunks
-        Elements that threads add up at the same time.
+    colours : list of list of (int, int)
+        Chunks of elements that threads may add up at the same time, see `chunks`.
     """
 
     row_start: np.ndarray
     column: np.ndarray
     position: np.ndarray
     diagonal: np.ndarray
-    chunks: Chunks
+    colours: list[list[Chunk]]
 
     @classmethod
     def of(cls, elements: np.ndarray, n_nodes: int) -> Sparsity:
@@ -50,7 +51,7 @@ class Sparsity:
         position = np.empty((len(elements), N_NODES, N_NODES), dtype=np.int32)
         _find_positions(elements, row_start, column, position)
         diagonal = np.flatnonzero(np.repeat(np.arange(n_nodes), np.diff(row_start)) == column)
-        return cls(row_start, column, position, diagonal, Chunks.of(elements, n_nodes))
+        return cls(row_start, column, position, diagonal, coloured_chunks(elements, n_nodes))
 
     def entries(self, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Row and column of every entry (n_blocks, 3, 3) among the free degrees of freedom, -1 if held."""
@@ -120,35 +121,24 @@ def assemble(
     float
         Incremental potential; NaN if an element is turned inside out. [µJ]
     """
-    chunks, potentials = sparsity.chunks, np.empty(sparsity.chunks.first.size)
-    _add_colours(
-        nodes, elements, displacement, layer, law, s, history, sparsity.position, with_tangent,
-        force, blocks, chunks.first, chunks.last, chunks.colour_start, potentials,
-    )  # fmt: skip
-    return float(potentials.sum())
 
+    def clear(first: int, last: int) -> None:
+        blocks[first:last] = 0.0
 
-@njit(cache=True, parallel=True)
-def _add_colours(  # type: ignore[no-untyped-def]
-    nodes, elements, displacement, layer, law, s, history, position, with_tangent,
-    force, blocks, first, last, colour_start, potentials,
-):  # fmt: skip
-    """Add up colour after colour, the chunks of a colour at the same time; one potential per chunk."""
+    def add(first: int, last: int) -> float:
+        return _add_chunk(
+            nodes, elements, displacement, layer, law, s, history, sparsity.position, with_tangent,
+            force, blocks, first, last,
+        )  # fmt: skip
+
     force[:] = 0.0
-    if with_tangent:
-        for block in prange(blocks.shape[0]):
-            for i in range(3):
-                for j in range(3):
-                    blocks[block, i, j] = 0.0
-    for colour in range(colour_start.size - 1):
-        for chunk in prange(colour_start[colour], colour_start[colour + 1]):
-            potentials[chunk] = _add_chunk(
-                nodes, elements, displacement, layer, law, s, history, position, with_tangent,
-                force, blocks, first[chunk], last[chunk],
-            )  # fmt: skip
+    with worker_threads() as each:
+        if with_tangent:
+            each(clear, even_chunks(len(blocks)))
+        return sum(potential for chunks in sparsity.colours for potential in each(add, chunks))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _add_chunk(  # type: ignore[no-untyped-def]
     nodes, elements, displacement, layer, law, s, history, position, with_tangent,
     force, blocks, first, last,

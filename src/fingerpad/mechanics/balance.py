@@ -22,10 +22,12 @@ from numba import njit
 from scipy.interpolate import CubicSpline
 
 from fingerpad.checks import FloatArray
+from fingerpad.mechanics.chunks import even_chunks
 from fingerpad.mechanics.element import N_NODES, N_POINTS, frame_scale, gradients_at_points
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
 from fingerpad.mechanics.tensors import invert, push_forward
 from fingerpad.mechanics.viscoelastic import StressHistory
+from fingerpad.threads import worker_threads
 
 FEW_STEPS = 3
 """Points of a phase below which a cubic cannot be drawn and straight lines take its place."""
@@ -235,17 +237,18 @@ class DissipationCoefficients:
         return cls(lost_twice, 2.0 * lost**2 / x, np.where(x < _SERIES_BELOW, series, exact))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _dissipated(  # type: ignore[no-untyped-def]
-    nodes, elements, displacement, layer, law, shares, before, mixed, increment, old, relaxed, new, energies
-):
+    nodes, elements, displacement, layer, law, shares, before, mixed, increment, old, relaxed, new, energies,
+    first, last,
+):  # fmt: skip
     n_terms = relaxed.shape[0]
     weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
     gradients, inverse = np.empty((N_POINTS, 3, 3)), np.empty((3, 3))
     spatial, tensors = np.empty((n_terms + 2, 6)), np.empty((n_terms + 2, 6))
     jacobians = np.empty(N_POINTS)
     total = 0.0
-    for e in range(elements.shape[0]):
+    for e in range(first, last):
         material = layer[e]
         volume = gradients_at_points(
             nodes[elements[e]], displacement[elements[e]], weights, slopes, gradients
@@ -324,7 +327,12 @@ def dissipated_energy(
         [µJ]
     """
     c = DissipationCoefficients.of(table, step_ms)
-    return _dissipated(
-        nodes, elements, displacement, layer, table.law, table.shares, c.before, c.mixed, c.increment,
-        before.instantaneous, before.relaxed, instantaneous, energies,
-    )  # fmt: skip
+
+    def find(first: int, last: int) -> float:
+        return _dissipated(
+            nodes, elements, displacement, layer, table.law, table.shares, c.before, c.mixed, c.increment,
+            before.instantaneous, before.relaxed, instantaneous, energies, first, last,
+        )  # fmt: skip
+
+    with worker_threads() as each:
+        return sum(each(find, even_chunks(len(elements))))

@@ -8,58 +8,61 @@ add to a node, and in which order, depends on chunks and colours, and these on t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+
+Chunk = tuple[int, int]
+"""Consecutive numbers, from the first up to but not including the last."""
 
 MANY_CHUNKS = 128
 """Chunks of a large mesh: enough for every thread, few enough to cut the mesh in few places."""
-FEWEST_ELEMENTS = 64
+FEWEST_ELEMENTS = 128
 """Elements of a chunk, at least: a smaller one would not be worth a thread's while."""
 
 
-@dataclass(frozen=True)
-class Chunks:
-    """Chunks of consecutive elements, ordered by colour.
+def even_chunks(count: int) -> list[Chunk]:
+    """Cut `count` numbers in chunks of one size; only the last may be smaller.
+
+    Examples
+    --------
+    >>> even_chunks(300)
+    [(0, 128), (128, 256), (256, 300)]
+    """
+    size = max(FEWEST_ELEMENTS, -(-count // MANY_CHUNKS))
+    return [(first, min(first + size, count)) for first in range(0, count, size)]
+
+
+def coloured_chunks(elements: np.ndarray, n_nodes: int) -> list[list[Chunk]]:
+    """Chunks of a mesh by colour, each in the first colour that is free.
 
     Parameters
     ----------
-    first, last : int array (n_chunks,)
-        Elements of a chunk, from `first` up to but not including `last`.
-    colour_start : int array (n_colours + 1,)
-        First chunk of every colour, and the number of chunks.
+    elements : int array (n_elements, 8)
+        Nodes of each element.
+    n_nodes : int
+        Number of nodes of the mesh.
+
+    Returns
+    -------
+    list of list of (int, int)
+        For each colour its chunks, of which no two share a node.
+
+    Examples
+    --------
+    A row of 400 elements takes every second chunk in the first colour:
+
+    >>> row = np.arange(400)[:, None] + np.array([0, 1, 1, 0, 0, 1, 1, 0])
+    >>> coloured_chunks(row, n_nodes=401)
+    [[(0, 128), (256, 384)], [(128, 256), (384, 400)]]
     """
-
-    first: np.ndarray
-    last: np.ndarray
-    colour_start: np.ndarray
-
-    @classmethod
-    def of(cls, elements: np.ndarray, n_nodes: int) -> Chunks:
-        """Chunks of a mesh of `elements` (n_elements, 8), each in the first colour that is free.
-
-        Examples
-        --------
-        A row of 200 elements takes four chunks of 64 and less, every second one in the first colour:
-
-        >>> row = np.arange(200)[:, None] + np.array([0, 1, 1, 0, 0, 1, 1, 0])
-        >>> chunks = Chunks.of(row, n_nodes=201)
-        >>> chunks.first.tolist(), chunks.last.tolist(), chunks.colour_start.tolist()
-        ([0, 128, 64, 192], [64, 192, 128, 200], [0, 2, 4])
-        """
-        n = len(elements)
-        size = max(FEWEST_ELEMENTS, -(-n // MANY_CHUNKS))
-        first = np.arange(0, n, size)
-        last = np.minimum(first + size, n)
-        touched: list[np.ndarray] = []  # for each colour, whether it touches a node
-        colour_of = np.empty(first.size, dtype=np.int64)
-        for chunk in range(first.size):
-            nodes = elements[first[chunk] : last[chunk]]
-            free = (colour for colour, taken in enumerate(touched) if not taken[nodes].any())
-            colour_of[chunk] = next(free, len(touched))
-            if colour_of[chunk] == len(touched):
-                touched.append(np.zeros(n_nodes, dtype=bool))
-            touched[colour_of[chunk]][nodes] = True
-        order = np.argsort(colour_of, kind="stable")
-        colour_start = np.searchsorted(colour_of[order], np.arange(len(touched) + 1))
-        return cls(first[order], last[order], colour_start)
+    colours: list[list[Chunk]] = []
+    touched: list[np.ndarray] = []  # for each colour, whether it touches a node
+    for first, last in even_chunks(len(elements)):
+        nodes = elements[first:last]
+        free = (colour for colour, taken in enumerate(touched) if not taken[nodes].any())
+        colour = next(free, len(colours))
+        if colour == len(colours):
+            colours.append([])
+            touched.append(np.zeros(n_nodes, dtype=bool))
+        colours[colour].append((first, last))
+        touched[colour][nodes] = True
+    return colours

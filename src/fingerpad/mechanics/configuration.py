@@ -230,7 +230,7 @@ def evaluate(
         pressures = Pressures.of(*where, mesh.layer, body.table.law)
         if pressure_kpa is not None:
             change = pressure_kpa - pressures.pressure_kpa
-            exchange_pressure(*where, change, body.sparsity.position, blocks)
+            exchange_pressure(*where, change, body.sparsity, blocks)
     positions = mesh.nodes_mm[contact.nodes] + displacement_mm[contact.nodes]
     touch = contact.state(positions, depth_mm, lagging.multipliers_mn, lagging.anchors, before)
     np.negative(force, out=force)

@@ -24,11 +24,13 @@ import numpy as np
 from numba import njit
 
 from fingerpad.checks import FloatArray, one_of
+from fingerpad.mechanics.chunks import even_chunks
 from fingerpad.mechanics.element import N_NODES, N_POINTS, element_state, frame_scale, gradients_at_points
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
 from fingerpad.mechanics.tensors import COLUMN, INDEX, ROW, invert, push_forward
 from fingerpad.mechanics.viscoelastic import StressHistory
 from fingerpad.mesh import Mesh
+from fingerpad.threads import worker_threads
 
 
 @dataclass(frozen=True)
@@ -248,14 +250,20 @@ class Watched:
         convected = history.instantaneous[chosen] - history.relaxed[:, chosen].sum(axis=0)
         gradient, stress = np.empty((n, 3, 3)), np.empty((n, 6))
         pressure, dilatation, work = np.empty(n), np.empty(n), np.empty(n)
-        _mean_fields(
-            self.nodes_mm, self.corners, displacement_mm, self.layer, self.table.law, convected,
-            pressure, dilatation, gradient, stress,
-        )  # fmt: skip
-        _isochoric_work(
-            self.nodes_mm, self.corners, self.layer, self.table.law, before.displacement_mm, displacement_mm,
-            before.dilatation, dilatation, before.convected_kpa, convected, work,
-        )  # fmt: skip
+
+        def find(first: int, last: int) -> None:
+            _mean_fields(
+                self.nodes_mm, self.corners, displacement_mm, self.layer, self.table.law, convected,
+                pressure, dilatation, gradient, stress, first, last,
+            )  # fmt: skip
+            _isochoric_work(
+                self.nodes_mm, self.corners, self.layer, self.table.law, before.displacement_mm,
+                displacement_mm, before.dilatation, dilatation, before.convected_kpa, convected, work,
+                first, last,
+            )  # fmt: skip
+
+        with worker_threads() as each:
+            each(find, even_chunks(n))
         work += 0.5 * (before.pressure_kpa + pressure) * (dilatation - before.dilatation)
         weights, isochoric = energies[chosen, :, 0], energies[chosen, :, 1]
         instantaneous = (weights * isochoric).sum(axis=1) / weights.sum(axis=1) + volumetric_kpa[chosen]
@@ -286,22 +294,31 @@ def cauchy_stress(
     """
     n = len(mesh.elements)
     stress, gradient, pressure, dilatation = np.empty((n, 6)), np.empty((n, 3, 3)), np.empty(n), np.empty(n)
-    _mean_fields(
-        mesh.nodes_mm, mesh.elements, displacement_mm, mesh.layer, table.law,
-        history.instantaneous - history.relaxed.sum(axis=0), pressure, dilatation, gradient, stress,
-    )  # fmt: skip
+    # Copies can be written to, as those of `Watched` can: Numba compiles once for both.
+    corners, layer = mesh.elements.copy(), mesh.layer.copy()
+    convected = history.instantaneous - history.relaxed.sum(axis=0)
+
+    def find(first: int, last: int) -> None:
+        _mean_fields(
+            mesh.nodes_mm, corners, displacement_mm, layer, table.law, convected,
+            pressure, dilatation, gradient, stress, first, last,
+        )  # fmt: skip
+
+    with worker_threads() as each:
+        each(find, even_chunks(n))
     return stress
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _mean_fields(  # type: ignore[no-untyped-def]
-    nodes, corners, displacement, layer, law, convected, pressure, dilatation, mean_gradient, stress
-):
+    nodes, corners, displacement, layer, law, convected, pressure, dilatation, mean_gradient, stress,
+    first, last,
+):  # fmt: skip
     """Write pressure U'(Jbar), Jbar, the scaled mean gradient and the mean Cauchy stress of all elements."""
     weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
     gradients, inverse, spatial = np.empty((N_POINTS, 3, 3)), np.empty((3, 3)), np.empty(6)
     unused, unused_energies = np.empty((N_POINTS, 6)), np.empty((N_POINTS, 2))
-    for e in range(corners.shape[0]):
+    for e in range(first, last):
         material, moved = law[layer[e]], displacement[corners[e]]
         volume = gradients_at_points(nodes[corners[e]], moved, weights, slopes, gradients)
         _, pressure[e], dilatation[e] = element_state(
@@ -326,10 +343,10 @@ def _mean_fields(  # type: ignore[no-untyped-def]
         mean_gradient[e] *= (dilatation[e] / invert(mean_gradient[e], inverse)) ** (1.0 / 3.0)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _isochoric_work(  # type: ignore[no-untyped-def]
     nodes, corners, layer, law, before, now, dilatation_before, dilatation_now,
-    convected_before, convected_now, work,
+    convected_before, convected_now, work, first, last,
 ):  # fmt: skip
     """Write the element means of 1/2 (S_n + S_n+1) : 1/2 (C_n+1 - C_n), with C = c F'F of `frame_scale`.
 
@@ -337,7 +354,7 @@ def _isochoric_work(  # type: ignore[no-untyped-def]
     """
     weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
     old, new, inverse = np.empty((N_POINTS, 3, 3)), np.empty((N_POINTS, 3, 3)), np.empty((3, 3))
-    for e in range(corners.shape[0]):
+    for e in range(first, last):
         material = law[layer[e]]
         gradients_at_points(nodes[corners[e]], before[corners[e]], weights, slopes, old)
         volume = gradients_at_points(nodes[corners[e]], now[corners[e]], weights, slopes, new)

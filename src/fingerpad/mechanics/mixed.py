@@ -25,10 +25,13 @@ import numpy as np
 from numba import njit
 
 from fingerpad.checks import FloatArray
+from fingerpad.mechanics.assembly import Sparsity
+from fingerpad.mechanics.chunks import even_chunks
 from fingerpad.mechanics.element import N_NODES, N_POINTS, gradients_at_points
 from fingerpad.mechanics.energy import CARRIED, differentiate
 from fingerpad.mechanics.materials import COUPLED, N_COEFFICIENTS, POLYNOMIAL
 from fingerpad.mechanics.tensors import invert
+from fingerpad.threads import worker_threads
 
 MIXED_POISSON = 0.49
 """Poisson's ratio above which it pays: a Newton step takes a quarter more time. There a block takes 15 of
@@ -61,7 +64,12 @@ class Pressures:
     ) -> Pressures:
         """Pressures of a mesh at its displacements; `law` is that of `MaterialTable`."""
         pressure, slope = np.empty(len(elements)), np.empty((len(elements), N_NODES, 3))
-        _pressures(nodes, elements, displacement, layer, law, pressure, slope)
+
+        def find(first: int, last: int) -> None:
+            _pressures(nodes, elements, displacement, layer, law, pressure, slope, first, last)
+
+        with worker_threads() as each:
+            each(find, even_chunks(len(elements)))
         return cls(pressure, slope)
 
     def after(self, elements: np.ndarray, step_mm: FloatArray) -> FloatArray:
@@ -95,11 +103,11 @@ def _present_gradients(slopes, inverse, present):  # type: ignore[no-untyped-def
                 present[a, i] += slopes[a, k] * inverse[k, i]
 
 
-@njit(cache=True)
-def _pressures(nodes, elements, displacement, layer, law, pressure, slope):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True)
+def _pressures(nodes, elements, displacement, layer, law, pressure, slope, first, last):  # type: ignore[no-untyped-def]
     weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
     gradients, inverse, present = np.empty((N_POINTS, 3, 3)), np.empty((3, 3)), np.empty((N_NODES, 3))
-    for e in range(elements.shape[0]):
+    for e in range(first, last):
         volume = gradients_at_points(
             nodes[elements[e]], displacement[elements[e]], weights, slopes, gradients
         )
@@ -114,8 +122,14 @@ def _pressures(nodes, elements, displacement, layer, law, pressure, slope):  # t
         slope[e] *= stiffness / volume
 
 
-@njit(cache=True)
-def exchange_pressure(nodes, elements, displacement, change, position, blocks):  # type: ignore[no-untyped-def]
+def exchange_pressure(
+    nodes: FloatArray,
+    elements: np.ndarray,
+    displacement: FloatArray,
+    change: FloatArray,
+    sparsity: Sparsity,
+    blocks: np.ndarray,
+) -> None:
     """Add (change of p) d²v of every element to a tangent.
 
     With g the present gradients of the shape functions, d²v_ai,bj = sum_q w_q J_q (g_ai g_bj - g_aj g_bi).
@@ -128,23 +142,42 @@ def exchange_pressure(nodes, elements, displacement, change, position, blocks): 
         Connectivity.
     change : array (n_elements,)
         Pressure wanted minus pressure in the tangent. [kPa]
-    position : int array (n_elements, 8, 8)
-        `Sparsity.position`.
-    blocks : array (n_blocks, 3, 3)
+    sparsity : Sparsity
+        Pattern of the tangent.
+    blocks : float64 or float32 array (n_blocks, 3, 3)
         The tangent. [mN/mm]
     """
+
+    def exchange(first: int, last: int) -> None:
+        _exchange_chunk(nodes, elements, displacement, change, sparsity.position, blocks, first, last)
+
+    with worker_threads() as each:
+        for chunks in sparsity.colours:
+            each(exchange, chunks)
+
+
+@njit(cache=True, nogil=True)
+def _exchange_chunk(nodes, elements, displacement, change, position, blocks, first, last):  # type: ignore[no-untyped-def]
+    """Add the elements from `first` up to `last`; each block is written once per element."""
     weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
     gradients, inverse, g = np.empty((N_POINTS, 3, 3)), np.empty((3, 3)), np.empty((N_NODES, 3))
-    for e in range(elements.shape[0]):
+    sums = np.empty((N_NODES, N_NODES, 3))
+    for e in range(first, last):
         if change[e] == 0.0:
             continue
         gradients_at_points(nodes[elements[e]], displacement[elements[e]], weights, slopes, gradients)
+        sums[:] = 0.0
         for q in range(N_POINTS):
             factor = change[e] * weights[q] * invert(gradients[q], inverse)
             _present_gradients(slopes[q], inverse, g)
             for a in range(N_NODES):
                 for b in range(N_NODES):
-                    target = position[e, a, b]
-                    for i in range(3):
-                        for j in range(3):
-                            blocks[target, i, j] += factor * (g[a, i] * g[b, j] - g[a, j] * g[b, i])
+                    for k in range(3):
+                        i, j = (k + 1) % 3, (k + 2) % 3
+                        sums[a, b, k] += factor * (g[a, i] * g[b, j] - g[a, j] * g[b, i])
+        for a in range(N_NODES):
+            for b in range(N_NODES):
+                for k in range(3):  # antisymmetric in i and j
+                    i, j = (k + 1) % 3, (k + 2) % 3
+                    blocks[position[e, a, b], i, j] += sums[a, b, k]
+                    blocks[position[e, a, b], j, i] -= sums[a, b, k]

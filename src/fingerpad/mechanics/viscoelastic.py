@@ -18,8 +18,10 @@ import numpy as np
 from numba import njit
 
 from fingerpad.checks import FloatArray
+from fingerpad.mechanics.chunks import even_chunks
 from fingerpad.mechanics.element import N_POINTS, element_state, relaxing_norms
 from fingerpad.mechanics.materials import MaterialTable
+from fingerpad.threads import worker_threads
 
 
 @dataclass(frozen=True)
@@ -70,42 +72,81 @@ class StressHistory:
 
     def carried(self, step: StepCoefficients, layer: np.ndarray) -> FloatArray:
         """H of the next step, (n_elements, 8, 6). [kPa]"""
-        total = np.zeros_like(self.instantaneous)
-        for term, relaxed in enumerate(self.relaxed):
-            total += step.old[layer, term][:, None, None] * self.instantaneous
-            total += step.decay[layer, term][:, None, None] * relaxed
+        total = np.empty_like(self.instantaneous)
+
+        def carry(first: int, last: int) -> None:
+            _carry(step.old, step.decay, layer, self.instantaneous, self.relaxed, total, first, last)
+
+        with worker_threads() as each:
+            each(carry, even_chunks(len(layer)))
         return total
 
     def advanced(self, step: StepCoefficients, layer: np.ndarray, instantaneous: FloatArray) -> StressHistory:
         """State at the end of the step, given S0 there."""
         relaxed = np.empty_like(self.relaxed)
-        for term in range(len(relaxed)):
-            relaxed[term] = (
-                step.new[layer, term][:, None, None] * instantaneous
-                + step.old[layer, term][:, None, None] * self.instantaneous
-                + step.decay[layer, term][:, None, None] * self.relaxed[term]
-            )
+
+        def relax(first: int, last: int) -> None:
+            _relax(
+                step.new, step.old, step.decay, layer, instantaneous, self.instantaneous, self.relaxed,
+                relaxed, first, last,
+            )  # fmt: skip
+
+        with worker_threads() as each:
+            each(relax, even_chunks(len(layer)))
         return StressHistory(instantaneous, relaxed)
 
 
-@njit(cache=True)
-def _all_states(nodes, elements, displacement, layer, law, instantaneous, energies, volumetric):  # type: ignore[no-untyped-def]
-    for e in range(elements.shape[0]):
+@njit(cache=True, nogil=True)
+def _carry(old, decay, layer, instantaneous, relaxed, total, first, last):  # type: ignore[no-untyped-def]
+    """Write H = sum_i (b_i g_i S0_n + gamma_i S_i,n)."""
+    for e in range(first, last):
+        material = layer[e]
+        for q in range(N_POINTS):
+            for k in range(6):
+                value = 0.0
+                for term in range(relaxed.shape[0]):
+                    value += old[material, term] * instantaneous[e, q, k]
+                    value += decay[material, term] * relaxed[term, e, q, k]
+                total[e, q, k] = value
+
+
+@njit(cache=True, nogil=True)
+def _relax(new, old, decay, layer, now, before, relaxed_before, relaxed, first, last):  # type: ignore[no-untyped-def]
+    """Write S_i = a_i g_i S0 + b_i g_i S0_n + gamma_i S_i,n."""
+    for term in range(relaxed.shape[0]):
+        for e in range(first, last):
+            a, b, gamma = new[layer[e], term], old[layer[e], term], decay[layer[e], term]
+            for q in range(N_POINTS):
+                for k in range(6):
+                    relaxed[term, e, q, k] = (
+                        a * now[e, q, k] + b * before[e, q, k] + gamma * relaxed_before[term, e, q, k]
+                    )
+
+
+@njit(cache=True, nogil=True)
+def _states(  # type: ignore[no-untyped-def]
+    nodes, elements, displacement, layer, law, instantaneous, energies, volumetric, first, last
+):
+    for e in range(first, last):
         volumetric[e], _, _ = element_state(
             nodes[elements[e]], displacement[elements[e]], law[layer[e]], instantaneous[e], energies[e]
         )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _stored_energy(  # type: ignore[no-untyped-def]
-    nodes, elements, displacement, layer, law, shares, instantaneous, relaxed, energies, volumetric, stored
-):
+    nodes, elements, displacement, layer, law, shares, instantaneous, relaxed, energies, volumetric, stored,
+    first, last,
+):  # fmt: skip
     n_terms = relaxed.shape[0]
     tensors, norms = np.empty((n_terms + 1, N_POINTS, 6)), np.empty((n_terms + 1, N_POINTS))
-    for e in range(elements.shape[0]):
-        tensors[0] = instantaneous[e]
-        for term in range(n_terms):
-            tensors[term + 1] = shares[layer[e], term] * instantaneous[e] - relaxed[term, e]
+    for e in range(first, last):
+        for q in range(N_POINTS):
+            for k in range(6):
+                tensors[0, q, k] = instantaneous[e, q, k]
+                for term in range(n_terms):
+                    whole = shares[layer[e], term] * instantaneous[e, q, k]
+                    tensors[term + 1, q, k] = whole - relaxed[term, e, q, k]
         relaxing_norms(nodes[elements[e]], displacement[elements[e]], law[layer[e]], tensors, norms)
         total, volume = 0.0, 0.0
         for q in range(N_POINTS):
@@ -124,7 +165,14 @@ def instantaneous_state(
     """S0 (n_elements, 8, 6), weights and energies W0 (n_elements, 8, 2), volumetric energy (n_elements,)."""
     n = len(elements)
     instantaneous, energies, volumetric = np.empty((n, N_POINTS, 6)), np.empty((n, N_POINTS, 2)), np.empty(n)
-    _all_states(nodes, elements, displacement, layer, table.law, instantaneous, energies, volumetric)
+
+    def find(first: int, last: int) -> None:
+        _states(
+            nodes, elements, displacement, layer, table.law, instantaneous, energies, volumetric, first, last
+        )
+
+    with worker_threads() as each:
+        each(find, even_chunks(n))
     return instantaneous, energies, volumetric
 
 
@@ -153,8 +201,13 @@ def stored_energy_density(
         Stored energy per reference volume. [kPa = µJ/mm³]
     """
     stored = np.empty(len(elements))
-    _stored_energy(
-        nodes, elements, displacement, layer, table.law, table.shares,
-        history.instantaneous, history.relaxed, energies, volumetric, stored,
-    )  # fmt: skip
+
+    def find(first: int, last: int) -> None:
+        _stored_energy(
+            nodes, elements, displacement, layer, table.law, table.shares,
+            history.instantaneous, history.relaxed, energies, volumetric, stored, first, last,
+        )  # fmt: skip
+
+    with worker_threads() as each:
+        each(find, even_chunks(len(elements)))
     return stored
