@@ -123,13 +123,14 @@ def _add_second_derivatives(d1, d2, d3, d4, first, b, b2, moduli):  # type: igno
             )
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(cache=True)
 def _add_tangent(weight, moduli, stress, spherical, slopes, packed):  # type: ignore[no-untyped-def]
     """Add one point's K_ij = w G' A_ij G, with A_ij,pr = c_ip,jr + delta_ij tau_pr, for i <= j.
 
     `slopes` is G (3, 8), the present gradients of the shape functions; `packed` (3, 3, 8, 8) is K_ij with
     the second node before the first, so that the innermost loop runs over neighbours in memory. Products
-    and sums may be contracted into one rounding; nothing else is reordered.
+    and sums keep their roundings: contracted, their last digits would depend on which copy of this function,
+    compiled into several others, is loaded first.
     """
     a = np.empty((3, 3))
     for i in range(3):
