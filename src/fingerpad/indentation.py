@@ -34,7 +34,7 @@ STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
 THIN_SIZE_MM = 0.025
 """Elements along the finger below a wire: two across the strip that it pushes. [mm]"""
 
-SLOWEST_KERNEL = assembly._add_colours
+SLOWEST_KERNEL = assembly._add_chunk
 """Of all that a press compiles, most of a minute is spent on this."""
 
 LARGEST_TILT_DEG = 45.0
