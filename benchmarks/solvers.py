@@ -14,60 +14,72 @@ from benchmarks.results import Report, Table
 
 THREADS = 2
 
-RUNS = (
-    ("quick", "multigrid"),
-    ("quick", "multigrid without MKL"),
-    ("quick", "PARDISO"),
-    ("quick", "SuperLU"),
-    ("quick", "pyamg"),
-    ("standard", "multigrid"),
-    ("standard", "multigrid without MKL"),
-    ("standard", "PARDISO"),
-)
-"""Resolutions and solvers. SuperLU and pyamg take too long for more."""
+MULTIGRID, MULTIGRID_WITHOUT_MKL = "multigrid, coarsest by PARDISO", "multigrid, coarsest by SuperLU"
+PARDISO, SUPERLU, PYAMG = "PARDISO (MKL)", "SuperLU (SciPy)", "smoothed aggregation (pyamg)"
 
-WORDS = {
-    "multigrid": "multigrid by columns, coarsest level by PARDISO",
-    "multigrid without MKL": "multigrid by columns, coarsest level by SuperLU",
-    "PARDISO": "PARDISO (MKL), a kept factor",
-    "SuperLU": "SuperLU (SciPy), a kept factor",
-    "pyamg": "smoothed aggregation (pyamg)",
-}
+RUNS = (
+    ("quick", MULTIGRID),
+    ("quick", MULTIGRID_WITHOUT_MKL),
+    ("quick", PARDISO),
+    ("quick", SUPERLU),
+    ("quick", PYAMG),
+    ("standard", MULTIGRID),
+    ("standard", MULTIGRID_WITHOUT_MKL),
+    ("standard", PARDISO),
+)
+"""Resolutions and preconditioners; SuperLU and pyamg take too long for more than `quick`."""
+
+
+class Aggregation:
+    """One V-cycle of pyamg's hierarchy in place of a factor, the rigid motions as its near null space.
+
+    Parameters
+    ----------
+    row, column : int array
+        Place of every value; -1 where an unknown is held.
+    rigid : array (n, 6)
+        Rigid motions of the unknowns.
+    """
+
+    def __init__(self, row: np.ndarray, column: np.ndarray, rigid: np.ndarray):
+        self._row, self._column, self._rigid = row.ravel(), column.ravel(), rigid
+        self._kept = (self._row >= 0) & (self._column >= 0)
+
+    def renew(self, values: np.ndarray) -> None:
+        """Build the hierarchy for the matrix of these values."""
+        import pyamg
+        from scipy import sparse
+
+        places = self._row[self._kept], self._column[self._kept]
+        matrix = sparse.csr_matrix((values.ravel()[self._kept], places), shape=(len(self._rigid),) * 2)
+        hierarchy = pyamg.smoothed_aggregation_solver(
+            matrix, B=self._rigid, symmetry="symmetric", max_coarse=500
+        )
+        self._cycle = hierarchy.aspreconditioner()
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """One V-cycle for a right-hand side (n,)."""
+        return self._cycle @ right
 
 
 def preconditioner(name: str, sparsity: Any, free: np.ndarray, mesh: Any) -> Any:
-    """Make one of `WORDS` for a tangent."""
+    """Make the preconditioner of a name of `RUNS` for a mesh."""
     from fingerpad.mechanics.factors import PardisoFactor, SuperLuFactor
     from fingerpad.mechanics.linear import KeptFactor
     from fingerpad.mechanics.multigrid import Multigrid
-
-    if name.startswith("multigrid"):
-        factor = SuperLuFactor if "without" in name else PardisoFactor
-        return Multigrid(sparsity, free, mesh.nodes_mm, mesh.grid, factor)
-    if name != "pyamg":
-        return KeptFactor(sparsity, free, PardisoFactor if name == "PARDISO" else SuperLuFactor)
-
-    import pyamg
-
     from fingerpad.mesh_quality import rigid_motions
 
-    class Aggregation(KeptFactor):
-        """Smoothed aggregation with the rigid motions as near null space."""
+    if name in (MULTIGRID, MULTIGRID_WITHOUT_MKL):
+        coarsest = PardisoFactor if name == MULTIGRID else SuperLuFactor
+        return Multigrid(sparsity, free, mesh.nodes_mm, mesh.grid, coarsest)
+    if name in (PARDISO, SUPERLU):
+        return KeptFactor(sparsity, free, PardisoFactor if name == PARDISO else SuperLuFactor)
+    rigid = rigid_motions(mesh.nodes_mm).reshape(-1, 6)[free]
 
-        def renew(self, blocks: np.ndarray) -> None:
-            self.follow(blocks)
-            matrix = self._matrix.tocsr()[free][:, free].tocsr()
-            rigid = rigid_motions(mesh.nodes_mm).reshape(-1, 6)[free]
-            hierarchy = pyamg.smoothed_aggregation_solver(
-                matrix, B=rigid, symmetry="symmetric", max_coarse=500
-            )
-            self._cycle = hierarchy.aspreconditioner()
+    def aggregation(row: np.ndarray, column: np.ndarray) -> Aggregation:
+        return Aggregation(row, column, rigid)
 
-        def apply(self, residual: np.ndarray) -> np.ndarray:
-            return self._cycle @ residual
-
-    # The factor of its base is made for the pattern, and never renewed.
-    return Aggregation(sparsity, free, SuperLuFactor)
+    return KeptFactor(sparsity, free, aggregation)
 
 
 def press_with(resolution: str, solver: str) -> dict[str, Any]:
@@ -78,7 +90,7 @@ def press_with(resolution: str, solver: str) -> dict[str, Any]:
     resolution : str
         Mesh and steps.
     solver : str
-        Key of `WORDS`.
+        Name of a preconditioner in `RUNS`.
 
     Returns
     -------
@@ -88,22 +100,24 @@ def press_with(resolution: str, solver: str) -> dict[str, Any]:
     from fingerpad.mechanics import linear
     from fingerpad.mechanics import press as module
 
-    spent_s = []
-    solvers = []
+    spent_s: list[float] = []
+    solvers: list[linear.LinearSolver] = []
 
     class Timed(linear.LinearSolver):
         """The product's solver under a clock."""
 
+        def __init__(self, *arguments: Any):
+            super().__init__(*arguments)
+            solvers.append(self)
+
         def solve(self, *arguments: Any, **named: Any) -> np.ndarray:
-            if self not in solvers:
-                solvers.append(self)
             started = perf_counter()
             found = super().solve(*arguments, **named)
             spent_s.append(perf_counter() - started)
             return found
 
     def choose(sparsity: Any, free: np.ndarray, mesh: Any, poisson: float) -> tuple[Any, str]:
-        return preconditioner(solver, sparsity, free, mesh), WORDS[solver]
+        return preconditioner(solver, sparsity, free, mesh), solver
 
     vars(module).update(choose_preconditioner=choose, LinearSolver=Timed)
     touch = touch_of_sphere(resolution)
@@ -125,12 +139,9 @@ def measure(runs: Sequence[tuple[str, str]] = RUNS) -> Report:
     for resolution, solver in runs:
         done = run_job("solvers", "press_with", THREADS, resolution=resolution, solver=solver)
         found = done.answer
-        rows.append(
-            [
-                resolution, found["nodes"], WORDS[solver], found["factorisations"], found["solves"],
-                found["iterations"], found["linear_s"], found["solve_s"], done.peak_mb, found["force_mn"],
-            ]
-        )  # fmt: skip
+        work = [found["nodes"], solver, found["factorisations"], found["solves"], found["iterations"]]
+        spent = [found["linear_s"], found["solve_s"], done.peak_mb]
+        rows.append([resolution, *work, *spent, found["force_mn"]])
     return Report(
         name="solvers",
         title="Linear solvers",
@@ -146,7 +157,6 @@ def measure(runs: Sequence[tuple[str, str]] = RUNS) -> Report:
             )
         ],
         notes=[
-            "Where MKL is missing, SuperLU factors the coarsest level; pyamg was the choice for large meshes "
-            "before there was multigrid by columns, and is here for comparison only."
+            "A processor without MKL runs the multigrid with SuperLU; pyamg is here for comparison only.",
         ],
     )  # fmt: skip
