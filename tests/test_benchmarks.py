@@ -103,7 +103,7 @@ def test_spread_is_median_and_range():
 
 def test_unknown_benchmark_is_refused(capsys):
     assert run(["spheres"]) == 2
-    assert "spheres is none of sphere" in capsys.readouterr().err
+    assert f"spheres is none of {BENCHMARKS[0]}" in capsys.readouterr().err
 
 
 def test_continuous_integration_runs_no_benchmark():
