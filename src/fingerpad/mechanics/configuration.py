@@ -22,6 +22,8 @@ from fingerpad.mesh import Mesh
 SMALLEST_FORCE_MN = 1e-6
 """Below it residuals are no longer taken relative to the force of contact. [mN]"""
 
+NO_BLOCKS = np.empty((0, 3, 3))
+
 CURVATURE_BELOW_RESIDUAL = 0.1
 """Residual over contact force below which the indenter's curvature is part of the tangent."""
 
@@ -145,6 +147,8 @@ class Configuration:
         The same of the free degrees of freedom. [mN]
     relative_residual : float
         Norm of the residual over the contact force.
+    has_tangent : bool
+        Whether the tangent was assembled.
     pressures : Pressures, optional
         Of the elements, for a mixed method.
     """
@@ -158,6 +162,7 @@ class Configuration:
     out_of_balance_mn: FloatArray
     residual_mn: FloatArray
     relative_residual: float
+    has_tangent: bool
     pressures: Pressures | None = None
 
     @property
@@ -191,7 +196,7 @@ def evaluate(
     displacement_mm: FloatArray,
     depth_mm: float,
     lagging: Lagging,
-    blocks: FloatArray,
+    blocks: FloatArray | None,
     before: Friction | None = None,
     pressure_kpa: FloatArray | None = None,
 ) -> Configuration:
@@ -207,8 +212,8 @@ def evaluate(
         How far the indenter has advanced. [mm]
     lagging : Lagging
         Multipliers and anchors.
-    blocks : array (n_blocks, 3, 3)
-        Overwritten with the tangent. [mN/mm]
+    blocks : array (n_blocks, 3, 3), optional
+        Overwritten with the tangent; without it none is assembled. [mN/mm]
     before : Friction, optional
         Friction one Newton step ago, for the same anchors.
     pressure_kpa : array (n_elements,), optional
@@ -219,16 +224,18 @@ def evaluate(
     Configuration
     """
     mesh, contact = body.mesh, load.contact
-    force = np.empty_like(displacement_mm)
+    force, has_tangent = np.empty_like(displacement_mm), blocks is not None
+    if blocks is None:
+        blocks = NO_BLOCKS
     internal = assemble(
         mesh.nodes_mm, mesh.elements, displacement_mm, mesh.layer, body.table.law, load.step.s, load.carried,
-        body.sparsity, True, force, blocks,
+        body.sparsity, has_tangent, force, blocks,
     )  # fmt: skip
     pressures = None
     if body.is_mixed and not np.isnan(internal):
         where = (mesh.nodes_mm, mesh.elements, displacement_mm)
         pressures = Pressures.of(*where, mesh.layer, body.table.law)
-        if pressure_kpa is not None:
+        if pressure_kpa is not None and has_tangent:
             change = pressure_kpa - pressures.pressure_kpa
             exchange_pressure(*where, change, body.sparsity, blocks)
     positions = mesh.nodes_mm[contact.nodes] + displacement_mm[contact.nodes]
@@ -244,7 +251,8 @@ def evaluate(
     stiffness = touch.stiffness
     if relative_residual < CURVATURE_BELOW_RESIDUAL:
         stiffness = stiffness + contact.curvature_stiffness(touch, positions, depth_mm)
-    blocks[body.sparsity.diagonal[contact.nodes]] += stiffness
+    if has_tangent:
+        blocks[body.sparsity.diagonal[contact.nodes]] += stiffness
     return Configuration(
         displacement_mm=displacement_mm,
         depth_mm=depth_mm,
@@ -255,5 +263,6 @@ def evaluate(
         out_of_balance_mn=force,
         residual_mn=residual,
         relative_residual=relative_residual,
+        has_tangent=has_tangent,
         pressures=pressures,
     )

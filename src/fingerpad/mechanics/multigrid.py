@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
+from numba import get_num_threads, njit, prange, set_num_threads
 
 from fingerpad.checks import FloatArray
 from fingerpad.mechanics.assembly import Sparsity
@@ -39,6 +39,9 @@ MERGED_OVER_FINEST = 4.0
 
 COARSEST_COLUMNS = 100
 """A grid with fewer columns is not coarsened: its factor costs less than a level."""
+
+THREADED_COLUMNS = 1_000
+"""Smallest grid that is shared between threads; on smaller ones starting them takes longer than the work."""
 
 WORTHWHILE = 0.8
 """Largest ratio of columns, coarse over fine, for which a level pays."""
@@ -391,12 +394,18 @@ class Multigrid:
         """Approximate solution for a residual, both flat."""
         finest = self._levels[0]
         finest.right[:] = residual.reshape(finest.x.shape)
-        self._cycle(0)
+        threads = get_num_threads()
+        try:
+            self._cycle(0)
+        finally:
+            set_num_threads(threads)
         return finest.x.ravel().copy()
 
     def _cycle(self, n: int) -> None:
         """Solve approximately for `right` of level n, into its `x`."""
         level = self._levels[n]
+        if level.own.size < THREADED_COLUMNS:
+            set_num_threads(1)
         if n == len(self._transfers):
             inner = level.x[:, :, 1 : self._depth + 1]
             right = level.right[:, :, 1 : self._depth + 1][self._coarsest]
@@ -408,7 +417,9 @@ class Multigrid:
             transfer.child_start, transfer.child, transfer.child_weight, _rows(level.residual),
             _rows(coarse.free), _rows(coarse.right),
         )  # fmt: skip
+        threads = get_num_threads()
         self._cycle(n + 1)
+        set_num_threads(threads)
         _add_prolonged(
             transfer.parent, transfer.weight, _rows(coarse.x), _rows(level.free), _rows(level.x)
         )  # fmt: skip

@@ -34,6 +34,10 @@ FORCING, FORCING_RANGE = 0.1, (1e-4, 5e-3)
 """Tolerance of a linear solve over the residual. Looser ones let stiff contact overshoot: at 0.05 a press
 took three times the evaluations."""
 
+LAST_STEP = 5e-3
+"""Residual over contact force from which one Newton step mostly ends the search. The tangent after it is
+assembled only if it is needed after all."""
+
 AT_REST = 1e-2
 """Residual over contact force below which the depth is moved towards the given force."""
 DEPTH_FORCING = 1e-3
@@ -185,7 +189,7 @@ class _Search:
             )
             accepted_mn = settings.residual_tolerance * (load.force_mn or 0.0)
             if abs(now.missing_force_mn(load)) > accepted_mn and now.relative_residual <= AT_REST:
-                now = self.advance_indenter(now)
+                now = self.advance_indenter(self.with_tangent(now))
                 potentials, settled = [now.potential_uj], not rubs
                 continue
             balanced = balance.imbalance <= settings.balance_tolerance
@@ -200,11 +204,18 @@ class _Search:
                 if close:
                     continue  # only friction was renewed: the body may still be at rest
             forcing = float(np.clip(FORCING * now.relative_residual, *FORCING_RANGE))
+            now = self.with_tangent(now)
             direction = self.solver.solve(self.blocks, now.residual_mn, forcing)
             now = self.line_search(now, direction, max(potentials[-REMEMBERED_POTENTIALS:]))
             potentials.append(now.potential_uj)
             settled = not rubs
         raise ConvergenceError(f"No equilibrium after {settings.most_iterations} Newton steps.")
+
+    def with_tangent(self, now: Configuration) -> Configuration:
+        """Return the same configuration with its tangent in `blocks`."""
+        if now.has_tangent:
+            return now
+        return evaluate(self.body, self.load, now.displacement_mm, now.depth_mm, self.lagging, self.blocks)
 
     def renewed(self, now: Configuration, augmented: bool) -> Lagging:
         """Multipliers and anchors of the contact found."""
@@ -240,8 +251,11 @@ class _Search:
         depth_mm, before, pressure = start.depth_mm + advance_mm, start.contact.friction, None
         if start.pressures is not None:
             pressure = start.pressures.after(self.body.mesh.elements, displacement - start.displacement_mm)
+        # Friction and mixed methods carry more than the displacements over to the tangent.
+        carries = self.load.anchors is not None or self.body.is_mixed
+        blocks = self.blocks if carries or start.relative_residual > LAST_STEP else None
         return evaluate(
-            self.body, self.load, displacement, depth_mm, self.lagging, self.blocks, before, pressure
+            self.body, self.load, displacement, depth_mm, self.lagging, blocks, before, pressure
         )
 
     def line_search(self, start: Configuration, direction: FloatArray, highest_uj: float) -> Configuration:
