@@ -5,99 +5,26 @@ import subprocess
 import sys
 import threading
 
-import numba
 import numpy as np
 import pytest
 
 import fingerpad as fp
 from fingerpad.errors import InputError
-from fingerpad.threads import available_threads, compiled_threads, worker_threads
+from fingerpad.threads import available_threads, compiled_threads, current_threads, worker_threads
 
 needs_two_threads = pytest.mark.skipif(available_threads() < 2, reason="this machine has one core")
 
-LOOPS = """
-import os, threading
-import numpy as np
-from numba import njit, prange
-from fingerpad.errors import FingerpadError
-from fingerpad.threads import compiled_threads
 
-@njit(parallel=True)
-def halve(numbers):
-    for n in prange(numbers.size):
-        numbers[n] /= 2.0
-
-def several():
-    for _ in range(1000):
-        with compiled_threads():
-            halve(np.ones(10000))
-"""
-"""What the processes below begin with: one of Numba's own parallel loops, a thousand times over."""
-
-SIDE_BY_SIDE = """
-together = [threading.Thread(target=several) for _ in range(2)]
-for one in together:
-    one.start()
-for one in together:
-    one.join()
-print("both done")
-"""
-
-FORKED = """
-several()
-child = os.fork()
-if child == 0:
-    try:
-        several()
-        print("done", flush=True)
-    except FingerpadError as error:
-        print(error, flush=True)
-    os._exit(0)
-print("ended with", os.waitpid(child, 0)[1])
-"""
-
-
-def said(code, layer):
-    """What a process that runs `code` prints."""
-    environment = os.environ | {"NUMBA_THREADING_LAYER": layer}
-    done = subprocess.run(
-        [sys.executable, "-c", LOOPS + code], env=environment, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-def has_openmp():
-    try:
-        from numba.np.ufunc import omppool  # noqa: F401
-    except ImportError:
-        return False
-    return sys.platform == "linux"
-
-
-needs_openmp = pytest.mark.skipif(not has_openmp(), reason="Numba finds no GNU OpenMP here")
-
-
-def test_numba_has_its_number_back():
-    before = numba.get_num_threads()
+def test_number_is_what_it_was_afterwards():
+    before = current_threads()
     with compiled_threads(1) as threads:
-        assert threads == numba.get_num_threads() == 1
-    assert numba.get_num_threads() == before
+        assert threads == current_threads() == 1
+        with compiled_threads() as inner:
+            assert inner == 1
+    assert current_threads() == before == available_threads()
     with pytest.raises(ZeroDivisionError), compiled_threads(1):
         raise ZeroDivisionError
-    assert numba.get_num_threads() == before
-
-
-def test_default_is_the_number_that_the_caller_has_set():
-    before = numba.get_num_threads()
-    with compiled_threads() as threads:
-        assert threads == before
-    numba.set_num_threads(1)
-    try:
-        with compiled_threads() as threads:
-            assert threads == 1
-    finally:
-        numba.set_num_threads(before)
+    assert current_threads() == before
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1.5, True, 10_000])
@@ -148,20 +75,50 @@ def test_press_has_the_same_bits_on_any_number_of_threads():
 
 
 @needs_two_threads
-def test_python_threads_go_one_after_the_other():
-    """Numba's own layer ends a process in which two run loops at once."""
-    assert said(SIDE_BY_SIDE, "workqueue") == "both done\n"
+def test_a_failure_in_any_thread_is_raised():
+    with compiled_threads(2), worker_threads() as each:
+        with pytest.raises(ZeroDivisionError):
+            each(lambda first, last: 1 // (first - 3), [(n, n + 1) for n in range(6)])
+        assert each(lambda first, last: first, [(0, 1), (1, 2)]) == [0, 1]
+
+
+@needs_two_threads
+def test_python_threads_may_share_out_work_at_once():
+    sums = {}
+
+    def several(name):
+        for _ in range(200):
+            with compiled_threads(2), worker_threads() as each:
+                sums[name] = each(lambda first, last: last - first, [(0, 3), (3, 5), (5, 9)])
+
+    together = [threading.Thread(target=several, args=(name,)) for name in "ab"]
+    for one in together:
+        one.start()
+    for one in together:
+        one.join()
+    assert sums == {"a": [3, 2, 4], "b": [3, 2, 4]}
+
+
+FORKED = """
+import os
+from fingerpad.threads import compiled_threads, worker_threads
+
+def shared():
+    with compiled_threads(2), worker_threads() as each:
+        return each(lambda first, last: last - first, [(0, 3), (3, 5), (5, 9)])
+
+shared()
+child = os.fork()
+if child == 0:
+    print(shared(), flush=True)
+    os._exit(0)
+print("ended with", os.waitpid(child, 0)[1])
+"""
 
 
 @needs_two_threads
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
-def test_forked_process_works_with_the_layer_that_can():
-    assert said(FORKED, "workqueue") == "done\nended with 0\n"
-
-
-@needs_two_threads
-@needs_openmp
-def test_forked_process_is_refused_where_openmp_would_end_it():
-    heard = said(FORKED, "omp")
-    assert heard.startswith("This process was forked from one that had used its threads")
-    assert heard.endswith("ended with 0\n")
+def test_forked_process_has_threads_of_its_own():
+    command = [sys.executable, "-W", "ignore", "-c", FORKED]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.stdout, done.returncode) == ("[3, 2, 4]\nended with 0\n", 0)

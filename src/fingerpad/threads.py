@@ -1,46 +1,33 @@
-"""How many threads compiled loops use, and who may use them: docs/decisions/threads.md."""
+"""How many threads share the work of compiled loops, and how it is shared: docs/decisions/threads.md."""
 
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from contextvars import ContextVar
+from functools import cache
 from itertools import starmap
 from typing import Any
 
 import numba
 
 from fingerpad.checks import whole
-from fingerpad.errors import FingerpadError, InputError
+from fingerpad.errors import InputError
+
+_THREADS: ContextVar[int | None] = ContextVar("threads", default=None)
 
 
-@dataclass
-class _Pool:
-    """What this process knows of Numba's threads."""
-
-    one_at_a_time: threading.RLock = field(default_factory=threading.RLock)
-    lost: bool = False
-
-    def forked(self) -> None:
-        """Begin anew in a child process: nobody holds the lock, and OpenMP's threads stayed behind."""
-        self.one_at_a_time = threading.RLock()
-        self.lost = self.lost or _layer() == "omp"
+@cache
+def _helpers(threads: int) -> ThreadPoolExecutor:
+    """Threads that help the one that asks; they wait, without turning, until they are asked again."""
+    return ThreadPoolExecutor(threads - 1, thread_name_prefix="fingerpad")
 
 
-_POOL = _Pool()
 if hasattr(os, "register_at_fork"):  # not on Windows, where nothing forks
-    os.register_at_fork(after_in_child=_POOL.forked)
-
-
-def _layer() -> str:
-    """Library that runs Numba's threads in this process, or nothing before the first threaded loop."""
-    try:
-        return str(numba.threading_layer())
-    except ValueError:
-        return ""
+    # The threads of a parent stay behind: a child gets its own.
+    os.register_at_fork(after_in_child=_helpers.cache_clear)
 
 
 def available_threads() -> int:
@@ -48,16 +35,21 @@ def available_threads() -> int:
     return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 
 
+def current_threads() -> int:
+    """Threads that compiled loops use now."""
+    return _THREADS.get() or available_threads()
+
+
 @contextmanager
 def compiled_threads(threads: int | None = None) -> Iterator[int]:
-    """Let compiled loops use so many threads for a while; afterwards Numba has its own number again.
+    """Let compiled loops use so many threads for a while; afterwards the number is what it was.
 
-    Python threads that come here together go in one after the other.
+    Every Python thread has a number of its own.
 
     Parameters
     ----------
     threads : int, optional
-        Number of threads; by default Numba's own, one per core unless the caller has set another.
+        Number of threads; by default as many as before.
 
     Yields
     ------
@@ -68,30 +60,21 @@ def compiled_threads(threads: int | None = None) -> Iterator[int]:
     ------
     InputError
         If there are not so many.
-    FingerpadError
-        In a process that was forked after OpenMP had run loops in its parent.
 
     Examples
     --------
     >>> with compiled_threads(1) as threads:
-    ...     print(threads, numba.get_num_threads())
+    ...     print(threads, current_threads())
     1 1
     """
     most = available_threads()
     if threads is not None and whole("threads", threads, at_least=1) > most:
-        raise InputError(f"threads must not exceed {most}, what Numba has here: got {threads}.")
-    if _POOL.lost:
-        raise FingerpadError(
-            "This process was forked from one that had used its threads, and OpenMP would end it: start "
-            'processes by "spawn" (multiprocessing.get_context), or set NUMBA_THREADING_LAYER=workqueue.'
-        )
-    with _POOL.one_at_a_time:
-        before = numba.get_num_threads()
-        numba.set_num_threads(threads or before)
-        try:
-            yield numba.get_num_threads()
-        finally:
-            numba.set_num_threads(before)
+        raise InputError(f"threads must not exceed {most}, one per core: got {threads}.")
+    before = _THREADS.set(threads or _THREADS.get())
+    try:
+        yield current_threads()
+    finally:
+        _THREADS.reset(before)
 
 
 Work = Callable[[int, int], Any]
@@ -100,7 +83,7 @@ Work = Callable[[int, int], Any]
 
 @contextmanager
 def worker_threads() -> Iterator[Callable[[Work, Sequence[tuple[int, int]]], list[Any]]]:
-    """Share work out to as many threads as compiled loops may use.
+    """Share work out to as many threads as compiled loops may use, the caller's among them.
 
     The work must release Python's lock (nogil=True), and no two chunks of one call may write to the same
     place. A thread that is done with a chunk takes the next one, so none waits for a slower one.
@@ -116,9 +99,22 @@ def worker_threads() -> Iterator[Callable[[Work, Sequence[tuple[int, int]]], lis
     ...     each(lambda first, last: last - first, [(0, 4), (4, 9)])
     [4, 5]
     """
-    threads = numba.get_num_threads()
-    if threads == 1:
-        yield lambda work, chunks: list(starmap(work, chunks))
-        return
-    with ThreadPoolExecutor(threads) as pool:
-        yield lambda work, chunks: list(pool.map(work, *zip(*chunks, strict=True)))
+    threads = current_threads()
+
+    def each(work: Work, chunks: Sequence[tuple[int, int]]) -> list[Any]:
+        if threads == 1 or len(chunks) == 1:
+            return list(starmap(work, chunks))
+        answers: list[Any] = [None] * len(chunks)
+        numbers = iter(range(len(chunks)))
+
+        def take() -> None:
+            for n in numbers:
+                answers[n] = work(*chunks[n])
+
+        others = [_helpers(threads).submit(take) for _ in range(min(threads, len(chunks)) - 1)]
+        take()
+        for other in others:
+            other.result()
+        return answers
+
+    yield each

@@ -12,7 +12,7 @@ matrix steers an iteration whose goal is measured in double precision elsewhere.
 
 Columns are coloured so that neighbours differ, and sorted by colour. Within a colour a Gauss-Seidel sweep may
 visit columns in any order, on any number of threads, and gives the same bits; the sorting lets it run through
-memory from one end to the other, which halves its time.
+memory from one end to the other, which halves its time. Kernels work on columns `first` to `last`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from fingerpad.checks import FloatArray
@@ -138,12 +138,14 @@ def to_nodes(columns: SingleArray, order: np.ndarray, depth: int) -> FloatArray:
     return values.reshape(-1, 3)
 
 
-@njit(cache=True, parallel=True)
-def take_blocks(row_start, column, blocks, order, place, start, neighbour, depth, free, matrix):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True)
+def take_blocks(first, last, row_start, column, blocks, order, place, start, neighbour, depth, free, matrix):  # type: ignore[no-untyped-def]
     """Copy a tangent of 3 x 3 blocks (see `assembly.Sparsity`) into a matrix, zero where unknowns are held.
 
     Parameters
     ----------
+    first, last : int
+        Columns.
     row_start, column, blocks : array
         Block rows, their columns, and the blocks (n_blocks, 3, 3).
     order, place : int array (n_columns,)
@@ -157,14 +159,14 @@ def take_blocks(row_start, column, blocks, order, place, start, neighbour, depth
     matrix : array (n_pairs, 3, 3, 3, lanes)
         Overwritten; zero beyond the ends of the columns, as it was.
     """
-    for c in prange(order.size):
+    for c in range(first, last):
         for k in range(depth):
             node = order[c] * depth + k
-            pair, last = start[c], -1
+            pair, before = start[c], -1
             for block in range(row_start[node], row_start[node + 1]):
                 among_nodes = column[block] // depth
-                if among_nodes != last:
-                    pair, last = start[c], among_nodes
+                if among_nodes != before:
+                    pair, before = start[c], among_nodes
                     while neighbour[pair] != place[among_nodes]:
                         pair += 1
                 below = column[block] - among_nodes * depth
@@ -235,14 +237,16 @@ def _invert(d, inverse):  # type: ignore[no-untyped-def]
             inverse[a, b] /= determinant
 
 
-@njit(cache=True, parallel=True)
-def factor_columns(own, matrix, depth, lower, inverse):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True)
+def factor_columns(first, last, own, matrix, depth, lower, inverse):  # type: ignore[no-untyped-def]
     """Factor the part T of a matrix that stays within a column, block tridiagonal.
 
     T = (1 + M) D (1 + M)' with D_0 = T_00, M_k = T_k,k-1 D_k-1^-1, D_k = T_kk - M_k T_k,k-1'.
 
     Parameters
     ----------
+    first, last : int
+        Columns.
     own : int array (n_columns,)
         `ColumnGraph.own`.
     matrix : array (n_pairs, 3, 3, 3, lanes)
@@ -252,7 +256,7 @@ def factor_columns(own, matrix, depth, lower, inverse):  # type: ignore[no-untyp
     lower, inverse : array (n_columns, depth, 9)
         Overwritten with M and D^-1, row by row.
     """
-    for c in prange(own.size):
+    for c in range(first, last):
         d, m, before = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
         for k in range(depth):
             for a in range(3):
@@ -275,69 +279,71 @@ def factor_columns(own, matrix, depth, lower, inverse):  # type: ignore[no-untyp
                     inverse[c, k, 3 * a + b] = before[a, b]
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
-def multiply(start, neighbour, matrix, x, product):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def multiply(first, last, start, neighbour, matrix, x, product):  # type: ignore[no-untyped-def]
     """Write the product A x; vectors (n_columns, 3, lanes + 2)."""
-    width = matrix.shape[4]
-    for c in prange(start.size - 1):
-        r = np.zeros((3, width), dtype=np.float32)
+    r = np.empty((3, matrix.shape[4]), dtype=np.float32)
+    for c in range(first, last):
+        r[:] = 0.0
         _subtract_product(start[c], start[c + 1], neighbour, matrix, x, r)
         for a in range(3):
-            for k in range(width):
+            for k in range(r.shape[1]):
                 product[c, a, k + 1] = -r[a, k]
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
-def sweep_forward(colour_start, start, own, neighbour, matrix, depth, lower, inverse, right, x, residual):  # type: ignore[no-untyped-def]
-    """Gauss-Seidel sweep over the columns from x = 0, and the residual that it leaves.
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def sweep_forward(first, last, start, own, neighbour, matrix, depth, lower, inverse, right, x):  # type: ignore[no-untyped-def]
+    """Gauss-Seidel on columns of one colour, colours before it done and those after it still zero.
 
-    With A = L + T + L' by the order of the columns: (T + L) x = right, and so right - A x = -L' x.
+    Over all colours, with A = L + T + L' by the order of the columns, (T + L) x = right.
 
     Parameters
     ----------
-    colour_start : int array (n_colours + 1,)
-        First column of every colour.
+    first, last : int
+        Columns.
     start, own, neighbour, matrix, depth
         The matrix.
     lower, inverse : array (n_columns, depth, 9)
         From `factor_columns`.
     right : array (n_columns, 3, lanes + 2)
         Right-hand side.
-    x, residual : array (n_columns, 3, lanes + 2)
+    x : array (n_columns, 3, lanes + 2)
         Overwritten.
     """
-    width = matrix.shape[4]
-    for colour in range(colour_start.size - 1):
-        for c in prange(colour_start[colour], colour_start[colour + 1]):
-            r = np.empty((3, width), dtype=np.float32)
-            for a in range(3):
-                for k in range(width):
-                    r[a, k] = right[c, a, k + 1]
-            _subtract_product(start[c], own[c], neighbour, matrix, x, r)
-            _solve_column(depth, lower, inverse, c, r)
-            for a in range(3):
-                for k in range(depth):
-                    x[c, a, k + 1] = r[a, k]
-    for c in prange(start.size - 1):
-        r = np.zeros((3, width), dtype=np.float32)
+    r = np.empty((3, matrix.shape[4]), dtype=np.float32)
+    for c in range(first, last):
+        for a in range(3):
+            for k in range(r.shape[1]):
+                r[a, k] = right[c, a, k + 1]
+        _subtract_product(start[c], own[c], neighbour, matrix, x, r)
+        _solve_column(depth, lower, inverse, c, r)
+        for a in range(3):
+            for k in range(depth):
+                x[c, a, k + 1] = r[a, k]
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def residual_after_forward(first, last, start, own, neighbour, matrix, x, residual):  # type: ignore[no-untyped-def]
+    """Write right - A x after a forward sweep, which is -L' x; parameters as in `sweep_forward`."""
+    r = np.empty((3, matrix.shape[4]), dtype=np.float32)
+    for c in range(first, last):
+        r[:] = 0.0
         _subtract_product(own[c] + 1, start[c + 1], neighbour, matrix, x, r)
         for a in range(3):
-            for k in range(width):
+            for k in range(r.shape[1]):
                 residual[c, a, k + 1] = r[a, k]
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
-def sweep_backward(colour_start, start, neighbour, matrix, depth, lower, inverse, right, x):  # type: ignore[no-untyped-def]
-    """Gauss-Seidel sweep over the columns in the opposite order; parameters as in `sweep_forward`."""
-    width = matrix.shape[4]
-    for colour in range(colour_start.size - 2, -1, -1):
-        for c in prange(colour_start[colour], colour_start[colour + 1]):
-            r = np.empty((3, width), dtype=np.float32)
-            for a in range(3):
-                for k in range(width):
-                    r[a, k] = right[c, a, k + 1]
-            _subtract_product(start[c], start[c + 1], neighbour, matrix, x, r)
-            _solve_column(depth, lower, inverse, c, r)
-            for a in range(3):
-                for k in range(depth):
-                    x[c, a, k + 1] += r[a, k]
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def sweep_backward(first, last, start, neighbour, matrix, depth, lower, inverse, right, x):  # type: ignore[no-untyped-def]
+    """Gauss-Seidel on columns of one colour, the last colour first; parameters as in `sweep_forward`."""
+    r = np.empty((3, matrix.shape[4]), dtype=np.float32)
+    for c in range(first, last):
+        for a in range(3):
+            for k in range(r.shape[1]):
+                r[a, k] = right[c, a, k + 1]
+        _subtract_product(start[c], start[c + 1], neighbour, matrix, x, r)
+        _solve_column(depth, lower, inverse, c, r)
+        for a in range(3):
+            for k in range(depth):
+                x[c, a, k + 1] += r[a, k]

@@ -27,6 +27,10 @@ SETTINGS = {1: 1, 2: 2, 8: 0, 10: 8, 11: 0, 13: 0, 18: -1, 24: 0, 28: 1, 35: 1}
 """Numbers of MKL's manual: own settings, METIS order, no refinement, single precision, 0-based."""
 
 
+SAME_BITS_AVX2 = 10
+"""Mode of MKL's conditional reproducibility, by MKL's number for it."""
+
+
 class Factor(Protocol):
     """A factor that is renewed for other numbers in the same places."""
 
@@ -62,6 +66,8 @@ class PardisoFactor:
         self._row_start = np.searchsorted(row[self._entries], np.arange(self._size + 1)).astype(np.int32)
         self._values = np.empty(self._entries.size, dtype=np.float32)
         self._mkl = pypardiso.PyPardisoSolver(mtype=2)
+        # Else sums hang on where in memory the numbers happen to lie; only the first such call counts.
+        self._mkl.libmkl.MKL_CBWR_Set(SAME_BITS_AVX2)
         for index, value in SETTINGS.items():
             self._mkl.iparm[index - 1] = value
         self._analysed = False

@@ -13,10 +13,13 @@ operator, as conjugate gradients need.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
-from numba import get_num_threads, njit, prange, set_num_threads
+from numba import njit
 
 from fingerpad.checks import FloatArray
 from fingerpad.mechanics.assembly import Sparsity
@@ -26,6 +29,7 @@ from fingerpad.mechanics.columns import (
     colours,
     factor_columns,
     multiply,
+    residual_after_forward,
     sweep_backward,
     sweep_forward,
     take_blocks,
@@ -33,6 +37,7 @@ from fingerpad.mechanics.columns import (
     to_nodes,
 )
 from fingerpad.mechanics.factors import MakeFactor
+from fingerpad.threads import current_threads, worker_threads
 
 MERGED_OVER_FINEST = 4.0
 """Largest distance of two lines that become one step, over the smallest distance on the grid."""
@@ -40,8 +45,8 @@ MERGED_OVER_FINEST = 4.0
 COARSEST_COLUMNS = 100
 """A grid with fewer columns is not coarsened: its factor costs less than a level."""
 
-THREADED_COLUMNS = 1_000
-"""Smallest grid that is shared between threads; on smaller ones starting them takes longer than the work."""
+FEWEST_COLUMNS = 200
+"""Columns of one colour for a thread, at least: waking it takes as long as the work on some tens of them."""
 
 WORTHWHILE = 0.8
 """Largest ratio of columns, coarse over fine, for which a level pays."""
@@ -199,10 +204,10 @@ class ColumnGrid:
         return ColumnGrid(number, *distances), chosen, parent[first], weight[first]
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
-def _galerkin(part_start, part, part_weight, fine, coarse):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _galerkin(first, last, part_start, part, part_weight, fine, coarse):  # type: ignore[no-untyped-def]
     """Write every coarse pair as the weighted sum of its fine ones; matrices (n_pairs, numbers of a pair)."""
-    for pair in prange(part_start.size - 1):
+    for pair in range(first, last):
         coarse[pair] = 0.0
         for n in range(part_start[pair], part_start[pair + 1]):
             weight, source = part_weight[n], part[n]
@@ -210,10 +215,10 @@ def _galerkin(part_start, part, part_weight, fine, coarse):  # type: ignore[no-u
                 coarse[pair, k] += weight * fine[source, k]
 
 
-@njit(cache=True, parallel=True)
-def _hold(start, neighbour, free, matrix):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True)
+def _hold(first, last, start, neighbour, free, matrix):  # type: ignore[no-untyped-def]
     """Set rows and columns of held unknowns to zero."""
-    for c in prange(start.size - 1):
+    for c in range(first, last):
         for pair in range(start[c], start[c + 1]):
             for s in range(3):
                 for a in range(3):
@@ -222,10 +227,10 @@ def _hold(start, neighbour, free, matrix):  # type: ignore[no-untyped-def]
                             matrix[pair, s, a, b, k] *= free[c, a, k + 1] * free[neighbour[pair], b, k + s]
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
-def _restrict(child_start, child, child_weight, fine, free, coarse):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _restrict(first, last, child_start, child, child_weight, fine, free, coarse):  # type: ignore[no-untyped-def]
     """Set coarse to P' fine, zero where held; vectors (n_columns, numbers of a column)."""
-    for c in prange(child_start.size - 1):
+    for c in range(first, last):
         coarse[c] = 0.0
         for n in range(child_start[c], child_start[c + 1]):
             for k in range(fine.shape[1]):
@@ -234,10 +239,10 @@ def _restrict(child_start, child, child_weight, fine, free, coarse):  # type: ig
             coarse[c, k] *= free[c, k]
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
-def _add_prolonged(parent, weight, coarse, free, fine):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _add_prolonged(first, last, parent, weight, coarse, free, fine):  # type: ignore[no-untyped-def]
     """Add P coarse to fine, nothing where held; vectors (n_columns, numbers of a column)."""
-    for c in prange(parent.shape[0]):
+    for c in range(first, last):
         for k in range(fine.shape[1]):
             value = np.float32(0.0)
             for n in range(4):
@@ -245,40 +250,54 @@ def _add_prolonged(parent, weight, coarse, free, fine):  # type: ignore[no-untyp
             fine[c, k] += free[c, k] * value
 
 
+def _share(kernel: Callable[..., None], first: int, last: int, *arguments: Any) -> None:
+    """Run a kernel on consecutive columns, or pairs of columns, with all threads."""
+    parts = max(1, min(current_threads(), (last - first) // FEWEST_COLUMNS))
+    ends = [first + (last - first) * n // parts for n in range(parts + 1)]
+    with worker_threads() as each:
+        each(lambda start, stop: kernel(start, stop, *arguments), list(pairwise(ends)))
+
+
 class _Level:
     """One grid: its matrix, the factors of its columns, and the vectors of a cycle."""
 
-    def __init__(self, graph: ColumnGraph, colour_start: np.ndarray, free: SingleArray, depth: int):
+    def __init__(self, graph: ColumnGraph, colour_start: list[int], free: SingleArray, depth: int):
         self.graph, self.colour_start, self.free, self.depth = graph, colour_start, free, depth
         self.own = graph.own.astype(np.int32)
         self.matrix = graph.zeros(depth)
         self.right, self.x, self.residual = (np.zeros_like(free) for _ in range(3))
         self.lower, self.inverse = (np.zeros((self.own.size, depth, 9), dtype=np.float32) for _ in range(2))
 
+    @property
+    def n_columns(self) -> int:
+        """Number of columns."""
+        return int(self.own.size)
+
     def factor(self) -> None:
         """Factor the columns of a new matrix."""
-        factor_columns(self.own, self.matrix, self.depth, self.lower, self.inverse)
+        _share(factor_columns, 0, self.n_columns, self.own, self.matrix, self.depth, self.lower, self.inverse)
 
     def sweep_forward(self) -> None:
         """Write `x` and `residual` for `right`."""
-        sweep_forward(
-            self.colour_start, self.graph.start, self.own, self.graph.neighbour, self.matrix, self.depth,
-            self.lower, self.inverse, self.right, self.x, self.residual,
-        )  # fmt: skip
+        pattern = self.graph.start, self.own, self.graph.neighbour, self.matrix
+        for colour in pairwise(self.colour_start):
+            _share(sweep_forward, *colour, *pattern, self.depth, self.lower, self.inverse, self.right, self.x)
+        _share(residual_after_forward, 0, self.n_columns, *pattern, self.x, self.residual)
 
     def sweep_backward(self) -> None:
         """Improve `x`."""
-        sweep_backward(
-            self.colour_start, self.graph.start, self.graph.neighbour, self.matrix, self.depth,
-            self.lower, self.inverse, self.right, self.x,
-        )  # fmt: skip
+        pattern = self.graph.start, self.graph.neighbour, self.matrix
+        for colour in reversed(list(pairwise(self.colour_start))):
+            _share(
+                sweep_backward, *colour, *pattern, self.depth, self.lower, self.inverse, self.right, self.x
+            )
 
 
-def _by_colour(graph: ColumnGraph) -> tuple[np.ndarray, np.ndarray]:
+def _by_colour(graph: ColumnGraph) -> tuple[np.ndarray, list[int]]:
     """Order of the columns by colour, and the first column of every colour in that order."""
     colour = colours(graph.start, graph.neighbour)
     order = np.argsort(colour, kind="stable")
-    return order, np.searchsorted(colour[order], np.arange(colour.max() + 2))
+    return order, np.searchsorted(colour[order], np.arange(colour.max() + 2)).tolist()
 
 
 class Multigrid:
@@ -342,14 +361,15 @@ class Multigrid:
     @property
     def columns_of_levels(self) -> tuple[int, ...]:
         """Number of columns of each level, finest first."""
-        return tuple(level.own.size for level in self._levels)
+        return tuple(level.n_columns for level in self._levels)
 
     def follow(self, blocks: FloatArray) -> None:
         """Take a new tangent, blocks (n_blocks, 3, 3), on the finest level; others stay as they are."""
         finest = self._levels[0]
-        take_blocks(
-            self._sparsity.row_start, self._sparsity.column, blocks, self._order, self._place,
-            finest.graph.start, finest.graph.neighbour, self._depth, finest.free, finest.matrix,
+        _share(
+            take_blocks, 0, finest.n_columns, self._sparsity.row_start, self._sparsity.column, blocks,
+            self._order, self._place, finest.graph.start, finest.graph.neighbour, self._depth, finest.free,
+            finest.matrix,
         )  # fmt: skip
         finest.factor()
 
@@ -358,11 +378,19 @@ class Multigrid:
         self.follow(blocks)
         for n, transfer in enumerate(self._transfers):
             fine, coarse = self._levels[n], self._levels[n + 1]
-            _galerkin(
-                transfer.part_start, transfer.part, transfer.part_weight,
+            _share(
+                _galerkin, 0, len(coarse.matrix), transfer.part_start, transfer.part, transfer.part_weight,
                 _rows(fine.matrix), _rows(coarse.matrix),
             )  # fmt: skip
-            _hold(coarse.graph.start, coarse.graph.neighbour, coarse.free, coarse.matrix)
+            _share(
+                _hold,
+                0,
+                coarse.n_columns,
+                coarse.graph.start,
+                coarse.graph.neighbour,
+                coarse.free,
+                coarse.matrix,
+            )
             coarse.factor()
         self._factor.renew(self._levels[-1].matrix)
 
@@ -381,7 +409,10 @@ class Multigrid:
         """Product of the tangent last taken and a flat vector."""
         finest = self._levels[0]
         product = np.zeros_like(finest.x)
-        multiply(
+        _share(
+            multiply,
+            0,
+            finest.n_columns,
             finest.graph.start,
             finest.graph.neighbour,
             finest.matrix,
@@ -394,18 +425,12 @@ class Multigrid:
         """Approximate solution for a residual, both flat."""
         finest = self._levels[0]
         finest.right[:] = residual.reshape(finest.x.shape)
-        threads = get_num_threads()
-        try:
-            self._cycle(0)
-        finally:
-            set_num_threads(threads)
+        self._cycle(0)
         return finest.x.ravel().copy()
 
     def _cycle(self, n: int) -> None:
         """Solve approximately for `right` of level n, into its `x`."""
         level = self._levels[n]
-        if level.own.size < THREADED_COLUMNS:
-            set_num_threads(1)
         if n == len(self._transfers):
             inner = level.x[:, :, 1 : self._depth + 1]
             right = level.right[:, :, 1 : self._depth + 1][self._coarsest]
@@ -413,15 +438,14 @@ class Multigrid:
             return
         coarse, transfer = self._levels[n + 1], self._transfers[n]
         level.sweep_forward()
-        _restrict(
-            transfer.child_start, transfer.child, transfer.child_weight, _rows(level.residual),
-            _rows(coarse.free), _rows(coarse.right),
+        _share(
+            _restrict, 0, coarse.n_columns, transfer.child_start, transfer.child, transfer.child_weight,
+            _rows(level.residual), _rows(coarse.free), _rows(coarse.right),
         )  # fmt: skip
-        threads = get_num_threads()
         self._cycle(n + 1)
-        set_num_threads(threads)
-        _add_prolonged(
-            transfer.parent, transfer.weight, _rows(coarse.x), _rows(level.free), _rows(level.x)
+        _share(
+            _add_prolonged, 0, level.n_columns, transfer.parent, transfer.weight, _rows(coarse.x),
+            _rows(level.free), _rows(level.x),
         )  # fmt: skip
         level.sweep_backward()
 

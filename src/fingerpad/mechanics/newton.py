@@ -254,9 +254,7 @@ class _Search:
         # Friction and mixed methods carry more than the displacements over to the tangent.
         carries = self.load.anchors is not None or self.body.is_mixed
         blocks = self.blocks if carries or start.relative_residual > LAST_STEP else None
-        return evaluate(
-            self.body, self.load, displacement, depth_mm, self.lagging, blocks, before, pressure
-        )
+        return evaluate(self.body, self.load, displacement, depth_mm, self.lagging, blocks, before, pressure)
 
     def line_search(self, start: Configuration, direction: FloatArray, highest_uj: float) -> Configuration:
         """Go along `direction`, halving until the potential falls below the highest remembered one.
