@@ -34,6 +34,9 @@ FORCING, FORCING_RANGE = 0.1, (1e-4, 5e-3)
 """Tolerance of a linear solve over the residual. Looser ones let stiff contact overshoot: at 0.05 a press
 took three times the evaluations."""
 
+ENOUGH = 0.05
+"""Share of the tolerance of the residual that a linear solve may leave: more would be solved for nothing."""
+
 LAST_STEP = 5e-3
 """Residual over contact force from which one Newton step mostly ends the search. The tangent after it is
 assembled only if it is needed after all."""
@@ -203,7 +206,8 @@ class _Search:
                 potentials, settled = [now.potential_uj], True
                 if close:
                     continue  # only friction was renewed: the body may still be at rest
-            forcing = float(np.clip(FORCING * now.relative_residual, *FORCING_RANGE))
+            enough = ENOUGH * settings.residual_tolerance / now.relative_residual
+            forcing = float(np.clip(max(FORCING * now.relative_residual, enough), *FORCING_RANGE))
             now = self.with_tangent(now)
             direction = self.solver.solve(self.blocks, now.residual_mn, forcing)
             now = self.line_search(now, direction, max(potentials[-REMEMBERED_POTENTIALS:]))
