@@ -193,7 +193,7 @@ def test_multigrid_is_chosen_for_a_large_mesh_within_its_reach(monkeypatch, mkl)
     preconditioner, reason = chosen(Material.neo_hooke(7.0, 0.495).poisson)
     assert isinstance(preconditioner, Multigrid)
     assert reason == (
-        f"geometric multigrid on 1 levels, the coarsest by {'PARDISO' if mkl else 'SuperLU'}: 175 nodes are "
+        f"geometric multigrid, levels: 1, the coarsest by {'PARDISO' if mkl else 'SuperLU'}: 175 nodes are "
         "at least 100, and Poisson's ratio 0.495 is within 0.495."
     )
     if not mkl:

@@ -235,7 +235,7 @@ def test_press_equals_that_of_a_factor_in_every_step(monkeypatch, mkl):
     monkeypatch.setattr(linear, "MULTIGRID_NODES", 100)
     monkeypatch.setattr(multigrid, "COARSEST_COLUMNS", 10)
     fast = pressed()
-    assert fast.linear_solver.startswith("geometric multigrid on 4 levels")
+    assert fast.linear_solver.startswith("geometric multigrid, levels: 4")
     monkeypatch.setattr(linear, "MULTIGRID_NODES", 10**9)
     monkeypatch.setattr(linear, "pypardiso", None)
     monkeypatch.setattr(linear.KeptFactor, "patience", -(10**9))

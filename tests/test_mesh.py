@@ -8,7 +8,7 @@ import pytest
 from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import Grading, graded_lines, lines_along, resolution_grading
-from fingerpad.mesh import LAYERS, Mesh, block_mesh, finger_lines, finger_mesh
+from fingerpad.mesh import LAYERS, Mesh, block_mesh, finger_mesh
 from fingerpad.mesh_quality import jacobian_at_gauss, scaled_jacobian
 
 FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
@@ -203,15 +203,15 @@ def test_sheet_of_living_epidermis_lies_on_the_border(standard):
     assert np.linalg.norm(lower - expected, axis=-1).min() < 0.2
 
 
-def test_the_nodes_of_a_parent_are_nodes_of_its_child():
-    lines = finger_lines(FINGER, resolution_grading("standard", CONTACT_X))
-    child, parent = finger_mesh(FINGER, lines), finger_mesh(FINGER, lines.parent())
-    assert len(parent.nodes_mm) < len(child.nodes_mm) / 5
-    assert {1.0, 2.0, 3.0, 4.0} <= set(lines.parent().through)  # layer borders stay
-    assert {tuple(point) for point in parent.nodes_mm} <= {tuple(point) for point in child.nodes_mm}
-    assert (jacobian_at_gauss(parent) > 0).all()
-    assert set(parent.layer) == set(range(len(LAYERS)))
-    assert np.abs(parent.nodes_mm[parent.midline_nodes, 0] - CONTACT_X).min() < 1e-4
+@pytest.mark.parametrize("full", [False, True])
+def test_grid_holds_the_corners_of_every_brick_in_columns_of_consecutive_nodes(full):
+    mesh = finger_mesh(FINGER, replace(resolution_grading("quick", CONTACT_X), full=full))
+    for body in (mesh, block()):
+        corners = body.elements.reshape(*body.shape, 8)
+        np.testing.assert_array_equal(body.grid[:-1, :-1, :-1], corners[..., 4])
+        np.testing.assert_array_equal(body.grid[1:, 1:, 1:], corners[..., 2])
+        np.testing.assert_array_equal(np.unique(body.grid), np.arange(len(body.nodes_mm)))
+        assert (body.grid[:, :, 0] % body.grid.shape[2] == 0).all()
 
 
 def test_a_line_indenter_gets_elements_of_its_own_size():
@@ -270,6 +270,3 @@ def test_what_cannot_be_meshed_is_refused():
         block_mesh([0, 1], [0, 2], [0, 1], layers=[0, 1])
     with pytest.raises(InputError, match="must start at 0"):
         block_mesh([0, 1], [0, 2], [1, 2], layers=[0], symmetric=True)
-    odd = finger_lines(FINGER, resolution_grading("quick", CONTACT_X))
-    with pytest.raises(InputError, match="even numbers of steps"):
-        replace(odd, along_mm=odd.along_mm[1:]).parent()

@@ -230,25 +230,6 @@ class GridLines:
         """Whether the lines go all around the finger."""
         return bool(self.around_rad[0] < 0.0)
 
-    def parent(self) -> GridLines:
-        """Every second line along and around, and within each layer that has an even number of elements.
-
-        Layer borders stay, so elements keep one material, and the nodes of the parent are nodes of its child.
-
-        Raises
-        ------
-        InputError
-            If the number of steps along or around is odd.
-        """
-        steps = self.along_mm.size - 1, self.around_rad.size - 1
-        if steps[0] % 2 or steps[1] % 2:
-            raise InputError(f"Only even numbers of steps along and around can be halved: got {steps}.")
-        through = [np.zeros(1)]
-        for layer in range(len(LAYERS)):
-            lines = self.through[(self.through > layer) & (self.through <= layer + 1)]
-            through.append(lines[1::2] if lines.size % 2 == 0 else lines)
-        return GridLines(self.along_mm[::2], self.around_rad[::2], np.concatenate(through))
-
 
 def _rays(finger: Fingertip, station: FloatArray, around_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Origins and directions (..., 3) of rays from the bone's axis.
@@ -284,7 +265,7 @@ def _midline(finger: Fingertip) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def finger_lines(finger: Fingertip, grading: Grading) -> GridLines:
-    """Grid lines of a finger: even numbers of steps to either side of the centre, so that parents keep it.
+    """Grid lines of a finger, an even number of steps to either side of the centre.
 
     Parameters
     ----------
@@ -351,7 +332,7 @@ def finger_mesh(finger: Fingertip, grading: Grading | GridLines) -> Mesh:
     finger : Fingertip
         The geometry.
     grading : Grading or GridLines
-        What to build; lines come from `finger_lines` and `GridLines.parent`.
+        What to build; lines come from `finger_lines`.
 
     Returns
     -------

@@ -154,7 +154,7 @@ def choose_preconditioner(
     if n_nodes >= MULTIGRID_NODES and poisson <= MULTIGRID_POISSON + 1e-9:
         multigrid = Multigrid(sparsity, free, mesh.nodes_mm, mesh.grid, factor)
         reason = (
-            f"geometric multigrid on {len(multigrid.columns_of_levels)} levels, the coarsest by {name}: "
+            f"geometric multigrid, levels: {len(multigrid.columns_of_levels)}, the coarsest by {name}: "
             f"{n_nodes} nodes are at least {MULTIGRID_NODES}, and Poisson's ratio {poisson:.4g} is within "
             f"{MULTIGRID_POISSON}."
         )
