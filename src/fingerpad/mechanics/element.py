@@ -16,6 +16,9 @@ W(Jbar^(1/3) F~) takes the place of W and U, the whole stress relaxes, and C = J
 
 Tensors are stored as xx, yy, zz, xy, yz, xz. All functions are compiled and single-threaded,
 so the answer does not depend on the number of threads.
+
+Products and sums keep their roundings (no contraction, no other order): else their last digits would depend
+on which copy of a function, compiled into several others, is loaded first.
 """
 
 from __future__ import annotations
@@ -26,6 +29,7 @@ from numba import njit
 from fingerpad.checks import FloatArray
 from fingerpad.mechanics.energy import CARRIED, SECOND, differentiate
 from fingerpad.mechanics.materials import COUPLED, N_COEFFICIENTS, POLYNOMIAL
+from fingerpad.mechanics.small_arrays import small_array
 from fingerpad.mechanics.tensors import (
     COLUMN,
     INDEX,
@@ -39,6 +43,9 @@ from fingerpad.mechanics.tensors import (
 
 N_NODES = 8
 N_POINTS = 8
+N_COLUMNS = 6 * N_NODES
+"""Numbers of a row of the packed tangent, six pairs of directions times eight nodes."""
+ONE = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 WITH_VOLUME = SECOND[:3, 3].copy()
 
 
@@ -74,19 +81,15 @@ def _elasticity(stress, deviator, pressure, moduli):  # type: ignore[no-untyped-
 
     `stress` is the stress before the deviator is taken, T = s (g1 b + g2 b²) - h; `pressure` is p J.
     c = P : c~ : P + 2/3 tr(T) (I_s - 1/3 1x1) - 2/3 (dev T x 1 + 1 x dev T) + p J (1x1 - 2 I_s),
-    of which c~ is left out. Only the upper triangle is written.
+    of which c~ is left out.
     """
     trace = stress[0] + stress[1] + stress[2]
+    identity, both = 2.0 / 3.0 * trace - 2.0 * pressure, pressure - 2.0 / 9.0 * trace
     for m in range(6):
-        one_m = 1.0 if m < 3 else 0.0
-        for n in range(m, 6):
-            one_n = 1.0 if n < 3 else 0.0
-            identity = 0.0
-            if m == n:
-                identity = 1.0 if m < 3 else 0.5
-            value = 2.0 / 3.0 * trace * (identity - one_m * one_n / 3.0)
-            value -= 2.0 / 3.0 * (deviator[m] * one_n + one_m * deviator[n])
-            moduli[m, n] = value + pressure * (one_m * one_n - 2.0 * identity)
+        one_m = ONE[m]
+        for n in range(6):
+            moduli[m, n] = (both * one_m - 2.0 / 3.0 * deviator[m]) * ONE[n] - 2.0 / 3.0 * one_m * deviator[n]
+        moduli[m, m] += identity * (0.5 + 0.5 * one_m)
 
 
 @njit(cache=True, inline="always")
@@ -104,55 +107,80 @@ def _add_polynomial(law, s, first, b, b2, moduli):  # type: ignore[no-untyped-de
         _add_second_derivatives(d1, d2, d3, d4, first, b, b2, moduli)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _add_second_derivatives(d1, d2, d3, d4, first, b, b2, moduli):  # type: ignore[no-untyped-def]
-    """Add P : (d1 b x b + d2 (b x b² + b² x b) + d3 b² x b² + d4 b . b) : P to the upper triangle."""
-    trace_b2 = b2[0] + b2[1] + b2[2]
+    """Add P : (d1 b x b + d2 (b x b² + b² x b) + d3 b² x b² + d4 b . b) : P."""
+    third, third_b2 = first / 3.0, (b2[0] + b2[1] + b2[2]) / 3.0
+    db, db2, product = small_array((6,)), small_array((6,)), small_array((6, 6))
+    for k in range(6):
+        db[k], db2[k] = b[k] - third * ONE[k], b2[k] - third_b2 * ONE[k]
+    _product_row(0, 0, 0, b, product)
+    _product_row(1, 1, 1, b, product)
+    _product_row(2, 2, 2, b, product)
+    _product_row(3, 0, 1, b, product)
+    _product_row(4, 1, 2, b, product)
+    _product_row(5, 0, 2, b, product)
     for m in range(6):
-        i, j = ROW[m], COLUMN[m]
-        one_m = 1.0 if m < 3 else 0.0
-        db_m, db2_m = b[m] - one_m * first / 3.0, b2[m] - one_m * trace_b2 / 3.0
-        for n in range(m, 6):
-            k, l = ROW[n], COLUMN[n]  # noqa: E741 - the index letters of the formula
-            one_n = 1.0 if n < 3 else 0.0
-            db_n, db2_n = b[n] - one_n * first / 3.0, b2[n] - one_n * trace_b2 / 3.0
-            product = 0.5 * (b[INDEX[i, k]] * b[INDEX[j, l]] + b[INDEX[i, l]] * b[INDEX[j, k]])
-            moduli[m, n] += d1 * db_m * db_n + d2 * (db_m * db2_n + db2_m * db_n) + d3 * db2_m * db2_n
-            moduli[m, n] += d4 * (
-                product - (b2[m] * one_n + one_m * b2[n]) / 3.0 + trace_b2 * one_m * one_n / 9.0
+        with_db, with_db2 = d1 * db[m] + d2 * db2[m], d2 * db[m] + d3 * db2[m]
+        with_one, with_b2 = d4 * (third_b2 * ONE[m] - b2[m]) / 3.0, -d4 * ONE[m] / 3.0
+        for n in range(6):
+            moduli[m, n] += with_db * db[n] + with_db2 * db2[n] + d4 * product[m, n]
+            moduli[m, n] += with_one * ONE[n] + with_b2 * b2[n]
+
+
+@njit(cache=True, forceinline=True)
+def _product_row(m, i, j, b, product):  # type: ignore[no-untyped-def]
+    """Write row m = ij of b . b, (b . b)_ij,kl = (b_ik b_jl + b_il b_jk) / 2."""
+    for k in range(3):
+        product[m, k] = b[INDEX[i, k]] * b[INDEX[j, k]]
+        l = (k + 1) % 3  # noqa: E741 - the index letters of the formula
+        product[m, INDEX[k, l]] = 0.5 * (b[INDEX[i, k]] * b[INDEX[j, l]] + b[INDEX[i, l]] * b[INDEX[j, k]])
+
+
+@njit(cache=True, inline="always")
+def _tangent_at_point(weight, moduli, tau, slopes, products):  # type: ignore[no-untyped-def]
+    """Write V_ij = w A_ij G of one point, with A_ij,pr = c_ip,jr + delta_ij tau_pr, for i <= j.
+
+    `slopes` is G (3, 8), the present gradients of the shape functions; `products` (3, 48) is V_ij, with the
+    pairs ij in the order of a tensor's components and the eight nodes of a pair side by side. Every pair is
+    spelt out: in a loop over pairs the compiler would look up its indices and scatter what it writes.
+    """
+    _pair_at_point(0, 0, 0, weight, moduli, tau, slopes, products)
+    _pair_at_point(1, 1, 1, weight, moduli, tau, slopes, products)
+    _pair_at_point(2, 2, 2, weight, moduli, tau, slopes, products)
+    _pair_at_point(3, 0, 1, weight, moduli, tau, slopes, products)
+    _pair_at_point(4, 1, 2, weight, moduli, tau, slopes, products)
+    _pair_at_point(5, 0, 2, weight, moduli, tau, slopes, products)
+
+
+@njit(cache=True, forceinline=True)
+def _pair_at_point(pair, i, j, weight, moduli, tau, slopes, products):  # type: ignore[no-untyped-def]
+    """Write V_ij of one pair, see `_tangent_at_point`."""
+    for p in range(3):
+        m = INDEX[i, p]
+        x, y, z = moduli[m, INDEX[j, 0]], moduli[m, INDEX[j, 1]], moduli[m, INDEX[j, 2]]
+        if i == j:
+            x, y, z = x + tau[INDEX[p, 0]], y + tau[INDEX[p, 1]], z + tau[INDEX[p, 2]]
+        x, y, z = weight * x, weight * y, weight * z
+        for node in range(N_NODES):
+            products[p, N_NODES * pair + node] = (
+                x * slopes[0, node] + y * slopes[1, node] + z * slopes[2, node]
             )
 
 
-@njit(cache=True)
-def _add_tangent(weight, moduli, stress, spherical, slopes, packed):  # type: ignore[no-untyped-def]
-    """Add one point's K_ij = w G' A_ij G, with A_ij,pr = c_ip,jr + delta_ij tau_pr, for i <= j.
+@njit(cache=True, inline="always")
+def _add_points(slopes, products, packed):  # type: ignore[no-untyped-def]
+    """Write K_ij = sum_q G_q' V_ij,q of all pairs ij as one product of matrices.
 
-    `slopes` is G (3, 8), the present gradients of the shape functions; `packed` (3, 3, 8, 8) is K_ij with
-    the second node before the first, so that the innermost loop runs over neighbours in memory. Products
-    and sums keep their roundings: contracted, their last digits would depend on which copy of this function,
-    compiled into several others, is loaded first.
+    `slopes` is G_q (8 points, 3, 8), `products` V_ij,q (8 points, 3, 48) and `packed` K_ij (8, 48). The
+    innermost loop runs over 48 neighbours in memory, which is what vector registers want.
     """
-    a = np.empty((3, 3))
-    for i in range(3):
-        for j in range(i, 3):
-            for p in range(3):
-                for r in range(3):
-                    a[p, r] = moduli[INDEX[i, p], INDEX[j, r]]
-                    if i == j:
-                        a[p, r] += stress[INDEX[p, r]]
-                if i == j:
-                    a[p, p] += spherical
-            axx, axy, axz = weight * a[0, 0], weight * a[0, 1], weight * a[0, 2]
-            ayx, ayy, ayz = weight * a[1, 0], weight * a[1, 1], weight * a[1, 2]
-            azx, azy, azz = weight * a[2, 0], weight * a[2, 1], weight * a[2, 2]
-            for node in range(N_NODES):
-                x, y, z = slopes[0, node], slopes[1, node], slopes[2, node]
-                first, second = axx * x + axy * y + axz * z, ayx * x + ayy * y + ayz * z
-                third = azx * x + azy * y + azz * z
-                for other in range(N_NODES):
-                    packed[i, j, node, other] += (
-                        slopes[0, other] * first + slopes[1, other] * second + slopes[2, other] * third
-                    )
+    packed[:] = 0.0
+    for node in range(N_NODES):
+        for q in range(N_POINTS):
+            x, y, z = slopes[q, 0, node], slopes[q, 1, node], slopes[q, 2, node]
+            for k in range(N_COLUMNS):
+                packed[node, k] += x * products[q, 0, k] + y * products[q, 1, k] + z * products[q, 2, k]
 
 
 @njit(cache=True)
@@ -163,14 +191,14 @@ def _formula_points(law, gradients, jacobians, dilatation, logs, axes, derivativ
     Unless shape and volume are coupled, that is no part of W, but its derivatives are kept.
     """
     count, factor = int(law[10]), law[9]
-    results, b, b2 = np.empty((count + 1, CARRIED)), np.empty(6), np.empty(6)
+    results, b, b2 = np.empty((count + 1, CARRIED)), small_array((6,)), small_array((6,))
     volumetric = 0.0
     if law[8] != COUPLED:
         logs[0, :3], logs[0, 3] = 0.0, np.log(dilatation)
         differentiate(law[N_COEFFICIENTS:], count, logs[0], results)
         volumetric = results[count - 1, 0]
     for q in range(N_POINTS):
-        left_cauchy_green(gradients[q], jacobians[q], b, b2)
+        left_cauchy_green(gradients[q], jacobians[q] ** (-2.0 / 3.0), b, b2)
         principal_axes(b, logs[q], axes[q])
         logs[q, 3] = np.log(dilatation)
         differentiate(law[N_COEFFICIENTS:], count, logs[q], results)
@@ -188,13 +216,14 @@ def _add_principal(s, derivatives, logs, axes, moduli):  # type: ignore[no-untyp
     Along the axes c~_aabb = h_ab - 2 beta_a delta_ab; between them, with l the squares of the stretches,
     c~_abab = (beta_a l_b - beta_b l_a) / (l_a - l_b), or (h_aa - h_ab) / 2 - beta_a for equal stretches.
     """
-    block, mean = np.empty((3, 3)), np.zeros(3)
+    block, mean = small_array((3, 3)), small_array((3,))
+    mean[:] = 0.0
     for a in range(3):
         for c in range(3):
             block[a, c] = derivatives[SECOND[a, c]] - (2.0 * derivatives[1 + a] if a == c else 0.0)
             mean[c] += block[a, c] / 3.0
     total = (mean[0] + mean[1] + mean[2]) / 3.0
-    mixed = np.empty(6)
+    mixed = small_array((6,))
     for a in range(3):
         for c in range(3):
             value = s * (block[a, c] - mean[a] - mean[c] + total)
@@ -241,7 +270,7 @@ def gradients_at_points(reference, displacement, weights, slopes, gradient):  # 
 
     Writes `weights` (8,), `slopes` dN/dX (8, 8, 3) and `gradient` F (8, 3, 3); returns the reference volume.
     """
-    jacobian, inverse = np.empty((3, 3)), np.empty((3, 3))
+    jacobian, inverse = small_array((3, 3)), small_array((3, 3))
     volume = 0.0
     for q in range(N_POINTS):
         jacobian[:] = 0.0
@@ -291,11 +320,14 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
     float
         Incremental potential, or NaN if a point of the element is turned inside out. [µJ]
     """
-    weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
-    gradients = np.empty((N_POINTS, 3, 3))
-    present, jacobians, inverse = np.empty((N_POINTS, 3, N_NODES)), np.empty(N_POINTS), np.empty((3, 3))
-    b, b2, relaxed, stress, deviator = np.empty(6), np.empty(6), np.empty(6), np.empty(6), np.empty(6)
-    moduli, packed, dilatation = np.empty((6, 6)), np.zeros((3, 3, N_NODES, N_NODES)), np.zeros((3, N_NODES))
+    weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
+    gradients, jacobians = small_array((N_POINTS, 3, 3)), small_array((N_POINTS,))
+    present, inverse = small_array((N_POINTS, 3, N_NODES)), small_array((3, 3))
+    b, b2, relaxed = small_array((6,)), small_array((6,)), small_array((6,))
+    stress, deviator, tau = small_array((6,)), small_array((6,)), small_array((6,))
+    moduli, products = small_array((6, 6)), small_array((N_POINTS, 3, N_COLUMNS))
+    packed, dilatation = small_array((N_NODES, N_COLUMNS)), small_array((3, N_NODES))
+    dilatation[:] = 0.0
 
     volume = gradients_at_points(reference, displacement, weights, slopes, gradients)
     present_volume = 0.0
@@ -314,9 +346,10 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
     mean_jacobian = present_volume / volume
     is_formula, is_coupled = law[8] != POLYNOMIAL, law[8] == COUPLED
     if is_formula:
-        logs, axes = np.empty((N_POINTS, 4)), np.empty((N_POINTS, 3, 3))
-        derivatives, coupling = np.empty((N_POINTS, CARRIED)), np.zeros((3, N_NODES))
-        mixed = np.zeros(6)
+        logs, axes = small_array((N_POINTS, 4)), small_array((N_POINTS, 3, 3))
+        derivatives = small_array((N_POINTS, CARRIED))
+        coupling, mixed = small_array((3, N_NODES)), small_array((6,))
+        coupling[:] = 0.0
         volumetric = _formula_points(law, gradients, jacobians, mean_jacobian, logs, axes, derivatives)
         pressure, stiffness = 0.0, 0.0  # first the sums of dW/d(ln Jbar) and of its own slope
         for q in range(N_POINTS):
@@ -338,14 +371,15 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
     force[:] = 0.0
     for q in range(N_POINTS):
         w = weights[q]
-        push_forward(gradients[q], frame_scale(law, jacobians[q], mean_jacobian), history[q], relaxed)
+        frame = frame_scale(law, jacobians[q], mean_jacobian)
+        push_forward(gradients[q], frame, history[q], relaxed)
         if is_formula:
             energy = derivatives[q, 0]
             for k in range(6):
                 stress[k] = -relaxed[k]
             add_in_axes(s * derivatives[q, 1:4], axes[q], stress)
         else:
-            first, second = left_cauchy_green(gradients[q], jacobians[q], b, b2)
+            first, second = left_cauchy_green(gradients[q], frame, b, b2)
             energy, w1, w2 = _energy(law, first, second)
             for k in range(6):
                 stress[k] = 2.0 * s * ((w1 + first * w2) * b[k] - w2 * b2[k]) - relaxed[k]
@@ -355,21 +389,23 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
         for k in range(6):
             deviator[k] = stress[k] - (mean if k < 3 else 0.0)
         spherical = pressure * jacobians[q]
+        for k in range(6):
+            tau[k] = deviator[k] + spherical * ONE[k]
         for node in range(N_NODES):
             x, y, z = w * present[q, 0, node], w * present[q, 1, node], w * present[q, 2, node]
-            force[node, 0] += (deviator[0] + spherical) * x + deviator[3] * y + deviator[5] * z
-            force[node, 1] += deviator[3] * x + (deviator[1] + spherical) * y + deviator[4] * z
-            force[node, 2] += deviator[5] * x + deviator[4] * y + (deviator[2] + spherical) * z
+            force[node, 0] += tau[0] * x + tau[3] * y + tau[5] * z
+            force[node, 1] += tau[3] * x + tau[1] * y + tau[4] * z
+            force[node, 2] += tau[5] * x + tau[4] * y + tau[2] * z
         if with_tangent:
             _elasticity(stress, deviator, spherical, moduli)
             if is_formula:
                 _add_principal(s, derivatives[q], logs[q], axes[q], moduli)
+                for m in range(6):
+                    for n in range(m):
+                        moduli[m, n] = moduli[n, m]
             else:
                 _add_polynomial(law, s, first, b, b2, moduli)
-            for m in range(6):
-                for n in range(m):
-                    moduli[m, n] = moduli[n, m]
-            _add_tangent(w, moduli, deviator, spherical, present[q], packed)
+            _tangent_at_point(w, moduli, tau, present[q], products[q])
             if is_coupled:  # d²W / dx d(ln Jbar) acts like a stress, whose forces are the coupling
                 for k in range(6):
                     mixed[k] = -2.0 / 3.0 * relaxed[k]
@@ -381,18 +417,20 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
                             component = mixed[INDEX[i, j]] - (mean if i == j else 0.0)
                             coupling[i, node] += w / present_volume * component * present[q, j, node]
     if with_tangent:
-        for i in range(3):
-            for j in range(i, 3):
-                for node in range(N_NODES):
-                    for other in range(N_NODES):
-                        value = (
-                            packed[i, j, node, other] + stiffness * dilatation[i, other] * dilatation[j, node]
-                        )
-                        if is_coupled:
-                            value += coupling[i, other] * dilatation[j, node]
-                            value += dilatation[i, other] * coupling[j, node]
-                        tangent[other, node, i, j] = value
-                        tangent[node, other, j, i] = value
+        _add_points(present, products, packed)
+        for m in range(6):
+            i, j = ROW[m], COLUMN[m]
+            for node in range(N_NODES):
+                for other in range(N_NODES):
+                    value = (
+                        packed[node, N_NODES * m + other]
+                        + stiffness * dilatation[i, node] * dilatation[j, other]
+                    )
+                    if is_coupled:
+                        value += coupling[i, node] * dilatation[j, other]
+                        value += dilatation[i, node] * coupling[j, other]
+                    tangent[node, other, i, j] = value
+                    tangent[other, node, j, i] = value
     return potential
 
 
@@ -417,9 +455,13 @@ def element_state(reference, displacement, law, instantaneous, energies):  # typ
         Volumetric energy density U(Jbar) and pressure U'(Jbar) [kPa], both 0 if the law couples shape and
         volume and all stress is in S0; and Jbar.
     """
-    weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
-    gradients, jacobians, inverse = np.empty((N_POINTS, 3, 3)), np.empty(N_POINTS), np.empty((3, 3))
-    b, b2, deviator = np.empty(6), np.empty(6), np.empty(6)
+    weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
+    gradients, jacobians, inverse = (
+        small_array((N_POINTS, 3, 3)),
+        small_array((N_POINTS,)),
+        small_array((3, 3)),
+    )
+    b, b2, deviator = small_array((6,)), small_array((6,)), small_array((6,))
     is_formula, is_coupled = law[8] != POLYNOMIAL, law[8] == COUPLED
     volume = gradients_at_points(reference, displacement, weights, slopes, gradients)
     present_volume = 0.0
@@ -431,8 +473,8 @@ def element_state(reference, displacement, law, instantaneous, energies):  # typ
     volumetric = law[5] * change**2 + law[6] * change**4
     pressure = 2.0 * law[5] * change + 4.0 * law[6] * change**3
     if is_formula:
-        logs, axes = np.empty((N_POINTS, 4)), np.empty((N_POINTS, 3, 3))
-        derivatives = np.empty((N_POINTS, CARRIED))
+        logs, axes = small_array((N_POINTS, 4)), small_array((N_POINTS, 3, 3))
+        derivatives = small_array((N_POINTS, CARRIED))
         volumetric = _formula_points(law, gradients, jacobians, mean_jacobian, logs, axes, derivatives)
         pressure = 0.0 if is_coupled else derivatives[0, 4] / mean_jacobian
     for q in range(N_POINTS):
@@ -442,7 +484,7 @@ def element_state(reference, displacement, law, instantaneous, energies):  # typ
             deviator[:] = 0.0
             add_in_axes(derivatives[q, 1:4], axes[q], deviator)
         else:
-            first, second = left_cauchy_green(gradients[q], jacobians[q], b, b2)
+            first, second = left_cauchy_green(gradients[q], jacobians[q] ** (-2.0 / 3.0), b, b2)
             energy, w1, w2 = _energy(law, first, second)
             for k in range(6):
                 deviator[k] = 2.0 * ((w1 + first * w2) * b[k] - w2 * b2[k])
@@ -472,9 +514,9 @@ def relaxing_norms(reference, displacement, law, tensors, norms):  # type: ignor
     norms : array (n, 8)
         Overwritten with the squared norms. [kPa²]
     """
-    weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
-    gradients = np.empty((N_POINTS, 3, 3))
-    inverse, spatial = np.empty((3, 3)), np.empty(6)
+    weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
+    gradients = small_array((N_POINTS, 3, 3))
+    inverse, spatial = small_array((3, 3)), small_array((6,))
     volume = gradients_at_points(reference, displacement, weights, slopes, gradients)
     present_volume = 0.0
     for q in range(N_POINTS):

@@ -36,9 +36,8 @@ def invert(matrix, inverse):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, inline="always")
-def left_cauchy_green(gradient, jacobian, b, b2):  # type: ignore[no-untyped-def]
-    """Isochoric b~ = J^(-2/3) F F' and its square; return the invariants I1 and I2."""
-    scale = jacobian ** (-2.0 / 3.0)
+def left_cauchy_green(gradient, scale, b, b2):  # type: ignore[no-untyped-def]
+    """Write b = scale F F' and its square; return its invariants. The isochoric b~ has scale J^(-2/3)."""
     for k in range(6):
         f, g = gradient[ROW[k]], gradient[COLUMN[k]]
         b[k] = scale * (f[0] * g[0] + f[1] * g[1] + f[2] * g[2])

@@ -1,0 +1,60 @@
+"""Arrays on the stack of compiled functions behave like any others."""
+
+import numpy as np
+import pytest
+from numba import njit
+from numba.core.errors import TypingError
+
+from fingerpad.mechanics.small_arrays import ALIGNMENT, small_array
+
+N_ROWS = 3
+
+
+@njit
+def read_and_written(values, results):
+    """Copy (3, 5) numbers through two arrays on the stack, one of them handed on to another function."""
+    first, second = small_array((N_ROWS, 5)), small_array((5,))
+    for i in range(N_ROWS):
+        for j in range(5):
+            first[i, j] = values[i, j]
+    for i in range(N_ROWS):
+        second[:] = 0.0
+        add(first[i], second)
+        for j in range(5):
+            results[i, j] = second[j]
+    return first.shape, first.strides, first.ctypes.data % ALIGNMENT
+
+
+@njit
+def add(row, total):
+    for j in range(len(row)):
+        total[j] += row[j]
+
+
+def test_numbers_stay_where_they_are_put():
+    values, results = np.random.default_rng(5).normal(size=(3, 5)), np.empty((3, 5))
+    assert read_and_written(values, results) == ((3, 5), (40, 8), 0)
+    np.testing.assert_array_equal(results, values)
+
+
+@njit
+def addresses_of_rounds(addresses):
+    for k in range(len(addresses)):
+        addresses[k] = small_array((64,)).ctypes.data
+
+
+def test_an_array_made_in_a_loop_takes_memory_once():
+    """Else the stack would grow from round to round and overflow in a long loop."""
+    addresses = np.empty(100, dtype=np.int64)
+    addresses_of_rounds(addresses)
+    assert len(set(addresses)) == 1
+
+
+@pytest.mark.parametrize("shape", [(3, 4), 3], ids=["unknown sizes", "no tuple"])
+def test_sizes_must_be_constant(shape):
+    @njit
+    def of_any_size(shape):
+        return small_array(shape).sum()
+
+    with pytest.raises(TypingError, match="needs a tuple of constant sizes"):
+        of_any_size(shape)
