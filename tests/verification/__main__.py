@@ -16,7 +16,7 @@ import fingerpad
 from .cases import ORDERED
 from .page import PAGE, expectation, number, page_text
 from .pictures import draw_all
-from .refinement import section
+from .stored_runs import section
 
 
 def run_all(names: list[str]) -> int:

@@ -8,7 +8,7 @@ import pytest
 from .case import at_least, at_most, equal, near
 from .cases import ORDERED, THEMES
 from .page import PAGE, allowance, case_text, expectation, page_text, rows_shown
-from .refinement import PICTURE, section, stored_results
+from .stored_runs import PICTURE, section, stored_results
 
 FAST = [case for case in ORDERED if not case.slow]
 SHOWN = rows_shown(PAGE.read_text(encoding="utf-8"))
