@@ -25,6 +25,7 @@ BENCHMARKS = (
     "solvers",
     "growth",
     "reproduction",
+    "neurons",
     "peers",
 )
 
