@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from fingerpad import blocks
 from fingerpad.blocks import BLOCK
 from fingerpad.errors import InputError
+from fingerpad.exact_spikes import _next_guess
 from fingerpad.lif import LeakyIntegrateAndFire
 from fingerpad.signals import CurrentTraces
 
@@ -255,6 +256,52 @@ def test_many_neurons_fire_as_each_does_alone_on_any_number_of_threads(monkeypat
     for neuron in (0, BLOCK - 1, BLOCK, 2 * BLOCK + 2):
         alone = NEURON.spikes(CurrentTraces(current.times_ms, current.current_ma[:, [neuron]]))
         assert_array_equal(alone.times_ms, one[neuron])
+
+
+def test_neurons_side_by_side_match_the_slow_reference_each():
+    """Silent, hardly firing and fast ones, resting across knots, jumps and falls between two knots."""
+    times = np.array([0.0, 0.3, 0.9, 3.0, 20.0, 20.0, 20.001, 60.0, 100.0, 400.0])
+    shapes = np.random.default_rng(3).uniform(-0.2, 1.0, (times.size, 24))
+    current = shapes * np.geomspace(0.8 * RHEOBASE, 60.0 * RHEOBASE, 24)
+    neuron = LeakyIntegrateAndFire(TAU, CAPACITANCE, THRESHOLD, 2.0)
+    trains = neuron.spikes(CurrentTraces(times, current))
+    counts = np.diff(trains.offsets)
+    assert (counts == 0).any()
+    assert counts.max() >= 100
+    for train, course in zip(trains, current.T, strict=True):
+        slow = slow_reference(times, course, neuron)
+        assert train.size == len(slow)
+        assert_allclose(train, slow, rtol=0.0, atol=1e-10)
+
+
+def test_a_guess_called_exact_is_exact_and_one_step_makes_most_guesses_so():
+    """From guesses within 1 % of the crossing; the crossing is bisected to round-off."""
+    rng = np.random.default_rng(11)
+    called_exact = 0
+    trials = 400
+    for trial in range(trials):
+        steady, drift = THRESHOLD * rng.uniform(1.5, 30.0), THRESHOLD * rng.uniform(-0.5, 20.0)
+        if trial % 4 == 0:
+            # Rise = 3 drift at the crossing: Halley's own error vanishes, and that of the series stays.
+            x = rng.uniform(0.1, 0.5)
+            gone = -math.expm1(-x)
+            rise = THRESHOLD * (1.0 - gone) / ((1.0 - x / 3.0) * gone + (x - gone) / 3.0)
+            steady, drift = THRESHOLD + rise * (1.0 - x / 3.0), rise / 3.0
+
+        def missing(x, steady=steady, drift=drift):
+            gone = -math.expm1(-x)
+            return THRESHOLD - (steady * gone + drift * (x - gone))
+
+        crossing = brentq(missing, 0.0, 2.0, xtol=1e-300, rtol=1e-15)
+        guess = crossing * (1.0 + 10.0 ** rng.uniform(-6.0, -1.0) * rng.choice([-1.0, 1.0]))
+        rise = steady + drift * guess - (THRESHOLD - missing(guess))
+        better, exact = _next_guess(guess, missing(guess), rise, drift, 2.0 * crossing)
+        called_exact += exact
+        if exact:
+            assert_allclose(better, crossing, rtol=4e-15)
+        else:
+            assert abs(better - crossing) < 0.1 * abs(guess - crossing)
+    assert 0.7 * trials < called_exact < trials
 
 
 def test_spike_times_are_exact_to_the_round_off_of_the_potential():

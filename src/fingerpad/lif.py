@@ -1,18 +1,12 @@
 """Membrane current -> spike times: the leaky integrate-and-fire neuron (paper, Eqs. 3-5).
 
-Between two knots the current is a straight line, I + m s, and Eq. 5, du/ds = -u/tau + (I + m s)/C, has
-the closed form
-
-    u(s) = u e^(-s/tau) + tau/C [ I g + m (s - tau g) ],    g = 1 - e^(-s/tau),
-
-whose slope is monotone: u has at most one extremum between two knots. A crossing of the threshold can
-therefore be bracketed with certainty, and is then refined to round-off. No time step is involved.
-The paper's own scheme, Runge-Kutta with a fixed step, is there for comparison.
+Between two knots the current is a straight line, and the potential has a closed form: a crossing of the
+threshold is bracketed with certainty and refined to round-off (`fingerpad.exact_spikes`). No time step is
+involved. The paper's own scheme, Runge-Kutta with a fixed step, is there for comparison.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,11 +14,8 @@ from numba import njit
 
 from fingerpad.blocks import in_blocks
 from fingerpad.checks import FloatArray, positive
+from fingerpad.exact_spikes import exact_trains
 from fingerpad.signals import CurrentTraces, SpikeTrains
-
-_NEVER = -1.0
-_MOST_REFINEMENTS = 200
-_ROUND_OFF = 4.0 * float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True)
@@ -86,8 +77,8 @@ class LeakyIntegrateAndFire:
         """
 
         def trains(neurons: slice) -> SpikeTrains:
-            by_neuron = _by_neuron(current.current_ma[:, neurons])
-            return SpikeTrains(*_exact_trains(current.times_ms, by_neuron, *self._constants()))
+            some = current.part(neurons)
+            return SpikeTrains(*exact_trains(some.times_ms, some.current_ma, *self._constants()))
 
         return SpikeTrains.joined(in_blocks(trains, current.n_sites))
 
@@ -116,7 +107,10 @@ class LeakyIntegrateAndFire:
         """
         step = positive("step_ms", step_ms, "ms")
         return SpikeTrains(
-            *_runge_kutta_trains(current.times_ms, _by_neuron(current.current_ma), *self._constants(), step)
+            # A neuron runs through its own row: neighbours in time must be neighbours in memory.
+            *_runge_kutta_trains(
+                current.times_ms, np.ascontiguousarray(current.current_ma.T), *self._constants(), step
+            )
         )
 
     def _constants(self) -> tuple[float, float, float, float]:
@@ -128,144 +122,10 @@ class LeakyIntegrateAndFire:
         )
 
 
-def _by_neuron(current_ma: FloatArray) -> FloatArray:
-    # A neuron runs through its own row: neighbours in time must be neighbours in memory.
-    return np.ascontiguousarray(current_ma.T)
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _gone(elapsed: float, tau: float) -> float:
-    """Share of the potential that has leaked after `elapsed`: g."""
-    return -math.expm1(-elapsed / tau)
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _potential(
-    elapsed: float, gone: float, start: float, current: float, slope: float, tau: float, capacitance: float
-) -> float:
-    """Solve Eq. 5 in closed form, `elapsed` after the potential was `start` and the current `current`."""
-    return start * (1.0 - gone) + tau / capacitance * (current * gone + slope * (elapsed - tau * gone))
-
-
 @njit(cache=True, error_model="numpy", nogil=True)
 def _growth(potential: float, current: float, tau: float, capacitance: float) -> float:
     """Right side of Eq. 5."""
     return -potential / tau + current / capacitance
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _refine(
-    high: float,
-    reached: float,
-    start: float,
-    current: float,
-    slope: float,
-    tau: float,
-    capacitance: float,
-    threshold: float,
-) -> float:
-    """Time of the only crossing within (0, high], where the potential has `reached` the threshold.
-
-    Newton, or bisection where Newton leaves the bracket. After a step ds Newton's error is |u''/2u'| ds^2:
-    once that is round-off, another step would only follow the round-off of the potential.
-    """
-    low = 0.0
-    guess = high * min(1.0, (threshold - start) / (reached - start))
-    for _ in range(_MOST_REFINEMENTS):
-        potential = _potential(guess, _gone(guess, tau), start, current, slope, tau, capacitance)
-        if potential < threshold:
-            low = guess
-        else:
-            high = guess
-        growth = _growth(potential, current + slope * guess, tau, capacitance)
-        bend = slope / capacitance - growth / tau
-        step = (threshold - potential) / growth
-        if low < guess + step < high and abs(bend * step) * abs(step) <= 2.0 * _ROUND_OFF * high * abs(
-            growth
-        ):
-            return guess + step
-        following = guess + step if low < guess + step < high else 0.5 * (low + high)
-        if abs(following - guess) <= _ROUND_OFF * high:
-            return following
-        guess = following
-    return guess
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _advance(
-    length: float,
-    gone: float,
-    start: float,
-    current: float,
-    slope: float,
-    tau: float,
-    capacitance: float,
-    threshold: float,
-) -> tuple[float, float]:
-    """Time of the first crossing within (0, length], or never, and the potential at `length`.
-
-    `gone` is that of `length`, which most neurons share: its exponential is dearer than all the rest.
-    """
-    potential = _potential(length, gone, start, current, slope, tau, capacitance)
-    if potential >= threshold:
-        return _refine(length, potential, start, current, slope, tau, capacitance, threshold), potential
-    # Eq. 5 times C tau, whose sign is all that matters here: rises at the start and falls at the end.
-    if tau * current > capacitance * start and tau * (current + slope * length) < capacitance * potential:
-        # du/ds = b + (rises - b) e^(-s/tau) with b = tau m/C < 0: the potential peaks where that is 0.
-        rises = _growth(start, current, tau, capacitance)
-        top = min(length, tau * math.log1p(-rises * capacitance / (tau * slope)))
-        highest = _potential(top, _gone(top, tau), start, current, slope, tau, capacitance)
-        if highest >= threshold:
-            return _refine(top, highest, start, current, slope, tau, capacitance, threshold), potential
-    return _NEVER, potential
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _exact_trains(
-    times: FloatArray,
-    currents: FloatArray,
-    tau: float,
-    capacitance: float,
-    threshold: float,
-    refractory: float,
-) -> tuple[FloatArray, np.ndarray]:
-    """Spike times of all neurons, one after the other, and where each one's begin."""
-    n_neurons = currents.shape[0]
-    gone = np.empty(times.size - 1)
-    for knot in range(times.size - 1):
-        gone[knot] = _gone(times[knot + 1] - times[knot], tau)
-    found = np.empty(64 * (n_neurons + 1))
-    offsets = np.zeros(n_neurons + 1, dtype=np.int64)
-    count = 0
-    for neuron in range(n_neurons):
-        current = currents[neuron]
-        potential = 0.0
-        ready = times[0]
-        for knot in range(times.size - 1):
-            end = times[knot + 1]
-            begin = max(times[knot], ready)
-            if begin >= end:
-                continue
-            slope = (current[knot + 1] - current[knot]) / (end - times[knot])
-            while begin < end:
-                present = current[knot] + slope * (begin - times[knot])
-                length = end - begin
-                left = gone[knot] if begin == times[knot] else _gone(length, tau)
-                crossing, later = _advance(
-                    length, left, potential, present, slope, tau, capacitance, threshold
-                )
-                if crossing == _NEVER:
-                    potential = later
-                    break
-                if count == found.size:
-                    found = np.concatenate((found, np.empty(found.size)))
-                found[count] = begin + crossing
-                ready = found[count] + refractory
-                count += 1
-                potential = 0.0
-                begin = ready
-        offsets[neuron + 1] = count
-    return found[:count], offsets
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -287,7 +147,7 @@ def _runge_kutta_trains(
     refractory: float,
     step: float,
 ) -> tuple[FloatArray, np.ndarray]:
-    """Integrate Eq. 5 with the classical Runge-Kutta scheme; same answer as `_exact_trains`."""
+    """Integrate Eq. 5 with the classical Runge-Kutta scheme; same answer as `exact_trains`."""
     n_neurons = currents.shape[0]
     n_steps = int((times[-1] - times[0]) / step + 1e-9)
     found = np.empty(64 * (n_neurons + 1))

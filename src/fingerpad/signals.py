@@ -127,6 +127,12 @@ class CurrentTraces:
         """Number of receptor sites."""
         return self.current_ma.shape[1]
 
+    def part(self, sites: slice) -> CurrentTraces:
+        """Currents of some of the sites."""
+        if sites == slice(0, self.n_sites):
+            return self
+        return CurrentTraces(self.times_ms, self.current_ma[:, sites])
+
 
 @dataclass(frozen=True)
 class SpikeTrains:
