@@ -10,7 +10,7 @@ from fingerpad.threads import available_threads
 
 Result = TypeVar("Result")
 
-BLOCK = 512
+BLOCK = 1024
 """Receptors of a block: enough to be worth a thread's while, few enough to keep memory small."""
 
 
