@@ -23,13 +23,13 @@ _MOST_REFINEMENTS = 200
 _ROUND_OFF = 4.0 * float(np.finfo(np.float64).eps)
 
 
-@njit(cache=True, error_model="numpy", nogil=True, inline="always")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _potential(x: float, gone: float, start: float, steady: float, drift: float) -> float:
     """Solve Eq. 5 in closed form: u at x, from u = `start` and w = `steady` at 0; `gone` is g."""
     return start + (steady - start) * gone + drift * (x - gone)
 
 
-@njit(cache=True, error_model="numpy", nogil=True, inline="always")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _first_guess(missing: float, rise: float, drift: float) -> float:
     """Time in which the potential gains what is `missing`, roughly, from r = `rise` and c = `drift`.
 
@@ -43,7 +43,7 @@ def _first_guess(missing: float, rise: float, drift: float) -> float:
     return 3.0 * a * (2.0 * b - a) / (6.0 * b * (b - a) + a * a)
 
 
-@njit(cache=True, error_model="numpy", nogil=True, inline="always")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _next_guess(guess: float, missing: float, rise: float, drift: float, high: float) -> tuple[float, bool]:
     """Better guess of the crossing, and whether it is exact to the round-off of times up to `high`.
 
