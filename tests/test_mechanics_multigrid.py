@@ -179,6 +179,15 @@ def test_cycle_is_symmetric_and_positive(monkeypatch, mesh):
     assert cycled_x @ x > 0.0
 
 
+def test_a_few_close_lines_do_not_stop_the_coarsening():
+    """As below a wire: two steps that are twenty times shorter than all others."""
+    along = np.concatenate([np.full(20, 0.5), [0.025, 0.025], np.full(20, 0.5)])
+    grid = multigrid.ColumnGrid(np.arange(43 * 11).reshape(43, 11), along, np.full(10, 0.5))
+    coarse = grid.coarser()
+    assert coarse is not None
+    assert coarse[0].n_columns < 0.4 * grid.n_columns
+
+
 def iterations(mesh, poisson=0.45):
     hierarchy, _, free, blocks = made(mesh, poisson, stretch=0.0)
     solver = LinearSolver(hierarchy)

@@ -188,10 +188,16 @@ class ColumnGrid:
         if self.n_columns < COARSEST_COLUMNS:
             return None
         finest_mm = float(min(self.along_mm.min(), self.around_mm.min()))
-        along, around = kept_lines(self.along_mm, finest_mm), kept_lines(self.around_mm, finest_mm)
-        chosen, number = np.unique(self.columns[np.ix_(along, around)], return_inverse=True)
-        if chosen.size > WORTHWHILE * self.n_columns:
-            return None
+        largest_mm = float(max(self.along_mm.max(), self.around_mm.max()))
+        while True:
+            along, around = kept_lines(self.along_mm, finest_mm), kept_lines(self.around_mm, finest_mm)
+            chosen, number = np.unique(self.columns[np.ix_(along, around)], return_inverse=True)
+            if chosen.size <= WORTHWHILE * self.n_columns:
+                break
+            # A few lines much closer than all others, as below a wire, are not worth a level.
+            finest_mm *= 2.0
+            if finest_mm > largest_mm:
+                return None
         number = number.reshape(along.size, around.size)
         (i, weight_i), (j, weight_j) = _between(self.along_mm, along), _between(self.around_mm, around)
         parent = number[i[:, None, :, None], j[None, :, None, :]].reshape(-1, 4)
