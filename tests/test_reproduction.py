@@ -205,7 +205,7 @@ def test_the_manifest_says_how_to_repeat_it(first):
     for stage in stages[1:-1]:
         assert 0.0 < stage["largest_force_imbalance"] <= 1e-4
         assert 0.0 < stage["largest_energy_imbalance"] < BALANCE
-            assert all(reason.startswith("geometric multigrid") for reason in stage["linear_solvers"])
+        assert all(reason.startswith("geometric multigrid") for reason in stage["linear_solvers"])
     assert all(mesh["smallest_gauss_jacobian_mm3"] > 0 for mesh in manifest["meshes"].values())
 
 
