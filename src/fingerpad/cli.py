@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # What a command runs is imported where it runs: help and version need none of it and come at once.
 
-EXPECTED_TIME = {"quick": "about 3 minutes", "standard": "about 10 minutes", "paper": "more than a day"}
+EXPECTED_TIME = {"quick": "about 2 minutes", "standard": "about 6 minutes", "paper": "some hours"}
 """On two cores, nothing stored yet."""
 
 RESOLUTIONS = ("quick", "standard", "paper")

@@ -258,7 +258,10 @@ def _add_prolonged(first, last, parent, weight, coarse, free, fine):  # type: ig
 
 def _share(kernel: Callable[..., None], first: int, last: int, *arguments: Any) -> None:
     """Run a kernel on consecutive columns, or pairs of columns, with all threads."""
-    parts = max(1, min(current_threads(), (last - first) // FEWEST_COLUMNS))
+    parts = min(current_threads(), (last - first) // FEWEST_COLUMNS)
+    if parts <= 1:
+        kernel(first, last, *arguments)
+        return
     ends = [first + (last - first) * n // parts for n in range(parts + 1)]
     with worker_threads() as each:
         each(lambda start, stop: kernel(start, stop, *arguments), list(pairwise(ends)))
