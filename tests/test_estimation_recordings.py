@@ -1,0 +1,64 @@
+"""The hand-over types of recordings: what they hold, and what they refuse."""
+
+import numpy as np
+import pytest
+
+from fingerpad.errors import InputError
+from fingerpad.estimation.recordings import RateRecordings, SpikeRecordings
+from fingerpad.signals import SpikeTrains
+
+
+def test_chosen_rows_keep_names_rates_and_a_phase_that_was_not_recorded():
+    recordings = RateRecordings(("a", "b", "c"), None, [1.0, 2.0, 3.0], "bench").chosen([2, 0])
+    assert recordings.stimuli == ("c", "a")
+    assert recordings.static_rate_hz.tolist() == [3.0, 1.0]
+    assert recordings.dynamic_rate_hz is None
+    assert (recordings.phases, recordings.n_rates, recordings.source) == (("static",), 2, "bench")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((("a", "a"), [1.0, 2.0], None), "'a' stands twice"),
+        ((("a", "b"), [1.0], None), "dynamic_rate_hz needs one rate per stimulus: got 1 for 2"),
+        ((("a", "b"), None, [1.0, -2.0]), "static_rate_hz must not be negative: the smallest is -2"),
+        ((("a", "b"), [1.0, np.nan], None), "dynamic_rate_hz must hold finite numbers only"),
+        ((("a", "b"), None, None), "got neither"),
+    ],
+    ids=["twice", "size", "negative", "nan", "neither"],
+)
+def test_rates_that_cannot_be_are_refused(arguments, said):
+    with pytest.raises(InputError, match=said):
+        RateRecordings(*arguments)
+
+
+def test_rates_of_spikes_are_means_over_presentations_in_the_order_of_their_first():
+    # Intervals that close in (30, 50]: 10 ms, then 20 ms, then none; in (600, 950]: 50 ms in the last alone.
+    trains = SpikeTrains.from_lists([[25.0, 35.0], [700.0, 750.0], [15.0, 35.0]])
+    rates = SpikeRecordings(("b", "a", "b"), trains, [1000.0, 1200.0, 1000.0]).rates()
+    assert rates.stimuli == ("b", "a")
+    assert rates.dynamic_rate_hz.tolist() == [(100.0 + 50.0) / 2, 0.0]
+    assert rates.static_rate_hz.tolist() == [0.0, 20.0]
+
+
+@pytest.mark.parametrize(
+    ("trains", "duration_ms", "said"),
+    [
+        ([[1.0]], 1000.0, "one train per presentation: got 1 for 2"),
+        ([[1.0], [-1.0, 2.0]], 1000.0, "'b' has one at -1 ms"),
+        ([[1.0], [2.0, 1001.0]], 1000.0, "'b' has one at 1001 ms"),
+        ([[1.0], [2.0]], [1000.0, 0.0], "duration_ms must be above 0"),
+        ([[1.0], [2.0]], [1.0, 1.0, 1.0], "duration_ms must be above 0, one for all or for each of 2"),
+    ],
+    ids=["size", "before", "after", "no time", "sizes"],
+)
+def test_spikes_that_cannot_be_are_refused(trains, duration_ms, said):
+    with pytest.raises(InputError, match=said):
+        SpikeRecordings(("a", "b"), SpikeTrains.from_lists(trains), duration_ms)
+
+
+def test_a_window_beyond_the_recording_has_no_rate():
+    recordings = SpikeRecordings(("a",), SpikeTrains.from_lists([[1.0]]), 900.0)
+    with pytest.raises(InputError, match="one ends at 950 ms"):
+        recordings.rates()
+    assert recordings.rates(((30.0, 50.0), (600.0, 900.0))).static_rate_hz.tolist() == [0.0]
