@@ -1,0 +1,64 @@
+"""Four numbers out of six: they fix the spikes, and nothing else is lost."""
+
+import numpy as np
+import pytest
+
+from fingerpad.afferent import Afferent
+from fingerpad.errors import InputError
+from fingerpad.estimation.identifiable import (
+    IDENTIFIABLE_NAMES,
+    IDENTIFIABLE_UNITS,
+    identifiable,
+    six_parameters,
+)
+from fingerpad.signals import SedTraces
+
+SIX = np.array([2.3e-7, 1.0e-4, 5.6e-7, 72.0, 6.0e-7, 30.0])
+SED = SedTraces([0.0, 25.0, 50.0, 1000.0], [[0.0, 0.0], [0.4, 0.9], [1.0, 2.0], [0.8, 1.7]], [50.0])
+
+
+def test_the_numbers_are_the_gains_over_capacitance_and_threshold() -> None:
+    scale = 6.0e-7 * 30.0
+    np.testing.assert_allclose(
+        identifiable(SIX), [2.3e-7 / scale, 1e-4 / scale, 5.6e-7 / scale, 72.0], rtol=1e-14
+    )
+    assert len(IDENTIFIABLE_NAMES) == len(IDENTIFIABLE_UNITS) == 4
+
+
+@pytest.mark.parametrize(("capacitance", "threshold"), [(6.0e-7, 30.0), (1.0e-6, 50.0), (3.0e-7, 90.0)])
+def test_spikes_depend_on_the_four_numbers_alone(capacitance: float, threshold: float) -> None:
+    others = six_parameters(identifiable(SIX), capacitance, threshold)
+    assert others[4:].tolist() == [capacitance, threshold]
+    np.testing.assert_allclose(identifiable(others), identifiable(SIX), rtol=1e-14)
+    expected, found = (Afferent.from_parameters(six).spikes(SED) for six in (SIX, others))
+    np.testing.assert_array_equal(found.offsets, expected.offsets)
+    np.testing.assert_allclose(found.times_ms, expected.times_ms, rtol=1e-11)
+    # Each of the four does move spikes.
+    for index in range(4):
+        moved = identifiable(SIX)
+        moved[index] *= 1.05
+        other = Afferent.from_parameters(six_parameters(moved)).spikes(SED)
+        assert abs(other[1][3] - expected[1][3]) > 0.005
+
+
+def test_rows_are_turned_one_by_one() -> None:
+    rows = np.array([SIX, 2.0 * SIX])
+    np.testing.assert_array_equal(identifiable(rows), [identifiable(row) for row in rows])
+    four = identifiable(rows)
+    np.testing.assert_array_equal(six_parameters(four), [six_parameters(row) for row in four])
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: identifiable(SIX[:5]), "parameters must hold intercept_ma, .*got shape \\(5,\\)"),
+        (lambda: identifiable([*SIX[:5], np.nan]), "parameters must hold finite numbers only: 1"),
+        (lambda: identifiable([*SIX[:4], 0.0, 30.0]), "must be greater than 0"),
+        (lambda: six_parameters(SIX), "four must hold intercept_per_ms, .*got shape \\(6,\\)"),
+        (lambda: six_parameters(SIX[:4], threshold_mv=0.0), "threshold_mv must be greater than 0"),
+        (lambda: six_parameters(["a"] * 4), "four must hold numbers"),
+    ],
+)
+def test_what_are_not_such_numbers_is_refused(call, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        call()
