@@ -1,0 +1,297 @@
+"""Random numbers by key: the same key gives the same numbers, on any number of threads and in any order.
+
+A key says what a number is for: the seed of the run, the presentation, the receptor and the purpose. The
+generator is counter-based (Philox 4x64, 10 rounds; Salmon, Moraes, Dror & Shaw 2011): it scrambles the
+key and a counter into four words of 64 bits, so that any number of any stream is made at once, without the
+ones before it.
+
+    key     = (seed, purpose)
+    counter = (block, 0, receptor, trial),    block = 1, 2, ...
+
+NumPy has the same generator and counts the same way: `generator` and `uniforms` agree to the last bit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from enum import IntEnum
+
+import numpy as np
+from numba import njit, uint64
+from numpy.typing import NDArray
+
+from fingerpad.checks import FloatArray, instance, whole
+from fingerpad.errors import InputError
+
+IntArray = NDArray[np.int64]
+
+LARGEST_SEED = 2**63 - 1
+"""Seeds, trials and receptors fit into a signed word, as NumPy's integers do."""
+
+
+class Purpose(IntEnum):
+    """What random numbers are for. Streams of different purposes have nothing in common.
+
+    The numbers are part of every key: a new purpose takes a new one, and none ever changes.
+    """
+
+    CURRENT = 1
+    """Noise of the current through a membrane."""
+    THRESHOLD = 2
+    """Threshold of each interval between spikes."""
+    GAIN = 3
+    """How strongly an end organ answers."""
+    ESCAPE = 4
+    """When a membrane with an escape rate fires."""
+    RESPONSE = 5
+    """Noise that multiplies a finished response, such as a rate."""
+
+
+# Constants of Philox 4x64 as published: two multipliers, and what is added to the key each round.
+_MULTIPLIER_0 = np.uint64(0xD2E7470EE14C6C93)
+_MULTIPLIER_1 = np.uint64(0xCA5A826395121157)
+_ADDED_0 = np.uint64(0x9E3779B97F4A7C15)
+_ADDED_1 = np.uint64(0xBB67AE8584CAA73B)
+_ROUNDS = 10
+_HALF = np.uint64(32)
+_LOW_HALF = np.uint64(0xFFFFFFFF)
+_BEYOND_DOUBLE = np.uint64(11)
+_WORDS = 4
+_LAST_BIT = 2.0**-53
+
+
+@njit(cache=True, nogil=True)
+def _high_word(a: np.uint64, b: np.uint64) -> np.uint64:
+    """Upper 64 of the 128 bits of a product, from the four products of halves."""
+    a0, a1 = a & _LOW_HALF, a >> _HALF
+    b0, b1 = b & _LOW_HALF, b >> _HALF
+    middle = a1 * b0 + ((a0 * b0) >> _HALF)
+    other = a0 * b1 + (middle & _LOW_HALF)
+    return a1 * b1 + (middle >> _HALF) + (other >> _HALF)
+
+
+@njit(cache=True, nogil=True)
+def _words(
+    seed: int, purpose: int, block: int, receptor: int, trial: int
+) -> tuple[np.uint64, np.uint64, np.uint64, np.uint64]:
+    """Scramble a key and a counter into four words (Salmon et al. 2011, section 4.3)."""
+    k0, k1 = uint64(seed), uint64(purpose)
+    c0, c1, c2, c3 = uint64(block), uint64(0), uint64(receptor), uint64(trial)
+    for _ in range(_ROUNDS):
+        high_0, low_0 = _high_word(_MULTIPLIER_0, c0), _MULTIPLIER_0 * c0
+        high_1, low_1 = _high_word(_MULTIPLIER_1, c2), _MULTIPLIER_1 * c2
+        c0, c1, c2, c3 = high_1 ^ c1 ^ k0, low_1, high_0 ^ c3 ^ k1, low_0
+        k0, k1 = k0 + _ADDED_0, k1 + _ADDED_1
+    return c0, c1, c2, c3
+
+
+@njit(cache=True, nogil=True)
+def four_uniforms(
+    seed: int, trial: int, receptor: int, purpose: int, block: int
+) -> tuple[float, float, float, float]:
+    """Return the four uniform numbers of one block, for kernels; the stream's number 0 opens block 1."""
+    w0, w1, w2, w3 = _words(seed, purpose, block, receptor, trial)
+    return (
+        (w0 >> _BEYOND_DOUBLE) * _LAST_BIT,
+        (w1 >> _BEYOND_DOUBLE) * _LAST_BIT,
+        (w2 >> _BEYOND_DOUBLE) * _LAST_BIT,
+        (w3 >> _BEYOND_DOUBLE) * _LAST_BIT,
+    )
+
+
+@njit(cache=True, nogil=True)
+def four_normals(
+    seed: int, trial: int, receptor: int, purpose: int, block: int
+) -> tuple[float, float, float, float]:
+    """Return the four standard normal numbers of one block, for kernels, by the formula of Box and Muller.
+
+    From u0 and u1: r = sqrt(-2 ln(1 - u0)) on the circle at the angle 2 pi u1; likewise from u2 and u3.
+    """
+    u0, u1, u2, u3 = four_uniforms(seed, trial, receptor, purpose, block)
+    r0, r1 = math.sqrt(-2.0 * math.log1p(-u0)), math.sqrt(-2.0 * math.log1p(-u2))
+    angle_0, angle_1 = 2.0 * math.pi * u1, 2.0 * math.pi * u3
+    return (
+        r0 * math.cos(angle_0),
+        r0 * math.sin(angle_0),
+        r1 * math.cos(angle_1),
+        r1 * math.sin(angle_1),
+    )
+
+
+def generator(seed: int, trial: int, receptor: int, purpose: Purpose) -> np.random.Generator:
+    """Make NumPy's generator of one stream.
+
+    Parameters
+    ----------
+    seed : int
+        Of the whole run; written down with its results.
+    trial, receptor : int
+        Which presentation and which end organ, from 0.
+    purpose : Purpose
+        What the numbers are for.
+
+    Returns
+    -------
+    numpy.random.Generator
+        At the beginning of the stream.
+
+    Raises
+    ------
+    InputError
+        If a number is negative or not whole, or the purpose is none.
+
+    Examples
+    --------
+    >>> first = generator(7, trial=0, receptor=3, purpose=Purpose.GAIN).random()
+    >>> first == generator(7, trial=0, receptor=3, purpose=Purpose.GAIN).random()
+    True
+    """
+    key = [_number("seed", seed), int(instance("purpose", purpose, Purpose))]
+    counter = [0, 0, _number("receptor", receptor), _number("trial", trial)]
+    return np.random.Generator(
+        np.random.Philox(counter=np.array(counter, dtype=np.uint64), key=np.array(key, dtype=np.uint64))
+    )
+
+
+def uniforms(
+    seed: int, trials: int | Sequence[int], receptors: int | Sequence[int], purpose: Purpose, count: int
+) -> FloatArray:
+    """Draw uniform numbers of many streams at once.
+
+    Parameters
+    ----------
+    seed : int
+        Of the whole run.
+    trials, receptors : int or sequence of int
+        Which presentations and which end organs: their own numbers, such as `range(3, 5)`, or how many of
+        them from 0.
+    purpose : Purpose
+        What the numbers are for.
+    count : int
+        How many each stream gives.
+
+    Returns
+    -------
+    array (n_trials, n_receptors, count)
+        Within 0 ... 1, without 1; what `generator` of the same key gives by `random`.
+
+    Raises
+    ------
+    InputError
+        As in `generator`.
+
+    Examples
+    --------
+    >>> two_trials = uniforms(7, trials=2, receptors=[3, 5], purpose=Purpose.GAIN, count=4)
+    >>> two_trials.shape
+    (2, 2, 4)
+    >>> alone = uniforms(7, trials=[1], receptors=[5], purpose=Purpose.GAIN, count=1)
+    >>> bool(alone[0, 0, 0] == two_trials[1, 1, 0])
+    True
+    """
+    numbers = np.empty(_shape(trials, receptors, count))
+    _fill(*_key(seed, trials, receptors, purpose), False, numbers)
+    return numbers
+
+
+def normals(
+    seed: int, trials: int | Sequence[int], receptors: int | Sequence[int], purpose: Purpose, count: int
+) -> FloatArray:
+    """Draw standard normal numbers of many streams at once.
+
+    Parameters
+    ----------
+    seed, trials, receptors, purpose, count
+        As in `uniforms`.
+
+    Returns
+    -------
+    array (n_trials, n_receptors, count)
+        Mean 0, variance 1.
+
+    Raises
+    ------
+    InputError
+        As in `generator`.
+
+    Notes
+    -----
+    Box & Muller 1958. `generator` makes normal numbers in another way: they differ from these.
+
+    Examples
+    --------
+    >>> numbers = normals(7, trials=100, receptors=10, purpose=Purpose.GAIN, count=10)
+    >>> abs(float(numbers.mean())) < 0.05, 0.95 < float(numbers.std()) < 1.05
+    (True, True)
+    """
+    numbers = np.empty(_shape(trials, receptors, count))
+    _fill(*_key(seed, trials, receptors, purpose), True, numbers)
+    return numbers
+
+
+@njit(cache=True, nogil=True)
+def _fill(seed, trials, receptors, purpose, normal, numbers):  # type: ignore[no-untyped-def]
+    """Write the first numbers of every stream."""
+    count = numbers.shape[2]
+    for i in range(trials.size):
+        for j in range(receptors.size):
+            for first in range(0, count, _WORDS):
+                block = first // _WORDS + 1
+                if normal:
+                    four = four_normals(seed, trials[i], receptors[j], purpose, block)
+                else:
+                    four = four_uniforms(seed, trials[i], receptors[j], purpose, block)
+                for k in range(min(_WORDS, count - first)):
+                    numbers[i, j, first + k] = four[k]
+
+
+def numbered(name: str, which: int | Sequence[int]) -> IntArray:
+    """Return the numbers of trials or receptors: the ones given, or so many from 0.
+
+    Parameters
+    ----------
+    name : str
+        What they are, for the message.
+    which : int or sequence of int
+        How many, or which.
+
+    Returns
+    -------
+    int array (n,)
+
+    Raises
+    ------
+    InputError
+        If one is negative or not whole.
+
+    Examples
+    --------
+    >>> numbered("trials", 3).tolist(), numbered("trials", [4, 2]).tolist()
+    ([0, 1, 2], [4, 2])
+    """
+    if isinstance(which, int | np.integer):
+        return np.arange(whole(name, int(which), 1), dtype=np.int64)
+    return np.array([_number(name, number) for number in which], dtype=np.int64)
+
+
+def _key(
+    seed: int, trials: int | Sequence[int], receptors: int | Sequence[int], purpose: Purpose
+) -> tuple[int, IntArray, IntArray, int]:
+    return (
+        _number("seed", seed),
+        numbered("trials", trials),
+        numbered("receptors", receptors),
+        int(instance("purpose", purpose, Purpose)),
+    )
+
+
+def _shape(trials: int | Sequence[int], receptors: int | Sequence[int], count: int) -> tuple[int, int, int]:
+    return numbered("trials", trials).size, numbered("receptors", receptors).size, whole("count", count, 0)
+
+
+def _number(name: str, value: int) -> int:
+    number = whole(name, value, 0)
+    if number > LARGEST_SEED:
+        raise InputError(f"{name} must not exceed {LARGEST_SEED}: got {number}.")
+    return number
