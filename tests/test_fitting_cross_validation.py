@@ -1,10 +1,14 @@
 """Cross validation: folds part the data, nothing leaks, and synthetic truth comes back."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
 from fingerpad.errors import InputError
 from fingerpad.fitting import (
+    ResponseSurface,
     coding_increments,
     cross_validate,
     interleaved_folds,
@@ -24,18 +28,31 @@ def toy_rates(parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return floor + 3.0 * height * shape, floor + height * shape**2
 
 
-def toy_score(observed: tuple[np.ndarray, np.ndarray]):
+@dataclass(frozen=True)
+class Scored:
+    """A problem that consists of a score."""
+
+    score: Callable[[np.ndarray, np.ndarray], float]
+    n_observations: int = 36
+    names: tuple[str, ...] = ("floor", "height", "width")
+
+    def residuals(self, parameters: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        raise AssertionError("the response surface method needs no residuals")
+
+
+def toy_problem(observed: tuple[np.ndarray, np.ndarray]) -> Scored:
     def score(parameters: np.ndarray, chosen: np.ndarray) -> float:
         dynamic, static = toy_rates(parameters)
         return weighted_fractional_sum_of_squares(
             observed[0][chosen], dynamic[chosen], observed[1][chosen], static[chosen]
         )
 
-    return score
+    return Scored(score)
 
 
-def toy_increments() -> np.ndarray:
-    return np.array([coding_increments(start, 0.01, where_zero=[0.01, 0.0, 0.0]) for start in STARTS])
+def toy_method(smallest_gain: float = 1e-4) -> ResponseSurface:
+    increments = [coding_increments(start, 0.01, where_zero=[0.01, 0.0, 0.0]) for start in STARTS]
+    return ResponseSurface(STARTS, increments, smallest_gain=smallest_gain)
 
 
 def test_interleaved_folds_part_36_shifts_into_six_equal_sets() -> None:
@@ -46,30 +63,26 @@ def test_interleaved_folds_part_36_shifts_into_six_equal_sets() -> None:
 
 
 def test_synthetic_truth_is_recovered_in_every_fold() -> None:
-    result = cross_validate(
-        toy_score(toy_rates(TRUTH)), STARTS, toy_increments(), interleaved_folds(36), smallest_gain=1e-7
-    )
+    result = cross_validate(toy_problem(toy_rates(TRUTH)), toy_method(1e-7), interleaved_folds(36))
     assert len(result.folds) == 6
     for fold in result.folds:
-        np.testing.assert_allclose(fold.parameters, TRUTH, atol=0.05)
-        assert fold.fss_test > 0.999
-    assert result.fss_train > 0.999
-    assert result.fss_test == pytest.approx(np.mean([fold.fss_test for fold in result.folds]))
-    assert result.fss_train == pytest.approx(np.mean([fold.fss_train for fold in result.folds]))
+        np.testing.assert_allclose(fold.fit.parameters, TRUTH, atol=0.05)
+        assert fold.score_test > 0.999
+    assert result.score_train > 0.999
+    assert result.score_test == pytest.approx(np.mean([fold.score_test for fold in result.folds]))
+    assert result.score_train == pytest.approx(np.mean([fold.score_train for fold in result.folds]))
 
 
 def test_each_fold_is_fitted_without_its_own_observations() -> None:
     observed = toy_rates(TRUTH)
-    clean = cross_validate(toy_score(observed), STARTS, toy_increments(), interleaved_folds(36))
+    clean = cross_validate(toy_problem(observed), toy_method(), interleaved_folds(36))
     spoiled_dynamic = observed[0].copy()
     spoiled_dynamic[2::6] *= 2.0
-    spoiled = cross_validate(
-        toy_score((spoiled_dynamic, observed[1])), STARTS, toy_increments(), interleaved_folds(36)
-    )
-    assert spoiled.folds[2].parameters.tobytes() == clean.folds[2].parameters.tobytes()
-    assert spoiled.folds[2].fss_train == clean.folds[2].fss_train
-    assert spoiled.folds[2].fss_test < clean.folds[2].fss_test - 0.01
-    assert spoiled.folds[0].parameters.tobytes() != clean.folds[0].parameters.tobytes()
+    spoiled = cross_validate(toy_problem((spoiled_dynamic, observed[1])), toy_method(), interleaved_folds(36))
+    assert spoiled.folds[2].fit.parameters.tobytes() == clean.folds[2].fit.parameters.tobytes()
+    assert spoiled.folds[2].score_train == clean.folds[2].score_train
+    assert spoiled.folds[2].score_test < clean.folds[2].score_test - 0.01
+    assert spoiled.folds[0].fit.parameters.tobytes() != clean.folds[0].fit.parameters.tobytes()
 
 
 def test_training_and_testing_sets_part_the_observations() -> None:
@@ -80,9 +93,11 @@ def test_training_and_testing_sets_part_the_observations() -> None:
         asked.append(tuple(chosen.tolist()))
         return -float(parameters[0] ** 2)
 
-    result = cross_validate(score, [[0.0]], [0.1], memberships)
+    result = cross_validate(Scored(score, 7), ResponseSurface([[0.0]], [0.1]), memberships)
     everything = set(range(7))
     assert [fold.testing.tolist() for fold in result.folds] == [[0, 1], [2, 4], [3, 5, 6]]
+    for fold in result.folds:
+        assert fold.training.tolist() == sorted(everything - set(fold.testing.tolist()))
     expected = {tuple(fold.testing.tolist()) for fold in result.folds}
     expected |= {tuple(sorted(everything - set(testing))) for testing in expected}
     assert set(asked) == expected
@@ -93,33 +108,44 @@ def test_the_better_start_on_the_training_set_is_taken() -> None:
         x = float(parameters[0])
         return max(0.5 - (x + 2.0) ** 2, 1.0 - (x - 2.0) ** 2)
 
-    result = cross_validate(two_hills, [[-2.5], [2.5]], [0.05], interleaved_folds(4, 2))
+    method = ResponseSurface([[-2.5], [2.5]], [0.05])
+    result = cross_validate(Scored(two_hills, 4), method, interleaved_folds(4, 2))
     for fold in result.folds:
-        assert fold.start == 1
-        assert fold.fss_train == max(fit.objective for fit in fold.fits)
-        assert fold.history == fold.fits[1].history
-        assert fold.fits[0].objective == pytest.approx(0.5, abs=0.01)
+        low, high = fold.fit.attempts
+        assert fold.fit.start == 1
+        assert fold.score_train == high.score > low.score
+        assert fold.fit.history == high.history
+        assert fold.fit.n_evaluations == low.n_evaluations + high.n_evaluations
+        assert low.score == pytest.approx(0.5, abs=0.01)
 
 
-def test_a_fold_is_the_same_as_a_fit_to_its_training_set() -> None:
-    score, increments = toy_score(toy_rates(TRUTH)), toy_increments()
-    fold = cross_validate(score, STARTS, increments, interleaved_folds(36)).folds[3]
+def test_a_fold_is_the_same_as_a_climb_on_its_training_set() -> None:
+    problem, method = toy_problem(toy_rates(TRUTH)), toy_method()
+    fit = cross_validate(problem, method, interleaved_folds(36)).folds[3].fit
     training = np.setdiff1d(np.arange(36), np.arange(3, 36, 6))
     alone = maximise(
-        lambda parameters: score(parameters, training), STARTS[fold.start], increments[fold.start]
+        lambda parameters: problem.score(parameters, training),
+        STARTS[fit.start],
+        np.asarray(method.increments)[fit.start],
     )
-    assert alone.parameters.tobytes() == fold.parameters.tobytes()
+    assert alone.parameters.tobytes() == fit.parameters.tobytes()
+    assert [row.objective for row in alone.history] == [row.score for row in fit.history]
 
 
 @pytest.mark.parametrize("memberships", [[0, 0, 0], [0, 2, 2], [1, 2, 1], [0.5, 0, 1], [-1, 0, 1]])
 def test_memberships_with_a_gap_are_refused(memberships: list[float]) -> None:
     with pytest.raises(InputError, match="memberships must number at least two folds"):
-        cross_validate(lambda parameters, chosen: 0.0, [[0.0]], [0.1], memberships)
+        cross_validate(Scored(lambda *_: 0.0, 3), ResponseSurface([[0.0]], [0.1]), memberships)
+
+
+def test_memberships_that_miss_an_observation_are_refused() -> None:
+    with pytest.raises(InputError, match="memberships needs one fold per observation: got 3 for 4"):
+        cross_validate(Scored(lambda *_: 0.0, 4), ResponseSurface([[0.0]], [0.1]), [0, 1, 0])
 
 
 def test_other_wrong_shapes_are_refused() -> None:
     with pytest.raises(InputError, match="increments must match starts"):
-        cross_validate(lambda parameters, chosen: 0.0, [[0.0], [1.0]], [0.1, 0.1, 0.1], [0, 1])
+        ResponseSurface([[0.0], [1.0]], [0.1, 0.1, 0.1])
     with pytest.raises(InputError, match="n_observations must be a whole number of at least 6"):
         interleaved_folds(5)
     with pytest.raises(InputError, match="n_folds must be a whole number of at least 2"):

@@ -229,51 +229,52 @@ def bar_traces(shift_mm):
 
 
 @pytest.fixture(scope="module")
-def synthetic_recordings():
+def synthetic_problem():
     """What a known afferent would have been recorded to answer."""
-    recordings = single_unit.Recordings(bar_traces(bar_firing_rates().shift_mm))
+    problem = single_unit.rate_problem(bar_traces(bar_firing_rates().shift_mm))
     truth = np.array([3e-7, 2.6e-4, 1.1e-6, 60.0, 1.0e-6, 50.0])
-    recordings.dynamic, recordings.static = recordings.predict(truth)
-    return recordings, truth
+    dynamic, static = problem.model.rates(truth)
+    return replace(problem, dynamic_rate_hz=dynamic, static_rate_hz=static), truth
 
 
 @pytest.fixture(scope="module")
-def synthetic_fit(synthetic_recordings):
-    return single_unit.fit(synthetic_recordings[0])
+def synthetic_fit(synthetic_problem):
+    return single_unit.fit(synthetic_problem[0])
 
 
-def test_a_known_afferent_scores_perfectly_and_others_do_not(synthetic_recordings):
-    recordings, truth = synthetic_recordings
+def test_a_known_afferent_scores_perfectly_and_others_do_not(synthetic_problem):
+    problem, truth = synthetic_problem
     everything = np.arange(36)
-    assert np.ptp(recordings.dynamic) > 50.0
-    assert np.ptp(recordings.static) > 10.0
-    assert recordings.score(truth, everything) == 1.0
-    assert recordings.score(truth * [1, 1, 1.3, 1, 1, 1], everything) < 0.95
-    assert recordings.score(truth * [1, 1.3, 1, 1, 1, 1], everything) < 0.99
+    assert np.ptp(problem.dynamic_rate_hz) > 50.0
+    assert np.ptp(problem.static_rate_hz) > 10.0
+    assert problem.score(truth, everything) == 1.0
+    assert problem.score(truth * [1, 1, 1.3, 1, 1, 1], everything) < 0.95
+    assert problem.score(truth * [1, 1.3, 1, 1, 1, 1], everything) < 0.99
 
 
-def test_the_fit_finds_what_a_known_afferent_answered(synthetic_recordings, synthetic_fit):
-    recordings, _ = synthetic_recordings
+def test_the_fit_finds_what_a_known_afferent_answered(synthetic_problem, synthetic_fit):
+    problem, _ = synthetic_problem
     best, folds = synthetic_fit
-    assert best.objective > 0.98
-    assert best.objective == recordings.score(best.parameters, np.arange(36))
-    assert folds.fss_test > 0.97
-    starts = [recordings.score(start, np.arange(36)) for start in single_unit.start_points()]
-    assert best.objective > max(starts)
+    assert best.score > 0.98
+    assert best.score == problem.score(best.parameters, np.arange(36))
+    assert folds.score_test > 0.97
+    starts = [problem.score(start, np.arange(36)) for start in single_unit.start_points()]
+    assert best.score > max(starts)
 
 
-def test_single_unit_result_names_every_number(synthetic_recordings, synthetic_fit):
-    recordings, _ = synthetic_recordings
+def test_single_unit_result_names_every_number(synthetic_problem, synthetic_fit):
+    problem, _ = synthetic_problem
     best, folds = synthetic_fit
-    found = single_unit.result(recordings, best, folds)
-    dynamic, static = recordings.predict(best.parameters)
+    found = single_unit.result(problem, best, folds)
+    shift_mm = bar_firing_rates().shift_mm
+    dynamic, static = problem.model.rates(best.parameters)
     np.testing.assert_array_equal(found["dynamic_rate_hz"], dynamic)
     np.testing.assert_array_equal(found["static_rate_hz"], static)
     assert list(found["parameters"].values()) == best.parameters.tolist()
     assert set(found["parameters"]) == set(found["units"])
     assert [fold["fold"] for fold in found["folds"]] == [1, 2, 3, 4, 5, 6]
     tested = np.concatenate([fold["testing_shift_mm"] for fold in found["folds"]])
-    np.testing.assert_array_equal(np.sort(tested), recordings.shift_mm)
+    np.testing.assert_array_equal(np.sort(tested), shift_mm)
     assert found["fss_out_of_sample"] == pytest.approx(np.mean([fold["fss_test"] for fold in found["folds"]]))
     for fold in found["folds"]:
         assert fold["history"][-1]["fss"] == fold["fss_train"]
@@ -281,7 +282,7 @@ def test_single_unit_result_names_every_number(synthetic_recordings, synthetic_f
     weighted = 0.25 * found["fss_in_sample_dynamic"] + 0.75 * found["fss_in_sample_static"]
     assert found["fss_in_sample"] == pytest.approx(weighted, rel=1e-12)
     ours = found["modulation"]["static"]["ours"]
-    under = static[np.abs(recordings.shift_mm) < 1.2]
+    under = static[np.abs(shift_mm) < 1.2]
     assert (ours["maximum_hz"], ours["minimum_hz"]) == (static.max(), under.min())
     json.dumps(plain(found), allow_nan=False)
 

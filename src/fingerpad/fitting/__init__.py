@@ -1,6 +1,7 @@
 """Fit any function of a few parameters; nothing here knows a model.
 
-Goodness of fit (Eqs. 12-14), the response surface method and cross validation of the paper's section 2.2.2.
+Goodness of fit (Eqs. 12-14), the response surface method and cross validation of the paper's section 2.2.2,
+and other methods beside it. A method fits a `Problem` and gives a `Fit`.
 """
 
 from fingerpad.fitting.cross_validation import CrossValidation, FoldFit, cross_validate, interleaved_folds
@@ -8,6 +9,8 @@ from fingerpad.fitting.fractional_sum_of_squares import (
     fractional_sum_of_squares,
     weighted_fractional_sum_of_squares,
 )
+from fingerpad.fitting.methods import Fit, Method, ResponseSurface, Step, best_of
+from fingerpad.fitting.problem import Problem
 from fingerpad.fitting.response_surface import (
     Iteration,
     ResponseSurfaceFit,
@@ -19,9 +22,15 @@ from fingerpad.fitting.response_surface import (
 
 __all__ = [
     "CrossValidation",
+    "Fit",
     "FoldFit",
     "Iteration",
+    "Method",
+    "Problem",
+    "ResponseSurface",
     "ResponseSurfaceFit",
+    "Step",
+    "best_of",
     "coding_increments",
     "cross_validate",
     "factorial_design",

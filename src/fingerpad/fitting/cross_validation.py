@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from fingerpad.checks import FloatArray, float_array, whole
+from fingerpad.checks import float_array, whole
 from fingerpad.errors import InputError
-from fingerpad.fitting.response_surface import Iteration, ResponseSurfaceFit, maximise
+from fingerpad.fitting.methods import Fit, Method
+from fingerpad.fitting.problem import IntArray, Problem
 from fingerpad.parameters import protocol
-
-IntArray = NDArray[np.int64]
-Score = Callable[[FloatArray, IntArray], float]
 
 
 @dataclass(frozen=True)
@@ -25,28 +22,24 @@ class FoldFit:
     ----------
     fold : int
         Number of the fold, from 0.
-    start : int
-        Which start point led to the better training score; the first one of equals.
-    parameters : array (n_parameters,)
-        Fitted on the training set.
-    fss_train, fss_test : float
-        Score of `parameters` on the observations used for fitting, and on those left out.
-    history : tuple of Iteration
-        The climb from the chosen start point.
-    fits : tuple of ResponseSurfaceFit
-        The climbs from all start points, in their order.
-    testing : int array (n_testing,)
-        Observations that were left out.
+    fit : Fit
+        To the training set.
+    score_test : float
+        Score of its parameters on the observations left out.
+    training, testing : int array (n_training,), (n_testing,)
+        Observations used for fitting, and those left out.
     """
 
     fold: int
-    start: int
-    parameters: FloatArray
-    fss_train: float
-    fss_test: float
-    history: tuple[Iteration, ...]
-    fits: tuple[ResponseSurfaceFit, ...]
+    fit: Fit
+    score_test: float
+    training: IntArray
     testing: IntArray
+
+    @property
+    def score_train(self) -> float:
+        """Score on the training set."""
+        return self.fit.score
 
 
 @dataclass(frozen=True)
@@ -62,14 +55,14 @@ class CrossValidation:
     folds: tuple[FoldFit, ...]
 
     @property
-    def fss_train(self) -> float:
+    def score_train(self) -> float:
         """Mean training score of the folds."""
-        return float(np.mean([fold.fss_train for fold in self.folds]))
+        return float(np.mean([fold.score_train for fold in self.folds]))
 
     @property
-    def fss_test(self) -> float:
+    def score_test(self) -> float:
         """Mean testing score of the folds, the estimate of performance out of sample."""
-        return float(np.mean([fold.fss_test for fold in self.folds]))
+        return float(np.mean([fold.score_test for fold in self.folds]))
 
 
 def interleaved_folds(n_observations: int, n_folds: int = int(protocol.FOLDS.value)) -> IntArray:
@@ -94,29 +87,17 @@ def interleaved_folds(n_observations: int, n_folds: int = int(protocol.FOLDS.val
     return np.arange(n_observations, dtype=np.int64) % n_folds
 
 
-def cross_validate(
-    score: Score,
-    starts: ArrayLike,
-    increments: ArrayLike,
-    memberships: ArrayLike,
-    lower_bounds: ArrayLike | None = None,
-    smallest_gain: float = 1.0e-4,
-    most_iterations: int = 200,
-) -> CrossValidation:
-    """Fit every fold from every start point; the better training score of a fold is judged on its test set.
+def cross_validate(problem: Problem, method: Method, memberships: ArrayLike) -> CrossValidation:
+    """Fit every fold without its own observations, and judge the result on them.
 
     Parameters
     ----------
-    score : callable
-        `score(parameters, observations)`: goodness of fit over the observations with these indices.
-    starts : array (n_starts, n_parameters)
-        Start points of every fold.
-    increments : array (n_parameters,) or (n_starts, n_parameters)
-        One coded unit of each parameter, for all start points or for each.
+    problem : Problem
+        What is fitted.
+    method : Method
+        How.
     memberships : int array (n_observations,)
         Fold of each observation, 0 ... n_folds - 1, none empty; `interleaved_folds` deals them out.
-    lower_bounds, smallest_gain, most_iterations
-        As in `maximise`.
 
     Returns
     -------
@@ -125,61 +106,44 @@ def cross_validate(
     Raises
     ------
     InputError
-        If shapes disagree or a fold is empty.
+        If an observation has no fold, or a fold is empty.
     ConvergenceError
-        If a climb does not end.
+        If a fit does not end.
 
     Notes
     -----
-    Gerling et al. 2014, section 2.2.2. Nothing is random: the same input gives the same bits.
+    Gerling et al. 2014, section 2.2.2.
 
     Examples
     --------
-    >>> observed = np.array([1.0, 2.0, 3.0, 4.0])
-    >>> def score(slope, chosen):
-    ...     return -float(((observed - slope * [1, 2, 3, 4])[chosen] ** 2).sum())
-    >>> result = cross_validate(score, [[0.5], [2.0]], [0.01], interleaved_folds(4, 2))
-    >>> [round(float(fold.parameters[0]), 1) for fold in result.folds]
+    >>> from fingerpad.fitting import ResponseSurface
+    >>> class Line:
+    ...     names, n_observations = ("slope",), 4
+    ...     def residuals(self, slope, chosen):
+    ...         return ((np.array([1.0, 2.0, 3.0, 4.0]) - slope * [1, 2, 3, 4]) / 5.0)[chosen]
+    ...     def score(self, slope, chosen):
+    ...         return 1.0 - float((self.residuals(slope, chosen) ** 2).sum())
+    >>> method = ResponseSurface(starts=[[0.5], [2.0]], increments=[0.01])
+    >>> result = cross_validate(Line(), method, interleaved_folds(4, 2))
+    >>> [round(float(fold.fit.parameters[0]), 1) for fold in result.folds]
     [1.0, 1.0]
     """
-    points = float_array("starts", starts, 2)
-    units = np.asarray(increments, dtype=np.float64)
-    if units.shape not in (points.shape, points.shape[1:]):
-        raise InputError(f"increments must match starts {points.shape} or one row of it: got {units.shape}.")
-    units = np.broadcast_to(units, points.shape)
-    folds = _checked_memberships(memberships)
+    folds = _checked_memberships(memberships, problem.n_observations)
 
     def fold_fit(fold: int) -> FoldFit:
         training, testing = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
-        fits = tuple(
-            maximise(
-                lambda parameters: score(parameters, training),
-                start,
-                increment,
-                lower_bounds,
-                smallest_gain,
-                most_iterations,
-            )
-            for start, increment in zip(points, units, strict=True)
-        )
-        best = int(np.argmax([fit.objective for fit in fits]))
-        chosen = fits[best]
-        return FoldFit(
-            fold=fold,
-            start=best,
-            parameters=chosen.parameters,
-            fss_train=chosen.objective,
-            fss_test=float(score(chosen.parameters, testing)),
-            history=chosen.history,
-            fits=fits,
-            testing=testing,
-        )
+        fit = method.fit(problem, training)
+        return FoldFit(fold, fit, float(problem.score(fit.parameters, testing)), training, testing)
 
     return CrossValidation(tuple(fold_fit(fold) for fold in range(int(folds.max()) + 1)))
 
 
-def _checked_memberships(memberships: ArrayLike) -> IntArray:
+def _checked_memberships(memberships: ArrayLike, n_observations: int) -> IntArray:
     given = float_array("memberships", memberships, 1)
+    if given.size != n_observations:
+        raise InputError(
+            f"memberships needs one fold per observation: got {given.size} for {n_observations}."
+        )
     folds = given.astype(np.int64)
     present = np.unique(folds)
     if (folds != given).any() or present.size < 2 or not np.array_equal(present, np.arange(present.size)):

@@ -172,7 +172,7 @@ class Levels:
 
     def __init__(self, sed: SedTraces, spheres: Sequence[SedTraces], seed: int):
         population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
-        self.recordings = single_unit.Recordings(sed)
+        self.problem = single_unit.rate_problem(sed)
         self.spheres: list[Drive] = [drive(traces) for traces in spheres]
         self.neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
         draws = (sphere_discrimination.NOISE_DRAWS, len(population.positions_mm))
@@ -180,7 +180,7 @@ class Levels:
         self.seed = seed
         self.everything = np.arange(sed.n_sites)
         self.sed_peak_kpa = float(sed.sed_kpa[-1].max())
-        self.rate_peak_kpa_per_ms = float(self.recordings.drive.rate_kpa_per_ms.max())
+        self.rate_peak_kpa_per_ms = float(drive(sed).rate_kpa_per_ms.max())
 
     def parameters(self, searched: FloatArray) -> FloatArray:
         """Six numbers of an afferent from the four that are searched, see `BOUNDS`."""
@@ -201,7 +201,7 @@ class Levels:
 
     def fss(self, parameters: FloatArray) -> float:
         """Weighted FSS over all shifts."""
-        return self.recordings.score(parameters, self.everything)
+        return self.problem.score(parameters, self.everything)
 
     def hit_rates(self, parameters: FloatArray, noise_sigma: float) -> FloatArray:
         """Predict the hit rates at 296 and 365 /m of the static Gradient Sum."""
@@ -234,7 +234,7 @@ class Levels:
 
     def judged(self, parameters: FloatArray) -> dict[str, Any]:
         """FSS, hit rates and the noise that would be needed, of one afferent."""
-        dynamic, static = self.recordings.predict(parameters)
+        dynamic, static = self.problem.model.rates(parameters)
         try:
             noise = fit_noise_sigma(lambda sigma: self.hit_rates(parameters, sigma))
             sigma, error = noise.noise_sigma, noise.root_mean_square_error
@@ -242,8 +242,8 @@ class Levels:
             sigma, error = float("nan"), float("nan")
         return {
             "fss": self.fss(parameters),
-            "fss_dynamic": fractional_sum_of_squares(self.recordings.dynamic, dynamic),
-            "fss_static": fractional_sum_of_squares(self.recordings.static, static),
+            "fss_dynamic": fractional_sum_of_squares(self.problem.dynamic_rate_hz, dynamic),
+            "fss_static": fractional_sum_of_squares(self.problem.static_rate_hz, static),
             "noise_sigma": sigma,
             "noise_fit_error": error,
             "hit_rate": self.hit_rates(parameters, NOISE_SIGMA),

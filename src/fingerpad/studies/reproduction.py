@@ -124,8 +124,8 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
     sphere_responses, nail_response = responses["spheres"], responses["nail"]["nail"]
 
     with _timed("fit and discrimination", 3, progress, stages) as advance:
-        recordings = single_unit.Recordings(single_unit.receptor_sed(list(bar_responses.values())))
-        best, folds = single_unit.fit(recordings)
+        problem = single_unit.rate_problem(single_unit.receptor_sed(list(bar_responses.values())))
+        best, folds = single_unit.fit(problem)
         advance()
         afferent = Afferent.from_parameters(best.parameters)
         discrimination = sphere_discrimination.result(sphere_responses, afferent, conditions.seed)
@@ -133,7 +133,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
         standard = sphere_responses[STANDARD_SPHERE]
         results: dict[str, Any] = {
             "skin_deflection": skin_deflection.result(deflection),
-            "single_unit": single_unit.result(recordings, best, folds),
+            "single_unit": single_unit.result(problem, best, folds),
             "discrimination": discrimination,
             "population": sphere_discrimination.population_map(standard, afferent),
             "nail": nail_border.result(nail_response),

@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from fingerpad.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.afferent import PARAMETER_NAMES
 from fingerpad.checks import FloatArray
+from fingerpad.estimation.rate_problem import AfferentModel, RateProblem
 from fingerpad.fitting import (
     CrossValidation,
-    ResponseSurfaceFit,
+    Fit,
+    ResponseSurface,
     coding_increments,
     cross_validate,
     fractional_sum_of_squares,
     interleaved_folds,
-    maximise,
-    weighted_fractional_sum_of_squares,
 )
 from fingerpad.indenters import Bar
 from fingerpad.parameters import neuron, protocol
@@ -25,7 +25,7 @@ from fingerpad.sampling import SkinResponse
 from fingerpad.signals import SedTraces
 from fingerpad.spikes import modulation_difference, modulation_index
 from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions, Touch
-from fingerpad.transduction import Drive, drive
+from fingerpad.transduction import drive
 
 INCREMENT = 0.01
 """Coding increment over the start value; the paper's are "typically two orders of magnitude smaller"."""
@@ -83,82 +83,70 @@ def increments(starts: FloatArray) -> FloatArray:
     return np.array([coding_increments(start, INCREMENT, where_zero) for start in starts])
 
 
-class Recordings:
-    """Observed rates at all shifts and the drive that the model answers; scores parameters against them."""
-
-    def __init__(self, sed: SedTraces):
-        observed = bar_firing_rates()
-        self.drive: Drive = drive(sed)
-        self.shift_mm = observed.shift_mm
-        self.dynamic, self.static = observed.dynamic_rate_hz, observed.static_rate_hz
-
-    def predict(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Dynamic and static rates at all shifts. [spikes/s]"""
-        return Afferent.from_parameters(parameters).rates(self.drive)
-
-    def score(self, parameters: FloatArray, chosen: np.ndarray) -> float:
-        """Weighted FSS of Eqs. 12-14 over some shifts."""
-        dynamic, static = self.predict(parameters)
-        return weighted_fractional_sum_of_squares(
-            self.dynamic[chosen], dynamic[chosen], self.static[chosen], static[chosen]
-        )
+def rate_problem(sed: SedTraces) -> RateProblem:
+    """Observed rates at all shifts, and the paper's model of the afferent that answers `sed`."""
+    observed = bar_firing_rates()
+    return RateProblem(AfferentModel(drive(sed)), observed.dynamic_rate_hz, observed.static_rate_hz)
 
 
-def fit(recordings: Recordings) -> tuple[ResponseSurfaceFit, CrossValidation]:
-    """Best fit to all shifts from both start points, and the six folds."""
+def response_surface() -> ResponseSurface:
+    """Return the paper's method from its two start points; what is of the membrane stays physical."""
     starts = start_points()
-    steps = increments(starts)
     bounds = np.array([-np.inf, 0.0, 0.0, *(LOWEST_SHARE * starts[0, 3:])])
-    everything = np.arange(recordings.shift_mm.size)
-    climbs = [
-        maximise(lambda parameters: recordings.score(parameters, everything), start, step, bounds)
-        for start, step in zip(starts, steps, strict=True)
-    ]
-    folds = cross_validate(recordings.score, starts, steps, interleaved_folds(everything.size), bounds)
-    return max(climbs, key=lambda climb: climb.objective), folds
+    return ResponseSurface(starts, increments(starts), bounds)
 
 
-def result(recordings: Recordings, best: ResponseSurfaceFit, folds: CrossValidation) -> dict[str, Any]:
+def fit(problem: RateProblem) -> tuple[Fit, CrossValidation]:
+    """Best fit to all shifts from both start points, and the six folds."""
+    method, everything = response_surface(), np.arange(problem.n_observations)
+    return method.fit(problem, everything), cross_validate(
+        problem, method, interleaved_folds(everything.size)
+    )
+
+
+def result(problem: RateProblem, best: Fit, folds: CrossValidation) -> dict[str, Any]:
     """Rates, fits and modulation, ready for the report."""
-    dynamic, static = recordings.predict(best.parameters)
+    observed_dynamic, observed_static = problem.dynamic_rate_hz, problem.static_rate_hz
+    shift_mm = bar_firing_rates().shift_mm
+    dynamic, static = problem.model.rates(best.parameters)
     return {
-        "fss_in_sample": best.objective,
-        "fss_in_sample_dynamic": fractional_sum_of_squares(recordings.dynamic, dynamic),
-        "fss_in_sample_static": fractional_sum_of_squares(recordings.static, static),
-        "fss_out_of_sample": folds.fss_test,
-        "fss_training_mean": folds.fss_train,
+        "fss_in_sample": best.score,
+        "fss_in_sample_dynamic": fractional_sum_of_squares(observed_dynamic, dynamic),
+        "fss_in_sample_static": fractional_sum_of_squares(observed_static, static),
+        "fss_out_of_sample": folds.score_test,
+        "fss_training_mean": folds.score_train,
         "parameters": _named(best.parameters),
         "units": dict(zip(PARAMETER_NAMES, UNITS, strict=True)),
-        "shift_mm": recordings.shift_mm,
+        "shift_mm": shift_mm,
         "dynamic_rate_hz": dynamic,
         "static_rate_hz": static,
-        "observed_dynamic_rate_hz": recordings.dynamic,
-        "observed_static_rate_hz": recordings.static,
+        "observed_dynamic_rate_hz": observed_dynamic,
+        "observed_static_rate_hz": observed_static,
         "start_points": [_named(start) for start in start_points()],
         "folds": [
             {
                 "fold": fold.fold + 1,
-                "start": fold.start + 1,
-                "testing_shift_mm": recordings.shift_mm[fold.testing],
-                "fss_start": [climb.history[0].objective for climb in fold.fits],
-                "fss_train": fold.fss_train,
-                "fss_test": fold.fss_test,
-                "parameters": _named(fold.parameters),
+                "start": fold.fit.start + 1,
+                "testing_shift_mm": shift_mm[fold.testing],
+                "fss_start": [climb.history[0].score for climb in fold.fit.attempts],
+                "fss_train": fold.score_train,
+                "fss_test": fold.score_test,
+                "parameters": _named(fold.fit.parameters),
                 "history": [
-                    {"iteration": number, "fss": row.objective, "parameters": _named(row.parameters)}
-                    for number, row in enumerate(fold.history)
+                    {"iteration": number, "fss": row.score, "parameters": _named(row.parameters)}
+                    for number, row in enumerate(fold.fit.history)
                 ],
             }
             for fold in folds.folds
         ],
         "modulation": {
             "dynamic": {
-                "observed": _modulation(recordings.shift_mm, recordings.dynamic),
-                "ours": _modulation(recordings.shift_mm, dynamic),
+                "observed": _modulation(shift_mm, observed_dynamic),
+                "ours": _modulation(shift_mm, dynamic),
             },
             "static": {
-                "observed": _modulation(recordings.shift_mm, recordings.static),
-                "ours": _modulation(recordings.shift_mm, static),
+                "observed": _modulation(shift_mm, observed_static),
+                "ours": _modulation(shift_mm, static),
             },
         },
     }

@@ -1,0 +1,212 @@
+"""Firing rates to be fitted: a model of an afferent under known stimuli, and the rates that were observed.
+
+The model is one small contract, so that its variants are short: the paper's six parameters, other numbers
+that stand for them, a receptor whose place is not known, another dynamic response.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from fingerpad.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.checks import FloatArray, float_array, not_negative
+from fingerpad.errors import InputError
+from fingerpad.fitting import weighted_fractional_sum_of_squares
+from fingerpad.fitting.problem import IntArray
+from fingerpad.parameters import neuron, protocol
+from fingerpad.transduction import Drive
+
+
+class RateModel(Protocol):
+    """Anything that predicts the dynamic and static rate under every stimulus from a few numbers."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters, in their order."""
+        ...
+
+    @property
+    def n_stimuli(self) -> int:
+        """Number of stimuli."""
+        ...
+
+    def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Dynamic and static rates, (n_stimuli,) each. [spikes/s]"""
+        ...
+
+
+@dataclass(frozen=True)
+class AfferentModel:
+    """The paper's model: one afferent, its six parameters free.
+
+    Parameters
+    ----------
+    drive : Drive
+        Strain energy density and its rate of change, one column per stimulus.
+    refractory_ms : float
+        Rest after each spike, which is not fitted. [ms]
+
+    Examples
+    --------
+    >>> from fingerpad.signals import SedTraces
+    >>> from fingerpad.transduction import drive
+    >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    >>> dynamic_hz, static_hz = AfferentModel(drive(sed)).rates(Afferent().parameters)
+    >>> dynamic_hz.round().tolist(), static_hz.round().tolist()
+    ([217.0], [63.0])
+    """
+
+    drive: Drive
+    refractory_ms: float = neuron.REFRACTORY.value
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """beta, k_d, k_s, tau, C, v under their full names."""
+        return PARAMETER_NAMES
+
+    @property
+    def n_stimuli(self) -> int:
+        """Number of columns of the drive."""
+        return self.drive.n_sites
+
+    def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Dynamic and static rates of the afferent with these six parameters. [spikes/s]"""
+        return Afferent.from_parameters(parameters, self.refractory_ms).rates(self.drive)
+
+
+@dataclass(frozen=True)
+class Reparametrised:
+    """The same model in other numbers.
+
+    Parameters
+    ----------
+    model : RateModel
+        What predicts.
+    names : tuple of str
+        Names of the new parameters.
+    translated : callable
+        From the new parameters to those of `model`.
+
+    Examples
+    --------
+    A model that has only its static gain free:
+
+    >>> from fingerpad.signals import SedTraces
+    >>> from fingerpad.transduction import drive
+    >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    >>> model = Reparametrised(
+    ...     AfferentModel(drive(sed)),
+    ...     ("static_gain",),
+    ...     lambda gain: np.array([0.0, 1e-4, gain[0], 70.0, 1e-6, 50.0]),
+    ... )
+    >>> [model.rates(np.array([gain]))[1].round().tolist() for gain in (5e-7, 2e-6)]
+    [[11.0], [68.0]]
+    """
+
+    model: RateModel
+    names: tuple[str, ...]
+    translated: Callable[[FloatArray], FloatArray]
+
+    @property
+    def n_stimuli(self) -> int:
+        """Number of stimuli."""
+        return self.model.n_stimuli
+
+    def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Dynamic and static rates. [spikes/s]"""
+        return self.model.rates(self.translated(parameters))
+
+
+@dataclass(frozen=True)
+class RateProblem:
+    """Observed rates under some stimuli and the model that is to predict them.
+
+    Parameters
+    ----------
+    model : RateModel
+        Predicts the rates under all stimuli.
+    dynamic_rate_hz, static_rate_hz : array (n_stimuli,)
+        Observed rates. [spikes/s]
+    dynamic_weight, static_weight : float
+        Weights of the two phases, Eq. 12. [1]
+
+    Raises
+    ------
+    InputError
+        If there is not one rate of each phase per stimulus, or one is negative.
+
+    Notes
+    -----
+    Gerling et al. 2014, Eqs. 12-14. The sums run over the chosen stimuli.
+
+    Examples
+    --------
+    >>> from fingerpad.signals import SedTraces
+    >>> from fingerpad.transduction import drive
+    >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    >>> problem = RateProblem(AfferentModel(drive(sed)), [217.0], [126.0])
+    >>> round(problem.score(Afferent().parameters, np.array([0])), 2)  # static rates half as observed
+    0.81
+    """
+
+    model: RateModel
+    dynamic_rate_hz: FloatArray
+    static_rate_hz: FloatArray
+    dynamic_weight: float = protocol.DYNAMIC_WEIGHT.value
+    static_weight: float = protocol.STATIC_WEIGHT.value
+
+    def __post_init__(self) -> None:
+        for name in ("dynamic_rate_hz", "static_rate_hz"):
+            rates = float_array(name, getattr(self, name), 1)
+            if rates.size != self.model.n_stimuli:
+                raise InputError(
+                    f"{name} needs one rate per stimulus: got {rates.size} for {self.model.n_stimuli}."
+                )
+            if (rates < 0.0).any():
+                row = int(np.argmax(rates < 0.0))
+                raise InputError(f"{name} must not be negative: row {row} holds {rates[row]:g} spikes/s.")
+            object.__setattr__(self, name, rates)
+        not_negative("dynamic_weight", self.dynamic_weight)
+        not_negative("static_weight", self.static_weight)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the model's parameters."""
+        return self.model.names
+
+    @property
+    def n_observations(self) -> int:
+        """Number of stimuli, each with its two rates."""
+        return self.model.n_stimuli
+
+    def residuals(self, parameters: FloatArray, chosen: IntArray) -> FloatArray:
+        """Differences of both phases, scaled so that FSS = 1 - residuals @ residuals.
+
+        r_i = sqrt(w / sum f^2) (f_i - p_i), with the weight w, observed f and predicted p of each phase.
+        """
+        dynamic, static = self.model.rates(parameters)
+        return np.concatenate(
+            [
+                np.sqrt(weight / (observed[chosen] @ observed[chosen])) * (observed - predicted)[chosen]
+                for weight, observed, predicted in (
+                    (self.dynamic_weight, self.dynamic_rate_hz, dynamic),
+                    (self.static_weight, self.static_rate_hz, static),
+                )
+            ]
+        )
+
+    def score(self, parameters: FloatArray, chosen: IntArray) -> float:
+        """Weighted FSS of Eqs. 12-14 over the chosen stimuli."""
+        dynamic, static = self.model.rates(parameters)
+        return weighted_fractional_sum_of_squares(
+            self.dynamic_rate_hz[chosen],
+            dynamic[chosen],
+            self.static_rate_hz[chosen],
+            static[chosen],
+            self.dynamic_weight,
+            self.static_weight,
+        )
