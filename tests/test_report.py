@@ -162,7 +162,16 @@ def _single_unit() -> dict:
                 "fss_train": 0.85,
                 "fss_test": 0.80 + 0.01 * fold,
                 "parameters": PARAMETERS,
-                "history": history,
+                "climbs": [
+                    {
+                        "start": start,
+                        "fss_train": 0.81 + 0.01 * start,
+                        "fss_test": 0.80,
+                        "runs": 400 + start,
+                        "history": history,
+                    }
+                    for start in (1, 2)
+                ],
             }
             for fold in range(1, 7)
         ],
@@ -443,6 +452,15 @@ def test_the_last_step_of_the_papers_fold_is_marked_and_others_are_not():
     assert "fold 3, start 2" in table.title
     assert [row.kind for row in table.rows] == ["", "", "", "", "final"]
     assert table.rows[-1].cells[:2] == ("4", "0.820")
+
+
+def test_every_fold_and_start_has_its_climb_and_the_better_ones_are_marked():
+    table = next(table for table in tables.single_unit(_single_unit()) if table.title.startswith("Climbs"))
+    assert [row.cells[0] for row in table.rows] == [
+        f"{fold}, {start}" for fold in range(1, 7) for start in (1, 2)
+    ]
+    assert table.rows[5].cells == ("3, 2", "0.700", "0.830", "0.800", "4", "402")
+    assert [row.kind for row in table.rows[:4]] == ["", "final", "final", ""]
 
 
 def test_hit_rates_stand_in_the_table_as_they_are_drawn():

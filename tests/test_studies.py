@@ -234,7 +234,8 @@ def synthetic_problem():
     problem = single_unit.rate_problem(bar_traces(bar_firing_rates().shift_mm))
     truth = np.array([3e-7, 2.6e-4, 1.1e-6, 60.0, 1.0e-6, 50.0])
     dynamic, static = problem.model.rates(truth)
-    return replace(problem, dynamic_rate_hz=dynamic, static_rate_hz=static), truth
+    recordings = replace(problem.recordings, dynamic_rate_hz=dynamic, static_rate_hz=static)
+    return replace(problem, recordings=recordings), truth
 
 
 @pytest.fixture(scope="module")
@@ -245,8 +246,8 @@ def synthetic_fit(synthetic_problem):
 def test_a_known_afferent_scores_perfectly_and_others_do_not(synthetic_problem):
     problem, truth = synthetic_problem
     everything = np.arange(36)
-    assert np.ptp(problem.dynamic_rate_hz) > 50.0
-    assert np.ptp(problem.static_rate_hz) > 10.0
+    assert np.ptp(problem.recordings.dynamic_rate_hz) > 50.0
+    assert np.ptp(problem.recordings.static_rate_hz) > 10.0
     assert problem.score(truth, everything) == 1.0
     assert problem.score(truth * [1, 1, 1.3, 1, 1, 1], everything) < 0.95
     assert problem.score(truth * [1, 1.3, 1, 1, 1, 1], everything) < 0.99
@@ -277,8 +278,15 @@ def test_single_unit_result_names_every_number(synthetic_problem, synthetic_fit)
     np.testing.assert_array_equal(np.sort(tested), shift_mm)
     assert found["fss_out_of_sample"] == pytest.approx(np.mean([fold["fss_test"] for fold in found["folds"]]))
     for fold in found["folds"]:
-        assert fold["history"][-1]["fss"] == fold["fss_train"]
         assert fold["fss_train"] >= max(fold["fss_start"])
+        assert [climb["start"] for climb in fold["climbs"]] == [1, 2]
+        better = fold["climbs"][fold["start"] - 1]
+        assert fold["fss_train"] == better["fss_train"] == max(climb["fss_train"] for climb in fold["climbs"])
+        assert fold["fss_test"] == better["fss_test"]
+        for climb, begun in zip(fold["climbs"], fold["fss_start"], strict=True):
+            assert climb["history"][0]["fss"] == begun
+            assert climb["history"][-1]["fss"] == climb["fss_train"]
+            assert climb["runs"] >= 65 * len(climb["history"])
     weighted = 0.25 * found["fss_in_sample_dynamic"] + 0.75 * found["fss_in_sample_static"]
     assert found["fss_in_sample"] == pytest.approx(weighted, rel=1e-12)
     ours = found["modulation"]["static"]["ours"]

@@ -6,16 +6,17 @@ that stand for them, a receptor whose place is not known, another dynamic respon
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from fingerpad.afferent import PARAMETER_NAMES, Afferent
-from fingerpad.checks import FloatArray, float_array, not_negative
+from fingerpad.checks import FloatArray, not_negative
 from fingerpad.errors import InputError
-from fingerpad.fitting import weighted_fractional_sum_of_squares
+from fingerpad.estimation.recordings import RateRecordings
+from fingerpad.fitting import fractional_sum_of_squares
 from fingerpad.fitting.problem import IntArray
 from fingerpad.parameters import neuron, protocol
 from fingerpad.transduction import Drive
@@ -128,16 +129,16 @@ class RateProblem:
     Parameters
     ----------
     model : RateModel
-        Predicts the rates under all stimuli.
-    dynamic_rate_hz, static_rate_hz : array (n_stimuli,)
-        Observed rates. [spikes/s]
+        Predicts the rates under all stimuli, in the order of the recordings.
+    recordings : RateRecordings
+        Observed rates. A phase that was not recorded has no part in the score.
     dynamic_weight, static_weight : float
-        Weights of the two phases, Eq. 12. [1]
+        Weights of the two phases where both were recorded, Eq. 12. [1]
 
     Raises
     ------
     InputError
-        If there is not one rate of each phase per stimulus, or one is negative.
+        If model and recordings differ in the number of stimuli, or a weight is negative.
 
     Notes
     -----
@@ -148,28 +149,23 @@ class RateProblem:
     >>> from fingerpad.signals import SedTraces
     >>> from fingerpad.transduction import drive
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-    >>> problem = RateProblem(AfferentModel(drive(sed)), [217.0], [126.0])
+    >>> problem = RateProblem(AfferentModel(drive(sed)), RateRecordings(("flat",), [217.0], [126.0]))
     >>> round(problem.score(Afferent().parameters, np.array([0])), 2)  # static rates half as observed
     0.81
     """
 
     model: RateModel
-    dynamic_rate_hz: FloatArray
-    static_rate_hz: FloatArray
+    recordings: RateRecordings
     dynamic_weight: float = protocol.DYNAMIC_WEIGHT.value
     static_weight: float = protocol.STATIC_WEIGHT.value
 
     def __post_init__(self) -> None:
-        for name in ("dynamic_rate_hz", "static_rate_hz"):
-            rates = float_array(name, getattr(self, name), 1)
-            if rates.size != self.model.n_stimuli:
-                raise InputError(
-                    f"{name} needs one rate per stimulus: got {rates.size} for {self.model.n_stimuli}."
-                )
-            if (rates < 0.0).any():
-                row = int(np.argmax(rates < 0.0))
-                raise InputError(f"{name} must not be negative: row {row} holds {rates[row]:g} spikes/s.")
-            object.__setattr__(self, name, rates)
+        observed = len(self.recordings.stimuli)
+        if observed != self.model.n_stimuli:
+            raise InputError(
+                "recordings needs one stimulus per column of the model's drive: "
+                f"got {observed} for {self.model.n_stimuli}."
+            )
         not_negative("dynamic_weight", self.dynamic_weight)
         not_negative("static_weight", self.static_weight)
 
@@ -180,33 +176,43 @@ class RateProblem:
 
     @property
     def n_observations(self) -> int:
-        """Number of stimuli, each with its two rates."""
+        """Number of stimuli, whether one or two rates were recorded under each."""
         return self.model.n_stimuli
 
     def residuals(self, parameters: FloatArray, chosen: IntArray) -> FloatArray:
-        """Differences of both phases, scaled so that FSS = 1 - residuals @ residuals.
+        """Differences of the recorded phases, scaled so that FSS = 1 - residuals @ residuals.
 
         r_i = sqrt(w / sum f^2) (f_i - p_i), with the weight w, observed f and predicted p of each phase.
         """
-        dynamic, static = self.model.rates(parameters)
         return np.concatenate(
             [
-                np.sqrt(weight / (observed[chosen] @ observed[chosen])) * (observed - predicted)[chosen]
-                for weight, observed, predicted in (
-                    (self.dynamic_weight, self.dynamic_rate_hz, dynamic),
-                    (self.static_weight, self.static_rate_hz, static),
-                )
+                np.sqrt(weight / (observed @ observed)) * (observed - predicted)
+                for weight, observed, predicted in self._phases(parameters, chosen)
             ]
         )
 
     def score(self, parameters: FloatArray, chosen: IntArray) -> float:
-        """Weighted FSS of Eqs. 12-14 over the chosen stimuli."""
-        dynamic, static = self.model.rates(parameters)
-        return weighted_fractional_sum_of_squares(
-            self.dynamic_rate_hz[chosen],
-            dynamic[chosen],
-            self.static_rate_hz[chosen],
-            static[chosen],
-            self.dynamic_weight,
-            self.static_weight,
+        """FSS of Eqs. 12-14 over the chosen stimuli, weighted where both phases were recorded."""
+        return sum(
+            weight * fractional_sum_of_squares(observed, predicted)
+            for weight, observed, predicted in self._phases(parameters, chosen)
         )
+
+    def score_by_phase(self, parameters: FloatArray, chosen: IntArray) -> dict[str, float]:
+        """FSS of "dynamic" and "static" rates by themselves, of those that were recorded (Eqs. 13, 14)."""
+        scores = (
+            fractional_sum_of_squares(observed, predicted)
+            for _, observed, predicted in self._phases(parameters, chosen)
+        )
+        return dict(zip(self.recordings.phases, scores, strict=True))
+
+    def _phases(
+        self, parameters: FloatArray, chosen: IntArray
+    ) -> Iterator[tuple[float, FloatArray, FloatArray]]:
+        """Weight, observed and predicted rates of each phase that was recorded."""
+        alone = len(self.recordings.phases) == 1
+        weights = (self.dynamic_weight, self.static_weight)
+        observed = (self.recordings.dynamic_rate_hz, self.recordings.static_rate_hz)
+        for weight, seen, predicted in zip(weights, observed, self.model.rates(parameters), strict=True):
+            if seen is not None:
+                yield 1.0 if alone else weight, seen[chosen], predicted[chosen]

@@ -19,7 +19,6 @@ from fingerpad.checks import FloatArray, not_negative, whole
 from fingerpad.discrimination import expected_hit_rates, fit_noise_sigma
 from fingerpad.encoding import neighbour_pairs
 from fingerpad.errors import ConvergenceError, InputError
-from fingerpad.fitting import fractional_sum_of_squares
 from fingerpad.grading import Grading
 from fingerpad.indenters import Bar, Cylinder
 from fingerpad.mechanics.materials import Tissues
@@ -234,7 +233,7 @@ class Levels:
 
     def judged(self, parameters: FloatArray) -> dict[str, Any]:
         """FSS, hit rates and the noise that would be needed, of one afferent."""
-        dynamic, static = self.problem.model.rates(parameters)
+        by_phase = self.problem.score_by_phase(parameters, self.everything)
         try:
             noise = fit_noise_sigma(lambda sigma: self.hit_rates(parameters, sigma))
             sigma, error = noise.noise_sigma, noise.root_mean_square_error
@@ -242,8 +241,8 @@ class Levels:
             sigma, error = float("nan"), float("nan")
         return {
             "fss": self.fss(parameters),
-            "fss_dynamic": fractional_sum_of_squares(self.problem.dynamic_rate_hz, dynamic),
-            "fss_static": fractional_sum_of_squares(self.problem.static_rate_hz, static),
+            "fss_dynamic": by_phase["dynamic"],
+            "fss_static": by_phase["static"],
             "noise_sigma": sigma,
             "noise_fit_error": error,
             "hit_rate": self.hit_rates(parameters, NOISE_SIGMA),

@@ -9,13 +9,14 @@ import numpy as np
 from fingerpad.afferent import PARAMETER_NAMES
 from fingerpad.checks import FloatArray
 from fingerpad.estimation.rate_problem import AfferentModel, RateProblem
+from fingerpad.estimation.recordings import PHASES, RateRecordings
 from fingerpad.fitting import (
     CrossValidation,
     Fit,
+    FoldFit,
     ResponseSurface,
     coding_increments,
     cross_validate,
-    fractional_sum_of_squares,
     interleaved_folds,
 )
 from fingerpad.indenters import Bar
@@ -85,8 +86,14 @@ def increments(starts: FloatArray) -> FloatArray:
 
 def rate_problem(sed: SedTraces) -> RateProblem:
     """Observed rates at all shifts, and the paper's model of the afferent that answers `sed`."""
+    return RateProblem(AfferentModel(drive(sed)), bar_recordings())
+
+
+def bar_recordings() -> RateRecordings:
+    """Return the rates observed under the bar, stimuli named by their shift in mm."""
     observed = bar_firing_rates()
-    return RateProblem(AfferentModel(drive(sed)), observed.dynamic_rate_hz, observed.static_rate_hz)
+    names = tuple(f"{shift:g}" for shift in observed.shift_mm)
+    return RateRecordings(names, observed.dynamic_rate_hz, observed.static_rate_hz, observed.source)
 
 
 def response_surface() -> ResponseSurface:
@@ -106,49 +113,55 @@ def fit(problem: RateProblem) -> tuple[Fit, CrossValidation]:
 
 def result(problem: RateProblem, best: Fit, folds: CrossValidation) -> dict[str, Any]:
     """Rates, fits and modulation, ready for the report."""
-    observed_dynamic, observed_static = problem.dynamic_rate_hz, problem.static_rate_hz
     shift_mm = bar_firing_rates().shift_mm
-    dynamic, static = problem.model.rates(best.parameters)
+    observed = {phase: getattr(problem.recordings, f"{phase}_rate_hz") for phase in PHASES}
+    predicted = dict(zip(PHASES, problem.model.rates(best.parameters), strict=True))
+    by_phase = problem.score_by_phase(best.parameters, np.arange(problem.n_observations))
     return {
         "fss_in_sample": best.score,
-        "fss_in_sample_dynamic": fractional_sum_of_squares(observed_dynamic, dynamic),
-        "fss_in_sample_static": fractional_sum_of_squares(observed_static, static),
+        **{f"fss_in_sample_{phase}": by_phase[phase] for phase in PHASES},
         "fss_out_of_sample": folds.score_test,
         "fss_training_mean": folds.score_train,
         "parameters": _named(best.parameters),
         "units": dict(zip(PARAMETER_NAMES, UNITS, strict=True)),
         "shift_mm": shift_mm,
-        "dynamic_rate_hz": dynamic,
-        "static_rate_hz": static,
-        "observed_dynamic_rate_hz": observed_dynamic,
-        "observed_static_rate_hz": observed_static,
+        **{f"{phase}_rate_hz": predicted[phase] for phase in PHASES},
+        **{f"observed_{phase}_rate_hz": observed[phase] for phase in PHASES},
         "start_points": [_named(start) for start in start_points()],
-        "folds": [
+        "folds": [_fold(problem, fold, shift_mm) for fold in folds.folds],
+        "modulation": {
+            phase: {
+                "observed": _modulation(shift_mm, observed[phase]),
+                "ours": _modulation(shift_mm, predicted[phase]),
+            }
+            for phase in PHASES
+        },
+    }
+
+
+def _fold(problem: RateProblem, fold: FoldFit, shift_mm: FloatArray) -> dict[str, Any]:
+    """One fold: which shifts were left out, the better of its climbs, and the steps of each."""
+    return {
+        "fold": fold.fold + 1,
+        "start": fold.fit.start + 1,
+        "testing_shift_mm": shift_mm[fold.testing],
+        "fss_start": [climb.history[0].score for climb in fold.fit.attempts],
+        "fss_train": fold.score_train,
+        "fss_test": fold.score_test,
+        "parameters": _named(fold.fit.parameters),
+        "climbs": [
             {
-                "fold": fold.fold + 1,
-                "start": fold.fit.start + 1,
-                "testing_shift_mm": shift_mm[fold.testing],
-                "fss_start": [climb.history[0].score for climb in fold.fit.attempts],
-                "fss_train": fold.score_train,
-                "fss_test": fold.score_test,
-                "parameters": _named(fold.fit.parameters),
+                "start": number + 1,
+                "fss_train": climb.score,
+                "fss_test": problem.score(climb.parameters, fold.testing),
+                "runs": climb.n_evaluations,
                 "history": [
-                    {"iteration": number, "fss": row.score, "parameters": _named(row.parameters)}
-                    for number, row in enumerate(fold.fit.history)
+                    {"iteration": iteration, "fss": step.score, "parameters": _named(step.parameters)}
+                    for iteration, step in enumerate(climb.history)
                 ],
             }
-            for fold in folds.folds
+            for number, climb in enumerate(fold.fit.attempts)
         ],
-        "modulation": {
-            "dynamic": {
-                "observed": _modulation(shift_mm, observed_dynamic),
-                "ours": _modulation(shift_mm, dynamic),
-            },
-            "static": {
-                "observed": _modulation(shift_mm, observed_static),
-                "ours": _modulation(shift_mm, static),
-            },
-        },
     }
 
 
