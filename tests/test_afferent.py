@@ -140,3 +140,21 @@ def test_a_single_wrong_field_is_named():
         Afferent(threshold_mv=0.0)
     with pytest.raises(InputError, match="dynamic_gain"):
         Afferent(dynamic_gain=np.inf)
+
+
+def test_an_afferent_and_its_traces_agree_on_what_the_dynamic_term_follows():
+    energy = ramp_and_hold(1.0, 2.0)
+    both = SedTraces(energy.times_ms, energy.sed_kpa, energy.kinks_ms, 10.0 * energy.sed_kpa, "von_mises")
+    extended = Afferent(dynamic_gain=Afferent().dynamic_gain / 10.0, dynamic_quantity="von_mises")
+    # Ten times the quantity and a tenth of its gain are the paper's afferent.
+    assert_allclose(extended.spikes(both).times_ms, Afferent().spikes(energy).times_ms, rtol=1e-12)
+    assert_array_equal(extended.spikes(drive(both)).times_ms, extended.spikes(both).times_ms)
+    for afferent, traces in ((Afferent(), both), (extended, energy), (extended, drive(energy))):
+        with pytest.raises(InputError, match=r"dynamic term follows '\w+': got traces for '\w+', sample"):
+            afferent.spikes(traces)
+
+
+def test_what_the_dynamic_term_follows_is_no_fitted_number():
+    extended = Afferent.from_parameters(Afferent().parameters, dynamic_quantity="work")
+    assert extended == Afferent(dynamic_quantity="work")
+    assert_array_equal(extended.parameters, Afferent().parameters)

@@ -94,3 +94,27 @@ class OneTrace:
 def test_what_cannot_be_used_is_refused(wrong, message):
     with pytest.raises(InputError, match=message):
         wrong()
+
+
+class BumpWithStress(Bump):
+    """The same skin, which also knows a stress: wider than the energy."""
+
+    def sed(self, sites, dynamic_quantity="stored"):
+        traces = super().sed(sites)
+        if dynamic_quantity == "stored":
+            return traces
+        stress_kpa = np.sqrt(traces.sed_kpa)
+        return SedTraces(traces.times_ms, traces.sed_kpa, traces.kinks_ms, stress_kpa, dynamic_quantity)
+
+
+def test_a_population_samples_what_the_dynamic_term_of_its_afferent_follows():
+    skin = BumpWithStress(17.0, 0.3)
+    usual, extended = (
+        Population.grid(afferent=afferent).respond(skin)
+        for afferent in (Afferent(), Afferent(dynamic_quantity="compressive_stress"))
+    )
+    assert_array_equal(usual.spikes.times_ms, Population.grid().respond(Bump(17.0, 0.3)).spikes.times_ms)
+    lone = Afferent(dynamic_quantity="compressive_stress")
+    dynamic_hz, _ = lone.rates(skin.sed(Population.grid().positions_mm, "compressive_stress"))
+    assert_array_equal(extended.dynamic_rate_hz, dynamic_hz)
+    assert (extended.dynamic_rate_hz != usual.dynamic_rate_hz).any()

@@ -102,6 +102,15 @@ def test_other_quantities_are_read_like_the_stored_energy(symmetric):
     np.testing.assert_allclose(skin.sample("von_mises", SITES), 7.0 * stored, rtol=1e-5)
 
 
+def test_energy_comes_with_what_the_dynamic_term_follows():
+    skin = response(block(), bump)
+    traces = skin.sed(SITES, dynamic_quantity="von_mises")
+    np.testing.assert_array_equal(traces.sed_kpa, skin.sed(SITES).sed_kpa)
+    np.testing.assert_array_equal(traces.dynamic_kpa, skin.sample("von_mises", SITES))
+    assert traces.dynamic_quantity == "von_mises"
+    assert skin.sed(SITES).dynamic_kpa is None
+
+
 @pytest.mark.parametrize("quantity", ["heat", "", "work"])
 def test_quantity_that_the_skin_does_not_know_is_refused(quantity):
     with pytest.raises(InputError, match="quantity must be one of stored, von_mises: got"):

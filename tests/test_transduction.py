@@ -139,6 +139,22 @@ def test_two_times_are_enough_and_kinks_at_the_ends_change_nothing():
     [
         (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], kinks_ms=[0.5]), "kinks_ms must be among times_ms"),
         (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], kinks_ms=[1.0, 0.0]), "kinks_ms must increase"),
+        (
+            lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], dynamic_kpa=[[0.0], [1.0]]),
+            "dynamic_kpa is needed for every dynamic_quantity but 'stored'.*'stored' with it",
+        ),
+        (
+            lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], dynamic_quantity="work"),
+            "dynamic_kpa is needed .* got 'work' without it",
+        ),
+        (
+            lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], (), [[0.0, 1.0], [1.0, 1.0]], "work"),
+            "dynamic_kpa must match sed_kpa",
+        ),
+        (
+            lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], (), [[0.0], [-1.0]], "work"),
+            "dynamic_kpa .* must not be negative",
+        ),
         (lambda: CurrentTraces([0.0, 0.0, 0.0], np.zeros((3, 1))), "nor repeat more than once"),
         (lambda: CurrentTraces([0.0, 2.0, 1.0], np.zeros((3, 1))), "must not decrease"),
         (lambda: Drive([0.0, 1.0], np.zeros((2, 1)), np.zeros((2, 2))), "Drive needs one row"),
@@ -177,3 +193,30 @@ def test_a_part_of_traces_or_of_their_drive_is_that_of_its_sites():
     assert_array_equal(part.rate_kpa_per_ms, whole.rate_kpa_per_ms)
     assert_array_equal(part.sed_kpa, whole.sed_kpa)
     assert part.n_sites == 1
+
+
+def test_the_dynamic_term_follows_what_the_traces_bring_and_the_static_term_energy():
+    energy, stress = ramp_and_hold(), SedTraces(TIMES_MS, np.sqrt(ramp_and_hold().sed_kpa), [RAMP_MS])
+    both = SedTraces(TIMES_MS, energy.sed_kpa, [RAMP_MS], stress.sed_kpa, "compressive_stress")
+    for options in ({}, {"difference_step_ms": 0.001}, {"pieces": 4}):
+        driven = drive(both, **options)
+        assert_array_equal(driven.sed_kpa, drive(energy, **options).sed_kpa)
+        assert_array_equal(driven.rate_kpa_per_ms, drive(stress, **options).rate_kpa_per_ms)
+        assert driven.dynamic_quantity == "compressive_stress"
+
+
+def test_a_dynamic_term_that_follows_energy_under_another_name_is_the_papers_to_the_last_bit():
+    energy = ramp_and_hold()
+    renamed = SedTraces(TIMES_MS, energy.sed_kpa, [RAMP_MS], energy.sed_kpa, "work")
+    gains = Transduction(1e-7, 1e-4, 6e-7)
+    assert_array_equal(gains.current(renamed).current_ma, gains.current(energy).current_ma)
+    assert drive(energy).dynamic_quantity == "stored"
+
+
+def test_a_part_of_traces_or_of_their_drive_keeps_what_the_dynamic_term_follows():
+    energy = ramp_and_hold()
+    both = SedTraces(TIMES_MS, energy.sed_kpa, [RAMP_MS], energy.sed_kpa[:, ::-1] ** 2, "von_mises")
+    part, whole = drive(both).part(slice(0, 2)), drive(both.part(slice(0, 2)))
+    assert_array_equal(part.rate_kpa_per_ms, whole.rate_kpa_per_ms)
+    assert_array_equal(part.rate_kpa_per_ms, drive(both).rate_kpa_per_ms[:, :2])
+    assert part.dynamic_quantity == whole.dynamic_quantity == "von_mises"

@@ -11,7 +11,7 @@ from fingerpad.checks import FloatArray, float_array
 from fingerpad.errors import InputError
 from fingerpad.lif import LeakyIntegrateAndFire
 from fingerpad.parameters import neuron, protocol
-from fingerpad.signals import SedTraces, SpikeTrains
+from fingerpad.signals import STORED_ENERGY, SedTraces, SpikeTrains
 from fingerpad.spikes import firing_rate_hz
 from fingerpad.transduction import Drive, Transduction
 
@@ -49,6 +49,9 @@ class Afferent:
         Potential that elicits a spike, v. [mV]
     refractory_ms : float
         Rest after each spike. [ms]
+    dynamic_quantity : str
+        What the dynamic term follows, by the names of `SkinResponse.sample`. Any but SED, "stored", is an
+        extension of the paper's model; k_d belongs to its quantity.
 
     Raises
     ------
@@ -72,6 +75,7 @@ class Afferent:
     capacitance_mf: float = neuron.CAPACITANCE_FITTED.value
     threshold_mv: float = neuron.THRESHOLD_FITTED.value
     refractory_ms: float = neuron.REFRACTORY.value
+    dynamic_quantity: str = STORED_ENERGY
 
     def __post_init__(self) -> None:
         # Both stages check what they are made of; building them once here checks at the boundary.
@@ -79,7 +83,10 @@ class Afferent:
 
     @classmethod
     def from_parameters(
-        cls, parameters: ArrayLike, refractory_ms: float = neuron.REFRACTORY.value
+        cls,
+        parameters: ArrayLike,
+        refractory_ms: float = neuron.REFRACTORY.value,
+        dynamic_quantity: str = STORED_ENERGY,
     ) -> Afferent:
         """Make an afferent from the six fitted numbers.
 
@@ -90,6 +97,8 @@ class Afferent:
             `PARAMETER_NAMES`.
         refractory_ms : float, optional
             Rest after each spike, which is not fitted. [ms]
+        dynamic_quantity : str, optional
+            What the dynamic term follows.
 
         Returns
         -------
@@ -108,7 +117,8 @@ class Afferent:
         values = float_array("parameters", parameters, 1)
         if values.size != len(PARAMETER_NAMES):
             raise InputError(f"parameters must hold {', '.join(PARAMETER_NAMES)}: got {values.size} numbers.")
-        return cls(refractory_ms=refractory_ms, **dict(zip(PARAMETER_NAMES, values.tolist(), strict=True)))
+        fitted = dict(zip(PARAMETER_NAMES, values.tolist(), strict=True))
+        return cls(refractory_ms=refractory_ms, dynamic_quantity=dynamic_quantity, **fitted)
 
     @property
     def parameters(self) -> FloatArray:
@@ -140,7 +150,17 @@ class Afferent:
         -------
         SpikeTrains
             One train per site.
+
+        Raises
+        ------
+        InputError
+            If the dynamic term is to follow another quantity than the one that `sed` brings.
         """
+        if sed.dynamic_quantity != self.dynamic_quantity:
+            raise InputError(
+                f"This afferent's dynamic term follows {self.dynamic_quantity!r}: got traces for "
+                f"{sed.dynamic_quantity!r}, sample the skin with dynamic_quantity={self.dynamic_quantity!r}."
+            )
 
         def trains(sites: slice) -> SpikeTrains:
             return self.membrane.spikes(self.transduction.current(sed.part(sites)))

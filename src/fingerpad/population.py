@@ -11,7 +11,7 @@ from fingerpad.afferent import Afferent
 from fingerpad.checks import FloatArray, finite, float_array, positive, whole
 from fingerpad.errors import InputError
 from fingerpad.parameters import fingertip, protocol, psychophysics
-from fingerpad.signals import ResponseMap, Skin
+from fingerpad.signals import STORED_ENERGY, ResponseMap, Skin
 from fingerpad.spikes import firing_rate_hz, first_spike_latency_ms
 
 MM_PER_CM = 10.0
@@ -122,7 +122,10 @@ class Population:
         InputError
             If the skin does not answer with one trace per receptor.
         """
-        sed = skin.sed(self.positions_mm)
+        dynamic_quantity = self.afferent.dynamic_quantity
+        # Skins that know nothing but their energy need not know the extension either.
+        further = () if dynamic_quantity == STORED_ENERGY else (dynamic_quantity,)
+        sed = skin.sed(self.positions_mm, *further)
         if sed.n_sites != len(self.positions_mm):
             raise InputError(
                 f"skin.sed must give one trace per receptor: got {sed.n_sites} for {len(self.positions_mm)}."

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from fingerpad.checks import FloatArray, float_array, one_of
 from fingerpad.errors import InputError
 from fingerpad.mesh import Mesh
-from fingerpad.signals import SedTraces
+from fingerpad.signals import STORED_ENERGY, SedTraces
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class SkinResponse:
         distance = self.mesh.nodes_mm[self.mesh.midline_nodes, 0] - self.axis_x_mm
         return SurfaceProfile(distance, self.skin_displacement_mm[time_index, row] @ self.direction)
 
-    def sed(self, sites: ArrayLike) -> SedTraces:
+    def sed(self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY) -> SedTraces:
         """Strain energy density in the living epidermis below points of the undeformed skin.
 
         The means of the elements just above the epidermal-dermal border (0.371 to 0.471 mm deep) are
@@ -129,6 +129,8 @@ class SkinResponse:
         ----------
         sites : array (n_sites, 2)
             x and z on the volar skin. [mm]
+        dynamic_quantity : str, optional
+            What the dynamic response follows, by the names of `sample`. Default: SED, as in the paper.
 
         Returns
         -------
@@ -138,9 +140,16 @@ class SkinResponse:
         Raises
         ------
         InputError
-            If `sites` is not an array of pairs, or a site is not on the volar skin.
+            If `sites` is not an array of pairs, a site is not on the volar skin, or the quantity is unknown.
         """
-        return SedTraces(self.times_ms, self.sample("stored", sites), np.array(self.kinks_ms))
+        dynamic = None if dynamic_quantity == STORED_ENERGY else self.sample(dynamic_quantity, sites)
+        return SedTraces(
+            self.times_ms,
+            self.sample(STORED_ENERGY, sites),
+            np.array(self.kinks_ms),
+            dynamic,
+            dynamic_quantity,
+        )
 
     def sample(self, quantity: str, sites: ArrayLike) -> FloatArray:
         """Anything that may drive an afferent, in the living epidermis below points of the undeformed skin.

@@ -16,12 +16,18 @@ from numpy.typing import ArrayLike
 from fingerpad.checks import FloatArray, float_array, increasing, positive
 from fingerpad.errors import InputError
 
+STORED_ENERGY = "stored"
+"""Name of the quantity that both terms of the current follow in the paper: strain energy density."""
+
 
 class Skin(Protocol):
     """Anything that can tell the strain energy density below points of its surface."""
 
-    def sed(self, sites: ArrayLike) -> SedTraces:
-        """Strain energy density over time at `sites` (n_sites, 2), x and z on the skin. [mm]"""
+    def sed(self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY) -> SedTraces:
+        """Strain energy density over time at `sites` (n_sites, 2), x and z on the skin. [mm]
+
+        With it comes what the dynamic response follows, if that is another quantity.
+        """
         ...
 
 
@@ -54,11 +60,17 @@ class SedTraces:
     kinks_ms : array (n_kinks,), optional
         Those of `times_ms` at which the motion changes abruptly, as from ramp to hold: there the
         rate of change of SED jumps, and whoever interpolates must not smooth across. [ms]
+    dynamic_kpa : array (n_times, n_sites), optional
+        What the dynamic response follows instead of SED, an extension of the paper's model; not negative.
+        [kPa, a strain in mm/mm]
+    dynamic_quantity : str, optional
+        Its name, one of those of `SkinResponse.sample`; "stored" is SED itself.
 
     Raises
     ------
     InputError
-        If shapes disagree, a value is not finite, an energy is negative or a kink is not among the times.
+        If shapes disagree, a value is not finite or negative, a kink is not among the times, or one of
+        `dynamic_kpa` and its name comes without the other.
 
     Examples
     --------
@@ -69,6 +81,8 @@ class SedTraces:
     times_ms: FloatArray
     sed_kpa: FloatArray
     kinks_ms: FloatArray = field(default_factory=lambda: np.empty(0))
+    dynamic_kpa: FloatArray | None = None
+    dynamic_quantity: str = STORED_ENERGY
 
     def __post_init__(self) -> None:
         times, sed = _traces("SedTraces", "sed_kpa", self.times_ms, self.sed_kpa)
@@ -79,6 +93,19 @@ class SedTraces:
         if not np.isin(kinks, times).all():
             raise InputError(f"kinks_ms must be among times_ms: got {kinks[~np.isin(kinks, times)]}.")
         _freeze(self, times_ms=times, sed_kpa=sed, kinks_ms=kinks)
+        if (self.dynamic_kpa is None) != (self.dynamic_quantity == STORED_ENERGY):
+            raise InputError(
+                f"dynamic_kpa is needed for every dynamic_quantity but {STORED_ENERGY!r}, and for no other: "
+                f"got {self.dynamic_quantity!r} {'without' if self.dynamic_kpa is None else 'with'} it."
+            )
+        if self.dynamic_kpa is not None:
+            _, dynamic = _traces("SedTraces", "dynamic_kpa", times, self.dynamic_kpa)
+            if dynamic.shape != sed.shape or (dynamic < 0.0).any():
+                raise InputError(
+                    "dynamic_kpa must match sed_kpa and must not be negative: got shape "
+                    f"{dynamic.shape} for {sed.shape} and a smallest value of {dynamic.min():.3g}."
+                )
+            _freeze(self, dynamic_kpa=dynamic)
 
     @property
     def n_sites(self) -> int:
@@ -89,7 +116,8 @@ class SedTraces:
         """Traces of some of the sites."""
         if sites == slice(0, self.n_sites):
             return self
-        return SedTraces(self.times_ms, self.sed_kpa[:, sites], self.kinks_ms)
+        dynamic = None if self.dynamic_kpa is None else self.dynamic_kpa[:, sites]
+        return SedTraces(self.times_ms, self.sed_kpa[:, sites], self.kinks_ms, dynamic, self.dynamic_quantity)
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,14 @@ given times, which makes the absolute value in Eq. 2 harmless.
 
 What does not depend on the gains, SED and its rate on fine knots, is a `Drive`. Resample once, then try
 many gains: each costs a linear combination.
+
+In the paper both terms follow SED. As an extension, traces may bring another quantity for the dynamic term:
+I = beta + k_d |Q'| + k_s U (docs/decisions/what-the-dynamic-term-follows.md).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,7 +23,7 @@ from scipy.interpolate import PchipInterpolator, PPoly
 
 from fingerpad.checks import FloatArray, finite, float_array, positive, whole
 from fingerpad.errors import InputError
-from fingerpad.signals import CurrentTraces, SedTraces
+from fingerpad.signals import STORED_ENERGY, CurrentTraces, SedTraces
 
 PIECES_PER_INTERVAL = 32
 """Linear pieces that stand for the cubic between two given times, at most."""
@@ -40,12 +43,16 @@ class Drive:
     sed_kpa : array (n_knots, n_sites)
         Strain energy density. [kPa]
     rate_kpa_per_ms : array (n_knots, n_sites)
-        Absolute rate of change of SED, U' of Eq. 2; 0 at the onset. [kPa/ms]
+        Absolute rate of change of SED, U' of Eq. 2, or of what the dynamic term follows instead; 0 at the
+        onset. [kPa/ms, of a strain 1/ms]
+    dynamic_quantity : str, optional
+        Whose rate that is, by the names of `SkinResponse.sample`; "stored" is SED itself.
     """
 
     times_ms: FloatArray
     sed_kpa: FloatArray
     rate_kpa_per_ms: FloatArray
+    dynamic_quantity: str = STORED_ENERGY
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "times_ms", float_array("times_ms", self.times_ms, 1))
@@ -66,7 +73,9 @@ class Drive:
         """Drive of some of the sites."""
         if sites == slice(0, self.n_sites):
             return self
-        return Drive(self.times_ms, self.sed_kpa[:, sites], self.rate_kpa_per_ms[:, sites])
+        return Drive(
+            self.times_ms, self.sed_kpa[:, sites], self.rate_kpa_per_ms[:, sites], self.dynamic_quantity
+        )
 
 
 @dataclass(frozen=True)
@@ -140,7 +149,8 @@ def drive(
     Parameters
     ----------
     sed : SedTraces
-        Its `kinks_ms` part the phases that are interpolated on their own.
+        Its `kinks_ms` part the phases that are interpolated on their own. Where it brings `dynamic_kpa`, the
+        rate is that of this quantity.
     difference_step_ms : float, optional
         Step h of the backward difference printed as Eq. 2 (the paper: 0.001 ms). Before the onset SED is
         that of the onset. Default: the limit h -> 0, the derivative of the interpolant. [ms]
@@ -171,6 +181,19 @@ def drive(
     """
     whole("pieces", pieces, 1)
     positive("shortest_piece_ms", shortest_piece_ms, "ms")
+    if sed.dynamic_kpa is not None:
+        energy, followed = (
+            drive(
+                SedTraces(sed.times_ms, values, sed.kinks_ms),
+                difference_step_ms=difference_step_ms,
+                pieces=pieces,
+                shortest_piece_ms=shortest_piece_ms,
+            )
+            for values in (sed.sed_kpa, sed.dynamic_kpa)
+        )
+        return replace(
+            energy, rate_kpa_per_ms=followed.rate_kpa_per_ms, dynamic_quantity=sed.dynamic_quantity
+        )
     phases = _phases(sed)
     knots = [_knots(phase.x, pieces, shortest_piece_ms) for phase in phases]
     if difference_step_ms is not None:
