@@ -47,7 +47,8 @@ class AfferentModel:
     Parameters
     ----------
     drive : Drive
-        Strain energy density and its rate of change, one column per stimulus.
+        Strain energy density and its rate of change, or that of what the dynamic term follows instead, one
+        column per stimulus.
     refractory_ms : float
         Rest after each spike, which is not fitted. [ms]
 
@@ -76,7 +77,8 @@ class AfferentModel:
 
     def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Dynamic and static rates of the afferent with these six parameters. [spikes/s]"""
-        return Afferent.from_parameters(parameters, self.refractory_ms).rates(self.drive)
+        afferent = Afferent.from_parameters(parameters, self.refractory_ms, self.drive.dynamic_quantity)
+        return afferent.rates(self.drive)
 
 
 @dataclass(frozen=True)
