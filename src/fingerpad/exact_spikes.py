@@ -91,6 +91,44 @@ def _refine(
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
+def first_crossing(
+    length: float, start: float, steady: float, later: float, threshold: float
+) -> tuple[bool, float, float]:
+    """Let one potential run between two knots, for kernels that treat neurons one by one.
+
+    Parameters
+    ----------
+    length : float
+        Time between the knots over tau, above 0. [1]
+    start : float
+        Potential at the first knot, below the threshold. [mV]
+    steady, later : float
+        w at the two knots. [mV]
+    threshold : float
+        Potential to reach. [mV]
+
+    Returns
+    -------
+    crosses : bool
+        Whether the potential reaches the threshold by the second knot.
+    x : float
+        When it first does; the length if it does not. [1]
+    reached : float
+        Potential at the second knot if the threshold were not there. [mV]
+    """
+    drift = (later - steady) / length
+    at_knot = reached = _potential(length, -math.expm1(-length), start, steady, drift)
+    high = length
+    if reached < threshold and steady >= threshold > later:
+        # As in `_bracket`: the potential peaks between the knots.
+        high = min(high, math.log1p(-(steady - start) / drift))
+        reached = _potential(high, -math.expm1(-high), start, steady, drift)
+    if reached < threshold:
+        return False, length, at_knot
+    return True, _refine(high, reached, start, steady, drift, threshold), at_knot
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def exact_trains(
     times: FloatArray,
     currents: FloatArray,

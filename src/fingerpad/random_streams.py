@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -117,6 +118,72 @@ def four_normals(
         r1 * math.cos(angle_1),
         r1 * math.sin(angle_1),
     )
+
+
+@dataclass(frozen=True)
+class Presentations:
+    """Which drive each spike train answers, and whose random numbers it draws.
+
+    Parameters
+    ----------
+    sites : int array (n_trains,)
+        Column of the current or drive.
+    trials : int array (n_trains,)
+        Number of the presentation; trains of one receptor need different ones.
+    receptors : int array (n_trains,)
+        Number of the end organ.
+
+    Raises
+    ------
+    InputError
+        If the three differ in length, a number is negative, or two trains have the same trial and receptor.
+
+    Examples
+    --------
+    >>> Presentations.of_population(n_receptors=2, n_trials=2).trials.tolist()
+    [0, 0, 1, 1]
+    >>> Presentations.of_one_afferent(n_stimuli=2, n_repeats=2).trials.tolist()
+    [0, 1, 2, 3]
+    """
+
+    sites: IntArray
+    trials: IntArray
+    receptors: IntArray
+
+    def __post_init__(self) -> None:
+        for name in ("sites", "trials", "receptors"):
+            numbers = numbered(name, tuple(getattr(self, name)))
+            numbers.setflags(write=False)
+            object.__setattr__(self, name, numbers)
+        sizes = self.sites.size, self.trials.size, self.receptors.size
+        if len(set(sizes)) > 1:
+            raise InputError(f"Presentations needs one site, trial and receptor per train: got {sizes}.")
+        if len(set(zip(self.trials.tolist(), self.receptors.tolist(), strict=True))) < len(self):
+            raise InputError(
+                "Presentations needs another trial for each train of a receptor, or they draw the same "
+                f"numbers: got trials {self.trials[:8].tolist()} of receptors {self.receptors[:8].tolist()}."
+            )
+
+    @classmethod
+    def of_population(cls, n_receptors: int, n_trials: int = 1) -> Presentations:
+        """Present one touch `n_trials` times to as many receptors as there are sites, trial by trial."""
+        receptors, trials = numbered("n_receptors", n_receptors), numbered("n_trials", n_trials)
+        sites = np.tile(receptors, trials.size)
+        return cls(sites, np.repeat(trials, receptors.size), sites)
+
+    @classmethod
+    def of_one_afferent(cls, n_stimuli: int, n_repeats: int = 1) -> Presentations:
+        """Present one stimulus per site to one afferent, all of them `n_repeats` times in turn."""
+        stimuli, repeats = numbered("n_stimuli", n_stimuli), numbered("n_repeats", n_repeats)
+        sites = np.tile(stimuli, repeats.size)
+        return cls(sites, np.arange(sites.size), np.zeros_like(sites))
+
+    def __len__(self) -> int:
+        return self.sites.size
+
+    def part(self, trains: slice) -> Presentations:
+        """Return what belongs to some of the trains."""
+        return Presentations(self.sites[trains], self.trials[trains], self.receptors[trains])
 
 
 def generator(seed: int, trial: int, receptor: int, purpose: Purpose) -> np.random.Generator:
