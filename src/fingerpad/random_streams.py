@@ -152,13 +152,13 @@ class Presentations:
 
     def __post_init__(self) -> None:
         for name in ("sites", "trials", "receptors"):
-            numbers = numbered(name, tuple(getattr(self, name)))
+            numbers = numbered(name, np.asarray(getattr(self, name)))
             numbers.setflags(write=False)
             object.__setattr__(self, name, numbers)
         sizes = self.sites.size, self.trials.size, self.receptors.size
         if len(set(sizes)) > 1:
             raise InputError(f"Presentations needs one site, trial and receptor per train: got {sizes}.")
-        if len(set(zip(self.trials.tolist(), self.receptors.tolist(), strict=True))) < len(self):
+        if len(np.unique(np.stack([self.trials, self.receptors]), axis=1).T) < len(self):
             raise InputError(
                 "Presentations needs another trial for each train of a receptor, or they draw the same "
                 f"numbers: got trials {self.trials[:8].tolist()} of receptors {self.receptors[:8].tolist()}."
@@ -313,7 +313,48 @@ def _fill(seed, trials, receptors, purpose, normal, numbers):  # type: ignore[no
                     numbers[i, j, first + k] = four[k]
 
 
-def numbered(name: str, which: int | Sequence[int]) -> IntArray:
+def normals_of(seed: int, presentations: Presentations, purpose: Purpose, count: int) -> FloatArray:
+    """Draw standard normal numbers for each train of a set of presentations.
+
+    Parameters
+    ----------
+    seed, purpose, count
+        As in `uniforms`.
+    presentations : Presentations
+        Whose numbers to draw.
+
+    Returns
+    -------
+    array (n_trains, count)
+        The numbers that `normals` gives to the trial and receptor of each train.
+
+    Raises
+    ------
+    InputError
+        As in `generator`.
+
+    Examples
+    --------
+    >>> one = Presentations(sites=[0], trials=[1], receptors=[5])
+    >>> every = normals(7, trials=2, receptors=6, purpose=Purpose.GAIN, count=3)
+    >>> bool((normals_of(7, one, Purpose.GAIN, 3)[0] == every[1, 5]).all())
+    True
+    """
+    numbers = np.empty((len(presentations), whole("count", count, 0)))
+    key = _number("seed", seed), int(instance("purpose", purpose, Purpose))
+    _fill_trains(key[0], presentations.trials, presentations.receptors, key[1], numbers)
+    return numbers
+
+
+@njit(cache=True, nogil=True)
+def _fill_trains(seed, trials, receptors, purpose, numbers):  # type: ignore[no-untyped-def]
+    """Write the first numbers of one stream per train."""
+    for train in range(trials.size):
+        some = slice(train, train + 1)
+        _fill(seed, trials[some], receptors[some], purpose, True, numbers[some].reshape((1, 1, -1)))
+
+
+def numbered(name: str, which: int | Sequence[int] | np.ndarray) -> IntArray:
     """Return the numbers of trials or receptors: the ones given, or so many from 0.
 
     Parameters
@@ -339,6 +380,8 @@ def numbered(name: str, which: int | Sequence[int]) -> IntArray:
     """
     if isinstance(which, int | np.integer):
         return np.arange(whole(name, int(which), 1), dtype=np.int64)
+    if isinstance(which, np.ndarray) and np.issubdtype(which.dtype, np.integer) and which.min(initial=0) >= 0:
+        return which.astype(np.int64)
     return np.array([_number(name, number) for number in which], dtype=np.int64)
 
 

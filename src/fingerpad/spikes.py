@@ -140,7 +140,7 @@ def interval_statistics(spikes: SpikeTrains, window_ms: tuple[float, ...]) -> In
     return IntervalStatistics(count, mean_ms, variation, 3.0 * local)
 
 
-def _ratio(numerator: FloatArray, denominator: np.ndarray) -> FloatArray:
+def _ratio(numerator: np.ndarray, denominator: np.ndarray) -> FloatArray:
     """Quotient, NaN where the denominator is not positive."""
     return np.divide(numerator, denominator, out=np.full(numerator.shape, np.nan), where=denominator > 0)
 
