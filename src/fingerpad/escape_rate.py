@@ -43,7 +43,7 @@ _LONGEST_PANEL = 0.5
 """Time over tau that one panel spans, at most: over longer ones the potential bends."""
 
 _HIGHEST_STEP = 1.0
-"""Change of the logarithm of the hazard over one panel, at most: Gauss's formula then errs by at most 1e-9."""
+"""Change of the logarithm of the hazard over one panel, at most: Gauss's formula then errs by 1e-9."""
 
 _NEGLIGIBLE = -60.0
 """A hazard of exp(-60)/tau_e never fires: panels below it are passed over."""
