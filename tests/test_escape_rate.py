@@ -101,10 +101,11 @@ def test_tau_e_only_moves_the_threshold():
 
 
 def test_intensity_is_the_hazard_of_the_potential_since_the_last_spike():
+    slow = EscapeRate(NEURON, 0.2, escape_ms=2.0)
     current = touched(2)
     spikes = SpikeTrains.from_lists([[15.0, 62.0], []])
     times = [0.0, 10.0, 15.0, 16.0, 18.0, 40.0, 60.0, 62.0, 64.9, 65.0, 250.0]
-    found = SOFT.intensity_per_ms(current, spikes, [1, 0], times)
+    found = slow.intensity_per_ms(current, spikes, [1, 0], times)
     for train, (site, restarts) in enumerate(((1, [0.0, 18.0, 65.0]), (0, [0.0]))):
         for row, time in enumerate(times):
             resting = train == 0 and any(spike < time < spike + REFRACTORY for spike in (15.0, 62.0))
@@ -113,8 +114,8 @@ def test_intensity_is_the_hazard_of_the_potential_since_the_last_spike():
                 assert found[row, train] == 0.0
                 continue
             u = free_potential(current, site, begin, time)[-1][2](time)[0] if time > begin else 0.0
-            assert_allclose(found[row, train], math.exp((u - 1.0) / 0.2), rtol=1e-8)
-            assert_allclose(found[row, train], SOFT.hazard_per_ms(THRESHOLD * u), rtol=1e-8)
+            assert_allclose(found[row, train], 0.5 * math.exp((u - 1.0) / 0.2), rtol=1e-8)
+            assert_allclose(found[row, train], slow.hazard_per_ms(THRESHOLD * u), rtol=1e-8)
 
 
 def test_gauss_on_panels_errs_by_a_billionth_at_most():
