@@ -40,6 +40,14 @@ class RateModel(Protocol):
         ...
 
 
+class SmoothRateModel(RateModel, Protocol):
+    """A model of rates that knows its slopes."""
+
+    def slopes(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Slopes of dynamic and static rates along the parameters, (n_stimuli, n_parameters) each."""
+        ...
+
+
 @dataclass(frozen=True)
 class AfferentModel:
     """The paper's model: one afferent, its six parameters free.
@@ -193,6 +201,19 @@ class RateProblem:
             ]
         )
 
+    def jacobian_of(self, model: SmoothRateModel) -> Callable[[FloatArray, IntArray], FloatArray]:
+        """Slopes of the residuals if `model` predicted, as a function; (n_residuals, n_parameters)."""
+
+        def jacobian(parameters: FloatArray, chosen: IntArray) -> FloatArray:
+            return np.concatenate(
+                [
+                    -np.sqrt(weight / (observed @ observed)) * slopes[chosen]
+                    for weight, observed, slopes in self._recorded(chosen, model.slopes(parameters))
+                ]
+            )
+
+        return jacobian
+
     def score(self, parameters: FloatArray, chosen: IntArray) -> float:
         """FSS of Eqs. 12-14 over the chosen stimuli, weighted where both phases were recorded."""
         return sum(
@@ -212,9 +233,16 @@ class RateProblem:
         self, parameters: FloatArray, chosen: IntArray
     ) -> Iterator[tuple[float, FloatArray, FloatArray]]:
         """Weight, observed and predicted rates of each phase that was recorded."""
+        for weight, observed, predicted in self._recorded(chosen, self.model.rates(parameters)):
+            yield weight, observed, predicted[chosen]
+
+    def _recorded(
+        self, chosen: IntArray, of_phases: tuple[FloatArray, FloatArray]
+    ) -> Iterator[tuple[float, FloatArray, FloatArray]]:
+        """Weight and observed rates of each phase that was recorded, with what is given for it."""
         alone = len(self.recordings.phases) == 1
         weights = (self.dynamic_weight, self.static_weight)
         observed = (self.recordings.dynamic_rate_hz, self.recordings.static_rate_hz)
-        for weight, seen, predicted in zip(weights, observed, self.model.rates(parameters), strict=True):
-            if seen is not None:
-                yield 1.0 if alone else weight, seen[chosen], predicted[chosen]
+        for weight, rates, given in zip(weights, observed, of_phases, strict=True):
+            if rates is not None:
+                yield 1.0 if alone else weight, rates[chosen], given

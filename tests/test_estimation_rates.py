@@ -1,0 +1,210 @@
+"""Rates to be fitted: residuals make the score, a rate in closed form has slopes, a receptor may be moved."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fingerpad.afferent import Afferent
+from fingerpad.errors import InputError
+from fingerpad.estimation.closed_form import ClosedFormModel, constant_drive_rate
+from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
+from fingerpad.estimation.rate_problem import AfferentModel, RateProblem, Reparametrised
+from fingerpad.estimation.receptor_offset import ReceptorOffset, receptor_offset
+from fingerpad.estimation.recordings import RateRecordings
+from fingerpad.fitting import weighted_fractional_sum_of_squares
+from fingerpad.fitting.least_squares import LeastSquares
+from fingerpad.lif import LeakyIntegrateAndFire
+from fingerpad.signals import CurrentTraces, SedTraces
+from fingerpad.spikes import firing_rate_hz
+from fingerpad.transduction import drive
+
+SHIFT_MM = np.linspace(-2.0, 2.0, 21)
+FOUR = np.array([0.012, 3.2, 0.03, 45.0])
+TIMES_MS = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 100.0, 300.0, 1000.0])
+COURSE = np.array([0.0, 0.06, 0.2, 0.42, 0.7, 1.0, 0.92, 0.85, 0.8])
+EVERYTHING = np.arange(SHIFT_MM.size)
+
+
+def traces(offset_mm: float = 0.0) -> SedTraces:
+    """SED of a ramp and a relaxing hold; over the shifts a bump that is steeper on one side."""
+    place = SHIFT_MM + offset_mm
+    peak_kpa = 0.2 + 1.8 * np.exp(-np.square(place / np.where(place < 0.0, 0.6, 0.9)))
+    return SedTraces(TIMES_MS, np.outer(COURSE, peak_kpa), kinks_ms=[50.0])
+
+
+def problem(model, truth) -> RateProblem:
+    """What an afferent with these parameters would have been recorded to answer."""
+    dynamic, static = model.rates(truth)
+    return RateProblem(model, RateRecordings(tuple(f"{shift:g}" for shift in SHIFT_MM), dynamic, static))
+
+
+@pytest.fixture(scope="module")
+def four_numbers() -> RateProblem:
+    model = Reparametrised(AfferentModel(drive(traces())), IDENTIFIABLE_NAMES, six_parameters)
+    return problem(model, FOUR)
+
+
+# Rates as a problem
+
+
+def test_residuals_make_the_score_and_the_score_is_the_papers(four_numbers):
+    chosen = np.array([3, 8, 10, 11, 15])
+    other = FOUR * [1.0, 1.2, 0.8, 1.1]
+    residuals = four_numbers.residuals(other, chosen)
+    assert residuals.shape == (10,)
+    observed, (dynamic, static) = four_numbers.recordings, four_numbers.model.rates(other)
+    papers = weighted_fractional_sum_of_squares(
+        observed.dynamic_rate_hz[chosen], dynamic[chosen], observed.static_rate_hz[chosen], static[chosen]
+    )
+    assert four_numbers.score(other, chosen) == papers < 0.99
+    assert 1.0 - residuals @ residuals == pytest.approx(papers, abs=1e-14)
+    by_phase = four_numbers.score_by_phase(other, chosen)
+    assert 0.25 * by_phase["dynamic"] + 0.75 * by_phase["static"] == pytest.approx(papers, abs=1e-14)
+    assert four_numbers.score(FOUR, chosen) == 1.0
+
+
+def test_a_phase_that_was_not_recorded_has_no_part_in_the_score(four_numbers):
+    alone = replace(four_numbers, recordings=replace(four_numbers.recordings, dynamic_rate_hz=None))
+    other = FOUR * [1.0, 1.5, 0.8, 1.0]
+    assert alone.residuals(other, EVERYTHING).shape == (21,)
+    assert alone.score(other, EVERYTHING) == four_numbers.score_by_phase(other, EVERYTHING)["static"] < 0.99
+    assert list(alone.score_by_phase(other, EVERYTHING)) == ["static"]
+
+
+def test_six_parameters_and_their_four_numbers_predict_the_same(four_numbers):
+    six = six_parameters(FOUR, capacitance_mf=3e-7, threshold_mv=20.0)
+    rates = AfferentModel(drive(traces())).rates(six)
+    np.testing.assert_allclose(rates, four_numbers.model.rates(identifiable(six)), rtol=1e-9)
+
+
+def test_recordings_of_other_stimuli_are_refused(four_numbers):
+    with pytest.raises(InputError, match="one stimulus per column of the model's drive: got 2 for 21"):
+        replace(four_numbers, recordings=four_numbers.recordings.chosen([0, 1]))
+    with pytest.raises(InputError, match="static_weight must not be negative"):
+        replace(four_numbers, static_weight=-1.0)
+
+
+# The rate in closed form
+
+
+@pytest.mark.parametrize("drive_per_ms", [0.0, 0.0199, 0.0201, 0.03, 0.1, 1.0])
+def test_a_constant_current_fires_at_the_rate_of_the_formula(drive_per_ms):
+    membrane = LeakyIntegrateAndFire(50.0, 1e-6, 40.0, 1.0)
+    current = np.full((2, 1), drive_per_ms * 1e-6 * 40.0)
+    spikes = membrane.spikes(CurrentTraces([0.0, 5000.0], current))
+    rate, _, _ = constant_drive_rate([drive_per_ms], 50.0, 1.0)
+    np.testing.assert_allclose(rate, firing_rate_hz(spikes, (0.0, 5000.0)), rtol=1e-9)
+    assert (rate[0] > 0.0) == (drive_per_ms > 1.0 / 50.0)
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.05])
+def test_slopes_of_the_formula_are_those_of_its_differences(bend):
+    drives, tau, step = np.array([0.021, 0.03, 0.2, 1.5]), 50.0, 1e-6
+
+    def rate(g, tau):
+        return constant_drive_rate(g, tau, 1.0, bend)[0]
+
+    _, per_drive, per_tau = constant_drive_rate(drives, tau, 1.0, bend)
+    shift = step * drives
+    np.testing.assert_allclose(
+        per_drive, (rate(drives + shift, tau) - rate(drives - shift, tau)) / (2.0 * shift), rtol=1e-5
+    )
+    shift = step * tau
+    np.testing.assert_allclose(
+        per_tau, (rate(drives, tau + shift) - rate(drives, tau - shift)) / (2.0 * shift), rtol=1e-5
+    )
+
+
+def test_the_bend_lets_a_rate_set_in_gently_and_vanishes_with_its_width():
+    below, above = np.array([0.015]), np.array([0.03])
+    assert constant_drive_rate(below, 50.0)[0] == 0.0 < constant_drive_rate(below, 50.0, bend=0.05)[0]
+    exact = constant_drive_rate(above, 50.0)[0]
+    errors = [abs(constant_drive_rate(above, 50.0, bend=bend)[0] - exact) for bend in (0.2, 0.1, 0.01)]
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[2] < 1e-6
+
+
+def test_slopes_of_the_model_are_those_of_its_residuals(four_numbers):
+    smooth = replace(four_numbers, model=ClosedFormModel(drive(traces())))
+    slopes = smooth.jacobian_of(smooth.model)(FOUR, EVERYTHING)
+    steps = np.diag(1e-6 * FOUR)
+    differences = [
+        (smooth.residuals(FOUR + step, EVERYTHING) - smooth.residuals(FOUR - step, EVERYTHING))
+        / (2.0 * step.max())
+        for step in steps
+    ]
+    np.testing.assert_allclose(slopes, np.column_stack(differences), rtol=1e-4, atol=1e-7 * abs(slopes).max())
+
+
+def test_static_rates_of_the_formula_are_near_those_of_spikes(four_numbers):
+    dynamic, static = ClosedFormModel(drive(traces()), bend=0.0).rates(FOUR)
+    # Spikes do not fill the window to its borders; the formula does.
+    np.testing.assert_allclose(static, four_numbers.recordings.static_rate_hz, atol=0.3)
+    assert (static > 0.0).sum() == 11
+    assert np.corrcoef(dynamic, four_numbers.recordings.dynamic_rate_hz)[0, 1] > 0.9
+
+
+@pytest.mark.parametrize("by_formula", [False, True])
+def test_the_truth_is_recovered_from_simulated_rates(four_numbers, by_formula):
+    starts = FOUR * np.array([[0.3, 0.5, 1.6, 1.7], [1.5, 2.0, 0.5, 0.5]])
+    jacobian = four_numbers.jacobian_of(ClosedFormModel(drive(traces()))) if by_formula else None
+    method = LeastSquares(starts, 0.3 * FOUR, 0.0 * FOUR, 10.0 * FOUR, jacobian=jacobian)
+    fit = method.fit(four_numbers, EVERYTHING)
+    assert fit.score > 0.995
+    np.testing.assert_allclose(fit.parameters[1:3], FOUR[1:3], rtol=0.1)
+
+
+# A receptor beside the middle of its field
+
+OFFSETS_MM = (-0.4, -0.2, 0.0, 0.2, 0.4)
+
+
+def offset_model() -> ReceptorOffset:
+    return receptor_offset(OFFSETS_MM, [traces(offset) for offset in OFFSETS_MM])
+
+
+def test_at_a_sampled_place_the_receptor_feels_what_was_sampled():
+    model = offset_model()
+    six = Afferent().parameters
+    for offset in OFFSETS_MM:
+        rates = model.rates(np.append(six, offset))
+        np.testing.assert_array_equal(rates, AfferentModel(drive(traces(offset))).rates(six))
+
+
+def test_between_two_places_the_drive_is_interpolated():
+    model = offset_model()
+    middle = model.drive_at(0.1)
+    for name in ("sed_kpa", "rate_kpa_per_ms"):
+        ends = [getattr(drive(traces(offset)), name) for offset in (0.0, 0.2)]
+        np.testing.assert_allclose(getattr(middle, name), np.mean(ends, axis=0), rtol=1e-12, atol=1e-15)
+
+
+def test_a_hidden_offset_is_recovered():
+    six = six_parameters(FOUR)
+    hidden = problem(offset_model(), np.append(six, 0.13))
+    free = replace(
+        hidden,
+        model=Reparametrised(
+            hidden.model,
+            (*IDENTIFIABLE_NAMES, "offset_mm"),
+            lambda five: np.append(six_parameters(five[:4]), five[4]),
+        ),
+    )
+    start, scales = np.append(1.2 * FOUR, -0.05), np.append(0.3 * FOUR, 0.1)
+    method = LeastSquares([start], scales, [*(0.0 * FOUR), -0.4], [*(10.0 * FOUR), 0.4])
+    fit = method.fit(free, EVERYTHING)
+    assert fit.parameters[-1] == pytest.approx(0.13, abs=0.02)
+    blind = replace(hidden, model=AfferentModel(drive(traces())))
+    assert fit.score > 0.99 > blind.score(six, EVERYTHING) + 0.02
+
+
+def test_places_that_were_not_sampled_are_refused():
+    with pytest.raises(InputError, match=r"offset_mm must lie within -0\.4 \.\.\. 0\.4 mm.*got 0\.5"):
+        offset_model().drive_at(0.5)
+    with pytest.raises(InputError, match="got 1 places and 1 drives"):
+        receptor_offset([0.0], [traces()])
+    with pytest.raises(InputError, match="got 2 places and 2 drives of 2 kinds"):
+        receptor_offset([0.0, 0.1], [traces(), SedTraces([0.0, 1000.0], [[0.0], [1.0]])])
+    with pytest.raises(InputError, match="offsets_mm must increase strictly"):
+        receptor_offset([0.1, 0.0], [traces(), traces()])

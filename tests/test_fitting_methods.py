@@ -1,0 +1,149 @@
+"""Methods of fitting: each finds a known optimum, minds its bounds, counts its runs and repeats itself."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from fingerpad.errors import InputError
+from fingerpad.fitting import Fit, Step, best_of
+from fingerpad.fitting.covariance_adaptation import CovarianceAdaptation
+from fingerpad.fitting.least_squares import LeastSquares
+
+TIMES = np.linspace(0.0, 4.0, 24)
+TRUTH = np.array([2.0, 0.8])
+START, SCALES = np.array([1.0, 2.0]), np.array([0.5, 0.4])
+ALL = np.arange(24)
+
+
+@dataclass
+class Decay:
+    """Height and rate of a decay, which a recorder may have rounded: then the residuals jump."""
+
+    rounding: float = 0.0
+    names: tuple[str, ...] = ("height", "rate")
+    n_observations: int = 24
+    asked: list[np.ndarray] = field(default_factory=list)
+
+    def curve(self, parameters):
+        values = parameters[0] * np.exp(-parameters[1] * TIMES)
+        return np.round(values / self.rounding) * self.rounding if self.rounding else values
+
+    def residuals(self, parameters, chosen):
+        self.asked.append(np.array(parameters))
+        observed = self.curve(TRUTH)[chosen]
+        return (observed - self.curve(parameters)[chosen]) / np.sqrt(observed @ observed)
+
+    def score(self, parameters, chosen):
+        residuals = self.residuals(parameters, chosen)
+        return 1.0 - float(residuals @ residuals)
+
+    def jacobian(self, parameters, chosen):
+        observed = self.curve(TRUTH)[chosen]
+        decay = np.exp(-parameters[1] * TIMES)[chosen]
+        slopes = np.column_stack([-decay, parameters[0] * TIMES[chosen] * decay])
+        return slopes / np.sqrt(observed @ observed)
+
+
+METHODS = [
+    LeastSquares([START], SCALES),
+    LeastSquares([START], SCALES, jacobian=Decay().jacobian),
+    CovarianceAdaptation(START, SCALES),
+]
+
+
+@pytest.mark.parametrize("method", METHODS, ids=["least squares", "with slopes", "CMA-ES"])
+def test_truth_is_found_from_afar(method) -> None:
+    problem = Decay()
+    fit = method.fit(problem, ALL)
+    np.testing.assert_allclose(fit.parameters, TRUTH, rtol=1e-4)
+    assert fit.score == pytest.approx(1.0, abs=1e-8)
+    assert fit.n_evaluations == len(problem.asked)
+    assert fit.seconds > 0.0
+    assert fit.history[-1].score == fit.score
+    assert [step.score for step in fit.history] == sorted(step.score for step in fit.history)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=["least squares", "with slopes", "CMA-ES"])
+def test_the_same_input_gives_the_same_bits_and_leaves_the_global_random_state_alone(method) -> None:
+    state = np.random.get_state()[1].copy()  # noqa: NPY002
+    first, second = (method.fit(Decay(), ALL) for _ in range(2))
+    assert first.parameters.tobytes() == second.parameters.tobytes()
+    np.testing.assert_array_equal(np.random.get_state()[1], state)  # noqa: NPY002
+
+
+@pytest.mark.parametrize("method", METHODS, ids=["least squares", "with slopes", "CMA-ES"])
+def test_bounds_are_kept_and_the_best_place_within_is_found(method) -> None:
+    problem = Decay()
+    bounded = replace(method, lower_bounds=[0.0, 0.0], upper_bounds=[1.5, 10.0])
+    fit = bounded.fit(problem, ALL)
+    assert fit.parameters[0] == pytest.approx(1.5, rel=1e-3)
+    asked = np.array(problem.asked)
+    assert (asked >= 0.0).all()
+    assert (asked[:, 0] <= 1.5).all()
+    tried = [problem.score(np.array([1.5, rate]), ALL) for rate in np.linspace(0.3, 1.0, 141)]
+    assert fit.score >= max(tried) - 1e-6
+
+
+def test_large_differences_see_past_jumps_that_blind_small_ones() -> None:
+    rounded = Decay(rounding=0.1)
+    wide = LeastSquares([START], SCALES, difference_steps=(0.3, 0.1)).fit(rounded, ALL)
+    narrow = LeastSquares([START], SCALES, difference_steps=(1e-7,)).fit(rounded, ALL)
+    assert wide.score > 0.995
+    assert narrow.score < wide.score - 0.05
+
+
+def test_only_the_most_promising_starts_are_refined_and_the_best_is_kept() -> None:
+    starts = np.array([[9.0, 4.0], [1.9, 0.7], [9.0, 9.0], [2.5, 1.0]])
+    problem = Decay()
+    fit = LeastSquares(starts, SCALES, n_refined=2).fit(problem, ALL)
+    refined = fit.attempts[:-1]
+    assert [attempt.history[0].parameters.tolist() for attempt in refined] == [[1.9, 0.7], [2.5, 1.0]]
+    assert fit.score == max(attempt.score for attempt in fit.attempts)
+    assert fit.n_evaluations == len(problem.asked) == 4 + sum(attempt.n_evaluations for attempt in refined)
+
+
+def test_a_seed_decides_what_the_search_tries() -> None:
+    fits = [
+        CovarianceAdaptation(START, SCALES, seed=seed, most_evaluations=30).fit(Decay(), ALL)
+        for seed in (0, 1)
+    ]
+    assert fits[0].parameters.tolist() != fits[1].parameters.tolist()
+    assert all(fit.n_evaluations < 30 + 8 for fit in fits)
+
+
+def test_only_the_chosen_observations_are_fitted() -> None:
+    for method in METHODS:
+        problem = Decay()
+        chosen = np.arange(5)
+        fit = method.fit(problem, chosen)
+        assert fit.score == problem.score(fit.parameters, chosen)
+
+
+def test_the_first_of_equal_attempts_is_taken() -> None:
+    attempts = tuple(
+        Fit(np.array([value]), 0.5, 7, 0.25, (Step(np.array([value]), 0.5),)) for value in (1.0, 2.0)
+    )
+    best = best_of(attempts)
+    assert (best.start, best.parameters.tolist(), best.n_evaluations, best.seconds) == (0, [1.0], 14, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: LeastSquares([[1.0, 2.0]], [1.0]), "scales needs one number above 0 per parameter"),
+        (lambda: LeastSquares([[1.0]], [0.0]), "scales needs one number above 0 per parameter"),
+        (lambda: LeastSquares([[1.0]], [1.0], difference_steps=(0.0,)), "difference_steps must be greater"),
+        (lambda: LeastSquares([[1.0], [3.0]], [1.0], upper_bounds=[2.0]), "between the bounds: row 1"),
+        (lambda: LeastSquares([[1.0]], [1.0], n_refined=0), "n_refined must be a whole number"),
+        (lambda: CovarianceAdaptation([1.0, 2.0], [1.0]), "scales needs one number above 0 per parameter"),
+        (
+            lambda: CovarianceAdaptation([1.0, 2.0], [1.0, 1.0], first_spread=0.0),
+            "first_spread must be greater",
+        ),
+        (lambda: CovarianceAdaptation([1.0, 2.0], [1.0, 1.0], seed=-1), "seed must be a whole number"),
+    ],
+)
+def test_wrong_settings_are_refused(make, words) -> None:
+    with pytest.raises(InputError, match=words):
+        make()
