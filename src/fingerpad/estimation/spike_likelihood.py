@@ -514,17 +514,12 @@ def _operational_times(
     """Integral of the hazard up to the end of each stretch that a spike ends."""
     found = np.empty(flags[:, 1].sum())
     gradient, information = np.zeros(5), np.zeros((5, 5))
-    total, count, first = 0.0, 0, 0
+    count, first = 0, 0
     for n in range(stretches.shape[0]):
-        last = n == stretches.shape[0] - 1
-        # A sweep from one reset to the next counts minus the integral, and ln h of the spike that ends it.
-        if flags[n, 1] or last or flags[n + 1, 0]:
-            before = gradient[3]
+        if flags[n, 1]:
             _sweep(stretches[first : n + 1], flags[first : n + 1], numbers, escape, gradient, information)
-            # d log L/dG is the integral, less one for each spike.
-            total += gradient[3] - before + (1.0 if flags[n, 1] else 0.0)
             first = n + 1
-            if flags[n, 1]:
-                found[count] = total
-                count += 1
+            count += 1
+            # d log L/dG is the integral, less one for each spike.
+            found[count - 1] = gradient[3] + count
     return found

@@ -46,3 +46,13 @@ REFRACTORY = Published("refractory period", 1.0, "ms", "Gerling et al. 2014, sec
 DIFFERENCE_STEP = Published(
     "step h of the rate of change of energy density", 0.001, "ms", "Gerling et al. 2014, Eq. 2", "paper"
 )
+_VARIABILITY = (
+    "mouse SAI afferents, skin and nerve in a dish, while a touch is held: as quoted in later public "
+    "material of the authors' laboratory"
+)
+INTERVAL_VARIATION = Published(
+    "coefficient of variation of the intervals between spikes", 0.78, "1", _VARIABILITY, "read"
+)
+INTERVAL_VARIATION_SPREAD = Published(
+    "spread of that coefficient from afferent to afferent", 0.09, "1", _VARIABILITY, "read"
+)

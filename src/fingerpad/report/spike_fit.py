@@ -1,0 +1,266 @@
+"""Spike trains: what noise makes of them, and the afferent found again in them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fingerpad.report.appearance import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PALE,
+    new_figure,
+    numbers,
+    say_nothing_to_draw,
+)
+from fingerpad.report.tables import Row, Table
+from fingerpad.report.words import fixed, number
+
+NAMES = {
+    "intercept_per_ms": "β/(C v)",
+    "dynamic_gain_per_kpa": "k_d/(C v)",
+    "static_gain_per_kpa_ms": "k_s/(C v)",
+    "time_constant_ms": "τ",
+    "escape_width": "width δ/v",
+}
+STYLES = ((BLUE, "-"), (GREEN, "--"), (ORANGE, "-."), (BLACK, ":"), (GREY, "-"))
+LOWEST_INTENSITY_HZ = 1.0
+NOT_FITTED = "the spikes could not be fitted"
+
+
+def draw(section: Mapping[str, Any]) -> Figure:
+    """Draw spikes under the bar, their intensity, the test of time rescaling, and irregularity against noise.
+
+    Parameters
+    ----------
+    section : dict
+        `results["spike_fit"]`.
+
+    Returns
+    -------
+    Figure
+    """
+    figure = new_figure(10.0, 8.0)
+    raster, intensity, rescaled, variability = figure.subplots(2, 2).flat
+    _raster(raster, section["raster"])
+    _intensity(intensity, section["raster"])
+    _rescaled(rescaled, section["recovery"])
+    _variability(variability, section["variability"])
+    return figure
+
+
+def _raster(axes: Axes, found: Mapping[str, Any] | None) -> None:
+    axes.set_title("(a) spikes, one presentation each")
+    if not found:
+        say_nothing_to_draw(axes, NOT_FITTED)
+        return
+    shift = numbers(found["shift_mm"])
+    step = float(np.diff(shift).min()) if shift.size > 1 else 1.0
+    axes.eventplot(
+        [numbers(train) for train in found["spikes_ms"]],
+        lineoffsets=shift.tolist(),
+        linelengths=0.8 * step,
+        linewidths=0.7,
+        colors=BLACK,
+    )
+    axes.axhline(found["shown_shift_mm"], color=PALE, linewidth=8.0, zorder=0)
+    axes.set_xlabel("time [ms]")
+    axes.set_ylabel("position of the bar [mm]")
+
+
+def _intensity(axes: Axes, found: Mapping[str, Any] | None) -> None:
+    axes.set_title("(b) intensity")
+    if not found:
+        say_nothing_to_draw(axes, NOT_FITTED)
+        return
+    times = numbers(found["times_ms"])
+    for name, colour, line in (("truth", BLACK, "-"), ("fitted", ORANGE, "--")):
+        axes.plot(
+            times, numbers(found["intensity_hz"][name]), color=colour, linestyle=line, lw=1.2, label=name
+        )
+    row = list(found["shift_mm"]).index(found["shown_shift_mm"])
+    spikes = numbers(found["spikes_ms"][row])
+    shown = spikes[spikes <= times[-1]]
+    axes.plot(
+        shown,
+        np.full(shown.size, 0.04),
+        "|",
+        color=BLUE,
+        markersize=9.0,
+        label="spikes",
+        transform=axes.get_xaxis_transform(),
+    )
+    axes.set_title(f"(b) intensity, bar at {number(found['shown_shift_mm'])} mm")
+    axes.set_yscale("log")
+    axes.set_ylim(bottom=LOWEST_INTENSITY_HZ)
+    axes.set_xlabel("time [ms]")
+    axes.set_ylabel("intensity given the spikes before [1/s]")
+    axes.legend(loc="upper right")
+
+
+def _rescaled(axes: Axes, found: Mapping[str, Any] | None) -> None:
+    axes.set_title("(c) rescaled intervals")
+    if not found:
+        say_nothing_to_draw(axes, NOT_FITTED)
+        return
+    test = found["rescaled"]
+    share, limit = numbers(test["share"]), test["limit"]
+    axes.fill_between([0.0, 1.0], -limit, limit, color=PALE, label=f"{found['level']:.0%} of chance")
+    axes.plot(share, numbers(test["quantile"]) - share, color=BLUE, label="fitted")
+    axes.set_ylim(-2.0 * limit, 2.0 * limit)
+    axes.set_xlabel("uniform quantile")
+    axes.set_ylabel("quantile of the rescaled intervals, less uniform")
+    axes.legend(loc="upper left")
+
+
+def _variability(axes: Axes, found: Mapping[str, Any]) -> None:
+    axes.set_title("(d) irregularity")
+    if not found["sources"]:
+        say_nothing_to_draw(axes, "the afferent is silent")
+        return
+    low, high = (found["observed"] + sign * found["observed_spread"] for sign in (-1, 1))
+    axes.axhspan(low, high, color=PALE, zorder=0, label="observed, mouse")
+    for (colour, line), source in zip(STYLES, found["sources"], strict=False):
+        axes.plot(
+            numbers(source["amount"]),
+            numbers(source["coefficient_of_variation"]),
+            color=colour,
+            linestyle=line,
+            marker="o",
+            markersize=3.0,
+            label=source["name"],
+        )
+    axes.set_xlabel("amount of noise, relative")
+    axes.set_ylabel("coefficient of variation")
+    axes.set_ylim(0.0, 1.9)
+    axes.legend(loc="upper right", fontsize=7.5)
+
+
+def caption(section: Mapping[str, Any]) -> str:
+    """Say what the figure shows.
+
+    Parameters
+    ----------
+    section : dict
+        `results["spike_fit"]`.
+
+    Returns
+    -------
+    str
+    """
+    found = section["recovery"]
+    fitted = (
+        f"{found['n_held']} of {len(found['truth'])} intervals of {found['level']:.0%} hold the truth; the "
+        f"rescaled intervals stray from uniform by {number(found['rescaled']['distance'])}; chance allows "
+        f"{number(found['rescaled']['limit'])}."
+        if found
+        else "They could not be fitted."
+    )
+    return (
+        "Spikes of the fitted afferent with a soft threshold (escape rate) under the bar at "
+        f"{section['n_positions']} positions, {section['n_repeats']} times each, fitted by maximum "
+        f"likelihood from the paper's first start point. {fitted} (c) Intervals measured "
+        "in the integral of the fitted intensity: how far they stray from what a true model makes of them. "
+        "(d) Coefficient of variation of the intervals of the held afferent against the amount of noise, at "
+        "the rate that it has without noise; shaded: observed in mice. The meaning of each amount stands in "
+        "the table."
+    )
+
+
+def table(section: Mapping[str, Any]) -> list[Table]:
+    """Return truth and estimates, fits to other noise, and the noise that makes the observed irregularity.
+
+    Parameters
+    ----------
+    section : dict
+        `results["spike_fit"]`.
+
+    Returns
+    -------
+    list of Table
+    """
+    tables = [_recovery(section), _other_noise(section), _sources(section["variability"])]
+    return [found for found in tables if found.rows]
+
+
+def _recovery(section: Mapping[str, Any]) -> Table:
+    found = section["recovery"] or {}
+    columns = ("parameter", "start", "truth", "estimate", "standard error", "from", "to", "unit")
+    keys = ("start", "truth", "estimate", "standard_error", "low", "high")
+    rows = [
+        Row((NAMES.get(name, name), *(number(found[key][place], 4) for key in keys), unit))
+        for place, (name, unit) in enumerate(zip(section["names"], section["units"], strict=True))
+        if found
+    ]
+    note = (
+        f"{found['n_spikes']} spikes. Log-likelihood {fixed(found['log_likelihood'], 1)} at the estimate, "
+        f"{fixed(found['log_likelihood_of_truth'], 1)} at the truth; {found['n_steps']} steps. From and to: "
+        f"interval that holds the truth in {found['level']:.0%} of such experiments."
+        if found
+        else ""
+    )
+    return Table("The afferent found again in its spikes", columns, rows, note)
+
+
+def _other_noise(section: Mapping[str, Any]) -> Table:
+    columns = (
+        "spikes made with",
+        "amount",
+        "spikes",
+        *(f"{NAMES[name]}, over truth" for name in section["names"][:4]),
+        "width",
+        "distance (chance)",
+        "error of dynamic rate [1/s]",
+        "error of static rate [1/s]",
+    )
+    rows = [
+        Row(
+            (
+                found["name"],
+                number(found["amount"]),
+                number(found["n_spikes"], 5),
+                *(fixed(ratio, 2) for ratio in found.get("over_truth") or [None] * 4),
+                fixed((found.get("estimate") or [None] * 5)[4], 3),
+                f"{fixed(found.get('distance'), 3)} ({fixed(found.get('limit'), 3)})",
+                fixed(found.get("dynamic_rate_error_hz"), 1),
+                fixed(found.get("static_rate_error_hz"), 1),
+            )
+        )
+        for found in section["other_noise"]
+    ]
+    note = (
+        "Fitted with a soft threshold, which did not make them. Distance: of the rescaled intervals from "
+        "uniform; one above what chance allows says that the model did not make the spikes: its time "
+        "constant and intercept are not to be trusted then. Errors: root mean square over the positions."
+    )
+    return Table("Spikes of other noise", columns, rows, note)
+
+
+def _sources(found: Mapping[str, Any]) -> Table:
+    columns = ("noise", "amount is", "amount", "current, for the same rate", "local variation")
+    rows = [
+        Row(
+            (
+                source["name"],
+                source["amount_is"],
+                *(
+                    fixed((source["at_observed"] or {}).get(key), 2)
+                    for key in ("amount", "current_factor", "local_variation")
+                ),
+            )
+        )
+        for source in found["sources"]
+    ]
+    note = (
+        "Amount of each noise that gives intervals the coefficient of variation observed in mice, "
+        f"{number(found['observed'])}, in an afferent held at {fixed(found['rate_hz'], 1)} spikes/s; a dash: "
+        "no amount tried does, at the same rate. Current: factor that keeps the rate."
+    )
+    return Table("Noise that makes the observed irregularity", columns, rows, note)
