@@ -24,11 +24,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fingerpad.checks import FloatArray
+from fingerpad.mechanics.small_arrays import small_single_array
 
 SingleArray = NDArray[np.float32]
 
 LANES = 8
 """Depths are padded to a multiple of this: the single-precision numbers of one 256-bit register."""
+
+MOST_LANES = 512
+"""Padded depth of the deepest column that kernels take: they hold one on the stack."""
 
 
 @dataclass(frozen=True)
@@ -179,22 +183,27 @@ def take_blocks(first, last, row_start, column, blocks, order, place, start, nei
 
 @njit(cache=True, inline="always")
 def _subtract_product(first, last, neighbour, matrix, x, r):  # type: ignore[no-untyped-def]
-    """Subtract the products of some pairs of one column from r (3, lanes)."""
+    """Subtract the products of some pairs of one column from r (3, at least lanes)."""
     for pair in range(first, last):
         d = neighbour[pair]
         for s in range(3):
-            for a in range(3):
-                for k in range(r.shape[1]):
-                    r[a, k] -= (
-                        matrix[pair, s, a, 0, k] * x[d, 0, k + s]
-                        + matrix[pair, s, a, 1, k] * x[d, 1, k + s]
-                        + matrix[pair, s, a, 2, k] * x[d, 2, k + s]
-                    )
+            for k in range(matrix.shape[4]):
+                u, v, w = x[d, 0, k + s], x[d, 1, k + s], x[d, 2, k + s]
+                # The three rows together read x once; written out, they are not unrolled along k instead.
+                r[0, k] -= (
+                    matrix[pair, s, 0, 0, k] * u + matrix[pair, s, 0, 1, k] * v + matrix[pair, s, 0, 2, k] * w
+                )
+                r[1, k] -= (
+                    matrix[pair, s, 1, 0, k] * u + matrix[pair, s, 1, 1, k] * v + matrix[pair, s, 1, 2, k] * w
+                )
+                r[2, k] -= (
+                    matrix[pair, s, 2, 0, k] * u + matrix[pair, s, 2, 1, k] * v + matrix[pair, s, 2, 2, k] * w
+                )
 
 
 @njit(cache=True, inline="always")
 def _solve_column(depth, lower, inverse, c, r):  # type: ignore[no-untyped-def]
-    """Replace r (3, lanes) by T^-1 r, with the factors of column c."""
+    """Replace r (3, at least depth) by T^-1 r, with the factors of column c."""
     x, y, z = r[0, 0], r[1, 0], r[2, 0]
     for k in range(1, depth):
         x, y, z = (
@@ -282,12 +291,14 @@ def factor_columns(first, last, own, matrix, depth, lower, inverse):  # type: ig
 @njit(cache=True, nogil=True, fastmath={"contract"})
 def multiply(first, last, start, neighbour, matrix, x, product):  # type: ignore[no-untyped-def]
     """Write the product A x; vectors (n_columns, 3, lanes + 2)."""
-    r = np.empty((3, matrix.shape[4]), dtype=np.float32)
+    r = small_single_array((3, MOST_LANES))
     for c in range(first, last):
-        r[:] = 0.0
+        for a in range(3):
+            for k in range(matrix.shape[4]):
+                r[a, k] = 0.0
         _subtract_product(start[c], start[c + 1], neighbour, matrix, x, r)
         for a in range(3):
-            for k in range(r.shape[1]):
+            for k in range(matrix.shape[4]):
                 product[c, a, k + 1] = -r[a, k]
 
 
@@ -310,10 +321,10 @@ def sweep_forward(first, last, start, own, neighbour, matrix, depth, lower, inve
     x : array (n_columns, 3, lanes + 2)
         Overwritten.
     """
-    r = np.empty((3, matrix.shape[4]), dtype=np.float32)
+    r = small_single_array((3, MOST_LANES))
     for c in range(first, last):
         for a in range(3):
-            for k in range(r.shape[1]):
+            for k in range(matrix.shape[4]):
                 r[a, k] = right[c, a, k + 1]
         _subtract_product(start[c], own[c], neighbour, matrix, x, r)
         _solve_column(depth, lower, inverse, c, r)
@@ -325,25 +336,38 @@ def sweep_forward(first, last, start, own, neighbour, matrix, depth, lower, inve
 @njit(cache=True, nogil=True, fastmath={"contract"})
 def residual_after_forward(first, last, start, own, neighbour, matrix, x, residual):  # type: ignore[no-untyped-def]
     """Write right - A x after a forward sweep, which is -L' x; parameters as in `sweep_forward`."""
-    r = np.empty((3, matrix.shape[4]), dtype=np.float32)
+    r = small_single_array((3, MOST_LANES))
     for c in range(first, last):
-        r[:] = 0.0
+        for a in range(3):
+            for k in range(matrix.shape[4]):
+                r[a, k] = 0.0
         _subtract_product(own[c] + 1, start[c + 1], neighbour, matrix, x, r)
         for a in range(3):
-            for k in range(r.shape[1]):
+            for k in range(matrix.shape[4]):
                 residual[c, a, k + 1] = r[a, k]
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
 def sweep_backward(first, last, start, neighbour, matrix, depth, lower, inverse, right, x):  # type: ignore[no-untyped-def]
     """Gauss-Seidel on columns of one colour, the last colour first; parameters as in `sweep_forward`."""
-    r = np.empty((3, matrix.shape[4]), dtype=np.float32)
+    r = small_single_array((3, MOST_LANES))
     for c in range(first, last):
         for a in range(3):
-            for k in range(r.shape[1]):
+            for k in range(matrix.shape[4]):
                 r[a, k] = right[c, a, k + 1]
         _subtract_product(start[c], start[c + 1], neighbour, matrix, x, r)
         _solve_column(depth, lower, inverse, c, r)
         for a in range(3):
             for k in range(depth):
                 x[c, a, k + 1] += r[a, k]
+
+
+@njit(cache=True, nogil=True)
+def sweep_all_backward(colour_start, start, neighbour, matrix, depth, lower, inverse, right, x):  # type: ignore[no-untyped-def]
+    """Gauss-Seidel on all columns, the last colour first: what `sweep_backward` does, in one call.
+
+    The forward sweep needs no such function: in the order of the columns, colours follow each other.
+    """
+    for n in range(colour_start.size - 2, -1, -1):
+        first, last = colour_start[n], colour_start[n + 1]
+        sweep_backward(first, last, start, neighbour, matrix, depth, lower, inverse, right, x)

@@ -30,6 +30,7 @@ from fingerpad.mechanics.columns import (
     factor_columns,
     multiply,
     residual_after_forward,
+    sweep_all_backward,
     sweep_backward,
     sweep_forward,
     take_blocks,
@@ -256,10 +257,15 @@ def _add_prolonged(first, last, parent, weight, coarse, free, fine):  # type: ig
             fine[c, k] += free[c, k] * value
 
 
+def _parts(count: int) -> int:
+    """How many threads so many columns, or pairs of columns, are worth."""
+    return max(1, min(current_threads(), count // FEWEST_COLUMNS))
+
+
 def _share(kernel: Callable[..., None], first: int, last: int, *arguments: Any) -> None:
     """Run a kernel on consecutive columns, or pairs of columns, with all threads."""
-    parts = min(current_threads(), (last - first) // FEWEST_COLUMNS)
-    if parts <= 1:
+    parts = _parts(last - first)
+    if parts == 1:
         kernel(first, last, *arguments)
         return
     ends = [first + (last - first) * n // parts for n in range(parts + 1)]
@@ -270,7 +276,7 @@ def _share(kernel: Callable[..., None], first: int, last: int, *arguments: Any) 
 class _Level:
     """One grid: its matrix, the factors of its columns, and the vectors of a cycle."""
 
-    def __init__(self, graph: ColumnGraph, colour_start: list[int], free: SingleArray, depth: int):
+    def __init__(self, graph: ColumnGraph, colour_start: np.ndarray, free: SingleArray, depth: int):
         self.graph, self.colour_start, self.free, self.depth = graph, colour_start, free, depth
         self.own = graph.own.astype(np.int32)
         self.matrix = graph.zeros(depth)
@@ -286,27 +292,38 @@ class _Level:
         """Factor the columns of a new matrix."""
         _share(factor_columns, 0, self.n_columns, self.own, self.matrix, self.depth, self.lower, self.inverse)
 
+    @property
+    def is_shared(self) -> bool:
+        """Whether a sweep is worth more than one thread, colour by colour."""
+        return _parts(int(np.diff(self.colour_start).max())) > 1
+
     def sweep_forward(self) -> None:
         """Write `x` and `residual` for `right`."""
         pattern = self.graph.start, self.own, self.graph.neighbour, self.matrix
-        for colour in pairwise(self.colour_start):
-            _share(sweep_forward, *colour, *pattern, self.depth, self.lower, self.inverse, self.right, self.x)
+        rest = *pattern, self.depth, self.lower, self.inverse, self.right, self.x
+        if self.is_shared:
+            for colour in pairwise(self.colour_start.tolist()):
+                _share(sweep_forward, *colour, *rest)
+        else:
+            sweep_forward(0, self.n_columns, *rest)
         _share(residual_after_forward, 0, self.n_columns, *pattern, self.x, self.residual)
 
     def sweep_backward(self) -> None:
         """Improve `x`."""
         pattern = self.graph.start, self.graph.neighbour, self.matrix
-        for colour in reversed(list(pairwise(self.colour_start))):
-            _share(
-                sweep_backward, *colour, *pattern, self.depth, self.lower, self.inverse, self.right, self.x
-            )
+        rest = *pattern, self.depth, self.lower, self.inverse, self.right, self.x
+        if self.is_shared:
+            for colour in reversed(list(pairwise(self.colour_start.tolist()))):
+                _share(sweep_backward, *colour, *rest)
+        else:
+            sweep_all_backward(self.colour_start, *rest)
 
 
-def _by_colour(graph: ColumnGraph) -> tuple[np.ndarray, list[int]]:
+def _by_colour(graph: ColumnGraph) -> tuple[np.ndarray, np.ndarray]:
     """Order of the columns by colour, and the first column of every colour in that order."""
     colour = colours(graph.start, graph.neighbour)
     order = np.argsort(colour, kind="stable")
-    return order, np.searchsorted(colour[order], np.arange(colour.max() + 2)).tolist()
+    return order, np.searchsorted(colour[order], np.arange(colour.max() + 2))
 
 
 class Multigrid:

@@ -55,13 +55,35 @@ def small_array(typing_context: Any, shape: Any) -> Any:
     >>> squares_of_three()
     5.0
     """
+    return _on_the_stack(shape, types.float64, ir.DoubleType())
+
+
+@intrinsic(prefer_literal=True)
+def small_single_array(typing_context: Any, shape: Any) -> Any:
+    """Uninitialised array of float32 for use in compiled functions, else like `small_array`.
+
+    Examples
+    --------
+    >>> from numba import njit
+    >>> @njit
+    ... def third():
+    ...     numbers = small_single_array((1,))
+    ...     numbers[0] = 1.0 / 3.0
+    ...     return numbers[0]
+    >>> third()
+    0.3333333432674408
+    """
+    return _on_the_stack(shape, types.float32, ir.FloatType())
+
+
+def _on_the_stack(shape: Any, number_type: Any, number: Any) -> Any:
+    """Signature and code of a function that makes an array of such numbers."""
     members = getattr(shape, "types", ())
     if not members or not all(isinstance(size, types.Literal) for size in members):
-        raise TypingError(f"small_array needs a tuple of constant sizes, such as (8, 3): got {shape}.")
+        raise TypingError(f"A small array needs a tuple of constant sizes, such as (8, 3): got {shape}.")
     sizes = [size.literal_value for size in members]
-    array_type = types.Array(types.float64, len(sizes), "C")
-    number = ir.DoubleType()
-    number_bytes = 8
+    array_type = types.Array(number_type, len(sizes), "C")
+    number_bytes = number_type.bitwidth // 8
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         def constants(values: list[int]) -> Any:
