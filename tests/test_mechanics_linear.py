@@ -203,6 +203,13 @@ def test_multigrid_is_chosen_for_a_large_mesh_within_its_reach(monkeypatch, mkl)
             chosen(0.496)
 
 
+@needs_pardiso
+def test_column_too_deep_for_the_kernels_of_multigrid_gets_a_factor(monkeypatch):
+    monkeypatch.setattr(linear, "MULTIGRID_NODES", 100)
+    monkeypatch.setattr(linear, "MOST_LANES", BLOCK.grid.shape[2] - 1)
+    assert isinstance(chosen(0.48)[0], KeptFactor)
+
+
 @pytest.mark.parametrize("mkl", [pytest.param(True, marks=needs_pardiso), False])
 def test_ratio_beyond_every_solver_is_refused_with_what_to_do(monkeypatch, mkl):
     if not mkl:

@@ -16,6 +16,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 from fingerpad.checks import FloatArray
 from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.mechanics.assembly import Sparsity
+from fingerpad.mechanics.columns import MOST_LANES
 from fingerpad.mechanics.factors import MakeFactor, PardisoFactor, SuperLuFactor, pypardiso
 from fingerpad.mechanics.multigrid import Multigrid
 from fingerpad.mesh import Mesh
@@ -151,7 +152,8 @@ def choose_preconditioner(
     n_nodes = len(mesh.nodes_mm)
     factor: MakeFactor = PardisoFactor if pypardiso is not None else SuperLuFactor
     name = "PARDISO" if pypardiso is not None else "SuperLU"
-    if n_nodes >= MULTIGRID_NODES and poisson <= MULTIGRID_POISSON + 1e-9:
+    shallow = mesh.grid.shape[2] <= MOST_LANES
+    if n_nodes >= MULTIGRID_NODES and shallow and poisson <= MULTIGRID_POISSON + 1e-9:
         multigrid = Multigrid(sparsity, free, mesh.nodes_mm, mesh.grid, factor)
         reason = (
             f"geometric multigrid, levels: {len(multigrid.columns_of_levels)}, the coarsest by {name}: "

@@ -28,8 +28,10 @@ from fingerpad.mechanics.columns import (
     SingleArray,
     colours,
     factor_columns,
+    find_scales,
     multiply,
     residual_after_forward,
+    round_matrix,
     sweep_all_backward,
     sweep_backward,
     sweep_forward,
@@ -235,26 +237,27 @@ def _hold(first, last, start, neighbour, free, matrix):  # type: ignore[no-untyp
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def _restrict(first, last, child_start, child, child_weight, fine, free, coarse):  # type: ignore[no-untyped-def]
-    """Set coarse to P' fine, zero where held; vectors (n_columns, numbers of a column)."""
+def _restrict(first, last, child_start, child, child_weight, fine, shrink, coarse):  # type: ignore[no-untyped-def]
+    """Set coarse to P' fine, then scale it; vectors (n_columns, numbers of a column)."""
     for c in range(first, last):
         coarse[c] = 0.0
         for n in range(child_start[c], child_start[c + 1]):
+            weight, source = child_weight[n], child[n]
             for k in range(fine.shape[1]):
-                coarse[c, k] += child_weight[n] * fine[child[n], k]
+                coarse[c, k] += weight * fine[source, k]
         for k in range(fine.shape[1]):
-            coarse[c, k] *= free[c, k]
+            coarse[c, k] *= shrink[c, k]
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def _add_prolonged(first, last, parent, weight, coarse, free, fine):  # type: ignore[no-untyped-def]
-    """Add P coarse to fine, nothing where held; vectors (n_columns, numbers of a column)."""
+def _add_prolonged(first, last, parent, weight, coarse, scale, fine):  # type: ignore[no-untyped-def]
+    """Add P coarse, scaled, to fine; vectors (n_columns, numbers of a column)."""
     for c in range(first, last):
+        i, j, m, n = parent[c, 0], parent[c, 1], parent[c, 2], parent[c, 3]
+        p, q, r, s = weight[c, 0], weight[c, 1], weight[c, 2], weight[c, 3]
         for k in range(fine.shape[1]):
-            value = np.float32(0.0)
-            for n in range(4):
-                value += weight[c, n] * coarse[parent[c, n], k]
-            fine[c, k] += free[c, k] * value
+            value = p * coarse[i, k] + q * coarse[j, k] + r * coarse[m, k] + s * coarse[n, k]
+            fine[c, k] += scale[c, k] * value
 
 
 def _parts(count: int) -> int:
@@ -274,43 +277,58 @@ def _share(kernel: Callable[..., None], first: int, last: int, *arguments: Any) 
 
 
 class _Level:
-    """One grid: its matrix, the factors of its columns, and the vectors of a cycle."""
+    """One grid: its matrix A, what sweeps need of it (see `columns`), and the scaled vectors of a cycle.
+
+    On the coarsest grid nothing is swept or scaled, only held unknowns are.
+    """
 
     def __init__(self, graph: ColumnGraph, colour_start: np.ndarray, free: SingleArray, depth: int):
         self.graph, self.colour_start, self.free, self.depth = graph, colour_start, free, depth
+        self.most_of_a_colour = int(np.diff(colour_start).max())
         self.own = graph.own.astype(np.int32)
         self.matrix = graph.zeros(depth)
+        self.scale = self.shrink = free
         self.right, self.x, self.residual = (np.zeros_like(free) for _ in range(3))
-        self.lower, self.inverse = (np.zeros((self.own.size, depth, 9), dtype=np.float32) for _ in range(2))
 
     @property
     def n_columns(self) -> int:
         """Number of columns."""
         return int(self.own.size)
 
-    def factor(self) -> None:
-        """Factor the columns of a new matrix."""
-        _share(factor_columns, 0, self.n_columns, self.own, self.matrix, self.depth, self.lower, self.inverse)
+    def sweepable(self) -> None:
+        """Round the present matrix, and factor its columns."""
+        if self.scale is self.free:
+            self.scale, self.shrink = np.zeros_like(self.free), np.zeros_like(self.free)
+            self.rounded = np.zeros(self.matrix.shape, dtype=np.int16)
+            shape = (self.n_columns, self.depth, 9)
+            self.lower, self.inverse = (np.zeros(shape, dtype=np.float32) for _ in range(2))
+        pairs = self.graph.start, self.graph.neighbour
+        scales = self.scale, self.shrink
+        _share(find_scales, 0, self.n_columns, self.own, self.matrix, self.free, *scales)
+        _share(round_matrix, 0, self.n_columns, *pairs, self.matrix, self.shrink, self.rounded)
+        _share(
+            factor_columns, 0, self.n_columns, self.own, self.rounded, self.depth, self.lower, self.inverse
+        )
 
     @property
     def is_shared(self) -> bool:
         """Whether a sweep is worth more than one thread, colour by colour."""
-        return _parts(int(np.diff(self.colour_start).max())) > 1
+        return _parts(self.most_of_a_colour) > 1
 
     def sweep_forward(self) -> None:
-        """Write `x` and `residual` for `right`."""
-        pattern = self.graph.start, self.own, self.graph.neighbour, self.matrix
+        """Write `x` for `right`, and the `residual`, not scaled."""
+        pattern = self.graph.start, self.own, self.graph.neighbour, self.rounded
         rest = *pattern, self.depth, self.lower, self.inverse, self.right, self.x
         if self.is_shared:
             for colour in pairwise(self.colour_start.tolist()):
                 _share(sweep_forward, *colour, *rest)
         else:
             sweep_forward(0, self.n_columns, *rest)
-        _share(residual_after_forward, 0, self.n_columns, *pattern, self.x, self.residual)
+        _share(residual_after_forward, 0, self.n_columns, *pattern, self.x, self.scale, self.residual)
 
     def sweep_backward(self) -> None:
         """Improve `x`."""
-        pattern = self.graph.start, self.graph.neighbour, self.matrix
+        pattern = self.graph.start, self.graph.neighbour, self.rounded
         rest = *pattern, self.depth, self.lower, self.inverse, self.right, self.x
         if self.is_shared:
             for colour in reversed(list(pairwise(self.colour_start.tolist()))):
@@ -397,7 +415,8 @@ class Multigrid:
             self._order, self._place, finest.graph.start, finest.graph.neighbour, self._depth, finest.free,
             finest.matrix,
         )  # fmt: skip
-        finest.factor()
+        if self._transfers:
+            finest.sweepable()
 
     def renew(self, blocks: FloatArray) -> None:
         """Take a new tangent on all levels."""
@@ -417,7 +436,8 @@ class Multigrid:
                 coarse.free,
                 coarse.matrix,
             )
-            coarse.factor()
+            if coarse is not self._levels[-1]:
+                coarse.sweepable()
         self._factor.renew(self._levels[-1].matrix)
 
     def enter(self, values: FloatArray) -> SingleArray:
@@ -450,9 +470,9 @@ class Multigrid:
     def apply(self, residual: SingleArray) -> SingleArray:
         """Approximate solution for a residual, both flat."""
         finest = self._levels[0]
-        finest.right[:] = residual.reshape(finest.x.shape)
+        np.multiply(finest.shrink, residual.reshape(finest.x.shape), out=finest.right)
         self._cycle(0)
-        return finest.x.ravel().copy()
+        return (finest.shrink * finest.x).ravel()
 
     def _cycle(self, n: int) -> None:
         """Solve approximately for `right` of level n, into its `x`."""
@@ -466,12 +486,13 @@ class Multigrid:
         level.sweep_forward()
         _share(
             _restrict, 0, coarse.n_columns, transfer.child_start, transfer.child, transfer.child_weight,
-            _rows(level.residual), _rows(coarse.free), _rows(coarse.right),
+            _rows(level.residual), _rows(coarse.shrink), _rows(coarse.right),
         )  # fmt: skip
         self._cycle(n + 1)
+        coarse.x *= coarse.shrink
         _share(
             _add_prolonged, 0, level.n_columns, transfer.parent, transfer.weight, _rows(coarse.x),
-            _rows(level.free), _rows(level.x),
+            _rows(level.scale), _rows(level.x),
         )  # fmt: skip
         level.sweep_backward()
 
