@@ -153,7 +153,7 @@ def test_rounded_matrix_is_the_matrix_scaled_to_whole_numbers(monkeypatch, mesh)
 
 def test_matrix_that_is_not_positive_definite_is_cut_when_rounded():
     """Entries larger than the diagonal allows, and an unknown with negative stiffness, which stays at rest."""
-    start, neighbour, own = np.array([0, 1]), np.array([0]), np.array([0])
+    start, neighbour, own = np.array([0, 1]), np.zeros(1, dtype=int), np.zeros(1, dtype=int)
     matrix = np.zeros((1, 3, 3, 3, 8), dtype=np.float32)
     matrix[0, 1, :, :, 0] = [[1.0, -7.0, 0.0], [-7.0, 4.0, 0.0], [0.0, 0.0, -2.0]]
     free, scale, shrink = (np.ones((1, 3, 10), dtype=np.float32) for _ in range(3))
