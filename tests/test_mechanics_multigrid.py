@@ -136,7 +136,7 @@ def test_sweeps_solve_with_the_triangles_of_the_matrix(monkeypatch):
 
 @pytest.mark.parametrize("mesh", MESHES.values(), ids=MESHES.keys())
 def test_rounded_matrix_is_the_matrix_scaled_to_whole_numbers(monkeypatch, mesh):
-    """Q = D^-1 A D^-1 but for half a unit, symmetric, 32767 on the diagonal; D and its inverse 0 where held."""
+    """Q = D^-1 A D^-1 but for half a unit, symmetric, 32767 on the diagonal; D is 0 where held."""
     monkeypatch.setattr(multigrid, "COARSEST_COLUMNS", 10)
     for level in made(mesh)[0]._levels[:-1]:
         moves = inner(level, level.free) > 0.0
@@ -152,7 +152,7 @@ def test_rounded_matrix_is_the_matrix_scaled_to_whole_numbers(monkeypatch, mesh)
 
 
 def test_matrix_that_is_not_positive_definite_is_cut_when_rounded():
-    """Entries larger than the diagonal allows, and an unknown with negative stiffness, which stays at rest."""
+    """Entries larger than the diagonal allows, and an unknown of negative stiffness, which is held."""
     start, neighbour, own = np.array([0, 1]), np.zeros(1, dtype=int), np.zeros(1, dtype=int)
     matrix = np.zeros((1, 3, 3, 3, 8), dtype=np.float32)
     matrix[0, 1, :, :, 0] = [[1.0, -7.0, 0.0], [-7.0, 4.0, 0.0], [0.0, 0.0, -2.0]]

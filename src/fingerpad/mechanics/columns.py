@@ -10,9 +10,9 @@ columns, at the same depth or one above or below. So the matrix is a list of pai
 The depth k runs fastest in memory, so that one machine instruction serves many of them. Single precision: the
 matrix steers an iteration whose goal is measured in double precision elsewhere.
 
-Sweeps are an approximation anyway, and reading the matrix is what takes their time. They work on whole numbers
-of 16 bits, Q = D^-1 A D^-1 rounded, with D² the diagonal of A over 32767: of a positive definite matrix no
-entry of Q is larger than those on its diagonal. Vectors are scaled alike, y = D x and D^-1 r for r. Against
+Sweeps are an approximation anyway, and reading the matrix is what takes their time. They work on whole
+numbers of 16 bits, Q = D^-1 A D^-1 rounded, with D² the diagonal of A over 32767: of a positive definite
+matrix no entry of Q is larger than those on its diagonal. Vectors are scaled alike, y = D x and D^-1 r for r. Against
 floating-point numbers of 16 bits, whose error is that of every entry for itself, this one is at most 1/65534
 of the diagonal: with those, conjugate gradients stopped converging on thin elements.
 

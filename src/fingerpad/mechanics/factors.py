@@ -121,7 +121,7 @@ def _mkl() -> Any:
 
 
 def _pardiso(phase: int, size: int, settings: np.ndarray, held: np.ndarray, *arrays: np.ndarray) -> int:
-    """One phase of PARDISO on one thread, and its error; pypardiso's own call is for double precision only."""
+    """One phase of PARDISO on one thread, and its error; pypardiso's own call takes double precision only."""
 
     def number(value: int) -> Any:
         return ctypes.byref(ctypes.c_int32(value))
