@@ -13,8 +13,8 @@ matrix steers an iteration whose goal is measured in double precision elsewhere.
 Sweeps are an approximation anyway, and reading the matrix is what takes their time. They work on whole
 numbers of 16 bits, Q = D^-1 A D^-1 rounded, with D² the diagonal of A over 32767: of a positive definite
 matrix no entry of Q is larger than those on its diagonal. Vectors are scaled alike, y = D x and D^-1 r
-for r. The error is at most 1/65534 of the diagonal. That of floating-point numbers of 16 bits is in proportion
-to every entry, and with those conjugate gradients stopped converging on thin elements.
+for r. The error is at most 1/65534 of the diagonal. That of floating-point numbers of 16 bits is in
+proportion to every entry, and with those conjugate gradients stopped converging on thin elements.
 
 Columns are coloured so that neighbours differ, and sorted by colour. Within a colour a Gauss-Seidel sweep may
 visit columns in any order, on any number of threads, and gives the same bits; the sorting lets it run through
