@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from matplotlib.figure import Figure
 
 from fingerpad.errors import InputError
@@ -144,13 +144,69 @@ def write_report(results: Mapping[str, Any], folder: Path) -> Path:
     """
     if not isinstance(results, Mapping):
         raise InputError(f"results must map names of sections to sections: got {type(results).__name__}.")
-    chapters = [_drawn(chapter, results.get(chapter.section)) for chapter in CHAPTERS]
+    rows = results.get("comparison")
     others = {key: value for key, value in results.items() if key not in _KNOWN}
-    page = _page(results, chapters, [tables.generic(tables.spelled(key), others[key]) for key in others])
-    for chapter in chapters:
+    return write_page(
+        results,
+        CHAPTERS,
+        Path(folder) / "report.html",
+        heading="From a touch to a percept",
+        subtitle="A finite-element fingertip, slowly adapting afferents and an observer, after Gerling et "
+        "al. 2014.",
+        paragraphs=summary(results),
+        comparison=tables.comparison(rows) if rows else None,
+        others=[tables.generic(tables.spelled(key), others[key]) for key in others],
+    )
+
+
+def write_page(
+    results: Mapping[str, Any],
+    chapters: Sequence[Chapter],
+    path: Path,
+    *,
+    heading: str,
+    subtitle: str,
+    paragraphs: Sequence[str],
+    comparison: tables.Table | None = None,
+    others: Sequence[tables.Table] = (),
+) -> Path:
+    """Draw the chapters of a page: the page at `path`, its figures also beside it in `figures/`.
+
+    Parameters
+    ----------
+    results : mapping
+        JSON-able sections, and "manifest".
+    chapters : sequence of Chapter
+        What the page has, in order.
+    path : Path
+        Where it shall be; every file is written whole or not at all.
+    heading, subtitle : str
+        Its title, and what it is about.
+    paragraphs : sequence of str
+        What it says first.
+    comparison : Table, optional
+        A table before the chapters.
+    others : sequence of Table
+        Tables after them.
+
+    Returns
+    -------
+    Path
+        The page.
+    """
+    drawn = [_drawn(chapter, results.get(chapter.section)) for chapter in chapters]
+    page = _template().render(
+        heading=heading,
+        subtitle=subtitle,
+        edition=_edition(results.get("manifest") or {}),
+        summary=paragraphs,
+        comparison=comparison,
+        chapters=drawn,
+        others=others,
+    )
+    for chapter in drawn:
         for figure in chapter["figures"]:
-            write_atomically(Path(folder) / "figures" / f"{figure['drawing'].name}.png", figure["png"])
-    path = Path(folder) / "report.html"
+            write_atomically(path.parent / "figures" / f"{figure['drawing'].name}.png", figure["png"])
     write_atomically(path, page.encode())
     return path
 
@@ -175,7 +231,7 @@ def _drawn(chapter: Chapter, section: Any) -> dict[str, Any]:
         raise InputError(f"results[{chapter.section!r}] must hold {error.args[0]!r}: it does not.") from error
 
 
-def _page(results: Mapping[str, Any], chapters: list[dict[str, Any]], others: list[tables.Table]) -> str:
+def _template() -> Template:
     environment = Environment(
         loader=PackageLoader("fingerpad.report", "."),
         autoescape=True,
@@ -184,14 +240,7 @@ def _page(results: Mapping[str, Any], chapters: list[dict[str, Any]], others: li
         lstrip_blocks=True,
     )
     environment.filters["base64"] = lambda content: base64.b64encode(content).decode("ascii")
-    comparison = results.get("comparison")
-    return environment.get_template("template.html").render(
-        summary=summary(results),
-        edition=_edition(results.get("manifest") or {}),
-        comparison=tables.comparison(comparison) if comparison else None,
-        chapters=chapters,
-        others=others,
-    )
+    return environment.get_template("template.html")
 
 
 def _edition(manifest: Mapping[str, Any]) -> str:

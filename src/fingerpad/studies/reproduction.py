@@ -186,12 +186,10 @@ def _manifest(
     """Say what ran, so that the run can be repeated and its meshes judged."""
     meshes = {"sphere": standard.mesh, "bar": bars[0].mesh}
     meshes |= {name: deflection["trial3", name].mesh for name in skin_deflection.INDENTERS}
-    return {
-        "version": __version__,
+    return software() | {
         "seed": conditions.seed,
         "resolution": conditions.resolution,
         "materials": conditions.materials,
-        "code_hash": code_hash(),
         "nodes": len(standard.mesh.nodes_mm),
         "elements": len(standard.mesh.elements),
         "meshes": {
@@ -204,6 +202,14 @@ def _manifest(
             for name, mesh in meshes.items()
         },
         "half_model": not standard.grading.full,
+    }
+
+
+def software() -> dict[str, Any]:
+    """Say what program runs, on what."""
+    return {
+        "version": __version__,
+        "code_hash": code_hash(),
         "python": platform.python_version(),
         "platform": platform.platform(),
         "packages": {name: version(name) for name in PACKAGES if _installed(name)},
