@@ -1,9 +1,10 @@
-"""The command line: `fingerpad reproduce`, `refine`, `materials` and `export`."""
+"""The command line: `fingerpad reproduce`, `fit`, `refine`, `materials` and `export`."""
 
 from __future__ import annotations
 
 import json
 import os
+import shlex
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -19,6 +20,8 @@ from fingerpad.files import write_atomically
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from fingerpad.estimation.stimuli import Stimuli
 
 # What a command runs is imported where it runs: help and version need none of it and come at once.
 
@@ -46,6 +49,8 @@ MATERIALS = (
     "gerling2014_fit",
 )
 FORMATS = ("vtu", "abaqus", "calculix", "febio")
+FITTING_METHODS = ("response_surface",)
+QUANTITIES = ("stored", "instantaneous", "work", "von_mises", "compressive_strain", "compressive_stress")
 REFINEMENTS = {"fine": "mesh_refinement", "paper": "paper_size"}
 """What options may be, as the help names them; indenters with their class, finer meshes with
 their study and report. The modules behind them decide."""
@@ -58,6 +63,9 @@ app = typer.Typer(
 
 MISUSE: Any = typer.BadParameter.__base__
 """What typer raises for options that it does not know or cannot read; it names only this child of it."""
+
+BAR = "bar"
+"""What `--stimulus` calls the bar of the paper; anything else is a file."""
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C, by convention."""
@@ -137,6 +145,141 @@ def reproduce_command(
     typer.echo(f"Report: {report}")
     typer.echo(f"Results: {out / 'results.json'}")
     typer.echo(f"Missed: {'; '.join(missed) if missed else 'nothing'}")
+
+
+@app.command("fit")
+def fit_command(
+    recordings: Annotated[
+        Path | None, typer.Argument(help="CSV or NWB file, see docs/fit.md; not needed with --example.")
+    ] = None,
+    stimulus: Annotated[
+        str | None,
+        typer.Option(help="bar (shifted along the finger), or a CSV or YAML file that lists the stimuli."),
+    ] = None,
+    stimulus_column: Annotated[
+        str | None, typer.Option(help="Column that names the stimulus; shift_mm or stimulus by default.")
+    ] = None,
+    unit: Annotated[
+        int | None,
+        typer.Option(parser=_whole_number, metavar="INTEGER", help="Id of the spike unit of an NWB file."),
+    ] = None,
+    width: Annotated[
+        float | None, typer.Option(parser=_number, metavar="NUMBER", help="Width of the bar; 3 mm. [mm]")
+    ] = None,
+    fillet: Annotated[
+        float | None,
+        typer.Option(parser=_number, metavar="NUMBER", help="Radius of the bar's edges; 0.3 mm. [mm]"),
+    ] = None,
+    depth: Annotated[
+        float | None, typer.Option(parser=_number, metavar="NUMBER", help="Depth of the bar; 1 mm. [mm]")
+    ] = None,
+    dynamic_window: Annotated[
+        tuple[float, float], typer.Option(help="Start and end of the window of the dynamic rate. [ms]")
+    ] = (30.0, 50.0),
+    static_window: Annotated[
+        tuple[float, float], typer.Option(help="Start and end of the window of the static rate. [ms]")
+    ] = (600.0, 950.0),
+    dynamic_quantity: Annotated[
+        str,
+        typer.Option(
+            help=f"What the dynamic term follows: {QUANTITIES[0]} as in the paper, or as an extension "
+            f"{', '.join(QUANTITIES[1:])}."
+        ),
+    ] = "stored",
+    method: Annotated[str, typer.Option(help=f"One of {', '.join(FITTING_METHODS)}.")] = "response_surface",
+    folds: Annotated[
+        int | None,
+        typer.Option(
+            parser=_whole_number,
+            metavar="INTEGER",
+            help="Folds dealt out in turn; 6 by default, unless the recordings have a column fold.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option(help="Folder for page, figures, results and stored indentations.")
+    ] = Path("fit"),
+    resolution: Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTIONS)}.")] = "standard",
+    materials: Annotated[str, typer.Option(help=f"One of {', '.join(MATERIALS)}.")] = "trial3",
+    jobs: Annotated[
+        int | None,
+        typer.Option(parser=_whole_number, metavar="INTEGER", help="Processes; one per core by default."),
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(parser=_whole_number, metavar="INTEGER", help="Seed of methods that draw.")
+    ] = 0,
+    example: Annotated[
+        Path | None, typer.Option(help="Write recordings to try it with into this folder, and end.")
+    ] = None,
+) -> None:
+    """Fit an afferent to recordings of your own: rates or spikes under known stimuli."""
+    from rich.console import Console
+
+    from fingerpad.estimation.reading import read_recordings
+    from fingerpad.report.recording_fit import summary, write_fit_page
+    from fingerpad.studies import recording_fit
+    from fingerpad.studies.conditions import Conditions
+
+    if example is not None:
+        _make_writable(example, "--example")
+        for file, content in recording_fit.example().items():
+            write_atomically(example / file, content)
+        typer.echo(f"Try: fingerpad fit {example / recording_fit.EXAMPLE} --stimulus bar --resolution quick")
+        return
+    if recordings is None or stimulus is None:
+        raise InputError(
+            "fit needs recordings and --stimulus, or --example FOLDER: see fingerpad fit --help."
+        )
+    sizes = {"width": width, "fillet": fillet, "depth": depth}
+    stimuli = _stimuli(
+        stimulus, stimulus_column, {key: size for key, size in sizes.items() if size is not None}
+    )
+    task = recording_fit.RecordingFit(
+        read_recordings(recordings, stimuli, unit),
+        Conditions(resolution=resolution, seed=seed, materials=materials),
+        out,
+        method,
+        folds,
+        (dynamic_window, static_window),
+        jobs if jobs is not None else _cores(),
+        dynamic_quantity,
+    )
+    _make_writable(out)
+    inputs = [recordings, *([] if stimulus == BAR else [Path(stimulus)])]
+    with _interruptible():
+        results = recording_fit.run(
+            task,
+            _Bars(Console(stderr=True)),
+            command=shlex.join(["fingerpad", *sys.argv[1:]]),
+            inputs=[{"file": str(path), "sha256": recording_fit.sha256(path)} for path in inputs],
+        )
+        write_atomically(out / "fit.json", json.dumps(results, indent=1, allow_nan=False).encode())
+        page = write_fit_page(results, out)
+    for paragraph in summary(results["fit"]):
+        typer.echo(paragraph)
+    typer.echo(f"Report: {page}")
+    typer.echo(f"Results: {out / 'fit.json'}")
+
+
+def _stimuli(stimulus: str, column: str | None, given: dict[str, float | None]) -> Stimuli:
+    """Make what `--stimulus` names, with the sizes that are given where it is the bar."""
+    from dataclasses import replace
+
+    from fingerpad.estimation.stimuli import ShiftedBar, read_stimuli
+    from fingerpad.indenters import Bar
+    from fingerpad.stimulus import RampAndHold
+
+    sizes = {key: size for key, size in given.items() if size is not None}
+    if stimulus != BAR:
+        if sizes:
+            raise InputError(
+                f"--{next(iter(sizes))} is that of the bar, and {stimulus} lists stimuli with their own: "
+                "leave it out."
+            )
+        listed = read_stimuli(Path(stimulus))
+        return listed if column is None else replace(listed, column=column)
+    motion = RampAndHold(depth_mm=sizes.pop("depth")) if "depth" in sizes else RampAndHold()
+    bar = ShiftedBar(Bar(**{f"{key}_mm": size for key, size in sizes.items()}), motion)
+    return bar if column is None else replace(bar, column=column)
 
 
 @app.command("refine")

@@ -1,0 +1,134 @@
+"""One afferent under stimuli that may each move in their own time, its rates counted in windows of choice."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fingerpad.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.checks import FloatArray
+from fingerpad.errors import InputError
+from fingerpad.fitting.problem import IntArray
+from fingerpad.parameters import neuron, protocol
+from fingerpad.signals import SedTraces
+from fingerpad.transduction import Drive, drive
+
+Windows = tuple[tuple[float, ...], tuple[float, ...]]
+
+WINDOWS_MS: Windows = (protocol.DYNAMIC_WINDOW.value, protocol.STATIC_WINDOW.value)
+"""Windows of the dynamic and of the static rate, the paper's. [ms]"""
+
+
+@dataclass(frozen=True)
+class AnyMotion:
+    """The paper's model under stimuli that do not share their times; a `RateModel`.
+
+    Parameters
+    ----------
+    drives : tuple of Drive
+        One per group of stimuli that move alike.
+    stimuli : tuple of int array
+        Which stimulus each column of each drive belongs to, every stimulus once.
+    windows_ms : ((float, float), (float, float))
+        Windows of the dynamic and of the static rate. [ms]
+    refractory_ms : float
+        Rest after each spike, which is not fitted. [ms]
+
+    Examples
+    --------
+    >>> short = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    >>> longer = SedTraces([0.0, 50.0, 2000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    >>> model = AnyMotion.under([short, longer, short])
+    >>> [drive.n_sites for drive in model.drives]
+    [2, 1]
+    >>> model.rates(Afferent().parameters)[1].round().tolist()
+    [63.0, 63.0, 63.0]
+    """
+
+    drives: tuple[Drive, ...]
+    stimuli: tuple[IntArray, ...]
+    windows_ms: Windows = WINDOWS_MS
+    refractory_ms: float = neuron.REFRACTORY.value
+
+    @classmethod
+    def under(
+        cls,
+        sed: SedTraces | Sequence[SedTraces],
+        windows_ms: Windows = WINDOWS_MS,
+        refractory_ms: float = neuron.REFRACTORY.value,
+    ) -> AnyMotion:
+        """Group stimuli by their times, so that those that move alike are answered at once.
+
+        Parameters
+        ----------
+        sed : SedTraces or sequence of SedTraces
+            Strain energy density, one column per stimulus; several traces follow each other.
+        windows_ms, refractory_ms
+            As of the class.
+
+        Returns
+        -------
+        AnyMotion
+
+        Raises
+        ------
+        InputError
+            If a stimulus ends before a window does, or they bring several quantities for the dynamic term.
+        """
+        traces = [sed] if isinstance(sed, SedTraces) else list(sed)
+        quantities = sorted({trace.dynamic_quantity for trace in traces})
+        if len(quantities) != 1:
+            raise InputError(
+                f"sed must bring one dynamic_quantity: got {', '.join(quantities) or 'no traces'}."
+            )
+        end = max(bound for window in windows_ms for bound in window)
+        groups: dict[tuple[bytes, bytes], list[tuple[int, SedTraces]]] = {}
+        first = 0
+        for trace in traces:
+            if trace.times_ms[-1] < end:
+                raise InputError(
+                    f"windows_ms must end with the stimuli: one ends at {end:g} ms, stimulus {first + 1} at "
+                    f"{trace.times_ms[-1]:g} ms."
+                )
+            groups.setdefault((trace.times_ms.tobytes(), trace.kinks_ms.tobytes()), []).append((first, trace))
+            first += trace.n_sites
+        return cls(
+            tuple(drive(_side_by_side([trace for _, trace in group])) for group in groups.values()),
+            tuple(
+                np.concatenate([start + np.arange(trace.n_sites) for start, trace in group])
+                for group in groups.values()
+            ),
+            windows_ms,
+            refractory_ms,
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """beta, k_d, k_s, tau, C, v under their full names."""
+        return PARAMETER_NAMES
+
+    @property
+    def n_stimuli(self) -> int:
+        """Number of stimuli."""
+        return sum(drive.n_sites for drive in self.drives)
+
+    def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Dynamic and static rates of the afferent with these six parameters. [spikes/s]"""
+        quantity = self.drives[0].dynamic_quantity
+        afferent = Afferent.from_parameters(parameters, self.refractory_ms, quantity)
+        dynamic, static = np.empty((2, self.n_stimuli))
+        for group, columns in zip(self.drives, self.stimuli, strict=True):
+            dynamic[columns], static[columns] = afferent.rates(group, *self.windows_ms)
+        return dynamic, static
+
+
+def _side_by_side(traces: Sequence[SedTraces]) -> SedTraces:
+    """Join traces with the same times into one."""
+    dynamic = [trace.dynamic_kpa for trace in traces if trace.dynamic_kpa is not None]
+    return replace(
+        traces[0],
+        sed_kpa=np.hstack([trace.sed_kpa for trace in traces]),
+        dynamic_kpa=np.hstack(dynamic) if dynamic else None,
+    )

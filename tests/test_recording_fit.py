@@ -1,0 +1,455 @@
+"""A fit to recordings of one's own: recovery first, then what a fit says, refuses and writes."""
+
+import json
+import math
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+
+from fingerpad import cli
+from fingerpad.afferent import Afferent
+from fingerpad.compilation import NOTICE
+from fingerpad.errors import InputError
+from fingerpad.estimation.any_motion import AnyMotion
+from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, identifiable
+from fingerpad.estimation.reading import read_recordings
+from fingerpad.estimation.recordings import RateRecordings, SpikeRecordings
+from fingerpad.estimation.stimuli import INDENTERS, ShiftedBar, TactileStimulus
+from fingerpad.indenters import Bar, Line, Sphere
+from fingerpad.mechanics.fields import QUANTITIES
+from fingerpad.parameters import protocol
+from fingerpad.reference import bar_firing_rates
+from fingerpad.report import recording_fit as report
+from fingerpad.signals import SedTraces
+from fingerpad.stimulus import ForceRampAndHold, RampAndHold
+from fingerpad.studies import recording_fit as study
+from fingerpad.studies import single_unit
+from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
+
+ROOT = Path(__file__).parents[1]
+KNOWN = [2e-7, 1.2e-4, 9e-7, 60.0, 1e-6, 50.0]
+AFFERENT = Afferent.from_parameters(KNOWN)
+TIMES_MS = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 80.0, 120.0, 200.0, 400.0, 700.0, 1000.0])
+
+
+def traces(height_kpa, times_ms=TIMES_MS, **more):
+    """Energy density that rises with the square of time in 50 ms and relaxes by a third, one column each."""
+    ramp = np.minimum(times_ms / 50.0, 1.0) ** 2
+    relaxed = 1.0 - 0.3 * (1.0 - np.exp(-np.maximum(times_ms - 50.0, 0.0) / 300.0))
+    return SedTraces(times_ms, np.outer(ramp * relaxed, height_kpa), kinks_ms=[50.0], **more)
+
+
+HEIGHT_KPA = np.linspace(0.6, 3.0, 8)
+SED = traces(HEIGHT_KPA)
+NAMES = tuple(f"height {number}" for number in range(8))
+RATES = RateRecordings(NAMES, *AFFERENT.rates(SED), "simulated")
+
+
+@pytest.fixture(scope="module")
+def recovered():
+    """The fit to rates of a known afferent."""
+    return study.fit_recordings(SED, RATES, np.arange(8) % 2)
+
+
+# Recovery
+
+
+def test_rates_of_a_known_afferent_are_recovered_in_and_out_of_sample(recovered):
+    # The ascent ends where an iteration gains less than 1e-4 of FSS, in a valley that is long in tau.
+    assert recovered["fss_in_sample"] > 0.99
+    assert recovered["fss_out_of_sample"] > 0.95
+
+
+def test_spikes_of_a_known_afferent_give_the_fit_of_their_rates(recovered):
+    trains = AFFERENT.spikes(SED)
+    fitted = study.fit_recordings(SED, SpikeRecordings(NAMES, trains, 1000.0, "simulated"), np.arange(8) % 2)
+    same = {key: value for key, value in recovered.items() if key not in ("seconds", "folds")}
+    assert {key: fitted[key] for key in same} == same
+
+
+def test_one_phase_is_enough_for_a_fit_and_the_other_is_said_to_be_missing():
+    fitted = study.fit_recordings(SED, RateRecordings(NAMES, None, RATES.static_rate_hz), np.arange(8) % 2)
+    assert fitted["fss_in_sample"] == fitted["fss_in_sample_static"] > 0.99
+    assert fitted["observed_dynamic_rate_hz"] is None
+    assert fitted["fss_in_sample_dynamic"] is None
+
+
+# What a fit says
+
+
+def test_every_stimulus_is_predicted_without_its_fold(recovered):
+    assert recovered["stimulus"] == list(NAMES)
+    assert recovered["fold"] == [1, 2] * 4
+    assert [fold["stimuli"] for fold in recovered["folds"]] == [list(NAMES[::2]), list(NAMES[1::2])]
+    for fold in recovered["folds"]:
+        dynamic, static = Afferent.from_parameters(list(fold["parameters"].values())).rates(SED)
+        rows = np.flatnonzero(np.array(recovered["fold"]) == fold["fold"])
+        np.testing.assert_array_equal(np.array(recovered["out_of_sample_static_rate_hz"])[rows], static[rows])
+        np.testing.assert_array_equal(
+            np.array(recovered["out_of_sample_dynamic_rate_hz"])[rows], dynamic[rows]
+        )
+    scores = [fold["fss_test"] for fold in recovered["folds"]]
+    assert recovered["fss_out_of_sample"] == pytest.approx(np.mean(scores), rel=1e-12)
+
+
+def test_both_forms_of_the_parameters_are_one_afferent_and_the_errors_are_those_of_the_covariance(recovered):
+    six, four = (list(recovered[key].values()) for key in ("parameters", "identifiable"))
+    np.testing.assert_allclose(identifiable(six), four, rtol=1e-12)
+    covariance = np.array(recovered["identifiable_covariance"])
+    errors = [recovered["identifiable_standard_error"][name] for name in IDENTIFIABLE_NAMES]
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), errors, rtol=1e-12)
+    np.testing.assert_allclose(covariance, covariance.T, rtol=1e-9)
+
+
+def test_six_folds_are_dealt_out_by_default_and_one_per_stimulus_where_there_are_fewer():
+    assert study.dealt_folds(14).tolist() == [0, 1, 2, 3, 4, 5, 0, 1, 2, 3, 4, 5, 0, 1]
+    assert study.dealt_folds(4).tolist() == [0, 1, 2, 3]
+
+
+def test_stimuli_that_move_in_their_own_time_are_answered_each_in_theirs():
+    slow_ms = np.concatenate([TIMES_MS[:-1], [1000.0, 1500.0]])
+    short, longer = traces([1.0, 2.0]), traces([1.5], slow_ms)
+    model = AnyMotion.under([short, longer, traces([2.5])], ((20.0, 50.0), (500.0, 900.0)))
+    assert (model.n_stimuli, [drive.n_sites for drive in model.drives]) == (4, [3, 1])
+    dynamic, static = model.rates(np.array(KNOWN))
+    alone = [AFFERENT.rates(one, (20.0, 50.0), (500.0, 900.0)) for one in (short, longer, traces([2.5]))]
+    np.testing.assert_array_equal(dynamic, np.concatenate([rates[0] for rates in alone]))
+    np.testing.assert_array_equal(static, np.concatenate([rates[1] for rates in alone]))
+
+
+def test_another_quantity_for_the_dynamic_term_reaches_the_afferent():
+    more = {"dynamic_kpa": 2.0 * SED.sed_kpa, "dynamic_quantity": "work"}
+    doubled = AnyMotion.under([traces(HEIGHT_KPA, **more)])
+    halved = [KNOWN[0], KNOWN[1] / 2.0, *KNOWN[2:]]
+    for rates, expected in zip(doubled.rates(np.array(halved)), AFFERENT.rates(SED), strict=True):
+        np.testing.assert_allclose(rates, expected, rtol=1e-9)
+    with pytest.raises(InputError, match="one dynamic_quantity: got stored, work"):
+        AnyMotion.under([SED, traces([1.0], dynamic_kpa=SED.sed_kpa[:, :1], dynamic_quantity="work")])
+
+
+# What it refuses
+
+
+@pytest.mark.parametrize(
+    ("rates", "folds", "said"),
+    [
+        (RATES, [0, 1], "memberships needs one fold per stimulus: got 2 for 8"),
+        (RATES.chosen([0, 1, 2]), [0, 0, 1], "without fold 1 there are 2, record more"),
+        (RateRecordings(NAMES, None, range(1, 9)), [0, 0, 0, 0, 0, 1, 1, 1], "without fold 1 there are 3"),
+        (RateRecordings(NAMES[:4], [0, 1, 0, 1], [1] * 4), [0, 1, 0, 1], r"\(height 0, height 2\)"),
+    ],
+    ids=["size", "few stimuli", "one phase", "silent fold"],
+)
+def test_what_cannot_be_fitted_or_judged_is_refused(rates, folds, said):
+    with pytest.raises(InputError, match=said):
+        study.check_enough(rates, np.array(folds))
+
+
+def test_a_stimulus_that_ends_before_a_window_is_refused():
+    with pytest.raises(InputError, match="one ends at 950 ms, stimulus 9 at 700 ms"):
+        AnyMotion.under([SED, traces([1.0], TIMES_MS[:-1])])
+
+
+# What is pressed
+
+
+def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
+    path = tmp_path / study.EXAMPLE
+    path.write_bytes(study.example()[study.EXAMPLE])
+    recorded = read_recordings(path, ShiftedBar())
+    conditions = Conditions("quick")
+    assert list(study.touches(recorded.stimuli, conditions).values()) == single_unit.touches(conditions)
+    observed = bar_firing_rates()
+    np.testing.assert_array_equal(recorded.recordings.dynamic_rate_hz, observed.dynamic_rate_hz)
+    np.testing.assert_array_equal(recorded.recordings.static_rate_hz, observed.static_rate_hz)
+    assert [float(name) for name in recorded.stimuli] == observed.shift_mm.tolist()
+
+
+def test_stimuli_are_pressed_where_and_how_they_say():
+    conditions = Conditions("quick")
+    pressed = study.touches(
+        {
+            "beside": TactileStimulus(Sphere(340.0), RampAndHold(0.4), x_mm=1.0, z_mm=0.5, tilt_deg=3.0),
+            "wire": TactileStimulus(Line(), ForceRampAndHold(50.0)),
+        },
+        conditions,
+    )
+    beside, wire = pressed.values()
+    along = math.cos(math.radians(conditions.skin_tilt_deg))
+    assert beside.at_mm == (pytest.approx(RECEPTOR_X_MM + along, abs=1e-12), 0.5)
+    assert (beside.tilt_deg, beside.grading.full, beside.stimulus.depth_mm) == (3.0, True, 0.4)
+    assert (wire.tilt_deg, wire.grading.full, wire.stimulus.force_mn) == (0.0, False, 50.0)
+
+
+@pytest.mark.parametrize(
+    ("stimulus", "said"),
+    [
+        (
+            TactileStimulus(Bar(), RampAndHold(9.0)),
+            "Stimulus deep cannot be pressed: depth_mm must stay below",
+        ),
+        (TactileStimulus(Bar(), x_mm=80.0), "Stimulus deep cannot be pressed: "),
+        (TactileStimulus(Line(), tilt_deg=5.0), "cannot be pressed: tilt_deg must be 0 for Line"),
+    ],
+    ids=["depth", "place", "tilt"],
+)
+def test_a_stimulus_that_cannot_be_pressed_is_named(stimulus, said):
+    with pytest.raises(InputError, match=said):
+        study.touches({"deep": stimulus}, Conditions("quick"))
+
+
+# The command
+
+
+class Pressed:
+    """Stands for the skin under a touch: two humps of energy density where the edges of the bar are."""
+
+    def __init__(self, touch):
+        shift = touch.at_mm[0] - RECEPTOR_X_MM
+        self.height = 3.0 * np.exp(-((abs(shift) - 1.5) ** 2)) * touch.stimulus.depth_mm
+
+    def sed(self, sites, dynamic_quantity):
+        assert (sites, dynamic_quantity) == ([[RECEPTOR_X_MM, 0.0]], "stored")
+        return traces([self.height])
+
+
+@pytest.fixture
+def call(monkeypatch, capsys, tmp_path):
+    """Run the command in an empty folder; presses take no time."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(study, "solve_missing", lambda touches, *_: len(touches))
+    monkeypatch.setattr(study.Store, "load", lambda self, touch: Pressed(touch))
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["fingerpad", "fit", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        said = capsys.readouterr()
+        return ended.value.code or 0, said.out, said.err
+
+    return run
+
+
+SHIFTS_MM = (-2.0, -1.4, -0.4, 0.2, 1.0, 1.6)
+ROWS = "shift_mm,dynamic_rate_hz,static_rate_hz\n" + "".join(
+    f"{shift},{150 - 9 * row},{40 - 5 * row}\n" for row, shift in enumerate(SHIFTS_MM)
+)
+
+
+def test_a_fit_writes_page_figures_and_numbers_and_says_where_they_came_from(call, tmp_path):
+    (tmp_path / "mine.csv").write_text(ROWS)
+    arguments = ("mine.csv", "--stimulus", "bar", "--folds", "2", "--resolution", "quick", "--seed", "3")
+    status, said, errors = call(*arguments)
+    assert (status, errors) == (0, "")
+    results = json.loads((tmp_path / "fit" / "fit.json").read_text())
+    fit, manifest = results["fit"], results["manifest"]
+    assert said.splitlines()[0].startswith(
+        f"Fitted to 6 stimuli by response surface: FSS {fit['fss_in_sample']:.3f}"
+    )
+    assert said.splitlines()[-2:] == ["Report: fit/fit.html", "Results: fit/fit.json"]
+    found = {str(path.relative_to(tmp_path / "fit")) for path in (tmp_path / "fit").rglob("*.*")}
+    assert found == {"fit.html", "fit.json", "figures/fit.png", "figures/residuals.png"}
+    assert fit["shift_mm"] == list(SHIFTS_MM)
+    assert fit["presentations"] == [1] * 6
+    assert manifest["command"] == shlex.join(["fingerpad", "fit", *arguments])
+    assert manifest["inputs"] == [{"file": "mine.csv", "sha256": study.sha256(tmp_path / "mine.csv")}]
+    assert (manifest["seed"], manifest["resolution"], manifest["materials"]) == (3, "quick", "trial3")
+    assert manifest["windows_ms"] == [[30.0, 50.0], [600.0, 950.0]]
+    page = (tmp_path / "fit" / "fit.html").read_text()
+    assert "<h1>An afferent fitted to recordings</h1>" in page
+    assert page.count("data:image/png;base64,") == 2
+    assert f"<td>{fit['fss_out_of_sample']:.3f}</td>" in page.replace("−", "-")
+
+
+def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_path):
+    (tmp_path / "list.csv").write_text(
+        "stimulus,indenter,width_mm,depth_mm,x_mm,hold_ms\n"
+        + "".join(f"bar {row},bar,3,{1.0 - 0.1 * row},1.5,{900 + row}\n" for row in range(5))
+    )
+    (tmp_path / "mine.csv").write_text(
+        "what,static_rate_hz,fold\n"
+        + "".join(f"bar {row},{60 - 9 * row},{row + 1}\n" for row in (0, 2, 1, 3, 4))
+    )
+    call_with = ("mine.csv", "--stimulus", "list.csv", "--stimulus-column", "what", "--out", "there")
+    status, _, errors = call(*call_with, "--static-window", "500", "900", "--materials", "trial1")
+    assert (status, errors) == (0, "")
+    results = json.loads((tmp_path / "there" / "fit.json").read_text())
+    fit, manifest = results["fit"], results["manifest"]
+    assert (fit["stimulus"], fit["fold"]) == ([f"bar {row}" for row in (0, 2, 1, 3, 4)], [1, 3, 2, 4, 5])
+    assert fit["shift_mm"] is None
+    assert [entry["file"] for entry in manifest["inputs"]] == ["mine.csv", "list.csv"]
+    assert (manifest["windows_ms"][1], manifest["materials"]) == ([500.0, 900.0], "trial1")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "content", "said"),
+    [
+        ([], ROWS, "fit needs recordings and --stimulus, or --example"),
+        (["mine.csv"], ROWS, "fit needs recordings and --stimulus, or --example"),
+        (["none.csv", "--stimulus", "bar"], ROWS, "none.csv must be a file that can be read"),
+        (["mine.csv", "--stimulus", "none.csv"], ROWS, "none.csv must be a file that can be read"),
+        (["mine.csv", "--stimulus", "bar"], b"\xff\xfe", "mine.csv must be text in UTF-8"),
+        (["mine.csv", "--stimulus", "bar"], "", "mine.csv must hold a header and at least one row"),
+        (["mine.csv", "--stimulus", "bar"], ROWS + "2,-1,3\n", "mine.csv, line 8: dynamic_rate_hz must not"),
+        (["mine.csv", "--stimulus", "bar"], ROWS + "2,1,nan\n", "mine.csv, line 8: static_rate_hz must be a"),
+        (["mine.csv", "--stimulus", "bar"], "shift_mm,static_rate_hz\n0,1\n1,2\n", "at least 4 rates"),
+        (["mine.csv", "--stimulus", "bar"], ROWS + "90,1,3\n", "Stimulus 90 cannot be pressed"),
+        (["mine.csv", "--stimulus", "bar", "--depth", "9"], ROWS, "Stimulus -2 cannot be pressed: depth_mm"),
+        (["mine.csv", "--stimulus", "bar", "--width", "0"], ROWS, "width_mm must be greater than 0"),
+        (["mine.csv", "--stimulus", "bar", "--fillet", "2"], ROWS, "fillet_mm must not exceed half"),
+        (["mine.csv", "--stimulus", "bar", "--folds", "7"], ROWS, "n_observations must be a whole number of"),
+        (
+            ["mine.csv", "--stimulus", "bar", "--folds", "1"],
+            ROWS,
+            "n_folds must be a whole number of at least 2",
+        ),
+        (["mine.csv", "--stimulus", "bar", "--unit", "1"], ROWS, "unit belongs to NWB files"),
+        (
+            ["mine.csv", "--stimulus", "bar", "--method", "guess"],
+            ROWS,
+            "method must be one of response_surface",
+        ),
+        (["mine.csv", "--stimulus", "bar", "--jobs", "0"], ROWS, "jobs must be a whole number of at least 1"),
+        (["mine.csv", "--stimulus", "bar", "--materials", "wood"], ROWS, "materials must be one of"),
+        (["mine.csv", "--stimulus", "bar", "--resolution", "high"], ROWS, "resolution must be one of quick"),
+        (
+            ["mine.csv", "--stimulus", "bar", "--dynamic-quantity", "heat"],
+            ROWS,
+            "dynamic_quantity must be one",
+        ),
+        (["mine.csv", "--stimulus", "bar", "--static-window", "600", "1100"], ROWS, "not at 1100 ms"),
+        (
+            ["mine.csv", "--stimulus", "bar", "--static-window", "600", "500"],
+            ROWS,
+            "a later end: got 600, 500",
+        ),
+        (["mine.csv", "--stimulus", "bar", "--static-window", "600", "x"], ROWS, "'--static-window'"),
+        (["mine.csv", "--stimulus", "list.csv", "--width", "2"], ROWS, "--width is that of the bar"),
+        (["mine.csv", "--stimulus", "list.csv"], ROWS, "mine.csv, line 1: column 'shift_mm' is unknown"),
+        (
+            ["mine.csv", "--stimulus", "list.csv"],
+            "stimulus,static_rate_hz\nedge,1\nside,2\n",
+            "mine.csv, line 3: stimulus must be one of list.csv, edge",
+        ),
+        (
+            ["mine.csv", "--stimulus", "bar", "--folds", "2"],
+            "shift_mm,static_rate_hz,fold\n" + "".join(f"{row},9,{row + 1}\n" for row in range(6)),
+            "from the column fold or be dealt out, not both",
+        ),
+        (
+            ["mine.csv", "--stimulus", "bar"],
+            "shift_mm,spike_times_ms,duration_ms\n0,1 2,900\n1,3,900\n2,5,900\n",
+            "windows_ms must end within the recordings of 900 ms",
+        ),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_bad_input_is_one_sentence_and_status_2_and_nothing_is_written(
+    call, tmp_path, arguments, content, said
+):
+    (tmp_path / "mine.csv").write_bytes(content if isinstance(content, bytes) else content.encode())
+    (tmp_path / "list.csv").write_text("stimulus,indenter\nedge,bar\n")
+    status, out, errors = call(*arguments)
+    assert (status, out) == (2, "")
+    assert said in errors
+    assert errors.startswith("fingerpad: ")
+    assert errors.endswith(".\n")
+    assert errors.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["list.csv", "mine.csv"]
+
+
+def test_the_example_can_be_tried_as_it_says(call, tmp_path):
+    status, said, errors = call("--example", "try")
+    assert (status, errors) == (0, "")
+    assert said == "Try: fingerpad fit try/bar.csv --stimulus bar --resolution quick\n"
+    tried = said.split()[3:]
+    assert read_recordings(tmp_path / tried[0], ShiftedBar()).recordings.n_rates == 72
+
+
+def test_options_and_their_defaults_are_those_of_the_modules():
+    assert tuple(study.METHODS) == cli.FITTING_METHODS
+    assert tuple(QUANTITIES) == cli.QUANTITIES
+    assert set(INDENTERS) == set(cli.INDENTERS)
+    defaults = {option.name: option.default for option in command().params}
+    assert defaults["dynamic_window"] == protocol.DYNAMIC_WINDOW.value
+    assert defaults["static_window"] == protocol.STATIC_WINDOW.value
+
+
+def command():
+    return typer.main.get_command(cli.app).commands["fit"]
+
+
+def test_the_page_of_the_format_names_every_option_and_shows_commands_that_parse():
+    page = (ROOT / "docs" / "fit.md").read_text(encoding="utf-8")
+    options = {name for option in command().params for name in option.opts if name.startswith("--")}
+    rows = re.findall(r"^\| (`--.*?) \|", page, re.MULTILINE)
+    assert {name for row in rows for name in re.findall(r"--[\w-]+", row)} == options - {"--help"}
+    shown = re.findall(r"^fingerpad fit (.+)$", page, re.MULTILINE)
+    assert len(shown) == 2
+    for line in shown:
+        command().make_context("fit", shlex.split(line))
+
+
+# The figures
+
+
+def test_figures_show_what_was_recorded_and_nothing_else(recovered):
+    both = report.draw(recovered)
+    assert [axes.get_title().split(",")[0] for axes in both.axes] == ["dynamic ramp", "static hold"]
+    (observed,) = (line for line in both.axes[1].lines if line.get_label() == "observed")
+    np.testing.assert_allclose(observed.get_ydata(), RATES.static_rate_hz, rtol=1e-12)
+    alone = report.draw(recovered | {"observed_dynamic_rate_hz": None})
+    assert [axes.get_title().split(",")[0] for axes in alone.axes] == ["static hold"]
+    shifted = report.draw_residuals(recovered | {"shift_mm": list(range(8, 0, -1))})
+    points = next(line for line in shifted.axes[0].lines if line.get_label() == "fitted to all")
+    assert list(points.get_xdata()) == list(range(1, 9))
+    missed = RATES.dynamic_rate_hz - np.array(recovered["dynamic_rate_hz"])
+    np.testing.assert_allclose(points.get_ydata(), missed[::-1], rtol=0, atol=1e-9)
+
+
+def test_what_is_not_determined_is_said(recovered):
+    nothing = dict.fromkeys(IDENTIFIABLE_NAMES)
+    undetermined = recovered | {"identifiable_covariance": None, "identifiable_standard_error": nothing}
+    assert "do not determine all four free numbers" in report.summary(undetermined)[1]
+    assert len(report.summary(recovered)) == 1
+    table = report.fit_tables(undetermined)[1]
+    assert [row.cells[2] for row in table.rows] == ["–"] * 4
+
+
+# From nothing
+
+
+def test_a_fit_from_nothing_recovers_a_known_afferent(call, monkeypatch, tmp_path):
+    """Presses included, in a process whose warnings are errors; then the same stimuli with other rates."""
+    listed, strong = ["-1.5", "1.3", "1.5"], np.array([2e-7, 1.2e-4, 2e-6, 60.0, 1e-6, 50.0])
+    (tmp_path / "mine.csv").write_text(ROWS.splitlines()[0] + "".join(f"\n{name},100,30" for name in listed))
+    options = ("mine.csv", "--stimulus", "bar", "--resolution", "quick", "--jobs", "1")
+    shell = subprocess.run(
+        [sys.executable, "-W", "error", "-m", "fingerpad", "fit", *options],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (shell.returncode, shell.stderr.replace(f"{NOTICE}\n", "")) == (0, "")
+    folder = tmp_path / "fit"
+    assert json.loads((folder / "fit.json").read_text())["manifest"]["computed"] == 3
+
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    stimuli = {name: ShiftedBar().named(name)[1] for name in listed}
+    store, pressed = study.Store(folder / study.STORE_FOLDER), study.touches(stimuli, Conditions("quick"))
+    sed = [store.load(touch).sed([[RECEPTOR_X_MM, 0.0]]) for touch in pressed.values()]
+    rates = zip(listed, *AnyMotion.under(sed).rates(strong), strict=True)
+    (tmp_path / "mine.csv").write_text(
+        ROWS.splitlines()[0] + "".join(f"\n{name},{dynamic},{static}" for name, dynamic, static in rates)
+    )
+    status, _, errors = call(*options)
+    assert (status, errors) == (0, "")
+    second = json.loads((folder / "fit.json").read_text())
+    assert second["manifest"]["computed"] == 0
+    assert second["fit"]["fss_in_sample"] > 0.99
+    assert second["fit"]["fss_out_of_sample"] > 0.98
