@@ -331,6 +331,8 @@ def test_bad_mesh_is_refused_before_anything_is_solved():
 class Astray:
     """A linear solver that sends every free node through the body and out on the other side."""
 
+    number_type = np.float64
+
     def solve(self, blocks, residual, relative_tolerance):
         return np.tile([0.0, 1e4, 0.0], residual.size // 3)
 

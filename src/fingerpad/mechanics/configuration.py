@@ -22,8 +22,6 @@ from fingerpad.mesh import Mesh
 SMALLEST_FORCE_MN = 1e-6
 """Below it residuals are no longer taken relative to the force of contact. [mN]"""
 
-NO_BLOCKS = np.empty((0, 3, 3))
-
 CURVATURE_BELOW_RESIDUAL = 0.1
 """Residual over contact force below which the indenter's curvature is part of the tangent."""
 
@@ -196,7 +194,7 @@ def evaluate(
     displacement_mm: FloatArray,
     depth_mm: float,
     lagging: Lagging,
-    blocks: FloatArray | None,
+    blocks: np.ndarray,
     before: Friction | None = None,
     pressure_kpa: FloatArray | None = None,
 ) -> Configuration:
@@ -212,8 +210,8 @@ def evaluate(
         How far the indenter has advanced. [mm]
     lagging : Lagging
         Multipliers and anchors.
-    blocks : array (n_blocks, 3, 3), optional
-        Overwritten with the tangent; without it none is assembled. [mN/mm]
+    blocks : float64 or float32 array (n_blocks, 3, 3)
+        Overwritten with the tangent; if it has no blocks none is assembled. [mN/mm]
     before : Friction, optional
         Friction one Newton step ago, for the same anchors.
     pressure_kpa : array (n_elements,), optional
@@ -224,9 +222,7 @@ def evaluate(
     Configuration
     """
     mesh, contact = body.mesh, load.contact
-    force, has_tangent = np.empty_like(displacement_mm), blocks is not None
-    if blocks is None:
-        blocks = NO_BLOCKS
+    force, has_tangent = np.empty_like(displacement_mm), blocks.size > 0
     internal = assemble(
         mesh.nodes_mm, mesh.elements, displacement_mm, mesh.layer, body.table.law, load.step.s, load.carried,
         body.sparsity, has_tangent, force, blocks,

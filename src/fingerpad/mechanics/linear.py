@@ -47,11 +47,16 @@ class Preconditioner(Protocol):
         """Iterations beyond those of a renewed one after which it is worth renewing."""
         ...
 
-    def follow(self, blocks: FloatArray) -> None:
+    @property
+    def number_type(self) -> type[np.floating]:
+        """Type of the numbers that a tangent should have."""
+        ...
+
+    def follow(self, blocks: np.ndarray) -> None:
         """Take a new tangent, blocks (n_blocks, 3, 3), as far as that is cheap."""
         ...
 
-    def renew(self, blocks: FloatArray) -> None:
+    def renew(self, blocks: np.ndarray) -> None:
         """Take a new tangent altogether."""
         ...
 
@@ -86,16 +91,17 @@ class KeptFactor:
     """
 
     patience = 14
+    number_type = np.float64
 
     def __init__(self, sparsity: Sparsity, free: np.ndarray, factor: MakeFactor):
         self._sparsity, self._free = sparsity, free
         self._factor = factor(*sparsity.entries(free))
 
-    def follow(self, blocks: FloatArray) -> None:
+    def follow(self, blocks: np.ndarray) -> None:
         """Multiply with this tangent from now on."""
         self._matrix = self._sparsity.matrix(blocks)
 
-    def renew(self, blocks: FloatArray) -> None:
+    def renew(self, blocks: np.ndarray) -> None:
         """Factor this tangent; ConvergenceError if that fails."""
         self.follow(blocks)
         self._factor.renew(blocks)
@@ -190,12 +196,17 @@ class LinearSolver:
     _stale: bool = field(default=True, init=False)
     _renewed_rate: float = field(default=0.0, init=False)
 
+    @property
+    def number_type(self) -> type[np.floating]:
+        """Type of the numbers that a tangent should have."""
+        return self.approximate.number_type
+
     def multiply(self, direction: FloatArray) -> FloatArray:
         """Product of the tangent of the last solution and a direction (n_free,)."""
         vector = self.approximate.enter(direction)
         return self.approximate.leave(self.approximate.multiply(vector))
 
-    def solve(self, blocks: FloatArray, residual: FloatArray, relative_tolerance: float) -> FloatArray:
+    def solve(self, blocks: np.ndarray, residual: FloatArray, relative_tolerance: float) -> FloatArray:
         """Solve K x = r for the free degrees of freedom.
 
         Parameters

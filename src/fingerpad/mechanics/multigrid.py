@@ -362,6 +362,7 @@ class Multigrid:
     """
 
     patience = 3
+    number_type = np.float32
 
     def __init__(
         self,
@@ -407,7 +408,7 @@ class Multigrid:
         """Number of columns of each level, finest first."""
         return tuple(level.n_columns for level in self._levels)
 
-    def follow(self, blocks: FloatArray) -> None:
+    def follow(self, blocks: np.ndarray) -> None:
         """Take a new tangent, blocks (n_blocks, 3, 3), on the finest level; others stay as they are."""
         finest = self._levels[0]
         _share(
@@ -418,7 +419,7 @@ class Multigrid:
         if self._transfers:
             finest.sweepable()
 
-    def renew(self, blocks: FloatArray) -> None:
+    def renew(self, blocks: np.ndarray) -> None:
         """Take a new tangent on all levels."""
         self.follow(blocks)
         for n, transfer in enumerate(self._transfers):

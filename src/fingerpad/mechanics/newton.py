@@ -161,11 +161,11 @@ class _Search:
     load: Load
     solver: LinearSolver
     lagging: Lagging
-    blocks: FloatArray = field(init=False)
+    blocks: np.ndarray = field(init=False)
     history: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.blocks = np.empty((self.body.sparsity.column.size, 3, 3))
+        self.blocks = np.empty((self.body.sparsity.column.size, 3, 3), self.solver.number_type)
 
     def run(self, guess_mm: FloatArray, settings: NewtonSettings) -> Equilibrium:
         """Repeat Newton steps, and renew what lags behind whenever the body is at rest."""
@@ -257,7 +257,7 @@ class _Search:
             pressure = start.pressures.after(self.body.mesh.elements, displacement - start.displacement_mm)
         # Friction and mixed methods carry more than the displacements over to the tangent.
         carries = self.load.anchors is not None or self.body.is_mixed
-        blocks = self.blocks if carries or start.relative_residual > LAST_STEP else None
+        blocks = self.blocks if carries or start.relative_residual > LAST_STEP else self.blocks[:0]
         return evaluate(self.body, self.load, displacement, depth_mm, self.lagging, blocks, before, pressure)
 
     def line_search(self, start: Configuration, direction: FloatArray, highest_uj: float) -> Configuration:
