@@ -24,13 +24,17 @@ from fingerpad.estimation.stimuli import INDENTERS, ShiftedBar, TactileStimulus
 from fingerpad.indenters import Bar, Line, Sphere
 from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.parameters import protocol
+from fingerpad.random_streams import Presentations
 from fingerpad.reference import bar_firing_rates
 from fingerpad.report import recording_fit as report
-from fingerpad.signals import SedTraces
+from fingerpad.signals import SedTraces, SpikeTrains
 from fingerpad.stimulus import ForceRampAndHold, RampAndHold
 from fingerpad.studies import recording_fit as study
 from fingerpad.studies import single_unit
 from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.studies.recording_methods import METHODS, check_spikes
+from fingerpad.studies.spike_fit import soft_spikes
+from fingerpad.transduction import drive
 
 ROOT = Path(__file__).parents[1]
 KNOWN = [2e-7, 1.2e-4, 9e-7, 60.0, 1e-6, 50.0]
@@ -78,6 +82,25 @@ def test_one_phase_is_enough_for_a_fit_and_the_other_is_said_to_be_missing():
     assert fitted["fss_in_sample"] == fitted["fss_in_sample_static"] > 0.99
     assert fitted["observed_dynamic_rate_hz"] is None
     assert fitted["fss_in_sample_dynamic"] is None
+
+
+def test_a_soft_threshold_is_recovered_from_its_spikes_within_their_information():
+    true = np.array([0.004, 2.4, 0.03, 40.0, 0.2])
+    presentations = Presentations.of_one_afferent(8, 3)
+    trains = soft_spikes(drive(SED), true, presentations, seed=3)
+    recordings = SpikeRecordings(tuple(NAMES[site] for site in presentations.sites), trains, 1000.0)
+    fitted = study.fit_recordings(SED, recordings, np.arange(8) % 2, method="likelihood")
+    spikes = fitted["spikes"]
+    found = [*fitted["identifiable"].values(), spikes["escape_width"]]
+    errors = [*fitted["identifiable_standard_error"].values(), spikes["escape_width_standard_error"]]
+    assert (np.abs(found - true) < 2.6 * np.array(errors)).all()  # 99 % of each
+    assert (np.array(errors) < [0.01, 0.2, 0.002, 20.0, 0.02]).all()
+    assert spikes["n_spikes"] == trains.times_ms.size
+    # Out of sample it can only be worse, by about one for every parameter of each fold.
+    assert 0.0 < spikes["log_likelihood"] - spikes["log_likelihood_out_of_sample"] < 20.0
+    assert spikes["time_rescaling_p_value"] > 0.01
+    assert fitted["fss_out_of_sample"] > 0.97
+    assert len(report.fit_tables(fitted)) == 6
 
 
 # What a fit says
@@ -149,6 +172,22 @@ def test_another_quantity_for_the_dynamic_term_reaches_the_afferent():
 def test_what_cannot_be_fitted_or_judged_is_refused(rates, folds, said):
     with pytest.raises(InputError, match=said):
         study.check_enough(rates, np.array(folds))
+
+
+@pytest.mark.parametrize(
+    ("recordings", "n_motions", "said"),
+    [
+        (RATES, 1, "likelihood needs spike times: got rates"),
+        (SpikeRecordings(("a",), SpikeTrains.from_lists([[1, 5, 9, 14, 20]]), 50.0), 2, "got 2 motions"),
+        (SpikeRecordings(("a",), SpikeTrains.from_lists([[1, 5, 9, 14]]), 50.0), 1, "at least 5 spikes"),
+        (SpikeRecordings(("a",), SpikeTrains.from_lists([[0, 5, 9, 14, 20]]), 50.0), 1, "a has one at 0 ms"),
+        (SpikeRecordings(("a",), SpikeTrains.from_lists([[1, 5, 5.5, 9, 14]]), 50.0), 1, "0.5 ms apart"),
+    ],
+    ids=["rates", "motions", "few", "onset", "close"],
+)
+def test_spikes_that_have_no_likelihood_are_refused(recordings, n_motions, said):
+    with pytest.raises(InputError, match=said):
+        check_spikes(recordings, n_motions)
 
 
 def test_a_stimulus_that_ends_before_a_window_is_refused():
@@ -315,6 +354,7 @@ def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_pa
             ROWS,
             "method must be one of response_surface",
         ),
+        (["mine.csv", "--stimulus", "bar", "--method", "likelihood"], ROWS, "likelihood needs spike times"),
         (["mine.csv", "--stimulus", "bar", "--jobs", "0"], ROWS, "jobs must be a whole number of at least 1"),
         (["mine.csv", "--stimulus", "bar", "--materials", "wood"], ROWS, "materials must be one of"),
         (["mine.csv", "--stimulus", "bar", "--resolution", "high"], ROWS, "resolution must be one of quick"),
@@ -373,7 +413,7 @@ def test_the_example_can_be_tried_as_it_says(call, tmp_path):
 
 
 def test_options_and_their_defaults_are_those_of_the_modules():
-    assert tuple(study.METHODS) == cli.FITTING_METHODS
+    assert tuple(METHODS) == cli.FITTING_METHODS
     assert tuple(QUANTITIES) == cli.QUANTITIES
     assert set(INDENTERS) == set(cli.INDENTERS)
     defaults = {option.name: option.default for option in command().params}

@@ -49,7 +49,7 @@ MATERIALS = (
     "gerling2014_fit",
 )
 FORMATS = ("vtu", "abaqus", "calculix", "febio")
-FITTING_METHODS = ("response_surface",)
+FITTING_METHODS = ("response_surface", "likelihood")
 QUANTITIES = ("stored", "instantaneous", "work", "von_mises", "compressive_strain", "compressive_stress")
 REFINEMENTS = {"fine": "mesh_refinement", "paper": "paper_size"}
 """What options may be, as the help names them; indenters with their class, finer meshes with

@@ -127,7 +127,15 @@ def caption_residuals(section: Mapping[str, Any]) -> str:
 
 def fit_tables(section: Mapping[str, Any]) -> list[Table]:
     """Return scores, parameters in both forms, folds and rates."""
-    return [_scores(section), _identifiable(section), _parameters(section), _folds(section), _rates(section)]
+    spikes = [_spikes(section["spikes"])] if section["spikes"] else []
+    return [
+        _scores(section),
+        *spikes,
+        _identifiable(section),
+        _parameters(section),
+        _folds(section),
+        _rates(section),
+    ]
 
 
 CHAPTERS = (
@@ -232,6 +240,20 @@ def _scores(section: Mapping[str, Any]) -> Table:
     return Table("Fractional sum of squares (FSS)", ("over", "FSS"), rows)
 
 
+def _spikes(told: Mapping[str, Any]) -> Table:
+    names = {
+        "n_spikes": "spikes",
+        "log_likelihood": "log likelihood of all",
+        "log_likelihood_out_of_sample": "log likelihood of each fold, fitted without it",
+        "escape_width": "width of the threshold over the threshold",
+        "escape_width_standard_error": "its standard error",
+        "time_rescaling_distance": "Kolmogorov-Smirnov distance of rescaled intervals",
+        "time_rescaling_p_value": "chance of a larger distance",
+    }
+    rows = [Row((said, number(told[key]))) for key, said in names.items()]
+    return Table("What the spikes tell of a soft threshold", ("", ""), rows)
+
+
 def _identifiable(section: Mapping[str, Any]) -> Table:
     units, errors = section["identifiable_units"], section["identifiable_standard_error"]
     rows = [
@@ -240,7 +262,8 @@ def _identifiable(section: Mapping[str, Any]) -> Table:
     ]
     note = (
         "All that spikes can tell: gains, capacitance C and threshold v are known only up to a common scale. "
-        "Standard errors are those of least squares with residuals of unequal size (sandwich)."
+        "Standard errors hold near the best fit: from residuals of unequal size (sandwich), or from the "
+        "information in spikes."
     )
     return Table("The four numbers that are determined", ("", "fitted", "standard error", "unit"), rows, note)
 

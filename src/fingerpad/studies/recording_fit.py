@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cached_property
@@ -22,7 +22,6 @@ from fingerpad.estimation.identifiable import (
     IDENTIFIABLE_NAMES,
     IDENTIFIABLE_UNITS,
     identifiable,
-    six_parameters,
 )
 from fingerpad.estimation.rate_problem import RateProblem
 from fingerpad.estimation.reading import Recorded
@@ -30,12 +29,10 @@ from fingerpad.estimation.recordings import PHASES, RateRecordings, SpikeRecordi
 from fingerpad.estimation.stimuli import TactileStimulus
 from fingerpad.fitting import (
     CrossValidation,
-    Method,
     cross_validate,
     fractional_sum_of_squares,
     interleaved_folds,
 )
-from fingerpad.fitting.covariance import mean_slopes, sandwich_covariance
 from fingerpad.fitting.problem import IntArray
 from fingerpad.grading import Grading
 from fingerpad.indentation import Touch, touch_of
@@ -47,16 +44,11 @@ from fingerpad.signals import STORED_ENERGY, SedTraces
 from fingerpad.store import Store, solve_missing
 from fingerpad.studies import single_unit
 from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.studies.recording_methods import METHODS, Prepared, check_spikes
 from fingerpad.studies.reproduction import STORE_FOLDER, NoProgress, Progress, plain, software
-
-METHODS: dict[str, Callable[[], Method]] = {"response_surface": single_unit.response_surface}
-"""Ways to fit, by the names that the command line gives them."""
 
 EXAMPLE = "bar.csv"
 """Name of the file of `example`."""
-
-SLOPE_SHARE = 0.02
-"""Half of the box over which slopes are means, as a share of each number: wider than the rates' jumps."""
 
 
 def fit_recordings(
@@ -66,6 +58,7 @@ def fit_recordings(
     *,
     method: str = "response_surface",
     windows_ms: Windows = WINDOWS_MS,
+    seed: int = 0,
 ) -> dict[str, Any]:
     """Fit an afferent to what was recorded under stimuli whose strain energy density is known.
 
@@ -83,6 +76,8 @@ def fit_recordings(
         One of `METHODS`.
     windows_ms : ((float, float), (float, float)), optional
         Windows of the dynamic and of the static rate; the paper's by default. [ms]
+    seed : int, optional
+        Of methods that draw.
 
     Returns
     -------
@@ -94,7 +89,7 @@ def fit_recordings(
     ------
     InputError
         If there are fewer rates than free parameters in a training set, a fold has rates of 0 only, sizes
-        disagree or a stimulus ends before a window.
+        disagree, a stimulus ends before a window, or a likelihood is asked of rates.
     ConvergenceError
         If a fit does not end.
 
@@ -114,10 +109,11 @@ def fit_recordings(
     rates = recordings if isinstance(recordings, RateRecordings) else recordings.rates(windows_ms)
     folds = dealt_folds(len(rates.stimuli)) if memberships is None else np.asarray(memberships)
     check_enough(rates, folds)
-    problem = RateProblem(AnyMotion.under(sed, windows_ms), rates)
-    chosen_method = METHODS[one_of("method", method, tuple(METHODS))]()
-    best = chosen_method.fit(problem, np.arange(problem.n_observations))
-    validation = cross_validate(problem, chosen_method, folds)
+    prepared = METHODS[one_of("method", method, tuple(METHODS))](
+        AnyMotion.under(sed, windows_ms), recordings, rates, seed
+    )
+    best = prepared.method.fit(prepared.problem, np.arange(len(rates.stimuli)))
+    validation = cross_validate(prepared.problem, prepared.method, folds)
     return plain(
         {
             "method": method,
@@ -125,9 +121,9 @@ def fit_recordings(
             "n_evaluations": best.n_evaluations,
             "seconds": best.seconds,
         }
-        | _parameters(problem, best.parameters)
-        | _scores(problem, rates, best.parameters, validation)
-        | {"folds": _folds(rates, validation)}
+        | _parameters(prepared, best.parameters)
+        | _scores(prepared.problem, rates, best.parameters, validation)
+        | {"folds": _folds(prepared, rates, validation), "spikes": prepared.spikes(best, validation)}
     )
 
 
@@ -177,35 +173,31 @@ def check_enough(rates: RateRecordings, memberships: IntArray) -> None:
                     )
 
 
-def _parameters(problem: RateProblem, six: FloatArray) -> dict[str, Any]:
+def _parameters(prepared: Prepared, fitted: FloatArray) -> dict[str, Any]:
     """Parameters in both forms, and how well the recordings determine those four that they can."""
-    everything = np.arange(problem.n_observations)
-    four = identifiable(six)
-
-    def residuals(numbers: FloatArray) -> FloatArray:
-        return problem.residuals(six_parameters(numbers, *six[4:]), everything)
-
-    # beta may be 0: compared with the smallest current that makes a spike, C v / tau, it has a scale.
-    scale = np.array([1.0 / four[3], *np.abs(four[1:])])
-    start = identifiable(single_unit.start_points()[0])
-    steps = SLOPE_SHARE * np.where(scale > 0.0, scale, start)
-    covariance = sandwich_covariance(mean_slopes(residuals, four, steps), residuals(four))
+    covariance = prepared.covariance(fitted)
     errors = [None] * 4 if covariance is None else np.sqrt(np.diag(covariance)).tolist()
-    return {
-        "parameters": dict(zip(PARAMETER_NAMES, six, strict=True)),
+    return _named(prepared.six(fitted)) | {
         "units": dict(zip(PARAMETER_NAMES, single_unit.UNITS, strict=True)),
-        "identifiable": dict(zip(IDENTIFIABLE_NAMES, four, strict=True)),
         "identifiable_units": dict(zip(IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, strict=True)),
         "identifiable_standard_error": dict(zip(IDENTIFIABLE_NAMES, errors, strict=True)),
         "identifiable_covariance": covariance,
     }
 
 
+def _named(six: FloatArray) -> dict[str, dict[str, float]]:
+    """Six parameters, and the four that firing can tell, under their names."""
+    return {
+        "parameters": dict(zip(PARAMETER_NAMES, six.tolist(), strict=True)),
+        "identifiable": dict(zip(IDENTIFIABLE_NAMES, identifiable(six).tolist(), strict=True)),
+    }
+
+
 def _scores(
-    problem: RateProblem, rates: RateRecordings, six: FloatArray, validation: CrossValidation
+    problem: RateProblem, rates: RateRecordings, fitted: FloatArray, validation: CrossValidation
 ) -> dict[str, Any]:
     """FSS in and out of sample, and every rate as observed, predicted, and predicted without its fold."""
-    predicted = dict(zip(PHASES, problem.model.rates(six), strict=True))
+    predicted = dict(zip(PHASES, problem.model.rates(fitted), strict=True))
     left_out = {phase: np.empty(problem.n_observations) for phase in PHASES}
     memberships = np.empty(problem.n_observations, dtype=np.int64)
     for fold in validation.folds:
@@ -213,7 +205,7 @@ def _scores(
         for phase, rate in zip(PHASES, problem.model.rates(fold.fit.parameters), strict=True):
             left_out[phase][fold.testing] = rate[fold.testing]
     found: dict[str, Any] = {
-        "fss_in_sample": problem.score(six, np.arange(problem.n_observations)),
+        "fss_in_sample": problem.score(fitted, np.arange(problem.n_observations)),
         "fss_training_mean": validation.score_train,
         "fss_out_of_sample": validation.score_test,
         "stimulus": rates.stimuli,
@@ -232,7 +224,7 @@ def _scores(
     return found
 
 
-def _folds(rates: RateRecordings, validation: CrossValidation) -> list[dict[str, Any]]:
+def _folds(prepared: Prepared, rates: RateRecordings, validation: CrossValidation) -> list[dict[str, Any]]:
     return [
         {
             "fold": fold.fold + 1,
@@ -241,9 +233,8 @@ def _folds(rates: RateRecordings, validation: CrossValidation) -> list[dict[str,
             "fss_test": fold.score_test,
             "n_evaluations": fold.fit.n_evaluations,
             "seconds": fold.fit.seconds,
-            "parameters": dict(zip(PARAMETER_NAMES, fold.fit.parameters, strict=True)),
-            "identifiable": dict(zip(IDENTIFIABLE_NAMES, identifiable(fold.fit.parameters), strict=True)),
         }
+        | _named(prepared.six(fold.fit.parameters))
         for fold in validation.folds
     ]
 
@@ -304,6 +295,9 @@ class RecordingFit:
                     f"{stimulus.motion.end_ms:g} ms."
                 )
         check_enough(self.rates, self.memberships)
+        if self.method == "likelihood":
+            motions = {stimulus.motion for stimulus in self.recorded.stimuli.values()}
+            check_spikes(self.recorded.recordings, len(motions))
         # Built once here: what cannot be pressed is said before anything is.
         self.touches  # noqa: B018
 
