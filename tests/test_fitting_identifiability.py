@@ -1,0 +1,66 @@
+"""What cannot be told is found: directions along which nothing observed changes."""
+
+import numpy as np
+import pytest
+
+from fingerpad.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.errors import InputError
+from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
+from fingerpad.estimation.rate_problem import AfferentModel
+from fingerpad.fitting.identifiability import identifiability, jacobian
+from fingerpad.signals import SedTraces
+from fingerpad.transduction import drive
+
+PEAKS = np.array([0.3, 0.8, 1.4, 1.9, 2.5])
+TIMES = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 100.0, 200.0, 500.0, 1000.0])
+COURSE = np.where(TIMES <= 50.0, (TIMES / 50.0) ** 2, 0.75 + 0.25 * np.exp(-(TIMES - 50.0) / 150.0))
+MODEL = AfferentModel(drive(SedTraces(TIMES, COURSE[:, None] * PEAKS, [50.0])))
+
+
+def rates(six: np.ndarray) -> np.ndarray:
+    return np.concatenate(MODEL.rates(six))
+
+
+def test_rates_tell_four_of_six_parameters_and_two_scalings_are_silent() -> None:
+    found = identifiability(rates, Afferent().parameters, PARAMETER_NAMES)
+    assert found.rank == 4
+    assert found.singular_values[4] < 1e-6 * found.singular_values[0]
+    assert found.singular_values[3] > 1e-4 * found.singular_values[0]
+    # C or v by a factor, and the three gains with it: both lie in the silent plane.
+    for scaling in ([1, 1, 1, 0, 1, 0], [1, 1, 1, 0, 0, 1]):
+        unit = np.array(scaling) / np.linalg.norm(scaling)
+        np.testing.assert_allclose(
+            found.silent_directions.T @ (found.silent_directions @ unit), unit, atol=1e-3
+        )
+
+
+def test_rates_tell_all_of_the_four_numbers() -> None:
+    four = identifiable(Afferent().parameters)
+    found = identifiability(lambda numbers: rates(six_parameters(numbers)), four, IDENTIFIABLE_NAMES)
+    assert found.rank == 4
+    assert found.silent_directions.shape == (0, 4)
+
+
+def test_a_wide_step_averages_over_jumps() -> None:
+    """A staircase is level almost everywhere, and rises by one per unit at large."""
+
+    def staircase(parameters: np.ndarray) -> np.ndarray:
+        return np.floor(10.0 * parameters) / 10.0
+
+    assert jacobian(staircase, [0.55], [1.0])[0, 0] == 0.0
+    assert jacobian(staircase, [0.55], [1.0], step=5.0)[0, 0] == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: identifiability(np.exp, [1.0, 0.0], ("a", "b")), "scales must be greater than 0"),
+        (lambda: identifiability(np.exp, [1.0, 2.0], ("a",)), "names must name 2 parameters"),
+        (lambda: identifiability(lambda p: p[:1], [1.0, 2.0], ("a", "b")), "at least 2 numbers: got 1"),
+        (lambda: jacobian(np.exp, [1.0], [1.0], step=0.0), "step must be greater than 0"),
+        (lambda: jacobian(lambda p: p * np.nan, [1.0], [1.0]), "answer must hold finite numbers only"),
+    ],
+)
+def test_what_has_no_jacobian_is_refused(call, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        call()

@@ -1,0 +1,98 @@
+"""Profiles of likelihoods that are known in closed form; open sides are called open."""
+
+import numpy as np
+import pytest
+
+from fingerpad.errors import InputError
+from fingerpad.fitting.profile_likelihood import Profiles, profile_likelihoods
+
+COVARIANCE = np.array([[1.0, 1.2], [1.2, 4.0]])
+CENTRE = np.array([2.0, -3.0])
+NAMES = ("a", "b")
+
+
+def normal(points: np.ndarray) -> np.ndarray:
+    offsets = points - CENTRE
+    return 5.0 - 0.5 * np.einsum("ni,ij,nj->n", offsets, np.linalg.inv(COVARIANCE), offsets)
+
+
+@pytest.fixture(scope="module")
+def found() -> Profiles:
+    return profile_likelihoods(normal, [2.5, -2.0], [1.0, 2.0], NAMES)
+
+
+def test_a_normal_likelihood_has_its_marginal_intervals(found: Profiles) -> None:
+    np.testing.assert_allclose(found.best, CENTRE, atol=0.1)
+    assert found.log_likelihood == pytest.approx(5.0, abs=0.01)
+    for index, profile in enumerate(found.profiles):
+        deviation = np.sqrt(COVARIANCE[index, index])
+        exact = CENTRE[index] + 1.96 * deviation * np.array([-1.0, 1.0])
+        np.testing.assert_allclose(profile.interval, exact, atol=0.08 * deviation)
+        # The others take their best values: those on the regression line.
+        other = 1 - index
+        slope = COVARIANCE[0, 1] / COVARIANCE[index, index]
+        line = CENTRE[other] + slope * (profile.values - CENTRE[index])
+        np.testing.assert_allclose(profile.points[:, other], line, atol=0.2)
+        np.testing.assert_allclose(
+            profile.losses, 0.5 * ((profile.values - CENTRE[index]) / deviation) ** 2, atol=0.05
+        )
+        assert (np.diff(profile.values) > 0.0).all()
+
+
+def test_the_level_sets_the_width(found: Profiles) -> None:
+    narrow = profile_likelihoods(normal, [2.5, -2.0], [1.0, 2.0], NAMES, level=0.68)
+    widths = [np.diff(profiles.profiles[0].interval)[0] for profiles in (narrow, found)]
+    assert widths[0] / widths[1] == pytest.approx(0.9945 / 1.96, rel=0.05)
+
+
+def test_a_side_that_the_data_do_not_bound_is_open() -> None:
+    """A likelihood that levels off above: large values of a are all alike."""
+
+    def saturating(points: np.ndarray) -> np.ndarray:
+        a, b = points.T
+        return -8.0 * np.where(a < 0.0, a**2, 0.0) - 0.5 * (b - 1.0) ** 2
+
+    profile = profile_likelihoods(saturating, [0.5, 1.0], [1.0, 1.0], NAMES).profiles[0]
+    assert profile.interval[0] == pytest.approx(-0.49, abs=0.08)
+    assert profile.interval[1] == np.inf
+
+
+def test_a_better_fit_met_on_the_way_is_the_measure_of_all() -> None:
+    """Two lumps; the search begins at the lower one."""
+
+    def lumps(points: np.ndarray) -> np.ndarray:
+        a, b = points.T
+        shape = np.logaddexp(-0.5 * ((a + 2.0) / 0.6) ** 2, 2.0 - 0.5 * ((a - 1.0) / 0.6) ** 2)
+        return shape - 0.5 * b**2
+
+    found = profile_likelihoods(lumps, [-2.0, 0.0], [1.0, 1.0], NAMES)
+    assert found.best[0] == pytest.approx(1.0, abs=0.1)
+    assert found.log_likelihood == pytest.approx(2.0, abs=0.02)
+    assert all(profile.losses.min() >= 0.0 for profile in found.profiles)
+    low, high = found.profiles[0].interval
+    # The lower lump, 2 below, lies just outside of 1.92.
+    assert low > -1.0
+    assert high == pytest.approx(1.0 + 0.6 * 1.96, abs=0.15)
+
+
+def test_threads_and_repetition_change_nothing(found: Profiles) -> None:
+    again = profile_likelihoods(normal, [2.5, -2.0], [1.0, 2.0], NAMES)
+    assert again.n_evaluations == found.n_evaluations
+    for first, second in zip(found.profiles, again.profiles, strict=True):
+        np.testing.assert_array_equal(first.losses, second.losses)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"scales": [1.0, 0.0]}, "scales greater than 0"),
+        ({"names": ("a",)}, "at least two parameters"),
+        ({"level": 1.5}, "level must lie between 0 and 1"),
+        ({"log_likelihood": lambda points: np.full(len(points), -np.inf)}, "must be finite at the start"),
+        ({"log_likelihood": lambda points: np.full(len(points), np.nan)}, "it is NaN at"),
+    ],
+)
+def test_what_cannot_be_profiled_is_refused(changes: dict, words: str) -> None:
+    given = {"log_likelihood": normal, "start": CENTRE, "scales": [1.0, 2.0], "names": NAMES} | changes
+    with pytest.raises(InputError, match=words):
+        profile_likelihoods(**given)

@@ -1,0 +1,75 @@
+"""Sobol's indices of a function whose indices are known."""
+
+import numpy as np
+import pytest
+
+from fingerpad.errors import InputError
+from fingerpad.fitting.sensitivity import sobol_indices
+
+NAMES = ("a", "b", "c")
+
+
+def ishigami(points: np.ndarray) -> np.ndarray:
+    """Ishigami's function with 7 and 0.1: indices in closed form (Ishigami & Homma 1990)."""
+    x, y, z = points.T
+    return np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
+
+
+def closed_form() -> tuple[np.ndarray, np.ndarray, float]:
+    a, b = 7.0, 0.1
+    alone = np.array([0.5 * (1.0 + b * np.pi**4 / 5.0) ** 2, a**2 / 8.0, 0.0])
+    together = 8.0 * b**2 * np.pi**8 / 225.0
+    variance = alone.sum() + together
+    return alone / variance, (alone + together * np.array([1.0, 0.0, 1.0])) / variance, variance
+
+
+def test_indices_of_ishigamis_function_lie_within_their_confidence() -> None:
+    found = sobol_indices(ishigami, [-np.pi] * 3, [np.pi] * 3, NAMES, seed=1, n_base=1024)
+    first, total, variance = closed_form()
+    np.testing.assert_allclose(found.first, first, atol=0.05)
+    np.testing.assert_allclose(found.total, total, atol=0.05)
+    assert (np.abs(found.first - first) <= 1.5 * found.first_half_width).all()
+    assert (np.abs(found.total - total) <= 1.5 * found.total_half_width).all()
+    assert found.standard_deviation == pytest.approx(np.sqrt(variance), rel=0.03)
+    assert found.mean == pytest.approx(3.5, abs=0.1)
+    assert found.n_evaluations == 5 * 1024
+
+
+def test_the_seed_fixes_the_numbers_and_nothing_global_is_drawn() -> None:
+    np.random.seed(0)  # noqa: NPY002
+    before = np.random.get_state()[1].copy()  # noqa: NPY002
+    first, again, other = (
+        sobol_indices(ishigami, [-np.pi] * 3, [np.pi] * 3, NAMES, seed=seed, n_base=64) for seed in (0, 0, 1)
+    )
+    np.testing.assert_array_equal(first.total, again.total)
+    np.testing.assert_array_equal(first.total_half_width, again.total_half_width)
+    assert not np.array_equal(first.total, other.total)
+    np.testing.assert_array_equal(before, np.random.get_state()[1])  # noqa: NPY002
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"upper": [1.0, 0.0]}, "lower be below upper"),
+        ({"names": ("a",)}, "for 1 names"),
+        ({"n_base": 100}, "n_base must be a power of two: got 100"),
+        ({"level": 0.0}, "level must lie between 0 and 1"),
+        ({"objective": lambda points: np.ones(len(points))}, "it is constant"),
+        ({"objective": lambda points: np.ones(3)}, "got 3 for 256"),
+        (
+            {"objective": lambda points: np.full(len(points), np.nan)},
+            "objective must hold finite numbers only",
+        ),
+    ],
+)
+def test_what_has_no_indices_is_refused(changes: dict, words: str) -> None:
+    given = {
+        "objective": lambda points: points.sum(axis=1),
+        "lower": [0.0, 0.0],
+        "upper": [1.0, 1.0],
+        "names": ("a", "b"),
+        "seed": 1,
+        "n_base": 64,
+    }
+    with pytest.raises(InputError, match=words):
+        sobol_indices(**(given | changes))
