@@ -15,7 +15,7 @@ import typer
 from fingerpad import cli
 from fingerpad.afferent import Afferent
 from fingerpad.compilation import NOTICE
-from fingerpad.errors import InputError
+from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.estimation.any_motion import AnyMotion
 from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.estimation.reading import read_recordings
@@ -30,9 +30,11 @@ from fingerpad.report import recording_fit as report
 from fingerpad.signals import SedTraces, SpikeTrains
 from fingerpad.stimulus import ForceRampAndHold, RampAndHold
 from fingerpad.studies import recording_fit as study
-from fingerpad.studies import single_unit
+from fingerpad.studies import recording_posterior, single_unit
+from fingerpad.studies import recording_session as session
 from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.studies.recording_methods import METHODS, check_spikes
+from fingerpad.studies.recording_posterior import posterior
 from fingerpad.studies.spike_fit import soft_spikes
 from fingerpad.transduction import drive
 
@@ -82,6 +84,53 @@ def test_one_phase_is_enough_for_a_fit_and_the_other_is_said_to_be_missing():
     assert fitted["fss_in_sample"] == fitted["fss_in_sample_static"] > 0.99
     assert fitted["observed_dynamic_rate_hz"] is None
     assert fitted["fss_in_sample_dynamic"] is None
+
+
+def test_noisy_rates_leave_a_posterior_that_holds_the_known_afferent():
+    noise = np.random.default_rng(4).normal(0.0, 1.0, (2, 8))
+    noisy = RateRecordings(NAMES, *np.maximum(AFFERENT.rates(SED) + noise, 0.0))
+    model, known = AnyMotion.under(SED), identifiable(KNOWN)
+    few = {"n_ensembles": 2, "n_walkers": 32, "largest_r_hat": 1.1, "smallest_effective_size": 50.0}
+    drawn = posterior(model, noisy, known, 1, **few)
+    for value, (low, high) in zip(known, drawn["interval"].values(), strict=True):
+        assert low < value < high
+    assert 0.0 < np.diff(drawn["interval"]["static_gain_per_kpa_ms"])[0] < known[2]
+    band = drawn["bands"]["static"]
+    assert (band["predicted"]["high_hz"] >= band["predicted"]["low_hz"]).all()
+    # A new recording has a residual of its own: its band is the wider one, nearly everywhere.
+    width = {kind: band[kind]["high_hz"] - band[kind]["low_hz"] for kind in ("predicted", "new")}
+    assert (width["new"] > width["predicted"]).mean() > 0.9
+
+
+def test_draws_begin_where_they_can_though_a_gain_ended_at_its_bound(monkeypatch):
+    begun = []
+
+    def note(likelihood, start, **settings):
+        begun.append(start)
+        raise ConvergenceError("Enough.")
+
+    monkeypatch.setattr(recording_posterior, "afferent_posterior", note)
+    with pytest.raises(ConvergenceError, match="Enough"):
+        posterior(AnyMotion.under(SED), RATES, [-0.1, 0.0, 0.03, 40.0], 1)
+    assert begun[0].tolist() == [-0.1, identifiable(single_unit.start_points()[0])[1], 0.03, 40.0]
+
+
+def test_a_posterior_is_part_of_the_fit_and_of_its_page(recovered, monkeypatch):
+    asked = []
+    interval = {name: [1.0, 2.0] for name in IDENTIFIABLE_NAMES}
+    band = {"low_hz": [1.0] * 8, "high_hz": [90.0] * 8}
+    told = {"interval": interval, "bands": {"static": {"predicted": band, "new": band}}, "level": 0.95}
+    monkeypatch.setattr(study, "posterior", lambda *given: asked.append(given) or told)
+    fitted = study.fit_recordings(
+        SED, RATES, np.arange(8) % 2, seed=5, with_posterior=True, positions_mm=range(8)
+    )
+    ((model, rates, four, seed, positions),) = asked
+    assert (model.n_stimuli, rates, seed, list(positions)) == (8, RATES, 5, list(range(8)))
+    assert four.tolist() == list(fitted["identifiable"].values())
+    assert fitted["posterior"] == told
+    assert recovered["posterior"] is None
+    assert report.fit_tables(fitted)[1].rows[0].cells[3] == "1 … 2"
+    assert len(report.draw(fitted).axes[1].collections) == len(report.draw(recovered).axes[1].collections) + 1
 
 
 def test_a_soft_threshold_is_recovered_from_its_spikes_within_their_information():
@@ -199,11 +248,11 @@ def test_a_stimulus_that_ends_before_a_window_is_refused():
 
 
 def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
-    path = tmp_path / study.EXAMPLE
-    path.write_bytes(study.example()[study.EXAMPLE])
+    path = tmp_path / session.EXAMPLE
+    path.write_bytes(session.example()[session.EXAMPLE])
     recorded = read_recordings(path, ShiftedBar())
     conditions = Conditions("quick")
-    assert list(study.touches(recorded.stimuli, conditions).values()) == single_unit.touches(conditions)
+    assert list(session.touches(recorded.stimuli, conditions).values()) == single_unit.touches(conditions)
     observed = bar_firing_rates()
     np.testing.assert_array_equal(recorded.recordings.dynamic_rate_hz, observed.dynamic_rate_hz)
     np.testing.assert_array_equal(recorded.recordings.static_rate_hz, observed.static_rate_hz)
@@ -212,7 +261,7 @@ def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
 
 def test_stimuli_are_pressed_where_and_how_they_say():
     conditions = Conditions("quick")
-    pressed = study.touches(
+    pressed = session.touches(
         {
             "beside": TactileStimulus(Sphere(340.0), RampAndHold(0.4), x_mm=1.0, z_mm=0.5, tilt_deg=3.0),
             "wire": TactileStimulus(Line(), ForceRampAndHold(50.0)),
@@ -240,7 +289,7 @@ def test_stimuli_are_pressed_where_and_how_they_say():
 )
 def test_a_stimulus_that_cannot_be_pressed_is_named(stimulus, said):
     with pytest.raises(InputError, match=said):
-        study.touches({"deep": stimulus}, Conditions("quick"))
+        session.touches({"deep": stimulus}, Conditions("quick"))
 
 
 # The command
@@ -262,8 +311,8 @@ class Pressed:
 def call(monkeypatch, capsys, tmp_path):
     """Run the command in an empty folder; presses take no time."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(study, "solve_missing", lambda touches, *_: len(touches))
-    monkeypatch.setattr(study.Store, "load", lambda self, touch: Pressed(touch))
+    monkeypatch.setattr(session, "solve_missing", lambda touches, *_: len(touches))
+    monkeypatch.setattr(session.Store, "load", lambda self, touch: Pressed(touch))
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["fingerpad", "fit", *map(str, arguments)])
@@ -297,7 +346,7 @@ def test_a_fit_writes_page_figures_and_numbers_and_says_where_they_came_from(cal
     assert fit["shift_mm"] == list(SHIFTS_MM)
     assert fit["presentations"] == [1] * 6
     assert manifest["command"] == shlex.join(["fingerpad", "fit", *arguments])
-    assert manifest["inputs"] == [{"file": "mine.csv", "sha256": study.sha256(tmp_path / "mine.csv")}]
+    assert manifest["inputs"] == [{"file": "mine.csv", "sha256": session.sha256(tmp_path / "mine.csv")}]
     assert (manifest["seed"], manifest["resolution"], manifest["materials"]) == (3, "quick", "trial3")
     assert manifest["windows_ms"] == [[30.0, 50.0], [600.0, 950.0]]
     page = (tmp_path / "fit" / "fit.html").read_text()
@@ -481,7 +530,10 @@ def test_a_fit_from_nothing_recovers_a_known_afferent(call, monkeypatch, tmp_pat
     monkeypatch.undo()
     monkeypatch.chdir(tmp_path)
     stimuli = {name: ShiftedBar().named(name)[1] for name in listed}
-    store, pressed = study.Store(folder / study.STORE_FOLDER), study.touches(stimuli, Conditions("quick"))
+    store, pressed = (
+        session.Store(folder / session.STORE_FOLDER),
+        session.touches(stimuli, Conditions("quick")),
+    )
     sed = [store.load(touch).sed([[RECEPTOR_X_MM, 0.0]]) for touch in pressed.values()]
     rates = zip(listed, *AnyMotion.under(sed).rates(strong), strict=True)
     (tmp_path / "mine.csv").write_text(

@@ -187,6 +187,9 @@ def fit_command(
         ),
     ] = "stored",
     method: Annotated[str, typer.Option(help=f"One of {', '.join(FITTING_METHODS)}.")] = "response_surface",
+    posterior: Annotated[
+        bool, typer.Option("--posterior", help="Draw credible intervals of parameters and rates as well.")
+    ] = False,
     folds: Annotated[
         int | None,
         typer.Option(
@@ -216,14 +219,16 @@ def fit_command(
 
     from fingerpad.estimation.reading import read_recordings
     from fingerpad.report.recording_fit import summary, write_fit_page
-    from fingerpad.studies import recording_fit
+    from fingerpad.studies import recording_session
     from fingerpad.studies.conditions import Conditions
 
     if example is not None:
         _make_writable(example, "--example")
-        for file, content in recording_fit.example().items():
+        for file, content in recording_session.example().items():
             write_atomically(example / file, content)
-        typer.echo(f"Try: fingerpad fit {example / recording_fit.EXAMPLE} --stimulus bar --resolution quick")
+        typer.echo(
+            f"Try: fingerpad fit {example / recording_session.EXAMPLE} --stimulus bar --resolution quick"
+        )
         return
     if recordings is None or stimulus is None:
         raise InputError(
@@ -233,7 +238,7 @@ def fit_command(
     stimuli = _stimuli(
         stimulus, stimulus_column, {key: size for key, size in sizes.items() if size is not None}
     )
-    task = recording_fit.RecordingFit(
+    task = recording_session.RecordingFit(
         read_recordings(recordings, stimuli, unit),
         Conditions(resolution=resolution, seed=seed, materials=materials),
         out,
@@ -242,15 +247,16 @@ def fit_command(
         (dynamic_window, static_window),
         jobs if jobs is not None else _cores(),
         dynamic_quantity,
+        posterior,
     )
     _make_writable(out)
     inputs = [recordings, *([] if stimulus == BAR else [Path(stimulus)])]
     with _interruptible():
-        results = recording_fit.run(
+        results = recording_session.run(
             task,
             _Bars(Console(stderr=True)),
             command=shlex.join(["fingerpad", *sys.argv[1:]]),
-            inputs=[{"file": str(path), "sha256": recording_fit.sha256(path)} for path in inputs],
+            inputs=[{"file": str(path), "sha256": recording_session.sha256(path)} for path in inputs],
         )
         write_atomically(out / "fit.json", json.dumps(results, indent=1, allow_nan=False).encode())
         page = write_fit_page(results, out)

@@ -45,6 +45,11 @@ def draw(section: dict[str, Any]) -> Figure:
     phases = _recorded(section)
     where, order = _places(section)
     for axes, phase in zip(np.ravel(figure.subplots(1, len(phases))), phases, strict=True):
+        band = ((section["posterior"] or {}).get("bands") or {}).get(phase)
+        if band:
+            low, high = (numbers(band["predicted"][end])[order] for end in ("low_hz", "high_hz"))
+            label = f"{section['posterior']['level']:.0%} credible"
+            axes.fill_between(where, low, high, color=BLUE, alpha=0.2, linewidth=0.0, label=label)
         axes.plot(where, numbers(section[f"{phase}_rate_hz"])[order], color=BLUE, label="fitted to all")
         axes.plot(
             where,
@@ -66,7 +71,7 @@ def draw(section: dict[str, Any]) -> Figure:
         axes.set_ylabel("firing rate [spikes/s]")
         axes.set_ylim(bottom=0.0)
         _name_places(axes, section)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
 
@@ -256,8 +261,17 @@ def _spikes(told: Mapping[str, Any]) -> Table:
 
 def _identifiable(section: Mapping[str, Any]) -> Table:
     units, errors = section["identifiable_units"], section["identifiable_standard_error"]
+    intervals = (section["posterior"] or {}).get("interval")
     rows = [
-        Row((said, number(section["identifiable"][name]), number(errors[name]), units[name]))
+        Row(
+            (
+                said,
+                number(section["identifiable"][name]),
+                number(errors[name]),
+                *([" … ".join(number(end) for end in intervals[name])] if intervals else []),
+                units[name],
+            )
+        )
         for name, said in IDENTIFIABLE.items()
     ]
     note = (
@@ -265,7 +279,9 @@ def _identifiable(section: Mapping[str, Any]) -> Table:
         "Standard errors hold near the best fit: from residuals of unequal size (sandwich), or from the "
         "information in spikes."
     )
-    return Table("The four numbers that are determined", ("", "fitted", "standard error", "unit"), rows, note)
+    credible = [f"{section['posterior']['level']:.0%} credible"] if intervals else []
+    columns = ("", "fitted", "standard error", *credible, "unit")
+    return Table("The four numbers that are determined", columns, rows, note)
 
 
 def _parameters(section: Mapping[str, Any]) -> Table:

@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
-from functools import cached_property
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,9 +18,7 @@ from fingerpad.estimation.identifiable import (
     identifiable,
 )
 from fingerpad.estimation.rate_problem import RateProblem
-from fingerpad.estimation.reading import Recorded
 from fingerpad.estimation.recordings import PHASES, RateRecordings, SpikeRecordings
-from fingerpad.estimation.stimuli import TactileStimulus
 from fingerpad.fitting import (
     CrossValidation,
     cross_validate,
@@ -34,21 +26,12 @@ from fingerpad.fitting import (
     interleaved_folds,
 )
 from fingerpad.fitting.problem import IntArray
-from fingerpad.grading import Grading
-from fingerpad.indentation import Touch, touch_of
-from fingerpad.indenters import FlatPunch, Line, Sphere
-from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.parameters import protocol
-from fingerpad.reference import bar_firing_rates
-from fingerpad.signals import STORED_ENERGY, SedTraces
-from fingerpad.store import Store, solve_missing
+from fingerpad.signals import SedTraces
 from fingerpad.studies import single_unit
-from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.studies.recording_methods import METHODS, Prepared, check_spikes
-from fingerpad.studies.reproduction import STORE_FOLDER, NoProgress, Progress, plain, software
-
-EXAMPLE = "bar.csv"
-"""Name of the file of `example`."""
+from fingerpad.studies.recording_methods import METHODS, Prepared
+from fingerpad.studies.recording_posterior import posterior
+from fingerpad.studies.reproduction import plain
 
 
 def fit_recordings(
@@ -59,6 +42,8 @@ def fit_recordings(
     method: str = "response_surface",
     windows_ms: Windows = WINDOWS_MS,
     seed: int = 0,
+    with_posterior: bool = False,
+    positions_mm: ArrayLike | None = None,
 ) -> dict[str, Any]:
     """Fit an afferent to what was recorded under stimuli whose strain energy density is known.
 
@@ -78,6 +63,10 @@ def fit_recordings(
         Windows of the dynamic and of the static rate; the paper's by default. [ms]
     seed : int, optional
         Of methods that draw.
+    with_posterior : bool, optional
+        Whether credible intervals are drawn as well, of the four numbers and of the rates.
+    positions_mm : array_like (n_stimuli,), optional
+        Where along a line each stimulus was: in the posterior, neighbours may miss alike. [mm]
 
     Returns
     -------
@@ -109,11 +98,14 @@ def fit_recordings(
     rates = recordings if isinstance(recordings, RateRecordings) else recordings.rates(windows_ms)
     folds = dealt_folds(len(rates.stimuli)) if memberships is None else np.asarray(memberships)
     check_enough(rates, folds)
-    prepared = METHODS[one_of("method", method, tuple(METHODS))](
-        AnyMotion.under(sed, windows_ms), recordings, rates, seed
-    )
+    model = AnyMotion.under(sed, windows_ms)
+    prepared = METHODS[one_of("method", method, tuple(METHODS))](model, recordings, rates, seed)
     best = prepared.method.fit(prepared.problem, np.arange(len(rates.stimuli)))
     validation = cross_validate(prepared.problem, prepared.method, folds)
+    drawn = None
+    if with_posterior:
+        four = identifiable(prepared.six(best.parameters))
+        drawn = posterior(model, rates, four, seed, positions_mm)
     return plain(
         {
             "method": method,
@@ -123,7 +115,11 @@ def fit_recordings(
         }
         | _parameters(prepared, best.parameters)
         | _scores(prepared.problem, rates, best.parameters, validation)
-        | {"folds": _folds(prepared, rates, validation), "spikes": prepared.spikes(best, validation)}
+        | {
+            "folds": _folds(prepared, rates, validation),
+            "spikes": prepared.spikes(best, validation),
+            "posterior": drawn,
+        }
     )
 
 
@@ -237,233 +233,3 @@ def _folds(prepared: Prepared, rates: RateRecordings, validation: CrossValidatio
         | _named(prepared.six(fold.fit.parameters))
         for fold in validation.folds
     ]
-
-
-@dataclass(frozen=True)
-class RecordingFit:
-    """A fit to recordings with all that it needs.
-
-    Parameters
-    ----------
-    recorded : Recorded
-        From `fingerpad.estimation.reading.read_recordings`.
-    conditions : Conditions
-        Finger, tissues, accuracy and seed.
-    folder : Path
-        Where finished indentations are stored.
-    method : str
-        One of `METHODS`.
-    n_folds : int, optional
-        How many folds to deal out; not together with folds that the recordings bring.
-    windows_ms : ((float, float), (float, float))
-        Windows of the dynamic and of the static rate. [ms]
-    jobs : int
-        Processes to use; the numbers do not depend on it.
-    dynamic_quantity : str
-        What the dynamic term follows: strain energy density, "stored", as in the paper, or another quantity
-        of `SkinResponse.sample` as an extension.
-
-    Raises
-    ------
-    InputError
-        If the recordings cannot be fitted or a stimulus not be pressed; nothing has been pressed then.
-    """
-
-    recorded: Recorded
-    conditions: Conditions
-    folder: Path
-    method: str = "response_surface"
-    n_folds: int | None = None
-    windows_ms: Windows = WINDOWS_MS
-    jobs: int = 1
-    dynamic_quantity: str = STORED_ENERGY
-
-    def __post_init__(self) -> None:
-        one_of("method", self.method, tuple(METHODS))
-        one_of("dynamic_quantity", self.dynamic_quantity, tuple(QUANTITIES))
-        whole("jobs", self.jobs, at_least=1)
-        for start, end in self.windows_ms:
-            if not 0.0 <= start < end:
-                raise InputError(
-                    f"windows must be a start from 0 on and a later end: got {start:g}, {end:g}."
-                )
-        end = max(end for _, end in self.windows_ms)
-        for name, stimulus in self.recorded.stimuli.items():
-            if stimulus.motion.end_ms < end:
-                raise InputError(
-                    f"windows must end with the stimuli, not at {end:g} ms: {name} ends at "
-                    f"{stimulus.motion.end_ms:g} ms."
-                )
-        check_enough(self.rates, self.memberships)
-        if self.method == "likelihood":
-            motions = {stimulus.motion for stimulus in self.recorded.stimuli.values()}
-            check_spikes(self.recorded.recordings, len(motions))
-        # Built once here: what cannot be pressed is said before anything is.
-        self.touches  # noqa: B018
-
-    @cached_property
-    def rates(self) -> RateRecordings:
-        """What is fitted."""
-        recordings = self.recorded.recordings
-        return recordings if isinstance(recordings, RateRecordings) else recordings.rates(self.windows_ms)
-
-    @cached_property
-    def memberships(self) -> IntArray:
-        """Fold of each stimulus."""
-        given = self.recorded.memberships
-        if given is not None and self.n_folds is not None:
-            raise InputError("folds must come from the column fold or be dealt out, not both: leave one out.")
-        return dealt_folds(len(self.rates.stimuli), self.n_folds) if given is None else given
-
-    @cached_property
-    def touches(self) -> dict[str, Touch]:
-        """One touch per stimulus."""
-        return touches(self.recorded.stimuli, self.conditions)
-
-
-def touches(stimuli: Mapping[str, TactileStimulus], conditions: Conditions) -> dict[str, Touch]:
-    """One touch per stimulus; those of the paper's bar are the very touches of the reproduction.
-
-    Parameters
-    ----------
-    stimuli : mapping of str to TactileStimulus
-        By name.
-    conditions : Conditions
-        Finger, tissues and accuracy.
-
-    Returns
-    -------
-    dict of str to Touch
-
-    Raises
-    ------
-    InputError
-        If one cannot be pressed, with its name.
-    """
-    along = float(np.cos(np.deg2rad(conditions.skin_tilt_deg)))
-
-    def touch(stimulus: TactileStimulus) -> Touch:
-        wire = isinstance(stimulus.indenter, Line)
-        perpendicular = 0.0 if wire else conditions.skin_tilt_deg
-        return touch_of(
-            conditions.finger,
-            stimulus.indenter,
-            stimulus.motion,
-            conditions.materials,
-            conditions.resolution,
-            (RECEPTOR_X_MM + stimulus.x_mm * along, stimulus.z_mm),
-            None if wire else _grading(stimulus, conditions),
-            perpendicular if stimulus.tilt_deg is None else stimulus.tilt_deg,
-        )
-
-    found = {}
-    for name, stimulus in stimuli.items():
-        try:
-            found[name] = touch(stimulus)
-        except InputError as error:
-            raise InputError(f"Stimulus {name} cannot be pressed: {error}") from error
-    return found
-
-
-def _grading(stimulus: TactileStimulus, conditions: Conditions) -> Grading:
-    """Mesh that is fine about the receptor, the same for all stimuli of a kind."""
-    is_round = isinstance(stimulus.indenter, Sphere | FlatPunch)
-    grading = conditions.sphere_grading() if is_round else conditions.bar_grading()
-    return replace(grading, full=True) if stimulus.z_mm != 0.0 else grading
-
-
-def run(fit: RecordingFit, progress: Progress | None = None, **provenance: Any) -> dict[str, Any]:
-    """Press all stimuli, fit, and say how it was done.
-
-    Parameters
-    ----------
-    fit : RecordingFit
-        What to fit and how.
-    progress : Progress, optional
-        Told about each finished press.
-    **provenance
-        What else the results shall say of their origin, such as the command and hashes of its files.
-
-    Returns
-    -------
-    dict
-        "fit" as `fit_recordings` returns it, with the stimuli's presentations, and "manifest".
-
-    Raises
-    ------
-    ConvergenceError
-        If a press or a fit does not end; finished presses stay stored.
-    StoreError
-        If a stored press is damaged or the folder cannot be written.
-    """
-    progress = progress or NoProgress()
-    started, clock = datetime.now(UTC), time.perf_counter()
-    store = Store(fit.folder / STORE_FOLDER)
-    wanted = list(fit.touches.values())
-    with progress.stage("indentations", sum(not store.holds(touch) for touch in wanted)) as advance:
-        computed = solve_missing(wanted, store, fit.jobs, lambda seconds: advance())
-    site = [[RECEPTOR_X_MM, 0.0]]
-    sed = [store.load(touch).sed(site, fit.dynamic_quantity) for touch in wanted]
-    with progress.stage("fit", 1) as advance:
-        found = fit_recordings(sed, fit.rates, fit.memberships, method=fit.method, windows_ms=fit.windows_ms)
-        advance()
-    recorded = fit.recorded
-    return plain(
-        {
-            "fit": found
-            | {
-                "presentations": list(recorded.presentations.values()),
-                "spikes_after_hold": recorded.spikes_after_hold,
-                "shift_mm": _shifts_mm(list(recorded.stimuli.values())),
-            },
-            "manifest": software()
-            | {
-                "seed": fit.conditions.seed,
-                "resolution": fit.conditions.resolution,
-                "materials": fit.conditions.materials,
-                "windows_ms": fit.windows_ms,
-                "dynamic_quantity": fit.dynamic_quantity,
-                "indentations": len(wanted),
-                "computed": computed,
-                "started": started.isoformat(timespec="seconds"),
-                "wall_s": round(time.perf_counter() - clock, 2),
-            }
-            | provenance,
-        }
-    )
-
-
-def _shifts_mm(stimuli: Sequence[TactileStimulus]) -> list[float] | None:
-    """Shifts, proximal positive, of stimuli that differ in nothing else; None for others."""
-    if len({replace(stimulus, x_mm=0.0) for stimulus in stimuli}) > 1:
-        return None
-    return [0.0 - stimulus.x_mm for stimulus in stimuli]
-
-
-def example() -> dict[str, bytes]:
-    """Files to try a fit with: the rates under the paper's bar that come with the package.
-
-    Returns
-    -------
-    dict of str to bytes
-        Contents by file name.
-
-    Examples
-    --------
-    >>> print(example()[EXAMPLE].decode().splitlines()[3])
-    -3.5,0,0
-    """
-    observed = bar_firing_rates()
-    rows = np.column_stack([observed.shift_mm, observed.dynamic_rate_hz, observed.static_rate_hz])
-    lines = [
-        f"# One SAI afferent under a bar 3 mm wide, pressed in by 1 mm. {observed.source}",
-        "# shift: of the bar from the centre of the receptive field, proximal positive.",
-        "shift_mm,dynamic_rate_hz,static_rate_hz",
-        *(",".join(f"{value:g}" for value in row) for row in rows),
-    ]
-    return {EXAMPLE: ("\n".join(lines) + "\n").encode()}
-
-
-def sha256(path: Path) -> str:
-    """Hash of a file's content, by which it is known again."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
