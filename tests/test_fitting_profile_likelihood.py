@@ -75,6 +75,23 @@ def test_a_better_fit_met_on_the_way_is_the_measure_of_all() -> None:
     assert high == pytest.approx(1.0 + 0.6 * 1.96, abs=0.15)
 
 
+def test_several_starts_find_what_a_neighbour_does_not() -> None:
+    """Two ridges along a: the higher one changes at a = 0.5, and no climb leads from one to the other."""
+
+    def ridges(points: np.ndarray) -> np.ndarray:
+        a, b = points.T
+        low = -0.5 * (a + 0.5) ** 2 - 50.0 * (b + 3.0) ** 2
+        high = -0.5 * (a - 1.5) ** 2 - 50.0 * (b - 3.0) ** 2
+        return np.maximum(low, high)
+
+    starts = [[0.0, -3.0], [1.0, 3.0], [-1.0, -3.1], [2.0, 3.1]]
+    one, many = (
+        profile_likelihoods(ridges, points, [1.0, 0.1], NAMES).profiles[0] for points in (starts[0], starts)
+    )
+    np.testing.assert_allclose(one.interval, [-0.5 - 1.96, -0.5 + 1.96], atol=0.1)
+    np.testing.assert_allclose(many.interval, [-0.5 - 1.96, 1.5 + 1.96], atol=0.1)
+
+
 def test_threads_and_repetition_change_nothing(found: Profiles) -> None:
     again = profile_likelihoods(normal, [2.5, -2.0], [1.0, 2.0], NAMES)
     assert again.n_evaluations == found.n_evaluations
@@ -88,11 +105,11 @@ def test_threads_and_repetition_change_nothing(found: Profiles) -> None:
         ({"scales": [1.0, 0.0]}, "scales greater than 0"),
         ({"names": ("a",)}, "at least two parameters"),
         ({"level": 1.5}, "level must lie between 0 and 1"),
-        ({"log_likelihood": lambda points: np.full(len(points), -np.inf)}, "must be finite at the start"),
+        ({"log_likelihood": lambda points: np.full(len(points), -np.inf)}, "must be finite at a start"),
         ({"log_likelihood": lambda points: np.full(len(points), np.nan)}, "it is NaN at"),
     ],
 )
 def test_what_cannot_be_profiled_is_refused(changes: dict, words: str) -> None:
-    given = {"log_likelihood": normal, "start": CENTRE, "scales": [1.0, 2.0], "names": NAMES} | changes
+    given = {"log_likelihood": normal, "starts": CENTRE, "scales": [1.0, 2.0], "names": NAMES} | changes
     with pytest.raises(InputError, match=words):
         profile_likelihoods(**given)

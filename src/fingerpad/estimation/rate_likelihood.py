@@ -174,8 +174,8 @@ class RateLikelihood:
         predicted = dict(zip(("dynamic", "static"), rates_of_each(self.model, points), strict=True))
         for phase in self.phases:
             residuals = getattr(self.recordings, f"{phase}_rate_hz") - predicted[phase]
-            white = np.einsum("lij,pj->pli", self._whitening, residuals, optimize=True)
-            yield phase, predicted[phase], (white**2).sum(axis=2)
+            white = residuals @ np.swapaxes(self._whitening, 1, 2)  # (n_lengths, n_points, n_stimuli)
+            yield phase, predicted[phase], (white**2).sum(axis=2).T
 
     def _log_shares(self, squares: FloatArray) -> FloatArray:
         """Logarithm of each length's part of the likelihood, (n_points, n_lengths)."""

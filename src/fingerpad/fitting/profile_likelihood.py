@@ -25,8 +25,11 @@ LogLikelihood = Callable[[FloatArray], FloatArray]
 STEP = 0.5
 """Step of the parameter that is held, over its scale. [1]"""
 
-CLOSE = 0.01
+CLOSE = 0.02
 """Fits of the others end when they differ by this much: in log likelihood, and over the scales. [1]"""
+
+NEAREST = 20
+"""Starts nearest to where a parameter is held, the best of which is climbed from."""
 
 MOST_EVALUATIONS = 2000
 RESTARTS = 5
@@ -84,7 +87,7 @@ class Profiles:
 
 def profile_likelihoods(
     log_likelihood: LogLikelihood,
-    start: ArrayLike,
+    starts: ArrayLike,
     scales: ArrayLike,
     names: Sequence[str],
     *,
@@ -93,15 +96,15 @@ def profile_likelihoods(
 ) -> Profiles:
     """Profile the likelihood of every parameter.
 
-    Each profile is swept outwards from the best fit, where each fit starts from its neighbour's, and back, so
-    that a better fit farther out is taken over by those before it.
+    Each profile is swept outwards from the best fit. A fit starts from its neighbour's and, where several
+    starts are given, also from the best of those nearby: a likelihood with many lumps needs that.
 
     Parameters
     ----------
     log_likelihood : callable
         Of rows of parameters.
-    start : array (n_parameters,)
-        Near the best fit, which is looked for first.
+    starts : array (n_parameters,) or (n_starts, n_parameters)
+        Near the best fit, which is looked for first from the most likely of them; draws from a posterior do.
     scales : array (n_parameters,)
         About the standard deviation of each parameter.
     names : sequence of str
@@ -119,7 +122,7 @@ def profile_likelihoods(
     Raises
     ------
     InputError
-        If sizes disagree or the start is impossible.
+        If sizes disagree or all starts are impossible.
     ConvergenceError
         If a fit does not end.
 
@@ -135,24 +138,29 @@ def profile_likelihoods(
     [[-2.0, 2.0], [-2.8, 2.8]]
     """
     labels = tuple(names)
-    origin, units = float_array("start", start, 1), float_array("scales", scales, 1)
-    if not origin.size == units.size == len(labels) or len(labels) < 2 or (units <= 0.0).any():
+    origins, units = float_array("starts", np.atleast_2d(starts), 2), float_array("scales", scales, 1)
+    if not origins.shape[1] == units.size == len(labels) or len(labels) < 2 or (units <= 0.0).any():
         raise InputError(
-            "start, scales and names must have one entry for each of at least two parameters, scales greater "
-            f"than 0: got {origin.size}, {units.tolist()} and {len(labels)}."
+            "starts, scales and names must have one entry for each of at least two parameters, scales "
+            f"greater than 0: got {origins.shape[1]}, {units.tolist()} and {len(labels)}."
         )
     if not 0.0 < finite("level", level) < 1.0:
         raise InputError(f"level must lie between 0 and 1: got {level!r}.")
     whole("most_steps", most_steps, at_least=2)
-    search = _Search(log_likelihood, units)
-    if not np.isfinite(search.height(origin)):
-        raise InputError(f"log_likelihood must be finite at the start: it is not at {origin.tolist()}.")
-    best = search.climb(origin)
+    search = _Search(log_likelihood, units, origins)
+    best, highest = search.best_of(origins)
+    if not np.isfinite(highest):
+        raise InputError(f"log_likelihood must be finite at a start: it is not at {best.tolist()}.")
+    for _ in range(RESTARTS):
+        point = search.climb(best)
+        gain, best = search.height(point) - search.height(best), point
+        if gain <= CLOSE:
+            break
     allowed = 0.5 * float(chi2.ppf(level, 1))
 
     def sweep(indices: slice) -> tuple[_Search, list[tuple[FloatArray, float]]]:
         # A search of its own, so that threads share nothing.
-        own = _Search(log_likelihood, units)
+        own = _Search(log_likelihood, units, origins)
         return own, own.sweep(best, indices.start, allowed, most_steps)
 
     sweeps = in_blocks(sweep, len(labels), 1)
@@ -168,57 +176,58 @@ def profile_likelihoods(
 class _Search:
     """Looks for the most likely parameters, some of them held."""
 
-    def __init__(self, log_likelihood: LogLikelihood, scales: FloatArray):
+    def __init__(self, log_likelihood: LogLikelihood, scales: FloatArray, starts: FloatArray):
         self.log_likelihood = log_likelihood
         self.scales = scales
+        self.starts = starts
         self.count = 0
+
+    def heights(self, points: FloatArray) -> FloatArray:
+        """Log likelihoods of points."""
+        self.count += len(points)
+        values = np.asarray(self.log_likelihood(points), dtype=np.float64)
+        if np.isnan(values).any():
+            wrong = points[np.isnan(values)][0].tolist()
+            raise InputError(f"log_likelihood must be a number or -inf: it is NaN at {wrong}.")
+        return values
 
     def height(self, point: FloatArray) -> float:
         """Log likelihood of one point."""
-        self.count += 1
-        value = float(self.log_likelihood(point[None])[0])
-        if np.isnan(value):
-            raise InputError(f"log_likelihood must be a number or -inf: it is NaN at {point.tolist()}.")
-        return value
+        return float(self.heights(point[None])[0])
+
+    def best_of(self, points: FloatArray) -> tuple[FloatArray, float]:
+        """Most likely of some points, and its log likelihood."""
+        heights = self.heights(points)
+        return points[int(heights.argmax())], float(heights.max())
 
     def climb(self, start: FloatArray, held: int | None = None) -> FloatArray:
-        """Most likely point near the start: Nelder and Mead's method, begun anew until nothing is gained."""
+        """Most likely point near the start, by Nelder and Mead's method."""
         free = np.array([index for index in range(start.size) if index != held])
 
-        def loss(offsets: FloatArray) -> float:
+        def moved(offsets: FloatArray) -> FloatArray:
             point = start.copy()
             point[free] += self.scales[free] * offsets
-            # Nelder-Mead compares: a large number stands for what is impossible.
-            return min(-self.height(point), 1e300)
+            return point
 
-        offsets, before = np.zeros(free.size), np.inf
-        for restart in range(RESTARTS):
-            width = 0.5**restart
-            simplex = offsets + np.vstack([np.zeros(free.size), width * np.eye(free.size)])
-            found = minimize(
-                loss,
-                offsets,
-                method="Nelder-Mead",
-                options={
-                    "initial_simplex": simplex,
-                    "xatol": CLOSE,
-                    "fatol": CLOSE,
-                    "maxfev": MOST_EVALUATIONS,
-                },
+        found = minimize(
+            # It compares: a large number stands for what is impossible.
+            lambda offsets: min(-self.height(moved(offsets)), 1e300),
+            np.zeros(free.size),
+            method="Nelder-Mead",
+            options={
+                "initial_simplex": np.vstack([np.zeros(free.size), STEP * np.eye(free.size)]),
+                "xatol": CLOSE,
+                "fatol": CLOSE,
+                "maxfev": MOST_EVALUATIONS,
+            },
+        )
+        if not found.success:
+            raise ConvergenceError(
+                f"A fit of the profile has not ended after {MOST_EVALUATIONS} evaluations, near "
+                f"{moved(found.x).tolist()}: choose smaller scales.",
+                (f"log likelihood {-found.fun:.4f}",),
             )
-            if not found.success:
-                raise ConvergenceError(
-                    f"A fit of the profile has not ended after {MOST_EVALUATIONS} evaluations, near "
-                    f"{(start[free] + self.scales[free] * found.x).tolist()}: choose smaller scales.",
-                    (f"log likelihood {-found.fun:.4f}",),
-                )
-            offsets = found.x
-            if before - found.fun <= CLOSE:
-                break
-            before = found.fun
-        point = start.copy()
-        point[free] += self.scales[free] * offsets
-        return point
+        return moved(found.x)
 
     def sweep(
         self, best: FloatArray, index: int, allowed: float, most_steps: int
@@ -229,20 +238,21 @@ class _Search:
         for side in (-1.0, 1.0):
             line = [(best, top)]
             while len(line) <= most_steps and not all(top - height > allowed for _, height in line[-2:]):
-                line.append(
-                    self._fit(line[-1][0], index, best[index] + side * STEP * len(line) * self.scales[index])
-                )
-            for place in range(len(line) - 2, 0, -1):
-                again = self._fit(line[place + 1][0], index, line[place][0][index])
-                line[place] = max(line[place], again, key=lambda fit: fit[1])
+                value = best[index] + side * STEP * len(line) * self.scales[index]
+                line.append(self._fit(line[-1][0], index, value))
             fits += line[1:]
         return fits
 
     def _fit(self, neighbour: FloatArray, index: int, value: float) -> tuple[FloatArray, float]:
-        start = neighbour.copy()
-        start[index] = value
-        point = self.climb(start, held=index)
-        return point, self.height(point)
+        """Most likely point with one parameter held, from the neighbour and from the best start nearby."""
+        nearest = np.argsort(np.abs(self.starts[:, index] - value), kind="stable")[:NEAREST]
+        pools = [neighbour[None], self.starts[nearest]] if len(self.starts) > 1 else [neighbour[None]]
+        climbed = []
+        for pool in pools:
+            held = pool.copy()
+            held[:, index] = value
+            climbed.append(self.climb(self.best_of(held)[0], held=index))
+        return self.best_of(np.array(climbed))
 
 
 def _profile(
