@@ -51,6 +51,9 @@ COARSEST_COLUMNS = 100
 FEWEST_COLUMNS = 200
 """Columns of one colour for a thread, at least: waking it takes as long as the work on some tens of them."""
 
+PIECES_PER_THREAD = 2
+"""Pieces that columns are shared out in, for each thread, if there are enough columns."""
+
 WORTHWHILE = 0.8
 """Largest ratio of columns, coarse over fine, for which a level pays."""
 
@@ -271,7 +274,9 @@ def _share(kernel: Callable[..., None], first: int, last: int, *arguments: Any) 
     if parts == 1:
         kernel(first, last, *arguments)
         return
-    ends = [first + (last - first) * n // parts for n in range(parts + 1)]
+    # More pieces than threads: columns differ in work, and whoever is done takes the next piece.
+    pieces = min(PIECES_PER_THREAD * parts, (last - first) // FEWEST_COLUMNS)
+    ends = [first + (last - first) * n // pieces for n in range(pieces + 1)]
     with worker_threads() as each:
         each(lambda start, stop: kernel(start, stop, *arguments), list(pairwise(ends)))
 
