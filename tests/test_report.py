@@ -43,6 +43,7 @@ def synthetic_results() -> dict:
     return {
         "skin_deflection": _skin_deflection(),
         "single_unit": _single_unit(),
+        "drive_quantities": _drive_quantities(),
         "discrimination": _discrimination(),
         "population": _population(),
         "nail": _nail(),
@@ -180,6 +181,37 @@ def _single_unit() -> dict:
     }
 
 
+def _drive_quantities() -> dict:
+    wave = np.abs(np.sin(SHIFT_MM))
+    scores = {
+        f"fss_{sample}{phase}": 0.9
+        for sample in ("in_sample", "out_of_sample")
+        for phase in ("", "_dynamic", "_static")
+    }
+    fit = scores | {"fss_folds": [0.8, 0.95], "gain_interval": [0.01, 0.05], "evaluations": 300}
+    rates = {
+        f"{kind}{phase}_rate_hz": (scale * wave).tolist()
+        for kind in ("", "left_out_")
+        for phase, scale in (("dynamic", 200.0), ("static", 60.0))
+    }
+    return {
+        "method": "least squares",
+        "shift_mm": SHIFT_MM.tolist(),
+        "observed_dynamic_rate_hz": (190.0 * wave).tolist(),
+        "observed_static_rate_hz": (55.0 * wave).tolist(),
+        "candidates": [
+            {
+                "static": "stored",
+                "dynamic": dynamic,
+                "fit": fit,
+                "parameters": {"time_constant_ms": 40.0},
+                **rates,
+            }
+            for dynamic in ("stored", "compressive_stress")
+        ],
+    }
+
+
 def _discrimination() -> dict:
     rise = 1.0 - 0.5 * np.exp(-(np.array(CURVATURE_PER_M[1:]) - 287.0) / 30.0)
 
@@ -291,7 +323,7 @@ def pixels_per_metre(png: bytes) -> int:
 
 def test_one_picture_per_figure_of_the_paper_at_its_resolution(report):
     pictures = sorted((report.parent / "figures").iterdir())
-    assert [picture.name.split("_")[1] for picture in pictures] == ["4", "5", "6", "7", "8", "9"]
+    assert sorted(int(picture.name.split("_")[1]) for picture in pictures) == [4, 5, 6, 7, 8, 9, 10]
     for picture in pictures:
         assert pixels_per_metre(picture.read_bytes()) == round(RESOLUTION_DPI / 0.0254)
 
@@ -299,16 +331,17 @@ def test_one_picture_per_figure_of_the_paper_at_its_resolution(report):
 def test_the_page_holds_the_pictures_themselves_and_asks_for_nothing_else(report):
     text = report.read_text(encoding="utf-8")
     inside = [base64.b64decode(code) for code in re.findall(r"data:image/png;base64,([^\"]+)", text)]
-    assert inside == [picture.read_bytes() for picture in sorted((report.parent / "figures").iterdir())]
+    drawn = [chapter_drawing.name for chapter in page.CHAPTERS for chapter_drawing in chapter.drawings]
+    assert inside == [(report.parent / "figures" / f"{name}.png").read_bytes() for name in drawn]
     without_pictures = re.sub(r"base64,[^\"]+", "", text)
     assert not re.search(r"<script|<link|@import|url\(|https?:", without_pictures)
     assert text.startswith("<!DOCTYPE html>")
-    assert len(re.findall(r'<img alt="Figure \d: \w', text)) == len(inside)
+    assert len(re.findall(r'<img alt="Figure \d+: \w', text)) == len(inside)
 
 
 def test_nothing_unfinished_is_left_beside_the_report(report):
     left = sorted(entry.name for entry in report.parent.rglob("*") if entry.is_file())
-    assert len(left) == 7
+    assert len(left) == 8
     assert all(name.endswith((".png", ".html")) for name in left)
 
 

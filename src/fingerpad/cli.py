@@ -1,4 +1,4 @@
-"""The command line: `fingerpad reproduce`, `fit`, `refine`, `materials` and `export`."""
+"""The command line: `fingerpad reproduce`, `fit`, `drives`, `refine`, `materials` and `export`."""
 
 from __future__ import annotations
 
@@ -286,6 +286,42 @@ def _stimuli(stimulus: str, column: str | None, given: dict[str, float | None]) 
     motion = RampAndHold(depth_mm=sizes.pop("depth")) if "depth" in sizes else RampAndHold()
     bar = ShiftedBar(Bar(**{f"{key}_mm": size for key, size in sizes.items()}), motion)
     return bar if column is None else replace(bar, column=column)
+
+
+@app.command("drives")
+def drives_command(
+    resolution: Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTIONS)}.")] = "standard",
+    out: Annotated[
+        Path,
+        typer.Option(help="Folder for page, figure, numbers and stored indentations, as of a reproduction."),
+    ] = Path("reproduction"),
+    jobs: Annotated[
+        int | None,
+        typer.Option(parser=_whole_number, metavar="INTEGER", help="Processes; one per core by default."),
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(parser=_whole_number, metavar="INTEGER", help="Seed of search and bootstrap.")
+    ] = 0,
+) -> None:
+    """Compare what may drive the afferent: quantities in the skin, and explanations of the dynamic rates."""
+    from rich.console import Console
+
+    from fingerpad.report.drive_quantities import write_drive_page
+    from fingerpad.studies.conditions import Conditions
+    from fingerpad.studies.drive_study import DriveStudy, study_drives
+
+    study = DriveStudy(
+        Conditions(resolution=resolution, seed=seed), out, jobs if jobs is not None else _cores()
+    )
+    _make_writable(out)
+    console = Console(stderr=True, quiet=not sys.stderr.isatty())
+    with _interruptible():
+        results = study_drives(study, lambda part: console.print(f"done: {part}"))
+        numbers = out / "drive_quantities.json"
+        write_atomically(numbers, json.dumps(results, indent=1, allow_nan=False).encode())
+        page = write_drive_page(results, out, f"fingerpad drives --resolution {resolution}")
+    typer.echo(f"Page: {page}")
+    typer.echo(f"Results: {numbers}")
 
 
 @app.command("refine")

@@ -13,7 +13,15 @@ from matplotlib.figure import Figure
 
 from fingerpad.errors import InputError
 from fingerpad.files import write_atomically
-from fingerpad.report import discrimination, nail, population, single_unit, skin_deflection, tables
+from fingerpad.report import (
+    discrimination,
+    drive_quantities,
+    nail,
+    population,
+    single_unit,
+    skin_deflection,
+    tables,
+)
 from fingerpad.report.appearance import png
 from fingerpad.report.summary import summary
 
@@ -63,6 +71,20 @@ CHAPTERS = (
         "Level 2: single afferent",
         (Drawing(5, "figure_5_single_unit", "Rates under a bar", single_unit.draw, single_unit.caption),),
         tables.single_unit,
+    ),
+    Chapter(
+        "drive_quantities",
+        "Which quantity drives the afferent",
+        (
+            Drawing(
+                10,
+                "figure_10_drive_quantities",
+                "Rates by quantity",
+                drive_quantities.draw,
+                drive_quantities.caption,
+            ),
+        ),
+        drive_quantities.table,
     ),
     Chapter(
         "population",

@@ -82,6 +82,9 @@ APART = (EXTENDED, *(Drivers(STORED_ENERGY, quantity) for quantity in ("von_mise
 SHOWN = (PAPER, *(Drivers(quantity, quantity) for quantity in QUANTITIES[3:]), EXTENDED)
 """What a reproduction compares: the other energies differ from the stored one by hardly a percent."""
 
+SHOWN_QUANTITIES = (STORED_ENERGY, *QUANTITIES[3:])
+"""What it needs to read for that."""
+
 
 def receptor_traces(
     responses: Sequence[SkinResponse], quantities: Sequence[str] = QUANTITIES

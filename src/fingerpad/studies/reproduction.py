@@ -24,7 +24,13 @@ from fingerpad.mesh_quality import jacobian_at_gauss, scaled_jacobian
 from fingerpad.parameters import all_published
 from fingerpad.sampling import SkinResponse
 from fingerpad.store import Store, code_hash, solve_missing
-from fingerpad.studies import nail_border, single_unit, skin_deflection, sphere_discrimination
+from fingerpad.studies import (
+    drive_quantities,
+    nail_border,
+    single_unit,
+    skin_deflection,
+    sphere_discrimination,
+)
 from fingerpad.studies.comparison import comparison
 from fingerpad.studies.conditions import Conditions, Touch
 
@@ -123,9 +129,15 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
     deflection, bar_responses = responses["skin deflection"], responses["bar, 36 shifts"]
     sphere_responses, nail_response = responses["spheres"], responses["nail"]["nail"]
 
-    with _timed("fit and discrimination", 3, progress, stages) as advance:
+    with _timed("fit and discrimination", 4, progress, stages) as advance:
         problem = single_unit.rate_problem(single_unit.receptor_sed(list(bar_responses.values())))
         best, folds = single_unit.fit(problem)
+        advance()
+        drives = drive_quantities.result(
+            drive_quantities.receptor_traces(list(bar_responses.values()), drive_quantities.SHOWN_QUANTITIES),
+            problem.recordings,
+            np.random.default_rng(conditions.seed),
+        )
         advance()
         afferent = Afferent.from_parameters(best.parameters)
         discrimination = sphere_discrimination.result(sphere_responses, afferent, conditions.seed)
@@ -134,6 +146,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
         results: dict[str, Any] = {
             "skin_deflection": skin_deflection.result(deflection),
             "single_unit": single_unit.result(problem, best, folds),
+            "drive_quantities": drives,
             "discrimination": discrimination,
             "population": sphere_discrimination.population_map(standard, afferent),
             "nail": nail_border.result(nail_response),
