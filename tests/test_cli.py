@@ -1,5 +1,6 @@
 """The command line as a shell meets it: what it says, where, and with which status."""
 
+import json
 import re
 import signal
 import subprocess
@@ -16,10 +17,11 @@ from fingerpad.grading import RESOLUTIONS
 from fingerpad.indentation import touch_of
 from fingerpad.indenters import Indenter, Plate, Sphere
 from fingerpad.mechanics.tissues import TISSUES
+from fingerpad.report import drive_quantities as drives_report
 from fingerpad.report import mesh_refinement as report
 from fingerpad.report import paper_size as paper_report
 from fingerpad.stimulus import RampAndHold
-from fingerpad.studies import mesh_refinement, paper_size
+from fingerpad.studies import drive_study, mesh_refinement, paper_size
 
 COMMAND = [sys.executable, "-W", "error", "-m", "fingerpad"]
 
@@ -80,6 +82,26 @@ def test_refine_writes_its_page_numbers_and_figure(call, monkeypatch, tmp_path, 
     assert (status, asked) == (0, [(Path("meshes"), 3)])
     assert said == f"Report: {Path('meshes') / name}\n"
     assert (tmp_path / "meshes" / name).read_bytes() == b"errors"
+
+
+def test_drives_writes_its_page_and_numbers_for_the_conditions_given(call, monkeypatch, tmp_path):
+    asked = []
+
+    def study(task, on_finished):
+        asked.append((task.conditions.resolution, task.conditions.seed, task.folder, task.jobs))
+        return {"candidates": []}
+
+    def write(results, folder, command):
+        (folder / "page.md").write_text(command)
+        return folder / "page.md"
+
+    monkeypatch.setattr(drive_study, "study_drives", study)
+    monkeypatch.setattr(drives_report, "write_drive_page", write)
+    status, said, _ = call("drives", "--resolution", "quick", "--out", "found", "--jobs", "2", "--seed", "5")
+    assert (status, asked) == (0, [("quick", 5, Path("found"), 2)])
+    assert said == f"Page: {Path('found/page.md')}\nResults: {Path('found/drive_quantities.json')}\n"
+    assert (tmp_path / "found" / "page.md").read_text() == "fingerpad drives --resolution quick"
+    assert json.loads((tmp_path / "found" / "drive_quantities.json").read_text()) == {"candidates": []}
 
 
 def test_without_a_command_the_help_is_shown(call):
