@@ -174,8 +174,8 @@ def thorough_method(seed: int, n_added: int = 0) -> Method:
     start = np.zeros(len(RELATIVE_NAMES) + n_added)
     return BestOf(
         (
-            replace(quick, n_refined=4, difference_steps=(0.1, 0.03, 0.01)),
-            CovarianceAdaptation(start, np.ones(start.size), seed=seed),
+            replace(quick, n_refined=4),
+            CovarianceAdaptation(start, np.ones(start.size), most_evaluations=800, seed=seed),
         ),
         "least squares and CMA-ES, the better",
     )

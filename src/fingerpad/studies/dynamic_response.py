@@ -16,6 +16,8 @@ import numpy as np
 
 from fingerpad.afferent import Afferent
 from fingerpad.checks import FloatArray
+from fingerpad.estimation.closed_form import ClosedFormModel
+from fingerpad.estimation.identifiable import identifiable
 from fingerpad.sampling import SkinResponse
 from fingerpad.signals import STORED_ENERGY, SedTraces
 from fingerpad.studies.conditions import RECEPTOR_X_MM
@@ -144,11 +146,15 @@ class Explanation:
         Its own numbers.
     driven : callable
         From a patch and these numbers to a drive.
+    by_formula : bool, optional
+        Take rates from the closed form for a steady current instead of spikes, as if a window could not cut
+        intervals off.
     """
 
     name: str
     added: tuple[Added, ...]
     driven: Callable[[Patch, FloatArray], Drive]
+    by_formula: bool = False
 
 
 def _powered(values: FloatArray, exponent: float) -> FloatArray:
@@ -214,6 +220,12 @@ def _rate_powered(patch: Patch, numbers: FloatArray) -> Drive:
 
 EXPLANATIONS: tuple[Explanation, ...] = (
     Explanation("the paper's model", (), lambda patch, _: patch.drive(patch.at(STORED_ENERGY))),
+    Explanation(
+        "window of 20 ms cuts no interval",
+        (),
+        lambda patch, _: patch.drive(patch.at(STORED_ENERGY)),
+        by_formula=True,
+    ),
     Explanation(
         "receptor elsewhere", (_OFFSET,), lambda patch, n: patch.drive(patch.at(STORED_ENERGY, n[0]))
     ),
@@ -323,4 +335,6 @@ class ExplainedModel:
         """Dynamic and static rates. [spikes/s]"""
         driven = self.explanation.driven(self.patch, self.numbers(parameters))
         six = six_of_relative(parameters[: len(RELATIVE_NAMES)], self.start)
+        if self.explanation.by_formula:
+            return ClosedFormModel(driven, bend=0.0).rates(identifiable(six))
         return Afferent.from_parameters(six).rates(driven)
