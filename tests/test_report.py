@@ -44,6 +44,7 @@ def synthetic_results() -> dict:
         "skin_deflection": _skin_deflection(),
         "single_unit": _single_unit(),
         "drive_quantities": _drive_quantities(),
+        "spike_fit": _spike_fit(),
         "discrimination": _discrimination(),
         "population": _population(),
         "nail": _nail(),
@@ -212,6 +213,80 @@ def _drive_quantities() -> dict:
     }
 
 
+def _spike_fit() -> dict:
+    truth = [0.007, 3.2, 0.018, 71.8, 0.2]
+    curve = {"amount": [0.1, 0.2, 0.4], "current_factor": [1.0, 0.9, 0.5], "local_variation": [0.0, 0.1, 0.7]}
+    source = {"name": "soft threshold", "amount_is": "width", **curve}
+    source |= {"coefficient_of_variation": [0.1, 0.3, 0.9]}
+    at = {"amount": 0.36, "current_factor": 0.58, "local_variation": 0.58, "coefficient_of_variation": 0.78}
+    times = [0.5 * step for step in range(40)]
+    return {
+        "n_repeats": 5,
+        "n_positions": 36,
+        "names": [
+            "intercept_per_ms",
+            "dynamic_gain_per_kpa",
+            "static_gain_per_kpa_ms",
+            "time_constant_ms",
+            "escape_width",
+        ],
+        "units": ["1/ms", "1/kPa", "1/(kPa ms)", "ms", "1"],
+        "variability": {
+            "observed": 0.78,
+            "observed_spread": 0.09,
+            "rate_hz": 60.3,
+            "sources": [source | {"at_observed": at}, source | {"at_observed": None}],
+        },
+        "recovery": {
+            "n_spikes": 5464,
+            "level": 0.95,
+            "start": [0.0, 4.0, 0.014, 68.0, 0.5],
+            "truth": truth,
+            "estimate": [1.02 * value for value in truth],
+            "standard_error": [0.03 * value for value in truth],
+            "low": [0.96 * value for value in truth],
+            "high": [1.08 * value for value in truth],
+            "n_held": 5,
+            "correlation": np.eye(5).tolist(),
+            "log_likelihood": -21847.9,
+            "log_likelihood_of_truth": -21850.7,
+            "n_steps": 8,
+            "rescaled": {
+                "share": [0.25, 0.75],
+                "quantile": [0.251, 0.748],
+                "distance": 0.006,
+                "p_value": 0.99,
+                "distance_of_truth": 0.007,
+                "limit": 0.018,
+            },
+        },
+        "raster": {
+            "shift_mm": SHIFT_MM.tolist(),
+            "spikes_ms": [[float(10 + shift), 400.0] if shift % 2 else [] for shift in range(36)],
+            "shown": 1,
+            "times_ms": times,
+            "intensity_hz": {
+                "truth": [10.0 + time for time in times],
+                "fitted": [11.0 + time for time in times],
+            },
+        },
+        "other_noise": [
+            {
+                "name": "threshold, new for each interval",
+                "amount": 0.3,
+                "n_spikes": 2714,
+                "estimate": truth,
+                "over_truth": [0.35, 0.92, 1.18, 0.2],
+                "distance": 0.134,
+                "limit": 0.026,
+                "dynamic_rate_error_hz": 21.3,
+                "static_rate_error_hz": 3.9,
+            },
+            {"name": "white noise of the current", "amount": 0.3, "n_spikes": 3},
+        ],
+    }
+
+
 def _discrimination() -> dict:
     rise = 1.0 - 0.5 * np.exp(-(np.array(CURVATURE_PER_M[1:]) - 287.0) / 30.0)
 
@@ -323,7 +398,9 @@ def pixels_per_metre(png: bytes) -> int:
 
 def test_one_picture_per_figure_of_the_paper_at_its_resolution(report):
     pictures = sorted((report.parent / "figures").iterdir())
-    assert sorted(int(picture.name.split("_")[1]) for picture in pictures) == [4, 5, 6, 7, 8, 9, 10]
+    numbers = sorted(drawing.number for chapter in page.CHAPTERS for drawing in chapter.drawings)
+    assert sorted(int(picture.name.split("_")[1]) for picture in pictures) == numbers
+    assert numbers[:6] == [4, 5, 6, 7, 8, 9]
     for picture in pictures:
         assert pixels_per_metre(picture.read_bytes()) == round(RESOLUTION_DPI / 0.0254)
 
@@ -341,7 +418,7 @@ def test_the_page_holds_the_pictures_themselves_and_asks_for_nothing_else(report
 
 def test_nothing_unfinished_is_left_beside_the_report(report):
     left = sorted(entry.name for entry in report.parent.rglob("*") if entry.is_file())
-    assert len(left) == 8
+    assert len(left) == 1 + sum(len(chapter.drawings) for chapter in page.CHAPTERS)
     assert all(name.endswith((".png", ".html")) for name in left)
 
 
@@ -402,7 +479,7 @@ def test_texts_are_escaped_wherever_they_stand(tmp_path):
 def without_numbers(value):
     """The same results with None for every number that a run may fail to have."""
     keep = ("distance_mm", "shift_mm", "x_mm", "y_mm", "z_mm", "receptors_mm", "curvature_per_m", "fold")
-    keep += ("testing_shift_mm", "is_artefact", "inputs", "iteration")
+    keep += ("testing_shift_mm", "is_artefact", "inputs", "iteration", "shown")
     if isinstance(value, dict):
         return {key: item if key in keep else without_numbers(item) for key, item in value.items()}
     if isinstance(value, list):

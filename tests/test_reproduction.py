@@ -19,6 +19,7 @@ import pytest
 from fingerpad import __version__
 from fingerpad.compilation import NOTICE
 from fingerpad.parameters import all_published
+from fingerpad.report.page import CHAPTERS
 from fingerpad.studies.reproduction import STORE_FOLDER
 
 COMMAND = (sys.executable, "-W", "error", "-m", "fingerpad", "reproduce")
@@ -38,6 +39,7 @@ MEASURED = ("started", "wall_s", "peak_memory_mb", "stages")
 BALANCE = 0.01
 """Bound on the error of the balance of energy at quick resolution, where 0.0012 to 0.0034 are found."""
 
+DRAWINGS = [drawing for chapter in CHAPTERS for drawing in chapter.drawings]
 INDENTATIONS = 6 + 36 + 14 + 1
 
 
@@ -126,7 +128,8 @@ def numbers(value):
 
 
 def test_results_have_every_section_and_finite_numbers_only(first):
-    sections = {"skin_deflection", "single_unit", "drive_quantities", "discrimination", "population", "nail"}
+    studies = {"skin_deflection", "single_unit", "discrimination", "population", "nail"}
+    sections = studies | {"drive_quantities", "spike_fit"}
     assert set(first.results) == sections | {"comparison", "inputs", "manifest"}
     assert not re.search(r"\b(NaN|Infinity)\b", first.text)
     assert all(math.isfinite(number) for number in numbers(first.results))
@@ -180,6 +183,18 @@ def test_every_quantity_that_is_shown_is_judged_on_the_same_folds(first):
     # The target of a fit by any method; the paper's model misses it.
     assert extended["fit"]["fss_out_of_sample"] >= 0.92
     assert extended["fit"]["fss_out_of_sample_dynamic"] > paper["fit"]["fss_out_of_sample_dynamic"] + 0.1
+
+
+def test_spike_trains_are_complete(first):
+    found = first.results["spike_fit"]
+    assert len(found["variability"]["sources"]) == 5
+    recovery = found["recovery"]
+    for name in ("start", "truth", "estimate", "standard_error", "low", "high"):
+        assert len(recovery[name]) == len(found["names"]) == 5
+    assert recovery["n_held"] >= 3
+    assert recovery["rescaled"]["distance"] < 2.0 * recovery["rescaled"]["limit"]
+    assert len(found["raster"]["spikes_ms"]) == 36
+    assert len(found["other_noise"]) == 3
 
 
 def test_discrimination_is_complete(first):
@@ -280,7 +295,7 @@ class Links(HTMLParser):
 
 def test_the_page_needs_nothing_from_outside(page):
     links = Links(page)
-    assert links.tags.count("img") == 7
+    assert links.tags.count("img") == len(DRAWINGS)
     assert all(link.startswith(("data:image/png;base64,", "#")) for link in links.loaded)
     assert not {"script", "link", "iframe", "object", "embed", "base"} & set(links.tags)
     without_data = re.sub(r"data:[^\"']*", "", page)
@@ -298,7 +313,8 @@ def test_the_page_shows_every_compared_number_and_no_machine_path(first, page):
 def test_figures_are_images_of_a_readable_size(first):
     figures = sorted((first.folder / "figures").iterdir())
     named = sorted(int(re.match(r"figure_(\d+)_\w+\.png$", path.name)[1]) for path in figures)
-    assert named == [4, 5, 6, 7, 8, 9, 10]
+    assert named == sorted(drawing.number for drawing in DRAWINGS)
+    assert named[:6] == [4, 5, 6, 7, 8, 9]
     for path in figures:
         content = path.read_bytes()
         assert content.startswith(b"\x89PNG\r\n\x1a\n")
@@ -342,6 +358,7 @@ def test_another_seed_changes_what_the_observer_draws_and_nothing_else(first, ot
     for section in ("skin_deflection", "single_unit", "population", "nail", "inputs"):
         assert theirs[section] == ours[section]
     assert theirs["manifest"] == ours["manifest"] | {"seed": 7}
+    assert theirs["spike_fit"] != ours["spike_fit"]
     drawn, drawn_theirs = ours["discrimination"], theirs["discrimination"]
     for name in ("curvature_per_m", "goodwin", "gradient_sums", "noise_sigma_paper"):
         assert drawn_theirs[name] == drawn[name]

@@ -114,7 +114,8 @@ def test_the_raster_shows_the_first_presentation_of_each_position(found):
     raster = found["raster"]
     counts = [len(train) for train in raster["spikes_ms"]]
     assert len(counts) == SHIFT_MM.size
-    assert raster["shown_shift_mm"] == SHIFT_MM[int(np.argmax(counts))]
+    assert raster["shown"] == int(np.argmax(counts))
+    assert raster["shift_mm"] is SHIFT_MM
     for intensity in raster["intensity_hz"].values():
         assert intensity.shape == raster["times_ms"].shape
         assert (intensity >= 0.0).all()
@@ -151,7 +152,7 @@ def test_the_figure_and_the_tables_say_what_was_found(found):
     assert [row.cells[0] for row in others.rows] == [row["name"] for row in section["other_noise"]]
     assert [row.cells[0] for row in sources.rows] == [source.name for source in SOURCES]
     assert sources.rows[-1].cells[2:] == ("–", "–", "–")
-    assert f"{section['recovery']['n_held']} of 5 intervals of 95% hold the truth" in report.caption(section)
+    assert f"{section['recovery']['n_held']} of 5 intervals of 95 % hold the truth" in report.caption(section)
 
 
 def test_panels_show_the_numbers_of_the_section(found):

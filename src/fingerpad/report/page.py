@@ -20,6 +20,7 @@ from fingerpad.report import (
     population,
     single_unit,
     skin_deflection,
+    spike_fit,
     tables,
 )
 from fingerpad.report.appearance import png
@@ -28,7 +29,10 @@ from fingerpad.report.summary import summary
 
 @dataclass(frozen=True)
 class Drawing:
-    """One figure of the report: its number in the paper, file name, and what draws and explains it."""
+    """One figure of the report: its number, file name, and what draws and explains it.
+
+    Numbers up to 9 are the paper's; figures that the paper does not have go on from 10.
+    """
 
     number: int
     name: str
@@ -87,6 +91,12 @@ CHAPTERS = (
         drive_quantities.table,
     ),
     Chapter(
+        "spike_fit",
+        "Level 2: spike trains",
+        (Drawing(11, "figure_11_spike_fit", "Spikes and their fit", spike_fit.draw, spike_fit.caption),),
+        spike_fit.table,
+    ),
+    Chapter(
         "population",
         "Level 3: population",
         (
@@ -138,9 +148,9 @@ def write_report(results: Mapping[str, Any], folder: Path) -> Path:
     Parameters
     ----------
     results : mapping
-        JSON-able sections: skin_deflection, single_unit, population, discrimination, nail, comparison, inputs
-        and manifest. A section that is absent is said to be so; one of another name is listed as it stands.
-        None stands for what does not exist, such as the latency of a silent afferent.
+        JSON-able sections: skin_deflection, single_unit, drive_quantities, spike_fit, population,
+        discrimination, nail, comparison, inputs and manifest. An absent section is said to be so; one of another
+        name is listed as it stands. None stands for what does not exist: the latency of a silent afferent.
     folder : Path
         Made if needed; every file in it is written whole or not at all.
 

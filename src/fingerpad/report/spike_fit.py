@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fingerpad.checks import FloatArray
 from fingerpad.report.appearance import (
     BLACK,
     BLUE,
@@ -64,13 +65,13 @@ def _raster(axes: Axes, found: Mapping[str, Any] | None) -> None:
     shift = numbers(found["shift_mm"])
     step = float(np.diff(shift).min()) if shift.size > 1 else 1.0
     axes.eventplot(
-        [numbers(train) for train in found["spikes_ms"]],
+        [_known(train) for train in found["spikes_ms"]],
         lineoffsets=shift.tolist(),
         linelengths=0.8 * step,
         linewidths=0.7,
         colors=BLACK,
     )
-    axes.axhline(found["shown_shift_mm"], color=PALE, linewidth=8.0, zorder=0)
+    axes.axhline(shift[found["shown"]], color=PALE, linewidth=8.0, zorder=0)
     axes.set_xlabel("time [ms]")
     axes.set_ylabel("position of the bar [mm]")
 
@@ -85,8 +86,7 @@ def _intensity(axes: Axes, found: Mapping[str, Any] | None) -> None:
         axes.plot(
             times, numbers(found["intensity_hz"][name]), color=colour, linestyle=line, lw=1.2, label=name
         )
-    row = list(found["shift_mm"]).index(found["shown_shift_mm"])
-    spikes = numbers(found["spikes_ms"][row])
+    spikes = _known(found["spikes_ms"][found["shown"]])
     shown = spikes[spikes <= times[-1]]
     axes.plot(
         shown,
@@ -97,7 +97,7 @@ def _intensity(axes: Axes, found: Mapping[str, Any] | None) -> None:
         label="spikes",
         transform=axes.get_xaxis_transform(),
     )
-    axes.set_title(f"(b) intensity, bar at {number(found['shown_shift_mm'])} mm")
+    axes.set_title(f"(b) intensity, bar at {number(found['shift_mm'][found['shown']])} mm")
     axes.set_yscale("log")
     axes.set_ylim(bottom=LOWEST_INTENSITY_HZ)
     axes.set_xlabel("time [ms]")
@@ -111,10 +111,11 @@ def _rescaled(axes: Axes, found: Mapping[str, Any] | None) -> None:
         say_nothing_to_draw(axes, NOT_FITTED)
         return
     test = found["rescaled"]
-    share, limit = numbers(test["share"]), test["limit"]
-    axes.fill_between([0.0, 1.0], -limit, limit, color=PALE, label=f"{found['level']:.0%} of chance")
+    share, limit = numbers(test["share"]), float(numbers(test["limit"]))
+    axes.fill_between([0.0, 1.0], -limit, limit, color=PALE, label=f"{_percent(found['level'])} of chance")
     axes.plot(share, numbers(test["quantile"]) - share, color=BLUE, label="fitted")
-    axes.set_ylim(-2.0 * limit, 2.0 * limit)
+    if np.isfinite(limit):
+        axes.set_ylim(-2.0 * limit, 2.0 * limit)
     axes.set_xlabel("uniform quantile")
     axes.set_ylabel("quantile of the rescaled intervals, less uniform")
     axes.legend(loc="upper left")
@@ -125,8 +126,8 @@ def _variability(axes: Axes, found: Mapping[str, Any]) -> None:
     if not found["sources"]:
         say_nothing_to_draw(axes, "the afferent is silent")
         return
-    low, high = (found["observed"] + sign * found["observed_spread"] for sign in (-1, 1))
-    axes.axhspan(low, high, color=PALE, zorder=0, label="observed, mouse")
+    middle, spread = numbers([found["observed"], found["observed_spread"]])
+    axes.axhspan(middle - spread, middle + spread, color=PALE, zorder=0, label="observed, mouse")
     for (colour, line), source in zip(STYLES, found["sources"], strict=False):
         axes.plot(
             numbers(source["amount"]),
@@ -143,6 +144,16 @@ def _variability(axes: Axes, found: Mapping[str, Any]) -> None:
     axes.legend(loc="upper right", fontsize=7.5)
 
 
+def _known(times: Any) -> FloatArray:
+    """Return times as numbers, those that do not exist left out."""
+    given = numbers(times)
+    return given[np.isfinite(given)]
+
+
+def _percent(share: float | None) -> str:
+    return f"{fixed(None if share is None else 100.0 * share, 0)} %"
+
+
 def caption(section: Mapping[str, Any]) -> str:
     """Say what the figure shows.
 
@@ -156,21 +167,21 @@ def caption(section: Mapping[str, Any]) -> str:
     str
     """
     found = section["recovery"]
-    fitted = (
-        f"{found['n_held']} of {len(found['truth'])} intervals of {found['level']:.0%} hold the truth; the "
-        f"rescaled intervals stray from uniform by {number(found['rescaled']['distance'])}; chance allows "
-        f"{number(found['rescaled']['limit'])}."
-        if found
-        else "They could not be fitted."
-    )
+    fitted = "They could not be fitted."
+    if found:
+        held = f"{number(found['n_held'])} of {len(found['truth'])} intervals of {_percent(found['level'])}"
+        fitted = (
+            f"{held} hold the truth; the rescaled intervals stray from uniform by "
+            f"{number(found['rescaled']['distance'])}; chance allows {number(found['rescaled']['limit'])}."
+        )
+    shown = f"{number(section['n_positions'])} positions, {number(section['n_repeats'])} times each"
     return (
-        "Spikes of the fitted afferent with a soft threshold (escape rate) under the bar at "
-        f"{section['n_positions']} positions, {section['n_repeats']} times each, fitted by maximum "
-        f"likelihood from the paper's first start point. {fitted} (c) Intervals measured "
-        "in the integral of the fitted intensity: how far they stray from what a true model makes of them. "
-        "(d) Coefficient of variation of the intervals of the held afferent against the amount of noise, at "
-        "the rate that it has without noise; shaded: observed in mice. The meaning of each amount stands in "
-        "the table."
+        f"Spikes of the fitted afferent with a soft threshold (escape rate) under the bar at {shown}, fitted "
+        f"by maximum likelihood from the paper's first start point. {fitted} (c) Intervals measured in the "
+        "integral of the fitted intensity: how far they stray from what a true model makes of them. (d) "
+        "Coefficient of variation of the intervals of the held afferent against the amount of noise, at the "
+        "rate that it has without noise; shaded: observed in mice. The meaning of each amount stands in the "
+        "table."
     )
 
 
@@ -199,13 +210,14 @@ def _recovery(section: Mapping[str, Any]) -> Table:
         for place, (name, unit) in enumerate(zip(section["names"], section["units"], strict=True))
         if found
     ]
-    note = (
-        f"{found['n_spikes']} spikes. Log-likelihood {fixed(found['log_likelihood'], 1)} at the estimate, "
-        f"{fixed(found['log_likelihood_of_truth'], 1)} at the truth; {found['n_steps']} steps. From and to: "
-        f"interval that holds the truth in {found['level']:.0%} of such experiments."
-        if found
-        else ""
-    )
+    note = ""
+    if found:
+        there = fixed(found["log_likelihood"], 1), fixed(found["log_likelihood_of_truth"], 1)
+        note = (
+            f"{number(found['n_spikes'], 6)} spikes. Log-likelihood {there[0]} at the estimate, {there[1]} at "
+            f"the truth; {number(found['n_steps'])} steps. From and to: interval that holds the truth in "
+            f"{_percent(found['level'])} of such experiments."
+        )
     return Table("The afferent found again in its spikes", columns, rows, note)
 
 

@@ -21,7 +21,7 @@ from fingerpad import __version__
 from fingerpad.afferent import Afferent
 from fingerpad.checks import whole
 from fingerpad.mesh_quality import jacobian_at_gauss, scaled_jacobian
-from fingerpad.parameters import all_published
+from fingerpad.parameters import all_published, protocol
 from fingerpad.sampling import SkinResponse
 from fingerpad.store import Store, code_hash, solve_missing
 from fingerpad.studies import (
@@ -30,6 +30,7 @@ from fingerpad.studies import (
     single_unit,
     skin_deflection,
     sphere_discrimination,
+    spike_fit,
 )
 from fingerpad.studies.comparison import comparison
 from fingerpad.studies.conditions import Conditions, Touch
@@ -129,8 +130,9 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
     deflection, bar_responses = responses["skin deflection"], responses["bar, 36 shifts"]
     sphere_responses, nail_response = responses["spheres"], responses["nail"]["nail"]
 
-    with _timed("fit and discrimination", 4, progress, stages) as advance:
-        problem = single_unit.rate_problem(single_unit.receptor_sed(list(bar_responses.values())))
+    with _timed("fit and discrimination", 5, progress, stages) as advance:
+        bar_sed = single_unit.receptor_sed(list(bar_responses.values()))
+        problem = single_unit.rate_problem(bar_sed)
         best, folds = single_unit.fit(problem)
         advance()
         drives = drive_quantities.result(
@@ -142,11 +144,15 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
         afferent = Afferent.from_parameters(best.parameters)
         discrimination = sphere_discrimination.result(sphere_responses, afferent, conditions.seed)
         advance()
+        shift_mm = np.array(protocol.BAR_SHIFTS.value)
+        spike_trains = spike_fit.result(bar_sed, afferent, shift_mm, conditions.seed)
+        advance()
         standard = sphere_responses[STANDARD_SPHERE]
         results: dict[str, Any] = {
             "skin_deflection": skin_deflection.result(deflection),
             "single_unit": single_unit.result(problem, best, folds),
             "drive_quantities": drives,
+            "spike_fit": spike_trains,
             "discrimination": discrimination,
             "population": sphere_discrimination.population_map(standard, afferent),
             "nail": nail_border.result(nail_response),

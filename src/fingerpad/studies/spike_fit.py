@@ -226,7 +226,7 @@ def _raster(
     return {
         "shift_mm": shift_mm,
         "spikes_ms": first,
-        "shown_shift_mm": float(shift_mm[busiest]),
+        "shown": busiest,
         "times_ms": times,
         "intensity_hz": intensity_hz,
     }
