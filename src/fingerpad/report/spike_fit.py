@@ -214,8 +214,8 @@ def _recovery(section: Mapping[str, Any]) -> Table:
     if found:
         there = fixed(found["log_likelihood"], 1), fixed(found["log_likelihood_of_truth"], 1)
         note = (
-            f"{number(found['n_spikes'], 6)} spikes. Log-likelihood {there[0]} at the estimate, {there[1]} at "
-            f"the truth; {number(found['n_steps'])} steps. From and to: interval that holds the truth in "
+            f"{number(found['n_spikes'], 6)} spikes. Log-likelihood {there[0]} at the estimate, {there[1]} "
+            f"at the truth; {number(found['n_steps'])} steps. From and to: interval that holds the truth in "
             f"{_percent(found['level'])} of such experiments."
         )
     return Table("The afferent found again in its spikes", columns, rows, note)
