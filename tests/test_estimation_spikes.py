@@ -17,13 +17,15 @@ from fingerpad.escape_rate import EscapeRate
 from fingerpad.estimation.identifiable import six_parameters
 from fingerpad.estimation.spike_fit import SpikeFit, fit_spikes
 from fingerpad.estimation.spike_likelihood import (
+    SpikeLikelihood,
+    time_rescaling,
+)
+from fingerpad.estimation.spike_parameters import (
     SPIKE_PARAMETER_NAMES,
     SPIKE_PARAMETER_UNITS,
-    SpikeLikelihood,
     canonical,
     canonical_jacobian,
     from_canonical,
-    time_rescaling,
 )
 from fingerpad.random_streams import Presentations
 from fingerpad.signals import SedTraces, SpikeTrains

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from fingerpad.afferent import Afferent
-from fingerpad.estimation.spike_likelihood import SPIKE_PARAMETER_NAMES
+from fingerpad.estimation.spike_parameters import (
+    SPIKE_PARAMETER_NAMES,
+)
 from fingerpad.report import spike_fit as report
 from fingerpad.report.appearance import png
 from fingerpad.signals import SedTraces

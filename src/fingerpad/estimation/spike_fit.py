@@ -1,7 +1,7 @@
 """Fit an afferent with a soft threshold to spike trains by maximum likelihood.
 
 Newton's method with the expected curvature (Fisher scoring), damped as Levenberg and Marquardt do, in the
-numbers (A, B, C, G, ln tau) of `fingerpad.estimation.spike_likelihood`: at a given tau log L is concave in
+numbers (A, B, C, G, ln tau) of `fingerpad.estimation.spike_parameters`: at a given tau log L is concave in
 the other four, and a start far away is no harm.
 """
 
@@ -16,8 +16,10 @@ from scipy.special import ndtri
 from fingerpad.checks import FloatArray, finite, whole
 from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.estimation.spike_likelihood import (
-    N_PARAMETERS,
     SpikeLikelihood,
+)
+from fingerpad.estimation.spike_parameters import (
+    N_PARAMETERS,
     canonical,
     canonical_jacobian,
     checked_spike_parameters,
@@ -44,7 +46,7 @@ class SpikeFit:
     Parameters
     ----------
     parameters : array (5,)
-        In the order of `fingerpad.estimation.spike_likelihood.SPIKE_PARAMETER_NAMES`.
+        In the order of `fingerpad.estimation.spike_parameters.SPIKE_PARAMETER_NAMES`.
     covariance : array (5, 5)
         Inverse of the information.
     log_likelihood : float

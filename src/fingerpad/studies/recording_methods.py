@@ -18,7 +18,13 @@ from fingerpad.estimation.identifiable import identifiable, six_parameters
 from fingerpad.estimation.rate_problem import RateProblem
 from fingerpad.estimation.recordings import RateRecordings, SpikeRecordings
 from fingerpad.estimation.spike_fit import fit_spikes
-from fingerpad.estimation.spike_likelihood import SPIKE_PARAMETER_NAMES, SpikeLikelihood, time_rescaling
+from fingerpad.estimation.spike_likelihood import (
+    SpikeLikelihood,
+    time_rescaling,
+)
+from fingerpad.estimation.spike_parameters import (
+    SPIKE_PARAMETER_NAMES,
+)
 from fingerpad.fitting import CrossValidation, Fit, Method
 from fingerpad.fitting.covariance import mean_slopes, sandwich_covariance
 from fingerpad.fitting.problem import IntArray, Problem

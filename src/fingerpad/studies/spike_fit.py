@@ -19,10 +19,12 @@ from fingerpad.escape_rate import EscapeRate
 from fingerpad.estimation.identifiable import identifiable, six_parameters
 from fingerpad.estimation.spike_fit import SpikeFit, fit_spikes
 from fingerpad.estimation.spike_likelihood import (
-    SPIKE_PARAMETER_NAMES,
-    SPIKE_PARAMETER_UNITS,
     SpikeLikelihood,
     time_rescaling,
+)
+from fingerpad.estimation.spike_parameters import (
+    SPIKE_PARAMETER_NAMES,
+    SPIKE_PARAMETER_UNITS,
 )
 from fingerpad.noisy_lif import (
     CorrelatedCurrentNoise,
@@ -62,7 +64,7 @@ def start() -> FloatArray:
     Returns
     -------
     array (5,)
-        In the order of `fingerpad.estimation.spike_likelihood.SPIKE_PARAMETER_NAMES`.
+        In the order of `fingerpad.estimation.spike_parameters.SPIKE_PARAMETER_NAMES`.
     """
     paper = [
         neuron.INTERCEPT_START.value,
@@ -153,7 +155,7 @@ def soft_spikes(
     driven : Drive
         One column per stimulus.
     parameters : array (5,)
-        In the order of `fingerpad.estimation.spike_likelihood.SPIKE_PARAMETER_NAMES`.
+        In the order of `fingerpad.estimation.spike_parameters.SPIKE_PARAMETER_NAMES`.
     presentations : Presentations
         Which stimulus each train answers.
     seed : int
