@@ -149,8 +149,9 @@ def write_report(results: Mapping[str, Any], folder: Path) -> Path:
     ----------
     results : mapping
         JSON-able sections: skin_deflection, single_unit, drive_quantities, spike_fit, population,
-        discrimination, nail, comparison, inputs and manifest. An absent section is said to be so; one of another
-        name is listed as it stands. None stands for what does not exist: the latency of a silent afferent.
+        discrimination, nail, comparison, inputs and manifest. A section that is absent is said to be so; one
+        of another name is listed as it stands. None stands for what does not exist, such as the latency of a
+        silent afferent.
     folder : Path
         Made if needed; every file in it is written whole or not at all.
 

@@ -148,8 +148,8 @@ CHAPTERS = (
         "fit",
         "The fit",
         (
-            Drawing("1", "fit", "Observed and predicted rates", draw, caption),
-            Drawing("2", "residuals", "Residuals", draw_residuals, caption_residuals),
+            Drawing(1, "fit", "Observed and predicted rates", draw, caption),
+            Drawing(2, "residuals", "Residuals", draw_residuals, caption_residuals),
         ),
         fit_tables,
     ),
