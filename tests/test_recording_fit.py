@@ -173,10 +173,19 @@ def test_every_stimulus_is_predicted_without_its_fold(recovered):
 def test_both_forms_of_the_parameters_are_one_afferent_and_the_errors_are_those_of_the_covariance(recovered):
     six, four = (list(recovered[key].values()) for key in ("parameters", "identifiable"))
     np.testing.assert_allclose(identifiable(six), four, rtol=1e-12)
-    covariance = np.array(recovered["identifiable_covariance"])
-    errors = [recovered["identifiable_standard_error"][name] for name in IDENTIFIABLE_NAMES]
-    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), errors, rtol=1e-12)
-    np.testing.assert_allclose(covariance, covariance.T, rtol=1e-9)
+    assert recovered["identifiable_covariance"] is None  # two folds
+    assert set(recovered["identifiable_standard_error"].values()) == {None}
+
+
+def test_standard_errors_are_the_scatter_of_the_folds(call, tmp_path):
+    (tmp_path / "mine.csv").write_text(ROWS)
+    assert call("mine.csv", "--stimulus", "bar", "--folds", "5")[0] == 0
+    fit = json.loads((tmp_path / "fit" / "fit.json").read_text())["fit"]
+    fours = np.array([list(fold["identifiable"].values()) for fold in fit["folds"]])
+    expected = 4 / 5 * sum(np.outer(apart, apart) for apart in fours - fours.mean(axis=0))
+    np.testing.assert_allclose(fit["identifiable_covariance"], expected, rtol=1e-9, atol=1e-300)
+    errors = list(fit["identifiable_standard_error"].values())
+    np.testing.assert_allclose(errors, np.sqrt(np.diag(expected)), rtol=1e-9)
 
 
 def test_six_folds_are_dealt_out_by_default_and_one_per_stimulus_where_there_are_fewer():
@@ -505,8 +514,8 @@ def test_figures_show_what_was_recorded_and_nothing_else(recovered):
 def test_what_is_not_determined_is_said(recovered):
     nothing = dict.fromkeys(IDENTIFIABLE_NAMES)
     undetermined = recovered | {"identifiable_covariance": None, "identifiable_standard_error": nothing}
-    assert "do not determine all four free numbers" in report.summary(undetermined)[1]
-    assert len(report.summary(recovered)) == 1
+    assert "need five folds or more" in report.summary(undetermined)[1]
+    assert len(report.summary(recovered | {"identifiable_covariance": [[1.0] * 4] * 4})) == 1
     table = report.fit_tables(undetermined)[1]
     assert [row.cells[2] for row in table.rows] == ["–"] * 4
 

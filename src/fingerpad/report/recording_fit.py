@@ -202,8 +202,8 @@ def summary(section: Mapping[str, Any]) -> list[str]:
     ]
     if section["identifiable_covariance"] is None:
         found.append(
-            "The recordings do not determine all four free numbers, so that no standard errors are given: "
-            "record more stimuli, or both phases."
+            "No standard errors are given: they come from the scatter of the folds' fits, and four numbers "
+            "need five folds or more."
         )
     return found
 
@@ -276,8 +276,8 @@ def _identifiable(section: Mapping[str, Any]) -> Table:
     ]
     note = (
         "All that spikes can tell: gains, capacitance C and threshold v are known only up to a common scale. "
-        "Standard errors hold near the best fit: from residuals of unequal size (sandwich), or from the "
-        "information in spikes."
+        "Standard errors come from the scatter of the folds' fits (jackknife), or from the information in "
+        "spikes."
     )
     credible = [f"{section['posterior']['level']:.0%} credible"] if intervals else []
     columns = ("", "fitted", "standard error", *credible, "unit")

@@ -21,6 +21,7 @@ from fingerpad.estimation.rate_problem import RateProblem
 from fingerpad.estimation.recordings import PHASES, RateRecordings, SpikeRecordings
 from fingerpad.fitting import (
     CrossValidation,
+    Fit,
     cross_validate,
     fractional_sum_of_squares,
     interleaved_folds,
@@ -113,7 +114,7 @@ def fit_recordings(
             "n_evaluations": best.n_evaluations,
             "seconds": best.seconds,
         }
-        | _parameters(prepared, best.parameters)
+        | _parameters(prepared, best, validation)
         | _scores(prepared.problem, rates, best.parameters, validation)
         | {
             "folds": _folds(prepared, rates, validation),
@@ -169,11 +170,11 @@ def check_enough(rates: RateRecordings, memberships: IntArray) -> None:
                     )
 
 
-def _parameters(prepared: Prepared, fitted: FloatArray) -> dict[str, Any]:
+def _parameters(prepared: Prepared, best: Fit, validation: CrossValidation) -> dict[str, Any]:
     """Parameters in both forms, and how well the recordings determine those four that they can."""
-    covariance = prepared.covariance(fitted)
+    covariance = prepared.covariance(best, validation)
     errors = [None] * 4 if covariance is None else np.sqrt(np.diag(covariance)).tolist()
-    return _named(prepared.six(fitted)) | {
+    return _named(prepared.six(best.parameters)) | {
         "units": dict(zip(PARAMETER_NAMES, single_unit.UNITS, strict=True)),
         "identifiable_units": dict(zip(IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, strict=True)),
         "identifiable_standard_error": dict(zip(IDENTIFIABLE_NAMES, errors, strict=True)),

@@ -26,7 +26,7 @@ from fingerpad.estimation.spike_parameters import (
     SPIKE_PARAMETER_NAMES,
 )
 from fingerpad.fitting import CrossValidation, Fit, Method
-from fingerpad.fitting.covariance import mean_slopes, sandwich_covariance
+from fingerpad.fitting.covariance import jackknife_covariance
 from fingerpad.fitting.problem import IntArray, Problem
 from fingerpad.parameters import neuron
 from fingerpad.random_streams import Presentations
@@ -34,9 +34,6 @@ from fingerpad.signals import SpikeTrains
 from fingerpad.spikes import firing_rate_hz
 from fingerpad.studies import single_unit, spike_fit
 from fingerpad.transduction import Drive
-
-SLOPE_SHARE = 0.02
-"""Half of the box over which slopes are means, as a share of each number: wider than the rates' jumps."""
 
 PREDICTED_PRESENTATIONS = 20
 """Presentations whose mean is the rate that an afferent with a soft threshold is said to have."""
@@ -55,7 +52,7 @@ class Prepared:
     six : callable
         From those parameters to the paper's six.
     covariance : callable
-        From fitted parameters to the covariance (4, 4) of the identifiable numbers, or None.
+        From the fit to all and the folds to the covariance (4, 4) of the identifiable numbers, or None.
     spikes : callable
         From the fit to all and the folds to what only spikes tell; an empty dict for rates.
     """
@@ -63,7 +60,7 @@ class Prepared:
     problem: RateProblem
     method: Method
     six: Callable[[FloatArray], FloatArray]
-    covariance: Callable[[FloatArray], FloatArray | None]
+    covariance: Callable[[Fit, CrossValidation], FloatArray | None]
     spikes: Callable[[Fit, CrossValidation], dict[str, Any]] = lambda fit, folds: {}
 
 
@@ -105,29 +102,19 @@ def _response_surface(
     model: AnyMotion, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
 ) -> Prepared:
     """Prepare the paper's method in its six parameters."""
-    problem = RateProblem(model, rates)
     return Prepared(
-        problem,
+        RateProblem(model, rates),
         single_unit.response_surface(),
         lambda six: six,
-        lambda six: _sandwich(problem, identifiable(six), lambda four: six_parameters(four, *six[4:])),
+        _scatter_of(lambda six: six),
     )
 
 
-def _sandwich(
-    problem: RateProblem, four: FloatArray, parameters: Callable[[FloatArray], FloatArray]
-) -> FloatArray | None:
-    """Covariance of the four numbers from the residuals of rates."""
-    everything = np.arange(problem.n_observations)
-
-    def residuals(numbers: FloatArray) -> FloatArray:
-        return problem.residuals(parameters(numbers), everything)
-
-    # beta may be 0: compared with the smallest current that makes a spike, C v / tau, it has a scale.
-    scale = np.array([1.0 / four[3], *np.abs(four[1:])])
-    start = identifiable(single_unit.start_points()[0])
-    steps = SLOPE_SHARE * np.where(scale > 0.0, scale, start)
-    return sandwich_covariance(mean_slopes(residuals, four, steps), residuals(four))
+def _scatter_of(six: Callable[[FloatArray], FloatArray]) -> Callable[[Fit, CrossValidation], Any]:
+    """Return what finds the covariance of the four numbers in the fits of the folds."""
+    return lambda fit, folds: jackknife_covariance(
+        [identifiable(six(fold.fit.parameters)) for fold in folds.folds]
+    )
 
 
 @dataclass(frozen=True)
@@ -234,7 +221,7 @@ def _likelihood(
         RateProblem(SoftAfferent(drive, model.windows_ms, seed), rates),
         method,
         lambda five: six_parameters(five[:4]),
-        lambda five: covariance(five)[:4, :4],
+        lambda fit, folds: covariance(fit.parameters)[:4, :4],
         told,
     )
 
