@@ -97,9 +97,10 @@ def caption(section: Mapping[str, Any]) -> str:
     best = max(candidates, key=lambda candidate: candidate["fit"]["fss_out_of_sample"] or 0.0)
     paper = candidates[0]
     return (
-        "Rates of one afferent under the bar (shaded: it covers the receptor), by the quantity that drives "
-        "it. Lines are fitted to all positions; each cross is predicted by the fit of a fold that did not "
-        "know its position, and the fractional sum of squares (FSS) is the mean of the folds. Four numbers "
+        "Rates of one afferent under the bar, by the quantity that drives it; proximal positions are "
+        "positive, shaded ones cover the receptor. Lines are fitted to all positions; each cross is "
+        "predicted by the fit of a fold that did not know its position, and the fractional sum of squares "
+        "(FSS) is the mean of the folds. Four numbers "
         f"are free in every column. Best predicts: {_words(best)}, FSS "
         f"{fixed(best['fit']['fss_out_of_sample'], _DECIMALS)} on positions that were not fitted to, against "
         f"{fixed(paper['fit']['fss_out_of_sample'], _DECIMALS)} with {_words(paper)}."
