@@ -20,6 +20,7 @@ BENCHMARKS = (
     "startup",
     "population",
     "sphere",
+    "fitting",
     "profiles",
     "paper_size",
     "solvers",

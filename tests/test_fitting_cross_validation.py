@@ -11,6 +11,7 @@ from fingerpad.fitting import (
     ResponseSurface,
     coding_increments,
     cross_validate,
+    folds_of,
     interleaved_folds,
     maximise,
     weighted_fractional_sum_of_squares,
@@ -141,6 +142,29 @@ def test_memberships_with_a_gap_are_refused(memberships: list[float]) -> None:
 def test_memberships_that_miss_an_observation_are_refused() -> None:
     with pytest.raises(InputError, match="memberships needs one fold per observation: got 3 for 4"):
         cross_validate(Scored(lambda *_: 0.0, 4), ResponseSurface([[0.0]], [0.1]), [0, 1, 0])
+
+
+def test_folds_come_from_lists_of_what_each_leaves_out() -> None:
+    folds = folds_of([[4, 0], [1, 2, 5], [3]], 6)
+    assert folds.tolist() == [0, 1, 1, 2, 0, 1]
+    np.testing.assert_array_equal(
+        folds_of([range(fold, 36, 6) for fold in range(6)], 36), interleaved_folds(36)
+    )
+
+
+@pytest.mark.parametrize(
+    ("testing_sets", "words"),
+    [
+        ([[0, 1], [1, 2]], "must not overlap: observation 1 is in fold 0 and in fold 1"),
+        ([[0], [0, 1, 2]], "must not overlap: observation 0 is in fold 0 and in fold 1"),
+        ([[0], [2]], "must hold every observation: observation 1 is in none"),
+        ([[0, 1], [2, 3]], "must hold observations 0 ... 2: fold 1 holds 3"),
+        ([[0, 1], [-1]], "an observation of fold 1 must be a whole number of at least 0: got -1"),
+    ],
+)
+def test_folds_that_overlap_or_miss_an_observation_are_refused(testing_sets, words) -> None:
+    with pytest.raises(InputError, match=words):
+        folds_of(testing_sets, 3)
 
 
 def test_other_wrong_shapes_are_refused() -> None:

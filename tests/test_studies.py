@@ -16,7 +16,7 @@ from fingerpad.indenters import Bar, Cylinder, Line, Sphere
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.mesh import finger_mesh
-from fingerpad.parameters import paper, psychophysics
+from fingerpad.parameters import neuron, paper, psychophysics
 from fingerpad.reference import bar_firing_rates, cylinder_deflection
 from fingerpad.sampling import SurfaceProfile
 from fingerpad.signals import SedTraces
@@ -295,11 +295,16 @@ def test_single_unit_result_names_every_number(synthetic_problem, synthetic_fit)
     json.dumps(plain(found), allow_nan=False)
 
 
-def test_both_start_points_are_the_papers_with_the_dynamic_gain_rescaled_alike():
+def test_both_start_points_are_the_papers_with_both_gains_rescaled_alike():
+    printed = single_unit.printed_starts()
+    np.testing.assert_array_equal(printed[0], [0.0, 8e-9, 7e-7, 68.0, 1e-6, 50.0])
+    np.testing.assert_array_equal(printed[1], [0.0, 8.2e-9, 3e-7, 68.0, 1e-6, 50.0])
     first, second = single_unit.start_points()
-    np.testing.assert_allclose(first[[0, 2, 3, 4, 5]], [0.0, 7e-7, 68.0, 1e-6, 50.0], rtol=1e-14)
-    np.testing.assert_allclose(second[[0, 2, 3, 4, 5]], [0.0, 3e-7, 68.0, 1e-6, 50.0], rtol=1e-14)
+    np.testing.assert_array_equal([first[[0, 3, 4, 5]], second[[0, 3, 4, 5]]], printed[:, [0, 3, 4, 5]])
     assert second[1] / first[1] == pytest.approx(8.2 / 8.0, rel=1e-12)
+    assert second[2] / first[2] == pytest.approx(3.0 / 7.0, rel=1e-12)
+    assert first[1] / printed[0, 1] == pytest.approx(neuron.DYNAMIC_GAIN_SCALE.value, rel=1e-12)
+    assert first[2] / printed[0, 2] == pytest.approx(neuron.STATIC_GAIN_SCALE.value, rel=1e-12)
     steps = single_unit.increments(single_unit.start_points())
     np.testing.assert_allclose(steps[:, 1:], 0.01 * np.array([first, second])[:, 1:], rtol=1e-12)
     np.testing.assert_allclose(

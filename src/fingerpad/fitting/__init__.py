@@ -4,12 +4,18 @@ Goodness of fit (Eqs. 12-14), the response surface method and cross validation o
 and other methods beside it. A method fits a `Problem` and gives a `Fit`.
 """
 
-from fingerpad.fitting.cross_validation import CrossValidation, FoldFit, cross_validate, interleaved_folds
+from fingerpad.fitting.cross_validation import (
+    CrossValidation,
+    FoldFit,
+    cross_validate,
+    folds_of,
+    interleaved_folds,
+)
 from fingerpad.fitting.fractional_sum_of_squares import (
     fractional_sum_of_squares,
     weighted_fractional_sum_of_squares,
 )
-from fingerpad.fitting.methods import Fit, Method, ResponseSurface, Step, best_of
+from fingerpad.fitting.methods import Continued, Fit, Method, ResponseSurface, Step, best_of
 from fingerpad.fitting.problem import Problem
 from fingerpad.fitting.response_surface import (
     Iteration,
@@ -21,6 +27,7 @@ from fingerpad.fitting.response_surface import (
 )
 
 __all__ = [
+    "Continued",
     "CrossValidation",
     "Fit",
     "FoldFit",
@@ -34,6 +41,7 @@ __all__ = [
     "coding_increments",
     "cross_validate",
     "factorial_design",
+    "folds_of",
     "fractional_sum_of_squares",
     "interleaved_folds",
     "maximise",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -169,3 +170,48 @@ class ResponseSurface:
 
         starts, increments = np.asarray(self.starts), np.asarray(self.increments)
         return best_of(tuple(climb(start, units) for start, units in zip(starts, increments, strict=True)))
+
+
+@dataclass(frozen=True)
+class Continued:
+    """Two methods in a row: a cheap one that finds the hill, and one that climbs it.
+
+    Parameters
+    ----------
+    first : Method
+        Finds where to begin.
+    second : callable
+        `second(parameters)`: the method that begins there.
+    first_problem : Problem, optional
+        What the first one fits, if it is a simpler problem with the same observations.
+    name : str
+        What tables call it.
+
+    Examples
+    --------
+    >>> class Hill:
+    ...     names, n_observations = ("x",), 1
+    ...     def residuals(self, parameters, chosen):
+    ...         return parameters - 3.0
+    ...     def score(self, parameters, chosen):
+    ...         return 1.0 - float((parameters[0] - 3.0) ** 2)
+    >>> wide = ResponseSurface([[0.0]], [0.5])
+    >>> narrow = lambda parameters: ResponseSurface([parameters], [0.01])
+    >>> Continued(wide, narrow, name="both").fit(Hill(), np.arange(1)).parameters.round(2).tolist()
+    [3.0]
+    """
+
+    first: Method
+    second: Callable[[FloatArray], Method]
+    first_problem: Problem | None = None
+    name: str = "continued"
+
+    def fit(self, problem: Problem, chosen: IntArray) -> Fit:
+        """Fit with the first method, then with the second from where it ended; the effort is that of both."""
+        begun = self.first.fit(problem if self.first_problem is None else self.first_problem, chosen)
+        ended = self.second(begun.parameters).fit(problem, chosen)
+        return replace(
+            ended,
+            n_evaluations=begun.n_evaluations + ended.n_evaluations,
+            seconds=begun.seconds + ended.seconds,
+        )

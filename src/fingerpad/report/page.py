@@ -19,6 +19,7 @@ from fingerpad.report import (
     nail,
     population,
     single_unit,
+    single_unit_methods,
     skin_deflection,
     spike_fit,
     tables,
@@ -74,7 +75,7 @@ CHAPTERS = (
         "single_unit",
         "Level 2: single afferent",
         (Drawing(5, "figure_5_single_unit", "Rates under a bar", single_unit.draw, single_unit.caption),),
-        tables.single_unit,
+        lambda section: tables.single_unit(section) + single_unit_methods.tables(section),
     ),
     Chapter(
         "drive_quantities",

@@ -28,6 +28,8 @@ from fingerpad.studies import (
     drive_quantities,
     nail_border,
     single_unit,
+    single_unit_methods,
+    single_unit_starts,
     skin_deflection,
     sphere_discrimination,
     spike_fit,
@@ -130,13 +132,24 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
     deflection, bar_responses = responses["skin deflection"], responses["bar, 36 shifts"]
     sphere_responses, nail_response = responses["spheres"], responses["nail"]["nail"]
 
-    with _timed("fit and discrimination", 5, progress, stages) as advance:
-        bar_sed = single_unit.receptor_sed(list(bar_responses.values()))
+    with _timed("fit and discrimination", 6, progress, stages) as advance:
+        bars = list(bar_responses.values())
+        bar_sed = single_unit.receptor_sed(bars)
         problem = single_unit.rate_problem(bar_sed)
         best, folds = single_unit.fit(problem)
         advance()
+        beyond = {
+            "starts": single_unit_starts.result(problem, single_unit.receptor_traces(bars, "von_mises")),
+            "methods": single_unit_methods.result(
+                single_unit_methods.traces_beside(bars),
+                single_unit.receptor_sed(bars, single_unit_methods.OTHER_DYNAMIC_QUANTITY),
+                problem.recordings,
+                (best, folds),
+            ),
+        }
+        advance()
         drives = drive_quantities.result(
-            drive_quantities.receptor_traces(list(bar_responses.values()), drive_quantities.SHOWN_QUANTITIES),
+            drive_quantities.receptor_traces(bars, drive_quantities.SHOWN_QUANTITIES),
             problem.recordings,
             np.random.default_rng(conditions.seed),
         )
@@ -150,7 +163,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
         standard = sphere_responses[STANDARD_SPHERE]
         results: dict[str, Any] = {
             "skin_deflection": skin_deflection.result(deflection),
-            "single_unit": single_unit.result(problem, best, folds),
+            "single_unit": single_unit.result(problem, best, folds) | beyond,
             "drive_quantities": drives,
             "spike_fit": spike_trains,
             "discrimination": discrimination,

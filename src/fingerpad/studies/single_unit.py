@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fingerpad.afferent import PARAMETER_NAMES
 from fingerpad.checks import FloatArray
@@ -23,7 +25,7 @@ from fingerpad.indenters import Bar
 from fingerpad.parameters import neuron, protocol
 from fingerpad.reference import bar_firing_rates
 from fingerpad.sampling import SkinResponse
-from fingerpad.signals import SedTraces
+from fingerpad.signals import STORED_ENERGY, SedTraces
 from fingerpad.spikes import modulation_difference, modulation_index
 from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.transduction import drive
@@ -32,6 +34,9 @@ INCREMENT = 0.01
 """Coding increment over the start value; the paper's are "typically two orders of magnitude smaller"."""
 
 UNITS = ("mA", "mA ms/kPa", "mA/kPa", "ms", "mF", "mV")
+RECEPTOR = ((RECEPTOR_X_MM, 0.0),)
+"""Where the end organ lies: x and z on the skin. [mm]"""
+
 LOWEST_SHARE = 0.05
 """Time constant, capacitance and threshold stay above this share of their start, to stay physical."""
 
@@ -52,28 +57,59 @@ def touches(conditions: Conditions) -> list[Touch]:
     ]
 
 
-def receptor_sed(responses: list[SkinResponse]) -> SedTraces:
-    """Strain energy density at the one receptor, one column per shift of the bar."""
-    traces = [skin.sed([[RECEPTOR_X_MM, 0.0]]) for skin in responses]
+def receptor_sed(responses: list[SkinResponse], dynamic_quantity: str = STORED_ENERGY) -> SedTraces:
+    """Strain energy density at the one receptor, one column per shift of the bar.
+
+    Parameters
+    ----------
+    responses : list of SkinResponse
+        One per shift.
+    dynamic_quantity : str, optional
+        What the dynamic term follows; by default the same.
+    """
+    if dynamic_quantity != STORED_ENERGY:
+        energy = receptor_sed(responses)
+        followed = np.hstack([skin.sample(dynamic_quantity, RECEPTOR) for skin in responses])
+        return replace(energy, dynamic_kpa=followed, dynamic_quantity=dynamic_quantity)
+    traces = [skin.sed(RECEPTOR) for skin in responses]
     return SedTraces(traces[0].times_ms, np.hstack([trace.sed_kpa for trace in traces]), traces[0].kinks_ms)
 
 
-def start_points() -> FloatArray:
-    """Both start points of the paper, (2, 6), the printed dynamic gains rescaled.
+def receptor_traces(responses: list[SkinResponse], quantity: str) -> SedTraces:
+    """Another quantity at the receptor in the place of strain energy density, one column per shift.
 
-    See docs/decisions for why the printed k_d is multiplied by one factor in both.
+    Parameters
+    ----------
+    responses : list of SkinResponse
+        One per shift.
+    quantity : str
+        By the names of `SkinResponse.sample`.
     """
-    scale = neuron.DYNAMIC_GAIN_SCALE.value
+    sampled = np.hstack([skin.sample(quantity, RECEPTOR) for skin in responses])
+    return SedTraces(responses[0].times_ms, sampled, np.array(responses[0].kinks_ms))
+
+
+def printed_starts() -> FloatArray:
+    """Both start points of the paper as they are printed, (2, 6), read with energy density in kPa."""
     shared = (neuron.TIME_CONSTANT.value, neuron.CAPACITANCE.value, neuron.THRESHOLD.value)
     return np.array(
         [
-            [neuron.INTERCEPT_START.value, scale * dynamic.value, static.value, *shared]
+            [neuron.INTERCEPT_START.value, dynamic.value, static.value, *shared]
             for dynamic, static in (
                 (neuron.DYNAMIC_GAIN_START_1, neuron.STATIC_GAIN_START_1),
                 (neuron.DYNAMIC_GAIN_START_2, neuron.STATIC_GAIN_START_2),
             )
         ]
     )
+
+
+def start_points() -> FloatArray:
+    """Both start points of the paper, (2, 6), the printed gains rescaled.
+
+    See docs/decisions/dynamic-gain-rescaled.md for why one factor on k_d and one on k_s, the same in both.
+    """
+    scales = [1.0, neuron.DYNAMIC_GAIN_SCALE.value, neuron.STATIC_GAIN_SCALE.value, 1.0, 1.0, 1.0]
+    return printed_starts() * scales
 
 
 def increments(starts: FloatArray) -> FloatArray:
@@ -96,19 +132,33 @@ def bar_recordings() -> RateRecordings:
     return RateRecordings(names, observed.dynamic_rate_hz, observed.static_rate_hz, observed.source)
 
 
-def response_surface() -> ResponseSurface:
-    """Return the paper's method from its two start points; what is of the membrane stays physical."""
-    starts = start_points()
+def response_surface(starts: FloatArray | None = None) -> ResponseSurface:
+    """Return the paper's method; what is of the membrane stays physical.
+
+    Parameters
+    ----------
+    starts : array (n_starts, 6), optional
+        Start points; default: the paper's two, rescaled.
+    """
+    starts = start_points() if starts is None else starts
     bounds = np.array([-np.inf, 0.0, 0.0, *(LOWEST_SHARE * starts[0, 3:])])
     return ResponseSurface(starts, increments(starts), bounds)
 
 
-def fit(problem: RateProblem) -> tuple[Fit, CrossValidation]:
-    """Best fit to all shifts from both start points, and the six folds."""
+def fit(problem: RateProblem, memberships: ArrayLike | None = None) -> tuple[Fit, CrossValidation]:
+    """Best fit to all shifts from both start points, and the six folds.
+
+    Parameters
+    ----------
+    problem : RateProblem
+        From `rate_problem`.
+    memberships : int array (n_shifts,), optional
+        Fold of each shift, as `fingerpad.fitting.folds_of` makes them from a table like the paper's Table 3;
+        default: dealt out in turn.
+    """
     method, everything = response_surface(), np.arange(problem.n_observations)
-    return method.fit(problem, everything), cross_validate(
-        problem, method, interleaved_folds(everything.size)
-    )
+    folds = interleaved_folds(everything.size) if memberships is None else memberships
+    return method.fit(problem, everything), cross_validate(problem, method, folds)
 
 
 def result(problem: RateProblem, best: Fit, folds: CrossValidation) -> dict[str, Any]:

@@ -1,0 +1,117 @@
+"""Fitting one afferent to its rates under a bar, given strain energy density, the paper's way and others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from benchmarks.measuring import Spread, run_job
+from benchmarks.results import Report, Table
+from fingerpad.fitting import cross_validate, interleaved_folds
+from fingerpad.signals import SedTraces
+from fingerpad.store import Store, solve_missing
+from fingerpad.studies import single_unit, single_unit_methods
+from fingerpad.studies.conditions import Conditions
+from fingerpad.transduction import drive
+
+JOBS, REPEATS = 2, 3
+RESOLUTION = "quick"
+"""Of the presses, which are not timed: a fit takes as long on the finest mesh, for it sees one receptor."""
+
+
+def press(folder: str, traces: str) -> dict[str, Any]:
+    """Press the bar at all shifts and keep what the receptor feels.
+
+    Parameters
+    ----------
+    folder, traces : str
+        Where presses are stored, and the file to be written.
+
+    Returns
+    -------
+    dict
+        Number of times and of shifts.
+    """
+    touches, store = single_unit.touches(Conditions(resolution=RESOLUTION)), Store(Path(folder))
+    solve_missing(touches, store, JOBS, lambda seconds: None)
+    sed = single_unit.receptor_sed([store.load(touch) for touch in touches])
+    np.savez(traces, times_ms=sed.times_ms, sed_kpa=sed.sed_kpa, kinks_ms=sed.kinks_ms)
+    return {"times": sed.times_ms.size, "shifts": sed.n_sites}
+
+
+def fit(traces: str) -> dict[str, Any]:
+    """Fit all folds by every method, one thread.
+
+    Parameters
+    ----------
+    traces : str
+        Written by `press`.
+
+    Returns
+    -------
+    dict
+        By method: seconds, runs of the model and FSS on the testing positions; seconds of one run.
+    """
+    with np.load(traces) as stored:
+        sed = SedTraces(stored["times_ms"], stored["sed_kpa"], stored["kinks_ms"])
+    driven = drive(sed)
+    six = single_unit.rate_problem(sed)
+    four = single_unit_methods.four_numbers(driven, six.recordings)
+    folds = interleaved_folds(six.n_observations)
+    cases = [(six, single_unit.response_surface())]
+    cases += [(four, method) for method in single_unit_methods.methods(four, driven)]  # type: ignore[misc]
+    start = single_unit.start_points()[0]
+    six.score(start, np.arange(six.n_observations))  # loads compiled kernels
+    found: dict[str, Any] = {}
+    for problem, method in cases:
+        started = perf_counter()
+        crossed = cross_validate(problem, method, folds)
+        found[method.name] = {
+            "seconds": perf_counter() - started,
+            "runs": sum(fold.fit.n_evaluations for fold in crossed.folds),
+            "fss": crossed.score_test,
+        }
+    return found
+
+
+def measure() -> Report:
+    """Press once, then fit in fresh processes."""
+    with TemporaryDirectory() as name:
+        traces = str(Path(name) / "traces.npz")
+        run_job("fitting", "press", 1, folder=str(Path(name) / "indentations"), traces=traces)
+        runs = [run_job("fitting", "fit", 1, traces=traces).answer for _ in range(REPEATS)]
+    seconds = {method: Spread.of([run[method]["seconds"] for run in runs]) for method in runs[0]}
+    paper = single_unit.response_surface().name
+    return Report(
+        name="fitting",
+        title="Fits",
+        about=(
+            "One afferent, 36 positions of a bar, six folds, given what the receptor feels; one thread, "
+            f"{REPEATS} runs each in fresh processes: median (smallest to largest)."
+        ),
+        tables=[
+            Table(
+                "All six folds:",
+                ["method", "s", "runs of the model", "ms per run", "FSS on testing positions"],
+                [
+                    [
+                        method,
+                        str(spread),
+                        runs[0][method]["runs"],
+                        round(1000.0 * spread.median / runs[0][method]["runs"], 3),
+                        round(runs[0][method]["fss"], 3),
+                    ]
+                    for method, spread in seconds.items()
+                ],
+            )
+        ],
+        measured={"session_s": seconds[paper].median},
+        notes=[
+            f"The {paper} method is the paper's, from its two starts; the others fit four numbers, not six.",
+            f"Strain energy density at {RESOLUTION} resolution; FSS at standard is in docs/single-unit.md.",
+        ],
+    )
