@@ -49,7 +49,7 @@ MATERIALS = (
     "gerling2014_fit",
 )
 FORMATS = ("vtu", "abaqus", "calculix", "febio")
-FITTING_METHODS = ("response_surface", "likelihood")
+FITTING_METHODS = ("least_squares", "response_surface", "closed_form", "cma_es", "likelihood")
 QUANTITIES = ("stored", "instantaneous", "work", "von_mises", "compressive_strain", "compressive_stress")
 REFINEMENTS = {"fine": "mesh_refinement", "paper": "paper_size"}
 """What options may be, as the help names them; indenters with their class, finer meshes with
@@ -186,7 +186,7 @@ def fit_command(
             f"{', '.join(QUANTITIES[1:])}."
         ),
     ] = "stored",
-    method: Annotated[str, typer.Option(help=f"One of {', '.join(FITTING_METHODS)}.")] = "response_surface",
+    method: Annotated[str, typer.Option(help=f"One of {', '.join(FITTING_METHODS)}.")] = "least_squares",
     posterior: Annotated[
         bool, typer.Option("--posterior", help="Draw credible intervals of parameters and rates as well.")
     ] = False,

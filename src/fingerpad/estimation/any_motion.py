@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +10,8 @@ import numpy as np
 from fingerpad.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.checks import FloatArray
 from fingerpad.errors import InputError
+from fingerpad.estimation.closed_form import ClosedFormModel
+from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.fitting.problem import IntArray
 from fingerpad.parameters import neuron, protocol
 from fingerpad.signals import SedTraces
@@ -121,6 +123,49 @@ class AnyMotion:
         dynamic, static = np.empty((2, self.n_stimuli))
         for group, columns in zip(self.drives, self.stimuli, strict=True):
             dynamic[columns], static[columns] = afferent.rates(group, *self.windows_ms)
+        return dynamic, static
+
+
+@dataclass(frozen=True)
+class AnyMotionInClosedForm:
+    """The same stimuli in the closed form of constant drive, a source of slopes; a `SmoothRateModel`.
+
+    Parameters
+    ----------
+    stimuli : AnyMotion
+        Drives, windows and rest.
+    """
+
+    stimuli: AnyMotion
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The four numbers that firing can tell."""
+        return IDENTIFIABLE_NAMES
+
+    @property
+    def n_stimuli(self) -> int:
+        """Number of stimuli."""
+        return self.stimuli.n_stimuli
+
+    def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Dynamic and static rates. [spikes/s]"""
+        return self._collected(lambda group: group.rates(parameters))
+
+    def slopes(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Slopes of both rates along the four numbers, (n_stimuli, 4) each."""
+        return self._collected(lambda group: group.slopes(parameters))
+
+    def _collected(
+        self, told: Callable[[ClosedFormModel], tuple[FloatArray, FloatArray]]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Put what each group tells in the order of the stimuli."""
+        order = np.argsort(np.concatenate(self.stimuli.stimuli))
+        answers = [
+            told(ClosedFormModel(group, self.stimuli.refractory_ms, windows_ms=self.stimuli.windows_ms))
+            for group in self.stimuli.drives
+        ]
+        dynamic, static = (np.concatenate(phase)[order] for phase in zip(*answers, strict=True))
         return dynamic, static
 
 

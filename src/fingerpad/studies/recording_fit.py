@@ -40,7 +40,7 @@ def fit_recordings(
     recordings: RateRecordings | SpikeRecordings,
     memberships: ArrayLike | None = None,
     *,
-    method: str = "response_surface",
+    method: str = "least_squares",
     windows_ms: Windows = WINDOWS_MS,
     seed: int = 0,
     with_posterior: bool = False,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,9 +13,9 @@ from fingerpad.afferent import Afferent
 from fingerpad.checks import FloatArray
 from fingerpad.errors import InputError
 from fingerpad.escape_rate import EscapeRate
-from fingerpad.estimation.any_motion import AnyMotion, Windows
-from fingerpad.estimation.identifiable import identifiable, six_parameters
-from fingerpad.estimation.rate_problem import RateProblem
+from fingerpad.estimation.any_motion import AnyMotion, AnyMotionInClosedForm, Windows
+from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
+from fingerpad.estimation.rate_problem import RateProblem, Reparametrised
 from fingerpad.estimation.recordings import RateRecordings, SpikeRecordings
 from fingerpad.estimation.spike_fit import fit_spikes
 from fingerpad.estimation.spike_likelihood import (
@@ -27,13 +27,25 @@ from fingerpad.estimation.spike_parameters import (
 )
 from fingerpad.fitting import CrossValidation, Fit, Method
 from fingerpad.fitting.covariance import jackknife_covariance
+from fingerpad.fitting.covariance_adaptation import CovarianceAdaptation
+from fingerpad.fitting.least_squares import LeastSquares
+from fingerpad.fitting.methods import Continued
 from fingerpad.fitting.problem import IntArray, Problem
 from fingerpad.parameters import neuron
 from fingerpad.random_streams import Presentations
 from fingerpad.signals import SpikeTrains
 from fingerpad.spikes import firing_rate_hz
 from fingerpad.studies import single_unit, spike_fit
+from fingerpad.studies.single_unit_methods import (
+    FIRST_SPREAD,
+    MOST_EVALUATIONS,
+    Bounds,
+    bounds_of,
+    by_differences,
+)
 from fingerpad.transduction import Drive
+
+MethodOf = Callable[[RateProblem, Bounds], Method]
 
 PREDICTED_PRESENTATIONS = 20
 """Presentations whose mean is the rate that an afferent with a soft threshold is said to have."""
@@ -115,6 +127,64 @@ def _scatter_of(six: Callable[[FloatArray], FloatArray]) -> Callable[[Fit, Cross
     return lambda fit, folds: jackknife_covariance(
         [identifiable(six(fold.fit.parameters)) for fold in folds.folds]
     )
+
+
+def _four_numbers(model: AnyMotion, rates: RateRecordings, method_of: MethodOf) -> Prepared:
+    """Prepare a method for the four numbers that firing can tell, all methods with the same bounds."""
+    problem = RateProblem(Reparametrised(model, IDENTIFIABLE_NAMES, six_parameters), rates)
+    # Bounds only ask how strong a drive becomes, whatever the motion.
+    sed, rate = (
+        np.array([[max(float(getattr(group, name).max()) for group in model.drives)]] * 2)
+        for name in ("sed_kpa", "rate_kpa_per_ms")
+    )
+    envelope = Drive(np.array([0.0, 1.0]), sed, rate)
+    return Prepared(
+        problem,
+        method_of(problem, bounds_of(envelope)),
+        six_parameters,
+        _scatter_of(six_parameters),
+    )
+
+
+def _least_squares(
+    model: AnyMotion, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
+) -> Prepared:
+    """Prepare least squares by differences, from starts all over the range."""
+    return _four_numbers(model, rates, lambda problem, bounds: by_differences(bounds))
+
+
+def _closed_form(
+    model: AnyMotion, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
+) -> Prepared:
+    """Prepare least squares along the slopes of the rate in closed form."""
+    return _four_numbers(model, rates, lambda problem, bounds: _along_slopes(model, problem, bounds))
+
+
+def _along_slopes(model: AnyMotion, problem: RateProblem, bounds: Bounds) -> LeastSquares:
+    slopes = problem.jacobian_of(AnyMotionInClosedForm(model))
+    return replace(by_differences(bounds), jacobian=slopes, name="slopes in closed form")
+
+
+def _evolution(
+    model: AnyMotion, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
+) -> Prepared:
+    """Prepare CMA-ES from where the slopes in closed form lead."""
+
+    def method_of(problem: RateProblem, bounds: Bounds) -> Method:
+        def search(begun: FloatArray) -> CovarianceAdaptation:
+            return CovarianceAdaptation(
+                begun,
+                bounds.scales,
+                bounds.low,
+                bounds.high,
+                first_spread=FIRST_SPREAD,
+                most_evaluations=MOST_EVALUATIONS,
+                seed=seed,
+            )
+
+        return Continued(_along_slopes(model, problem, bounds), search, name="CMA-ES")
+
+    return _four_numbers(model, rates, method_of)
 
 
 @dataclass(frozen=True)
@@ -227,7 +297,10 @@ def _likelihood(
 
 
 METHODS: dict[str, Callable[[AnyMotion, RateRecordings | SpikeRecordings, RateRecordings, int], Prepared]] = {
+    "least_squares": _least_squares,
     "response_surface": _response_surface,
+    "closed_form": _closed_form,
+    "cma_es": _evolution,
     "likelihood": _likelihood,
 }
 """What fits recordings, by the names that the command line gives: from the model under the stimuli, what was

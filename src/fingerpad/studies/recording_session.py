@@ -71,7 +71,7 @@ class RecordingFit:
     recorded: Recorded
     conditions: Conditions
     folder: Path
-    method: str = "response_surface"
+    method: str = "least_squares"
     n_folds: int | None = None
     windows_ms: Windows = WINDOWS_MS
     jobs: int = 1
