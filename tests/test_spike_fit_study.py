@@ -10,6 +10,7 @@ from fingerpad.afferent import Afferent
 from fingerpad.estimation.spike_parameters import (
     SPIKE_PARAMETER_NAMES,
 )
+from fingerpad.random_streams import Presentations
 from fingerpad.report import spike_fit as report
 from fingerpad.report.appearance import png
 from fingerpad.signals import SedTraces
@@ -114,6 +115,10 @@ def test_spikes_of_other_noise_are_told_from_those_of_a_soft_threshold(found):
 
 def test_the_raster_shows_the_first_presentation_of_each_position(found):
     raster = found["raster"]
+    driven, true = drive(bar(), pieces=8), found["recovery"]["truth"]
+    once = spike_fit.soft_spikes(driven, true, Presentations.of_one_afferent(SHIFT_MM.size), SEED)
+    for number, train in enumerate(raster["spikes_ms"]):
+        np.testing.assert_array_equal(train, once[number])
     counts = [len(train) for train in raster["spikes_ms"]]
     assert len(counts) == SHIFT_MM.size
     assert raster["shown"] == int(np.argmax(counts))
