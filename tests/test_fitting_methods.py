@@ -93,6 +93,11 @@ def test_large_differences_see_past_jumps_that_blind_small_ones() -> None:
     assert narrow.score < wide.score - 0.05
 
 
+def test_exact_slopes_lead_there_in_a_few_steps() -> None:
+    """Slopes in other units than the steps' would need four times as many."""
+    assert LeastSquares([START], SCALES, jacobian=Decay().jacobian).fit(Decay(), ALL).n_evaluations <= 12
+
+
 def test_only_the_most_promising_starts_are_refined_and_the_best_is_kept() -> None:
     starts = np.array([[9.0, 4.0], [1.9, 0.7], [9.0, 9.0], [2.5, 1.0]])
     problem = Decay()

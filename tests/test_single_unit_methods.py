@@ -57,12 +57,12 @@ def recordings() -> RateRecordings:
 
 @pytest.fixture(scope="module")
 def starts(recordings) -> dict:
-    problem = replace(single_unit.rate_problem(traces(scale=0.3)), recordings=recordings)
+    problem = replace(single_unit.rate_problem(traces(scale=0.6)), recordings=recordings)
     return single_unit_starts.result(problem, traces(scale=10.0))
 
 
 def test_each_unit_multiplies_the_printed_gains(starts, recordings):
-    problem = replace(single_unit.rate_problem(traces(scale=0.3)), recordings=recordings)
+    problem = replace(single_unit.rate_problem(traces(scale=0.6)), recordings=recordings)
     rows = {(row["quantity"], row["unit"]): row for row in starts["units"]}
     assert len(rows) == 6
     for unit, factor in (("MPa", 1e-3), ("kPa", 1.0), ("Pa", 1e3)):
@@ -80,7 +80,7 @@ def test_each_unit_multiplies_the_printed_gains(starts, recordings):
 
 
 def test_the_map_of_scales_holds_the_score_of_each(starts, recordings):
-    problem = replace(single_unit.rate_problem(traces(scale=0.3)), recordings=recordings)
+    problem = replace(single_unit.rate_problem(traces(scale=0.6)), recordings=recordings)
     scales = starts["scales"]
     six = np.array([0.0, 8e-9 * 3.0 * 1e4, 7e-7 * 3.0, 68.0, 1e-6, 50.0])
     row, column = scales["energy_scale"].index(3.0), scales["dynamic_ratio"].index(1e4)
@@ -88,7 +88,7 @@ def test_the_map_of_scales_holds_the_score_of_each(starts, recordings):
 
 
 def test_the_papers_session_leaves_its_fold_out_and_begins_where_it_says(starts, recordings):
-    problem = replace(single_unit.rate_problem(traces(scale=0.3)), recordings=recordings)
+    problem = replace(single_unit.rate_problem(traces(scale=0.6)), recordings=recordings)
     training = np.flatnonzero(interleaved_folds(36) != 2)
     printed, second, ours = starts["sessions"]
     assert (printed["static_scale"], printed["dynamic_scale"]) == (1.0, 1.0)
