@@ -20,6 +20,7 @@ from fingerpad.report import (
     population,
     single_unit,
     single_unit_methods,
+    single_unit_uncertainty,
     skin_deflection,
     spike_fit,
     tables,
@@ -76,6 +77,20 @@ CHAPTERS = (
         "Level 2: single afferent",
         (Drawing(5, "figure_5_single_unit", "Rates under a bar", single_unit.draw, single_unit.caption),),
         lambda section: tables.single_unit(section) + single_unit_methods.tables(section),
+    ),
+    Chapter(
+        "single_unit_uncertainty",
+        "Level 2: what the rates determine",
+        (
+            Drawing(
+                11,
+                "figure_11_uncertainty",
+                "What rates under a bar determine",
+                single_unit_uncertainty.draw,
+                single_unit_uncertainty.caption,
+            ),
+        ),
+        single_unit_uncertainty.tables,
     ),
     Chapter(
         "drive_quantities",

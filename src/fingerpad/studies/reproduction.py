@@ -30,6 +30,7 @@ from fingerpad.studies import (
     single_unit,
     single_unit_methods,
     single_unit_starts,
+    single_unit_uncertainty,
     skin_deflection,
     sphere_discrimination,
     spike_fit,
@@ -132,7 +133,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
     deflection, bar_responses = responses["skin deflection"], responses["bar, 36 shifts"]
     sphere_responses, nail_response = responses["spheres"], responses["nail"]["nail"]
 
-    with _timed("fit and discrimination", 6, progress, stages) as advance:
+    with _timed("fit and discrimination", 7, progress, stages) as advance:
         bars = list(bar_responses.values())
         bar_sed = single_unit.receptor_sed(bars)
         problem = single_unit.rate_problem(bar_sed)
@@ -170,6 +171,11 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
             "population": sphere_discrimination.population_map(standard, afferent),
             "nail": nail_border.result(nail_response),
         }
+        advance()
+        if conditions.resolution != "quick":  # some ten seconds that a quick look does not wait for
+            results["single_unit_uncertainty"] = single_unit_uncertainty.result(
+                bar_sed, best.parameters, conditions.seed
+            )
         advance()
     results["comparison"] = comparison(results)
     results["inputs"] = [asdict(number) for number in all_published()]

@@ -1,0 +1,208 @@
+"""Level 2: what the rates under the bar determine of the afferent, and what they leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from fingerpad.parameters import protocol
+from fingerpad.report.appearance import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, numbers
+from fingerpad.report.tables import Row, Table
+from fingerpad.report.words import ABSENT, fixed, number
+
+PHASES = {"dynamic": "dynamic ramp", "static": "static hold"}
+SYMBOLS = {
+    "intercept_per_ms": "β/(C v)",
+    "dynamic_gain_per_kpa": "k_d/(C v)",
+    "static_gain_per_kpa_ms": "k_s/(C v)",
+    "time_constant_ms": "τ",
+}
+GAINS = {
+    "intercept_ma": ("β", "mA"),
+    "dynamic_gain": ("k_d", "mA ms/kPa"),
+    "static_gain": ("k_s", "mA/kPa"),
+}
+LARGEST_LOSS = 5.0
+"""Losses of log likelihood that are drawn; an interval of 95 % ends at 1.92."""
+
+
+def draw(section: Mapping[str, Any]) -> Figure:
+    """Draw the bands of predicted rates and of new recordings, and the profile of each number.
+
+    Parameters
+    ----------
+    section : dict
+        `results["single_unit_uncertainty"]`.
+
+    Returns
+    -------
+    Figure
+    """
+    figure = new_figure(10.0, 7.5)
+    grid = figure.add_gridspec(2, 4)
+    shift = numbers(section["shift_mm"])
+    for column, (phase, name) in enumerate(PHASES.items()):
+        if phase not in section["rates"]:
+            continue
+        names = ("observed_hz", "median_hz", "low_hz", "high_hz", "new_low_hz", "new_high_hz")
+        rates = {key: numbers(section["rates"][phase][key]) for key in names}
+        axes = figure.add_subplot(grid[0, 2 * column : 2 * column + 2])
+        bands = {"new recording": ("new_", PALE, 1.0), "prediction": ("", BLUE, 0.45)}
+        for label, (kind, colour, alpha) in bands.items():
+            low, high = rates[f"{kind}low_hz"], rates[f"{kind}high_hz"]
+            axes.fill_between(shift, low, high, color=colour, alpha=alpha, linewidth=0.0, label=label)
+        axes.plot(shift, rates["median_hz"], color=BLUE, label="median")
+        points: dict[str, Any] = {"color": BLACK, "markerfacecolor": "white", "markersize": 4.5}
+        axes.plot(shift, rates["observed_hz"], "o", label="observed", **points)
+        axes.set_title(f"({'ab'[column]}) {name}")
+        axes.set_xlabel("position of the bar, proximal positive [mm]")
+        axes.set_ylabel("firing rate [spikes/s]")
+        axes.set_ylim(bottom=0.0)
+        if column == 0:
+            figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    for column, profile in enumerate(section["profiles"]):
+        _profile(figure.add_subplot(grid[1, column]), profile, section, "cdef"[column])
+    return figure
+
+
+def _profile(axes: Any, profile: Mapping[str, Any], section: Mapping[str, Any], letter: str) -> None:
+    name = profile["name"]
+    axes.plot(numbers(profile["values"]), numbers(profile["losses"]), ".-", color=BLACK, linewidth=1.2)
+    axes.axhline(1.92, color=GREY, linestyle="--", linewidth=1.0)
+    axes.axvline(section["fit"][name], color=ORANGE, linestyle="-.", linewidth=1.4)
+    found = section["posterior"][name]
+    axes.plot([found["low"], found["high"]], [-0.25, -0.25], color=BLUE, linewidth=4.0, solid_capstyle="butt")
+    axes.set_ylim(-0.5, LARGEST_LOSS)
+    axes.set_title(f"({letter}) {SYMBOLS[name]}")
+    axes.set_xlabel(f"{SYMBOLS[name]} [{section['units'][name]}]")
+    if letter == "c":
+        axes.set_ylabel("loss of log likelihood")
+
+
+def caption(section: Mapping[str, Any]) -> str:
+    """Say what the bands, the profiles and their marks are."""
+    level = f"{100.0 * section['level']:.0f} %"
+    within = ", ".join(
+        f"{100.0 * rates['share_within_new']:.0f} % of the {phase} ones"
+        for phase, rates in section["rates"].items()
+    )
+    return (
+        f"What {len(section['shift_mm'])} positions of a bar {protocol.BAR_WIDTH.value} mm wide tell of one "
+        f"afferent. (a, b) {level} bands: blue, of the rates that the posterior predicts; pale, of a new "
+        f"recording, which departs from them as the observed one does. Of the observed rates {within} lie "
+        "within. (c-f) Loss of log likelihood with one number held and the others fitted anew; points below "
+        f"the dashed line are within the {level} interval, the bar beneath is that of the posterior, and the "
+        "orange line is the fit by response surfaces, which weighs phases differently. Profiles have lumps "
+        "since rates jump where a spike enters a window."
+    )
+
+
+def tables(section: Mapping[str, Any]) -> list[Table]:
+    """Return the numbers in both forms, the residuals, the sensitivity and the convergence."""
+    return [_determined(section), _residuals(section), _sensitivity(section), _convergence(section)]
+
+
+def _determined(section: Mapping[str, Any]) -> Table:
+    profiles = {profile["name"]: profile for profile in section["profiles"]}
+    rows = [
+        Row(
+            (
+                f"{symbol} [{section['units'][name]}]",
+                number(section["fit"][name]),
+                *_interval(section["posterior"][name]),
+                *_ends(profiles[name]),
+            )
+        )
+        for name, symbol in SYMBOLS.items()
+    ]
+    rows += [
+        Row((f"{symbol} [{unit}]", ABSENT, *_interval(section["posterior"][name]), ABSENT))
+        for name, (symbol, unit) in GAINS.items()
+    ]
+    rows.append(Row(("β τ/(C v) [1]", ABSENT, *_interval(section["posterior"]["resting_share"]), ABSENT)))
+    level = f"{100.0 * section['level']:.0f} %"
+    rank = section["identifiability"]["rank"]
+    smallest = numbers(section["identifiability"]["relative_singular_values"])
+    note = (
+        "Spikes tell four numbers. β, k_d, k_s, C and v are known only up to a common scale; the three gains "
+        f"are given for C = {number(section['capacitance_mf'])} mF and v = {number(section['threshold_mv'])} "
+        f"mV, as fitted. Of the six singular values of the rates' Jacobian {rank} are not zero; relative to "
+        f"the largest they are {', '.join(number(value, 2) for value in smallest[:rank])}, and the others at "
+        f"most {number(float(smallest[rank:].max()), 1) if rank < smallest.size else ABSENT}."
+    )
+    columns = ("number", "fit", "median", f"{level} credible interval", f"{level} by profile likelihood")
+    return Table("What the rates determine", columns, rows, note)
+
+
+def _interval(found: Mapping[str, Any]) -> tuple[str, str]:
+    return number(found["median"]), f"{number(found['low'])} … {number(found['high'])}"
+
+
+def _ends(profile: Mapping[str, Any]) -> tuple[str]:
+    ends = [profile["low"], profile["high"]]
+    return (" … ".join("open" if end is None else number(end) for end in ends),)
+
+
+def _residuals(section: Mapping[str, Any]) -> Table:
+    rows = [
+        Row(
+            (
+                PHASES[phase],
+                *_interval(rates["residual_deviation_hz"]),
+                *_interval(rates["residual_length_mm"]),
+                number(rates["probability_of_independence"], 2),
+                fixed(rates["share_within_new"], 2),
+            )
+        )
+        for phase, rates in section["rates"].items()
+    ]
+    columns = (
+        "phase", "standard deviation [spikes/s]", "interval", "alike over [mm]", "interval",
+        "probability of independence", "observed within the band",
+    )  # fmt: skip
+    note = (
+        "Residuals of neighbouring positions are alike. That they may be raises the largest log likelihood "
+        f"by {number(section['evidence_for_alike_residuals'])}."
+    )
+    return Table("What the model leaves over", columns, rows, note)
+
+
+def _sensitivity(section: Mapping[str, Any]) -> Table:
+    found = section["sensitivity"]
+    rows = [
+        Row(
+            (
+                f"{symbol} [{section['units'][name]}]",
+                f"{number(found['lower'][index])} … {number(found['upper'][index])}",
+                f"{fixed(found['first'][index], 2)} ± {fixed(found['first_half_width'][index], 2)}",
+                f"{fixed(found['total'][index], 2)} ± {fixed(found['total_half_width'][index], 2)}",
+            )
+        )
+        for index, (name, symbol) in enumerate(SYMBOLS.items())
+    ]
+    note = (
+        "Share of the variance of the weighted FSS when each number is uniform within its range: by itself, "
+        f"and with all that it does together with others. FSS is {fixed(found['mean_fss'], 3)} ± "
+        f"{fixed(found['deviation_fss'], 3)} over the ranges; {found['evaluations']} evaluations."
+    )
+    columns = ("number", "range", "first-order index", "total index")
+    return Table("What the fit is sensitive to (Sobol)", columns, rows, note)
+
+
+def _convergence(section: Mapping[str, Any]) -> Table:
+    names = {
+        "ensembles": "independent ensembles",
+        "walkers": "walkers of each",
+        "draws": "draws kept",
+        "evaluations": "evaluations of the model",
+        "acceptance": "share of moves taken",
+        "r_hat": "largest split R-hat",
+        "effective_draws": "effective draws, at least",
+        "effective_draws_of_tails": "effective draws of the tails, at least",
+        "draws_per_effective_draw": "autocorrelation, draws per effective one, at most",
+    }
+    found = section["convergence"]
+    rows = [Row((text, number(found[key], 4 if key == "r_hat" else 3))) for key, text in names.items()]
+    return Table("Convergence of the posterior", ("measure", "value"), rows)

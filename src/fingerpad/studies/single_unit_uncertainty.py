@@ -1,0 +1,227 @@
+"""Level 2: what the rates under the shifted bar determine of the afferent, and what they leave open."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.afferent import PARAMETER_NAMES
+from fingerpad.checks import FloatArray
+from fingerpad.estimation.afferent_posterior import AfferentPosterior, afferent_posterior, four_number_model
+from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, identifiable
+from fingerpad.estimation.many_rates import rates_of_each
+from fingerpad.estimation.rate_likelihood import INDEPENDENT, RateLikelihood, ResidualDraws
+from fingerpad.estimation.rate_problem import AfferentModel, RateProblem
+from fingerpad.fitting.identifiability import identifiability
+from fingerpad.fitting.posterior import credible_band
+from fingerpad.fitting.profile_likelihood import Profile, profile_likelihoods
+from fingerpad.fitting.sensitivity import sobol_indices
+from fingerpad.reference import bar_firing_rates
+from fingerpad.signals import SedTraces
+from fingerpad.studies import single_unit
+from fingerpad.transduction import drive
+
+LEVEL = 0.95
+"""Probability within every interval and band."""
+
+PIECES = 8
+"""Linear pieces of the drive between two given times. Rates differ by less than 0.01 spikes/s on average from
+those with 32, and an evaluation takes two thirds of the time."""
+
+THOROUGH: dict[str, Any] = {"smallest_effective_size": 200.0}
+"""Settings of the sampler: the ends of a 95 % interval err by a seventh of a standard deviation."""
+
+QUICK: dict[str, Any] = {"n_walkers": 40, "smallest_effective_size": 100.0, "largest_r_hat": 1.02}
+"""Settings for a look: the ends err by a fifth of a standard deviation."""
+
+SEEDS_OF_PROFILES = 300
+"""Draws from the posterior that profiles start from."""
+
+SENSITIVITY_SHARE = 0.25
+"""Sobol's ranges reach from this share below the fit to this share above. [1]"""
+
+SENSITIVITY_POINTS = 512
+"""Base points of Sobol's design."""
+
+
+def result(sed: SedTraces, fitted: ArrayLike, seed: int, *, quick: bool = False) -> dict[str, Any]:
+    """Find what the rates determine: identifiable numbers, posterior, profiles and sensitivity.
+
+    Parameters
+    ----------
+    sed : SedTraces
+        Strain energy density at the receptor, one column per shift of the bar.
+    fitted : array_like (6,)
+        A fit, in the order of `fingerpad.afferent.PARAMETER_NAMES`: where the draws begin, and about which
+        sensitivity is asked for.
+    seed : int
+        Of the random numbers.
+    quick : bool, optional
+        Whether half as many effective draws will do.
+
+    Returns
+    -------
+    dict
+        Plain numbers with units in their names, ready for the report.
+
+    Raises
+    ------
+    ConvergenceError
+        If draws or profiles do not converge.
+    """
+    recordings, shift_mm = single_unit.bar_recordings(), bar_firing_rates().shift_mm
+    six_model = AfferentModel(drive(sed, pieces=PIECES))
+    model = four_number_model(six_model)
+    six = np.asarray(fitted, dtype=np.float64)
+    four = identifiable(six)
+    alike, independent = RateLikelihood(model, recordings, shift_mm), RateLikelihood(model, recordings)
+    posterior = afferent_posterior(alike, four, seed=seed, **(QUICK if quick else THOROUGH))
+    some = posterior.four[np.linspace(0, len(posterior.four) - 1, SEEDS_OF_PROFILES).astype(np.int64)]
+    return {
+        "level": LEVEL,
+        "seed": seed,
+        "names": list(IDENTIFIABLE_NAMES),
+        "units": dict(zip(IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, strict=True)),
+        "fit": dict(zip(IDENTIFIABLE_NAMES, four, strict=True)),
+        "capacitance_mf": six[4],
+        "threshold_mv": six[5],
+        "identifiability": _identifiability(six_model, six),
+        "posterior": _numbers(posterior, six),
+        "convergence": _convergence(posterior),
+        "shift_mm": shift_mm,
+        "rates": {
+            phase: _phase(drawn, getattr(recordings, f"{phase}_rate_hz"))
+            for phase, drawn in posterior.rates.items()
+        },
+        "evidence_for_alike_residuals": (
+            alike.log_likelihood(some).max() - independent.log_likelihood(some).max()
+        ),
+        "profiles": _profiles(alike, some),
+        "sensitivity": _sensitivity(RateProblem(model, recordings), four, seed),
+    }
+
+
+def _identifiability(model: AfferentModel, six: FloatArray) -> dict[str, Any]:
+    """Singular values of the rates' Jacobian in shares of the six parameters."""
+    found = identifiability(lambda values: np.concatenate(model.rates(values)), six, PARAMETER_NAMES)
+    return {
+        "rank": found.rank,
+        "relative_singular_values": found.singular_values / found.singular_values[0],
+        "silent_directions": [
+            dict(zip(PARAMETER_NAMES, direction, strict=True)) for direction in found.silent_directions
+        ],
+    }
+
+
+def _numbers(posterior: AfferentPosterior, six: FloatArray) -> dict[str, Any]:
+    """Median and interval of the four numbers, and of the gains with the fit's capacitance and threshold."""
+    gains = posterior.six(float(six[4]), float(six[5]))[:, :3]
+    draws = dict(zip(IDENTIFIABLE_NAMES, posterior.four.T, strict=True))
+    draws |= dict(zip(PARAMETER_NAMES[:3], gains.T, strict=True))
+    draws["resting_share"] = posterior.chains.flat[:, 0]
+    return {name: _summary(values) for name, values in draws.items()}
+
+
+def _summary(draws: FloatArray) -> dict[str, float]:
+    low, high = credible_band(draws, LEVEL)
+    return {"median": float(np.median(draws)), "low": float(low), "high": float(high)}
+
+
+def _convergence(posterior: AfferentPosterior) -> dict[str, Any]:
+    chains = posterior.chains
+    return {
+        "ensembles": chains.draws.shape[0],
+        "walkers": chains.draws.shape[2],
+        "draws": len(posterior.four),
+        "evaluations": chains.n_evaluations,
+        "acceptance": chains.acceptance,
+        "r_hat": chains.r_hat.max(),
+        "effective_draws": chains.effective_sizes.min(),
+        "effective_draws_of_tails": chains.tail_effective_sizes.min(),
+        "draws_per_effective_draw": chains.autocorrelation_steps.max(),
+    }
+
+
+def _phase(drawn: ResidualDraws, observed_hz: FloatArray) -> dict[str, Any]:
+    """Bands of one phase, and how far the observed rates lie within them."""
+    low, high = credible_band(drawn.predicted_hz, LEVEL)
+    new_low, new_high = credible_band(drawn.new_hz, LEVEL)
+    return {
+        "observed_hz": observed_hz,
+        "median_hz": np.median(drawn.predicted_hz, axis=0),
+        "low_hz": low,
+        "high_hz": high,
+        "new_low_hz": new_low,
+        "new_high_hz": new_high,
+        "share_within_new": ((new_low <= observed_hz) & (observed_hz <= new_high)).mean(),
+        "residual_deviation_hz": _summary(drawn.deviation_hz),
+        "residual_length_mm": _summary(drawn.length_mm),
+        "probability_of_independence": (drawn.length_mm == INDEPENDENT).mean(),
+    }
+
+
+def _profiles(likelihood: RateLikelihood, some: FloatArray) -> list[dict[str, Any]]:
+    """Profile likelihoods of the four numbers; those that are positive are profiled in their logarithm."""
+
+    def log_likelihood(points: FloatArray) -> FloatArray:
+        numbers = np.concatenate([points[:, :1], np.exp(points[:, 1:])], axis=1)
+        heights = np.full(len(points), -np.inf)
+        # As in the prior: untouched skin elicits no spike.
+        silent = numbers[:, 0] * numbers[:, 3] < 1.0
+        if silent.any():
+            heights[silent] = likelihood.log_likelihood(numbers[silent])
+        return heights
+
+    starts = np.concatenate([some[:, :1], np.log(some[:, 1:])], axis=1)
+    found = profile_likelihoods(log_likelihood, starts, starts.std(axis=0), IDENTIFIABLE_NAMES, level=LEVEL)
+    return [
+        _profile(profile, np.exp if index else lambda values: values)
+        for index, profile in enumerate(found.profiles)
+    ]
+
+
+def _profile(profile: Profile, natural: Any) -> dict[str, Any]:
+    low, high = (float(natural(end)) for end in profile.interval)
+    return {
+        "name": profile.name,
+        "values": natural(profile.values),
+        "losses": profile.losses,
+        # An open end is None: 0 and infinity are as far as a logarithm goes.
+        "low": low if np.isfinite(profile.interval[0]) else None,
+        "high": high if np.isfinite(profile.interval[1]) else None,
+    }
+
+
+def _sensitivity(problem: RateProblem, four: FloatArray, seed: int) -> dict[str, Any]:
+    """Sobol's indices of FSS, each number between so much less and so much more than the fit."""
+
+    def fss(points: FloatArray) -> FloatArray:
+        residuals = [
+            weight * ((observed - predicted) ** 2).sum(axis=1) / (observed @ observed)
+            for weight, observed, predicted in zip(
+                (problem.dynamic_weight, problem.static_weight),
+                (problem.recordings.dynamic_rate_hz, problem.recordings.static_rate_hz),
+                rates_of_each(problem.model, points),
+                strict=True,
+            )
+            if observed is not None
+        ]
+        return 1.0 - np.sum(residuals, axis=0)
+
+    lower, upper = np.sort(four * np.array([[1.0 - SENSITIVITY_SHARE], [1.0 + SENSITIVITY_SHARE]]), axis=0)
+    found = sobol_indices(
+        fss, lower, upper, IDENTIFIABLE_NAMES, seed=seed, n_base=SENSITIVITY_POINTS, level=LEVEL
+    )
+    return {
+        "lower": found.lower,
+        "upper": found.upper,
+        "first": found.first,
+        "first_half_width": found.first_half_width,
+        "total": found.total,
+        "total_half_width": found.total_half_width,
+        "mean_fss": found.mean,
+        "deviation_fss": found.standard_deviation,
+        "evaluations": found.n_evaluations,
+    }
