@@ -83,8 +83,8 @@ CHAPTERS = (
         "Level 2: what the rates determine",
         (
             Drawing(
-                11,
-                "figure_11_uncertainty",
+                12,
+                "figure_12_uncertainty",
                 "What rates under a bar determine",
                 single_unit_uncertainty.draw,
                 single_unit_uncertainty.caption,

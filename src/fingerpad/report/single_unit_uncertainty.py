@@ -71,9 +71,16 @@ def _profile(axes: Any, profile: Mapping[str, Any], section: Mapping[str, Any], 
     name = profile["name"]
     axes.plot(numbers(profile["values"]), numbers(profile["losses"]), ".-", color=BLACK, linewidth=1.2)
     axes.axhline(1.92, color=GREY, linestyle="--", linewidth=1.0)
-    axes.axvline(section["fit"][name], color=ORANGE, linestyle="-.", linewidth=1.4)
+    if section["fit"][name] is not None:
+        axes.axvline(section["fit"][name], color=ORANGE, linestyle="-.", linewidth=1.4)
     found = section["posterior"][name]
-    axes.plot([found["low"], found["high"]], [-0.25, -0.25], color=BLUE, linewidth=4.0, solid_capstyle="butt")
+    axes.plot(
+        numbers([found["low"], found["high"]]),
+        [-0.25, -0.25],
+        color=BLUE,
+        linewidth=4.0,
+        solid_capstyle="butt",
+    )
     axes.set_ylim(-0.5, LARGEST_LOSS)
     axes.set_title(f"({letter}) {SYMBOLS[name]}")
     axes.set_xlabel(f"{SYMBOLS[name]} [{section['units'][name]}]")
@@ -83,9 +90,9 @@ def _profile(axes: Any, profile: Mapping[str, Any], section: Mapping[str, Any], 
 
 def caption(section: Mapping[str, Any]) -> str:
     """Say what the bands, the profiles and their marks are."""
-    level = f"{100.0 * section['level']:.0f} %"
+    level = _percent(section["level"])
     within = ", ".join(
-        f"{100.0 * rates['share_within_new']:.0f} % of the {phase} ones"
+        f"{_percent(rates['share_within_new'])} of the {phase} ones"
         for phase, rates in section["rates"].items()
     )
     return (
@@ -97,6 +104,10 @@ def caption(section: Mapping[str, Any]) -> str:
         "orange line is the fit by response surfaces, which weighs phases differently. Profiles have lumps "
         "since rates jump where a spike enters a window."
     )
+
+
+def _percent(share: float | None) -> str:
+    return f"{fixed(None if share is None else 100.0 * share, 0)} %"
 
 
 def tables(section: Mapping[str, Any]) -> list[Table]:
@@ -122,8 +133,8 @@ def _determined(section: Mapping[str, Any]) -> Table:
         for name, (symbol, unit) in GAINS.items()
     ]
     rows.append(Row(("β τ/(C v) [1]", ABSENT, *_interval(section["posterior"]["resting_share"]), ABSENT)))
-    level = f"{100.0 * section['level']:.0f} %"
-    rank = section["identifiability"]["rank"]
+    level = _percent(section["level"])
+    rank = section["identifiability"]["rank"] or 0
     smallest = numbers(section["identifiability"]["relative_singular_values"])
     note = (
         "Spikes tell four numbers. β, k_d, k_s, C and v are known only up to a common scale; the three gains "
@@ -185,7 +196,7 @@ def _sensitivity(section: Mapping[str, Any]) -> Table:
     note = (
         "Share of the variance of the weighted FSS when each number is uniform within its range: by itself, "
         f"and with all that it does together with others. FSS is {fixed(found['mean_fss'], 3)} ± "
-        f"{fixed(found['deviation_fss'], 3)} over the ranges; {found['evaluations']} evaluations."
+        f"{fixed(found['deviation_fss'], 3)} over the ranges; {number(found['evaluations'])} evaluations."
     )
     columns = ("number", "range", "first-order index", "total index")
     return Table("What the fit is sensitive to (Sobol)", columns, rows, note)
