@@ -114,7 +114,7 @@ def test_coordinates_go_there_and_back() -> None:
 
 def test_the_prior_is_centred_on_the_papers_start_and_silent_at_rest() -> None:
     prior = AfferentPrior()
-    np.testing.assert_allclose(np.exp(prior.centre[1:]), [4.0, 0.014, 68.0], rtol=1e-12)
+    np.testing.assert_allclose(np.exp(prior.centre[1:]), [4.8, 0.014, 68.0], rtol=1e-12)
     one_off = prior.centre + np.diag(prior.spread) * -1.0
     np.testing.assert_allclose(prior.log_density(one_off), prior.log_density(prior.centre) - 0.5, rtol=1e-12)
     fires_at_rest = prior.centre + np.eye(4)[0]
