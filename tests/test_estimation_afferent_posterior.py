@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.stats import binom
+from scipy.stats import binom, chi2
 
 from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.estimation.afferent_posterior import (
@@ -53,7 +53,7 @@ def simulated(four: np.ndarray, random: np.random.Generator) -> RateRecordings:
 def test_truth_lies_within_its_intervals_as_often_as_they_say() -> None:
     """Truths drawn from the prior: of 8 afferents the 80 % intervals hold a binomial number."""
     random = np.random.default_rng(11)
-    inside = []
+    inside, distances = [], []
     for data_set in range(8):
         truth = PRIOR.centre + PRIOR.spread * random.normal(size=4)
         likelihood = RateLikelihood(MODEL, simulated(from_coordinates(truth), random), deviation_hz=4.0)
@@ -62,12 +62,16 @@ def test_truth_lies_within_its_intervals_as_often_as_they_say() -> None:
         )
         low, high = posterior.chains.interval(0.8)
         inside.append((low <= truth) & (truth <= high))
+        off = truth - posterior.chains.mean
+        distances.append(off @ np.linalg.solve(posterior.chains.covariance, off))
         # The recordings taught something: intervals are narrower than the prior's.
         assert (high - low < 2.0 * 1.2816 * PRIOR.spread).all()
     counts = np.sum(inside, axis=0)
     # Outside of these numbers lies 1 % of the binomial law, for each of the four.
     assert (counts >= binom.ppf(0.005, 8, 0.8)).all()
     assert binom.ppf(0.005, 32, 0.8) <= counts.sum() <= binom.ppf(0.995, 32, 0.8)
+    # Nor is the truth farther off than draws are: squared distances in the posterior's own measure.
+    assert np.sum(distances) <= chi2.ppf(0.995, 32)
 
 
 @pytest.fixture(scope="module")
