@@ -54,6 +54,11 @@ FEWEST_COLUMNS = 200
 PIECES_PER_THREAD = 2
 """Pieces that columns are shared out in, for each thread, if there are enough columns."""
 
+ROUNDED_ASPECT = 50.0
+"""Largest step along or around over the smallest through, up to which sweeps may round: all fingers are within.
+What holds neighbours together across wide and thin elements is a small part of the diagonal, and would drown:
+at 80 a block of nearly incompressible tissue took twice the iterations, at 300 it did not converge."""
+
 WORTHWHILE = 0.8
 """Largest ratio of columns, coarse over fine, for which a level pays."""
 
@@ -282,16 +287,19 @@ def _share(kernel: Callable[..., None], first: int, last: int, *arguments: Any) 
 
 
 class _Level:
-    """One grid: its matrix A, what sweeps need of it (see `columns`), and the scaled vectors of a cycle.
+    """One grid: its matrix A, what sweeps need of it (see `columns`), and the vectors of a cycle.
 
-    On the coarsest grid nothing is swept or scaled, only held unknowns are.
+    Where sweeps round, they sweep Q instead of A, and vectors are scaled. On the coarsest grid nothing is swept.
     """
 
-    def __init__(self, graph: ColumnGraph, colour_start: np.ndarray, free: SingleArray, depth: int):
+    def __init__(
+        self, graph: ColumnGraph, colour_start: np.ndarray, free: SingleArray, depth: int, rounds: bool
+    ):
         self.graph, self.colour_start, self.free, self.depth = graph, colour_start, free, depth
+        self.rounds = rounds
         self.most_of_a_colour = int(np.diff(colour_start).max())
         self.own = graph.own.astype(np.int32)
-        self.matrix = graph.zeros(depth)
+        self.matrix = self.swept = graph.zeros(depth)
         self.scale = self.shrink = free
         self.right, self.x, self.residual = (np.zeros_like(free) for _ in range(3))
 
@@ -301,19 +309,18 @@ class _Level:
         return int(self.own.size)
 
     def sweepable(self) -> None:
-        """Round the present matrix, and factor its columns."""
-        if self.scale is self.free:
-            self.scale, self.shrink = np.zeros_like(self.free), np.zeros_like(self.free)
-            self.rounded = np.zeros(self.matrix.shape, dtype=np.int16)
+        """Round the present matrix, if at all, and factor its columns."""
+        if not hasattr(self, "lower"):
             shape = (self.n_columns, self.depth, 9)
             self.lower, self.inverse = (np.zeros(shape, dtype=np.float32) for _ in range(2))
-        pairs = self.graph.start, self.graph.neighbour
-        scales = self.scale, self.shrink
-        _share(find_scales, 0, self.n_columns, self.own, self.matrix, self.free, *scales)
-        _share(round_matrix, 0, self.n_columns, *pairs, self.matrix, self.shrink, self.rounded)
-        _share(
-            factor_columns, 0, self.n_columns, self.own, self.rounded, self.depth, self.lower, self.inverse
-        )
+            if self.rounds:
+                self.scale, self.shrink = np.zeros_like(self.free), np.zeros_like(self.free)
+                self.swept = np.zeros(self.matrix.shape, dtype=np.int16)
+        if self.rounds:
+            pairs, scales = (self.graph.start, self.graph.neighbour), (self.scale, self.shrink)
+            _share(find_scales, 0, self.n_columns, self.own, self.matrix, self.free, *scales)
+            _share(round_matrix, 0, self.n_columns, *pairs, self.matrix, self.shrink, self.swept)
+        _share(factor_columns, 0, self.n_columns, self.own, self.swept, self.depth, self.lower, self.inverse)
 
     @property
     def is_shared(self) -> bool:
@@ -322,7 +329,7 @@ class _Level:
 
     def sweep_forward(self) -> None:
         """Write `x` for `right`, and the `residual`, not scaled."""
-        pattern = self.graph.start, self.own, self.graph.neighbour, self.rounded
+        pattern = self.graph.start, self.own, self.graph.neighbour, self.swept
         rest = *pattern, self.depth, self.lower, self.inverse, self.right, self.x
         if self.is_shared:
             for colour in pairwise(self.colour_start.tolist()):
@@ -333,7 +340,7 @@ class _Level:
 
     def sweep_backward(self) -> None:
         """Improve `x`."""
-        pattern = self.graph.start, self.graph.neighbour, self.rounded
+        pattern = self.graph.start, self.graph.neighbour, self.swept
         rest = *pattern, self.depth, self.lower, self.inverse, self.right, self.x
         if self.is_shared:
             for colour in reversed(list(pairwise(self.colour_start.tolist()))):
@@ -391,10 +398,13 @@ class Multigrid:
         self._order, colour_start = _by_colour(graph)
         graph, columns = graph.sorted(self._order), columns.renumbered(self._order)
         self._place = np.argsort(self._order)
+        thinnest = np.linalg.norm(np.diff(nodes_mm[grid], axis=2), axis=3).min()
+        widest = max(np.linalg.norm(np.diff(skin, axis=axis), axis=2).max() for axis in (0, 1))
+        rounds = bool(widest <= ROUNDED_ASPECT * thinnest)
         moves = np.zeros((len(nodes_mm), 3))
         moves.ravel()[free] = 1.0
         moving = to_columns(moves, self._order, depth)
-        self._levels = [_Level(graph, colour_start, moving, depth)]
+        self._levels = [_Level(graph, colour_start, moving, depth, rounds)]
         self._transfers: list[Transfer] = []
         while (coarse := columns.coarser()) is not None:
             columns, chosen, parent, weight = coarse
@@ -402,7 +412,7 @@ class Multigrid:
             columns, parent = columns.renumbered(order), np.argsort(order)[parent]
             self._transfers.append(Transfer.of(graph, parent, weight))
             graph, moving = self._transfers[-1].graph, moving[chosen[order]]
-            self._levels.append(_Level(graph, colour_start, moving, depth))
+            self._levels.append(_Level(graph, colour_start, moving, depth, rounds))
         self._coarsest = moving[:, :, 1 : depth + 1] > 0.0
         number = np.full(self._coarsest.shape, -1, dtype=np.int64)
         number[self._coarsest] = np.arange(self._coarsest.sum())
