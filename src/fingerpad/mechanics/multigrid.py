@@ -55,7 +55,7 @@ PIECES_PER_THREAD = 2
 """Pieces that columns are shared out in, for each thread, if there are enough columns."""
 
 ROUNDED_ASPECT = 50.0
-"""Largest step along or around over the smallest through, up to which sweeps may round: all fingers are within.
+"""Largest step along or around over the smallest through, up to which sweeps may round: fingers are within.
 What holds neighbours together across wide and thin elements is a small part of the diagonal, and would drown:
 at 80 a block of nearly incompressible tissue took twice the iterations, at 300 it did not converge."""
 
@@ -289,7 +289,7 @@ def _share(kernel: Callable[..., None], first: int, last: int, *arguments: Any) 
 class _Level:
     """One grid: its matrix A, what sweeps need of it (see `columns`), and the vectors of a cycle.
 
-    Where sweeps round, they sweep Q instead of A, and vectors are scaled. On the coarsest grid nothing is swept.
+    Where sweeps round, they sweep Q instead of A, and vectors are scaled. The coarsest grid is not swept.
     """
 
     def __init__(
