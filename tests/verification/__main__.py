@@ -16,7 +16,7 @@ import fingerpad
 from .cases import ORDERED
 from .page import PAGE, expectation, number, page_text
 from .pictures import draw_all
-from .stored_runs import section
+from .stored_runs import closing
 
 
 def run_all(names: list[str]) -> int:
@@ -38,7 +38,7 @@ def run_all(names: list[str]) -> int:
         versions = f"Python {platform.python_version()}, NumPy {numpy.__version__}, SciPy {scipy.__version__}"
         day = datetime.now(UTC).date().isoformat()
         stamp = f"Written on {day} by fingerpad {fingerpad.__version__}, {versions}."
-        PAGE.write_text(page_text(ORDERED, draw_all(), stamp, section()), encoding="utf-8")
+        PAGE.write_text(page_text(ORDERED, draw_all(), stamp, closing()), encoding="utf-8")
         print(f"wrote {PAGE}")
     return failed
 

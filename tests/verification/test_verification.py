@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fingerpad.report import paper_size
+
 from .case import at_least, at_most, equal, near
 from .cases import ORDERED, THEMES
 from .page import PAGE, allowance, case_text, expectation, page_text, rows_shown
-from .stored_runs import PICTURE, section, stored_results
+from .stored_runs import PAPER_SIZE, REFINEMENT, closing
 
 FAST = [case for case in ORDERED if not case.slow]
 SHOWN = rows_shown(PAGE.read_text(encoding="utf-8"))
@@ -39,16 +41,17 @@ def test_the_page_shows_what_is_measured(case):
     assert [(cells[0], cells[2]) for cells in SHOWN[case.name] if "≤" in cells[2]] == bounds
 
 
-def test_the_page_ends_with_the_stored_refinement_which_belongs_to_no_case():
+def test_the_page_ends_with_the_stored_runs_which_belong_to_no_case():
     text = PAGE.read_text(encoding="utf-8")
-    assert text.endswith("\n" + section().rstrip() + "\n")
-    assert PICTURE.exists()
-    assert rows_shown(page_text(FAST[:1], {}, "", section())) == rows_shown(page_text(FAST[:1], {}, ""))
+    assert text.endswith("\n\n" + closing())
+    assert REFINEMENT.picture.exists()
+    assert PAPER_SIZE.picture.exists()
+    assert rows_shown(page_text(FAST[:1], {}, "", closing())) == rows_shown(page_text(FAST[:1], {}, ""))
 
 
 def test_stored_errors_are_those_of_the_stored_profiles():
     """Largest differences of SED and rates again from the profiles, so that none on the page is stale."""
-    bars = stored_results()["bars"]
+    bars = REFINEMENT.results()["bars"]
     finest = bars["profiles"]["fine"]
     columns = [("sed", "ramp", "sed_ramp_kpa"), ("sed", "hold", "sed_hold_kpa"),
                ("rate", "dynamic", "dynamic_rate_hz"), ("rate", "static", "static_rate_hz")]  # fmt: skip
@@ -61,6 +64,27 @@ def test_stored_errors_are_those_of_the_stored_profiles():
             unit = finer.max() if kind == "sed" else 1.0
             largest = np.abs(np.array(profile[column])[rows] - finer).max() / unit
             assert errors[kind][phase]["max"] == pytest.approx(largest, rel=1e-12)
+
+
+def test_stored_errors_of_the_papers_size_are_those_of_the_stored_profiles():
+    results = PAPER_SIZE.results()
+    bars, deflection = results["bars"], results["deflection"]
+    paper = {name: np.array(profile) for name, profile in bars["profiles"]["paper"].items()}
+    for name, errors in bars["errors"].items():
+        ours = {key: np.array(profile) for key, profile in bars["profiles"][name].items()}
+        sed = np.abs(ours["sed_ramp_kpa"] - paper["sed_ramp_kpa"]).max() / paper["sed_ramp_kpa"].max()
+        assert errors["sed"]["ramp"]["max"] == pytest.approx(sed, rel=1e-12)
+        for rate in ("dynamic", "static"):
+            largest = np.abs(ours[f"{rate}_rate_hz"] - paper[f"{rate}_rate_hz"]).max()
+            assert errors["rate"][rate]["max"] == pytest.approx(largest, rel=1e-12)
+        for touch, row in deflection["errors"][name].items():
+            profiles = (np.array(deflection["deflection_mm"][mesh][touch]) for mesh in (name, "paper"))
+            assert row["profile"]["max"] == pytest.approx(np.abs(np.subtract(*profiles)).max(), rel=1e-12)
+
+
+def test_the_decision_on_the_papers_size_shows_the_stored_differences():
+    page = (PAGE.parent / "decisions" / "paper-size.md").read_text(encoding="utf-8")
+    assert paper_size.summary(PAPER_SIZE.results()) in page
 
 
 def test_names_and_titles_of_cases_are_their_own():
