@@ -119,6 +119,13 @@ def reproduce_command(
     seed: Annotated[
         int, typer.Option(parser=_whole_number, metavar="INTEGER", help="Seed of the observer's noise.")
     ] = 0,
+    extended: Annotated[
+        bool | None,
+        typer.Option(
+            "--extended/--no-extended",
+            help="Go beyond the paper: other fits and drives, spikes, uncertainty; not at quick by default.",
+        ),
+    ] = None,
 ) -> None:
     """Press, fire, fit and discriminate as in Gerling et al. 2014, and report beside the paper's numbers."""
     from rich.console import Console
@@ -128,7 +135,7 @@ def reproduce_command(
     from fingerpad.studies.conditions import Conditions
 
     conditions = Conditions(resolution=resolution, seed=seed)
-    run = Reproduction(conditions, out, jobs if jobs is not None else _cores())
+    run = Reproduction(conditions, out, jobs if jobs is not None else _cores(), extended)
     _make_writable(out)
     console = Console(stderr=True)
     if console.is_terminal:

@@ -25,6 +25,7 @@ from fingerpad.checks import FloatArray
 from fingerpad.mechanics.chunks import even_chunks
 from fingerpad.mechanics.element import N_NODES, N_POINTS, frame_scale, gradients_at_points
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
+from fingerpad.mechanics.small_arrays import small_array
 from fingerpad.mechanics.tensors import invert, push_forward
 from fingerpad.mechanics.viscoelastic import StressHistory
 from fingerpad.threads import worker_threads
@@ -243,10 +244,9 @@ def _dissipated(  # type: ignore[no-untyped-def]
     first, last,
 ):  # fmt: skip
     n_terms = relaxed.shape[0]
-    weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
-    gradients, inverse = np.empty((N_POINTS, 3, 3)), np.empty((3, 3))
-    spatial, tensors = np.empty((n_terms + 2, 6)), np.empty((n_terms + 2, 6))
-    jacobians = np.empty(N_POINTS)
+    weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
+    gradients, inverse = small_array((N_POINTS, 3, 3)), small_array((3, 3))
+    jacobians, spatial = small_array((N_POINTS,)), np.empty((n_terms + 2, 6))
     total = 0.0
     for e in range(first, last):
         material = layer[e]
@@ -259,11 +259,11 @@ def _dissipated(  # type: ignore[no-untyped-def]
             present_volume += weights[q] * jacobians[q]
         for q in range(N_POINTS):
             scale = frame_scale(law[material], jacobians[q], present_volume / volume)
-            tensors[0], tensors[1] = new[e, q], old[e, q]
+            push_forward(gradients[q], scale, new[e, q], spatial[0])
+            push_forward(gradients[q], scale, old[e, q], spatial[1])
             for term in range(n_terms):
-                tensors[term + 2] = relaxed[term, e, q]
+                push_forward(gradients[q], scale, relaxed[term, e, q], spatial[term + 2])
             for n in range(n_terms + 2):
-                push_forward(gradients[q], scale, tensors[n], spatial[n])
                 if law[material, 8] != COUPLED:  # only the deviator relaxes then
                     mean = (spatial[n, 0] + spatial[n, 1] + spatial[n, 2]) / 3.0
                     for k in range(3):

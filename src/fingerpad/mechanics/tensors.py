@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fingerpad.mechanics.small_arrays import small_array
+
 ROW = np.array([0, 1, 2, 0, 1, 0])
 COLUMN = np.array([0, 1, 2, 1, 2, 2])
 INDEX = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
@@ -55,12 +57,18 @@ def left_cauchy_green(gradient, scale, b, b2):  # type: ignore[no-untyped-def]
 @njit(cache=True, inline="always")
 def push_forward(gradient, scale, reference, spatial):  # type: ignore[no-untyped-def]
     """Write scale F T F' of a symmetric reference tensor T."""
+    product = small_array((3, 3))  # F T
+    xx, yy, zz = reference[0], reference[1], reference[2]
+    xy, yz, zx = reference[3], reference[4], reference[5]
+    for i in range(3):
+        x, y, z = gradient[i, 0], gradient[i, 1], gradient[i, 2]
+        product[i, 0] = x * xx + y * xy + z * zx
+        product[i, 1] = x * xy + y * yy + z * yz
+        product[i, 2] = x * zx + y * yz + z * zz
     for k in range(6):
-        f, g = gradient[ROW[k]], gradient[COLUMN[k]]
+        i, j = ROW[k], COLUMN[k]
         spatial[k] = scale * (
-            f[0] * (reference[0] * g[0] + reference[3] * g[1] + reference[5] * g[2])
-            + f[1] * (reference[3] * g[0] + reference[1] * g[1] + reference[4] * g[2])
-            + f[2] * (reference[5] * g[0] + reference[4] * g[1] + reference[2] * g[2])
+            product[i, 0] * gradient[j, 0] + product[i, 1] * gradient[j, 1] + product[i, 2] * gradient[j, 2]
         )
 
 

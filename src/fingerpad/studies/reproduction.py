@@ -75,14 +75,24 @@ class Reproduction:
         Where finished indentations are stored.
     jobs : int
         Processes to use; the numbers do not depend on it.
+    extended : bool, optional
+        Whether to go beyond the paper: other ways to fit, what else may drive the afferent, spike trains, and
+        what the rates determine. Default: unless the resolution is "quick", which would take half as long
+        again.
     """
 
     conditions: Conditions
     folder: Path
     jobs: int = 1
+    extended: bool | None = None
 
     def __post_init__(self) -> None:
         whole("jobs", self.jobs, at_least=1)
+
+    @property
+    def goes_beyond(self) -> bool:
+        """Whether this run goes beyond the paper."""
+        return self.conditions.resolution != "quick" if self.extended is None else self.extended
 
 
 def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, Any]:
@@ -133,50 +143,50 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
     deflection, bar_responses = responses["skin deflection"], responses["bar, 36 shifts"]
     sphere_responses, nail_response = responses["spheres"], responses["nail"]["nail"]
 
-    with _timed("fit and discrimination", 7, progress, stages) as advance:
+    with _timed("fit and discrimination", 3, progress, stages) as advance:
         bars = list(bar_responses.values())
         bar_sed = single_unit.receptor_sed(bars)
         problem = single_unit.rate_problem(bar_sed)
         best, folds = single_unit.fit(problem)
         advance()
-        beyond = {
-            "starts": single_unit_starts.result(problem, single_unit.receptor_traces(bars, "von_mises")),
-            "methods": single_unit_methods.result(
-                single_unit_methods.traces_beside(bars),
-                single_unit.receptor_sed(bars, single_unit_methods.OTHER_DYNAMIC_QUANTITY),
-                problem.recordings,
-                (best, folds),
-            ),
-        }
-        advance()
-        drives = drive_quantities.result(
-            drive_quantities.receptor_traces(bars, drive_quantities.SHOWN_QUANTITIES),
-            problem.recordings,
-            np.random.default_rng(conditions.seed),
-        )
-        advance()
         afferent = Afferent.from_parameters(best.parameters)
         discrimination = sphere_discrimination.result(sphere_responses, afferent, conditions.seed)
-        advance()
-        shift_mm = np.array(protocol.BAR_SHIFTS.value)
-        spike_trains = spike_fit.result(bar_sed, afferent, shift_mm, conditions.seed)
         advance()
         standard = sphere_responses[STANDARD_SPHERE]
         results: dict[str, Any] = {
             "skin_deflection": skin_deflection.result(deflection),
-            "single_unit": single_unit.result(problem, best, folds) | beyond,
-            "drive_quantities": drives,
-            "spike_fit": spike_trains,
+            "single_unit": single_unit.result(problem, best, folds),
             "discrimination": discrimination,
             "population": sphere_discrimination.population_map(standard, afferent),
             "nail": nail_border.result(nail_response),
         }
         advance()
-        if conditions.resolution != "quick":  # some ten seconds that a quick look does not wait for
+    if run.goes_beyond:
+        with _timed("beyond the paper", 5, progress, stages) as advance:
+            results["single_unit"]["starts"] = single_unit_starts.result(
+                problem, single_unit.receptor_traces(bars, "von_mises")
+            )
+            advance()
+            results["single_unit"]["methods"] = single_unit_methods.result(
+                single_unit_methods.traces_beside(bars),
+                single_unit.receptor_sed(bars, single_unit_methods.OTHER_DYNAMIC_QUANTITY),
+                problem.recordings,
+                (best, folds),
+            )
+            advance()
+            results["drive_quantities"] = drive_quantities.result(
+                drive_quantities.receptor_traces(bars, drive_quantities.SHOWN_QUANTITIES),
+                problem.recordings,
+                np.random.default_rng(conditions.seed),
+            )
+            advance()
+            shift_mm = np.array(protocol.BAR_SHIFTS.value)
+            results["spike_fit"] = spike_fit.result(bar_sed, afferent, shift_mm, conditions.seed)
+            advance()
             results["single_unit_uncertainty"] = single_unit_uncertainty.result(
                 bar_sed, best.parameters, conditions.seed
             )
-        advance()
+            advance()
     results["comparison"] = comparison(results)
     results["inputs"] = [asdict(number) for number in all_published()]
     results["manifest"] = _manifest(conditions, spheres[STANDARD_SPHERE], deflection, bar_responses) | {
