@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # What a command runs is imported where it runs: help and version need none of it and come at once.
 
-EXPECTED_TIME = {"quick": "about 2 minutes", "standard": "about 6 minutes", "paper": "some hours"}
+EXPECTED_TIME = {"quick": "a minute and a half", "standard": "about 5 minutes", "paper": "some hours"}
 """On two cores, nothing stored yet."""
 
 RESOLUTIONS = ("quick", "standard", "paper")
