@@ -48,7 +48,8 @@ def test_the_table_of_options_is_that_of_the_command() -> None:
     table = dict(re.findall(r"^\| `(--\w+)` \| ([^|]+?) \|", README, re.MULTILINE))
     assert set(table) == set(options)
     assert table["--jobs"] == "one per core"
-    for name in set(table) - {"--jobs"}:
+    assert table["--extended"] == "not at `quick`"
+    for name in set(table) - {"--jobs", "--extended"}:
         assert table[name] == f"`{options[name]}`"
 
 

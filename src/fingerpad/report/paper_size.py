@@ -65,7 +65,7 @@ def draw(results: Mapping[str, Any]) -> Figure:
     -------
     Figure
     """
-    figure = new_figure(10.0, 7.5)
+    figure = new_figure(9.4, 7.1)
     panels = figure.subplots(2, 2)
     _deflections(panels[0, 0], results["deflection"])
     _errors_of_profiles(panels[0, 1], results["deflection"])
