@@ -417,6 +417,11 @@ def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_pa
         (["mine.csv"], ROWS, "fit needs recordings and --stimulus, or --example"),
         (["none.csv", "--stimulus", "bar"], ROWS, "none.csv must be a file that can be read"),
         (["mine.csv", "--stimulus", "none.csv"], ROWS, "none.csv must be a file that can be read"),
+        (
+            ["mine.csv", "--stimulus", "none.yaml"],
+            ROWS,
+            "fingerpad: none.yaml must be a file that can be read",
+        ),
         (["mine.csv", "--stimulus", "bar"], b"\xff\xfe", "mine.csv must be text in UTF-8"),
         (["mine.csv", "--stimulus", "bar"], "", "mine.csv must hold a header and at least one row"),
         (["mine.csv", "--stimulus", "bar"], ROWS + "2,-1,3\n", "mine.csv, line 8: dynamic_rate_hz must not"),

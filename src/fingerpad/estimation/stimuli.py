@@ -205,8 +205,9 @@ class _Loader(yaml.SafeLoader):
 
 def _yaml_lines(path: Path) -> list[Line]:
     """Entries of a YAML list as lines of a table."""
+    text = read_text(path)
     try:
-        content = yaml.load(read_text(path), _Loader)  # a SafeLoader: plain values only
+        content = yaml.load(text, _Loader)  # a SafeLoader: plain values only
     except yaml.YAMLError as error:
         said = " ".join(str(error).split()).rstrip(".")
         raise InputError(f"{path} cannot be read as YAML ({said}): correct it there.") from error
