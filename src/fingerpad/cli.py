@@ -242,9 +242,7 @@ def fit_command(
             "fit needs recordings and --stimulus, or --example FOLDER: see fingerpad fit --help."
         )
     sizes = {"width": width, "fillet": fillet, "depth": depth}
-    stimuli = _stimuli(
-        stimulus, stimulus_column, {key: size for key, size in sizes.items() if size is not None}
-    )
+    stimuli = _stimuli(stimulus, stimulus_column, sizes)
     task = recording_session.RecordingFit(
         read_recordings(recordings, stimuli, unit),
         Conditions(resolution=resolution, seed=seed, materials=materials),

@@ -311,8 +311,8 @@ def factor_columns(first, last, own, matrix, depth, lower, inverse):  # type: ig
         Columns.
     own : int array (n_columns,)
         `ColumnGraph.own`.
-    matrix : int array (n_pairs, 3, 3, 3, lanes)
-        The matrix Q.
+    matrix : array (n_pairs, 3, 3, 3, lanes)
+        The matrix Q, or A where sweeps do not round.
     depth : int
         Nodes in a column.
     lower, inverse : array (n_columns, depth, 9)

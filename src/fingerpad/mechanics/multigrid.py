@@ -292,11 +292,8 @@ class _Level:
     Where sweeps round, they sweep Q instead of A, and vectors are scaled. The coarsest grid is not swept.
     """
 
-    def __init__(
-        self, graph: ColumnGraph, colour_start: np.ndarray, free: SingleArray, depth: int, rounds: bool
-    ):
+    def __init__(self, graph: ColumnGraph, colour_start: np.ndarray, free: SingleArray, depth: int):
         self.graph, self.colour_start, self.free, self.depth = graph, colour_start, free, depth
-        self.rounds = rounds
         self.most_of_a_colour = int(np.diff(colour_start).max())
         self.own = graph.own.astype(np.int32)
         self.matrix = self.swept = graph.zeros(depth)
@@ -308,15 +305,17 @@ class _Level:
         """Number of columns."""
         return int(self.own.size)
 
-    def sweepable(self) -> None:
+    def make_sweepable(self, rounds: bool) -> None:
+        """Make room for what sweeps need, which on the coarsest grid is nothing."""
+        shape = (self.n_columns, self.depth, 9)
+        self.lower, self.inverse = (np.zeros(shape, dtype=np.float32) for _ in range(2))
+        if rounds:
+            self.scale, self.shrink = np.zeros_like(self.free), np.zeros_like(self.free)
+            self.swept = np.zeros(self.matrix.shape, dtype=np.int16)
+
+    def prepare_sweeps(self) -> None:
         """Round the present matrix, if at all, and factor its columns."""
-        if not hasattr(self, "lower"):
-            shape = (self.n_columns, self.depth, 9)
-            self.lower, self.inverse = (np.zeros(shape, dtype=np.float32) for _ in range(2))
-            if self.rounds:
-                self.scale, self.shrink = np.zeros_like(self.free), np.zeros_like(self.free)
-                self.swept = np.zeros(self.matrix.shape, dtype=np.int16)
-        if self.rounds:
+        if self.swept is not self.matrix:
             pairs, scales = (self.graph.start, self.graph.neighbour), (self.scale, self.shrink)
             _share(find_scales, 0, self.n_columns, self.own, self.matrix, self.free, *scales)
             _share(round_matrix, 0, self.n_columns, *pairs, self.matrix, self.shrink, self.swept)
@@ -400,11 +399,10 @@ class Multigrid:
         self._place = np.argsort(self._order)
         thinnest = np.linalg.norm(np.diff(nodes_mm[grid], axis=2), axis=3).min()
         widest = max(np.linalg.norm(np.diff(skin, axis=axis), axis=2).max() for axis in (0, 1))
-        rounds = bool(widest <= ROUNDED_ASPECT * thinnest)
         moves = np.zeros((len(nodes_mm), 3))
         moves.ravel()[free] = 1.0
         moving = to_columns(moves, self._order, depth)
-        self._levels = [_Level(graph, colour_start, moving, depth, rounds)]
+        self._levels = [_Level(graph, colour_start, moving, depth)]
         self._transfers: list[Transfer] = []
         while (coarse := columns.coarser()) is not None:
             columns, chosen, parent, weight = coarse
@@ -412,7 +410,9 @@ class Multigrid:
             columns, parent = columns.renumbered(order), np.argsort(order)[parent]
             self._transfers.append(Transfer.of(graph, parent, weight))
             graph, moving = self._transfers[-1].graph, moving[chosen[order]]
-            self._levels.append(_Level(graph, colour_start, moving, depth, rounds))
+            self._levels.append(_Level(graph, colour_start, moving, depth))
+        for level in self._levels[:-1]:
+            level.make_sweepable(rounds=bool(widest <= ROUNDED_ASPECT * thinnest))
         self._coarsest = moving[:, :, 1 : depth + 1] > 0.0
         number = np.full(self._coarsest.shape, -1, dtype=np.int64)
         number[self._coarsest] = np.arange(self._coarsest.sum())
@@ -432,7 +432,7 @@ class Multigrid:
             finest.matrix,
         )  # fmt: skip
         if self._transfers:
-            finest.sweepable()
+            finest.prepare_sweeps()
 
     def renew(self, blocks: np.ndarray) -> None:
         """Take a new tangent on all levels."""
@@ -453,7 +453,7 @@ class Multigrid:
                 coarse.matrix,
             )
             if coarse is not self._levels[-1]:
-                coarse.sweepable()
+                coarse.prepare_sweeps()
         self._factor.renew(self._levels[-1].matrix)
 
     def enter(self, values: FloatArray) -> SingleArray:

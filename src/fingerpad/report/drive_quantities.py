@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.files import write_atomically
-from fingerpad.parameters import protocol
 from fingerpad.report.appearance import BLACK, BLUE, GREY, PALE, new_figure, numbers, png
 from fingerpad.report.markdown import table as markdown_table
+from fingerpad.report.single_unit import BAR_HALF_WIDTH_MM
 from fingerpad.report.tables import Row, Table
-from fingerpad.report.words import ABSENT, fixed
+from fingerpad.report.words import ABSENT, PHASES, fixed
 
 FIGURE = "drive_quantities.png"
 QUANTITIES = {
@@ -25,9 +25,7 @@ QUANTITIES = {
     "compressive_stress": "compressive stress",
     "compressive_strain": "compressive strain",
 }
-PHASES = {"dynamic": "dynamic ramp", "static": "static hold"}
 FSS = ("fss_in_sample", "fss_out_of_sample")
-BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
 _DECIMALS = 3
 
 

@@ -15,16 +15,10 @@ from fingerpad.report import tables
 from fingerpad.report.appearance import BLACK, BLUE, GREY, ORANGE, new_figure, numbers
 from fingerpad.report.page import Chapter, Drawing, write_page
 from fingerpad.report.tables import PARAMETERS, Row, Table
-from fingerpad.report.words import ABSENT, fixed, number, plain
+from fingerpad.report.words import ABSENT, IDENTIFIABLE_SYMBOLS, PHASES, fixed, number, plain
 
 PAGE = "fit.html"
-PHASES = {"dynamic": "dynamic ramp", "static": "static hold"}
-IDENTIFIABLE = {
-    "intercept_per_ms": "β/(C v)",
-    "dynamic_gain_per_kpa": "k_d/(C v)",
-    "static_gain_per_kpa_ms": "k_s/(C v)",
-    "time_constant_ms": "time constant τ",
-}
+IDENTIFIABLE = IDENTIFIABLE_SYMBOLS | {"time_constant_ms": "time constant τ"}
 LONGEST_LABEL = 12
 """Names of stimuli are cut to so many letters at an axis."""
 

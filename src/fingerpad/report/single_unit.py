@@ -8,9 +8,8 @@ from matplotlib.figure import Figure
 
 from fingerpad.parameters import paper, protocol
 from fingerpad.report.appearance import BLACK, BLUE, new_figure, numbers
-from fingerpad.report.words import fixed, number
+from fingerpad.report.words import PHASES, fixed, number
 
-PHASES = {"dynamic": "dynamic ramp", "static": "static hold"}
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from fingerpad.parameters import paper
 from fingerpad.report.tables import Row, Table
-from fingerpad.report.words import fixed, number, plain
+from fingerpad.report.words import fixed, number, plain, whole_percent
 
 PLACES = {
     "dynamic_flat": "ramp, flat face over the receptor",
@@ -157,7 +157,7 @@ def _residuals(rows: Sequence[Mapping[str, Any]]) -> Table:
             (
                 row["model"],
                 fixed(1.0 - row["fss_in_sample"], 3),
-                *(f"{fixed(100.0 * row['residual_share'][place], 0)} %" for place in PLACES),
+                *(whole_percent(row["residual_share"][place]) for place in PLACES),
             )
         )
         for row in rows

@@ -10,15 +10,8 @@ from matplotlib.figure import Figure
 from fingerpad.parameters import protocol
 from fingerpad.report.appearance import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, numbers
 from fingerpad.report.tables import Row, Table
-from fingerpad.report.words import ABSENT, fixed, number
+from fingerpad.report.words import ABSENT, IDENTIFIABLE_SYMBOLS, PHASES, fixed, number, whole_percent
 
-PHASES = {"dynamic": "dynamic ramp", "static": "static hold"}
-SYMBOLS = {
-    "intercept_per_ms": "β/(C v)",
-    "dynamic_gain_per_kpa": "k_d/(C v)",
-    "static_gain_per_kpa_ms": "k_s/(C v)",
-    "time_constant_ms": "τ",
-}
 GAINS = {
     "intercept_ma": ("β", "mA"),
     "dynamic_gain": ("k_d", "mA ms/kPa"),
@@ -82,17 +75,17 @@ def _profile(axes: Any, profile: Mapping[str, Any], section: Mapping[str, Any], 
         solid_capstyle="butt",
     )
     axes.set_ylim(-0.5, LARGEST_LOSS)
-    axes.set_title(f"({letter}) {SYMBOLS[name]}")
-    axes.set_xlabel(f"{SYMBOLS[name]} [{section['units'][name]}]")
+    axes.set_title(f"({letter}) {IDENTIFIABLE_SYMBOLS[name]}")
+    axes.set_xlabel(f"{IDENTIFIABLE_SYMBOLS[name]} [{section['units'][name]}]")
     if letter == "c":
         axes.set_ylabel("loss of log likelihood")
 
 
 def caption(section: Mapping[str, Any]) -> str:
     """Say what the bands, the profiles and their marks are."""
-    level = _percent(section["level"])
+    level = whole_percent(section["level"])
     within = ", ".join(
-        f"{_percent(rates['share_within_new'])} of the {phase} ones"
+        f"{whole_percent(rates['share_within_new'])} of the {phase} ones"
         for phase, rates in section["rates"].items()
     )
     return (
@@ -104,10 +97,6 @@ def caption(section: Mapping[str, Any]) -> str:
         "orange line is the fit by response surfaces, which weighs phases differently. Profiles have lumps "
         "since rates jump where a spike enters a window."
     )
-
-
-def _percent(share: float | None) -> str:
-    return f"{fixed(None if share is None else 100.0 * share, 0)} %"
 
 
 def tables(section: Mapping[str, Any]) -> list[Table]:
@@ -126,14 +115,14 @@ def _determined(section: Mapping[str, Any]) -> Table:
                 *_ends(profiles[name]),
             )
         )
-        for name, symbol in SYMBOLS.items()
+        for name, symbol in IDENTIFIABLE_SYMBOLS.items()
     ]
     rows += [
         Row((f"{symbol} [{unit}]", ABSENT, *_interval(section["posterior"][name]), ABSENT))
         for name, (symbol, unit) in GAINS.items()
     ]
     rows.append(Row(("β τ/(C v) [1]", ABSENT, *_interval(section["posterior"]["resting_share"]), ABSENT)))
-    level = _percent(section["level"])
+    level = whole_percent(section["level"])
     rank = section["identifiability"]["rank"] or 0
     smallest = numbers(section["identifiability"]["relative_singular_values"])
     note = (
@@ -191,7 +180,7 @@ def _sensitivity(section: Mapping[str, Any]) -> Table:
                 f"{fixed(found['total'][index], 2)} ± {fixed(found['total_half_width'][index], 2)}",
             )
         )
-        for index, (name, symbol) in enumerate(SYMBOLS.items())
+        for index, (name, symbol) in enumerate(IDENTIFIABLE_SYMBOLS.items())
     ]
     note = (
         "Share of the variance of the weighted FSS when each number is uniform within its range: by itself, "

@@ -22,15 +22,9 @@ from fingerpad.report.appearance import (
     say_nothing_to_draw,
 )
 from fingerpad.report.tables import Row, Table
-from fingerpad.report.words import fixed, number
+from fingerpad.report.words import IDENTIFIABLE_SYMBOLS, fixed, number, whole_percent
 
-NAMES = {
-    "intercept_per_ms": "β/(C v)",
-    "dynamic_gain_per_kpa": "k_d/(C v)",
-    "static_gain_per_kpa_ms": "k_s/(C v)",
-    "time_constant_ms": "τ",
-    "escape_width": "width δ/v",
-}
+NAMES = IDENTIFIABLE_SYMBOLS | {"escape_width": "width δ/v"}
 STYLES = ((BLUE, "-"), (GREEN, "--"), (ORANGE, "-."), (BLACK, ":"), (GREY, "-"))
 LOWEST_INTENSITY_HZ = 1.0
 NOT_FITTED = "the spikes could not be fitted"
@@ -112,7 +106,9 @@ def _rescaled(axes: Axes, found: Mapping[str, Any] | None) -> None:
         return
     test = found["rescaled"]
     share, limit = numbers(test["share"]), float(numbers(test["limit"]))
-    axes.fill_between([0.0, 1.0], -limit, limit, color=PALE, label=f"{_percent(found['level'])} of chance")
+    axes.fill_between(
+        [0.0, 1.0], -limit, limit, color=PALE, label=f"{whole_percent(found['level'])} of chance"
+    )
     axes.plot(share, numbers(test["quantile"]) - share, color=BLUE, label="fitted")
     if np.isfinite(limit):
         axes.set_ylim(-2.0 * limit, 2.0 * limit)
@@ -150,10 +146,6 @@ def _known(times: Any) -> FloatArray:
     return given[np.isfinite(given)]
 
 
-def _percent(share: float | None) -> str:
-    return f"{fixed(None if share is None else 100.0 * share, 0)} %"
-
-
 def caption(section: Mapping[str, Any]) -> str:
     """Say what the figure shows.
 
@@ -169,7 +161,9 @@ def caption(section: Mapping[str, Any]) -> str:
     found = section["recovery"]
     fitted = "They could not be fitted."
     if found:
-        held = f"{number(found['n_held'])} of {len(found['truth'])} intervals of {_percent(found['level'])}"
+        held = (
+            f"{number(found['n_held'])} of {len(found['truth'])} intervals of {whole_percent(found['level'])}"
+        )
         fitted = (
             f"{held} hold the truth; the rescaled intervals stray from uniform by "
             f"{number(found['rescaled']['distance'])}; chance allows {number(found['rescaled']['limit'])}."
@@ -216,7 +210,7 @@ def _recovery(section: Mapping[str, Any]) -> Table:
         note = (
             f"{number(found['n_spikes'], 6)} spikes. Log-likelihood {there[0]} at the estimate, {there[1]} "
             f"at the truth; {number(found['n_steps'])} steps. From and to: interval that holds the truth in "
-            f"{_percent(found['level'])} of such experiments."
+            f"{whole_percent(found['level'])} of such experiments."
         )
     return Table("The afferent found again in its spikes", columns, rows, note)
 

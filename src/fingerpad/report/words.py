@@ -7,6 +7,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 ABSENT = "–"
+PHASES = {"dynamic": "dynamic ramp", "static": "static hold"}
+IDENTIFIABLE_SYMBOLS = {
+    "intercept_per_ms": "β/(C v)",
+    "dynamic_gain_per_kpa": "k_d/(C v)",
+    "static_gain_per_kpa_ms": "k_s/(C v)",
+    "time_constant_ms": "τ",
+}
+"""The four numbers that firing can tell."""
+
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -127,3 +136,14 @@ def plain(value: Any, digits: int = 3, longest: int = 8) -> str:
         span = f", {number(min(known))} … {number(max(known))}" if known else ""
         return f"{len(value)} values{span}"
     return str(value)
+
+
+def whole_percent(share: float | None) -> str:
+    """Return a share in whole percent, or a dash for one that does not exist.
+
+    Examples
+    --------
+    >>> whole_percent(0.926), whole_percent(None)
+    ('93 %', '– %')
+    """
+    return f"{fixed(None if share is None else 100.0 * share, 0)} %"

@@ -22,7 +22,7 @@ from fingerpad.estimation.recordings import PHASES, RateRecordings
 from fingerpad.fitting import Method
 from fingerpad.sampling import SkinResponse
 from fingerpad.signals import STORED_ENERGY, SedTraces
-from fingerpad.studies.conditions import RECEPTOR_X_MM
+from fingerpad.studies import single_unit
 from fingerpad.studies.drive_fits import (
     Judged,
     judge,
@@ -103,19 +103,11 @@ def receptor_traces(
     dict of str to SedTraces
         Each quantity in the place of SED.
     """
-    first, site = responses[0], [[RECEPTOR_X_MM, 0.0]]
-    return {
-        name: SedTraces(
-            first.times_ms,
-            np.hstack([skin.sample(name, site) for skin in responses]),
-            np.array(first.kinks_ms),
-        )
-        for name in quantities
-    }
+    return {name: single_unit.receptor_traces(list(responses), name) for name in quantities}
 
 
-def drive_of(traces: Mapping[str, SedTraces], drivers: Drivers) -> Drive:
-    """Drive of an afferent whose two terms follow these quantities.
+def traces_of(traces: Mapping[str, SedTraces], drivers: Drivers) -> SedTraces:
+    """Traces for an afferent whose two terms follow these quantities.
 
     Parameters
     ----------
@@ -126,17 +118,20 @@ def drive_of(traces: Mapping[str, SedTraces], drivers: Drivers) -> Drive:
 
     Returns
     -------
-    Drive
+    SedTraces
         With the static quantity in the place of SED.
     """
     static, dynamic = traces[drivers.static], traces[drivers.dynamic]
     if drivers.static == drivers.dynamic:
-        return drive(static)
+        return static
     if drivers.dynamic == STORED_ENERGY:
         raise InputError("drivers must name a quantity other than SED for a dynamic term of its own.")
-    return drive(
-        SedTraces(static.times_ms, static.sed_kpa, static.kinks_ms, dynamic.sed_kpa, drivers.dynamic)
-    )
+    return single_unit.following(static, dynamic, drivers.dynamic)
+
+
+def drive_of(traces: Mapping[str, SedTraces], drivers: Drivers) -> Drive:
+    """Drive of an afferent whose two terms follow these quantities; parameters as in `traces_of`."""
+    return drive(traces_of(traces, drivers))
 
 
 def result(

@@ -163,21 +163,18 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
         advance()
     if run.goes_beyond:
         with _timed("beyond the paper", 5, progress, stages) as advance:
-            results["single_unit"]["starts"] = single_unit_starts.result(
-                problem, single_unit.receptor_traces(bars, "von_mises")
-            )
+            traces = drive_quantities.receptor_traces(bars, drive_quantities.SHOWN_QUANTITIES)
+            results["single_unit"]["starts"] = single_unit_starts.result(problem, traces["von_mises"])
             advance()
             results["single_unit"]["methods"] = single_unit_methods.result(
                 single_unit_methods.traces_beside(bars),
-                single_unit.receptor_sed(bars, single_unit_methods.OTHER_DYNAMIC_QUANTITY),
+                drive_quantities.traces_of(traces, drive_quantities.EXTENDED),
                 problem.recordings,
                 (best, folds),
             )
             advance()
             results["drive_quantities"] = drive_quantities.result(
-                drive_quantities.receptor_traces(bars, drive_quantities.SHOWN_QUANTITIES),
-                problem.recordings,
-                np.random.default_rng(conditions.seed),
+                traces, problem.recordings, np.random.default_rng(conditions.seed)
             )
             advance()
             shift_mm = np.array(protocol.BAR_SHIFTS.value)

@@ -68,9 +68,9 @@ def receptor_sed(responses: list[SkinResponse], dynamic_quantity: str = STORED_E
         What the dynamic term follows; by default the same.
     """
     if dynamic_quantity != STORED_ENERGY:
-        energy = receptor_sed(responses)
-        followed = np.hstack([skin.sample(dynamic_quantity, RECEPTOR) for skin in responses])
-        return replace(energy, dynamic_kpa=followed, dynamic_quantity=dynamic_quantity)
+        return following(
+            receptor_sed(responses), receptor_traces(responses, dynamic_quantity), dynamic_quantity
+        )
     traces = [skin.sed(RECEPTOR) for skin in responses]
     return SedTraces(traces[0].times_ms, np.hstack([trace.sed_kpa for trace in traces]), traces[0].kinks_ms)
 
@@ -87,6 +87,21 @@ def receptor_traces(responses: list[SkinResponse], quantity: str) -> SedTraces:
     """
     sampled = np.hstack([skin.sample(quantity, RECEPTOR) for skin in responses])
     return SedTraces(responses[0].times_ms, sampled, np.array(responses[0].kinks_ms))
+
+
+def following(static: SedTraces, dynamic: SedTraces, quantity: str) -> SedTraces:
+    """Traces whose dynamic term follows another quantity.
+
+    Parameters
+    ----------
+    static : SedTraces
+        What the static term follows.
+    dynamic : SedTraces
+        The other quantity in the place of strain energy density, as from `receptor_traces`.
+    quantity : str
+        Its name.
+    """
+    return replace(static, dynamic_kpa=dynamic.sed_kpa, dynamic_quantity=quantity)
 
 
 def printed_starts() -> FloatArray:

@@ -40,9 +40,6 @@ from fingerpad.transduction import Drive, drive
 OFFSETS_MM = (-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
 """Places beside the receptor at which the drive is known. The bar moves in steps of 0.2 mm. [mm]"""
 
-OTHER_DYNAMIC_QUANTITY = "compressive_stress"
-"""What the dynamic term follows in the extension (docs/decisions/what-the-dynamic-term-follows.md)."""
-
 LOWEST = (-0.05, 0.0, 0.0, 3.0)
 HIGHEST = (0.05, 0.6, 0.2, 300.0)
 SCALES = (0.01, 0.05, 0.02, 20.0)

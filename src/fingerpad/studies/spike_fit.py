@@ -36,7 +36,7 @@ from fingerpad.noisy_lif import (
 from fingerpad.parameters import neuron, protocol
 from fingerpad.random_streams import Presentations
 from fingerpad.signals import SedTraces, SpikeTrains
-from fingerpad.studies import interval_variability
+from fingerpad.studies import interval_variability, single_unit_starts
 from fingerpad.studies.interval_variability import CORRELATION_MS, SOFT_THRESHOLD, STEP_MS
 from fingerpad.transduction import Drive, drive
 from fingerpad.units import MS_PER_S
@@ -66,14 +66,7 @@ def start() -> FloatArray:
     array (5,)
         In the order of `fingerpad.estimation.spike_parameters.SPIKE_PARAMETER_NAMES`.
     """
-    paper = [
-        neuron.INTERCEPT_START.value,
-        neuron.DYNAMIC_GAIN_SCALE.value * neuron.DYNAMIC_GAIN_START_1.value,
-        neuron.STATIC_GAIN_START_1.value,
-        neuron.TIME_CONSTANT.value,
-        neuron.CAPACITANCE.value,
-        neuron.THRESHOLD.value,
-    ]
+    paper = single_unit_starts.scaled_start(1, 1.0, neuron.DYNAMIC_GAIN_SCALE.value)
     return np.array([*identifiable(paper), START_WIDTH])
 
 
