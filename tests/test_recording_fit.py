@@ -390,6 +390,27 @@ def test_a_fit_writes_page_figures_and_numbers_and_says_where_they_came_from(cal
     assert f"<td>{fit['fss_out_of_sample']:.3f}</td>" in page.replace("−", "-")
 
 
+def test_spikes_seed_and_what_else_is_asked_for_reach_the_fit(call, tmp_path, monkeypatch):
+    asked = []
+
+    def note(sed, recordings, memberships, **settings):
+        asked.append((recordings, settings))
+        return study.fit_recordings(sed, recordings, memberships)
+
+    monkeypatch.setattr(session, "fit_recordings", note)
+    spikes = "1 5 9 20 33 41 48 700"
+    (tmp_path / "mine.csv").write_text(
+        "shift_mm,spike_times_ms\n" + "".join(f"{shift},{spikes}\n" for shift in SHIFTS_MM)
+    )
+    options = ("--method", "likelihood", "--posterior", "--seed", "7", "--folds", "2")
+    assert call("mine.csv", "--stimulus", "bar", *options)[0] == 0
+    ((recordings, settings),) = asked
+    assert isinstance(recordings, SpikeRecordings)
+    assert recordings.trains.times_ms.size == 8 * len(SHIFTS_MM)
+    assert (settings["method"], settings["seed"], settings["with_posterior"]) == ("likelihood", 7, True)
+    assert settings["positions_mm"] == list(SHIFTS_MM)
+
+
 def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_path):
     (tmp_path / "list.csv").write_text(
         "stimulus,indenter,width_mm,depth_mm,x_mm,hold_ms\n"

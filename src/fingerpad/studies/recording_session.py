@@ -196,7 +196,7 @@ def run(fit: RecordingFit, progress: Progress | None = None, **provenance: Any) 
     StoreError
         If a stored press is damaged or the folder cannot be written.
     """
-    progress = progress or NoProgress()
+    progress, recorded = progress or NoProgress(), fit.recorded
     started, clock = datetime.now(UTC), time.perf_counter()
     store = Store(fit.folder / STORE_FOLDER)
     wanted = list(fit.touches.values())
@@ -204,11 +204,19 @@ def run(fit: RecordingFit, progress: Progress | None = None, **provenance: Any) 
         computed = solve_missing(wanted, store, fit.jobs, lambda seconds: advance())
     site = [[RECEPTOR_X_MM, 0.0]]
     sed = [store.load(touch).sed(site, fit.dynamic_quantity) for touch in wanted]
-    shifts_mm = _shifts_mm(list(fit.recorded.stimuli.values()))
+    shifts_mm = _shifts_mm(list(recorded.stimuli.values()))
     with progress.stage("fit", 1) as advance:
-        found = fit_recordings(sed, fit.rates, fit.memberships, method=fit.method, windows_ms=fit.windows_ms)
+        found = fit_recordings(
+            sed,
+            recorded.recordings,
+            fit.memberships,
+            method=fit.method,
+            windows_ms=fit.windows_ms,
+            seed=fit.conditions.seed,
+            with_posterior=fit.with_posterior,
+            positions_mm=shifts_mm,
+        )
         advance()
-    recorded = fit.recorded
     return plain(
         {
             "fit": found
