@@ -3,10 +3,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial import cKDTree
 
-from fingerpad.encoding import distance, gradient_sum, neighbour_pairs
+from fingerpad.encoding import delaunay_pairs, distance, gradient_sum, neighbour_pairs, neighbours_of
 from fingerpad.errors import InputError
+from fingerpad.layouts import hexagonal, jittered, poisson_disc, rectangular, uniform
 from fingerpad.population import Population
+from fingerpad.regions import Ellipse
 
 GRID = Population.grid()
 EIGHT = neighbour_pairs(GRID.positions_mm, GRID.pitch_mm, 8)
@@ -93,8 +96,8 @@ def test_distances_are_the_two_norms():
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        (lambda: neighbour_pairs([[0.0, 0.0]], 1.0, count=6), "count must be 8 or 4"),
-        (lambda: neighbour_pairs([[0.0, 0.0, 0.0]], 1.0), "rows of x and z"),
+        (lambda: neighbour_pairs([[0.0, 0.0]], 1.0, count=5), "count must be 8, 4 or 6"),
+        (lambda: neighbour_pairs([[0.0, 0.0, 0.0]], 1.0), "rows of two numbers"),
         (lambda: neighbour_pairs([[0.0, 0.0]], 0.0), "pitch_mm must be greater"),
         (lambda: gradient_sum(np.ones(17), EIGHT), "neighbours must be within 0 ... 16"),
         (lambda: gradient_sum(np.ones(2), [[0, -1]]), "neighbours must be within"),
@@ -104,5 +107,62 @@ def test_distances_are_the_two_norms():
     ],
 )
 def test_what_cannot_be_used_is_refused(wrong, message):
+    with pytest.raises(InputError, match=message):
+        wrong()
+
+
+DISC = Ellipse(6.0, 6.0, (17.0, 0.0))
+"""Region of random and hexagonal layouts; inner receptors lie well inside it."""
+
+
+def neighbours_by_receptor(pairs, count):
+    return np.bincount(pairs.ravel(), minlength=count)
+
+
+def test_inner_receptors_of_a_hexagonal_layout_have_six_neighbours_one_pitch_away():
+    layout = hexagonal(DISC, 100.0)
+    pairs = neighbours_of(layout.places_mm, layout.pitch_mm, layout.pattern)
+    first, second = layout.places_mm[pairs.T]
+    assert_allclose(np.linalg.norm(first - second, axis=1), layout.pitch_mm, rtol=1e-12)
+    inner = np.linalg.norm(layout.places_mm - DISC.centre_mm, axis=1) < 4.5
+    assert (neighbours_by_receptor(pairs, len(layout))[inner] == 6).all()
+
+
+def test_a_square_layout_has_the_neighbours_of_its_lattice():
+    layout = rectangular(DISC, 100.0)
+    pairs = neighbours_of(layout.places_mm, layout.pitch_mm, "rectangular")
+    assert_array_equal(pairs, neighbour_pairs(layout.places_mm, layout.pitch_mm, 8))
+
+
+@pytest.mark.parametrize(
+    "layout",
+    [uniform(DISC, 100.0, 1), jittered(DISC, 100.0, 1), poisson_disc(DISC, 100.0, 1)],
+    ids=lambda layout: layout.pattern,
+)
+def test_neighbours_of_random_layouts_share_a_border_of_their_cells(layout):
+    """Points strewn densely: where the two nearest receptors are known, those two are neighbours."""
+    pairs = neighbours_of(layout.places_mm, layout.pitch_mm, layout.pattern)
+    assert_array_equal(pairs, np.unique(np.sort(pairs, axis=1), axis=0))
+    known = set(map(tuple, pairs.tolist()))
+    probes = uniform(Ellipse(4.0, 4.0, (17.0, 0.0)), 5000.0, 2).places_mm
+    nearest = np.sort(cKDTree(layout.places_mm).query(probes, k=2)[1], axis=1)
+    assert set(map(tuple, nearest.tolist())) <= known
+    first, second = layout.places_mm[pairs.T]
+    assert np.linalg.norm(first - second, axis=1).max() <= 3.0 * layout.pitch_mm
+    inner = np.linalg.norm(layout.places_mm - DISC.centre_mm, axis=1) < 4.0
+    # Euler: inside a triangulation every corner has six neighbours on average.
+    assert abs(neighbours_by_receptor(pairs, len(layout))[inner].mean() - 6.0) < 0.35
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: delaunay_pairs([[0.0, 0.0], [1.0, 0.0]], 1.0), "not on one line: got 2"),
+        (lambda: delaunay_pairs([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]], 1.0), "not on one line: got 3"),
+        (lambda: delaunay_pairs(np.ones((4, 3)), 1.0), "rows of two numbers"),
+        (lambda: neighbours_of([[0.0, 0.0]], 1.0, "square"), "pattern must be one of rectangular, hexagonal"),
+    ],
+)  # fmt: skip
+def test_layouts_without_neighbours_are_refused(wrong, message):
     with pytest.raises(InputError, match=message):
         wrong()

@@ -1,10 +1,15 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.stats import kstest
 
 from fingerpad.afferent import Afferent
 from fingerpad.errors import InputError
-from fingerpad.population import Population
+from fingerpad.layouts import jittered
+from fingerpad.population import Population, sensitivities
+from fingerpad.regions import Ellipse
 from fingerpad.signals import SedTraces
 
 
@@ -84,7 +89,7 @@ class OneTrace:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        (lambda: Population([[1.0, 2.0, 3.0]], 1.0), "rows of x and z"),
+        (lambda: Population([[1.0, 2.0, 3.0, 4.0]], 1.0), "rows of x and z"),
         (lambda: Population([[1.0, 2.0]], 0.0), "pitch_mm must be greater"),
         (lambda: Population.grid(density_per_cm2=-1.0), "density_per_cm2 must be greater"),
         (lambda: Population.grid(rows=0), "rows must be a whole number"),
@@ -118,3 +123,59 @@ def test_a_population_samples_what_the_dynamic_term_of_its_afferent_follows():
     dynamic_hz, _ = lone.rates(skin.sed(Population.grid().positions_mm, "compressive_stress"))
     assert_array_equal(extended.dynamic_rate_hz, dynamic_hz)
     assert (extended.dynamic_rate_hz != usual.dynamic_rate_hz).any()
+
+
+def test_sensitivity_multiplies_both_gains_and_not_the_intercept():
+    resting = Afferent(intercept_ma=4e-7, dynamic_gain=3e-4, static_gain=1e-6)
+    positions, skin = Population.grid().positions_mm, BumpWithStress(17.0, 0.3)
+    factors = np.linspace(0.4, 1.8, 18)
+    for quantity in ("stored", "compressive_stress"):
+        afferent = replace(resting, dynamic_quantity=quantity)
+        response = Population(positions, 1.0, afferent, sensitivity=factors).respond(skin)
+        for receptor, factor in enumerate(factors):
+            lone = replace(
+                afferent,
+                dynamic_gain=factor * afferent.dynamic_gain,
+                static_gain=factor * afferent.static_gain,
+            )
+            expected = Population(positions[[receptor]], 1.0, lone).respond(skin)
+            assert_allclose(response.spikes[receptor], expected.spikes[0], rtol=1e-9)
+        assert len(response.spikes.times_ms) > 100
+
+
+def test_sensitivities_are_lognormal_with_mean_one():
+    factors = sensitivities(20_000, spread=0.4, seed=3)
+    logarithms = np.log(factors)
+    assert kstest((logarithms + 0.08) / 0.4, "norm").pvalue > 0.01
+    assert abs(factors.mean() - 1.0) < 4.0 * factors.std() / np.sqrt(factors.size)
+    assert_array_equal(sensitivities(5, 0.4, seed=3), factors[:5])
+    assert not np.isin(sensitivities(5, 0.4, seed=4), factors).any()
+
+
+def test_a_layout_becomes_a_population_where_its_plane_lies_on_the_skin():
+    layout = jittered(Ellipse(3.0, 2.0), 100.0, seed=1)
+
+    def place(places):
+        return np.column_stack([places[:, 0] + 17.0, -np.ones(len(places)), places[:, 1]])
+
+    flat, curved = Population.of_layout(layout), Population.of_layout(layout, place)
+    assert_array_equal(flat.positions_mm, layout.places_mm)
+    assert curved.positions_mm.shape == (len(layout), 3)
+    for population in (flat, curved):
+        assert_array_equal(population.places_mm, layout.places_mm)
+        assert len(population) == len(layout)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: sensitivities(0, 0.4, 1), "count must be a whole number"),
+        (lambda: sensitivities(3, -0.4, 1), "spread must not be negative"),
+        (lambda: Population([[1.0, 2.0]], 1.0, sensitivity=[1.0, 1.0]), "per receptor, 1: got 2"),
+        (lambda: Population([[1.0, 2.0]], 1.0, sensitivity=[0.0]), "the smallest 0"),
+        (lambda: Population([[1.0, 2.0]], 1.0, places_mm=[[1.0, 2.0, 3.0]]), "a pair per receptor"),
+    ],
+)  # fmt: skip
+def test_sensitivities_that_cannot_be_are_refused(wrong, message):
+    with pytest.raises(InputError, match=message):
+        wrong()

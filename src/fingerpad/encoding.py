@@ -6,30 +6,38 @@ populations are read at once.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from fingerpad.checks import FloatArray, float_array, one_of, positive
 from fingerpad.errors import InputError
+from fingerpad.layouts import PATTERNS
 
 NORMS = ("city-block", "euclidean")
-_BETWEEN_FIRST_AND_SECOND_NEIGHBOUR = 1.5
+_BETWEEN_FIRST_AND_SECOND_NEIGHBOUR = {4: 1.5, 6: 0.5 * (1.0 + math.sqrt(3.0)), 8: 1.5}
+_METRIC = {4: 1.0, 6: 2.0, 8: np.inf}
+_LONGEST_PITCHES = 3.0
+_LATTICE_NEIGHBOURS = {"rectangular": 8, "hexagonal": 6}
 
 
 def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: float, count: int = 8) -> np.ndarray:
-    """Find who is whose neighbour.
+    """Find who is whose neighbour in a lattice.
 
-    Receptors are neighbours when they lie less than 1.5 pitches apart: in x and in z each (8 neighbours,
-    diagonals included), or in the sum of both (4 neighbours). On a lattice these are exactly the
-    surrounding ones, and a layout that strays a little from the lattice keeps them.
+    Receptors are neighbours when they lie less than 1.5 pitches apart: in x and z each (8 neighbours,
+    diagonals included), or in the sum of both (4 neighbours). On a square lattice these are exactly the
+    surrounding ones, and a layout that strays a little from the lattice keeps them. The 6 neighbours of a
+    hexagonal lattice lie less than 1.37 pitches away, half way from the first to the second nearest.
 
     Parameters
     ----------
     positions_mm : array_like (n_receptors, 2)
-        Places of the receptors. [mm]
+        Places of the receptors, such as `Population.places_mm`. [mm]
     pitch_mm : float
         Distance between neighbours of the layout. [mm]
-    count : {8, 4}, optional
+    count : {8, 4, 6}, optional
         Neighbours of a receptor inside a lattice; at the edges there are fewer.
 
     Returns
@@ -40,7 +48,7 @@ def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: float, count: int = 8) ->
     Raises
     ------
     InputError
-        If the positions are not pairs, the pitch is not positive or the count is neither 8 nor 4.
+        If the positions are not pairs, the pitch is not positive or the count is none of 8, 4 and 6.
 
     Examples
     --------
@@ -50,14 +58,106 @@ def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: float, count: int = 8) ->
     >>> len(neighbour_pairs(square, 1.0, count=8))
     6
     """
+    positions = _plane(positions_mm)
+    if count not in _METRIC:
+        raise InputError(f"count must be 8, 4 or 6 neighbours: got {count!r}.")
+    reach = _BETWEEN_FIRST_AND_SECOND_NEIGHBOUR[count] * positive("pitch_mm", pitch_mm, "mm")
+    # The tree's reach includes its end.
+    found = cKDTree(positions).query_pairs(np.nextafter(reach, 0.0), p=_METRIC[count], output_type="ndarray")
+    return _in_order(found)
+
+
+def delaunay_pairs(positions_mm: ArrayLike, pitch_mm: float) -> np.ndarray:
+    """Find who is whose neighbour where receptors lie at random.
+
+    Neighbours are joined by an edge of the Delaunay triangulation: their Voronoi cells, what lies nearest to
+    each, touch. Edges longer than 3 pitches are left out: they bridge the rim of a region or a hole in it.
+
+    Parameters
+    ----------
+    positions_mm : array_like (n_receptors, 2)
+        Places of the receptors, such as `Population.places_mm`. [mm]
+    pitch_mm : float
+        1/sqrt(density) of the layout. [mm]
+
+    Returns
+    -------
+    int array (n_pairs, 2)
+        Every pair of neighbours once, the lower index first.
+
+    Raises
+    ------
+    InputError
+        If the positions are not pairs, fewer than three or all on one line, or the pitch is not positive.
+
+    Examples
+    --------
+    >>> delaunay_pairs([[0.0, 0.0], [2.0, 0.1], [1.0, 1.0], [1.0, -1.0]], pitch_mm=1.0).tolist()
+    [[0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
+    """
+    positions = _plane(positions_mm)
+    longest = _LONGEST_PITCHES * positive("pitch_mm", pitch_mm, "mm")
+    try:
+        corners = Delaunay(positions).simplices
+    except (QhullError, ValueError) as error:
+        raise InputError(
+            "Neighbours of a random layout need three receptors that are not on one line: "
+            f"got {len(positions)}."
+        ) from error
+    pairs = np.unique(np.sort(corners[:, [[0, 1], [0, 2], [1, 2]]].reshape(-1, 2), axis=1), axis=0)
+    lengths = np.linalg.norm(positions[pairs[:, 0]] - positions[pairs[:, 1]], axis=1)
+    return pairs[lengths <= longest].astype(np.int64)
+
+
+def neighbours_of(places_mm: ArrayLike, pitch_mm: float, pattern: str) -> np.ndarray:
+    """Find who is whose neighbour in a layout of any pattern of `fingerpad.layouts`.
+
+    Parameters
+    ----------
+    places_mm : array_like (n_receptors, 2)
+        Of the layout. [mm]
+    pitch_mm : float
+        Of the layout. [mm]
+    pattern : str
+        "rectangular" has 8 neighbours, "hexagonal" 6, all others those of `delaunay_pairs`.
+
+    Returns
+    -------
+    int array (n_pairs, 2)
+        Every pair of neighbours once, the lower index first.
+
+    Raises
+    ------
+    InputError
+        If the pattern is unknown, or as the functions above.
+
+    Examples
+    --------
+    >>> from fingerpad.layouts import hexagonal
+    >>> from fingerpad.regions import Ellipse
+    >>> seven = hexagonal(Ellipse(1.2, 1.2), density_per_cm2=115.47)
+    >>> len(neighbours_of(seven.places_mm, seven.pitch_mm, seven.pattern))
+    12
+    """
+    one_of("pattern", pattern, PATTERNS)
+    if pattern in _LATTICE_NEIGHBOURS:
+        return neighbour_pairs(places_mm, pitch_mm, _LATTICE_NEIGHBOURS[pattern])
+    return delaunay_pairs(places_mm, pitch_mm)
+
+
+def _plane(positions_mm: ArrayLike) -> FloatArray:
     positions = float_array("positions_mm", positions_mm, 2)
     if positions.shape[1] != 2:
-        raise InputError(f"positions_mm must have rows of x and z: got shape {positions.shape}.")
-    if count not in (4, 8):
-        raise InputError(f"count must be 8 or 4 neighbours: got {count!r}.")
-    apart = np.abs(positions[:, np.newaxis] - positions) / positive("pitch_mm", pitch_mm, "mm")
-    separation = apart.max(axis=-1) if count == 8 else apart.sum(axis=-1)
-    return np.argwhere(np.triu(separation < _BETWEEN_FIRST_AND_SECOND_NEIGHBOUR, k=1))
+        raise InputError(
+            f"positions_mm must have rows of two numbers, such as x and z: got shape {positions.shape}."
+        )
+    return positions
+
+
+def _in_order(pairs: np.ndarray) -> np.ndarray:
+    """Pairs by their first, then by their second receptor, the lower first."""
+    ordered = np.sort(pairs.astype(np.int64), axis=1)
+    return ordered[np.lexsort((ordered[:, 1], ordered[:, 0]))]
 
 
 def gradient_sum(values: ArrayLike, neighbours: np.ndarray) -> FloatArray:

@@ -26,6 +26,8 @@ from fingerpad.checks import FloatArray, instance, whole
 from fingerpad.errors import InputError
 
 IntArray = NDArray[np.int64]
+Numbers = int | Sequence[int] | np.ndarray
+"""Which trials or receptors: their own numbers, or how many of them from 0."""
 
 LARGEST_SEED = 2**63 - 1
 """Seeds, trials and receptors fit into a signed word, as NumPy's integers do."""
@@ -47,6 +49,10 @@ class Purpose(IntEnum):
     """When a membrane with an escape rate fires."""
     RESPONSE = 5
     """Noise that multiplies a finished response, such as a rate."""
+    SENSITIVITY = 6
+    """How one end organ's sensitivity differs from the others', for good."""
+    LAYOUT = 7
+    """Where an end organ lies."""
 
 
 # Constants of Philox 4x64 as published: two multipliers, and what is added to the key each round.
@@ -221,9 +227,7 @@ def generator(seed: int, trial: int, receptor: int, purpose: Purpose) -> np.rand
     )
 
 
-def uniforms(
-    seed: int, trials: int | Sequence[int], receptors: int | Sequence[int], purpose: Purpose, count: int
-) -> FloatArray:
+def uniforms(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, count: int) -> FloatArray:
     """Draw uniform numbers of many streams at once.
 
     Parameters
@@ -262,9 +266,7 @@ def uniforms(
     return numbers
 
 
-def normals(
-    seed: int, trials: int | Sequence[int], receptors: int | Sequence[int], purpose: Purpose, count: int
-) -> FloatArray:
+def normals(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, count: int) -> FloatArray:
     """Draw standard normal numbers of many streams at once.
 
     Parameters
@@ -354,7 +356,7 @@ def _fill_trains(seed, trials, receptors, purpose, numbers):  # type: ignore[no-
         _fill(seed, trials[some], receptors[some], purpose, True, numbers[some].reshape((1, 1, -1)))
 
 
-def numbered(name: str, which: int | Sequence[int] | np.ndarray) -> IntArray:
+def numbered(name: str, which: Numbers) -> IntArray:
     """Return the numbers of trials or receptors: the ones given, or so many from 0.
 
     Parameters
@@ -386,7 +388,7 @@ def numbered(name: str, which: int | Sequence[int] | np.ndarray) -> IntArray:
 
 
 def _key(
-    seed: int, trials: int | Sequence[int], receptors: int | Sequence[int], purpose: Purpose
+    seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose
 ) -> tuple[int, IntArray, IntArray, int]:
     return (
         _number("seed", seed),
@@ -396,7 +398,7 @@ def _key(
     )
 
 
-def _shape(trials: int | Sequence[int], receptors: int | Sequence[int], count: int) -> tuple[int, int, int]:
+def _shape(trials: Numbers, receptors: Numbers, count: int) -> tuple[int, int, int]:
     return numbered("trials", trials).size, numbered("receptors", receptors).size, whole("count", count, 0)
 
 

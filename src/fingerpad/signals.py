@@ -24,7 +24,9 @@ class Skin(Protocol):
     """Anything that can tell the strain energy density below points of its surface."""
 
     def sed(self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY) -> SedTraces:
-        """Strain energy density over time at `sites` (n_sites, 2), x and z on the skin. [mm]
+        """Strain energy density over time below `sites` of the skin. [mm]
+
+        These are x and z (n_sites, 2) on its volar side, or x, y and z (n_sites, 3) anywhere.
 
         With it comes what the dynamic response follows, if that is another quantity.
         """
@@ -118,6 +120,20 @@ class SedTraces:
             return self
         dynamic = None if self.dynamic_kpa is None else self.dynamic_kpa[:, sites]
         return SedTraces(self.times_ms, self.sed_kpa[:, sites], self.kinks_ms, dynamic, self.dynamic_quantity)
+
+    def scaled(self, factors: ArrayLike) -> SedTraces:
+        """Traces with each site's values multiplied by a factor of its own, (n_sites,), not negative.
+
+        Examples
+        --------
+        >>> SedTraces([0.0, 50.0], [[0.0, 0.0], [2.0, 2.0]]).scaled([1.0, 1.5]).sed_kpa[-1].tolist()
+        [2.0, 3.0]
+        """
+        each = float_array("factors", factors, 1)
+        if each.size != self.n_sites:
+            raise InputError(f"factors needs one number per site: got {each.size} for {self.n_sites}.")
+        dynamic = None if self.dynamic_kpa is None else self.dynamic_kpa * each
+        return SedTraces(self.times_ms, self.sed_kpa * each, self.kinks_ms, dynamic, self.dynamic_quantity)
 
 
 @dataclass(frozen=True)
@@ -237,8 +253,8 @@ class ResponseMap:
 
     Parameters
     ----------
-    positions_mm : array (n_receptors, 2)
-        x (distal positive) and z (lateral) of each receptor on the skin. [mm]
+    positions_mm : array (n_receptors, 2) or (n_receptors, 3)
+        x (distal positive) and z (lateral) on the volar skin, or x, y and z of the skin anywhere. [mm]
     pitch_mm : float
         Distance between neighbours of the layout. [mm]
     spikes : SpikeTrains
@@ -258,8 +274,10 @@ class ResponseMap:
 
     def __post_init__(self) -> None:
         positions = float_array("positions_mm", self.positions_mm, 2)
-        if positions.shape[1] != 2:
-            raise InputError(f"positions_mm needs two columns, x and z: got shape {positions.shape}.")
+        if positions.shape[1] not in (2, 3):
+            raise InputError(
+                f"positions_mm needs columns x and z, or x, y and z: got shape {positions.shape}."
+            )
         positive("pitch_mm", self.pitch_mm, "mm")
         dynamic = float_array("dynamic_rate_hz", self.dynamic_rate_hz, 1)
         static = float_array("static_rate_hz", self.static_rate_hz, 1)

@@ -58,6 +58,13 @@ RECEPTOR_COUNT = Published("receptors in the population", 18.0, "1", "Gerling et
 HUMAN_RECEPTOR_DENSITY = Published(
     "density of SAI receptors in the human fingertip", 70.0, "1/cm2", "Johansson & Vallbo 1979", "recalled"
 )
+SENSITIVITY_SPREAD = Published(
+    "standard deviation of the logarithm of the sensitivity of SAI afferents",
+    0.4,
+    "1",
+    "called large, without a number, in the abstracts of Goodwin & Wheat 1999 and Wheat & Goodwin 2001",
+    "assumed",
+)
 INTERVAL_VARIATION = Published(
     "coefficient of variation of SAI interspike intervals and its spread, mouse",
     (0.78, 0.09),
