@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.measuring import Spread, run_job
 from benchmarks.results import Report, Table
 from fingerpad.afferent import Afferent
-from fingerpad.discrimination import discriminate_euclidean, discriminate_gradient_sum
+from fingerpad.discrimination import Experiment, discriminate_euclidean, discriminate_gradient_sum
 from fingerpad.encoding import neighbour_pairs
 from fingerpad.parameters import psychophysics
 from fingerpad.population import Population
@@ -75,10 +75,13 @@ def observe() -> dict[str, Any]:
     spheres = len(psychophysics.SPHERE_CURVATURES.value)
     responses = np.random.default_rng(0).uniform(*RESPONSES_HZ, (spheres, len(population.positions_mm)))
     sigma = psychophysics.NOISE_SIGMA.value
+    few = Experiment(presentations=2, distributions=2, hit_rates=2)
+    discriminate_gradient_sum(responses, neighbours, sigma, 1, few)  # loads compiled kernels
+    discriminate_euclidean(responses, sigma, 1, few)
     started = perf_counter()
-    discriminate_gradient_sum(responses, neighbours, sigma, np.random.default_rng(1))
+    discriminate_gradient_sum(responses, neighbours, sigma, 1)
     between = perf_counter()
-    discriminate_euclidean(responses, sigma, np.random.default_rng(1))
+    discriminate_euclidean(responses, sigma, 1)
     return {"gradient_sum_s": between - started, "euclidean_s": perf_counter() - between}
 
 

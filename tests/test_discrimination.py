@@ -1,4 +1,7 @@
 import math
+import os
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -11,12 +14,21 @@ from fingerpad.discrimination import (
     Experiment,
     discriminate_euclidean,
     discriminate_gradient_sum,
-    expected_hit_rates,
-    fit_noise_sigma,
+    hit_rates_of_sums,
 )
 from fingerpad.encoding import distance, gradient_sum, neighbour_pairs
 from fingerpad.errors import ConvergenceError, InputError
+from fingerpad.noise_fit import expected_hit_rates, fit_noise_sigma
+from fingerpad.noisy_responses import (
+    LARGEST_SESSION,
+    SESSION,
+    noisy_gradient_sums,
+    noisy_responses,
+    session_trials,
+    shared_noise_gradient_sums,
+)
 from fingerpad.population import Population
+from fingerpad.random_streams import Purpose, normals, uniforms
 
 GRID = Population.grid()
 PAIRS = neighbour_pairs(GRID.positions_mm, GRID.pitch_mm)
@@ -25,8 +37,8 @@ CURVATURES = np.array([287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0])
 TWO = [[0, 1]]
 
 
-def generator(seed=0):
-    return np.random.default_rng(seed)
+def standard_normals(seed, shape):
+    return np.random.default_rng(seed).standard_normal(shape)
 
 
 def bumps(curvatures=CURVATURES):
@@ -36,12 +48,20 @@ def bumps(curvatures=CURVATURES):
     return 40.0 * np.exp(-(x**2 + z**2) / (2.0 * width**2))
 
 
-def one_by_one(values, sigma, count, draws):
-    """(a): noise drawn number by number, in the order sphere, presentation, receptor."""
-    return [
-        [[value * (1.0 + sigma * draws.standard_normal()) for value in sphere] for _ in range(count)]
-        for sphere in values
+def one_by_one(sphere, sigma, seed, trial, count):
+    """(a): one presentation after the other, each number looked up by its key."""
+    numbers = [
+        normals(seed, [trial], [receptor], Purpose.RESPONSE, count)[0, 0] for receptor in range(len(sphere))
     ]
+    return [
+        [value * (1.0 + sigma * numbers[receptor][k]) for receptor, value in enumerate(sphere)]
+        for k in range(count)
+    ]
+
+
+def picked(seed, trial, count, choices):
+    """Numbers below `choices`, looked up by their key."""
+    return [int(u * choices) for u in uniforms(seed, [trial], [0], Purpose.PICK, count)[0, 0]]
 
 
 def mean_and_sd(numbers):
@@ -53,68 +73,85 @@ def normal_beyond(point, mean, sd, side):
     return 0.5 * math.erfc(-side * (mean - point) / sd / math.sqrt(2.0))
 
 
-def test_gradient_sum_follows_the_printed_steps():
-    values, sigma, plan = bumps([287.0, 310.0, 260.0]), 0.05, SMALL
-    draws = generator(5)
+@pytest.mark.parametrize("session", [0, 3])
+def test_gradient_sum_follows_the_printed_steps(session):
+    values, sigma, plan, seed = bumps([287.0, 310.0, 260.0]), 0.05, SMALL, 5
+    begin = session * SESSION
     fitted = []
-    for _ in range(plan.distributions):  # (f)
-        noisy = one_by_one(values, sigma, plan.presentations, draws)
-        sums = [[float(gradient_sum(one, PAIRS)) for one in sphere] for sphere in noisy]  # (b)-(d)
+    for distribution in range(plan.distributions):  # (f)
+        sums = [
+            [
+                float(gradient_sum(one, PAIRS))  # (b), (c)
+                for one in one_by_one(
+                    values[sphere],
+                    sigma,
+                    seed,
+                    begin + sphere * plan.distributions + distribution,
+                    plan.presentations,
+                )  # (d)
+            ]
+            for sphere in range(3)
+        ]
         fitted.append([mean_and_sd(of_sphere) for of_sphere in sums])  # (e)
     pooled = [sum(one[sphere][0] for one in fitted) / plan.distributions for sphere in range(3)]
-    picks = draws.integers(plan.distributions, size=(2, plan.hit_rates, 2))
     expected = []
     for comparison in (1, 2):  # (j)
         side = 1.0 if pooled[comparison] > pooled[0] else -1.0
+        picks = picked(seed, begin + comparison - 1, 2 * plan.hit_rates, plan.distributions)
         rates = []
         for judgement in range(plan.hit_rates):  # (i)
-            standard_mean, _ = fitted[picks[0, judgement, comparison - 1]][0]  # (g)
-            mean, sd = fitted[picks[1, judgement, comparison - 1]][comparison]
+            standard_mean, _ = fitted[picks[2 * judgement]][0]  # (g)
+            mean, sd = fitted[picks[2 * judgement + 1]][comparison]
             rates.append(normal_beyond(0.5 * (standard_mean + mean), mean, sd, side))  # (h)
         expected.append(mean_and_sd(rates))  # (k)
-    rates = discriminate_gradient_sum(values, PAIRS, sigma, generator(5), plan)
+    rates = discriminate_gradient_sum(values, PAIRS, sigma, seed, plan, session=session)
+    assert (rates.seed, rates.session) == (seed, session)
     assert pooled[2] != pooled[0]
     assert_allclose(rates.hit_rate, [mean for mean, _ in expected], rtol=1e-11)
     assert_allclose(rates.hit_rate_sd, [sd for _, sd in expected], rtol=1e-9)
 
 
-def test_the_varied_criterion_follows_the_printed_steps():
-    values, sigma = bumps([287.0, 310.0, 340.0]), 0.05
-    plan = Experiment(presentations_varied=9, hit_rates=7, criterion_sigma=0.02)
-    draws = generator(6)
+@pytest.mark.parametrize("moves", ["point", "fraction"])
+def test_the_varied_criterion_follows_the_printed_steps(moves):
+    values, sigma, seed = bumps([287.0, 310.0, 340.0]), 0.05, 6
+    plan = Experiment(presentations_varied=9, hit_rates=7, criterion_sigma=0.02, criterion_moves=moves)
     sums = [
-        [float(gradient_sum(one, PAIRS)) for one in sphere]
-        for sphere in one_by_one(values, sigma, plan.presentations_varied, draws)
+        [float(gradient_sum(one, PAIRS)) for one in one_by_one(values[sphere], sigma, seed, sphere, 9)]
+        for sphere in range(3)
     ]
     (standard_mean, _), *others = [mean_and_sd(of_sphere) for of_sphere in sums]
     hits = [[], []]
-    for _ in range(plan.hit_rates):
-        for comparison, (mean, sd) in enumerate(others):
-            point = 0.5 * (standard_mean + mean) * (1.0 + 0.02 * draws.standard_normal())
+    for comparison, (mean, sd) in enumerate(others):
+        for number in normals(seed, [comparison], [0], Purpose.CRITERION, plan.hit_rates)[0, 0]:
+            shift = 1.0 + 0.02 * number
+            if moves == "point":
+                point = 0.5 * (standard_mean + mean) * shift
+            else:
+                point = standard_mean + 0.5 * shift * (mean - standard_mean)
             hits[comparison].append(normal_beyond(point, mean, sd, math.copysign(1.0, mean - standard_mean)))
-    rates = discriminate_gradient_sum(values, PAIRS, sigma, generator(6), plan)
+    rates = discriminate_gradient_sum(values, PAIRS, sigma, seed, plan)
     assert_allclose(rates.hit_rate, [mean_and_sd(rate)[0] for rate in hits], rtol=1e-11)
     assert_allclose(rates.hit_rate_sd, [mean_and_sd(rate)[1] for rate in hits], rtol=1e-9)
 
 
 @pytest.mark.parametrize("norm", ["city-block", "euclidean"])
 def test_euclidean_distance_follows_the_printed_steps(norm):
-    values, sigma, plan = bumps([287.0, 310.0, 330.0]), 0.05, SMALL
-    draws = generator(8)
+    values, sigma, plan, seed = bumps([287.0, 310.0, 330.0]), 0.05, SMALL, 8
     repetitions = []
-    for _ in range(plan.hit_rates):
-        sets = one_by_one(values, sigma, plan.presentations, draws)  # (a)-(d*)
-        of_standard = draws.integers(plan.presentations, size=(3, plan.pairs))
-        of_sphere = draws.integers(plan.presentations, size=(3, plan.pairs))
-        other = draws.integers(plan.presentations - 1, size=plan.pairs)
+    for repetition in range(plan.hit_rates):
+        trials = [3 * repetition + sphere for sphere in range(3)]
+        sets = [
+            one_by_one(values[sphere], sigma, seed, trials[sphere], plan.presentations) for sphere in range(3)
+        ]  # (a)-(d*)
+        picks = [picked(seed, trial, 2 * plan.pairs, plan.presentations) for trial in trials]
+        other = picked(seed, trials[0], 2 * plan.pairs, plan.presentations - 1)
         sums = [[], [], []]
         for pair in range(plan.pairs):  # (f*)
             for sphere in range(3):  # (g*)
-                first = of_standard[sphere, pair]
-                second = of_sphere[sphere, pair]
+                first, second = picks[sphere][2 * pair : 2 * pair + 2]
                 if sphere == 0:
-                    second = [index for index in range(plan.presentations) if index != first][other[pair]]
-                    assert second != first
+                    others = [index for index in range(plan.presentations) if index != first]
+                    second = others[other[2 * pair + 1]]
                 apart = [a - b for a, b in zip(sets[0][first], sets[sphere][second], strict=True)]
                 power = 1 if norm == "city-block" else 2
                 sums[sphere].append(sum(abs(difference) ** power for difference in apart) ** (1 / power))
@@ -127,9 +164,77 @@ def test_euclidean_distance_follows_the_printed_steps(norm):
             above = pooled[comparison] > pooled[0]
             judged = [(one > midpoint) == above for one in sums[comparison]]  # (h*)
             hits[comparison - 1].append(sum(judged) / plan.pairs)
-    rates = discriminate_euclidean(values, sigma, generator(8), plan, norm=norm)
+    rates = discriminate_euclidean(values, sigma, seed, plan, norm=norm)
     assert_allclose(rates.hit_rate, [mean_and_sd(rate)[0] for rate in hits], rtol=1e-12)
     assert_allclose(rates.hit_rate_sd, [mean_and_sd(rate)[1] for rate in hits], rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("presentations", [1, 6, 128, 131])
+def test_sums_in_compiled_blocks_are_those_of_the_plain_formula(presentations):
+    """More presentations than a block holds, numbers that do not fill the generator's blocks of four."""
+    values, trials = bumps([287.0, 365.0]), session_trials(2, 2, 3)
+    sums = noisy_gradient_sums(values, PAIRS, 0.07, 4, trials, presentations)
+    assert sums.shape == (2, 3, presentations)
+    for repeat in range(3):
+        plain = gradient_sum(noisy_responses(values, 0.07, 4, trials[:, repeat], presentations), PAIRS)
+        assert_allclose(sums[:, repeat], plain, rtol=1e-13)
+
+
+def test_several_measures_and_noises_meet_the_same_numbers_as_each_alone():
+    measures, sigmas = np.array([bumps(), 60.0 - bumps()]), np.array([0.03, 0.08])
+    trials = session_trials(0, 7, 2)
+    together = noisy_gradient_sums(measures, PAIRS, sigmas, 4, trials, 5)
+    for one, measure, sigma in zip(together, measures, sigmas, strict=True):
+        assert_array_equal(one, noisy_gradient_sums(measure, PAIRS, sigma, 4, trials, 5))
+
+
+def test_shared_noise_is_the_same_for_every_sphere():
+    draws = standard_normals(3, (300, 18))
+    sums = shared_noise_gradient_sums(bumps(), PAIRS, 0.05, draws)
+    assert_allclose(sums, gradient_sum(bumps()[:, np.newaxis] * (1.0 + 0.05 * draws), PAIRS), rtol=1e-13)
+
+
+def test_the_number_of_threads_changes_no_bit():
+    """Threads share the trials; the same numbers come from a process that has only one."""
+    program = (
+        "import numpy as np\n"
+        "from fingerpad.noisy_responses import noisy_gradient_sums, session_trials\n"
+        "values = np.arange(1.0, 15.0).reshape(2, 7)\n"
+        "pairs = np.stack([np.arange(6), np.arange(1, 7)], axis=1)\n"
+        "sums = noisy_gradient_sums(values, pairs, 0.1, 3, session_trials(0, 2, 100), 10)\n"
+        "print(sums.tobytes().hex()[:4000], hash(sums.tobytes()))"
+    )
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env=os.environ | {"NUMBA_NUM_THREADS": threads, "PYTHONHASHSEED": "0"},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for threads in ("1", "2")
+    ]
+    assert said[0] == said[1] != ""
+
+
+def test_sessions_of_one_seed_share_no_noise():
+    first, second = (
+        noisy_responses(bumps()[:1], 0.05, 1, session_trials(session, 1), 1000)[0] / bumps()[0] - 1.0
+        for session in (0, 1)
+    )
+    correlation = np.corrcoef(first.ravel(), second.ravel())[0, 1]
+    assert abs(correlation) < 4.0 / np.sqrt(first.size)
+    with pytest.raises(InputError, match="session must not exceed"):
+        session_trials(LARGEST_SESSION + 1, 1)
+
+
+def test_fewer_hit_rates_are_the_first_of_many():
+    """So that 10 and 100 hit rates differ by their number and by nothing else."""
+    sums = noisy_gradient_sums(bumps(), PAIRS, 0.05, 1, session_trials(0, 7, 20), 10)
+    ten, hundred = (hit_rates_of_sums(sums, 1, Experiment(hit_rates=count)) for count in (10, 100))
+    assert_allclose(ten.hit_rate, hundred.hit_rate, atol=0.2)
+    again = hit_rates_of_sums(sums, 1, Experiment(hit_rates=10))
+    assert_array_equal(again.hit_rate, ten.hit_rate)
 
 
 def test_gradient_sum_of_two_receptors_is_normal_and_its_hit_rate_the_closed_form():
@@ -138,10 +243,10 @@ def test_gradient_sum_of_two_receptors_is_normal_and_its_hit_rate_the_closed_for
     separation = values[1:, 1] - values[0, 1]
     spread = sigma * np.hypot(values[1:, 0], values[1:, 1])
     closed = ndtr(separation / (2.0 * spread))
-    draws = generator(1).standard_normal((200_000, 2))
+    draws = standard_normals(1, (200_000, 2))
     assert_allclose(expected_hit_rates(values, TWO, sigma, draws), closed, atol=2e-3)
     plan = Experiment(presentations=1000, distributions=300, hit_rates=3000)
-    sampled = discriminate_gradient_sum(values, TWO, sigma, generator(2), plan)
+    sampled = discriminate_gradient_sum(values, TWO, sigma, 2, plan)
     assert_allclose(sampled.hit_rate, closed, atol=4e-3)
     # Error propagation through z = (mu_c - mu_s) / (2 sigma_c): two means and one standard deviation vary.
     z = separation / (2.0 * spread)
@@ -155,29 +260,29 @@ def test_gradient_sum_of_two_receptors_is_normal_and_its_hit_rate_the_closed_for
 def test_the_criterion_moves_the_decision_point(criterion):
     values, sigma = np.array([[50.0, 80.0], [50.0, 84.0]]), 0.03
     margin = (1.0 - criterion) * 4.0 / (sigma * np.hypot(50.0, 84.0))
-    draws = generator(1).standard_normal((200_000, 2))
+    draws = standard_normals(1, (200_000, 2))
     assert_allclose(expected_hit_rates(values, TWO, sigma, draws, criterion), ndtr(margin), atol=2e-3)
     plan = Experiment(presentations=1000, criterion=criterion)
-    sampled = discriminate_gradient_sum(values, TWO, sigma, generator(2), plan)
+    sampled = discriminate_gradient_sum(values, TWO, sigma, 2, plan)
     assert_allclose(sampled.hit_rate, ndtr(margin), atol=0.01)
 
 
 def test_equal_spheres_are_told_apart_by_chance_only():
     values = np.repeat(bumps([287.0]), 3, axis=0)
-    assert_allclose(discriminate_gradient_sum(values, PAIRS, 0.05, generator()).hit_rate, 0.5, atol=0.02)
-    assert_allclose(discriminate_euclidean(values, 0.05, generator()).hit_rate, 0.5, atol=0.03)
+    assert_allclose(discriminate_gradient_sum(values, PAIRS, 0.05, 0).hit_rate, 0.5, atol=0.02)
+    assert_allclose(discriminate_euclidean(values, 0.05, 0).hit_rate, 0.5, atol=0.03)
 
 
 def test_very_different_spheres_are_always_told_apart():
     values = bumps([287.0, 2000.0])
-    assert discriminate_gradient_sum(values, PAIRS, 0.05, generator()).hit_rate[0] > 0.999
-    assert discriminate_euclidean(values, 0.05, generator()).hit_rate[0] > 0.999
+    assert discriminate_gradient_sum(values, PAIRS, 0.05, 0).hit_rate[0] > 0.999
+    assert discriminate_euclidean(values, 0.05, 0).hit_rate[0] > 0.999
 
 
 def test_hit_rates_rise_with_curvature_and_fall_with_noise():
-    quiet = discriminate_gradient_sum(bumps(), PAIRS, 0.03, generator()).hit_rate
-    loud = discriminate_gradient_sum(bumps(), PAIRS, 0.1, generator()).hit_rate
-    apart = discriminate_euclidean(bumps(), 0.1, generator()).hit_rate
+    quiet = discriminate_gradient_sum(bumps(), PAIRS, 0.03, 0).hit_rate
+    loud = discriminate_gradient_sum(bumps(), PAIRS, 0.1, 0).hit_rate
+    apart = discriminate_euclidean(bumps(), 0.1, 0).hit_rate
     assert (np.diff(quiet[:-1]) > 0).all()
     assert (np.diff(loud) > 0).all()
     assert (np.diff(apart) > 0).all()
@@ -189,17 +294,15 @@ def test_a_measure_that_falls_with_curvature_is_read_like_one_that_rises():
     rising = np.array([[50.0, 80.0], [50.0, 84.0]])
     falling = np.array([[50.0, 84.0], [50.0, 80.0]])
     plan = Experiment(presentations=1000)
-    up = discriminate_gradient_sum(rising, TWO, 0.03, generator(1), plan).hit_rate[0]
-    down = discriminate_gradient_sum(falling, TWO, 0.03, generator(2), plan).hit_rate[0]
+    up = discriminate_gradient_sum(rising, TWO, 0.03, 1, plan).hit_rate[0]
+    down = discriminate_gradient_sum(falling, TWO, 0.03, 2, plan).hit_rate[0]
     assert up == pytest.approx(ndtr(2.0 / (0.03 * np.hypot(50.0, 84.0))), abs=0.01)
     assert down == pytest.approx(ndtr(2.0 / (0.03 * np.hypot(50.0, 80.0))), abs=0.01)
 
 
 def test_a_wavering_criterion_widens_the_error_bars_and_leaves_the_means():
     steady, little, much = (
-        discriminate_gradient_sum(
-            bumps(), PAIRS, 0.055, generator(3), Experiment(criterion_sigma=sigma, hit_rates=2000)
-        )
+        discriminate_gradient_sum(bumps(), PAIRS, 0.055, 3, Experiment(criterion_sigma=sigma, hit_rates=2000))
         for sigma in (1e-9, 0.01, 0.02)
     )
     assert (steady.hit_rate_sd < 1e-6).all()
@@ -210,16 +313,16 @@ def test_a_wavering_criterion_widens_the_error_bars_and_leaves_the_means():
 
 def test_fewer_presentations_widen_the_error_bars():
     """The paper's Figure 7 (g): 10 noise matrices instead of 100."""
-    many = discriminate_gradient_sum(bumps(), PAIRS, 0.055, generator(4))
-    few = discriminate_gradient_sum(bumps(), PAIRS, 0.055, generator(4), Experiment(presentations=10))
+    many = discriminate_gradient_sum(bumps(), PAIRS, 0.055, 4)
+    few = discriminate_gradient_sum(bumps(), PAIRS, 0.055, 4, Experiment(presentations=10))
     assert (few.hit_rate_sd[:4] > 2.0 * many.hit_rate_sd[:4]).all()
 
 
 def test_without_noise_every_difference_is_seen_and_no_difference_is_a_coin_flip():
     values = bumps([287.0, 287.0, 288.0])
     for rates in (
-        discriminate_gradient_sum(values, PAIRS, 0.0, generator(), SMALL),
-        discriminate_euclidean(values, 0.0, generator(), SMALL),
+        discriminate_gradient_sum(values, PAIRS, 0.0, 0, SMALL),
+        discriminate_euclidean(values, 0.0, 0, SMALL),
     ):
         assert_array_equal(rates.hit_rate, [0.5, 1.0])
         assert_array_equal(rates.hit_rate_sd, [0.0, 0.0])
@@ -229,36 +332,34 @@ def test_sums_that_never_vary_are_compared_as_they_are():
     """Integers, so that mean and standard deviation are exact: the standard deviation is 0."""
     values = [[50.0, 60.0], [50.0, 60.0], [50.0, 61.0]]
     plan = Experiment(presentations=8, distributions=8, hit_rates=8)
-    rates = discriminate_gradient_sum(values, TWO, 0.0, generator(), plan)
+    rates = discriminate_gradient_sum(values, TWO, 0.0, 0, plan)
     assert_array_equal(rates.hit_rate, [0.5, 1.0])
     assert_array_equal(expected_hit_rates(values, TWO, 0.0, np.zeros((4, 2))), [0.5, 1.0])
 
 
 def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
-    first, again, other = (
-        discriminate_gradient_sum(bumps(), PAIRS, 0.05, generator(seed)) for seed in (9, 9, 10)
-    )
+    first, again, other = (discriminate_gradient_sum(bumps(), PAIRS, 0.05, seed) for seed in (9, 9, 10))
     assert_array_equal(first.hit_rate, again.hit_rate)
     assert (first.hit_rate != other.hit_rate).any()
     assert_array_equal(
-        discriminate_euclidean(bumps(), 0.05, generator(9)).hit_rate,
-        discriminate_euclidean(bumps(), 0.05, generator(9)).hit_rate,
+        discriminate_euclidean(bumps(), 0.05, 9).hit_rate,
+        discriminate_euclidean(bumps(), 0.05, 9).hit_rate,
     )
 
 
 def test_expected_hit_rates_are_those_that_sampling_approaches():
-    draws = generator(11).standard_normal((20_000, 18))
+    draws = standard_normals(11, (20_000, 18))
     expected = expected_hit_rates(bumps(), PAIRS, 0.055, draws)
     plan = Experiment(presentations=500, distributions=50, hit_rates=2000)
-    sampled = discriminate_gradient_sum(bumps(), PAIRS, 0.055, generator(12), plan)
+    sampled = discriminate_gradient_sum(bumps(), PAIRS, 0.055, 12, plan)
     assert_allclose(sampled.hit_rate, expected, atol=0.01)
 
 
 def test_the_noise_behind_synthetic_hit_rates_is_recovered():
     truth = 0.073
     plan = Experiment(presentations=2000, distributions=100, hit_rates=4000)
-    observed = discriminate_gradient_sum(bumps()[[0, 1, 6]], PAIRS, truth, generator(13), plan).hit_rate
-    draws = generator(14).standard_normal((10_000, 18))
+    observed = discriminate_gradient_sum(bumps()[[0, 1, 6]], PAIRS, truth, 13, plan).hit_rate
+    draws = standard_normals(14, (10_000, 18))
     fit = fit_noise_sigma(lambda sigma: expected_hit_rates(bumps()[[0, 1, 6]], PAIRS, sigma, draws), observed)
     assert fit.noise_sigma == pytest.approx(truth, rel=0.03)
     assert_allclose(fit.hit_rates, observed, atol=0.01)
@@ -281,30 +382,28 @@ def test_silent_receptors_need_a_rule():
     latencies = np.where(bumps() > 8.0, 60.0 - bumps(), np.nan)
     assert np.isnan(latencies).any()
     with pytest.raises(InputError, match="silent_value"):
-        discriminate_gradient_sum(latencies, PAIRS, 0.05, generator(), SMALL)
+        discriminate_gradient_sum(latencies, PAIRS, 0.05, 0, SMALL)
     filled = np.where(np.isnan(latencies), END_OF_STIMULUS_MS, latencies)
     assert END_OF_STIMULUS_MS == 1000.0
     assert_array_equal(
-        discriminate_gradient_sum(
-            latencies, PAIRS, 0.05, generator(), SMALL, silent_value=END_OF_STIMULUS_MS
-        ).hit_rate,
-        discriminate_gradient_sum(filled, PAIRS, 0.05, generator(), SMALL).hit_rate,
+        discriminate_gradient_sum(latencies, PAIRS, 0.05, 0, SMALL, silent_value=END_OF_STIMULUS_MS).hit_rate,
+        discriminate_gradient_sum(filled, PAIRS, 0.05, 0, SMALL).hit_rate,
     )
     assert np.isnan(latencies).any()
 
 
 def test_the_whole_protocol_takes_a_fraction_of_a_second():
     start = time.perf_counter()
-    discriminate_gradient_sum(bumps(), PAIRS, 0.055, generator())
-    discriminate_euclidean(bumps(), 0.055, generator())
+    discriminate_gradient_sum(bumps(), PAIRS, 0.055, 0)
+    discriminate_euclidean(bumps(), 0.055, 0)
     assert time.perf_counter() - start < 1.0
 
 
 def test_city_block_and_euclidean_distance_lead_to_different_hit_rates():
     values = bumps()
     assert not np.allclose(distance(values[0], values), distance(values[0], values, "euclidean"))
-    city_block = discriminate_euclidean(values, 0.05, generator(1)).hit_rate
-    euclidean = discriminate_euclidean(values, 0.05, generator(1), norm="euclidean").hit_rate
+    city_block = discriminate_euclidean(values, 0.05, 1).hit_rate
+    euclidean = discriminate_euclidean(values, 0.05, 1, norm="euclidean").hit_rate
     assert (city_block != euclidean).any()
 
 
@@ -315,15 +414,24 @@ def test_city_block_and_euclidean_distance_lead_to_different_hit_rates():
         (lambda: Experiment(hit_rates=2.5), "hit_rates must be a whole number"),
         (lambda: Experiment(criterion=math.nan), "criterion must be a finite number"),
         (lambda: Experiment(criterion_sigma=-0.1), "criterion_sigma must not be negative"),
-        (lambda: discriminate_gradient_sum(bumps()[:1], PAIRS, 0.1, generator()), "at least one comparison"),
-        (lambda: discriminate_gradient_sum(bumps()[0], PAIRS, 0.1, generator()), "2 dimension"),
-        (lambda: discriminate_gradient_sum(bumps(), PAIRS, -0.1, generator()), "noise_sigma must not"),
-        (lambda: discriminate_gradient_sum(bumps(), PAIRS + 1, 0.1, generator()), "neighbours must be"),
-        (lambda: discriminate_gradient_sum([["a"]], PAIRS, 0.1, generator()), "responses must be numbers"),
-        (lambda: discriminate_gradient_sum([[np.inf]] * 2, TWO, 0.1, generator()), "finite numbers only"),
-        (lambda: discriminate_euclidean(bumps(), 0.1, generator(), norm="maximum"), "norm must be one of"),
+        (lambda: Experiment(criterion_moves="beta"), "criterion_moves must be one of point, fraction"),
+        (lambda: discriminate_gradient_sum(0.0 * bumps(), PAIRS, 0.1, 0), "no hit rate from zeros"),
         (
-            lambda: discriminate_euclidean(bumps(), 0.1, generator(), Experiment(criterion_sigma=0.1)),
+            lambda: discriminate_euclidean(bumps() * np.nan, 0.1, 0, silent_value=1.0),
+            "no hit rate from zeros",
+        ),
+        (lambda: expected_hit_rates(0.0 * bumps(), PAIRS, 0.1, np.ones((9, 18))), "no hit rate from zeros"),
+        (lambda: discriminate_gradient_sum(bumps(), PAIRS, 0.1, -1), "seed must be a whole number"),
+        (lambda: discriminate_gradient_sum(bumps(), PAIRS, 0.1, 0, session=-1), "session must be a whole"),
+        (lambda: discriminate_gradient_sum(bumps()[:1], PAIRS, 0.1, 0), "at least one comparison"),
+        (lambda: discriminate_gradient_sum(bumps()[0], PAIRS, 0.1, 0), "2 dimension"),
+        (lambda: discriminate_gradient_sum(bumps(), PAIRS, -0.1, 0), "noise_sigma must not"),
+        (lambda: discriminate_gradient_sum(bumps(), PAIRS + 1, 0.1, 0), "neighbours must be"),
+        (lambda: discriminate_gradient_sum([["a"]], PAIRS, 0.1, 0), "responses must be numbers"),
+        (lambda: discriminate_gradient_sum([[np.inf]] * 2, TWO, 0.1, 0), "finite numbers only"),
+        (lambda: discriminate_euclidean(bumps(), 0.1, 0, norm="maximum"), "norm must be one of"),
+        (
+            lambda: discriminate_euclidean(bumps(), 0.1, 0, Experiment(criterion_sigma=0.1)),
             "criterion_sigma must be 0",
         ),
         (lambda: expected_hit_rates(bumps(), PAIRS, 0.1, np.ones((9, 17))), "standard_normals needs"),

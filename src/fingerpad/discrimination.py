@@ -8,30 +8,35 @@ Letters in brackets are the steps of Figure 3. Readings where the paper is silen
 - Which side that is, is the observer's lasting knowledge: the sign of the difference of the means over
   all repetitions. Measures that fall with curvature (latencies) are read like those that rise, and equal
   spheres are told apart in half of the trials, not more.
+
+Every random number has a key: seed, trial, receptor and purpose. Trials are numbered within a session, so
+that sessions of one seed are experiments with nothing in common but what was touched.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize_scalar
-from scipy.special import ndtr
 
-from fingerpad.checks import FloatArray, finite, float_array, not_negative, one_of, positive, whole
-from fingerpad.encoding import NORMS, check_neighbours, distance, gradient_sum
-from fingerpad.errors import ConvergenceError, InputError
+from fingerpad.checks import FloatArray, finite, float_array, not_negative, one_of, whole
+from fingerpad.encoding import NORMS, check_neighbours, distance
+from fingerpad.errors import InputError
+from fingerpad.noisy_responses import noisy_gradient_sums, noisy_responses, session_trials
 from fingerpad.parameters import protocol, psychophysics
+from fingerpad.random_streams import IntArray, Purpose, normals, uniforms
+from fingerpad.signal_detection import decision_point, hit_probability, moments, side
 from fingerpad.signals import HitRates
 
 END_OF_STIMULUS_MS = protocol.RAMP.value + protocol.HOLD.value
 """A usual stand-in for the latency of a receptor that stays silent. [ms]"""
 
+WAVERING = ("point", "fraction")
+"""What a varied criterion multiplies: the decision point, or the fraction beta that places it."""
+
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
 _REPETITIONS_VARIED = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
-_NOISE_SCAN = 33
 
 
 @dataclass(frozen=True)
@@ -57,16 +62,18 @@ class Experiment:
         sphere, from `presentations_varied` sums; steps (f) and (g) fall away.
     presentations_varied : int
         Presentations of each sphere when the criterion varies.
+    criterion_moves : {"point", "fraction"}
+        What the varied criterion multiplies: the decision point itself, or beta.
 
     Raises
     ------
     InputError
-        If a count is below 2, the criterion not finite or its spread negative.
+        If a count is below 2, the criterion not finite, its spread negative, or what it moves unknown.
 
     Examples
     --------
-    >>> Experiment().hit_rates, Experiment(criterion_sigma=0.02).presentations_varied
-    (100, 5000)
+    >>> Experiment().hit_rates, Experiment(criterion_sigma=0.02).sums_per_sphere
+    (100, (1, 5000))
     """
 
     presentations: int = _REPETITIONS
@@ -76,40 +83,31 @@ class Experiment:
     criterion: float = psychophysics.DECISION_CRITERION.value
     criterion_sigma: float = 0.0
     presentations_varied: int = _REPETITIONS_VARIED
+    criterion_moves: str = WAVERING[0]
 
     def __post_init__(self) -> None:
         for name in ("presentations", "distributions", "pairs", "hit_rates", "presentations_varied"):
             whole(name, getattr(self, name), 2)
         finite("criterion", self.criterion)
         not_negative("criterion_sigma", self.criterion_sigma)
+        one_of("criterion_moves", self.criterion_moves, WAVERING)
 
-
-@dataclass(frozen=True)
-class NoiseFit:
-    """Noise that brings predicted hit rates closest to observed ones.
-
-    Parameters
-    ----------
-    noise_sigma : float
-        Standard deviation sigma_1 of the multiplicative noise.
-    hit_rates : array (n_targets,)
-        Predicted hit rates at that noise. [0-1]
-    root_mean_square_error : float
-        Of the predicted against the observed hit rates.
-    """
-
-    noise_sigma: float
-    hit_rates: FloatArray
-    root_mean_square_error: float
+    @property
+    def sums_per_sphere(self) -> tuple[int, int]:
+        """Distributions per sphere, and gradient sums behind each of them."""
+        if self.criterion_sigma > 0.0:
+            return 1, self.presentations_varied
+        return self.distributions, self.presentations
 
 
 def discriminate_gradient_sum(
     responses: ArrayLike,
     neighbours: np.ndarray,
     noise_sigma: float,
-    generator: np.random.Generator,
+    seed: int,
     experiment: Experiment | None = None,
     silent_value: float | None = None,
+    session: int = 0,
 ) -> HitRates:
     """Tell spheres apart by their Gradient Sum, steps (a) to (k).
 
@@ -121,13 +119,15 @@ def discriminate_gradient_sum(
         From `fingerpad.encoding.neighbour_pairs`.
     noise_sigma : float
         Standard deviation sigma_1 of the multiplicative noise.
-    generator : numpy.random.Generator
-        Same state, same answer.
+    seed : int
+        Of the whole run; same seed and session, same answer.
     experiment : Experiment, optional
         Repetitions and criterion; default: the paper's.
     silent_value : float, optional
         What a response of NaN, the latency of a silent receptor, stands for, before noise:
         `END_OF_STIMULUS_MS` is usual. Without it NaN is refused.
+    session : int, optional
+        Which session of this seed: another one draws other numbers.
 
     Returns
     -------
@@ -137,40 +137,69 @@ def discriminate_gradient_sum(
     Raises
     ------
     InputError
-        If there are fewer than two spheres, neighbours are not receptors, the noise is negative, or a
-        response is not finite and no `silent_value` is given.
+        If there are fewer than two spheres, no receptor answers, neighbours are not receptors, the noise,
+        the seed or the session is negative, or a response is not finite and no `silent_value` is given.
 
     Examples
     --------
     Two receptors whose difference is 10 for the standard, 10 and 14 for the comparisons:
 
     >>> responses = [[50.0, 60.0], [50.0, 60.0], [50.0, 64.0]]
-    >>> rates = discriminate_gradient_sum(responses, [[0, 1]], 0.02, np.random.default_rng(1))
-    >>> rates.hit_rate.round(1).tolist()
+    >>> discriminate_gradient_sum(responses, [[0, 1]], 0.02, seed=1).hit_rate.round(1).tolist()
     [0.5, 0.9]
     """
     plan = experiment or Experiment()
-    values = _checked_responses(responses, silent_value)
-    check_neighbours(neighbours, values.shape[1])
+    values = checked_responses(responses, silent_value)
+    pairs = check_neighbours(neighbours, values.shape[1])
     sigma = not_negative("noise_sigma", noise_sigma)
-    if plan.criterion_sigma > 0.0:
-        return _mean_and_spread(_varied_criterion(values, neighbours, sigma, generator, plan))
-    moments = [
-        _moments(gradient_sum(_noisy(values, sigma, plan.presentations, generator), neighbours))  # (a)-(e)
-        for _ in range(plan.distributions)  # (f)
-    ]
-    means = np.array([mean for mean, _ in moments])
-    spreads = np.array([spread for _, spread in moments])
-    return _mean_and_spread(_signal_detection(means, spreads, generator, plan))  # (k)
+    distributions, presentations = plan.sums_per_sphere
+    trials = session_trials(session, len(values), distributions)
+    sums = noisy_gradient_sums(values, pairs, sigma, whole("seed", seed, 0), trials, presentations)  # (a)-(f)
+    return hit_rates_of_sums(sums, seed, plan, session)
+
+
+def hit_rates_of_sums(
+    sums: FloatArray, seed: int, experiment: Experiment | None = None, session: int = 0
+) -> HitRates:
+    """Decide between spheres whose Gradient Sums are known, steps (e) and (g) to (k).
+
+    Parameters
+    ----------
+    sums : array (n_spheres, n_distributions, n_presentations)
+        From `fingerpad.noisy_responses.noisy_gradient_sums`, the standard first. [any unit]
+    seed : int
+        Of the whole run.
+    experiment : Experiment, optional
+        Hit rates and criterion; how many sums there are is seen from them.
+    session : int, optional
+        That of the sums.
+
+    Returns
+    -------
+    HitRates
+        One mean and standard deviation per comparison, mu_3 and sigma_3.
+
+    Examples
+    --------
+    >>> sums = np.array([[[9.0, 10.0, 11.0]] * 2, [[11.0, 12.0, 13.0]] * 2])
+    >>> hit_rates_of_sums(sums, seed=1).hit_rate.round(2).tolist()
+    [0.84]
+    """
+    plan = experiment or Experiment()
+    means, spreads = moments(sums)  # (e): (n_spheres, n_distributions)
+    varied = plan.criterion_sigma > 0.0
+    hit_rates = (_varied_criterion if varied else _picked_pairs)(means.T, spreads.T, seed, plan, session)
+    return _mean_and_spread(hit_rates, seed, session)  # (k)
 
 
 def discriminate_euclidean(
     responses: ArrayLike,
     noise_sigma: float,
-    generator: np.random.Generator,
+    seed: int,
     experiment: Experiment | None = None,
     silent_value: float | None = None,
     norm: str = "city-block",
+    session: int = 0,
 ) -> HitRates:
     """Tell spheres apart by their Euclidean Distance from the standard, steps (a) and (b*) to (h*).
 
@@ -185,14 +214,16 @@ def discriminate_euclidean(
         One measure (a rate, a latency) of every receptor; the standard in the first row. [any unit]
     noise_sigma : float
         Standard deviation sigma_1 of the multiplicative noise.
-    generator : numpy.random.Generator
-        Same state, same answer.
+    seed : int
+        Of the whole run; same seed and session, same answer.
     experiment : Experiment, optional
         Repetitions and criterion; default: the paper's. Its criterion does not vary here.
     silent_value : float, optional
         What a response of NaN stands for; without it NaN is refused.
     norm : {"city-block", "euclidean"}, optional
         Sum of absolute differences, as printed, or root of the sum of squares, as named.
+    session : int, optional
+        Which session of this seed: another one draws other numbers.
 
     Returns
     -------
@@ -202,15 +233,15 @@ def discriminate_euclidean(
     Raises
     ------
     InputError
-        If there are fewer than two spheres, the noise is negative, the norm unknown, the criterion is to
-        vary, or a response is not finite and no `silent_value` is given.
+        If there are fewer than two spheres, no receptor answers, the noise, the seed or the session is
+        negative, the norm unknown, the criterion is to vary, or a response is not finite and no
+        `silent_value` is given.
 
     Examples
     --------
-    >>> responses = [[50.0, 60.0], [50.0, 60.0], [60.0, 80.0]]
-    >>> rates = discriminate_euclidean(responses, 0.02, np.random.default_rng(1))
-    >>> rates.hit_rate.round(1).tolist()
-    [0.5, 1.0]
+    >>> responses = [[50.0, 60.0], [51.0, 62.0], [60.0, 80.0]]
+    >>> discriminate_euclidean(responses, 0.02, seed=1).hit_rate.round(1).tolist()
+    [0.6, 1.0]
     """
     plan = experiment or Experiment()
     if plan.criterion_sigma > 0.0:
@@ -218,144 +249,52 @@ def discriminate_euclidean(
             "criterion_sigma must be 0 for Euclidean Distance: its decision point does not vary."
         )
     one_of("norm", norm, NORMS)
-    values = _checked_responses(responses, silent_value)
+    values = checked_responses(responses, silent_value)
     sigma = not_negative("noise_sigma", noise_sigma)
-    sums = np.array(
-        [
-            _distances(_noisy(values, sigma, plan.presentations, generator), plan.pairs, generator, norm)
-            for _ in range(plan.hit_rates)
-        ]
-    )  # (a)-(g*): (hit_rates, n_spheres, pairs)
+    trials = session_trials(session, plan.hit_rates, len(values))
+    sums = np.array([_distances(values, sigma, seed, repetition, plan, norm) for repetition in trials])
+    # (a)-(g*): (hit_rates, n_spheres, pairs)
     means = sums.mean(axis=2)
-    points = _decision_point(means[:, :1], means[:, 1:], plan.criterion)
-    beyond = _side(means) * (sums[:, 1:] - points[:, :, np.newaxis]).transpose(0, 2, 1)
-    return _mean_and_spread(np.heaviside(beyond, 0.5).mean(axis=1))  # (h*)
+    points = decision_point(means[:, :1], means[:, 1:], plan.criterion)
+    beyond = side(means) * (sums[:, 1:] - points[:, :, np.newaxis]).transpose(0, 2, 1)
+    return _mean_and_spread(np.heaviside(beyond, 0.5).mean(axis=1), seed, session)  # (h*)
 
 
-def expected_hit_rates(
-    responses: ArrayLike,
-    neighbours: np.ndarray,
-    noise_sigma: float,
-    standard_normals: ArrayLike,
-    criterion: float = psychophysics.DECISION_CRITERION.value,
-    silent_value: float | None = None,
-) -> FloatArray:
-    """Predict the mean hit rates of `discriminate_gradient_sum` without repeating the experiment.
-
-    The same standard normal draws serve every sphere and every noise, so the result is a smooth function
-    of `noise_sigma`, made for `fit_noise_sigma`.
+def checked_responses(responses: ArrayLike, silent_value: float | None = None) -> FloatArray:
+    """Return responses as a table if spheres can be told apart by them, else raise `InputError`.
 
     Parameters
     ----------
-    responses, neighbours, noise_sigma, silent_value
-        As in `discriminate_gradient_sum`.
-    standard_normals : array_like (n_draws, n_receptors)
-        Draws from Normal(0, 1), several thousand.
-    criterion : float, optional
-        Decision point beta.
+    responses : array_like (n_spheres, n_receptors)
+        One measure of every receptor; the standard in the first row. [any unit]
+    silent_value : float, optional
+        What a response of NaN stands for; without it NaN is refused.
 
     Returns
     -------
-    array (n_comparisons,)
-        Expected hit rates. [0-1]
+    array (n_spheres, n_receptors)
 
     Raises
     ------
     InputError
-        As `discriminate_gradient_sum`, or if the draws are not one column per receptor.
+        If there are fewer than two spheres or no receptor, a response is no finite number, or no receptor
+        answers any sphere.
 
     Examples
     --------
-    >>> draws = np.random.default_rng(1).standard_normal((5000, 2))
-    >>> expected_hit_rates([[50.0, 60.0], [50.0, 64.0]], [[0, 1]], 0.02, draws).round(2).tolist()
-    [0.89]
+    >>> checked_responses([[20.0, np.nan], [30.0, 40.0]], silent_value=50.0).tolist()
+    [[20.0, 50.0], [30.0, 40.0]]
     """
-    values = _checked_responses(responses, silent_value)
-    draws = float_array("standard_normals", standard_normals, 2)
-    if draws.shape[1] != values.shape[1] or len(draws) < 2:
-        raise InputError(
-            f"standard_normals needs two rows or more and {values.shape[1]} columns, one per receptor: "
-            f"got shape {draws.shape}."
-        )
-    noise = 1.0 + not_negative("noise_sigma", noise_sigma) * draws
-    means, spreads = _moments(gradient_sum(values[:, np.newaxis] * noise, neighbours))
-    point = _decision_point(means[0], means[1:], finite("criterion", criterion))
-    return _beyond(point, means[1:], spreads[1:], _side(means[np.newaxis]))
-
-
-def fit_noise_sigma(
-    hit_rates_of_sigma: Callable[[float], ArrayLike],
-    target_hit_rates: ArrayLike = psychophysics.GOODWIN_HIT_RATES.value,
-    bounds: tuple[float, float] = (1e-3, 1.0),
-) -> NoiseFit:
-    """Choose the noise so that predicted hit rates come closest to observed ones, in least squares.
-
-    The bounds are scanned on a logarithmic grid and the best cell is refined, so that the flat stretches
-    at very small and very large noise do no harm. No random number is drawn here.
-
-    Parameters
-    ----------
-    hit_rates_of_sigma : callable
-        Hit rates (n_targets,) at a given noise sigma_1; smooth, such as `expected_hit_rates`.
-    target_hit_rates : array_like (n_targets,), optional
-        Observed hit rates; default: Goodwin's for 296 and 365 /m. [0-1]
-    bounds : (float, float), optional
-        Smallest and largest noise to consider.
-
-    Returns
-    -------
-    NoiseFit
-
-    Raises
-    ------
-    InputError
-        If the bounds are not positive and in order, or predictions and targets differ in number.
-    ConvergenceError
-        If the best noise lies on a bound: the targets then cannot be met by noise.
-
-    Examples
-    --------
-    >>> def predict(sigma):
-    ...     return ndtr([0.01 / sigma, 0.09 / sigma])
-    >>> fit = fit_noise_sigma(predict, predict(0.055))
-    >>> round(fit.noise_sigma, 4)
-    0.055
-    """
-    targets = float_array("target_hit_rates", target_hit_rates, 1)
-    smallest, largest = (positive("bounds", bound) for bound in bounds)
-    if smallest >= largest:
-        raise InputError(f"bounds must be a smaller and a larger noise: got {bounds!r}.")
-
-    def predict(sigma: float) -> FloatArray:
-        rates = float_array("hit rates of hit_rates_of_sigma", hit_rates_of_sigma(sigma), 1)
-        if rates.shape != targets.shape:
-            raise InputError(f"hit_rates_of_sigma must give {targets.size} hit rates: got {rates.size}.")
-        return rates
-
-    def misfit(log_sigma: float) -> float:
-        return float(np.square(predict(float(np.exp(log_sigma))) - targets).sum())
-
-    grid = np.linspace(np.log(smallest), np.log(largest), _NOISE_SCAN)
-    best = int(np.argmin([misfit(log_sigma) for log_sigma in grid]))
-    if best in (0, _NOISE_SCAN - 1):
-        raise ConvergenceError(
-            f"No noise within {smallest:g} ... {largest:g} meets the hit rates {targets.tolist()}: "
-            f"the best lies on the bound {np.exp(grid[best]):g}; widen the bounds or look at the responses."
-        )
-    refined = minimize_scalar(
-        misfit, bounds=(grid[best - 1], grid[best + 1]), method="bounded", options={"xatol": 1e-9}
-    )
-    sigma = float(np.exp(refined.x))
-    rates = predict(sigma)
-    return NoiseFit(sigma, rates, float(np.sqrt(np.mean(np.square(rates - targets)))))
-
-
-def _checked_responses(responses: ArrayLike, silent_value: float | None) -> FloatArray:
     try:
         table = np.array(responses, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(f"responses must be numbers: got {type(responses).__name__}.") from error
     silent = np.isnan(table)
+    if table.size and (silent | (table == 0.0)).all():
+        raise InputError(
+            "responses must come from a population that answers: it stays silent under every sphere, and "
+            "there is no hit rate from zeros; press deeper or take more sensitive afferents."
+        )
     if silent.any():
         if silent_value is None:
             raise InputError(
@@ -371,70 +310,54 @@ def _checked_responses(responses: ArrayLike, silent_value: float | None) -> Floa
     return table
 
 
-def _noisy(values: FloatArray, sigma: float, count: int, generator: np.random.Generator) -> FloatArray:
-    """Draw noisy presentations of every sphere (a), shape (n_spheres, count, n_receptors)."""
-    draws = generator.standard_normal((values.shape[0], count, values.shape[1]))
-    return values[:, np.newaxis] * (1.0 + sigma * draws)
-
-
-def _moments(sums: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return mean mu_2 and standard deviation sigma_2 over the last axis (e)."""
-    return sums.mean(axis=-1), sums.std(axis=-1, ddof=1)
-
-
-def _signal_detection(
-    means: FloatArray, spreads: FloatArray, generator: np.random.Generator, plan: Experiment
+def _picked_pairs(
+    means: FloatArray, spreads: FloatArray, seed: int, plan: Experiment, session: int
 ) -> FloatArray:
     """Return hit rates (hit_rates, n_comparisons) of randomly picked distributions (g)-(j)."""
     n_distributions, n_spheres = means.shape
     comparison = np.arange(1, n_spheres)
-    picks = generator.integers(n_distributions, size=(2, plan.hit_rates, n_spheres - 1))
+    trials = session_trials(session, n_spheres - 1)
+    picks = _picks(seed, trials, (plan.hit_rates, 2), n_distributions).transpose(2, 1, 0)
     standard_mean = means[picks[0], 0]
     comparison_mean = means[picks[1], comparison]
-    point = _decision_point(standard_mean, comparison_mean, plan.criterion)
-    return _beyond(point, comparison_mean, spreads[picks[1], comparison], _side(means))
+    point = decision_point(standard_mean, comparison_mean, plan.criterion)
+    return hit_probability(point, comparison_mean, spreads[picks[1], comparison], side(means))
 
 
 def _varied_criterion(
-    values: FloatArray, neighbours: np.ndarray, sigma: float, generator: np.random.Generator, plan: Experiment
+    means: FloatArray, spreads: FloatArray, seed: int, plan: Experiment, session: int
 ) -> FloatArray:
     """Return hit rates (hit_rates, n_comparisons) of one distribution per sphere, criterion wavering."""
-    means, spreads = _moments(
-        gradient_sum(_noisy(values, sigma, plan.presentations_varied, generator), neighbours)
-    )
-    wavering = 1.0 + plan.criterion_sigma * generator.standard_normal((plan.hit_rates, values.shape[0] - 1))
-    point = _decision_point(means[0], means[1:], plan.criterion) * wavering
-    return _beyond(point, means[1:], spreads[1:], _side(means[np.newaxis]))
+    trials = session_trials(session, means.shape[1] - 1)
+    draws = normals(seed, trials, 1, Purpose.CRITERION, plan.hit_rates)[:, 0].T
+    wavering = 1.0 + plan.criterion_sigma * draws
+    standard, comparison = means[0, 0], means[0, 1:]
+    if plan.criterion_moves == "point":
+        point = decision_point(standard, comparison, plan.criterion) * wavering
+    else:
+        point = decision_point(standard, comparison, plan.criterion * wavering)
+    return hit_probability(point, comparison, spreads[0, 1:], side(means[:1]))
 
 
-def _distances(sets: FloatArray, pairs: int, generator: np.random.Generator, norm: str) -> FloatArray:
-    """Return distances (n_spheres, pairs) of random sets from random sets of the standard (e*)-(g*)."""
+def _distances(
+    values: FloatArray, sigma: float, seed: int, trials: IntArray, plan: Experiment, norm: str
+) -> FloatArray:
+    """Return distances (n_spheres, pairs) of random sets from random sets of the standard (a)-(g*)."""
+    sets = noisy_responses(values, sigma, seed, trials, plan.presentations)
     n_spheres, n_sets, _ = sets.shape
-    of_standard = generator.integers(n_sets, size=(n_spheres, pairs))
-    of_sphere = generator.integers(n_sets, size=(n_spheres, pairs))
+    of_standard, of_sphere = _picks(seed, trials, (plan.pairs, 2), n_sets).transpose(2, 0, 1)
     # A set at distance 0 from itself would tell nothing about noise: the standard meets its other sets.
-    other = generator.integers(n_sets - 1, size=pairs)
+    other = _picks(seed, trials[:1], (plan.pairs, 2), n_sets - 1)[0, :, 1]
     of_sphere[0] = other + (other >= of_standard[0])
     return distance(sets[0, of_standard], sets[np.arange(n_spheres)[:, np.newaxis], of_sphere], norm)
 
 
-def _decision_point(standard: FloatArray, comparison: FloatArray, criterion: float) -> FloatArray:
-    return standard + criterion * (comparison - standard)
+def _picks(seed: int, trials: IntArray, shape: tuple[int, int], choices: int) -> IntArray:
+    """Pick among 0 ... choices - 1, `shape` times in each trial; (n_trials, *shape)."""
+    numbers = uniforms(seed, trials, 1, Purpose.PICK, shape[0] * shape[1])
+    return (numbers * choices).astype(np.int64).reshape(-1, *shape)
 
 
-def _side(means: FloatArray) -> FloatArray:
-    """Return +1 or -1 (n_comparisons,): on which side of the standard each comparison lies on the whole."""
-    pooled = means.mean(axis=0)
-    return np.where(pooled[1:] < pooled[0], -1.0, 1.0)
-
-
-def _beyond(point: FloatArray, mean: FloatArray, spread: FloatArray, side: FloatArray) -> FloatArray:
-    """Return the probability that Normal(mean, spread) lies beyond the decision point (h)."""
-    margin = side * (mean - point)
-    scaled = np.divide(margin, spread, out=np.zeros_like(margin), where=spread > 0.0)
-    return np.where(spread > 0.0, ndtr(scaled), np.heaviside(margin, 0.5))
-
-
-def _mean_and_spread(hit_rates: FloatArray) -> HitRates:
+def _mean_and_spread(hit_rates: FloatArray, seed: int, session: int) -> HitRates:
     """Return mean mu_3 and standard deviation sigma_3 over the repetitions (k)."""
-    return HitRates(hit_rates.mean(axis=0), hit_rates.std(axis=0, ddof=1))
+    return HitRates(hit_rates.mean(axis=0), hit_rates.std(axis=0, ddof=1), seed, session)

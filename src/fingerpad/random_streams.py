@@ -53,6 +53,10 @@ class Purpose(IntEnum):
     """How one end organ's sensitivity differs from the others', for good."""
     LAYOUT = 7
     """Where an end organ lies."""
+    PICK = 8
+    """Which of many distributions or sets an observer compares."""
+    CRITERION = 9
+    """Where an observer decides, if that wavers."""
 
 
 # Constants of Philox 4x64 as published: two multipliers, and what is added to the key each round.

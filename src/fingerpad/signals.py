@@ -311,10 +311,14 @@ class HitRates:
         Mean fraction of correct judgements, mu_3. [0-1]
     hit_rate_sd : array (n_comparisons,)
         Its standard deviation over repetitions, sigma_3. [0-1]
+    seed, session : int, optional
+        Whose random numbers the noise and the observer drew.
     """
 
     hit_rate: FloatArray
     hit_rate_sd: FloatArray
+    seed: int | None = None
+    session: int = 0
 
     def __post_init__(self) -> None:
         mean = float_array("hit_rate", self.hit_rate, 1)

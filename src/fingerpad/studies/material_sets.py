@@ -16,12 +16,12 @@ from scipy.optimize import differential_evolution
 
 from fingerpad.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.checks import FloatArray, not_negative, whole
-from fingerpad.discrimination import expected_hit_rates, fit_noise_sigma
 from fingerpad.encoding import neighbour_pairs
 from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.grading import Grading
 from fingerpad.indenters import Bar, Cylinder
 from fingerpad.mechanics.materials import Tissues
+from fingerpad.noise_fit import expected_hit_rates, fit_noise_sigma
 from fingerpad.parameters import neuron, protocol, psychophysics
 from fingerpad.population import Population
 from fingerpad.sampling import SkinResponse
@@ -38,6 +38,12 @@ SHOWN_DISTANCES_MM = (1.0, 2.0, 3.0, 4.0, 5.0)
 NOISE_SIGMA = psychophysics.NOISE_SIGMA.value
 GOODWIN = np.array(psychophysics.GOODWIN_HIT_RATES.value)
 SPHERES = (psychophysics.SPHERE_CURVATURES.value[0], *psychophysics.GOODWIN_CURVATURES.value)
+
+NOISE_DRAWS = 400
+"""Common random presentations behind expected hit rates, many thousand times in a search."""
+
+CHANCE = 0.5
+"""Hit rate of an observer who learns nothing. [0-1]"""
 
 SITE_MARGIN_MM = 0.3
 """Fine zone of the one bar beyond its outermost shifted site. [mm]"""
@@ -174,7 +180,7 @@ class Levels:
         self.problem = single_unit.rate_problem(sed)
         self.spheres: list[Drive] = [drive(traces) for traces in spheres]
         self.neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
-        draws = (sphere_discrimination.NOISE_DRAWS, len(population.positions_mm))
+        draws = (NOISE_DRAWS, len(population.positions_mm))
         self.draws = np.random.default_rng([seed, 0]).standard_normal(draws)
         self.seed = seed
         self.everything = np.arange(sed.n_sites)
@@ -206,6 +212,8 @@ class Levels:
         """Predict the hit rates at 296 and 365 /m of the static Gradient Sum."""
         afferent = Afferent.from_parameters(parameters)
         static = np.array([afferent.rates(traces)[1] for traces in self.spheres])
+        if not static.any():  # the search also tries afferents that stay silent; those can only guess
+            return np.full(len(SPHERES) - 1, CHANCE)
         return expected_hit_rates(static, self.neighbours, noise_sigma, self.draws)
 
     def percept_error(self, parameters: FloatArray) -> float:

@@ -11,9 +11,9 @@ from scipy.optimize import brentq
 
 from fingerpad.afferent import Afferent
 from fingerpad.checks import FloatArray, float_array
-from fingerpad.discrimination import expected_hit_rates
 from fingerpad.errors import InputError
 from fingerpad.fitting import weighted_fractional_sum_of_squares
+from fingerpad.noise_fit import expected_hit_rates
 from fingerpad.parameters import protocol, psychophysics
 from fingerpad.reference import bar_firing_rates
 from fingerpad.sampling import SkinResponse

@@ -9,25 +9,21 @@ import numpy as np
 
 from fingerpad.afferent import Afferent
 from fingerpad.checks import FloatArray
-from fingerpad.discrimination import (
-    Experiment,
-    discriminate_euclidean,
-    discriminate_gradient_sum,
-    expected_hit_rates,
-    fit_noise_sigma,
-)
+from fingerpad.discrimination import Experiment, discriminate_euclidean, discriminate_gradient_sum
 from fingerpad.encoding import gradient_sum, neighbour_pairs
 from fingerpad.indenters import Sphere
+from fingerpad.noise_fit import expected_hit_rates, fit_noise_sigma
 from fingerpad.parameters import protocol, psychophysics
 from fingerpad.population import Population
+from fingerpad.random_streams import Purpose, normals
 from fingerpad.sampling import SkinResponse
 from fingerpad.signals import HitRates, ResponseMap
 from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions, Touch
 
 CURVATURES = psychophysics.SPHERE_CURVATURES.value
 POSITIONS_MM = protocol.SPHERE_POSITIONS.value
-NOISE_DRAWS = 400
-"""Common random presentations behind the fit of the noise."""
+NOISE_DRAWS = 4000
+"""Common random presentations behind the fit of the noise, which they leave uncertain by one percent."""
 
 PATIENCE_MS = protocol.RAMP.value
 """How long the observer waits for first spikes. [ms]"""
@@ -71,7 +67,7 @@ def result(
         return np.array([MEASURES[measure](answers[position, curvature]) for curvature in CURVATURES])
 
     goodwin = [CURVATURES.index(curvature) - 1 for curvature in psychophysics.GOODWIN_CURVATURES.value]
-    draws = np.random.default_rng([seed, 0]).standard_normal((NOISE_DRAWS, len(population.positions_mm)))
+    draws = normals(seed, 1, len(population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
     static = table("static", POSITIONS_MM[0])
     noise = fit_noise_sigma(lambda sigma: expected_hit_rates(static, neighbours, sigma, draws)[goodwin])
 
@@ -79,14 +75,9 @@ def result(
         measure: str, sigma: float = noise.noise_sigma, experiment: Experiment | None = None
     ) -> dict[str, Any]:
         return _at_both_positions(
-            lambda position, generator: discriminate_gradient_sum(
-                table(measure, position),
-                neighbours,
-                sigma,
-                generator,
-                experiment,
-            ),
-            seed,
+            lambda position, session: discriminate_gradient_sum(
+                table(measure, position), neighbours, sigma, seed, experiment, session=session
+            )
         )
 
     variants = {f"sigma_{sigma:g}": gradient("static", sigma) for sigma in _shown_noise()}
@@ -94,6 +85,7 @@ def result(
     for sigma in psychophysics.DECISION_CRITERION_SIGMA.value:
         variants[f"criterion_{sigma:g}"] = gradient("static", experiment=Experiment(criterion_sigma=sigma))
     return {
+        "seed": seed,
         "curvature_per_m": CURVATURES,
         "noise_sigma": noise.noise_sigma,
         "noise_fit_error": noise.root_mean_square_error,
@@ -109,10 +101,9 @@ def result(
         "gradient_sum": {measure: gradient(measure) for measure in MEASURES},
         "euclidean": {
             "static": _at_both_positions(
-                lambda position, generator: discriminate_euclidean(
-                    table("static", position), noise.noise_sigma, generator
-                ),
-                seed,
+                lambda position, session: discriminate_euclidean(
+                    table("static", position), noise.noise_sigma, seed, session=session
+                )
             )
         },
         "variants": variants,
@@ -133,13 +124,10 @@ def _shown_noise() -> list[float]:
     return sorted({psychophysics.NOISE_SIGMA.value, *psychophysics.NOISE_SIGMA_SHOWN.value})
 
 
-def _at_both_positions(
-    discriminate: Callable[[float, np.random.Generator], HitRates], seed: int
-) -> dict[str, FloatArray]:
-    """Hit rates at both positions, each with its own stream of random numbers."""
+def _at_both_positions(discriminate: Callable[[float, int], HitRates]) -> dict[str, FloatArray]:
+    """Hit rates at both positions, each in a session of its own."""
     first, shifted = (
-        discriminate(position, np.random.default_rng([seed, 1, number]))
-        for number, position in enumerate(POSITIONS_MM)
+        discriminate(position, session) for session, position in enumerate(POSITIONS_MM, start=1)
     )
     return {
         "hit_rate": first.hit_rate,
