@@ -41,7 +41,8 @@ CAPACITANCE = Published("membrane capacitance C at the start", 1.0e-6, "mF", _ME
 THRESHOLD = Published("threshold v of the membrane potential at the start", 50.0, "mV", _MEMBRANE, "paper")
 _FITTED = (
     "our fit of all 36 bar shifts: response surface method from the paper's start points, "
-    "strain energy density at standard resolution with the stand-in materials of Trial 3"
+    "strain energy density at standard resolution with the stand-in materials of Trial 3; "
+    "silent without a touch"
 )
 INTERCEPT_FITTED = Published("fitted intercept beta", 2.32e-7, "mA", _FITTED, "assumed")
 DYNAMIC_GAIN_FITTED = Published("fitted dynamic gain k_d", 1.02e-4, "mA ms/kPa", _FITTED, "assumed")
