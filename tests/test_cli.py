@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fingerpad import __version__, cli, indenters, studies
+import fingerpad as fp
+from fingerpad import __version__, cli, studies
 from fingerpad.errors import ConvergenceError, FingerpadError, StoreError
 from fingerpad.export import formats
 from fingerpad.fingertip import Fingertip
@@ -61,7 +62,7 @@ def test_the_help_names_what_the_modules_know():
     assert cli.RESOLUTIONS == RESOLUTIONS
     assert tuple(TISSUES) == cli.MATERIALS
     assert tuple(formats.FORMATS) == cli.FORMATS
-    assert all(issubclass(getattr(indenters, name), Indenter) for name in cli.INDENTERS.values())
+    assert all(issubclass(getattr(fp, name), Indenter) for name in cli.INDENTERS.values())
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ import pytest
 from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import Grading
-from fingerpad.indentation import THIN_SIZE_MM, Touch, grading_about, indent, settings_of, touch_of
+from fingerpad.indentation import Touch, indent, settings_of, touch_of
+from fingerpad.indenter_grading import THIN_SIZE_MM, grading_about
 from fingerpad.indenters import Bar, Cylinder, Line, Plate, Sphere
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import place

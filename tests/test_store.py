@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from fingerpad import store as store_module
+from fingerpad.edged_indenters import Edge
 from fingerpad.errors import ConvergenceError, StoreError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import Grading
@@ -131,6 +132,7 @@ def test_key_changes_with_the_last_bit_of_every_input():
         {"settings": PressSettings(2, 1)},
         {"at_mm": (17.0, 0.0)},
         {"tilt_deg": 3.0},
+        {"spin_deg": 3.0},
     ],
     ids=lambda change: next(iter(change)),
 )
@@ -139,7 +141,16 @@ def test_key_changes_with_what_a_user_would_change(change):
 
 
 def test_indenters_of_equal_numbers_have_different_keys():
-    bodies = [Line(0.9), Cylinder(0.9), Bar(0.9), FlatPunch(0.9), Sphere(0.9), Plate(), Bar(0.9, 0.1)]
+    bodies = [
+        Line(0.9),
+        Cylinder(0.9),
+        Bar(0.9),
+        FlatPunch(0.9),
+        Sphere(0.9),
+        Plate(),
+        Bar(0.9, 0.1),
+        Edge(0.9),
+    ]
     assert len({touch_key(replace(TINY, indenter=body)) for body in bodies}) == len(bodies)
 
 

@@ -21,6 +21,7 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from fingerpad.afferent import Afferent
+    from fingerpad.edged_indenters import Edge, Gap, Grating
     from fingerpad.errors import ConvergenceError, FingerpadError, InputError, MaterialWarning, StoreError
     from fingerpad.fingertip import Fingertip
     from fingerpad.grading import Grading
@@ -49,12 +50,15 @@ __all__ = [
     "ConvergenceError",
     "CurrentTraces",
     "Cylinder",
+    "Edge",
     "Energy",
     "FingerpadError",
     "Fingertip",
     "FlatPunch",
     "ForceRampAndHold",
+    "Gap",
     "Grading",
+    "Grating",
     "Hencky",
     "HitRates",
     "Hyperfoam",
@@ -85,6 +89,7 @@ __all__ = [
 
 _HOMES = {
     "afferent": ("Afferent",),
+    "edged_indenters": ("Edge", "Gap", "Grating"),
     "errors": ("ConvergenceError", "FingerpadError", "InputError", "MaterialWarning", "StoreError"),
     "fingertip": ("Fingertip",),
     "grading": ("Grading",),

@@ -36,6 +36,9 @@ INDENTERS = {
     "line": "Line",
     "punch": "FlatPunch",
     "plate": "Plate",
+    "edge": "Edge",
+    "gap": "Gap",
+    "grating": "Grating",
 }
 MATERIALS = (
     "trial1",
@@ -431,7 +434,7 @@ def export_command(
     ] = None,
 ) -> None:
     """Press one indenter into the finger and write the touch for another program, ParaView by default."""
-    from fingerpad import indenters
+    import fingerpad
     from fingerpad.checks import one_of
     from fingerpad.export.formats import export_touch
     from fingerpad.fingertip import Fingertip
@@ -443,7 +446,7 @@ def export_command(
     if curvature is not None and indenter != "sphere":
         raise InputError(f"--curvature is that of a sphere, and a {indenter} has none: leave it out.")
     shape = {} if curvature is None else {"curvature_per_m": curvature}
-    body = getattr(indenters, INDENTERS[indenter])(**shape)
+    body = getattr(fingerpad, INDENTERS[indenter])(**shape)
     touch = touch_of(Fingertip(), body, RampAndHold(depth_mm=depth), materials, resolution)
     _make_writable(folder, "FOLDER")
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -113,6 +114,64 @@ def resolution_grading(
     length, width = max(half_length_mm, 6.0), max(half_width_mm, 5.0)
     pad = replace(zone, half_length_mm=length, half_width_mm=width)
     return replace(pad, size_x_mm=0.1, size_z_mm=0.1, full=True)
+
+
+def covering(gradings: Sequence[Grading]) -> Grading:
+    """One grading that is as fine as each of several, wherever that one is fine.
+
+    What is told apart should be pressed into one mesh: the error of a mesh is then the same for all.
+
+    Parameters
+    ----------
+    gradings : sequence of Grading
+        At least one.
+
+    Returns
+    -------
+    Grading
+        Its fine zone reaches over all of theirs; of both halves if one of them is.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+
+    Examples
+    --------
+    >>> near, far = resolution_grading("quick", 16.0, 1.0), resolution_grading("standard", 18.0, 2.0)
+    >>> both = covering([near, far])
+    >>> both.centre_mm, both.half_length_mm, both.size_x_mm, both.dermis
+    (17.5, 2.5, 0.25, 4)
+    """
+    if not gradings:
+        raise InputError("covering needs at least one grading: got none.")
+    proximal = min(grading.centre_mm - grading.half_length_mm for grading in gradings)
+    distal = max(grading.centre_mm + grading.half_length_mm for grading in gradings)
+    centre = 0.5 * (proximal + distal)
+    cores = [grading for grading in gradings if grading.core_size_mm]
+    core_reach = max(
+        (abs(grading.centre_mm - centre) + grading.core_half_length_mm for grading in cores), default=0.0
+    )
+    core_size = min((grading.core_size_mm for grading in cores), default=0.0)
+    joint = Grading(
+        centre_mm=centre,
+        half_length_mm=0.5 * (distal - proximal),
+        half_width_mm=max(grading.half_width_mm for grading in gradings),
+        size_x_mm=min(grading.size_x_mm for grading in gradings),
+        size_z_mm=min(grading.size_z_mm for grading in gradings),
+        largest_mm=min(grading.largest_mm for grading in gradings),
+        growth=min(grading.growth for grading in gradings),
+        stratum_corneum=max(grading.stratum_corneum for grading in gradings),
+        living_epidermis=max(grading.living_epidermis for grading in gradings),
+        dermis=max(grading.dermis for grading in gradings),
+        subcutis=max(grading.subcutis for grading in gradings),
+        full=any(grading.full for grading in gradings),
+    )
+    if not cores or joint.size_x_mm <= core_size:
+        return joint
+    if core_reach >= joint.half_length_mm:
+        return replace(joint, size_x_mm=core_size)
+    return replace(joint, core_half_length_mm=core_reach, core_size_mm=core_size)
 
 
 def lines_along(grading: Grading, length: float) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -13,7 +13,8 @@ from fingerpad.checks import FloatArray, finite, instance, one_of
 from fingerpad.compilation import announce_compilation
 from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
-from fingerpad.grading import RESOLUTIONS, Grading, resolution_grading
+from fingerpad.grading import RESOLUTIONS, Grading
+from fingerpad.indenter_grading import FEWEST_ACROSS_GROOVE, grading_about, sizes_across
 from fingerpad.indenters import Indenter
 from fingerpad.mechanics import assembly
 from fingerpad.mechanics.contact import Placement, check_friction, place
@@ -26,19 +27,16 @@ from fingerpad.parameters import fingertip as published
 from fingerpad.sampling import SkinResponse
 from fingerpad.stimulus import Motion, RampAndHold, Stimulus
 from fingerpad.threads import compiled_threads
+from fingerpad.units import cosine_and_sine
 
 CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
 STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
 """Steps in ramp and hold of each resolution."""
 
-THIN_SIZE_MM = 0.025
-"""Elements along the finger below a wire: two across the strip that it pushes. [mm]"""
-
 SLOWEST_KERNEL = assembly._add_chunk
 """Of all that a press compiles, most of a minute is spent on this."""
 
 LARGEST_TILT_DEG = 45.0
-_LONGEST_REACH_MM = 5.0
 _CLEARANCE_TO_BONE = 0.8
 
 
@@ -67,12 +65,16 @@ class Touch:
         a positive tilt turns the direction of pressing towards the proximal end. [degrees]
     friction : float
         Coulomb's coefficient between skin and indenter.
+    spin_deg : float
+        Rotation of the indenter about its direction of pressing, after the tilt. At 0 a bar lies across the
+        finger, at 90 along it; a positive spin turns the indenter's x axis from distal towards +z. [degrees]
 
     Raises
     ------
     InputError
-        If the axis misses the finger, the depth reaches the bone, an axis beside the midline meets half a
-        finger, or friction is asked of a wire.
+        If the axis misses the finger, the depth reaches the bone, an axis beside the midline or a spin that
+        breaks the symmetry meets half a finger, the elements are too long for a groove, or tilt, spin or
+        friction is asked of a wire.
     """
 
     finger: Fingertip
@@ -84,6 +86,7 @@ class Touch:
     at_mm: tuple[float, float] = CONTACT_POINT_MM
     tilt_deg: float = 0.0
     friction: float = 0.0
+    spin_deg: float = 0.0
 
     def __post_init__(self) -> None:
         for name, kind in (
@@ -101,15 +104,32 @@ class Touch:
             raise InputError(f"tilt_deg must lie within {LARGEST_TILT_DEG:g} degrees: got {self.tilt_deg:g}.")
         if z != 0.0 and not self.grading.full:
             raise InputError(f"at_mm beside the midline (z = {z:g} mm) needs a grading with full=True.")
-        if self.indenter.grips and self.tilt_deg != 0.0:
+        spin = finite("spin_deg", self.spin_deg, "degrees")
+        body = type(self.indenter).__name__
+        for name, angle in (("tilt_deg", self.tilt_deg), ("spin_deg", spin)):
+            if self.indenter.grips and angle != 0.0:
+                raise InputError(f"{name} must be 0 for {body}: got {angle:g} degrees.")
+        if not self.grading.full and not self.indenter.mirrors(spin):
             raise InputError(
-                f"tilt_deg must be 0 for {type(self.indenter).__name__}: got {self.tilt_deg:g} degrees."
+                f"spin_deg = {spin:g} degrees leaves {body} without symmetry across the midline, so half a "
+                "finger is not enough: give a grading with full=True."
             )
+        self._check_grooves()
         check_friction(self.friction, self.indenter)
         if isinstance(self.stimulus, RampAndHold) and self.stimulus.depth_mm > self.deepest_mm:
             raise InputError(
                 f"depth_mm must stay below {self.deepest_mm:.2f} mm at x = {x:g}, z = {z:g} mm, "
                 f"where the bone comes: got {self.stimulus.depth_mm:g} mm."
+            )
+
+    def _check_grooves(self) -> None:
+        """No node presses on a ridge, or fits into a groove, that lies between two of them."""
+        size_mm, narrowest_mm = max(sizes_across(self.grading, self.spin_deg)), self.indenter.narrowest_mm
+        if size_mm > narrowest_mm / FEWEST_ACROSS_GROOVE:
+            raise InputError(
+                f"grading must have elements of at most {narrowest_mm / FEWEST_ACROSS_GROOVE:g} mm across "
+                f"grooves and ridges of {narrowest_mm:g} mm: got {size_mm:g} mm; leave grading out or take "
+                "grading_about(...)."
             )
 
     def solve(self, threads: int | None = None) -> SkinResponse:
@@ -193,7 +213,7 @@ class Touch:
         """Where the indenter stands at first touch."""
         skin = self.mesh.nodes_mm[self.mesh.skin_nodes]
         at = self.finger.skin_point(*self.at_mm)
-        return place(self.indenter, skin, at, _rotation(self.tilt_deg))
+        return place(self.indenter, skin, at, _rotation(self.tilt_deg, self.spin_deg))
 
     @property
     def deepest_mm(self) -> float:
@@ -206,10 +226,12 @@ class Touch:
         return _mesh(self.finger, self.grading)
 
 
-def _rotation(tilt_deg: float) -> FloatArray:
-    """Axes of an indenter tilted about z, as columns."""
+def _rotation(tilt_deg: float, spin_deg: float) -> FloatArray:
+    """Axes of an indenter tilted about z and then turned about its own y, as columns."""
     cosine, sine = np.cos(np.deg2rad(tilt_deg)), np.sin(np.deg2rad(tilt_deg))
-    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    tilt = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    along, towards = cosine_and_sine(spin_deg)
+    return tilt @ np.array([[along, 0.0, -towards], [0.0, 1.0, 0.0], [towards, 0.0, along]])
 
 
 @lru_cache(maxsize=4)
@@ -228,6 +250,7 @@ def touch_of(
     tilt_deg: float = 0.0,
     settings: PressSettings | None = None,
     friction: float = 0.0,
+    spin_deg: float = 0.0,
 ) -> Touch:
     """Describe a touch without solving it; arguments as in `indent`.
 
@@ -239,6 +262,9 @@ def touch_of(
         Rotation of the indenter about z, see `Touch`. [degrees]
     friction : float
         Coulomb's coefficient between skin and indenter; the paper mentions none.
+    spin_deg : float
+        Rotation of the indenter about its direction of pressing, see `Touch`. Without a `grading` both halves
+        of the finger are meshed if the turned indenter is not its own mirror image. [degrees]
 
     Returns
     -------
@@ -255,11 +281,12 @@ def touch_of(
         indenter=indenter,
         stimulus=stimulus or RampAndHold(),
         tissues=materials if isinstance(materials, Tissues) else named_tissues(materials),
-        grading=grading or grading_about(indenter, resolution, x, z),
+        grading=grading or grading_about(indenter, resolution, x, z, finite("spin_deg", spin_deg, "degrees")),
         settings=settings or settings_of(resolution),
         at_mm=(x, z),
         tilt_deg=tilt_deg,
         friction=friction,
+        spin_deg=spin_deg,
     )
 
 
@@ -279,7 +306,7 @@ def indent(
     finger : Fingertip
         The finger.
     indenter : Indenter
-        `Line`, `Cylinder`, `Bar`, `Sphere`, `FlatPunch` or `Plate`.
+        `Line`, `Cylinder`, `Bar`, `Sphere`, `FlatPunch`, `Plate`, `Edge`, `Gap` or `Grating`.
     stimulus : RampAndHold or ForceRampAndHold, optional
         The motion, by depth or by force; the paper's by default.
     materials : str or Tissues
@@ -319,20 +346,6 @@ def settings_of(resolution: str) -> PressSettings:
     """Return steps and tolerances of a named resolution."""
     ramp_steps, hold_steps = STEPS[resolution]
     return PressSettings(ramp_steps, hold_steps)
-
-
-def grading_about(indenter: Indenter, resolution: str, x_mm: float, z_mm: float = 0.0) -> Grading:
-    """Mesh that is fine where an indenter at (x, z) touches and just beyond."""
-    reach = min(indenter.half_width_mm + 1.0, _LONGEST_REACH_MM)
-    grading = resolution_grading(resolution, x_mm, half_length_mm=reach, half_width_mm=abs(z_mm) + reach)
-    if indenter.half_width_mm < grading.size_x_mm:
-        # A wire needs elements of its own size below it; a few of them, from which the mesh grows.
-        few_mm = 4 * THIN_SIZE_MM
-        if resolution == "paper":  # whose fine zone is the whole pad
-            grading = replace(grading, core_half_length_mm=few_mm, core_size_mm=THIN_SIZE_MM)
-        else:
-            grading = replace(grading, half_length_mm=few_mm, size_x_mm=THIN_SIZE_MM)
-    return replace(grading, full=True) if z_mm != 0.0 else grading
 
 
 def _check_position(at_mm: Sequence[float]) -> tuple[float, float]:

@@ -1,8 +1,9 @@
 """Rigid indenters as signed gaps: how far a point of the skin is from the body, and which way it is pushed.
 
-Every indenter lives in its own frame: the tip at the origin, y along the direction of pressing (into the
-skin), x along the finger and z across it. The body fills y < 0 below its tip. `gap` is positive outside
-the body and negative inside; the normal points out of the body, along which a frictionless contact pushes.
+Every indenter lives in its own frame: its face touches y = 0, y runs along the direction of pressing (into
+the skin), x along the finger and z across it, unless a touch turns it. The body fills y < 0 below its face.
+`gap` is positive outside the body and negative inside; the normal points out of the body, along which a
+frictionless contact pushes. Bodies whose edges are the question stand in `fingerpad.edged_indenters`.
 """
 
 from __future__ import annotations
@@ -43,6 +44,23 @@ class Indenter(ABC):
         """Whether the skin that may touch cannot slide along the finger; most bodies are frictionless."""
         return False
 
+    def mirrors(self, spin_deg: float) -> bool:
+        """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0.
+
+        Half a finger can be solved only then. A body of your own is taken to be one as it stands.
+        """
+        return spin_deg % 180.0 == 0.0
+
+    @property
+    def edge_reach_mm(self) -> float:
+        """How far to either side of x = 0 the mesh is finer, for the edges there; 0 if it is not. [mm]"""
+        return 0.0
+
+    @property
+    def narrowest_mm(self) -> float:
+        """Width of the narrowest groove or ridge, which a mesh must resolve; no limit without. [mm]"""
+        return np.inf
+
 
 def _norm_and_direction(offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Length and unit direction of each row; a zero row points along y, the direction of pressing."""
@@ -51,7 +69,7 @@ def _norm_and_direction(offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
     return length, np.where(length[:, None] > 0.0, unit, [0.0, 1.0, 0.0])
 
 
-def _round_front(beside: FloatArray, radius: float) -> FloatArray:
+def round_front(beside: FloatArray, radius: float) -> FloatArray:
     """Height y of a rounded edge or ball beside its centre line: 0 on it, -inf beyond `radius`."""
     height = np.sqrt(np.maximum(radius**2 - np.maximum(beside, 0.0) ** 2, 0.0)) - radius
     return np.where(beside <= radius, height, -np.inf)
@@ -72,7 +90,9 @@ def _ball(centred: FloatArray, lateral: FloatArray, radius: float) -> tuple[Floa
     return gap, np.where(passed[:, None], front_normal, normal)
 
 
-def _rounded(inside: FloatArray, depth: FloatArray, outward: FloatArray, fillet: float) -> tuple:
+def rounded(
+    inside: FloatArray, depth: FloatArray, outward: FloatArray, fillet: float
+) -> tuple[FloatArray, FloatArray]:
     """Gap of a body with a flat top and rounded edges, from coordinates relative to its un-rounded core.
 
     The body is all points within `fillet` of the core {inside <= 0, depth <= 0}: `inside` runs outwards
@@ -116,9 +136,13 @@ class Cylinder(Indenter):
         """Half of the body's extent along x. [mm]"""
         return self.diameter_mm / 2
 
+    def mirrors(self, spin_deg: float) -> bool:
+        """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0."""
+        return spin_deg % 90.0 == 0.0
+
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
-        return _round_front(np.abs(points_mm[:, 0]), self.diameter_mm / 2)
+        return round_front(np.abs(points_mm[:, 0]), self.diameter_mm / 2)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
@@ -204,9 +228,13 @@ class Sphere(Indenter):
         """Half of the body's extent along x. [mm]"""
         return self.radius_mm
 
+    def mirrors(self, spin_deg: float) -> bool:
+        """Whether the body, turned about y, is its own mirror image across z = 0: however it is turned."""
+        return True
+
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
-        return _round_front(np.hypot(points_mm[:, 0], points_mm[:, 2]), self.radius_mm)
+        return round_front(np.hypot(points_mm[:, 0], points_mm[:, 2]), self.radius_mm)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
@@ -237,16 +265,20 @@ class Bar(Indenter):
 
     def __post_init__(self) -> None:
         positive("width_mm", self.width_mm, "mm")
-        _fillet_within(self.fillet_mm, self.width_mm, "width_mm")
+        fillet_within(self.fillet_mm, self.width_mm, "width_mm")
 
     @property
     def half_width_mm(self) -> float:
         """Half of the width. [mm]"""
         return self.width_mm / 2
 
+    def mirrors(self, spin_deg: float) -> bool:
+        """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0."""
+        return spin_deg % 90.0 == 0.0
+
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
-        return _round_front(np.abs(points_mm[:, 0]) - self.width_mm / 2 + self.fillet_mm, self.fillet_mm)
+        return round_front(np.abs(points_mm[:, 0]) - self.width_mm / 2 + self.fillet_mm, self.fillet_mm)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
@@ -254,7 +286,7 @@ class Bar(Indenter):
         outward = np.zeros_like(points_mm)
         outward[:, 0] = np.where(x < 0.0, -1.0, 1.0)
         inside = np.abs(x) - (self.width_mm / 2 - self.fillet_mm)
-        return _rounded(inside, y + self.fillet_mm, outward, self.fillet_mm)
+        return rounded(inside, y + self.fillet_mm, outward, self.fillet_mm)
 
 
 @dataclass(frozen=True)
@@ -274,16 +306,20 @@ class FlatPunch(Indenter):
 
     def __post_init__(self) -> None:
         positive("diameter_mm", self.diameter_mm, "mm")
-        _fillet_within(self.fillet_mm, self.diameter_mm, "diameter_mm")
+        fillet_within(self.fillet_mm, self.diameter_mm, "diameter_mm")
 
     @property
     def half_width_mm(self) -> float:
         """Half of the diameter. [mm]"""
         return self.diameter_mm / 2
 
+    def mirrors(self, spin_deg: float) -> bool:
+        """Whether the body, turned about y, is its own mirror image across z = 0: however it is turned."""
+        return True
+
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
-        return _round_front(
+        return round_front(
             np.hypot(points_mm[:, 0], points_mm[:, 2]) - self.diameter_mm / 2 + self.fillet_mm, self.fillet_mm
         )
 
@@ -293,7 +329,7 @@ class FlatPunch(Indenter):
         # On the axis any radial direction serves; x is taken, since y would not be radial.
         outward = np.where(radial[:, None] > 0.0, outward, [1.0, 0.0, 0.0])
         inside = radial - (self.diameter_mm / 2 - self.fillet_mm)
-        return _rounded(inside, points_mm[:, 1] + self.fillet_mm, outward, self.fillet_mm)
+        return rounded(inside, points_mm[:, 1] + self.fillet_mm, outward, self.fillet_mm)
 
 
 @dataclass(frozen=True)
@@ -305,6 +341,10 @@ class Plate(Indenter):
         """Half of the extent along x: no limit."""
         return np.inf
 
+    def mirrors(self, spin_deg: float) -> bool:
+        """Whether the body, turned about y, is its own mirror image across z = 0: however it is turned."""
+        return True
+
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return np.zeros(len(points_mm))
@@ -314,7 +354,8 @@ class Plate(Indenter):
         return points_mm[:, 1].copy(), np.broadcast_to([0.0, 1.0, 0.0], points_mm.shape).copy()
 
 
-def _fillet_within(fillet_mm: float, width_mm: float, width_name: str) -> None:
+def fillet_within(fillet_mm: float, width_mm: float, width_name: str) -> None:
+    """Refuse a fillet that is negative or takes more than half of a width. [mm]"""
     not_negative("fillet_mm", fillet_mm, "mm")
     if fillet_mm > width_mm / 2:
         raise InputError(

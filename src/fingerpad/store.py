@@ -41,6 +41,8 @@ MECHANICAL_SOURCES = (
     "fingertip.py",
     "grading.py",
     "indenters.py",
+    "edged_indenters.py",
+    "indenter_grading.py",
     "stimulus.py",
     "mesh.py",
     "mesh_checks.py",

@@ -4,6 +4,8 @@ They close among themselves: 1 kPa mm² = 1 mN, 1 kPa = 1 µJ/mm³ (so strain en
 kPa is energy per volume), and 1 mF mV/ms = 1 mA, so no factor appears in any equation of the paper.
 """
 
+import math
+
 MS_PER_S = 1000.0
 KPA_PER_MPA = 1000.0
 MM_PER_M = 1000.0
@@ -18,3 +20,17 @@ def radius_mm(curvature_per_m: float) -> float:
     3.484
     """
     return MM_PER_M / curvature_per_m
+
+
+def cosine_and_sine(angle_deg: float) -> tuple[float, float]:
+    """Cosine and sine of an angle in degrees, without rounding at quarter turns.
+
+    Examples
+    --------
+    >>> cosine_and_sine(90.0), cosine_and_sine(-90.0)
+    ((0.0, 1.0), (0.0, -1.0))
+    """
+    if angle_deg % 90.0 == 0.0:
+        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(angle_deg // 90.0) % 4]
+    angle = math.radians(angle_deg)
+    return math.cos(angle), math.sin(angle)

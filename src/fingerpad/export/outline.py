@@ -7,12 +7,13 @@ punch, swept along z a cylinder, a bar or a plate. It runs so that the skin is o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from fingerpad.checks import FloatArray, positive
+from fingerpad.edged_indenters import Edge, Gap, Grating
 from fingerpad.errors import InputError
 from fingerpad.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
 from fingerpad.mesh import IntArray
@@ -41,6 +42,8 @@ class Outline:
         u and y where segments meet. [mm]
     centres : tuple of (float, float) or None
         For each segment the centre of its arc, or None for a straight line. [mm]
+    middles : tuple of float
+        u of the middle of each ridge: 0, unless a groove parts the body or it ends there. [mm]
 
     Examples
     --------
@@ -51,6 +54,7 @@ class Outline:
     revolved: bool
     corners: tuple[Point, ...]
     centres: tuple[Point | None, ...]
+    middles: tuple[float, ...] = (0.0,)
 
     def points(self, lowest_mm: float) -> FloatArray:
         """Points along the outline, arcs divided finely, to just below y = `lowest_mm`, (n, 2). [mm]"""
@@ -84,7 +88,8 @@ def outline_of(indenter: Indenter, reach_mm: float) -> Outline:
     indenter : Indenter
         One of the package's own; a body of your own is only known by its gap.
     reach_mm : float
-        Half extent of what has no edge of its own (plate), and height of straight sides. [mm]
+        Half extent of what has no edge of its own (plate), and height of straight sides and depth of grooves,
+        which a drawing has to close. [mm]
 
     Returns
     -------
@@ -117,10 +122,51 @@ def outline_of(indenter: Indenter, reach_mm: float) -> Outline:
         return _without_empty_segments(False, (*mirrored, *corners), (*other, None, *centres))
     if isinstance(indenter, Plate | Line):
         return Outline(False, ((-reach_mm, 0.0), (reach_mm, 0.0)), (None,))
+    if isinstance(indenter, Edge):
+        corners, centres = _rounded_side(0.0, indenter.fillet_mm, reach_mm)
+        outline = _without_empty_segments(False, ((-reach_mm, 0.0), *corners), (None, *centres))
+        return replace(outline, middles=(-reach_mm / 2,))
+    if isinstance(indenter, Gap) and indenter.gap_mm == 0.0:
+        return outline_of(Bar(indenter.width_mm, indenter.fillet_mm), reach_mm)
+    if isinstance(indenter, Gap):
+        inner, outer, lip = indenter.gap_mm / 2, indenter.width_mm / 2, indenter.lip_radius_mm
+        left = _Ridge(-outer, -inner, indenter.fillet_mm, lip)
+        return _ridges((left, _Ridge(inner, outer, lip, indenter.fillet_mm)), reach_mm)
+    if isinstance(indenter, Grating):
+        count, half = int(np.ceil(reach_mm / indenter.period_mm)), indenter.ridge_mm / 2
+        middles = indenter.period_mm * np.arange(-count, count + 1)
+        lip = indenter.lip_mm
+        return _ridges(tuple(_Ridge(u - half, u + half, lip, lip) for u in middles.tolist()), reach_mm)
     raise InputError(
         f"{type(indenter).__name__} cannot be exported, since only its gap is known: take Sphere, Cylinder, "
-        "Bar, FlatPunch, Plate or Line."
+        "Bar, FlatPunch, Plate, Line, Edge, Gap or Grating."
     )
+
+
+@dataclass(frozen=True)
+class _Ridge:
+    """Flat ridge between two walls: their u and the radii of its two edges. [mm]"""
+
+    left: float
+    right: float
+    left_radius: float
+    right_radius: float
+
+
+def _ridges(ridges: tuple[_Ridge, ...], depth: float) -> Outline:
+    """Ridges side by side; floors as deep as `depth` join them to one line."""
+    corners: list[Point] = []
+    centres: list[Point | None] = []
+    for n, ridge in enumerate(ridges):
+        if n > 0:
+            centres.append(None)
+        right, right_centres = _rounded_side(ridge.right, ridge.right_radius, depth - ridge.right_radius)
+        left, left_centres = _rounded_side(-ridge.left, ridge.left_radius, depth - ridge.left_radius)
+        corners += [(-u, y) for u, y in reversed(left)] + list(right)
+        turned = [None if centre is None else (-centre[0], centre[1]) for centre in reversed(left_centres)]
+        centres += [*turned, None, *right_centres]
+    joined = _without_empty_segments(False, tuple(corners), tuple(centres))
+    return replace(joined, middles=tuple(0.5 * (ridge.left + ridge.right) for ridge in ridges))
 
 
 def _rounded_side(
@@ -194,8 +240,10 @@ def rigid_mesh(outline: Outline, lowest_mm: float, z_mm: tuple[float, float]) ->
     else:
         outer, quads = _swept(line, np.linspace(*z_mm, FACETS_ACROSS + 1))
         triangles = np.empty((0, 3), dtype=np.int64)
+    middles = np.array(outline.middles)
     towards = np.array([0.0, line[:, 1].min() - 1.0, 0.0]) - outer
     if not outline.revolved:
+        towards[:, 0] += middles[np.abs(outer[:, :1] - middles).argmin(axis=1)]
         towards[:, 2] = 0.0
     return RigidMesh(np.concatenate([outer, outer + SHELL_SHARE * towards]), quads, triangles)
 

@@ -16,6 +16,24 @@ BAR_WIDTH = Published("width of the bar", 3.0, "mm", _PROTOCOL, "paper")
 BAR_FILLET = Published(
     "fillet radius of the bar's edges", 0.3, "mm", "later bar model of the authors' laboratory", "read"
 )
+GAP_WIDTH = Published("width of a gap", 1.0, "mm", "above the 0.87 mm that people find in 3 of 4", "assumed")
+GAPPED_BAR_WIDTH = Published(
+    "full width of a bar with a gap",
+    8.0,
+    "mm",
+    "Johnson & Phillips 1981 kept it the same and much larger than the gaps",
+    "assumed",
+)
+LIP_RADIUS = Published(
+    "radius of the lips of a gap or groove",
+    0.2,
+    "mm",
+    "as small as the elements of a quick mesh across an edge, about which sharper lips tear their skin",
+    "assumed",
+)
+RIDGE_WIDTH = Published(
+    "width of the ridges and grooves of a grating", 1.5, "mm", "within what people can feel", "assumed"
+)
 BAR_SHIFTS = Published(
     "lateral positions of the bar relative to the receptor",
     tuple(round(-3.5 + 0.2 * step, 1) for step in range(36)),

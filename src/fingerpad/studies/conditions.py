@@ -9,8 +9,9 @@ import numpy as np
 from fingerpad.checks import one_of, whole
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import RESOLUTIONS, Grading, resolution_grading
-from fingerpad.indentation import CONTACT_POINT_MM, grading_about, touch_of
+from fingerpad.indentation import CONTACT_POINT_MM, touch_of
 from fingerpad.indentation import Touch as Touch
+from fingerpad.indenter_grading import grading_about
 from fingerpad.indenters import Indenter
 from fingerpad.mechanics.materials import Tissues
 

@@ -1,0 +1,175 @@
+"""Edge, gap and grating against densely drawn sections, and against the bars that they must become."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fingerpad.edged_indenters import Edge, Gap, Grating
+from fingerpad.errors import InputError
+from fingerpad.export.outline import outline_of
+from fingerpad.indenters import Bar, Plate
+
+EDGE, GAP, GRATING = Edge(0.3), Gap(1.0, 6.0, 0.4, 0.2), Grating(0.9, 0.7, 0.2)
+SHARP = [Edge(0.0), Gap(1.0, 6.0, 0.0, 0.0), Grating(0.9, 0.7, 0.0)]
+ROUNDED = [EDGE, GAP, GRATING, Gap(0.2, 6.0, 0.4, 0.3)]
+ALONG, UP, ACROSS = np.eye(3)
+NAMES = ["edge", "gap", "grating", "narrow gap", "sharp edge", "sharp gap", "sharp grating"]
+
+
+def points_about(seed=0, n=400):
+    return np.random.default_rng(seed).uniform([-4.0, -1.2, -3.0], [4.0, 0.8, 3.0], (n, 3))
+
+
+def drawn_section(body):
+    """Points closer than 1 µm along the face of a body, from corners and arcs that are written down here."""
+    turn = np.linspace(0.0, 0.5 * np.pi, 2001)[:, None]
+
+    def flat(start, end):
+        count = max(2, int(np.hypot(*np.subtract(end, start)) / 0.001))
+        return np.linspace(start, end, count)
+
+    def side(x, outwards, radius):
+        """From the end of the flat round the edge and down the wall that stands at x."""
+        centre = np.array([x - outwards * radius, -radius])
+        arc = centre + radius * np.hstack([outwards * np.sin(turn), np.cos(turn)])
+        return [arc, flat((x, -radius), (x, -6.0))]
+
+    def ridge(left, right, left_radius, right_radius):
+        top = flat((left + left_radius, 0.0), (right - right_radius, 0.0))
+        return [top, *side(left, -1.0, left_radius), *side(right, 1.0, right_radius)]
+
+    if isinstance(body, Edge):
+        parts = [flat((-9.0, 0.0), (-body.fillet_mm, 0.0)), *side(0.0, 1.0, body.fillet_mm)]
+    elif isinstance(body, Gap):
+        half, end = body.gap_mm / 2, body.width_mm / 2
+        lip = min(body.lip_mm, half)
+        parts = ridge(half, end, lip, body.fillet_mm) + ridge(-end, -half, body.fillet_mm, lip)
+    else:
+        parts = []
+        for n in range(-4, 5):
+            middle = n * (body.ridge_mm + body.groove_mm)
+            half = body.ridge_mm / 2
+            parts += ridge(middle - half, middle + half, body.lip_mm, body.lip_mm)
+    return np.concatenate(parts)
+
+
+@pytest.mark.parametrize("body", ROUNDED + SHARP, ids=NAMES)
+def test_gap_is_the_distance_to_the_face_and_negative_behind_it(body):
+    points = points_about(n=150)
+    section = drawn_section(body)
+    gap, _ = body.gap(points)
+    distance = np.array([np.hypot(*(section - point).T).min() for point in points[:, :2]])
+    # Half a spacing h beside the foot of a point, the drawing is h²/2d too far: 6e-6 mm at d = 0.02 mm.
+    far = distance > 0.02
+    np.testing.assert_allclose(np.abs(gap[far]), distance[far], rtol=0, atol=1e-5)
+    inside = points[:, 1] < body.front(points)
+    np.testing.assert_array_equal(gap < 0.0, inside)
+    assert 0.1 < inside.mean() < 0.9
+
+
+@pytest.mark.parametrize("body", ROUNDED, ids=NAMES[:4])
+@given(seed=st.integers(0, 10_000))
+def test_normal_is_the_slope_of_the_gap_and_of_unit_length(body, seed):
+    points, step = points_about(seed, 20), 1e-6
+    _, normal = body.gap(points)
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0, rtol=1e-14)
+    ahead, behind = (
+        np.stack([body.gap(points + sign * offset)[0] for offset in step * np.eye(3)]) for sign in (1.0, -1.0)
+    )
+    here = body.gap(points)[0]
+    # Halfway between two faces the slope jumps, and is that of no single one.
+    smooth = (np.abs(ahead + behind - 2 * here) < 1e-9).all(axis=0)
+    assert smooth.mean() > 0.8
+    np.testing.assert_allclose(normal[smooth], ((ahead - behind) / (2 * step)).T[smooth], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("body", ROUNDED + SHARP, ids=NAMES)
+def test_front_is_where_the_gap_changes_sign_and_nowhere_over_a_groove(body):
+    points = points_about(3, 200)
+    height = body.front(points)
+    over = np.isfinite(height)
+    assert 0.2 < over.mean() < 1.0
+    face = points[over].copy()
+    face[:, 1] = height[over]
+    np.testing.assert_allclose(body.gap(face)[0], 0.0, rtol=0, atol=1e-14)
+    assert (body.gap(face + 1e-3 * UP)[0] > 0.0).all()
+    deep = points[~over] * [1.0, 0.0, 1.0] - 3.0 * UP
+    assert (body.gap(deep)[0] > 0.0).all()
+
+
+def test_without_a_gap_it_is_the_bar():
+    points = points_about(4)
+    for given_gap, bar in zip(Gap(0.0, 6.0, 0.4).gap(points), Bar(6.0, 0.4).gap(points), strict=True):
+        np.testing.assert_array_equal(given_gap, bar)
+    np.testing.assert_array_equal(Gap(0.0, 6.0, 0.4).front(points), Bar(6.0, 0.4).front(points))
+
+
+def test_a_gap_that_closes_leaves_the_bar():
+    """Lips are rounder than half the gap only where there is none, so the face has no step in between."""
+    points = points_about(5)
+    outside = points[points[:, 1] > 0.01]
+    np.testing.assert_allclose(Gap(1e-6, 6.0).gap(outside)[0], Bar(6.0).gap(outside)[0], rtol=0, atol=1e-4)
+
+
+def test_a_gap_parts_two_bars():
+    points, apart = points_about(6), 1.75 * ALONG
+    with_gap = Gap(1.0, 6.0, 0.3, 0.3).gap(points)[0]
+    two = np.minimum(Bar(2.5, 0.3).gap(points - apart)[0], Bar(2.5, 0.3).gap(points + apart)[0])
+    np.testing.assert_allclose(with_gap, two, rtol=0, atol=1e-14)
+
+
+def test_grating_repeats_and_is_a_bar_where_its_grooves_are_wide():
+    points = points_about(7)
+    for moved in (GRATING.period_mm, -3 * GRATING.period_mm):
+        np.testing.assert_allclose(
+            GRATING.gap(points)[0], GRATING.gap(points + moved * ALONG)[0], rtol=0, atol=1e-13
+        )
+    wide = Grating(3.0, 50.0, 0.3)
+    np.testing.assert_array_equal(wide.gap(points)[0], Bar(3.0, 0.3).gap(points)[0])
+
+
+def test_an_edge_is_a_plate_far_from_its_wall_and_two_of_them_are_a_bar():
+    points = points_about(8)
+    above = points[points[:, 1] > -0.1] - 8.0 * ALONG
+    np.testing.assert_allclose(EDGE.gap(above)[0], Plate().gap(above)[0], rtol=0, atol=1e-15)
+    shift, turned = 1.5 * ALONG, np.array([-1.0, 1.0, -1.0])
+    two = np.maximum(EDGE.gap(points - shift)[0], EDGE.gap((points + shift) * turned)[0])
+    outside = Bar(3.0, 0.3).gap(points)[0] > 0.0
+    np.testing.assert_allclose(two[outside], Bar(3.0, 0.3).gap(points)[0][outside], rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("body", ROUNDED + SHARP, ids=NAMES)
+def test_bodies_do_not_end_in_z(body):
+    points = points_about(9)
+    np.testing.assert_array_equal(body.gap(points)[0], body.gap(points + 40.0 * ACROSS)[0])
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Edge(-0.1), "fillet_mm"),
+        (lambda: Gap(-0.5), "gap_mm must"),
+        (lambda: Gap(np.nan), "gap_mm must"),
+        (lambda: Gap(1.0, 0.0), "width_mm must be greater than 0"),
+        (lambda: Gap(1.0, 8.0, 4.5), "half of width_mm, 4 mm: got 4.5 mm"),
+        (lambda: Gap(1.0, 8.0, 0.3, -0.1), "lip_mm must"),
+        (lambda: Gap(7.5, 8.0), "two flat ridges of the bar, so be below 7 mm: got 7.5 mm"),
+        (lambda: Grating(0.0), "ridge_mm must"),
+        (lambda: Grating(1.0, 0.0), "groove_mm must"),
+        (lambda: Grating(1.0, 1.0, 0.6), "half of ridge_mm, 0.5 mm: got 0.6 mm"),
+    ],
+)
+def test_impossible_bodies_are_refused_in_one_sentence(make, said):
+    with pytest.raises(InputError, match=said) as refusal:
+        make()
+    assert str(refusal.value).endswith(".")
+    assert "\n" not in str(refusal.value)
+
+
+def test_outlines_follow_the_same_section():
+    for body in ROUNDED + SHARP:
+        line = outline_of(body, reach_mm=6.0).points(lowest_mm=-0.5)
+        points = np.column_stack([line, np.zeros(len(line))])
+        on_face = points[:, 1] > -5.0  # below it, only the floors that close grooves for a drawing
+        np.testing.assert_allclose(body.gap(points[on_face])[0], 0.0, rtol=0, atol=1e-12)

@@ -1,0 +1,207 @@
+"""Indenters turned about their direction of pressing: what stays, what changes, and what is refused."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from fingerpad.edged_indenters import Edge, Gap, Grating
+from fingerpad.errors import InputError
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import Grading, covering
+from fingerpad.indentation import Touch, touch_of
+from fingerpad.indenter_grading import ACROSS_GROOVE, EDGE_SIZE_MM, grading_about, sizes_across
+from fingerpad.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.mechanics.newton import NewtonSettings
+from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.stimulus import ForceRampAndHold, RampAndHold
+from fingerpad.store import touch_key
+from fingerpad.units import cosine_and_sine
+
+ALL = [Cylinder(), Bar(), Sphere(), FlatPunch(), Plate(), Line(), Edge(), Gap(), Grating()]
+HALF = Grading(17.37, 1.6, 1.6, 0.8, 0.8, largest_mm=5.0, stratum_corneum=1, dermis=1, subcutis=2)
+FULL = replace(HALF, full=True)
+
+
+def touch(indenter, spin_deg=0.0, grading=HALF, **changes):
+    arguments = {
+        "finger": Fingertip(),
+        "indenter": indenter,
+        "stimulus": RampAndHold(depth_mm=0.4),
+        "tissues": named_tissues("trial3"),
+        "grading": grading,
+        "settings": PressSettings(2, 1),
+        "spin_deg": spin_deg,
+    }
+    return Touch(**(arguments | changes))
+
+
+@dataclass(frozen=True)
+class BarAlong(Indenter):
+    """The bar along the finger, written with its axes exchanged."""
+
+    bar: Bar
+    half_width_mm = np.inf
+
+    def gap(self, points_mm):
+        gap, normal = self.bar.gap(points_mm[:, ::-1])
+        return gap, normal[:, ::-1]
+
+    def front(self, points_mm):
+        return self.bar.front(points_mm[:, ::-1])
+
+
+@pytest.mark.parametrize("spin_deg", [-270.0, -90.0, 0.0, 17.0, 45.0, 90.0, 180.0, 360.0])
+def test_cosine_and_sine_are_those_of_the_angle_and_exact_at_quarter_turns(spin_deg):
+    cosine, sine = cosine_and_sine(spin_deg)
+    expected = np.exp(1j * np.deg2rad(spin_deg))
+    np.testing.assert_allclose([cosine, sine], [expected.real, expected.imag], rtol=0, atol=1e-15)
+    assert (abs(cosine) + abs(sine) == 1.0) == (spin_deg % 90.0 == 0.0)
+
+
+@pytest.mark.parametrize("indenter", ALL, ids=lambda body: type(body).__name__)
+@pytest.mark.parametrize("spin_deg", [0.0, 30.0, 90.0, -90.0, 135.0, 180.0])
+def test_a_body_says_whether_it_is_its_own_mirror_image(indenter, spin_deg):
+    """Gaps at points and their mirror images, in the frame of the finger."""
+    points = np.random.default_rng(6).uniform([-5.0, -1.0, -5.0], [5.0, 0.5, 5.0], (200, 3))
+    cosine, sine = cosine_and_sine(spin_deg)
+    axes = np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]])
+    gap, mirrored = (indenter.gap(seen @ axes)[0] for seen in (points, points * [1.0, 1.0, -1.0]))
+    is_mirror_image = np.allclose(gap, mirrored, rtol=0, atol=1e-12)
+    # A wire's gap is that of a plate; what it may touch is not, and it is never turned.
+    assert indenter.mirrors(spin_deg) == is_mirror_image or isinstance(indenter, Line)
+
+
+def test_a_bar_turned_by_a_quarter_lies_along_the_finger():
+    turned, along = touch(Bar(), 90.0).solve(), touch(BarAlong(Bar())).solve()
+    np.testing.assert_allclose(turned.force_mn, along.force_mn, rtol=1e-9)
+    np.testing.assert_allclose(turned.displacement_mm, along.displacement_mm, rtol=0, atol=1e-10)
+    across = touch(Bar()).solve()
+    assert abs(across.force_mn[-1] / turned.force_mn[-1] - 1.0) > 0.02
+
+
+def test_turning_a_ball_changes_nothing():
+    ball, tight = Sphere(curvature_per_m=287.0), PressSettings(1, 1, NewtonSettings(1e-9, 1e-4))
+    still, turned = (touch(ball, spin, settings=tight).solve() for spin in (0.0, 33.0))
+    np.testing.assert_allclose(turned.force_mn, still.force_mn, rtol=1e-8)
+    np.testing.assert_allclose(turned.displacement_mm, still.displacement_mm, rtol=0, atol=1e-9)
+    assert grading_about(ball, "quick", 17.37, spin_deg=33.0) == grading_about(ball, "quick", 17.37)
+
+
+def test_opposite_spins_are_mirror_images():
+    """The mesh of a full finger is its own mirror image, so each node has a partner across the midline."""
+    left, right = (touch(Bar(1.6, 0.2), spin, FULL).solve() for spin in (25.0, -25.0))
+    nodes = left.mesh.nodes_mm
+    partner = np.lexsort(np.round(nodes * [1.0, 1.0, -1.0], 9).T)[
+        np.argsort(np.lexsort(np.round(nodes, 9).T))
+    ]
+    np.testing.assert_allclose(nodes[partner], nodes * [1.0, 1.0, -1.0], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(left.force_mn, right.force_mn, rtol=1e-5)
+    moved = right.displacement_mm[partner] * [1.0, 1.0, -1.0]
+    np.testing.assert_allclose(left.displacement_mm, moved, rtol=0, atol=1e-4 * 0.4)
+    assert np.abs(left.displacement_mm - right.displacement_mm).max() > 0.05 * 0.4
+
+
+def test_half_an_edge_turned_round_is_the_edge_from_the_other_side():
+    """Flat on the inclined pad, it presses the proximal or, at 180 degrees, the distal side of its axis."""
+    for spin, side in ((0.0, -1.0), (180.0, 1.0)):
+        profile = touch(Edge(), spin, tilt_deg=7.97).solve().surface_profile()
+        assert profile.at(0.8 * side) > 0.3
+        assert profile.at(-1.6 * side) < 0.5 * profile.at(0.8 * side)
+
+
+def test_force_control_turns_as_depth_does():
+    skin = touch(Bar(), 90.0, stimulus=ForceRampAndHold(80.0)).solve()
+    np.testing.assert_allclose(skin.force_mn, [0.0, 40.0, 80.0, 80.0], rtol=1e-5)
+    assert skin.force_imbalance <= 1e-4
+
+
+def test_spin_is_part_of_the_value_and_of_the_key():
+    assert touch(Bar(), 90.0) != touch(Bar())
+    assert touch_key(touch(Bar(), 90.0)) != touch_key(touch(Bar()))
+    assert touch_key(touch(Bar(), 90)) == touch_key(touch(Bar(), 90.0))
+
+
+def test_a_mesh_covers_the_turned_footprint_and_both_halves_where_it_must():
+    straight, turned = (grading_about(Bar(), "quick", 17.37, spin_deg=spin) for spin in (0.0, 30.0))
+    assert not straight.full
+    assert turned.full
+    grown = np.cos(np.pi / 6) + np.sin(np.pi / 6)
+    assert turned.half_length_mm == pytest.approx(grown * straight.half_length_mm)
+    assert turned.half_width_mm == pytest.approx(grown * straight.half_width_mm)
+    assert grading_about(Bar(), "quick", 17.37, spin_deg=90.0) == straight
+    assert grading_about(Edge(), "quick", 17.37, spin_deg=90.0).full
+    made = touch_of(Fingertip(), Bar(), spin_deg=30.0)
+    assert made.grading == turned
+    assert made.spin_deg == 30.0
+
+
+@pytest.mark.parametrize("resolution", ["quick", "standard"])
+@pytest.mark.parametrize("spin_deg", [0.0, 90.0, 30.0])
+@pytest.mark.parametrize(
+    "indenter", [Gap(0.3), Gap(2.0), Grating(0.8, 0.6), Edge()], ids=["gap 0.3", "gap 2", "grating", "edge"]
+)
+def test_a_mesh_is_fine_across_edges_however_they_lie(indenter, spin_deg, resolution):
+    grading = grading_about(indenter, resolution, 17.37, spin_deg=spin_deg)
+    assert max(sizes_across(grading, spin_deg)) <= EDGE_SIZE_MM[resolution]
+    assert max(sizes_across(grading, spin_deg)) <= indenter.narrowest_mm / ACROSS_GROOVE
+    if spin_deg == 0.0 and not isinstance(indenter, Grating):
+        assert grading.core_half_length_mm == indenter.edge_reach_mm
+    no_gap = grading_about(Gap(0.0), resolution, 17.37, spin_deg=spin_deg)
+    assert max(sizes_across(no_gap, spin_deg)) > EDGE_SIZE_MM[resolution]
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: touch(Bar(), 20.0), "spin_deg = 20 degrees leaves Bar without symmetry.*full=True"),
+        (lambda: touch(Edge(), 90.0), "spin_deg = 90 degrees leaves Edge without symmetry"),
+        (lambda: touch(Bar(), np.nan), "spin_deg must be a finite number"),
+        (lambda: touch(Bar(), "across"), "spin_deg must be a"),
+        (lambda: touch(Line(), 90.0), "spin_deg must be 0 for Line: got 90 degrees"),
+        (
+            lambda: touch(Gap(1.0)),
+            r"elements of at most 0.5 mm across grooves and ridges of 1 mm: got 0.8 mm",
+        ),
+        (lambda: touch(Gap(1.0), 90.0), r"elements of at most 0.5 mm"),
+        (lambda: touch(Gap(1.0), 9.0, replace(FULL, size_x_mm=0.4)), r"at most 0.5 mm.*got 0.8 mm"),
+        (lambda: touch_of(Fingertip(), Cylinder(0.1), spin_deg=20.0), "thinner than 0.9 mm, two elements"),
+        (lambda: touch_of(Fingertip(), Bar(), spin_deg=np.inf), "spin_deg must be a finite number"),
+    ],
+)
+def test_what_cannot_be_turned_is_refused_in_one_sentence(make, said):
+    with pytest.raises(InputError, match=said) as refusal:
+        make()
+    assert str(refusal.value).endswith(".")
+    assert "\n" not in str(refusal.value)
+
+
+def test_one_mesh_serves_several_indenters():
+    """As fine as each of them wherever that one is fine."""
+    parts = [
+        grading_about(Gap(0.5), "standard", 17.37),
+        grading_about(Gap(2.0), "quick", 17.0),
+        grading_about(Bar(), "quick", 18.0, spin_deg=20.0),
+    ]
+    joint = covering(parts)
+    assert joint.full
+    assert joint.stratum_corneum == 4
+    for part in parts:
+        assert joint.centre_mm - joint.half_length_mm <= part.centre_mm - part.half_length_mm + 1e-12
+        assert joint.centre_mm + joint.half_length_mm >= part.centre_mm + part.half_length_mm - 1e-12
+        assert joint.half_width_mm >= part.half_width_mm
+        assert joint.size_x_mm <= part.size_x_mm
+        assert joint.size_z_mm <= part.size_z_mm
+        if part.core_size_mm:
+            assert joint.core_size_mm <= part.core_size_mm
+            beyond = abs(part.centre_mm - joint.centre_mm) + part.core_half_length_mm
+            assert joint.core_half_length_mm >= beyond
+    assert covering([HALF]) == HALF
+    assert covering([grading_about(Line(), "paper", 17.37)] * 2) == grading_about(Line(), "paper", 17.37)
+    wide = replace(HALF, core_half_length_mm=1.5, core_size_mm=0.2)
+    apart = covering([wide, replace(wide, centre_mm=18.37)])
+    assert (apart.core_half_length_mm, apart.core_size_mm) == (2.0, 0.2)
+    assert covering([wide, replace(HALF, size_x_mm=0.1)]).core_size_mm == 0.0
+    with pytest.raises(InputError, match="at least one grading: got none"):
+        covering([])
