@@ -145,17 +145,21 @@ def covering(gradings: Sequence[Grading]) -> Grading:
     """
     if not gradings:
         raise InputError("covering needs at least one grading: got none.")
-    proximal = min(grading.centre_mm - grading.half_length_mm for grading in gradings)
-    distal = max(grading.centre_mm + grading.half_length_mm for grading in gradings)
-    centre = 0.5 * (proximal + distal)
+    first = gradings[0].centre_mm
+    proximal = min(grading.centre_mm - grading.half_length_mm - first for grading in gradings)
+    distal = max(grading.centre_mm + grading.half_length_mm - first for grading in gradings)
+    same_centre = all(grading.centre_mm == first for grading in gradings)  # then nothing is rounded
+    centre = first if same_centre else first + 0.5 * (proximal + distal)
+
+    def reach(name: str, parts: Sequence[Grading]) -> float:
+        return max((abs(part.centre_mm - centre) + getattr(part, name) for part in parts), default=0.0)
+
     cores = [grading for grading in gradings if grading.core_size_mm]
-    core_reach = max(
-        (abs(grading.centre_mm - centre) + grading.core_half_length_mm for grading in cores), default=0.0
-    )
+    core_reach = reach("core_half_length_mm", cores)
     core_size = min((grading.core_size_mm for grading in cores), default=0.0)
     joint = Grading(
         centre_mm=centre,
-        half_length_mm=0.5 * (distal - proximal),
+        half_length_mm=reach("half_length_mm", gradings),
         half_width_mm=max(grading.half_width_mm for grading in gradings),
         size_x_mm=min(grading.size_x_mm for grading in gradings),
         size_z_mm=min(grading.size_z_mm for grading in gradings),

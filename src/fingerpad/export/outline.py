@@ -102,8 +102,9 @@ def outline_of(indenter: Indenter, reach_mm: float) -> Outline:
 
     Examples
     --------
-    >>> outline_of(Sphere(curvature_per_m=500), reach_mm=5.0)
-    Outline(revolved=True, corners=((0.0, 0.0), (2.0, -2.0)), centres=((0.0, -2.0),))
+    >>> ball = outline_of(Sphere(curvature_per_m=500), reach_mm=5.0)
+    >>> ball.revolved, ball.corners, ball.centres
+    (True, ((0.0, 0.0), (2.0, -2.0)), ((0.0, -2.0),))
     """
     positive("reach_mm", reach_mm, "mm")
     if isinstance(indenter, Sphere):
