@@ -17,6 +17,8 @@ from fingerpad.report import (
     nail,
     page,
     population,
+    population_rate,
+    recruitment,
     single_unit,
     skin_deflection,
     summary,
@@ -48,6 +50,7 @@ def synthetic_results() -> dict:
         "spike_fit": _spike_fit(),
         "discrimination": _discrimination(),
         "population": _population(),
+        "population_timing": _population_timing(),
         "nail": _nail(),
         "comparison": [
             _compared("FSS out of sample", "0.81", "0.84", "+0.03", True),
@@ -382,6 +385,79 @@ def _population() -> dict:
         "static_rate_hz": static.tolist(),
         "first_spike_latency_ms": latency,
         "receptors_mm": [[15.0 + i, j - 1.0] for i in range(6) for j in range(3)],
+        "finger": _finger(),
+    }
+
+
+def _population_timing() -> dict:
+    sheet = _population()
+    latency = [value for row in sheet["first_spike_latency_ms"] for value in row]
+    positions = [[x, z] for x in sheet["x_mm"] for z in sheet["z_mm"]]
+    return {"recruitment": _recruitment(positions, latency), "rates": _rates()}
+
+
+def _finger() -> dict:
+    """Half of a tube with a closed end, its pad below."""
+    along, angle = np.meshgrid(np.linspace(0.0, 31.0, 20), np.linspace(0.0, np.pi, 16), indexing="ij")
+    taper = np.sqrt(1.0 - (along / 31.78) ** 6)
+    y, z = -9.8 * np.cos(angle) * taper, 9.8 * np.sin(angle) * taper
+    away = np.hypot(along[:-1, :-1] - 17.4, z[:-1, :-1])
+    rate = np.where(y[:-1, :-1] < 0.0, 50.0 * np.exp(-((away / 2.0) ** 2)), 0.0)
+    latency = [[None if r > 4.0 else 6.0 + 6.0 * r for r in row] for row in away]
+    return {
+        "x_mm": along.tolist(),
+        "y_mm": y.tolist(),
+        "z_mm": z.tolist(),
+        "dynamic_rate_hz": (4.0 * rate).tolist(),
+        "static_rate_hz": rate.tolist(),
+        "first_spike_latency_ms": latency,
+        "half": True,
+    }
+
+
+def _recruitment(positions: list, early: list) -> dict:
+    late = [None if value is None else 1.5 * value for value in early]
+
+    def rank(values: list) -> list:
+        known = sorted(value for value in values if value is not None)
+        return [None if value is None else 1.0 + known.index(value) for value in values]
+
+    numbers = {"recruited_mm2": 22.5, "recruited_in_ramp_mm2": 16.8, "first_ms": 6.0, "median_ms": 20.0}
+    return {
+        "positions_mm": positions,
+        "area_per_afferent_mm2": 0.75,
+        "touches": [
+            {"name": "287 /m", "both": 60, "either": 60, "rank_correlation": 1.0, "swapped": 0.0, **numbers},
+            {"name": "365 /m", "both": 60, "either": 60, "rank_correlation": 0.987, "swapped": 0.031}
+            | numbers,
+        ],
+        "afferents": [
+            {"name": name, "first_spike_latency_ms": values, "recruitment_rank": rank(values)}
+            for name, values in (("287 /m", early), ("365 /m", late))
+        ],
+    }
+
+
+def _rates() -> dict:
+    edges = np.concatenate([np.arange(0.0, 150.0, 10.0), np.arange(150.0, 1001.0, 50.0)])
+    active_edges = np.arange(0.0, 1001.0, 50.0)
+    rate = 60.0 + 140.0 * (edges[1:] <= 50.0)
+    return {
+        "edges_ms": edges.tolist(),
+        "active_edges_ms": active_edges.tolist(),
+        "smoothing_ms": 2.0,
+        "density_per_cm2": 100.0,
+        "radii_mm": [0.0, 1.0, 2.0],
+        "n_afferents": [50, 150],
+        "touches": [
+            {
+                "name": name,
+                "rate_hz": [rate.tolist(), (0.5 * rate).tolist()],
+                "active_fraction": [[1.0] * (active_edges.size - 1), [0.5] * (active_edges.size - 1)],
+                "together_per_cm2_hz": (factor * 60.0 * rate).tolist(),
+            }
+            for name, factor in (("287 /m", 1.0), ("365 /m", 1.1))
+        ],
     }
 
 
@@ -528,7 +604,8 @@ def test_texts_are_escaped_wherever_they_stand(tmp_path):
 def without_numbers(value):
     """The same results with None for every number that a run may fail to have."""
     keep = ("distance_mm", "shift_mm", "x_mm", "y_mm", "z_mm", "receptors_mm", "curvature_per_m", "fold")
-    keep += ("testing_shift_mm", "is_artefact", "inputs", "iteration", "shown")
+    keep += ("testing_shift_mm", "is_artefact", "inputs", "iteration", "shown", "positions_mm", "radii_mm")
+    keep += ("edges_ms", "active_edges_ms", "density_per_cm2", "area_per_afferent_mm2")
     if isinstance(value, dict):
         return {key: item if key in keep else without_numbers(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -678,6 +755,73 @@ def test_figure_6_leaves_silent_places_open():
     np.testing.assert_array_equal(shown, silent.T)
     for axes in maps:
         np.testing.assert_array_equal(axes.get_lines()[0].get_xydata(), section["receptors_mm"])
+
+
+def test_figure_6_colours_the_finger_where_afferents_fire_and_mirrors_half_of_it():
+    section = _population()
+    solid = [
+        axes.collections[0]
+        for axes in population.draw(section).axes
+        if axes.name == "3d" and not axes.get_xlabel()
+    ]
+    assert len(solid) == 3
+    finger = section["finger"]
+    x, y = (np.array(finger[key]) for key in ("x_mm", "y_mm"))
+    middle = [0.25 * (v[:-1, :-1] + v[1:, :-1] + v[1:, 1:] + v[:-1, 1:]) for v in (x, y)]
+    drawn = (middle[0] > population.PAD_FROM_MM) & (middle[1] < population.PAD_BELOW_MM)
+    known = np.array([[value is not None for value in row] for row in finger["first_spike_latency_ms"]])
+    # The picture lists its faces by their distance from the eye: they are counted, not compared.
+    colours = solid[2].get_facecolor()[:, :3]
+    coloured = np.ptp(colours, axis=1) > 0.1  # grey has hardly a hue
+    assert (len(coloured), coloured.sum()) == (2 * drawn.sum(), 2 * known[drawn].sum())
+    assert 0 < coloured.sum() < len(coloured)
+
+
+def test_figure_13_ranks_every_afferent_that_fires_and_counts_skin():
+    section = _population_timing()["recruitment"]
+    drawn = recruitment.draw(section).axes
+    first, silent = section["afferents"][0], drawn[0].collections[0]
+    latency = np.array(first["first_spike_latency_ms"], dtype=float)
+    fires = np.isfinite(latency)
+    assert len(silent.get_offsets()) == (~fires).sum() > 0
+    ranks = np.array(first["recruitment_rank"], dtype=float)[fires]
+    np.testing.assert_array_equal(drawn[0].collections[1].get_array(), ranks)
+    np.testing.assert_array_equal(
+        drawn[0].collections[1].get_offsets(), np.array(section["positions_mm"])[fires]
+    )
+    steps = lines(drawn[2])["365 /m"]
+    np.testing.assert_array_equal(steps.get_xdata(), 1.5 * np.sort(latency[fires]))
+    assert steps.get_ydata()[-1] == 0.75 * fires.sum()
+    beside = lines(drawn[3])["365 /m"].get_xydata()
+    np.testing.assert_array_equal(beside[fires], np.stack([latency[fires], 1.5 * latency[fires]], axis=1))
+
+
+def test_figure_13_and_its_table_say_how_much_the_order_changes():
+    section = _population_timing()["recruitment"]
+    assert "365 /m: rank correlation 0.987, 3.1 % of the pairs swap" in recruitment.caption(section)
+    table = recruitment.tables(section)[0]
+    assert list(table.rows[1].cells) == ["365 /m", "22.5", "16.8", "6.0", "20.0", "0.987", "3.1 %"]
+
+
+def test_figure_13_of_one_touch_leaves_the_comparison_empty():
+    section = _population_timing()["recruitment"]
+    alone = {**section, "touches": section["touches"][:1], "afferents": section["afferents"][:1]}
+    texts = [text.get_text() for axes in recruitment.draw(alone).axes for text in axes.texts]
+    assert texts.count("no other touch") == 2
+    assert "rank correlation" not in recruitment.caption(alone)
+
+
+def test_figure_14_has_one_scale_per_afferent_and_per_area():
+    section = _population_timing()["rates"]
+    figure = population_rate.draw(section)
+    early = figure.axes[0]
+    assert [patch.get_label() for patch in early.patches] == ["0 to 1 mm", "1 to 2 mm"]
+    np.testing.assert_array_equal(early.patches[1].get_data().values, section["touches"][0]["rate_hz"][1])
+    beside = figure.axes[1].child_axes[0]
+    figure.draw_without_rendering()
+    # 100 per cm2 that fire 50 spikes/s each make 5000 spikes/s per cm2.
+    assert beside.get_ylim()[1] / figure.axes[1].get_ylim()[1] == pytest.approx(5.0 / 50.0)
+    assert "1000 spikes/s per cm²" in beside.get_ylabel()
 
 
 def test_figure_7_keeps_the_papers_letters_and_shows_people_in_every_panel():

@@ -108,15 +108,27 @@ def test_smoothing_is_the_normal_density_about_the_middle_of_the_bin():
     found = population_rate(SpikeTrains.from_lists([[40.04]]), edges_ms, smoothing_ms=5.0)
     middle = found.times_ms[400]
     density = np.exp(-0.5 * ((found.times_ms - middle) / 5.0) ** 2) / (5.0 * np.sqrt(2.0 * np.pi))
-    # A bin's mean differs from its middle by at most h^2/24 times the second derivative, 0.4/s^3.
-    assert_allclose(found.rate_hz[0] / 1000.0, density, rtol=0, atol=0.1**2 / 24 * 0.4 / 5.0**3 * 1.01)
+    # Means over two bins of width h differ from the middle by up to h^2/12 of the second derivative, 0.4/s^3.
+    assert_allclose(found.rate_hz[0] / 1000.0, density, rtol=0, atol=0.1**2 / 12 * 0.4 / 5.0**3 * 1.01)
     assert found.active.sum() == 1
 
 
-def test_smoothing_keeps_a_constant_rate_away_from_the_ends():
-    edges_ms = np.arange(0.0, 201.0)
-    found = population_rate(SpikeTrains.from_lists([np.arange(0.5, 200.0)]), edges_ms, smoothing_ms=4.0)
-    assert_allclose(found.rate_hz[0, 40:160], 1000.0, rtol=1e-9)
+def test_smoothing_is_the_integral_over_both_bins():
+    """Both integrals by the midpoint rule, each wrong by up to h^2/24 of the second derivative."""
+    edges_ms, smoothing_ms, step = np.array([0.0, 1.0, 3.0, 3.5]), 0.8, 0.005
+    found = population_rate(SpikeTrains.from_lists([[2.0]]), edges_ms, smoothing_ms=smoothing_ms)
+    fine = np.arange(step / 2, 3.5, step)
+    source = fine[(fine > 1.0) & (fine < 3.0)]
+    density = np.exp(-0.5 * ((fine[:, None] - source) / smoothing_ms) ** 2).sum(axis=1)
+    shares = np.array([density[(fine > a) & (fine < b)].sum() for a, b in itertools.pairwise(edges_ms)])
+    assert_allclose(found.spikes[0], shares / shares.sum(), rtol=1e-4)
+
+
+def test_smoothing_keeps_a_constant_rate_away_from_the_ends_whatever_the_bins():
+    edges_ms = np.concatenate([np.arange(0.0, 100.0), np.arange(100.0, 301.0, 20.0)])
+    found = population_rate(SpikeTrains.from_lists([np.arange(0.5, 300.0)]), edges_ms, smoothing_ms=4.0)
+    inside = (found.times_ms > 50.0) & (found.times_ms < 250.0)
+    assert_allclose(found.rate_hz[0, inside], 1000.0, rtol=1e-9)
 
 
 def test_rate_of_a_patch_is_the_rate_per_afferent_times_the_density():

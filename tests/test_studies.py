@@ -25,6 +25,7 @@ from fingerpad.studies import (
     Reproduction,
     comparison,
     nail_border,
+    response_maps,
     single_unit,
     skin_deflection,
     sphere_discrimination,
@@ -413,24 +414,113 @@ def test_positions_draw_their_noise_apart():
 
 
 def test_population_map_is_a_sheet_that_peaks_under_the_sphere_and_is_silent_far_from_it():
-    found = sphere_discrimination.population_map(SphereSkin(0.0, 287.0), SENSITIVE)
+    population = response_maps.sheet(SENSITIVE)
+    found = response_maps.maps(population.respond(SphereSkin(0.0, 287.0)))
     x, z = found["x_mm"], found["z_mm"]
-    np.testing.assert_allclose(x, 17.37 + np.arange(-10, 11) / 2, rtol=1e-14)
-    np.testing.assert_allclose(z, np.arange(-10, 11) / 2, rtol=0, atol=1e-14)
-    assert found["receptors_mm"].shape == (18, 2)
-    assert found["curvature_per_m"] == 287.0
+    np.testing.assert_allclose(x, 17.37 + np.arange(-20, 21) / 4, rtol=1e-14)
+    np.testing.assert_allclose(z, np.arange(-20, 21) / 4, rtol=0, atol=1e-14)
     for name in ("dynamic_rate_hz", "static_rate_hz"):
         rates = found[name]
-        assert rates.shape == (21, 21)
-        assert rates[10, 10] == rates.max() > 0.0
+        assert rates.shape == (41, 41)
+        assert rates[20, 20] == rates.max() > 0.0
         np.testing.assert_allclose(rates, rates[:, ::-1], rtol=1e-9)
         assert rates[0, 0] == 0.0
     latency = found["first_spike_latency_ms"]
     assert np.isnan(latency[0, 0])
-    assert np.nanmin(latency) == latency[10, 10]
+    assert np.nanmin(latency) == latency[20, 20]
     # Rows are x, columns are z: moved along the finger, the peak moves along the rows.
-    moved = sphere_discrimination.population_map(SphereSkin(1.0, 287.0), SENSITIVE)["static_rate_hz"]
-    assert np.unravel_index(moved.argmax(), moved.shape) == (12, 10)
+    moved = response_maps.maps(population.respond(SphereSkin(1.0, 287.0)))["static_rate_hz"]
+    assert np.unravel_index(moved.argmax(), moved.shape) == (24, 20)
+
+
+@pytest.fixture(scope="module")
+def sheet_answers():
+    population = response_maps.sheet(SENSITIVE)
+    return {
+        "standard": population.respond(SphereSkin(0.0, 287.0)),
+        "curved": population.respond(SphereSkin(0.0, 365.0)),
+        "moved": population.respond(SphereSkin(1.0, 287.0)),
+    }
+
+
+def test_a_moved_sphere_changes_who_comes_first_and_a_more_curved_one_only_when(sheet_answers):
+    """These skins are functions of the distance from the middle: every curvature has the same order."""
+    found = response_maps.recruitment(sheet_answers, area_per_afferent_mm2=0.0625)
+    standard, curved, moved = found["touches"]
+    assert (standard["rank_correlation"], standard["swapped"]) == (pytest.approx(1.0), 0.0)
+    # Equal distances may come out of the exponential a bit apart, one touch's order of them being another's.
+    assert curved["swapped"] < 0.01
+    assert curved["rank_correlation"] > 0.999
+    assert curved["median_ms"] != standard["median_ms"]
+    assert moved["swapped"] > 0.1
+    assert moved["rank_correlation"] < 0.9
+    latency = sheet_answers["moved"].first_spike_latency_ms
+    assert moved["recruited_mm2"] == np.isfinite(latency).sum() / 16
+    assert moved["recruited_in_ramp_mm2"] == (latency <= 50.0).sum() / 16
+    assert moved["first_ms"] == np.nanmin(latency)
+    np.testing.assert_array_equal(found["afferents"][2]["first_spike_latency_ms"], latency)
+
+
+def test_rings_about_the_sphere_hold_all_spikes_near_it(sheet_answers):
+    found = response_maps.rates(sheet_answers, (RECEPTOR_X_MM, 0.0), density_per_cm2=100.0)
+    away = np.hypot(*(sheet_answers["standard"].positions_mm - [RECEPTOR_X_MM, 0.0]).T)
+    for touch in found["touches"]:
+        trains = sheet_answers[touch["name"]].spikes
+        total = sum(trains[afferent].size for afferent in np.flatnonzero(away < 4.0))
+        spikes = touch["rate_hz"] * np.diff(found["edges_ms"]) / 1000.0 * found["n_afferents"][:, None]
+        assert total > 0
+        np.testing.assert_allclose(spikes.sum(), total, rtol=1e-9)
+        # 100 per cm2 on the skin of all rings fire as often as the mean afferent of them, a hundredfold.
+        mean_hz = spikes.sum(axis=0) / found["n_afferents"].sum() / np.diff(found["edges_ms"]) * 1000.0
+        np.testing.assert_allclose(touch["together_per_cm2_hz"], 100.0 * mean_hz, rtol=1e-9)
+        ring = np.flatnonzero((away >= 1.0) & (away < 2.0))
+        firing = [((trains[afferent] > 500.0) & (trains[afferent] <= 510.0)).any() for afferent in ring]
+        assert touch["active_fraction"].shape == (4, 100)
+        assert touch["active_fraction"][1, 50] == np.mean(firing)
+
+
+def test_timing_asks_every_sphere_over_the_middle_and_the_standard_beside_it():
+    found = response_maps.timing(SKINS, SENSITIVE)
+    names = [touch["name"] for touch in found["recruitment"]["touches"]]
+    assert names == [*(f"{curvature:g} /m" for curvature in CURVATURES), "287 /m, 0.2 mm away"]
+    assert [touch["name"] for touch in found["rates"]["touches"]] == ["287 /m", "365 /m"]
+    curved = response_maps.sheet(SENSITIVE).respond(SKINS[0.0, 365.0])
+    shown = found["recruitment"]["afferents"]
+    assert [touch["name"] for touch in shown] == ["287 /m", "365 /m", "287 /m, 0.2 mm away"]
+    np.testing.assert_array_equal(shown[1]["first_spike_latency_ms"], curved.first_spike_latency_ms)
+    moved = response_maps.sheet(SENSITIVE).respond(SKINS[0.2, 287.0])
+    np.testing.assert_array_equal(shown[2]["first_spike_latency_ms"], moved.first_spike_latency_ms)
+
+
+def test_answers_of_other_afferents_are_refused(sheet_answers):
+    other = response_maps.sheet(SENSITIVE, reach_mm=1.0).respond(SphereSkin(0.0, 287.0))
+    with pytest.raises(InputError, match="those of 'other' are at other positions than those of 'one'"):
+        response_maps.recruitment({"one": sheet_answers["standard"], "other": other}, 0.0625)
+    with pytest.raises(InputError, match="at least one touch"):
+        response_maps.rates({}, (17.37, 0.0), 100.0)
+    with pytest.raises(InputError, match="area_per_afferent_mm2 must be greater than 0"):
+        response_maps.recruitment(sheet_answers, 0.0)
+
+
+def test_the_finger_carries_the_answers_of_the_afferents_below_its_faces(tiny_skin):
+    """Energy that grows with x: below each face answers what a lone afferent answers there."""
+    mesh = tiny_skin.mesh
+    x = mesh.nodes_mm[mesh.elements, 0].mean(axis=1)
+    sed = np.outer(tiny_skin.times_ms / tiny_skin.times_ms[-1], 3.0 * np.exp(-np.square(x - 18.0)))
+    skin = replace(tiny_skin, sed_kpa=sed)
+    found = response_maps.on_the_finger(skin, SENSITIVE)
+    grid = mesh.nodes_mm[mesh.skin_grid]
+    np.testing.assert_array_equal(found["y_mm"], (grid + skin.displacement_mm[mesh.skin_grid])[..., 1])
+    assert found["half"]
+    middle = 0.25 * (grid[:-1, :-1] + grid[1:, :-1] + grid[1:, 1:] + grid[:-1, 1:])
+    answers = np.argwhere(np.isfinite(found["static_rate_hz"]))
+    assert len(answers) > 20
+    for along, around in answers[::7]:
+        lone = SENSITIVE.rates(skin.sed([middle[along, around, [0, 2]]]))
+        values = [found[name][along, around] for name in ("dynamic_rate_hz", "static_rate_hz")]
+        np.testing.assert_allclose(values, np.ravel(lone), rtol=1e-9)
+    under = found["static_rate_hz"][np.abs(middle[..., 0] - 18.0) < 0.8]
+    assert np.nanmax(found["static_rate_hz"]) == np.nanmax(under) > 0.0
 
 
 # The nail

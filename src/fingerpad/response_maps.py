@@ -22,6 +22,7 @@ from fingerpad.units import MS_PER_S
 NO_GROUP = -1
 """Group of an afferent that belongs to none."""
 
+_LEAST_SMOOTHING = 1e-6
 _PAIRS_AT_A_TIME = 4_000_000
 
 
@@ -249,10 +250,9 @@ def population_rate(
     """Count the spikes of a population bin by bin: its peristimulus histogram.
 
     A bin excludes its start and includes its end, as the windows of `firing_rate_hz` do. Smoothing spreads
-    the content of bin j over the bins i by a normal density phi about its middle m_j, of which every bin
-    gets its share:
+    the n_j spikes of bin j, evenly over the bin, by a normal density phi, of which every bin gets its share:
 
-        n_i = sum_j K_ij n_j,    K_ij = integral over bin i of phi(t - m_j) / integral over all bins
+        n_i <- sum_j K_ij n_j,    K_ij ~ integral over t in bin i, s in bin j of phi(t - s),    sum_i K_ij = 1
 
     The shares of each spike add up to 1, so that smoothing neither makes nor loses spikes, at the ends of the
     histogram neither. Who is active is never smoothed.
@@ -329,9 +329,15 @@ def _groups(groups: ArrayLike | None, n_afferents: int) -> np.ndarray:
 
 
 def _kernel(edges: FloatArray, smoothing_ms: float) -> FloatArray:
-    """K_ij: share of bin i in a normal density about the middle of bin j, (n_bins, n_bins)."""
-    middles = 0.5 * (edges[1:] + edges[:-1])
-    shares = np.diff(ndtr((edges[:, np.newaxis] - middles) / smoothing_ms), axis=0)
+    """K_ij: what bin i gets of bin j, (n_bins, n_bins).
+
+    The double integral of phi is G(x) = x Phi(x) + phi(x), with signs, at the four pairs of borders.
+    """
+    # Far below the bins' width a density moves nothing, and its square overflows.
+    scale_ms = max(smoothing_ms, _LEAST_SMOOTHING * np.diff(edges).min())
+    x = (edges[:, np.newaxis] - edges) / scale_ms
+    integral = x * ndtr(x) + np.exp(-0.5 * x**2) / np.sqrt(2.0 * np.pi)
+    shares = np.maximum(-np.diff(np.diff(integral, axis=0), axis=1), 0.0)
     return shares / shares.sum(axis=0)
 
 

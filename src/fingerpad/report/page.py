@@ -18,6 +18,8 @@ from fingerpad.report import (
     drive_quantities,
     nail,
     population,
+    population_rate,
+    recruitment,
     single_unit,
     single_unit_methods,
     single_unit_uncertainty,
@@ -127,6 +129,27 @@ CHAPTERS = (
         _no_tables,
     ),
     Chapter(
+        "population_timing",
+        "Level 3: when a population fires",
+        (
+            Drawing(
+                13,
+                "figure_13_recruitment",
+                "Order of first spikes",
+                lambda section: recruitment.draw(section["recruitment"]),
+                lambda section: recruitment.caption(section["recruitment"]),
+            ),
+            Drawing(
+                14,
+                "figure_14_population_rate",
+                "Population rate over time",
+                lambda section: population_rate.draw(section["rates"]),
+                lambda section: population_rate.caption(section["rates"]),
+            ),
+        ),
+        lambda section: recruitment.tables(section["recruitment"]),
+    ),
+    Chapter(
         "discrimination",
         "Level 3: discrimination",
         (
@@ -165,9 +188,9 @@ def write_report(results: Mapping[str, Any], folder: Path) -> Path:
     ----------
     results : mapping
         JSON-able sections: skin_deflection, single_unit, drive_quantities, spike_fit, population,
-        discrimination, nail, comparison, inputs and manifest. A section that is absent is said to be so; one
-        of another name is listed as it stands. None stands for what does not exist, such as the latency of a
-        silent afferent.
+        population_timing, discrimination, nail, comparison, inputs and manifest. A section that is absent is
+        said to be so; one of another name is listed as it stands. None stands for what does not exist, such
+        as the latency of a silent afferent.
     folder : Path
         Made if needed; every file in it is written whole or not at all.
 

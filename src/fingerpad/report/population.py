@@ -1,13 +1,16 @@
-"""Level 3, Figure 6: what a sheet of afferents answers to one sphere."""
+"""Level 3, Figure 6: what a sheet of afferents answers to one sphere, as height, on the finger and flat."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from fingerpad.checks import FloatArray
 from fingerpad.parameters import protocol
@@ -15,14 +18,23 @@ from fingerpad.report.appearance import GREY, PALE, new_figure, numbers, say_not
 from fingerpad.report.words import number
 
 QUANTITIES = {
-    "dynamic_rate_hz": ("dynamic ramp", "rate [spikes/s]", "viridis"),
-    "static_rate_hz": ("static hold", "rate [spikes/s]", "viridis"),
-    "first_spike_latency_ms": ("first spike", "latency [ms]", "viridis_r"),
+    "dynamic_rate_hz": ("dynamic ramp", "rate [spikes/s]", "viridis", Normalize),
+    "static_rate_hz": ("static hold", "rate [spikes/s]", "viridis", Normalize),
+    # Most first spikes come within a few tens of milliseconds, those at the rim after hundreds.
+    "first_spike_latency_ms": ("first spike", "latency [ms]", "viridis_r", LogNorm),
 }
+
+TICKS_MS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+
+PAD_FROM_MM, PAD_BELOW_MM = 9.0, -1.0
+"""The picture of the finger shows skin distal of the first x and below the second y. [mm]"""
+
+LIGHT = np.array([0.8, 0.3, -0.52])
+"""Where the light on the finger comes from: distal, a little from the side, mostly from below (x, z, y)."""
 
 
 def draw(section: dict[str, Any]) -> Figure:
-    """Draw Figure 6: each quantity as a surface on the left and as a map with the receptors on the right.
+    """Draw Figure 6: each quantity as a surface, as a map on the pressed finger, and flat with the receptors.
 
     Parameters
     ----------
@@ -33,44 +45,111 @@ def draw(section: dict[str, Any]) -> Figure:
     -------
     Figure
     """
-    figure = new_figure(10.0, 11.0)
-    grid = figure.add_gridspec(3, 2, width_ratios=(1.1, 1.0))
+    figure = new_figure(14.0, 11.0)
+    grid = figure.add_gridspec(3, 3, width_ratios=(1.05, 1.1, 1.0))
+    finger = _faces(section["finger"])
     x, z = numbers(section["x_mm"]), numbers(section["z_mm"])
     receptors = numbers(section["receptors_mm"]).reshape(-1, 2)
-    for row, (key, (phase, label, colours)) in enumerate(QUANTITIES.items()):
+    for row, (key, (phase, label, colours, scaling)) in enumerate(QUANTITIES.items()):
         values = numbers(section[key])
         surface = figure.add_subplot(grid[row, 0], projection="3d")
         surface.set_title(f"({'abc'[row]}) {phase}")
-        plane = figure.add_subplot(grid[row, 1])
+        solid = figure.add_subplot(grid[row, 1], projection="3d")
+        plane = figure.add_subplot(grid[row, 2])
         if np.isnan(values).all():
             say_nothing_to_draw(plane, "no afferent fires a spike")
             surface.set_axis_off()
+            solid.set_axis_off()
             continue
-        _surface(surface, x, z, values, label, colours)
-        _map(plane, x, z, values, label, colours, receptors)
+        scale = scaling(*_span(values), clip=True)
+        _surface(surface, x, z, values, label, colours, scale)
+        _on_the_finger(solid, finger, key, colours, scale)
+        _map(plane, x, z, values, label, colours, scale, receptors)
     return figure
 
 
-def _surface(axes: Any, x: FloatArray, z: FloatArray, values: FloatArray, label: str, colours: str) -> None:
+def _span(values: FloatArray) -> tuple[float, float]:
+    """Lowest and highest value; apart from each other, as logarithms need it."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    return low, max(high, 1.001 * low, 1e-3)
+
+
+def _ticks(scale: Normalize) -> list[float]:
+    """Round numbers within a logarithmic scale."""
+    return [tick for tick in TICKS_MS if 0.0 <= float(scale(tick, clip=False)) <= 1.0]
+
+
+def _surface(
+    axes: Any,
+    x: FloatArray,
+    z: FloatArray,
+    values: FloatArray,
+    label: str,
+    colours: str,
+    scale: Normalize,
+) -> None:
     along, lateral = np.meshgrid(x, z, indexing="ij")
+    # Surfaces know no logarithmic axis: the heights are logarithms, and the ticks say of what.
+    logarithmic = isinstance(scale, LogNorm)
     axes.plot_surface(
         along,
         lateral,
-        values,
-        cmap=colours,
-        vmin=np.nanmin(values),
-        vmax=np.nanmax(values),
+        np.log10(values) if logarithmic else values,
+        facecolors=colormaps[colours](scale(values)),
         rcount=60,
         ccount=60,
         edgecolor="#00000030",
         linewidth=0.3,
+        shade=False,
     )
     axes.locator_params(nbins=5)
+    if logarithmic:
+        shown = _ticks(scale)
+        axes.set_zticks(np.log10(shown), labels=[f"{tick:g}" for tick in shown])
     axes.set_xlabel("along, x [mm]", labelpad=6.0)
     axes.set_ylabel("across, z [mm]", labelpad=6.0)
     axes.set_zlabel(label, labelpad=6.0)
     axes.view_init(elev=28.0, azim=-58.0)
     axes.set_box_aspect((1.25, 1.05, 0.85), zoom=1.0)
+
+
+def _faces(finger: dict[str, Any]) -> dict[str, FloatArray]:
+    """Corners of the deformed faces, (n_faces, 4, 3) in the order x, z, y, and what is known below each."""
+    x, y, z = (numbers(finger[key]) for key in ("x_mm", "y_mm", "z_mm"))
+    corners = np.stack([x, z, y], axis=-1)
+    around = (corners[:-1, :-1], corners[1:, :-1], corners[1:, 1:], corners[:-1, 1:])
+    faces = np.stack(around, axis=2).reshape(-1, 4, 3)
+    middle = faces.mean(axis=1)
+    pad = (middle[:, 0] > PAD_FROM_MM) & (middle[:, 2] < PAD_BELOW_MM)
+    values = {key: numbers(finger[key]).ravel()[pad] for key in QUANTITIES}
+    faces = faces[pad]
+    if finger["half"]:
+        faces = np.concatenate([faces, faces * [1.0, -1.0, 1.0]])
+        values = {key: np.tile(entries, 2) for key, entries in values.items()}
+    return {"corners_mm": faces} | values
+
+
+def _on_the_finger(
+    axes: Any, finger: dict[str, FloatArray], key: str, colours: str, scale: Normalize
+) -> None:
+    """Colour the pressed skin, seen from below and from the side of the tip, with light on its relief."""
+    corners, values = finger["corners_mm"], finger[key]
+    # Silent skin and skin that nobody asked look alike: neither says anything.
+    silent = ~(values > 0.0)
+    paint = colormaps[colours](scale(np.where(silent, np.nanmax(values), values)))[:, :3]
+    paint[silent] = to_rgb(PALE)
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    # The pad looks down, whichever way round the corners of a face are listed.
+    normal *= -np.sign(normal[:, 2:]) / np.linalg.norm(normal, axis=1, keepdims=True)
+    brightness = np.maximum(normal @ LIGHT, 0.0)
+    shaded = paint * (0.45 + 0.55 * brightness)[:, np.newaxis]
+    polygons = Poly3DCollection(corners, facecolors=shaded, edgecolors="#00000028", linewidths=0.4)
+    axes.add_collection3d(polygons)
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set_box_aspect(high - low, zoom=1.5)
+    axes.view_init(elev=-62.0, azim=-75.0)
+    axes.set_axis_off()
 
 
 def _map(
@@ -80,9 +159,12 @@ def _map(
     values: FloatArray,
     label: str,
     colours: str,
+    scale: Normalize,
     receptors: FloatArray,
 ) -> None:
-    picture = axes.pcolormesh(x, z, np.ma.masked_invalid(values.T), cmap=colours, shading="nearest")
+    picture = axes.pcolormesh(
+        x, z, np.ma.masked_invalid(values.T), cmap=colours, norm=scale, shading="nearest"
+    )
     silent = Rectangle((0, 0), 1, 1, transform=axes.transAxes, facecolor=PALE, hatch="//", edgecolor=GREY)
     silent.set(zorder=0, linewidth=0.0)
     axes.add_patch(silent)
@@ -99,7 +181,11 @@ def _map(
     axes.grid(visible=False)
     axes.set_xlabel("along the finger, x [mm]")
     axes.set_ylabel("across, z [mm]")
-    axes.figure.colorbar(picture, ax=axes, label=label, shrink=0.85)
+    bar = axes.figure.colorbar(picture, ax=axes, label=label, shrink=0.85)
+    if isinstance(scale, LogNorm):
+        bar.set_ticks(_ticks(scale))
+        bar.minorticks_off()
+        bar.ax.yaxis.set_major_formatter("{x:g}")
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
 
 
@@ -107,7 +193,9 @@ def caption(section: dict[str, Any]) -> str:
     """Say what Figure 6 shows."""
     return (
         f"Response of afferents all over the pad to a sphere of {number(section['curvature_per_m'])} 1/m, "
-        f"{protocol.DEPTH.value} mm deep. Left: the quantity as a height. Right: the same from above; "
-        "circles are the receptors that the observers of Figures 7 and 8 read, hatched places stay silent. "
-        "The paper draws the same three quantities."
+        f"{protocol.DEPTH.value} mm deep. Left: the quantity as a height, as the paper draws it, but "
+        "latencies to a logarithmic scale. Middle: the same on the skin as it lies under the sphere at the "
+        "end of the hold, seen from below, the tip to the right; grey skin stays silent. Right: seen from "
+        "above; circles are the receptors that the observers of Figures 7 and 8 read, hatched places never "
+        "fire."
     )

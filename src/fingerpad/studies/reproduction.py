@@ -27,6 +27,7 @@ from fingerpad.store import Store, code_hash, solve_missing
 from fingerpad.studies import (
     drive_quantities,
     nail_border,
+    response_maps,
     single_unit,
     single_unit_methods,
     single_unit_starts,
@@ -76,9 +77,9 @@ class Reproduction:
     jobs : int
         Processes to use; the numbers do not depend on it.
     extended : bool, optional
-        Whether to go beyond the paper: other ways to fit, what else may drive the afferent, spike trains, and
-        what the rates determine. Default: unless the resolution is "quick", which would take half as long
-        again.
+        Whether to go beyond the paper: other ways to fit, what else may drive the afferent, spike trains,
+        what the rates determine, and when a population fires. Default: unless the resolution is "quick",
+        which would take half as long again.
     """
 
     conditions: Conditions
@@ -152,17 +153,16 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
         afferent = Afferent.from_parameters(best.parameters)
         discrimination = sphere_discrimination.result(sphere_responses, afferent, conditions.seed)
         advance()
-        standard = sphere_responses[STANDARD_SPHERE]
         results: dict[str, Any] = {
             "skin_deflection": skin_deflection.result(deflection),
             "single_unit": single_unit.result(problem, best, folds),
             "discrimination": discrimination,
-            "population": sphere_discrimination.population_map(standard, afferent),
+            "population": response_maps.result(sphere_responses[STANDARD_SPHERE], afferent),
             "nail": nail_border.result(nail_response),
         }
         advance()
     if run.goes_beyond:
-        with _timed("beyond the paper", 5, progress, stages) as advance:
+        with _timed("beyond the paper", 6, progress, stages) as advance:
             traces = drive_quantities.receptor_traces(bars, drive_quantities.SHOWN_QUANTITIES)
             results["single_unit"]["starts"] = single_unit_starts.result(problem, traces["von_mises"])
             advance()
@@ -183,6 +183,8 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
             results["single_unit_uncertainty"] = single_unit_uncertainty.result(
                 bar_sed, best.parameters, conditions.seed
             )
+            advance()
+            results["population_timing"] = response_maps.timing(sphere_responses, afferent)
             advance()
     results["comparison"] = comparison(results)
     results["inputs"] = [asdict(number) for number in all_published()]

@@ -28,8 +28,6 @@ NOISE_DRAWS = 4000
 PATIENCE_MS = protocol.RAMP.value
 """How long the observer waits for first spikes. [ms]"""
 
-MAP_REACH_MM, MAP_STEP_MM = 5.0, 0.5
-
 Measure = Callable[[ResponseMap], FloatArray]
 MEASURES: dict[str, Measure] = {
     "static": lambda response: response.static_rate_hz,
@@ -134,22 +132,4 @@ def _at_both_positions(discriminate: Callable[[float, int], HitRates]) -> dict[s
         "hit_rate_sd": first.hit_rate_sd,
         "hit_rate_shifted": shifted.hit_rate,
         "hit_rate_shifted_sd": shifted.hit_rate_sd,
-    }
-
-
-def population_map(skin: SkinResponse, afferent: Afferent) -> dict[str, Any]:
-    """Answers of a dense sheet of afferents to the standard sphere, and the 18 receptors in it (Figure 6)."""
-    offsets = np.arange(-MAP_REACH_MM, MAP_REACH_MM + MAP_STEP_MM / 2, MAP_STEP_MM)
-    x, z = RECEPTOR_X_MM + offsets, offsets
-    sites = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
-    answer = Population(positions_mm=sites, pitch_mm=MAP_STEP_MM, afferent=afferent).respond(skin)
-    shape = (x.size, z.size)
-    return {
-        "curvature_per_m": psychophysics.SPHERE_CURVATURES.value[0],
-        "x_mm": x,
-        "z_mm": z,
-        "dynamic_rate_hz": answer.dynamic_rate_hz.reshape(shape),
-        "static_rate_hz": answer.static_rate_hz.reshape(shape),
-        "first_spike_latency_ms": answer.first_spike_latency_ms.reshape(shape),
-        "receptors_mm": Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0)).positions_mm,
     }

@@ -1,0 +1,220 @@
+"""Level 3, beyond the paper: in which order a touch recruits afferents, and what changes that order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fingerpad.checks import FloatArray
+from fingerpad.parameters import protocol
+from fingerpad.report.appearance import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PALE,
+    new_figure,
+    numbers,
+    say_nothing_to_draw,
+)
+from fingerpad.report.tables import Row, Table
+from fingerpad.report.words import fixed
+
+CONTOURS_MS = (10.0, 20.0, 30.0, 50.0, 100.0, 200.0)
+LEAST_FOR_CONTOURS = 12
+LINES: tuple[dict[str, Any], ...] = (
+    {"color": BLUE, "linestyle": "-"},
+    {"color": ORANGE, "linestyle": "--"},
+    {"color": GREEN, "linestyle": ":"},
+    {"color": BLACK, "linestyle": "-."},
+)
+MARKERS = ("o", "+", "x", "^")
+
+
+def draw(section: Mapping[str, Any]) -> Figure:
+    """Draw who fires when: ranks on the skin, recruitment over time, and latencies of one touch by another's.
+
+    Parameters
+    ----------
+    section : mapping
+        `results["population_timing"]["recruitment"]`, or what `studies.response_maps.recruitment` makes of
+        any responses.
+
+    Returns
+    -------
+    Figure
+    """
+    figure = new_figure(11.0, 9.0)
+    panels = figure.subplots(2, 2)
+    positions = numbers(section["positions_mm"])
+    shown = section["afferents"]
+    window = _window(positions, shown)
+    for axes, letter, touch in zip(panels[0], "ab", shown, strict=False):
+        _ranks(axes, positions, touch, window)
+        axes.set_title(f"({letter}) order of first spikes, {touch['name']}")
+    if len(shown) < 2:
+        say_nothing_to_draw(panels[0, 1], "no other touch")
+    _over_time(panels[1, 0], section)
+    panels[1, 0].set_title("(c) recruited skin")
+    _beside(panels[1, 1], shown)
+    panels[1, 1].set_title("(d) first spikes, touch by touch")
+    return figure
+
+
+def _window(positions: FloatArray, shown: Sequence[Mapping[str, Any]]) -> FloatArray:
+    """Return the square about all afferents that fire, rows x and z, columns low and high. [mm]"""
+    fires = np.any([np.isfinite(numbers(touch["recruitment_rank"])) for touch in shown], axis=0)
+    plane = positions[fires if fires.any() else slice(None)][:, [0, -1]]
+    low, high = plane.min(axis=0), plane.max(axis=0)
+    reach = 0.55 * max(float((high - low).max()), 1.0)
+    middle = 0.5 * (low + high)
+    return np.stack([middle - reach, middle + reach], axis=1)
+
+
+def _ranks(axes: Axes, positions: FloatArray, touch: Mapping[str, Any], window: FloatArray) -> None:
+    """Colour each afferent by its place in the order, and join places that fire together."""
+    x, z = positions[:, 0], positions[:, -1]
+    rank, latency = numbers(touch["recruitment_rank"]), numbers(touch["first_spike_latency_ms"])
+    fires = np.isfinite(rank)
+    inside = (positions[:, [0, -1]] >= window[:, 0]) & (positions[:, [0, -1]] <= window[:, 1])
+    size = _dot(int(inside.all(axis=1).sum()))
+    axes.scatter(x[~fires], z[~fires], s=size, color=PALE, linewidths=0.0)
+    axes.set_aspect("equal")
+    axes.set(xlim=window[0], ylim=window[1])
+    axes.grid(visible=False)
+    axes.set_xlabel("along the finger, x [mm]")
+    axes.set_ylabel("across, z [mm]")
+    if not fires.any():
+        axes.text(0.5, 0.5, "no afferent fires a spike", ha="center", color=GREY, transform=axes.transAxes)
+        return
+    dots = axes.scatter(x[fires], z[fires], s=size, c=rank[fires], cmap="viridis_r", linewidths=0.0, vmin=1.0)
+    axes.figure.colorbar(dots, ax=axes, label="place in the order", shrink=0.85)
+    levels = [level for level in CONTOURS_MS if latency[fires].min() < level < latency[fires].max()]
+    if levels and fires.sum() >= LEAST_FOR_CONTOURS:
+        lines = axes.tricontour(x[fires], z[fires], latency[fires], levels, colors=BLACK, linewidths=0.8)
+        axes.clabel(lines, fmt="%g ms", fontsize=8)
+
+
+def _dot(count: int) -> float:
+    """Area of a dot, so that many of them neither hide each other nor vanish. [points2]"""
+    return float(np.clip(30_000.0 / max(count, 1), 8.0, 120.0))
+
+
+def _over_time(axes: Axes, section: Mapping[str, Any]) -> None:
+    area = section["area_per_afferent_mm2"]
+    for line, touch in zip(LINES, section["afferents"], strict=False):
+        latency = np.sort(numbers(touch["first_spike_latency_ms"]))
+        latency = latency[np.isfinite(latency)]
+        axes.step(latency, area * np.arange(1, latency.size + 1), where="post", label=touch["name"], **line)
+    axes.axvline(protocol.RAMP.value, color=GREY, linewidth=0.8)
+    axes.text(
+        protocol.RAMP.value, 0.02, " end of ramp", transform=axes.get_xaxis_transform(), color=GREY, size=8
+    )
+    axes.set_xscale("log")
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("time from onset [ms]")
+    axes.set_ylabel("skin whose afferents have fired [mm²]\n= afferents at 100 per cm²")
+    axes.legend(loc="upper left")
+
+
+def _beside(axes: Axes, shown: Sequence[Mapping[str, Any]]) -> None:
+    if len(shown) < 2:
+        say_nothing_to_draw(axes, "no other touch")
+        return
+    first = numbers(shown[0]["first_spike_latency_ms"])
+    for line, marker, touch in zip(LINES[1:], MARKERS[1:], shown[1:], strict=False):
+        other = numbers(touch["first_spike_latency_ms"])
+        axes.plot(first, other, marker, markersize=3.5, color=line["color"], label=touch["name"])
+    known = first[np.isfinite(first)]
+    if known.size:
+        span = [known.min(), known.max()]
+        axes.plot(span, span, color=BLACK, linewidth=0.8, label="no change")
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_major_formatter("{x:g}")
+    axes.set_xlabel(f"latency under {shown[0]['name']} [ms]")
+    axes.set_ylabel("latency under another touch [ms]")
+    axes.legend(loc="upper left")
+
+
+def caption(section: Mapping[str, Any]) -> str:
+    """Say what the figure shows, and how little or how much the order changes."""
+    first, *others = section["touches"]
+    changes = "; ".join(
+        f"{touch['name']}: rank correlation {fixed(touch['rank_correlation'], 3)}, "
+        f"{percent(touch['swapped'])} of the pairs swap"
+        for touch in others
+        if touch["name"] in {shown["name"] for shown in section["afferents"]}
+    )
+    return (
+        "Recruitment by first spikes; one dot per afferent of a dense sheet. (a, b) Place in the order, the "
+        "first in yellow, with lines through afferents that fire at the same time; pale ones never do. (c) "
+        "Skin whose afferents have fired. (d) Latency of each afferent under one touch and another: on the "
+        "line nothing changes, and an order changes only where dots scatter about a rising curve. "
+        + (f"Against {first['name']}: {changes}. " if changes else "")
+        + "The paper (section 4.2) names the order of first spikes as a code and does not use it."
+    )
+
+
+def tables(section: Mapping[str, Any]) -> list[Table]:
+    """Return recruitment under every touch, and how its order differs from that under the first.
+
+    Parameters
+    ----------
+    section : mapping
+        As for `draw`.
+
+    Returns
+    -------
+    list of Table
+    """
+    rows = [
+        Row(
+            (
+                touch["name"],
+                fixed(touch["recruited_mm2"], 1),
+                fixed(touch["recruited_in_ramp_mm2"], 1),
+                fixed(touch["first_ms"], 1),
+                fixed(touch["median_ms"], 1),
+                fixed(touch["rank_correlation"], 3),
+                percent(touch["swapped"]),
+            )
+        )
+        for touch in section["touches"]
+    ]
+    first = section["touches"][0]["name"]
+    return [
+        Table(
+            "Recruitment by first spikes",
+            (
+                "touch",
+                "skin recruited, mm²",
+                "by the end of the ramp, mm²",
+                "first spike, ms",
+                "median first spike, ms",
+                f"rank correlation with {first}",
+                "pairs in another order",
+            ),
+            rows,
+            "Skin times 100 per cm² is the number of afferents. Order is compared over the afferents that "
+            "fire under both touches.",
+        )
+    ]
+
+
+def percent(share: float | None) -> str:
+    """Return a share in percent with one decimal, or a dash.
+
+    Examples
+    --------
+    >>> percent(0.0127), percent(None)
+    ('1.3 %', '– %')
+    """
+    return f"{fixed(None if share is None else 100.0 * share, 1)} %"

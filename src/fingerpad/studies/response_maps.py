@@ -1,0 +1,295 @@
+"""Level 3, Figure 6: what afferents all over the pad answer to a sphere, in which order and how fast.
+
+A dense sheet of afferents stands for the population of any density: whoever ends at a place answers what the
+sheet answers there. Beside the paper's three maps stands what it names and leaves open (section 4.2): the
+order of first spikes, which is a code of its own (Johansson & Birznieks 2004), and the population rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.afferent import Afferent
+from fingerpad.checks import positive
+from fingerpad.errors import InputError
+from fingerpad.parameters import protocol, psychophysics
+from fingerpad.population import Population
+from fingerpad.response_maps import (
+    NO_GROUP,
+    order_change,
+    population_rate,
+    recruited,
+    recruitment_rank,
+    rings,
+)
+from fingerpad.sampling import SkinResponse
+from fingerpad.signals import ResponseMap
+from fingerpad.studies.conditions import RECEPTOR_X_MM
+
+REACH_MM, STEP_MM = 5.0, 0.25
+"""Half the side of the sheet, and its pitch. [mm]"""
+
+RINGS_MM = (0.0, 1.0, 2.0, 3.0, 4.0)
+"""Inner radius of the first ring about the contact, and the outer radius of each. [mm]"""
+
+RATE_EDGES_MS = np.concatenate([np.arange(0.0, 150.0, 1.0), np.arange(150.0, 1000.1, 25.0)])
+"""Borders of the bins of the population rate: fine while it changes fast. [ms]"""
+
+SMOOTHING_MS = 2.0
+"""Standard deviation of the normal density that smooths the population rate. [ms]"""
+
+ACTIVE_BIN_MS = 10.0
+"""Bins in which afferents count as active or not: the interval of one that fires 100 spikes/s. [ms]"""
+
+MEASURES = ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms")
+
+
+def result(standard: SkinResponse, afferent: Afferent) -> dict[str, Any]:
+    """Ask a dense sheet of afferents under the standard sphere (Figure 6).
+
+    Parameters
+    ----------
+    standard : SkinResponse
+        Skin under that sphere.
+    afferent : Afferent
+        What every one of the sheet is.
+
+    Returns
+    -------
+    dict
+        Three maps over "x_mm" and "z_mm", the 18 receptors among them, and "finger" with the same three on
+        the deformed finger.
+    """
+    return {
+        "curvature_per_m": protocol.STANDARD_CURVATURE.value,
+        **maps(sheet(afferent).respond(standard)),
+        "receptors_mm": Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0)).positions_mm,
+        "finger": on_the_finger(standard, afferent),
+    }
+
+
+def timing(responses: Mapping[tuple[float, float], SkinResponse], afferent: Afferent) -> dict[str, Any]:
+    """Ask the same sheet who fires first and how much at a time, under every sphere.
+
+    Parameters
+    ----------
+    responses : mapping of (position, curvature) to SkinResponse
+        Skin under the spheres, as `sphere_discrimination.touches` names them. [mm], [1/m]
+    afferent : Afferent
+        What every one of the sheet is.
+
+    Returns
+    -------
+    dict
+        "recruitment" (see `recruitment`) by every sphere over the middle and by the standard at the other
+        position; "rates" (see `rates`) under the standard and the most curved.
+    """
+    standard = protocol.STANDARD_CURVATURE.value
+    here, shifted = protocol.SPHERE_POSITIONS.value
+    population = sheet(afferent)
+    answers = {
+        touch_name(curvature): population.respond(responses[here, curvature])
+        for position, curvature in sorted(responses)
+        if position == here
+    }
+    moved = f"{touch_name(standard)}, {shifted - here:g} mm away"
+    answers[moved] = population.respond(responses[shifted, standard])
+    names = touch_name(standard), touch_name(max(curvature for _, curvature in responses))
+    return {
+        "recruitment": recruitment(answers, STEP_MM**2, shown=(*names, moved)),
+        "rates": rates(
+            {name: answers[name] for name in names},
+            (RECEPTOR_X_MM + here, 0.0),
+            density_per_cm2=psychophysics.RECEPTOR_DENSITY.value,
+        ),
+    }
+
+
+def touch_name(curvature_per_m: float) -> str:
+    """Name of a sphere among the touches.
+
+    Examples
+    --------
+    >>> touch_name(287.0)
+    '287 /m'
+    """
+    return f"{curvature_per_m:g} /m"
+
+
+def sheet(afferent: Afferent, reach_mm: float = REACH_MM, step_mm: float = STEP_MM) -> Population:
+    """Lay afferents side by side over a square about the contact point, ordered by x, then by z.
+
+    Examples
+    --------
+    >>> len(sheet(Afferent(), reach_mm=1.0, step_mm=0.5).positions_mm)
+    25
+    """
+    offsets = step_mm * np.arange(-round(reach_mm / step_mm), round(reach_mm / step_mm) + 1)
+    x, z = RECEPTOR_X_MM + offsets, offsets
+    sites = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
+    return Population(positions_mm=sites, pitch_mm=step_mm, afferent=afferent)
+
+
+def maps(answer: ResponseMap) -> dict[str, Any]:
+    """Responses of a sheet as tables over x (rows) and z (columns)."""
+    x, z = (np.unique(coordinate) for coordinate in answer.positions_mm.T)
+    found = {name: getattr(answer, name).reshape(x.size, z.size) for name in MEASURES}
+    return {"x_mm": x, "z_mm": z, **found}
+
+
+def on_the_finger(skin: SkinResponse, afferent: Afferent) -> dict[str, Any]:
+    """Responses below every face of the skin, and where touch moves it by the end of the hold.
+
+    Returns
+    -------
+    dict
+        Deformed corners of the faces, "x_mm", "y_mm" and "z_mm" (n_along + 1, n_around + 1), the three
+        measures of the afferent below the middle of each face (n_along, n_around), NaN where it is not
+        asked, and whether they are one "half" of the finger.
+    """
+    mesh = skin.mesh
+    still, pressed = mesh.nodes_mm[mesh.skin_grid], (mesh.nodes_mm + skin.displacement_mm)[mesh.skin_grid]
+    middle = 0.25 * (still[:-1, :-1] + still[1:, :-1] + still[1:, 1:] + still[:-1, 1:])
+    asked = (middle[..., 1] < 0.0) & (np.abs(middle[..., 2]) < REACH_MM)
+    asked &= np.abs(middle[..., 0] - RECEPTOR_X_MM) < REACH_MM
+    answer = Population(middle[asked][:, [0, 2]], STEP_MM, afferent).respond(skin)
+    found: dict[str, Any] = {name: pressed[..., axis] for axis, name in enumerate(("x_mm", "y_mm", "z_mm"))}
+    for name in MEASURES:
+        values = np.full(asked.shape, np.nan)
+        values[asked] = getattr(answer, name)
+        found[name] = values
+    return found | {"half": bool(mesh.symmetry_nodes.size)}
+
+
+def recruitment(
+    answers: Mapping[str, ResponseMap], area_per_afferent_mm2: float, shown: Sequence[str] | None = None
+) -> dict[str, Any]:
+    """Order of first spikes under several touches, and how it differs from that under the first.
+
+    Parameters
+    ----------
+    answers : mapping of str to ResponseMap
+        Answers of the same afferents, by the names of the touches; what the others are compared with first.
+    area_per_afferent_mm2 : float
+        Skin that each of them stands for, one over their density. [mm2]
+    shown : sequence of str, optional
+        Touches whose latencies are kept afferent by afferent. Default: all.
+
+    Returns
+    -------
+    dict
+        "positions_mm"; "area_per_afferent_mm2"; "touches", one row of numbers each; and "afferents", each
+        touch with "first_spike_latency_ms" and "recruitment_rank" of every afferent.
+
+    Raises
+    ------
+    InputError
+        If there is no touch, a touch has other afferents than the first, or the area is not positive.
+    """
+    positive("area_per_afferent_mm2", area_per_afferent_mm2, "mm2")
+    first = _same_afferents(answers)
+    rows = []
+    for name, answer in answers.items():
+        latency_ms = answer.first_spike_latency_ms
+        change = order_change(first.first_spike_latency_ms, latency_ms)
+        fires = np.isfinite(latency_ms)
+        rows.append(
+            {
+                "name": name,
+                "recruited_mm2": fires.sum() * area_per_afferent_mm2,
+                "recruited_in_ramp_mm2": recruited(latency_ms, protocol.RAMP.value) * area_per_afferent_mm2,
+                "first_ms": np.min(latency_ms[fires], initial=np.inf),
+                "median_ms": np.median(latency_ms[fires]) if fires.any() else np.nan,
+                **asdict(change),
+            }
+        )
+    return {
+        "positions_mm": first.positions_mm,
+        "area_per_afferent_mm2": area_per_afferent_mm2,
+        "touches": rows,
+        "afferents": [
+            {
+                "name": name,
+                "first_spike_latency_ms": answers[name].first_spike_latency_ms,
+                "recruitment_rank": recruitment_rank(answers[name].first_spike_latency_ms),
+            }
+            for name in shown or answers
+        ],
+    }
+
+
+def rates(
+    answers: Mapping[str, ResponseMap],
+    centre_mm: ArrayLike,
+    density_per_cm2: float,
+    radii_mm: Sequence[float] = RINGS_MM,
+) -> dict[str, Any]:
+    """Count spikes and active afferents over time, ring by ring about a point.
+
+    Parameters
+    ----------
+    answers : mapping of str to ResponseMap
+        Answers of the same afferents, by the names of the touches.
+    centre_mm : array_like
+        Middle of the rings, in the coordinates of the positions. [mm]
+    density_per_cm2 : float
+        Afferents per area of the skin that is meant, which need not be as dense as those that answer. [1/cm2]
+    radii_mm : sequence of float, optional
+        Inner radius of the first ring, then outer radii. [mm]
+
+    Returns
+    -------
+    dict
+        "edges_ms", "active_edges_ms", "smoothing_ms", "density_per_cm2", "radii_mm", "n_afferents" of each
+        ring, and "touches", each with "rate_hz" per afferent (n_rings, n_bins), "active_fraction"
+        (n_rings, n_active_bins) and "together_per_cm2_hz", the rate of all rings per area (n_bins,).
+
+    Raises
+    ------
+    InputError
+        If there is no touch, a touch has other afferents than the first, or `rings` refuses the radii.
+    """
+    first = _same_afferents(answers)
+    ring = rings(first.positions_mm, centre_mm, radii_mm)
+    inside = np.where(ring == NO_GROUP, NO_GROUP, 0)
+    active_edges_ms = np.arange(0.0, RATE_EDGES_MS[-1] + ACTIVE_BIN_MS / 2, ACTIVE_BIN_MS)
+    touches = []
+    for name, answer in answers.items():
+        by_ring = population_rate(answer.spikes, RATE_EDGES_MS, ring, SMOOTHING_MS)
+        together = population_rate(answer.spikes, RATE_EDGES_MS, inside, SMOOTHING_MS)
+        touches.append(
+            {
+                "name": name,
+                "rate_hz": by_ring.rate_hz,
+                "active_fraction": population_rate(answer.spikes, active_edges_ms, ring).active_fraction,
+                "together_per_cm2_hz": together.rate_per_area(density_per_cm2)[0],
+            }
+        )
+    return {
+        "edges_ms": RATE_EDGES_MS,
+        "active_edges_ms": active_edges_ms,
+        "smoothing_ms": SMOOTHING_MS,
+        "density_per_cm2": density_per_cm2,
+        "radii_mm": radii_mm,
+        "n_afferents": np.bincount(ring[ring != NO_GROUP], minlength=len(radii_mm) - 1),
+        "touches": touches,
+    }
+
+
+def _same_afferents(answers: Mapping[str, ResponseMap]) -> ResponseMap:
+    """Answer to the first touch, after a check that all touches have its afferents."""
+    if not answers:
+        raise InputError("answers must hold at least one touch: it is empty.")
+    first = next(iter(answers.values()))
+    for name, answer in answers.items():
+        if not np.array_equal(answer.positions_mm, first.positions_mm):
+            raise InputError(
+                f"answers must come from the same afferents: those of {name!r} are at other positions than "
+                f"those of {next(iter(answers))!r}."
+            )
+    return first
