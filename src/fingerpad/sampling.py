@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CloughTocher2DInterpolator
-from scipy.spatial import Delaunay
-from threadpoolctl import threadpool_limits
 
 from fingerpad.checks import FloatArray, float_array, one_of
 from fingerpad.errors import InputError
 from fingerpad.mesh import Mesh
+from fingerpad.receptor_sheet import ReceptorSheet
 from fingerpad.signals import STORED_ENERGY, SedTraces
 
 
@@ -122,13 +120,14 @@ class SkinResponse:
     def sed(self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY) -> SedTraces:
         """Strain energy density in the living epidermis below points of the undeformed skin.
 
-        The means of the elements just above the epidermal-dermal border (0.371 to 0.471 mm deep) are
-        interpolated across that sheet by a cubic of class C1, and never across the border, where SED jumps.
+        End organs lie on the epidermal-dermal border, 0.471 mm below along the skin's normal, and move with
+        the tissue. The means of the elements just above that border (0.371 to 0.471 mm deep) are interpolated
+        along it by a cubic of class C1, and never across it, where SED jumps.
 
         Parameters
         ----------
-        sites : array (n_sites, 2)
-            x and z on the volar skin. [mm]
+        sites : array (n_sites, 2) or (n_sites, 3)
+            x and z on the volar skin, or x, y and z of the skin on any side. [mm]
         dynamic_quantity : str, optional
             What the dynamic response follows, by the names of `sample`. Default: SED, as in the paper.
 
@@ -140,14 +139,15 @@ class SkinResponse:
         Raises
         ------
         InputError
-            If `sites` is not an array of pairs, a site is not on the volar skin, or the quantity is unknown.
+            If `sites` is not an array of pairs or triples, a site is not on the skin, or the quantity is
+            unknown.
         """
-        dynamic = None if dynamic_quantity == STORED_ENERGY else self.sample(dynamic_quantity, sites)
+        stored, *dynamic = self._read(dict.fromkeys((STORED_ENERGY, dynamic_quantity)), sites)
         return SedTraces(
             self.times_ms,
-            self.sample(STORED_ENERGY, sites),
+            stored,
             np.array(self.kinks_ms),
-            dynamic,
+            dynamic[0] if dynamic else None,
             dynamic_quantity,
         )
 
@@ -161,8 +161,8 @@ class SkinResponse:
         quantity : str
             "stored", "instantaneous" or "work" (energy densities by their three definitions), "von_mises",
             "compressive_stress" [all kPa] or "compressive_strain" (logarithmic).
-        sites : array (n_sites, 2)
-            x and z on the volar skin. [mm]
+        sites : array (n_sites, 2) or (n_sites, 3)
+            x and z on the volar skin, or x, y and z of the skin on any side. [mm]
 
         Returns
         -------
@@ -172,46 +172,29 @@ class SkinResponse:
         Raises
         ------
         InputError
-            If the quantity is unknown, `sites` is not an array of pairs, or a site is not on the volar skin.
+            If the quantity is unknown, `sites` is not an array of pairs or triples, or a site is not on the
+            skin.
         """
-        one_of("quantity", quantity, ("stored", *self.sheet))
+        return self._read([quantity], sites)[0]
+
+    def _read(self, quantities: Iterable[str], sites: ArrayLike) -> list[FloatArray]:
+        """Several quantities at the same sites, (n_times, n_sites) each."""
+        known = [self._of_sheet(quantity) for quantity in quantities]
         points = float_array("sites", sites, 2)
-        if points.shape[1] != 2:
-            raise InputError(f"sites needs two columns, x and z in mm: got shape {points.shape}.")
-        triangulation, rows = self._border
-        outside = np.flatnonzero(triangulation.find_simplex(points) < 0)
-        if outside.size:
-            x, z = points[outside[0]]
-            raise InputError(
-                f"sites must lie on the volar skin of the mesh: (x, z) = ({x:g}, {z:g}) mm does not."
-            )
-        stored = self.sed_kpa[:, self.mesh.living_epidermis.ravel()]
-        values = (stored if quantity == "stored" else self.sheet[quantity])[:, rows]
-        interpolate = CloughTocher2DInterpolator(triangulation, values.T.astype(np.float64))
-        if self.mesh.symmetry_nodes.size:
-            # Diagonals of the triangles are not mirrored: without this, a site and its mirror image differ.
-            points = np.column_stack([points[:, 0], np.abs(points[:, 1])])
+        if points.shape[1] not in (2, 3):
+            raise InputError(f"sites needs columns x and z, or x, y and z, in mm: got shape {points.shape}.")
+        find = self._receptors.below_volar if points.shape[1] == 2 else self._receptors.below
+        organs = find(points)
         # The cubic may dip below zero beside a steep front; none of the quantities can.
-        return np.maximum(interpolate(points).T, 0.0)
+        return [np.maximum(self._receptors.read(organs, values), 0.0) for values in known]
+
+    def _of_sheet(self, quantity: str) -> FloatArray:
+        """One quantity in the elements `mesh.living_epidermis`, (n_times, n_sheet)."""
+        one_of("quantity", quantity, (STORED_ENERGY, *self.sheet))
+        if quantity == STORED_ENERGY:
+            return self.sed_kpa[:, self.mesh.living_epidermis.ravel()]
+        return self.sheet[quantity]
 
     @cached_property
-    def _border(self) -> tuple[Delaunay, np.ndarray]:
-        """Triangulated (x, z) of the volar sheet of living epidermis, and its rows; both halves."""
-        mesh = self.mesh
-        elements = mesh.living_epidermis.ravel()
-        if not elements.size:
-            raise InputError("This mesh has no living epidermis: SED is sampled only in a layered finger.")
-        corners = mesh.nodes_mm[mesh.elements[elements]]
-        centre = corners.mean(axis=1)
-        # The upper face (last four nodes) looks towards the skin: volar where its normal has y < 0.
-        normal = np.cross(corners[:, 6] - corners[:, 4], corners[:, 7] - corners[:, 5])
-        volar = normal[:, 1] < 0.0
-        plane, rows = centre[volar][:, [0, 2]], np.flatnonzero(volar)
-        if mesh.symmetry_nodes.size:
-            plane, rows = np.vstack([plane, plane * [1.0, -1.0]]), np.tile(rows, 2)
-        triangulation = Delaunay(plane)
-        # Its first search solves one 2x2 system per triangle, for each of which OpenBLAS would wake its
-        # threads: on busy processors 8 ms a triangle, half a minute in all.
-        with threadpool_limits(limits=1):
-            triangulation.find_simplex(plane[:1])
-        return triangulation, rows
+    def _receptors(self) -> ReceptorSheet:
+        return ReceptorSheet(self.mesh)

@@ -1,0 +1,172 @@
+"""End organs below any point of the skin: where they lie, what they read, and no seam anywhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from fingerpad.errors import InputError
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import Grading
+from fingerpad.mesh import block_mesh, finger_mesh
+from fingerpad.receptor_sheet import ReceptorSheet
+
+FINGER = Fingertip()
+EVEN = Grading(
+    17.37, 30.0, 30.0, 0.6, 0.6, 0.6, stratum_corneum=1, living_epidermis=1, dermis=1, subcutis=1, full=True
+)
+"""As fine on the back of the finger as on the pad."""
+
+FULL = finger_mesh(FINGER, EVEN)
+HALF = finger_mesh(FINGER, replace(EVEN, full=False))
+SHEETS = {"full": ReceptorSheet(FULL), "half": ReceptorSheet(HALF)}
+MIDDLE_DEPTH_MM = 0.421
+
+
+def skin_at(x, angle):
+    """Points of the skin by x and the angle around a section: 0 volar, pi dorsal."""
+    volar, dorsal, half_width = FINGER.section(x)
+    height = np.where(np.cos(angle) > 0.0, volar, dorsal)
+    return np.stack([x, -height * np.cos(angle), half_width * np.sin(angle)], axis=-1)
+
+
+def random_skin(count, seed, ends_mm=(2.0, 29.0)):
+    rng = np.random.default_rng(seed)
+    return skin_at(rng.uniform(*ends_mm, count), rng.uniform(-np.pi, np.pi, count))
+
+
+def on_tight_ridge(points):
+    """Where the skin turns within less than 3 mm, about y = 0 on the back: elements there cut corners."""
+    return (points[:, 1] > -0.5) & (points[:, 1] < 2.0)
+
+
+def centres(mesh):
+    return mesh.nodes_mm[mesh.elements[mesh.living_epidermis.ravel()]].mean(axis=1)
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_a_linear_field_is_read_all_around_the_finger(name):
+    """Every direction of the field, every side of the finger; half a finger knows even fields only."""
+    sheet, points = SHEETS[name], random_skin(400, 1)
+    organs = FINGER.subsurface(points, MIDDLE_DEPTH_MM)
+    fields, known = centres(sheet.mesh).T, organs.T.copy()
+    if name == "half":
+        known[2] = np.abs(known[2])
+    read = sheet.read(sheet.below(points), fields)
+    off = np.linalg.norm(read - known, axis=0)
+    # Beside the midline of half a finger |z| has a kink, which a cubic rounds off.
+    smooth = ~on_tight_ridge(points) & ((name == "full") | (np.abs(points[:, 2]) > 1.2))
+    assert smooth.sum() > 250
+    # Elements are 0.6 mm wide: their middles lie up to 0.6^2/(8 R) inside a skin of radius R.
+    assert off[smooth].max() < 0.025
+    assert off[smooth & (points[:, 1] < -2.0) & (points[:, 0] < 27.0)].max() < 0.01
+
+
+def test_end_organs_lie_on_the_normal_and_on_the_border():
+    sheet, points = SHEETS["full"], random_skin(300, 2)
+    organs = sheet._border(sheet.below(points))[0]
+    off = np.linalg.norm(organs - FINGER.subsurface(points, 0.471), axis=1)
+    assert np.median(off) < 0.003
+    assert off[~on_tight_ridge(points)].max() < 0.012
+    assert off.max() < 0.12
+
+
+def test_pairs_are_the_volar_points_of_the_skin():
+    rng = np.random.default_rng(3)
+    x = rng.uniform(5.0, 29.0, 200)
+    z = rng.uniform(-0.9, 0.9, 200) * FINGER.section(x)[2]
+    sheet = SHEETS["full"]
+    from_pairs = sheet.read(sheet.below_volar(np.column_stack([x, z])), centres(FULL).T)
+    from_points = sheet.read(sheet.below(FINGER.skin_point(x, z)), centres(FULL).T)
+    # The skin of the mesh passes beside the finger's by microns, which a steep flank makes longer.
+    steep = 1.0 / np.abs(FINGER.skin_normal(FINGER.skin_point(x, z))[:, 1])
+    assert (np.linalg.norm(from_pairs - from_points, axis=0) < 0.004 * steep).all()
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_mirrored_points_read_mirrored_fields_alike(name):
+    sheet, points = SHEETS[name], random_skin(200, 5)
+    x, y, z = centres(sheet.mesh).T
+    field = np.exp(-0.05 * ((x - 17.0) ** 2 + (y + 8.0) ** 2 + z**2))[None]
+    here, there = (sheet.read(sheet.below(points * [1.0, 1.0, side]), field) for side in (1.0, -1.0))
+    assert_allclose(here, there, rtol=0, atol=1e-12 if name == "half" else 1e-6)
+
+
+def test_half_a_finger_reads_what_the_whole_reads():
+    points = random_skin(200, 6)
+    read = {}
+    for name, sheet in SHEETS.items():
+        x, y, z = centres(sheet.mesh).T
+        read[name] = sheet.read(sheet.below(points), np.cos(0.3 * x)[None] * np.cos(0.4 * z) + 0.1 * y)
+    assert_allclose(read["half"], read["full"], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", SHEETS)
+@pytest.mark.parametrize("angle", [0.0, np.pi, 0.7])
+def test_no_seam_shows(name, angle):
+    """Across the midlines, where halves meet and columns close, neither values nor slopes jump."""
+    sheet = SHEETS[name]
+    x, y, z = centres(sheet.mesh).T
+    field = (np.sin(x) + np.cos(1.1 * z) + 0.3 * y)[None]
+    steps = 1e-5 * np.array([-2.0, -1.0, -1e-3, 1e-3, 1.0, 2.0])
+    read = sheet.read(sheet.below(skin_at(np.full(6, 14.2), angle + steps)), field)[0]
+    before, after = read[1] - read[0], read[5] - read[4]
+    assert abs(read[3] - read[2]) < 1e-5
+    assert abs(after - before) < 1e-7
+    far = sheet.read(sheet.below(skin_at(np.full(2, 14.2), angle + np.array([0.0, 0.3]))), field)[0]
+    assert abs(far[1] - far[0]) > 0.01
+
+
+def test_every_element_is_read_exactly_at_its_middle():
+    sheet = SHEETS["full"]
+    values = np.random.default_rng(7).random((3, FULL.living_epidermis.size))
+    middles = np.argwhere(np.ones(FULL.living_epidermis.shape, dtype=bool)).astype(float)
+    assert_array_equal(sheet.read(middles, values), values)
+
+
+def test_the_way_to_the_tip_has_no_gap():
+    """Through the last rows to the pole: what depends on x alone is followed from any side."""
+    sheet = SHEETS["full"]
+    for angle in (0.0, 1.0, 3.0):
+        points = skin_at(np.linspace(29.0, 31.6, 14), np.full(14, angle))
+        organs = FINGER.subsurface(points, MIDDLE_DEPTH_MM)
+        read = sheet.read(sheet.below(points), centres(FULL).T[:1])[0]
+        assert_allclose(read, organs[:, 0], rtol=0, atol=0.12)
+
+
+@pytest.mark.parametrize(
+    ("site", "side"), [((17.37, -9.0, 0.0), 0.8), ((17.37, -12.0, 0.0), 2.1), ((40.0, 0.0, 0.0), 8.0)]
+)
+def test_points_beside_the_skin_are_refused(site, side):
+    with pytest.raises(InputError, match="must lie on the skin of the mesh") as refusal:
+        SHEETS["full"].below(np.array([[17.37, -9.85, 0.0], site]))
+    away = float(str(refusal.value).split(" mm is ")[1].split(" mm")[0])
+    assert abs(away - side) < 0.15 * side
+
+
+def test_a_block_is_read_up_to_its_rim():
+    edges = np.cumsum([0.0, 0.5, 0.6, 0.7, 0.8])
+    block = block_mesh(edges, [0.0, 0.371, 0.471, 2.0], edges, layers=[0, 1, 2])
+    sheet, rim = ReceptorSheet(block), edges[-1]
+    sites = np.array([[0.0, 0.0], [rim, rim], [0.0, rim], [1.0, 0.3]])
+    x, _, z = centres(block).T
+    expected = 2.0 * sites[:, 0] - sites[:, 1]
+    assert_allclose(sheet.read(sheet.below_volar(sites), [2.0 * x - z])[0], expected, rtol=0, atol=1e-8)
+    assert_allclose(
+        sheet.below(np.insert(sites, 1, 0.0, axis=1)), sheet.below_volar(sites), rtol=0, atol=1e-8
+    )
+
+
+def test_a_sheet_of_one_row_is_refused():
+    block = block_mesh([0.0, 1.0], [0.0, 0.4, 0.5], [0.0, 1.0, 2.0], layers=[0, 1])
+    with pytest.raises(InputError, match=r"two elements along and around, or more: got \(1, 2\)"):
+        ReceptorSheet(block)
+
+
+@pytest.mark.parametrize(("z", "distal", "outwards"), [(0.0, 0.07, 0.0), (2.5, 0.06, 0.12)])
+def test_straight_down_is_not_along_the_normal(z, distal, outwards):
+    """The numbers of docs/decisions/depth-of-sampling.md."""
+    sheet = SHEETS["full"]
+    organ = sheet._border(sheet.below_volar(np.array([[17.37, z]])))[0][0]
+    assert_allclose([17.37 - organ[0], z - organ[2]], [distal, outwards], rtol=0, atol=0.006)
