@@ -1,0 +1,89 @@
+"""What a population answered, as a table for other programs."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from fingerpad.checks import instance
+from fingerpad.files import write_atomically
+from fingerpad.response_maps import recruitment_rank
+from fingerpad.signals import ResponseMap
+
+PLACES = {2: ("x_mm", "z_mm"), 3: ("x_mm", "y_mm", "z_mm")}
+"""Columns of a position by the number of its coordinates."""
+
+ANSWERS = (
+    "dynamic_rate_hz",
+    "static_rate_hz",
+    "first_spike_latency_ms",
+    "recruitment_rank",
+    "spike_times_ms",
+)
+"""Columns of what a receptor answers."""
+
+
+def write_response_csv(response: ResponseMap, path: Path) -> Path:
+    """Write one row per receptor: where it lies, its rates, its first spike and all others.
+
+    Spike times stand in one entry, separated by spaces, as `fingerpad fit` reads them; what does not exist,
+    such as the latency of a silent receptor, is empty. Every number has all its digits: read back, it is the
+    same to the last bit.
+
+    Parameters
+    ----------
+    response : ResponseMap
+        What a population answered to one touch.
+    path : Path
+        The file, in UTF-8; folders are made as needed, and it is there whole or not at all.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If `response` is none.
+    StoreError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from fingerpad.signals import SpikeTrains
+    >>> trains = SpikeTrains.from_lists([[12.5, 40.0], []])
+    >>> response = ResponseMap([[17.0, 0.5], [17.0, 1.5]], 1.0, trains, [36.4, 0], [0, 0], [12.5, np.nan])
+    >>> with TemporaryDirectory() as folder:
+    ...     print(write_response_csv(response, Path(folder) / "response.csv").read_text(encoding="utf-8"))
+    receptor,x_mm,z_mm,dynamic_rate_hz,static_rate_hz,first_spike_latency_ms,recruitment_rank,spike_times_ms
+    0,17.0,0.5,36.4,0.0,12.5,1.0,12.5 40.0
+    1,17.0,1.5,0.0,0.0,,,
+    """
+    instance("response", response, ResponseMap)
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(("receptor", *PLACES[response.positions_mm.shape[1]], *ANSWERS))
+    table.writerows(_rows(response))
+    write_atomically(Path(path), text.getvalue().encode())
+    return Path(path)
+
+
+def _rows(response: ResponseMap) -> Iterator[list[object]]:
+    numbers = np.column_stack(
+        [
+            response.positions_mm,
+            response.dynamic_rate_hz,
+            response.static_rate_hz,
+            response.first_spike_latency_ms,
+            recruitment_rank(response.first_spike_latency_ms),
+        ]
+    )
+    for receptor, row in enumerate(numbers.tolist()):
+        times = " ".join(map(repr, response.spikes[receptor].tolist()))
+        yield [receptor, *("" if np.isnan(number) else number for number in row), times]
