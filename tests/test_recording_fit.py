@@ -15,6 +15,7 @@ import typer
 from fingerpad import cli
 from fingerpad.afferent import Afferent
 from fingerpad.compilation import NOTICE
+from fingerpad.edged_indenters import Gap
 from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.estimation.any_motion import AnyMotion, AnyMotionInClosedForm
 from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, identifiable
@@ -300,14 +301,19 @@ def test_stimuli_are_pressed_where_and_how_they_say():
         {
             "beside": TactileStimulus(Sphere(340.0), RampAndHold(0.4), x_mm=1.0, z_mm=0.5, tilt_deg=3.0),
             "wire": TactileStimulus(Line(), ForceRampAndHold(50.0)),
+            "gap": TactileStimulus(Gap(gap_mm=0.5), x_mm=0.2),
+            "turned": TactileStimulus(Bar(), spin_deg=30.0),
         },
         conditions,
     )
-    beside, wire = pressed.values()
+    beside, wire, gap, turned = pressed.values()
     along = math.cos(math.radians(conditions.skin_tilt_deg))
     assert beside.at_mm == (pytest.approx(RECEPTOR_X_MM + along, abs=1e-12), 0.5)
     assert (beside.tilt_deg, beside.grading.full, beside.stimulus.depth_mm) == (3.0, True, 0.4)
     assert (wire.tilt_deg, wire.grading.full, wire.stimulus.force_mn) == (0.0, False, 50.0)
+    assert (gap.indenter.gap_mm, gap.grading.full, gap.spin_deg) == (0.5, False, 0.0)
+    assert min(gap.grading.size_x_mm, gap.grading.core_size_mm or 1.0) <= 0.5 / 4
+    assert (turned.spin_deg, turned.grading.full) == (30.0, True)
 
 
 @pytest.mark.parametrize(

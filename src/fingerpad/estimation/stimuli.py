@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import yaml
 
 from fingerpad.checks import finite, one_of
+from fingerpad.edged_indenters import Edge, Gap, Grating
 from fingerpad.errors import InputError
 from fingerpad.estimation.tables import Line, read_csv, read_text
 from fingerpad.indenters import Bar, Cylinder, FlatPunch, Indenter, Plate, Sphere
@@ -23,12 +24,16 @@ INDENTERS: dict[str, type[Indenter]] = {
     "line": Wire,
     "punch": FlatPunch,
     "plate": Plate,
+    "edge": Edge,
+    "gap": Gap,
+    "grating": Grating,
 }
 """Indenters by the names that the command line gives them."""
 
-SIZES = {"curvature_per_m": "1/m", "diameter_mm": "mm", "width_mm": "mm", "fillet_mm": "mm"}
+LENGTHS = ("diameter_mm", "width_mm", "gap_mm", "ridge_mm", "groove_mm", "fillet_mm", "lip_mm")
+SIZES = {"curvature_per_m": "1/m"} | dict.fromkeys(LENGTHS, "mm")
 MOTION = {"depth_mm": "mm", "force_mn": "mN", "ramp_ms": "ms", "hold_ms": "ms"}
-PLACE = {"x_mm": "mm", "z_mm": "mm", "tilt_deg": "degrees"}
+PLACE = {"x_mm": "mm", "z_mm": "mm", "tilt_deg": "degrees", "spin_deg": "degrees"}
 COLUMNS = ("stimulus", "indenter", *SIZES, *MOTION, *PLACE)
 """Columns of a file of stimuli; only the first two are needed."""
 
@@ -48,6 +53,8 @@ class TactileStimulus:
         tangent of the skin, distal positive, and across. [mm]
     tilt_deg : float, optional
         As in `fingerpad.Touch`; by default it presses perpendicular to the skin at the receptor. [degrees]
+    spin_deg : float
+        As in `fingerpad.Touch`: the orientation of a bar, an edge, a gap or a grating. [degrees]
     """
 
     indenter: Indenter
@@ -55,10 +62,12 @@ class TactileStimulus:
     x_mm: float = 0.0
     z_mm: float = 0.0
     tilt_deg: float | None = None
+    spin_deg: float = 0.0
 
     def __post_init__(self) -> None:
         finite("x_mm", self.x_mm, "mm")
         finite("z_mm", self.z_mm, "mm")
+        finite("spin_deg", self.spin_deg, "degrees")
         if self.tilt_deg is not None:
             finite("tilt_deg", self.tilt_deg, "degrees")
 

@@ -20,8 +20,9 @@ from fingerpad.estimation.reading import Recorded
 from fingerpad.estimation.recordings import RateRecordings
 from fingerpad.estimation.stimuli import TactileStimulus
 from fingerpad.fitting.problem import IntArray
-from fingerpad.grading import Grading
+from fingerpad.grading import Grading, covering
 from fingerpad.indentation import Touch, touch_of
+from fingerpad.indenter_grading import grading_about
 from fingerpad.indenters import FlatPunch, Line, Sphere
 from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.reference import bar_firing_rates
@@ -154,6 +155,7 @@ def touches(stimuli: Mapping[str, TactileStimulus], conditions: Conditions) -> d
             (RECEPTOR_X_MM + stimulus.x_mm * along, stimulus.z_mm),
             None if wire else _grading(stimulus, conditions),
             perpendicular if stimulus.tilt_deg is None else stimulus.tilt_deg,
+            spin_deg=stimulus.spin_deg,
         )
 
     found = {}
@@ -166,9 +168,13 @@ def touches(stimuli: Mapping[str, TactileStimulus], conditions: Conditions) -> d
 
 
 def _grading(stimulus: TactileStimulus, conditions: Conditions) -> Grading:
-    """Mesh that is fine about the receptor, the same for all stimuli of a kind."""
-    is_round = isinstance(stimulus.indenter, Sphere | FlatPunch)
+    """Mesh that is fine about the receptor, the same for all stimuli of a kind, and about edges within it."""
+    indenter, spin_deg = stimulus.indenter, stimulus.spin_deg
+    is_round = isinstance(indenter, Sphere | FlatPunch)
     grading = conditions.sphere_grading() if is_round else conditions.bar_grading()
+    if not is_round and (indenter.edge_reach_mm > 0.0 or spin_deg != 0.0):
+        about = grading_about(indenter, conditions.resolution, RECEPTOR_X_MM, stimulus.z_mm, spin_deg)
+        grading = covering([grading, about])
     return replace(grading, full=True) if stimulus.z_mm != 0.0 else grading
 
 
