@@ -8,7 +8,13 @@ from hypothesis import strategies as st
 from fingerpad.edged_indenters import Edge, Gap, Grating
 from fingerpad.errors import InputError
 from fingerpad.export.outline import outline_of
+from fingerpad.fingertip import Fingertip
+from fingerpad.grading import Grading
+from fingerpad.indentation import Touch
 from fingerpad.indenters import Bar, Plate
+from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.stimulus import RampAndHold
 
 EDGE, GAP, GRATING = Edge(0.3), Gap(1.0, 6.0, 0.4, 0.2), Grating(0.9, 0.7, 0.2)
 SHARP = [Edge(0.0), Gap(1.0, 6.0, 0.0, 0.0), Grating(0.9, 0.7, 0.0)]
@@ -173,3 +179,49 @@ def test_outlines_follow_the_same_section():
         points = np.column_stack([line, np.zeros(len(line))])
         on_face = points[:, 1] > -5.0  # below it, only the floors that close grooves for a drawing
         np.testing.assert_allclose(body.gap(points[on_face])[0], 0.0, rtol=0, atol=1e-12)
+
+
+# On the finger
+
+
+def pressed(body):
+    """A shallow press into a coarse half finger, its lines 0.25 mm apart where the edges are."""
+    grading = Grading(
+        17.37, 2.5, 1.2, 0.5, 0.8, 5.0, 1.3, stratum_corneum=1, dermis=1, subcutis=2,
+        core_half_length_mm=1.2, core_size_mm=0.25,
+    )  # fmt: skip
+    tissues, motion = named_tissues("trial3"), RampAndHold(depth_mm=0.4)
+    return Touch(Fingertip(), body, motion, tissues, grading, PressSettings(2, 1), tilt_deg=LEVEL_DEG).solve()
+
+
+LEVEL_DEG = 7.97
+"""Slope of the pad at the point that is pressed. [degrees]"""
+
+
+@pytest.fixture(scope="module")
+def bulges():
+    return {gap_mm: pressed(Gap(gap_mm, 5.0)) for gap_mm in (0.0, 1.0, 1.8)}
+
+
+def test_skin_rises_into_a_gap_and_further_into_a_wider_one(bulges):
+    flat, narrow, wide = (skin.surface_profile() for skin in bulges.values())
+    assert flat.at(0.0) > narrow.at(0.0) + 0.02 > wide.at(0.0) + 0.04
+    for profile in (narrow, wide):
+        np.testing.assert_allclose(profile.at(1.3), flat.at(1.3), rtol=0, atol=0.03)
+
+
+def test_a_press_with_a_gap_owes_what_every_press_owes(bulges):
+    for skin in bulges.values():
+        assert skin.force_imbalance <= 1e-4
+        assert skin.penetration_mm <= 0.005 * 0.4
+        assert (np.diff(skin.force_mn[:3]) > 0.0).all()
+    with_bar = pressed(Bar(5.0))
+    np.testing.assert_array_equal(bulges[0.0].force_mn, with_bar.force_mn)
+    np.testing.assert_array_equal(bulges[0.0].sed_kpa, with_bar.sed_kpa)
+
+
+def test_energy_gathers_under_the_lips(bulges):
+    """The end organ below a lip has more of it than below the middle of the gap or under a flat bar."""
+    flat, wide = (bulges[gap].sed([[17.37, 0.0], [17.37 + 0.9, 0.0]]).sed_kpa[-1] for gap in (0.0, 1.8))
+    assert wide[1] > 1.3 * wide[0]
+    assert wide[1] > 1.1 * flat[1]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from fingerpad.edged_indenters import Edge, Gap
 from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import Grading
@@ -20,7 +21,7 @@ from fingerpad.stimulus import ForceRampAndHold, RampAndHold
 from fingerpad.store import Store, touch_key
 
 BALL = Sphere(curvature_per_m=500.0)
-SIX = [Line(), Cylinder(3.0), Bar(2.0, 0.3), BALL, FlatPunch(2.0, 0.3), Plate()]
+BODIES = [Line(), Cylinder(3.0), Bar(2.0, 0.3), BALL, FlatPunch(2.0, 0.3), Plate(), Edge(0.3), Gap(0.8, 4.0)]
 ELASTIC = tuple(Material.neo_hooke(shear, 0.45) for shear in (40.0, 40.0, 20.0, 8.0))
 TIGHT = NewtonSettings(residual_tolerance=1e-6, penetration_tolerance=2e-4)
 STEPS = PressSettings(2, 1, TIGHT)
@@ -38,7 +39,7 @@ def pressed(mesh, stimulus, indenter=BALL, materials=ELASTIC, settings=STEPS, **
     return press(mesh, materials, indenter, placement, stimulus, settings, **limits)
 
 
-@pytest.mark.parametrize("indenter", SIX, ids=lambda body: type(body).__name__)
+@pytest.mark.parametrize("indenter", BODIES, ids=lambda body: type(body).__name__)
 def test_force_that_a_depth_needs_gives_that_depth_back(indenter):
     """An elastic answer does not depend on the way there, so the whole field must come back."""
     by_depth = pressed(block(), RampAndHold(0.2, 50.0, 100.0), indenter)

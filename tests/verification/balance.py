@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from fingerpad.edged_indenters import Edge, Gap
 from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony
@@ -26,6 +27,8 @@ INDENTERS = {
     "sphere": Sphere(curvature_per_m=500.0),
     "flat punch": FlatPunch(2.0, 0.3),
     "plate": Plate(),
+    "edge": Edge(0.3),
+    "bar with a gap": Gap(0.8, 4.0, 0.3, 0.2),
 }
 LAYERS = tuple(Material.neo_hooke(shear, 0.45) for shear in (40.0, 40.0, 20.0, 8.0))
 PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))
