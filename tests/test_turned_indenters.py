@@ -10,7 +10,13 @@ from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
 from fingerpad.grading import Grading, covering
 from fingerpad.indentation import Touch, touch_of
-from fingerpad.indenter_grading import ACROSS_GROOVE, EDGE_SIZE_MM, grading_about, sizes_across
+from fingerpad.indenter_grading import (
+    ACROSS_GROOVE,
+    EDGE_SIZE_MM,
+    OBLIQUE_SIZE_MM,
+    grading_about,
+    sizes_across,
+)
 from fingerpad.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import PressSettings
@@ -130,7 +136,8 @@ def test_a_mesh_covers_the_turned_footprint_and_both_halves_where_it_must():
     grown = np.cos(np.pi / 6) + np.sin(np.pi / 6)
     assert turned.half_length_mm == pytest.approx(grown * straight.half_length_mm)
     assert turned.half_width_mm == pytest.approx(grown * straight.half_width_mm)
-    assert grading_about(Bar(), "quick", 17.37, spin_deg=90.0) == straight
+    along = grading_about(Bar(), "quick", 17.37, spin_deg=90.0)
+    assert (along.half_length_mm, along.half_width_mm, along.full) == (2.5, 2.5, False)
     assert grading_about(Edge(), "quick", 17.37, spin_deg=90.0).full
     made = touch_of(Fingertip(), Bar(), spin_deg=30.0)
     assert made.grading == turned
@@ -140,16 +147,19 @@ def test_a_mesh_covers_the_turned_footprint_and_both_halves_where_it_must():
 @pytest.mark.parametrize("resolution", ["quick", "standard"])
 @pytest.mark.parametrize("spin_deg", [0.0, 90.0, 30.0])
 @pytest.mark.parametrize(
-    "indenter", [Gap(0.3), Gap(2.0), Grating(0.8, 0.6), Edge()], ids=["gap 0.3", "gap 2", "grating", "edge"]
+    "indenter",
+    [Bar(), Gap(0.3), Gap(2.0), Grating(0.8, 0.6), Edge()],
+    ids=["bar", "gap 0.3", "gap 2", "grating", "edge"],
 )
 def test_a_mesh_is_fine_across_edges_however_they_lie(indenter, spin_deg, resolution):
     grading = grading_about(indenter, resolution, 17.37, spin_deg=spin_deg)
-    assert max(sizes_across(grading, spin_deg)) <= EDGE_SIZE_MM[resolution]
+    largest = (OBLIQUE_SIZE_MM if spin_deg == 30.0 else EDGE_SIZE_MM)[resolution]
+    assert max(sizes_across(grading, spin_deg)) <= largest
     assert max(sizes_across(grading, spin_deg)) <= indenter.narrowest_mm / ACROSS_GROOVE
     if spin_deg == 0.0 and not isinstance(indenter, Grating):
         assert grading.core_half_length_mm == indenter.edge_reach_mm
     no_gap = grading_about(Gap(0.0), resolution, 17.37, spin_deg=spin_deg)
-    assert max(sizes_across(no_gap, spin_deg)) > EDGE_SIZE_MM[resolution]
+    assert max(sizes_across(no_gap, spin_deg)) > largest
 
 
 @pytest.mark.parametrize(

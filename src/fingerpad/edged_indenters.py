@@ -14,11 +14,8 @@ import numpy as np
 
 from fingerpad.checks import FloatArray, not_negative, positive
 from fingerpad.errors import InputError
-from fingerpad.indenters import Bar, Indenter, fillet_within, round_front, rounded
+from fingerpad.indenters import BESIDE_EDGE_MM, Bar, Indenter, fillet_within, round_front, rounded
 from fingerpad.parameters import protocol
-
-BESIDE_EDGE_MM = 0.4
-"""How far beside the wall of an edge skin bends sharply about it. [mm]"""
 
 
 def _corner(

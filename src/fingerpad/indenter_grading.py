@@ -13,7 +13,10 @@ THIN_SIZE_MM = 0.025
 """Elements along the finger below a wire: two across the strip that it pushes. [mm]"""
 
 EDGE_SIZE_MM = {"quick": 0.2, "standard": 0.1, "paper": 0.1}
-"""Elements across the edges of an indenter that has a fine zone for them, as under the paper's bar. [mm]"""
+"""Elements across edges that lie along lines of the mesh, as those of the paper's bar. [mm]"""
+
+OBLIQUE_SIZE_MM = {"quick": 0.3, "standard": 0.2, "paper": 0.1}
+"""Elements under edges that cross lines of the mesh, and meet all positions between two of them. [mm]"""
 
 ACROSS_GROOVE, FEWEST_ACROSS_GROOVE = 4, 2
 """Elements across the narrowest groove or ridge: in a mesh that is graded about it, and in any."""
@@ -70,7 +73,8 @@ def grading_about(
         return replace(grading, half_length_mm=few_mm, size_x_mm=THIN_SIZE_MM)
     if indenter.edge_reach_mm == 0.0:
         return grading
-    size = min(EDGE_SIZE_MM[resolution], indenter.narrowest_mm / ACROSS_GROOVE)
+    largest = EDGE_SIZE_MM if spin_deg % 90.0 == 0.0 else OBLIQUE_SIZE_MM
+    size = min(largest[resolution], indenter.narrowest_mm / ACROSS_GROOVE)
     return _finer_across_edges(grading, size, indenter.edge_reach_mm, spin_deg)
 
 

@@ -18,6 +18,9 @@ from fingerpad.errors import InputError
 from fingerpad.parameters import protocol
 from fingerpad.units import radius_mm
 
+BESIDE_EDGE_MM = 0.4
+"""How far beside the wall of an edge skin bends sharply about it. [mm]"""
+
 
 class Indenter(ABC):
     """A rigid body with a signed gap; derive from it to press a body of your own."""
@@ -275,6 +278,11 @@ class Bar(Indenter):
     def mirrors(self, spin_deg: float) -> bool:
         """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0."""
         return spin_deg % 90.0 == 0.0
+
+    @property
+    def edge_reach_mm(self) -> float:
+        """How far to either side of x = 0 skin bends about the edges. [mm]"""
+        return self.width_mm / 2 + BESIDE_EDGE_MM
 
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
