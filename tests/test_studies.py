@@ -513,14 +513,18 @@ def test_the_finger_carries_the_answers_of_the_afferents_below_its_faces(tiny_sk
     np.testing.assert_array_equal(found["y_mm"], (grid + skin.displacement_mm[mesh.skin_grid])[..., 1])
     assert found["half"]
     middle = 0.25 * (grid[:-1, :-1] + grid[1:, :-1] + grid[1:, 1:] + grid[:-1, 1:])
-    answers = np.argwhere(np.isfinite(found["static_rate_hz"]))
-    assert len(answers) > 20
-    for along, around in answers[::7]:
-        lone = SENSITIVE.rates(skin.sed([middle[along, around, [0, 2]]]))
-        values = [found[name][along, around] for name in ("dynamic_rate_hz", "static_rate_hz")]
-        np.testing.assert_allclose(values, np.ravel(lone), rtol=1e-9)
-    under = found["static_rate_hz"][np.abs(middle[..., 0] - 18.0) < 0.8]
-    assert np.nanmax(found["static_rate_hz"]) == np.nanmax(under) > 0.0
+    rates = found["static_rate_hz"]
+    assert rates.shape == middle.shape[:2]
+    dorsal = middle[..., 1] > 0.0
+    for side in (dorsal, ~dorsal):
+        answers = np.argwhere(side & (rates > 0.0))
+        assert len(answers) > 5
+        for along, around in answers[::5]:
+            lone = SENSITIVE.rates(skin.sed([middle[along, around]]))
+            values = [found[name][along, around] for name in ("dynamic_rate_hz", "static_rate_hz")]
+            np.testing.assert_allclose(values, np.ravel(lone), rtol=1e-9)
+    assert rates[np.abs(middle[..., 0] - 18.0) < 0.8].max() == rates.max()
+    assert np.isnan(found["first_spike_latency_ms"][np.abs(middle[..., 0] - 18.0) > 5.0]).all()
 
 
 # The nail

@@ -134,7 +134,6 @@ def _on_the_finger(
 ) -> None:
     """Colour the pressed skin, seen from below and from the side of the tip, with light on its relief."""
     corners, values = finger["corners_mm"], finger[key]
-    # Silent skin and skin that nobody asked look alike: neither says anything.
     silent = ~(values > 0.0)
     paint = colormaps[colours](scale(np.where(silent, np.nanmax(values), values)))[:, :3]
     paint[silent] = to_rgb(PALE)

@@ -149,20 +149,15 @@ def on_the_finger(skin: SkinResponse, afferent: Afferent) -> dict[str, Any]:
     -------
     dict
         Deformed corners of the faces, "x_mm", "y_mm" and "z_mm" (n_along + 1, n_around + 1), the three
-        measures of the afferent below the middle of each face (n_along, n_around), NaN where it is not
-        asked, and whether they are one "half" of the finger.
+        measures of the afferent below the middle of each face (n_along, n_around), and whether they are one
+        "half" of the finger.
     """
     mesh = skin.mesh
     still, pressed = mesh.nodes_mm[mesh.skin_grid], (mesh.nodes_mm + skin.displacement_mm)[mesh.skin_grid]
     middle = 0.25 * (still[:-1, :-1] + still[1:, :-1] + still[1:, 1:] + still[:-1, 1:])
-    asked = (middle[..., 1] < 0.0) & (np.abs(middle[..., 2]) < REACH_MM)
-    asked &= np.abs(middle[..., 0] - RECEPTOR_X_MM) < REACH_MM
-    answer = Population(middle[asked][:, [0, 2]], STEP_MM, afferent).respond(skin)
+    answer = Population(middle.reshape(-1, 3), STEP_MM, afferent).respond(skin)
     found: dict[str, Any] = {name: pressed[..., axis] for axis, name in enumerate(("x_mm", "y_mm", "z_mm"))}
-    for name in MEASURES:
-        values = np.full(asked.shape, np.nan)
-        values[asked] = getattr(answer, name)
-        found[name] = values
+    found |= {name: getattr(answer, name).reshape(middle.shape[:2]) for name in MEASURES}
     return found | {"half": bool(mesh.symmetry_nodes.size)}
 
 
