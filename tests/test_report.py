@@ -386,6 +386,7 @@ def _population() -> dict:
         "first_spike_latency_ms": latency,
         "receptors_mm": [[15.0 + i, j - 1.0] for i in range(6) for j in range(3)],
         "finger": _finger(),
+        "at_rest": {"dynamic_rate_hz": 0.0, "static_rate_hz": 4.0, "first_spike_latency_ms": 251.0},
     }
 
 
@@ -426,6 +427,7 @@ def _recruitment(positions: list, early: list) -> dict:
     return {
         "positions_mm": positions,
         "area_per_afferent_mm2": 0.75,
+        "resting_latency_ms": None,
         "touches": [
             {"name": "287 /m", "both": 60, "either": 60, "rank_correlation": 1.0, "swapped": 0.0, **numbers},
             {"name": "365 /m", "both": 60, "either": 60, "rank_correlation": 0.987, "swapped": 0.031}
@@ -447,6 +449,7 @@ def _rates() -> dict:
         "active_edges_ms": active_edges.tolist(),
         "smoothing_ms": 2.0,
         "density_per_cm2": 100.0,
+        "resting_latency_ms": 251.0,
         "radii_mm": [0.0, 1.0, 2.0],
         "n_afferents": [50, 150],
         "touches": [
@@ -775,6 +778,17 @@ def test_figure_6_colours_the_finger_where_afferents_fire_and_mirrors_half_of_it
     coloured = np.ptp(colours, axis=1) > 0.1  # grey has hardly a hue
     assert (len(coloured), coloured.sum()) == (2 * drawn.sum(), 2 * known[drawn].sum())
     assert 0 < coloured.sum() < len(coloured)
+
+
+def test_captions_say_what_afferents_do_without_a_touch():
+    section, timing = _population(), _population_timing()
+    assert "without any touch too, 4 spikes/s from 251 ms on" in population.caption(section)
+    silent = section | {"at_rest": {"static_rate_hz": 0.0, "first_spike_latency_ms": None}}
+    assert "without any touch" not in population.caption(silent)
+    assert "first fire at 251 ms. All of them start" in population_rate.caption(timing["rates"])
+    assert "Without any touch" not in recruitment.caption(timing["recruitment"])
+    firing = timing["recruitment"] | {"resting_latency_ms": 251.0}
+    assert "first fire at 251 ms. They count as recruited" in recruitment.caption(firing)
 
 
 def test_figure_13_ranks_every_afferent_that_fires_and_counts_skin():

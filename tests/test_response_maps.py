@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fingerpad.errors import InputError
 from fingerpad.response_maps import (
     NO_GROUP,
+    evoked_latency_ms,
     order_change,
     population_rate,
     recruited,
@@ -40,6 +41,13 @@ def test_rank_counts_who_was_earlier_and_half_of_who_came_together(latency_ms):
 def test_recruited_counts_who_has_fired(latency_ms, time_ms):
     assert recruited(latency_ms, time_ms) == sum(own <= time_ms for own in latency_ms)
     assert recruited(latency_ms, [np.inf])[0] == sum(not np.isnan(own) for own in latency_ms)
+
+
+@given(latencies, st.one_of(st.sampled_from([np.nan, np.inf]), st.floats(0.0, 20.0)))
+def test_evoked_is_what_comes_in_half_the_time_at_rest_or_less(latency_ms, resting_ms):
+    never = np.isnan(resting_ms)
+    expected = [own if never or own <= resting_ms / 2 else np.nan for own in latency_ms]
+    assert_array_equal(evoked_latency_ms(latency_ms, resting_ms), expected)
 
 
 @given(st.lists(st.tuples(*[st.one_of(st.just(np.nan), st.integers(1, 6).map(float))] * 2), max_size=10))
@@ -165,6 +173,7 @@ def test_rings_part_the_plane_and_space_by_distance(places):
     [
         (lambda: recruitment_rank([[1.0]]), "latency_ms must be one row of times"),
         (lambda: recruitment_rank([np.inf]), "infinite times"),
+        (lambda: evoked_latency_ms([1.0], -1.0), "resting_latency_ms must not be negative"),
         (lambda: order_change([1.0], [1.0, 2.0]), "same afferents twice: got 1 and 2"),
         (lambda: population_rate(SpikeTrains.from_lists([[1.0]]), [0.0]), "at least one bin"),
         (lambda: population_rate(SpikeTrains.from_lists([[1.0]]), [1.0, 0.0]), "increase strictly"),

@@ -492,6 +492,38 @@ def test_timing_asks_every_sphere_over_the_middle_and_the_standard_beside_it():
     np.testing.assert_array_equal(shown[2]["first_spike_latency_ms"], moved.first_spike_latency_ms)
 
 
+RESTLESS = Afferent(static_gain=1.2e-6, intercept_ma=8e-7)
+"""It fires without a touch: beta tau / C is above the threshold."""
+
+
+def test_at_rest_an_afferent_fires_where_its_current_alone_reaches_the_threshold():
+    """Closed form: u = beta tau/C (1 - exp(-t/tau)) meets v at t = -tau ln(1 - v C / (beta tau))."""
+    resting = response_maps.at_rest(RESTLESS)
+    drive_mv = RESTLESS.intercept_ma * RESTLESS.time_constant_ms / RESTLESS.capacitance_mf
+    expected = -RESTLESS.time_constant_ms * np.log(1.0 - RESTLESS.threshold_mv / drive_mv)
+    np.testing.assert_allclose(resting["first_spike_latency_ms"], expected, rtol=1e-9)
+    np.testing.assert_allclose(resting["static_rate_hz"], 1000.0 / (expected + 1.0), rtol=1e-9)
+    assert np.isnan(response_maps.at_rest(SENSITIVE)["first_spike_latency_ms"])
+    extended = replace(RESTLESS, dynamic_quantity="von_mises")
+    assert response_maps.at_rest(extended) == resting
+
+
+def test_spikes_that_come_without_a_touch_recruit_nobody(tiny_skin):
+    latency = response_maps.at_rest(RESTLESS)["first_spike_latency_ms"]
+    answer = response_maps.sheet(RESTLESS).respond(SphereSkin(0.0, 287.0))
+    assert np.isfinite(answer.first_spike_latency_ms).all()
+    found = response_maps.recruitment({"standard": answer}, 0.0625, resting_latency_ms=latency)
+    early = (answer.first_spike_latency_ms <= latency / 2).sum()
+    assert 0 < early < answer.first_spike_latency_ms.size
+    assert found["touches"][0]["recruited_mm2"] == early / 16
+    everybody = response_maps.recruitment({"standard": answer}, 0.0625)["touches"][0]
+    assert everybody["recruited_mm2"] == answer.first_spike_latency_ms.size / 16
+    # On the finger, untouched skin is left open in all three maps.
+    untouched = replace(tiny_skin, sed_kpa=np.zeros_like(tiny_skin.sed_kpa))
+    finger = response_maps.on_the_finger(untouched, RESTLESS)
+    assert all(np.isnan(finger[name]).all() for name in response_maps.MEASURES)
+
+
 def test_answers_of_other_afferents_are_refused(sheet_answers):
     other = response_maps.sheet(SENSITIVE, reach_mm=1.0).respond(SphereSkin(0.0, 287.0))
     with pytest.raises(InputError, match="those of 'other' are at other positions than those of 'one'"):
@@ -517,13 +549,14 @@ def test_the_finger_carries_the_answers_of_the_afferents_below_its_faces(tiny_sk
     assert rates.shape == middle.shape[:2]
     dorsal = middle[..., 1] > 0.0
     for side in (dorsal, ~dorsal):
-        answers = np.argwhere(side & (rates > 0.0))
+        answers = np.argwhere(side & np.isfinite(rates))
         assert len(answers) > 5
         for along, around in answers[::5]:
-            lone = SENSITIVE.rates(skin.sed([middle[along, around]]))
-            values = [found[name][along, around] for name in ("dynamic_rate_hz", "static_rate_hz")]
-            np.testing.assert_allclose(values, np.ravel(lone), rtol=1e-9)
-    assert rates[np.abs(middle[..., 0] - 18.0) < 0.8].max() == rates.max()
+            dynamic_hz, static_hz = SENSITIVE.rates(skin.sed([middle[along, around]]))
+            np.testing.assert_allclose(rates[along, around], static_hz[0], rtol=1e-9)
+            dynamic = found["dynamic_rate_hz"][along, around]
+            np.testing.assert_allclose(dynamic, dynamic_hz[0] or np.nan, rtol=1e-9)
+    assert np.nanmax(rates[np.abs(middle[..., 0] - 18.0) < 0.8]) == np.nanmax(rates)
     assert np.isnan(found["first_spike_latency_ms"][np.abs(middle[..., 0] - 18.0) > 5.0]).all()
 
 

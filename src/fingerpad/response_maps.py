@@ -86,6 +86,41 @@ def recruited(latency_ms: ArrayLike, times_ms: ArrayLike) -> np.ndarray:
     return np.searchsorted(in_order, np.asarray(times_ms, dtype=np.float64), side="right")
 
 
+def evoked_latency_ms(latency_ms: ArrayLike, resting_latency_ms: float) -> FloatArray:
+    """Keep the first spikes that a touch brings about, of afferents that also fire at rest.
+
+    A spike counts as evoked if the touch brings it to half of the time that it takes by itself, or less: the
+    afferent then fires twice as fast as at rest.
+
+    Parameters
+    ----------
+    latency_ms : array_like (n_afferents,)
+        First-spike latencies; NaN for an afferent that stays silent. [ms]
+    resting_latency_ms : float
+        When the afferent would first fire without any touch; infinity, or NaN, if never. [ms]
+
+    Returns
+    -------
+    array (n_afferents,)
+        Latencies; NaN where no spike is evoked. [ms]
+
+    Raises
+    ------
+    InputError
+        If the latencies are not one row of numbers, or the one at rest is negative.
+
+    Examples
+    --------
+    >>> evoked_latency_ms([12.0, 249.0, np.nan], 250.0).tolist(), evoked_latency_ms([249.0], np.inf).tolist()
+    ([12.0, nan, nan], [249.0])
+    """
+    latency = _latencies("latency_ms", latency_ms)
+    if resting_latency_ms < 0.0:
+        raise InputError(f"resting_latency_ms must not be negative [ms]: got {resting_latency_ms!r}.")
+    latest_ms = np.inf if np.isnan(resting_latency_ms) else 0.5 * resting_latency_ms
+    return np.where(latency <= latest_ms, latency, np.nan)
+
+
 @dataclass(frozen=True)
 class OrderChange:
     """How the order of first spikes differs between two touches.

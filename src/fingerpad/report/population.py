@@ -194,7 +194,17 @@ def caption(section: dict[str, Any]) -> str:
         f"Response of afferents all over the pad to a sphere of {number(section['curvature_per_m'])} 1/m, "
         f"{protocol.DEPTH.value} mm deep. Left: the quantity as a height, as the paper draws it, but "
         "latencies to a logarithmic scale. Middle: the same on the skin as it lies under the sphere at the "
-        "end of the hold, seen from below, the tip to the right; grey skin stays silent. Right: seen from "
+        "end of the hold, seen from below, the tip to the right; grey skin does not answer. Right: seen from "
         "above; circles are the receptors that the observers of Figures 7 and 8 read, hatched places never "
-        "fire."
+        f"fire.{_resting(section['at_rest'])}"
+    )
+
+
+def _resting(rest: dict[str, Any]) -> str:
+    """Say what afferents do that are not touched, if they do anything."""
+    if rest["first_spike_latency_ms"] is None or np.isnan(rest["first_spike_latency_ms"]):
+        return ""
+    return (
+        f" This afferent fires without any touch too, {number(rest['static_rate_hz'])} spikes/s from "
+        f"{number(rest['first_spike_latency_ms'])} ms on: grey is skin that makes it less than twice as fast."
     )

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from fingerpad.checks import FloatArray
 from fingerpad.parameters import protocol
 from fingerpad.report.appearance import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, numbers
+from fingerpad.report.recruitment import resting
 from fingerpad.report.words import number
 
 LINES: tuple[dict[str, Any], ...] = (
@@ -92,5 +93,6 @@ def caption(section: Mapping[str, Any]) -> str:
         "Share of the afferents that fire at least once in a bin. (c) All afferents from "
         f"{number(inner)} to {number(outer)} mm together, under "
         + " and ".join(touch["name"] for touch in section["touches"])
-        + ". The model has no noise here, so that neighbours fire almost together: ripples are theirs."
+        + ". The model has no noise here, so that neighbours fire almost together: ripples are theirs. "
+        + resting(section, "All of them start at onset: bumps at its multiples are not the touch's.")
     )

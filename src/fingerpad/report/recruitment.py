@@ -23,7 +23,7 @@ from fingerpad.report.appearance import (
     say_nothing_to_draw,
 )
 from fingerpad.report.tables import Row, Table
-from fingerpad.report.words import fixed
+from fingerpad.report.words import fixed, number
 
 CONTOURS_MS = (10.0, 20.0, 30.0, 50.0, 100.0, 200.0)
 LEAST_FOR_CONTOURS = 12
@@ -159,6 +159,7 @@ def caption(section: Mapping[str, Any]) -> str:
         "Skin whose afferents have fired. (d) Latency of each afferent under one touch and another: on the "
         "line nothing changes, and an order changes only where dots scatter about a rising curve. "
         + (f"Against {first['name']}: {changes}. " if changes else "")
+        + resting(section, "They count as recruited if touch halves that time at least. ")
         + "The paper (section 4.2) names the order of first spikes as a code and does not use it."
     )
 
@@ -207,6 +208,22 @@ def tables(section: Mapping[str, Any]) -> list[Table]:
             "fire under both touches.",
         )
     ]
+
+
+def resting(section: Mapping[str, Any], then: str) -> str:
+    """Say when afferents fire without a touch and what follows from it; nothing if they do not.
+
+    Examples
+    --------
+    >>> resting({"resting_latency_ms": 258.3}, "So they do.")
+    'Without any touch these afferents first fire at 258 ms. So they do.'
+    >>> resting({"resting_latency_ms": None}, "So they do.")
+    ''
+    """
+    latency_ms = section["resting_latency_ms"]
+    if latency_ms is None or not np.isfinite(latency_ms):
+        return ""
+    return f"Without any touch these afferents first fire at {number(latency_ms)} ms. {then}"
 
 
 def percent(share: float | None) -> str:

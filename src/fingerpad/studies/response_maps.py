@@ -21,6 +21,7 @@ from fingerpad.parameters import protocol, psychophysics
 from fingerpad.population import Population
 from fingerpad.response_maps import (
     NO_GROUP,
+    evoked_latency_ms,
     order_change,
     population_rate,
     recruited,
@@ -28,7 +29,8 @@ from fingerpad.response_maps import (
     rings,
 )
 from fingerpad.sampling import SkinResponse
-from fingerpad.signals import ResponseMap
+from fingerpad.signals import STORED_ENERGY, ResponseMap, SedTraces
+from fingerpad.spikes import first_spike_latency_ms
 from fingerpad.studies.conditions import RECEPTOR_X_MM
 
 REACH_MM, STEP_MM = 5.0, 0.25
@@ -62,11 +64,12 @@ def result(standard: SkinResponse, afferent: Afferent) -> dict[str, Any]:
     Returns
     -------
     dict
-        Three maps over "x_mm" and "z_mm", the 18 receptors among them, and "finger" with the same three on
-        the deformed finger.
+        Three maps over "x_mm" and "z_mm", the 18 receptors among them, "finger" with the same three on the
+        deformed finger, and the same of an afferent "at_rest".
     """
     return {
         "curvature_per_m": protocol.STANDARD_CURVATURE.value,
+        "at_rest": at_rest(afferent),
         **maps(sheet(afferent).respond(standard)),
         "receptors_mm": Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0)).positions_mm,
         "finger": on_the_finger(standard, afferent),
@@ -91,7 +94,7 @@ def timing(responses: Mapping[tuple[float, float], SkinResponse], afferent: Affe
     """
     standard = protocol.STANDARD_CURVATURE.value
     here, shifted = protocol.SPHERE_POSITIONS.value
-    population = sheet(afferent)
+    population, rest = sheet(afferent), at_rest(afferent)
     answers = {
         touch_name(curvature): population.respond(responses[here, curvature])
         for position, curvature in sorted(responses)
@@ -101,13 +104,37 @@ def timing(responses: Mapping[tuple[float, float], SkinResponse], afferent: Affe
     answers[moved] = population.respond(responses[shifted, standard])
     names = touch_name(standard), touch_name(max(curvature for _, curvature in responses))
     return {
-        "recruitment": recruitment(answers, STEP_MM**2, shown=(*names, moved)),
+        "recruitment": recruitment(
+            answers,
+            STEP_MM**2,
+            resting_latency_ms=rest["first_spike_latency_ms"],
+            shown=(*names, moved),
+        ),
         "rates": rates(
             {name: answers[name] for name in names},
             (RECEPTOR_X_MM + here, 0.0),
             density_per_cm2=psychophysics.RECEPTOR_DENSITY.value,
+            resting_latency_ms=rest["first_spike_latency_ms"],
         ),
     }
+
+
+def at_rest(afferent: Afferent) -> dict[str, float]:
+    """Say what an afferent does without any touch: the three measures, NaN for a latency without a spike.
+
+    Examples
+    --------
+    >>> at_rest(Afferent())
+    {'dynamic_rate_hz': 0.0, 'static_rate_hz': 0.0, 'first_spike_latency_ms': nan}
+    """
+    end_ms = protocol.RAMP.value + protocol.HOLD.value
+    nothing = np.zeros((2, 1))
+    further = None if afferent.dynamic_quantity == STORED_ENERGY else nothing
+    times_ms = np.array([0.0, end_ms])
+    sed = SedTraces(times_ms, nothing, dynamic_kpa=further, dynamic_quantity=afferent.dynamic_quantity)
+    dynamic_hz, static_hz = afferent.rates(sed)
+    first_ms = first_spike_latency_ms(afferent.spikes(sed))
+    return dict(zip(MEASURES, (float(found[0]) for found in (dynamic_hz, static_hz, first_ms)), strict=True))
 
 
 def touch_name(curvature_per_m: float) -> str:
@@ -149,20 +176,30 @@ def on_the_finger(skin: SkinResponse, afferent: Afferent) -> dict[str, Any]:
     -------
     dict
         Deformed corners of the faces, "x_mm", "y_mm" and "z_mm" (n_along + 1, n_around + 1), the three
-        measures of the afferent below the middle of each face (n_along, n_around), and whether they are one
-        "half" of the finger.
+        measures of the afferent below the middle of each face (n_along, n_around), NaN where it does not
+        answer or less than twice as fast as at rest, and whether they are one "half" of the finger.
     """
+    rest = at_rest(afferent)
     mesh = skin.mesh
     still, pressed = mesh.nodes_mm[mesh.skin_grid], (mesh.nodes_mm + skin.displacement_mm)[mesh.skin_grid]
     middle = 0.25 * (still[:-1, :-1] + still[1:, :-1] + still[1:, 1:] + still[:-1, 1:])
     answer = Population(middle.reshape(-1, 3), STEP_MM, afferent).respond(skin)
     found: dict[str, Any] = {name: pressed[..., axis] for axis, name in enumerate(("x_mm", "y_mm", "z_mm"))}
-    found |= {name: getattr(answer, name).reshape(middle.shape[:2]) for name in MEASURES}
+    for name in MEASURES:
+        values = getattr(answer, name).reshape(middle.shape[:2])
+        if name == "first_spike_latency_ms":
+            values = evoked_latency_ms(values.ravel(), rest[name]).reshape(values.shape)
+        else:
+            values = np.where((values > 0.0) & (values >= 2.0 * rest[name]), values, np.nan)
+        found[name] = values
     return found | {"half": bool(mesh.symmetry_nodes.size)}
 
 
 def recruitment(
-    answers: Mapping[str, ResponseMap], area_per_afferent_mm2: float, shown: Sequence[str] | None = None
+    answers: Mapping[str, ResponseMap],
+    area_per_afferent_mm2: float,
+    resting_latency_ms: float = np.inf,
+    shown: Sequence[str] | None = None,
 ) -> dict[str, Any]:
     """Order of first spikes under several touches, and how it differs from that under the first.
 
@@ -172,14 +209,17 @@ def recruitment(
         Answers of the same afferents, by the names of the touches; what the others are compared with first.
     area_per_afferent_mm2 : float
         Skin that each of them stands for, one over their density. [mm2]
+    resting_latency_ms : float, optional
+        When they would first fire without a touch, see `response_maps.evoked_latency_ms`. Default: never.
+        [ms]
     shown : sequence of str, optional
         Touches whose latencies are kept afferent by afferent. Default: all.
 
     Returns
     -------
     dict
-        "positions_mm"; "area_per_afferent_mm2"; "touches", one row of numbers each; and "afferents", each
-        touch with "first_spike_latency_ms" and "recruitment_rank" of every afferent.
+        "positions_mm"; "area_per_afferent_mm2"; "resting_latency_ms"; "touches", one row of numbers each; and
+        "afferents", each touch with "first_spike_latency_ms" and "recruitment_rank" of every afferent.
 
     Raises
     ------
@@ -187,11 +227,14 @@ def recruitment(
         If there is no touch, a touch has other afferents than the first, or the area is not positive.
     """
     positive("area_per_afferent_mm2", area_per_afferent_mm2, "mm2")
-    first = _same_afferents(answers)
+    positions_mm = _same_afferents(answers).positions_mm
+    latencies_ms = {
+        name: evoked_latency_ms(answer.first_spike_latency_ms, resting_latency_ms)
+        for name, answer in answers.items()
+    }
+    first_ms = next(iter(latencies_ms.values()))
     rows = []
-    for name, answer in answers.items():
-        latency_ms = answer.first_spike_latency_ms
-        change = order_change(first.first_spike_latency_ms, latency_ms)
+    for name, latency_ms in latencies_ms.items():
         fires = np.isfinite(latency_ms)
         rows.append(
             {
@@ -200,18 +243,19 @@ def recruitment(
                 "recruited_in_ramp_mm2": recruited(latency_ms, protocol.RAMP.value) * area_per_afferent_mm2,
                 "first_ms": np.min(latency_ms[fires], initial=np.inf),
                 "median_ms": np.median(latency_ms[fires]) if fires.any() else np.nan,
-                **asdict(change),
+                **asdict(order_change(first_ms, latency_ms)),
             }
         )
     return {
-        "positions_mm": first.positions_mm,
+        "positions_mm": positions_mm,
         "area_per_afferent_mm2": area_per_afferent_mm2,
+        "resting_latency_ms": resting_latency_ms,
         "touches": rows,
         "afferents": [
             {
                 "name": name,
-                "first_spike_latency_ms": answers[name].first_spike_latency_ms,
-                "recruitment_rank": recruitment_rank(answers[name].first_spike_latency_ms),
+                "first_spike_latency_ms": latencies_ms[name],
+                "recruitment_rank": recruitment_rank(latencies_ms[name]),
             }
             for name in shown or answers
         ],
@@ -223,6 +267,7 @@ def rates(
     centre_mm: ArrayLike,
     density_per_cm2: float,
     radii_mm: Sequence[float] = RINGS_MM,
+    resting_latency_ms: float = np.inf,
 ) -> dict[str, Any]:
     """Count spikes and active afferents over time, ring by ring about a point.
 
@@ -236,13 +281,16 @@ def rates(
         Afferents per area of the skin that is meant, which need not be as dense as those that answer. [1/cm2]
     radii_mm : sequence of float, optional
         Inner radius of the first ring, then outer radii. [mm]
+    resting_latency_ms : float, optional
+        When the afferents would first fire without a touch, for readers of the result. Default: never. [ms]
 
     Returns
     -------
     dict
-        "edges_ms", "active_edges_ms", "smoothing_ms", "density_per_cm2", "radii_mm", "n_afferents" of each
-        ring, and "touches", each with "rate_hz" per afferent (n_rings, n_bins), "active_fraction"
-        (n_rings, n_active_bins) and "together_per_cm2_hz", the rate of all rings per area (n_bins,).
+        "edges_ms", "active_edges_ms", "smoothing_ms", "density_per_cm2", "resting_latency_ms", "radii_mm",
+        "n_afferents" of each ring, and "touches", each with "rate_hz" per afferent (n_rings, n_bins),
+        "active_fraction" (n_rings, n_active_bins) and "together_per_cm2_hz", the rate of all rings per area
+        (n_bins,).
 
     Raises
     ------
@@ -270,6 +318,7 @@ def rates(
         "active_edges_ms": active_edges_ms,
         "smoothing_ms": SMOOTHING_MS,
         "density_per_cm2": density_per_cm2,
+        "resting_latency_ms": resting_latency_ms,
         "radii_mm": radii_mm,
         "n_afferents": np.bincount(ring[ring != NO_GROUP], minlength=len(radii_mm) - 1),
         "touches": touches,
