@@ -57,6 +57,10 @@ class Purpose(IntEnum):
     """Which of many distributions or sets an observer compares."""
     CRITERION = 9
     """Where an observer decides, if that wavers."""
+    JUDGEMENT = 10
+    """Whether a judge who follows a psychometric function is right."""
+    SPIKE_COUNT = 11
+    """How many spikes a Poisson process has in a window."""
 
 
 # Constants of Philox 4x64 as published: two multipliers, and what is added to the key each round.

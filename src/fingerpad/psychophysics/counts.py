@@ -1,0 +1,116 @@
+"""Judgements counted at each level of a stimulus, and how probable a psychometric function makes them.
+
+    P(k | n, p)      = C(n, k) p^k (1 - p)^(n - k)                      binomial
+    P(k | n, p, rho) = C(n, k) B(k + p v, n - k + (1 - p) v) / B(p v, (1 - p) v),    v = (1 - rho) / rho
+
+The second, beta-binomial, is for judgements that hang together: a run of them shares a mood. Any two of one
+level correlate by rho, and their count varies by a factor of 1 + (n - 1) rho more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import betaln, gammaln, xlog1py, xlogy
+
+from fingerpad.checks import FloatArray, float_array
+from fingerpad.errors import InputError
+
+SMALLEST_OVERDISPERSION = 1e-5
+"""Below it the beta-binomial formula loses precision; the binomial one takes over."""
+
+
+@dataclass(frozen=True)
+class JudgementCounts:
+    """How many judgements at each level were right, or "yes".
+
+    Parameters
+    ----------
+    levels : array (n_levels,)
+        Increasing. [any unit]
+    n_correct, n_trials : array (n_levels,)
+        Whole numbers.
+
+    Raises
+    ------
+    InputError
+        If they differ in length, levels do not increase, or counts are not whole or not within
+        0 ... n_trials.
+
+    Examples
+    --------
+    >>> JudgementCounts([296.0, 365.0], [58, 95], [100, 100]).proportion.tolist()
+    [0.58, 0.95]
+    """
+
+    levels: FloatArray
+    n_correct: FloatArray
+    n_trials: FloatArray
+
+    def __post_init__(self) -> None:
+        levels = float_array("levels", self.levels, 1)
+        correct = float_array("n_correct", self.n_correct, 1)
+        trials = float_array("n_trials", self.n_trials, 1)
+        if not levels.size == correct.size == trials.size or levels.size == 0:
+            raise InputError(
+                "levels, n_correct and n_trials must have one entry per level: "
+                f"got {levels.size}, {correct.size} and {trials.size}."
+            )
+        if (np.diff(levels) <= 0.0).any():
+            raise InputError(f"levels must increase strictly, each level once: got {levels.tolist()}.")
+        if (correct != np.floor(correct)).any() or (trials != np.floor(trials)).any():
+            raise InputError("n_correct and n_trials must be whole numbers: multiply rates by their trials.")
+        if (trials < 1.0).any() or (correct < 0.0).any() or (correct > trials).any():
+            raise InputError(
+                "n_trials must be at least 1 and n_correct within 0 ... n_trials: "
+                f"got {correct.tolist()} of {trials.tolist()}."
+            )
+        for name, values in (("levels", levels), ("n_correct", correct), ("n_trials", trials)):
+            object.__setattr__(self, name, values)
+
+    @property
+    def proportion(self) -> FloatArray:
+        """n_correct / n_trials."""
+        return self.n_correct / self.n_trials
+
+
+def log_probability(
+    n_correct: ArrayLike, n_trials: ArrayLike, proportion: ArrayLike, overdispersion: ArrayLike = 0.0
+) -> FloatArray:
+    """Logarithm of the probability of a count; all arguments broadcast.
+
+    Parameters
+    ----------
+    n_correct, n_trials : array_like
+        k and n.
+    proportion : array_like
+        p. [0-1]
+    overdispersion : array_like, optional
+        rho; 0 is the binomial distribution. [0-1]
+
+    Returns
+    -------
+    array
+        -inf where p is 0 or 1 and k says otherwise.
+
+    Examples
+    --------
+    Two judgements that always agree are both right as often as one:
+
+    >>> np.exp(log_probability(2, 2, 0.5, [0.0, 0.999999])).round(3).tolist()
+    [0.25, 0.5]
+    """
+    k, n = np.asarray(n_correct, dtype=np.float64), np.asarray(n_trials, dtype=np.float64)
+    p, rho = np.asarray(proportion, dtype=np.float64), np.asarray(overdispersion, dtype=np.float64)
+    ways = gammaln(n + 1.0) - gammaln(k + 1.0) - gammaln(n - k + 1.0)
+    if not (rho >= SMALLEST_OVERDISPERSION).any():
+        return ways + xlogy(k, p) + xlog1py(n - k, -p)
+    v = (1.0 - rho) / np.maximum(rho, SMALLEST_OVERDISPERSION)
+    # Both shapes of the beta function must be positive: a certainty is taken as a near one.
+    inside = np.clip(p, _NEARLY_NEVER, 1.0 - _NEARLY_NEVER)
+    return ways + betaln(k + inside * v, n - k + (1.0 - inside) * v) - betaln(inside * v, (1.0 - inside) * v)
+
+
+_NEARLY_NEVER = 1e-12

@@ -1,0 +1,293 @@
+"""The psychometric function: how often a judgement is right, or "yes", as the stimulus grows.
+
+    psi(x) = gamma + (1 - gamma - lambda) F(x; m, w)
+    F(x; m, w) = S(s_50 + (s_95 - s_05) (c(x) - c(m)) / w),    s_q = S^-1(q)
+
+gamma is the rate of guessing, lambda that of lapses, m the threshold, at which F is one half, and w the
+width, over which F rises from 5 to 95 %. Every shape S has the same two numbers, so that shapes can be
+exchanged. The coordinate c(x) is x itself, and ln x for Weibull's function: its width is that of ln x.
+
+Source: Wichmann & Hill 2001, Perception & Psychophysics 63; threshold and width as in Schuett, Harmeling,
+Macke & Wichmann 2016, Vision Research 122.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import expit, logit, ndtr, ndtri
+
+from fingerpad.checks import FloatArray, finite, float_array, one_of, positive
+from fingerpad.errors import InputError
+
+LOWER, HALF, UPPER = 0.05, 0.5, 0.95
+"""Shares of F at the start of its width, at its threshold and at the end of its width."""
+
+Curve = Callable[[FloatArray], FloatArray]
+
+
+@dataclass(frozen=True)
+class Sigmoid:
+    """A shape S of the psychometric function.
+
+    Parameters
+    ----------
+    cumulative, density, quantile : callable
+        S, its derivative and its inverse.
+    logarithmic : bool
+        Whether the coordinate is ln x instead of x.
+    """
+
+    cumulative: Curve
+    density: Curve
+    quantile: Curve
+    logarithmic: bool = False
+
+    def coordinate(self, levels: ArrayLike) -> FloatArray:
+        """c(x)."""
+        return np.log(levels) if self.logarithmic else np.asarray(levels, dtype=np.float64)
+
+    def level(self, coordinate: FloatArray) -> FloatArray:
+        """Inverse of c."""
+        return np.exp(coordinate) if self.logarithmic else coordinate
+
+    @property
+    def half(self) -> float:
+        """s_50."""
+        return float(self.quantile(np.asarray(HALF)))
+
+    @property
+    def stretch(self) -> float:
+        """s_95 - s_05, the width of S itself."""
+        lower, upper = self.quantile(np.array([LOWER, UPPER]))
+        return float(upper - lower)
+
+    def argument(self, coordinate: FloatArray, middle: ArrayLike, width: ArrayLike) -> FloatArray:
+        """Return what S is taken of: s_50 + (s_95 - s_05) (c(x) - c(m)) / w."""
+        return self.half + self.stretch * (coordinate - np.asarray(middle)) / np.asarray(width)
+
+
+def _normal_density(t: FloatArray) -> FloatArray:
+    return np.exp(-0.5 * np.square(t)) / np.sqrt(2.0 * np.pi)
+
+
+def _logistic_density(t: FloatArray) -> FloatArray:
+    return expit(t) * expit(-t)
+
+
+def _gumbel(t: FloatArray) -> FloatArray:
+    return -np.expm1(-np.exp(np.minimum(t, _LARGEST_EXPONENT)))
+
+
+def _gumbel_density(t: FloatArray) -> FloatArray:
+    clipped = np.minimum(t, _LARGEST_EXPONENT)
+    return np.exp(clipped - np.exp(clipped))
+
+
+def _gumbel_quantile(share: FloatArray) -> FloatArray:
+    return np.log(-np.log1p(-share))
+
+
+_LARGEST_EXPONENT = 50.0
+"""Beyond it the function is one to the last bit, and exp would overflow."""
+
+SIGMOIDS = {
+    "normal": Sigmoid(ndtr, _normal_density, ndtri),
+    "logistic": Sigmoid(expit, _logistic_density, logit),
+    "gumbel": Sigmoid(_gumbel, _gumbel_density, _gumbel_quantile),
+    "weibull": Sigmoid(_gumbel, _gumbel_density, _gumbel_quantile, logarithmic=True),
+}
+"""Shapes by name. Gumbel's is the one of smallest extremes, 1 - exp(-exp t); Weibull's is it over ln x."""
+
+
+def proportion(
+    sigmoid: Sigmoid,
+    levels: ArrayLike,
+    threshold: ArrayLike,
+    width: ArrayLike,
+    guess: ArrayLike,
+    lapse: ArrayLike,
+) -> FloatArray:
+    """psi(x) of one or many functions; all arguments broadcast."""
+    x, m = np.asarray(levels, dtype=np.float64), np.asarray(threshold, dtype=np.float64)
+    w, gamma, lapses = (np.asarray(value, dtype=np.float64) for value in (width, guess, lapse))
+    share = sigmoid.cumulative(sigmoid.argument(sigmoid.coordinate(x), sigmoid.coordinate(m), w))
+    return gamma + (1.0 - gamma - lapses) * share
+
+
+def level_at(
+    sigmoid: Sigmoid,
+    proportion_correct: ArrayLike,
+    threshold: ArrayLike,
+    width: ArrayLike,
+    guess: ArrayLike,
+    lapse: ArrayLike,
+) -> FloatArray:
+    """Inverse of `proportion`: where psi takes a value; -inf or inf where it never falls or rises to it.
+
+    All arguments broadcast.
+    """
+    m, w, gamma, lapses = (np.asarray(value, dtype=np.float64) for value in (threshold, width, guess, lapse))
+    share = np.clip((np.asarray(proportion_correct) - gamma) / (1.0 - gamma - lapses), 0.0, 1.0)
+    with np.errstate(divide="ignore"):
+        beyond_half = sigmoid.quantile(share) - sigmoid.half
+    return sigmoid.level(sigmoid.coordinate(m) + w * beyond_half / sigmoid.stretch)
+
+
+@dataclass(frozen=True)
+class PsychometricFunction:
+    """One psychometric function.
+
+    Parameters
+    ----------
+    threshold : float
+        Level m at which F is one half. [unit of the levels]
+    width : float
+        Distance w over which F rises from 5 to 95 %. [unit of the levels; of their logarithm for "weibull"]
+    guess : float
+        Rate gamma at levels far below the threshold. [0-1]
+    lapse : float
+        What lambda is missing to 1 far above the threshold. [0-1]
+    sigmoid : {"normal", "logistic", "weibull", "gumbel"}
+        Shape of F.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, the width (or Weibull's threshold) is not positive, or guess and lapse are
+        no rates that leave room for F.
+
+    Examples
+    --------
+    >>> told_apart = PsychometricFunction(threshold=319.0, width=80.0, guess=0.5, lapse=0.02)
+    >>> told_apart.predict([287.0, 319.0, 400.0]).round(2).tolist()
+    [0.55, 0.74, 0.98]
+    >>> round(told_apart.level_at(0.75), 1)
+    320.3
+    """
+
+    threshold: float
+    width: float
+    guess: float = 0.5
+    lapse: float = 0.0
+    sigmoid: str = "normal"
+
+    def __post_init__(self) -> None:
+        one_of("sigmoid", self.sigmoid, SIGMOIDS)
+        check = positive if self.shape.logarithmic else finite
+        object.__setattr__(self, "threshold", check("threshold", self.threshold))
+        object.__setattr__(self, "width", positive("width", self.width))
+        guess, lapse = finite("guess", self.guess), finite("lapse", self.lapse)
+        if guess < 0.0 or lapse < 0.0 or guess + lapse >= 1.0:
+            raise InputError(
+                "guess and lapse must not be negative and must sum to less than 1: "
+                f"got {guess:g} and {lapse:g}."
+            )
+
+    @property
+    def shape(self) -> Sigmoid:
+        """The function S."""
+        return SIGMOIDS[self.sigmoid]
+
+    def predict(self, levels: ArrayLike) -> FloatArray:
+        """Psi at levels of the stimulus.
+
+        Parameters
+        ----------
+        levels : array_like (n_levels,)
+            [unit of the levels]
+
+        Returns
+        -------
+        array (n_levels,)
+            [0-1]
+
+        Raises
+        ------
+        InputError
+            If a level is not finite, or not positive for "weibull".
+        """
+        return proportion(
+            self.shape,
+            checked_levels(levels, self.sigmoid),
+            self.threshold,
+            self.width,
+            self.guess,
+            self.lapse,
+        )
+
+    def level_at(self, proportion_correct: float = 0.75) -> float:
+        """Level at which psi takes a value.
+
+        Parameters
+        ----------
+        proportion_correct : float, optional
+            Between guess and 1 - lapse. [0-1]
+
+        Returns
+        -------
+        float
+            [unit of the levels]
+
+        Raises
+        ------
+        InputError
+            If psi never takes that value.
+        """
+        wanted = finite("proportion_correct", proportion_correct)
+        if not self.guess < wanted < 1.0 - self.lapse:
+            raise InputError(
+                f"proportion_correct must lie between guess and 1 - lapse, {self.guess:g} ... "
+                f"{1.0 - self.lapse:g}: got {wanted:g}."
+            )
+        return float(level_at(self.shape, wanted, self.threshold, self.width, self.guess, self.lapse))
+
+    def slope(self, proportion_correct: float = 0.75) -> float:
+        """Rise of psi per unit of the level, where psi takes a value.
+
+        Parameters
+        ----------
+        proportion_correct : float, optional
+            Between guess and 1 - lapse. [0-1]
+
+        Returns
+        -------
+        float
+            [1/unit of the levels]
+
+        Raises
+        ------
+        InputError
+            If psi never takes that value.
+
+        Examples
+        --------
+        >>> steep = PsychometricFunction(threshold=0.0, width=2.0, guess=0.0, sigmoid="logistic")
+        >>> round(steep.slope(0.5), 4)
+        0.7361
+        """
+        x = self.level_at(proportion_correct)
+        t = self.shape.argument(self.shape.coordinate(x), self.shape.coordinate(self.threshold), self.width)
+        per_coordinate = self.shape.density(t) * self.shape.stretch / self.width
+        per_level = per_coordinate / x if self.shape.logarithmic else per_coordinate
+        return float((1.0 - self.guess - self.lapse) * per_level)
+
+
+def checked_levels(levels: ArrayLike, sigmoid: str) -> FloatArray:
+    """Return levels as an array if `sigmoid` can be taken of them, else raise `InputError`.
+
+    Examples
+    --------
+    >>> checked_levels([1, 2], "weibull").tolist()
+    [1.0, 2.0]
+    """
+    checked = float_array("levels", levels, 1)
+    if SIGMOIDS[sigmoid].logarithmic and (checked <= 0.0).any():
+        raise InputError(
+            f"levels must be greater than 0 for {sigmoid!r}: the smallest is {checked.min():g}; shift them, "
+            "or choose another sigmoid."
+        )
+    return checked

@@ -1,0 +1,259 @@
+"""Fit a psychometric function to counted judgements by maximum likelihood."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.checks import FloatArray, finite, one_of
+from fingerpad.errors import ConvergenceError, InputError
+from fingerpad.psychophysics.counts import SMALLEST_OVERDISPERSION, JudgementCounts, log_probability
+from fingerpad.psychophysics.functions import SIGMOIDS, PsychometricFunction, checked_levels
+from fingerpad.psychophysics.maximum_likelihood import (
+    LAPSE,
+    OVERDISPERSION,
+    PARAMETERS,
+    THRESHOLD,
+    WIDTH,
+    Model,
+    maximise,
+)
+
+LARGEST_LAPSE = 0.1
+"""Bound of a lapse rate that is looked for: lapses are rare, or the task was not understood."""
+
+LARGEST_GUESS = 0.5
+LARGEST_OVERDISPERSION = 0.5
+NARROWEST, WIDEST = 0.5, 5.0
+"""Bounds of the width: in the smallest distance between levels, and in the distance of the outermost."""
+
+
+@dataclass(frozen=True)
+class PsychometricFit:
+    """A psychometric function fitted to counts.
+
+    Parameters
+    ----------
+    counts : JudgementCounts
+        What was judged.
+    function : PsychometricFunction
+        The most likely one.
+    overdispersion : float
+        Correlation rho of judgements of one level; 0 for independent ones. [0-1]
+    log_likelihood : float
+        Natural logarithm of the probability of the counts.
+    model : Model
+        What was looked for, within which bounds.
+    """
+
+    counts: JudgementCounts
+    function: PsychometricFunction
+    overdispersion: float
+    log_likelihood: float
+    model: Model
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the parameters that were fitted."""
+        return tuple(name for name, free in zip(PARAMETERS, self.model.free, strict=True) if free)
+
+    @property
+    def point(self) -> FloatArray:
+        """Working coordinates (5,) of the fit: c(m), ln w, gamma, lambda, rho."""
+        return working_point(self.function, self.overdispersion)
+
+    @property
+    def at_bounds(self) -> tuple[str, ...]:
+        """Names of the fitted parameters that lie on a bound.
+
+        A width there says that data are too steep or too flat to tell it. No lapse rate and no overdispersion
+        at all are nothing to warn of.
+        """
+        on = np.isclose(self.point, self.model.upper, rtol=0.0, atol=1e-9)
+        on[:LAPSE] |= np.isclose(self.point, self.model.lower, rtol=0.0, atol=1e-9)[:LAPSE]
+        return tuple(name for name, there in zip(PARAMETERS, on & self.model.free, strict=True) if there)
+
+    @property
+    def deviance(self) -> float:
+        """Twice the log likelihood that is missing to a model that meets every proportion exactly."""
+        perfect = log_probability(
+            self.counts.n_correct, self.counts.n_trials, self.counts.proportion, self.overdispersion
+        )
+        return float(2.0 * (perfect.sum() - self.log_likelihood))
+
+    def predict(self, levels: ArrayLike) -> FloatArray:
+        """Proportion correct (n_levels,) at any levels; see `PsychometricFunction.predict`."""
+        return self.function.predict(levels)
+
+    def threshold(self, proportion_correct: float = 0.75) -> float:
+        """Level at which a proportion is judged correctly; see `PsychometricFunction.level_at`."""
+        return self.function.level_at(proportion_correct)
+
+    def slope(self, proportion_correct: float = 0.75) -> float:
+        """Rise of the proportion per unit of the level there; see `PsychometricFunction.slope`."""
+        return self.function.slope(proportion_correct)
+
+
+def fit_psychometric(
+    levels: ArrayLike,
+    n_correct: ArrayLike,
+    n_trials: ArrayLike,
+    *,
+    sigmoid: str = "normal",
+    guess: float | None = 0.5,
+    lapse: float | None = None,
+    threshold: float | None = None,
+    width: float | None = None,
+    overdispersion: float | None = 0.0,
+) -> PsychometricFit:
+    """Find the psychometric function that makes counted judgements most probable.
+
+    Parameters
+    ----------
+    levels : array_like (n_levels,)
+        Levels of the stimulus, increasing. [any unit]
+    n_correct, n_trials : array_like (n_levels,)
+        Judgements that were correct, or "yes", of how many.
+    sigmoid : {"normal", "logistic", "weibull", "gumbel"}, optional
+        Shape.
+    guess : float or None, optional
+        Rate far below the threshold: 0.5 for two alternatives, 1/m for m of them, 0 for "which is more
+        curved"; None to look for it within 0 ... 0.5. [0-1]
+    lapse : float or None, optional
+        What is missing to 1 far above the threshold; None to look for it within 0 ... 0.1. [0-1]
+    threshold : float or None, optional
+        Level at which F is one half; None to look for it up to half the span of the levels beyond them.
+    width : float or None, optional
+        Distance of 5 and 95 % of F; None to look for it from half the smallest distance of levels to five
+        times their span.
+    overdispersion : float or None, optional
+        Correlation of judgements of one level; 0 for the binomial likelihood, None to look for it within
+        0 ... 0.5. [0-1]
+
+    Returns
+    -------
+    PsychometricFit
+
+    Raises
+    ------
+    InputError
+        If counts are not possible, a given parameter is not, or there are fewer levels than parameters of
+        position and slope to find.
+    ConvergenceError
+        If the most likely threshold lies on its bound, or one proportion explains all counts as well: the
+        levels do not tell a threshold.
+
+    Examples
+    --------
+    >>> told_apart = fit_psychometric([296, 305, 316, 340, 365], [57, 64, 72, 88, 97], [100] * 5, lapse=0.0)
+    >>> round(told_apart.threshold(0.75), 1), told_apart.predict([287.0]).round(2).tolist()
+    (321.3, [0.55])
+
+    Levels on both sides of a standard, judged "more curved":
+
+    >>> more_curved = fit_psychometric([260, 275, 300, 315], [4, 20, 83, 97], [100] * 4, guess=0.0, lapse=0.0)
+    >>> round(more_curved.threshold(0.5)), more_curved.free
+    (287, ('threshold', 'width'))
+    """
+    one_of("sigmoid", sigmoid, SIGMOIDS)
+    counts = JudgementCounts(checked_levels(levels, sigmoid), n_correct, n_trials)  # type: ignore[arg-type]
+    given = _given(sigmoid, threshold, width, guess, lapse, overdispersion)
+    model = _model(counts, sigmoid, given)
+    n_shaping = int(model.free[: WIDTH + 1].sum())
+    if counts.levels.size < n_shaping:
+        raise InputError(
+            f"levels must be at least {n_shaping}, one for each of threshold and width that is not given: "
+            f"got {counts.levels.size}; measure more levels, or give one of the two."
+        )
+    points, heights = maximise(model, counts.n_correct[np.newaxis])
+    fit = fit_at(counts, sigmoid, model, points[0], float(heights[0]))
+    _refuse_what_tells_no_threshold(fit, n_shaping)
+    return fit
+
+
+def _refuse_what_tells_no_threshold(fit: PsychometricFit, n_shaping: int) -> None:
+    """Raise `ConvergenceError` if levels miss the threshold, or one proportion explains all as well."""
+    counts = fit.counts
+    where = (
+        f"the levels {counts.levels[0]:g} ... {counts.levels[-1]:g} with proportions "
+        f"{counts.proportion[0]:.2f} ... {counts.proportion[-1]:.2f}"
+    )
+    if "threshold" in fit.at_bounds:
+        raise ConvergenceError(
+            f"The most likely threshold lies at {fit.function.threshold:g}, on the bound of where it was "
+            f"looked for, outside of {where}: choose levels about the threshold."
+        )
+    overall = counts.n_correct.sum() / counts.n_trials.sum()
+    same = log_probability(counts.n_correct, counts.n_trials, overall, fit.overdispersion).sum()
+    # Akaike's rule: every parameter more has to gain 1. One proportion is a parameter as well.
+    if n_shaping and fit.log_likelihood - same <= n_shaping - 1.0:
+        raise ConvergenceError(
+            f"One proportion, {overall:.3f}, explains {where} as well as a psychometric function: there is "
+            "no threshold in them; choose levels about it, or more trials."
+        )
+
+
+def fit_at(
+    counts: JudgementCounts, sigmoid: str, model: Model, point: FloatArray, log_likelihood: float
+) -> PsychometricFit:
+    """Return working coordinates as a fit."""
+    shape = SIGMOIDS[sigmoid]
+    function = PsychometricFunction(
+        threshold=float(shape.level(point[THRESHOLD])),
+        width=float(np.exp(point[WIDTH])),
+        guess=float(point[2]),
+        lapse=float(point[LAPSE]),
+        sigmoid=sigmoid,
+    )
+    return PsychometricFit(counts, function, float(point[OVERDISPERSION]), log_likelihood, model)
+
+
+def working_point(function: PsychometricFunction, overdispersion: float) -> FloatArray:
+    """Working coordinates (5,) of a function: c(m), ln w, gamma, lambda, rho."""
+    middle = function.shape.coordinate(function.threshold)
+    return np.array([float(middle), np.log(function.width), function.guess, function.lapse, overdispersion])
+
+
+def _given(
+    sigmoid: str,
+    threshold: float | None,
+    width: float | None,
+    guess: float | None,
+    lapse: float | None,
+    overdispersion: float | None,
+) -> list[float | None]:
+    """Check the parameters that are given and return their working coordinates, None for the others."""
+    # The function itself knows which values make sense; stand-ins take the places of those to find.
+    PsychometricFunction(
+        1.0 if threshold is None else threshold,
+        1.0 if width is None else width,
+        0.0 if guess is None else guess,
+        0.0 if lapse is None else lapse,
+        sigmoid,
+    )
+    if overdispersion is not None and not 0.0 <= finite("overdispersion", overdispersion) < 1.0:
+        raise InputError(f"overdispersion must lie within 0 ... 1 and below 1: got {overdispersion:g}.")
+    middle = None if threshold is None else float(SIGMOIDS[sigmoid].coordinate(threshold))
+    return [middle, None if width is None else float(np.log(width)), guess, lapse, overdispersion]
+
+
+def _model(counts: JudgementCounts, sigmoid: str, given: list[float | None]) -> Model:
+    """Bounds of what is looked for, and the given values as bounds without room between."""
+    coordinates = SIGMOIDS[sigmoid].coordinate(counts.levels)
+    span = float(np.ptp(coordinates)) or abs(float(coordinates[0])) or 1.0
+    gap = float(np.diff(coordinates).min(initial=span))
+    bounds = np.array(
+        [
+            (coordinates[0] - 0.5 * span, coordinates[-1] + 0.5 * span),
+            (np.log(NARROWEST * gap), np.log(WIDEST * span)),
+            (0.0, LARGEST_GUESS),
+            (0.0, LARGEST_LAPSE),
+            (SMALLEST_OVERDISPERSION, LARGEST_OVERDISPERSION),
+        ]
+    )
+    for index, value in enumerate(given):
+        if value is not None:
+            bounds[index] = value
+    return Model(SIGMOIDS[sigmoid], coordinates, counts.n_trials, bounds[:, 0], bounds[:, 1])

@@ -1,0 +1,355 @@
+"""How far a fitted psychometric function can be trusted: parametric bootstrap, and posterior.
+
+Both are a cloud of functions with weights, asked the same questions: where a parameter, a threshold or the
+curve itself lies with a given probability.
+
+- Bootstrap: counts are drawn from the fitted function again and again, and fitted in the same way.
+- Posterior: Bayes's rule on a grid over the parameters that were fitted, flat in the threshold, in the
+  logarithm of the width, and in guess, lapse and overdispersion, within the bounds of the fit. The grid is
+  first coarse, then laid finely over where the posterior is; nothing is drawn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.checks import FloatArray, finite, float_array, instance, one_of, whole
+from fingerpad.errors import InputError
+from fingerpad.psychophysics.counts import log_probability
+from fingerpad.psychophysics.functions import SIGMOIDS, Sigmoid, checked_levels, level_at, proportion
+from fingerpad.psychophysics.maximum_likelihood import (
+    GUESS,
+    LAPSE,
+    OVERDISPERSION,
+    PARAMETERS,
+    THRESHOLD,
+    WIDTH,
+    Model,
+    maximise,
+)
+from fingerpad.psychophysics.psychometric import PsychometricFit
+from fingerpad.random_streams import Purpose, uniforms
+
+COARSE_POINTS = 21
+FINE_POINTS = {1: (401,), 2: (81, 81), 3: (51, 41, 17), 4: (31, 27, 13, 13), 5: (21, 19, 9, 9, 9)}
+"""Points of the fine grid along each fitted parameter, by how many there are."""
+
+NEGLIGIBLE = 1e-5
+"""Share of its greatest value at which a posterior counts as none."""
+
+REFINEMENTS = 2
+
+
+@dataclass(frozen=True)
+class FunctionCloud:
+    """Psychometric functions with weights: what the true one may be.
+
+    Parameters
+    ----------
+    sigmoid : str
+        Shape of all of them.
+    values : array (n_functions, 5)
+        threshold, width, guess, lapse and overdispersion of each.
+    weights : array (n_functions,)
+        How much each counts; they sum to 1.
+    """
+
+    sigmoid: str
+    values: FloatArray
+    weights: FloatArray
+
+    @property
+    def shape(self) -> Sigmoid:
+        """The function S."""
+        return SIGMOIDS[self.sigmoid]
+
+    def interval(self, parameter: str, probability: float = 0.95) -> tuple[float, float]:
+        """Central interval of a parameter.
+
+        Parameters
+        ----------
+        parameter : {"threshold", "width", "guess", "lapse", "overdispersion"}
+            "threshold" is where F is one half.
+        probability : float, optional
+            That it holds the true value. [0-1]
+
+        Returns
+        -------
+        (float, float)
+
+        Raises
+        ------
+        InputError
+            If there is no such parameter, or the probability is not within 0 ... 1.
+        """
+        one_of("parameter", parameter, PARAMETERS)
+        return self._central(self.values[:, PARAMETERS.index(parameter)], probability)
+
+    def threshold_interval(
+        self, proportion_correct: float = 0.75, probability: float = 0.95
+    ) -> tuple[float, float]:
+        """Central interval of the level at which a proportion is judged correctly.
+
+        Parameters
+        ----------
+        proportion_correct : float, optional
+            [0-1]
+        probability : float, optional
+            That it holds the true value. [0-1]
+
+        Returns
+        -------
+        (float, float)
+            An end may be infinite: then so many of the functions never take that value.
+
+        Raises
+        ------
+        InputError
+            If the proportion or the probability is not within 0 ... 1.
+        """
+        return self._central(self.thresholds(proportion_correct), probability)
+
+    def thresholds(self, proportion_correct: float = 0.75) -> FloatArray:
+        """Level (n_functions,) at which each function takes a value; infinite where it never does."""
+        wanted = _share("proportion_correct", proportion_correct)
+        threshold, width, guess, lapse, _ = self.values.T
+        return level_at(self.shape, wanted, threshold, width, guess, lapse)
+
+    def band(self, levels: ArrayLike, probability: float = 0.95) -> FloatArray:
+        """Central interval of the curve at each level.
+
+        Parameters
+        ----------
+        levels : array_like (n_levels,)
+            [unit of the levels]
+        probability : float, optional
+            That it holds the true proportion, level by level. [0-1]
+
+        Returns
+        -------
+        array (2, n_levels)
+            Lower and upper end. [0-1]
+
+        Raises
+        ------
+        InputError
+            If a level does not suit the sigmoid, or the probability is not within 0 ... 1.
+        """
+        x = checked_levels(levels, self.sigmoid)
+        threshold, width, guess, lapse, _ = self.values.T
+        ends = [
+            self._central(proportion(self.shape, level, threshold, width, guess, lapse), probability)
+            for level in x
+        ]
+        return np.array(ends).reshape(-1, 2).T
+
+    def _central(self, quantity: FloatArray, probability: float) -> tuple[float, float]:
+        outside = 0.5 * (1.0 - _share("probability", probability))
+        lower, upper = weighted_quantiles(quantity, self.weights, [outside, 1.0 - outside])
+        return float(lower), float(upper)
+
+
+def weighted_quantiles(values: ArrayLike, weights: ArrayLike, shares: ArrayLike) -> FloatArray:
+    """Quantiles of values of which some count more than others.
+
+    Each value stands in the middle of its own weight; between values it is interpolated.
+
+    Parameters
+    ----------
+    values : array_like (n,)
+        May be infinite.
+    weights : array_like (n,)
+        Not negative, with a positive sum.
+    shares : array_like (n_shares,)
+        [0-1]
+
+    Returns
+    -------
+    array (n_shares,)
+
+    Examples
+    --------
+    >>> weighted_quantiles([1.0, 2.0, 3.0], [1.0, 2.0, 1.0], [0.5, 0.9]).tolist()
+    [2.0, 3.0]
+    """
+    # What stands several times, as on a grid, stands once with the whole of its weight.
+    quantity, which = np.unique(np.asarray(values, dtype=np.float64), return_inverse=True)
+    mass = np.bincount(which, np.asarray(weights, dtype=np.float64))
+    middles = (np.cumsum(mass) - 0.5 * mass) / mass.sum()
+    # Infinite values stand for themselves, as no number lies between them and others.
+    finite_part = np.isfinite(quantity)
+    wanted = np.asarray(shares, dtype=np.float64)
+    if finite_part.all():
+        return np.interp(wanted, middles, quantity)
+    if not finite_part.any():
+        return quantity[np.searchsorted(middles, wanted).clip(0, quantity.size - 1)]
+    inside = np.interp(wanted, middles[finite_part], quantity[finite_part])
+    below, above = middles[finite_part][0], middles[finite_part][-1]
+    inside = np.where((wanted < below) & (quantity[0] == -np.inf), -np.inf, inside)
+    return np.where((wanted > above) & (quantity[-1] == np.inf), np.inf, inside)
+
+
+def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> FunctionCloud:
+    """Draw counts from a fit and fit them again, many times.
+
+    Parameters
+    ----------
+    fit : PsychometricFit
+        What to draw from.
+    seed : int
+        Of the random numbers; keyed by replicate and level.
+    n_replicates : int, optional
+        How many times.
+
+    Returns
+    -------
+    FunctionCloud
+        One function per replicate, all of equal weight.
+
+    Raises
+    ------
+    InputError
+        If a number is not whole or not positive.
+    ConvergenceError
+        If a replicate cannot be fitted.
+
+    Examples
+    --------
+    >>> from fingerpad.psychophysics.psychometric import fit_psychometric
+    >>> fit = fit_psychometric([296, 305, 316, 340, 365], [57, 64, 72, 88, 97], [100] * 5, lapse=0.0)
+    >>> lower, upper = bootstrap(fit, seed=1, n_replicates=200).threshold_interval(0.75)
+    >>> bool(lower < fit.threshold(0.75) < upper)
+    True
+    """
+    points, _ = maximise(fit.model, drawn_counts(fit, seed, n_replicates))
+    return _cloud(fit, points, np.full(len(points), 1.0 / len(points)))
+
+
+def drawn_counts(fit: PsychometricFit, seed: int, n_replicates: int) -> FloatArray:
+    """Draw the counts (n_replicates, n_levels) of a judge who follows a fit.
+
+    Parameters
+    ----------
+    fit : PsychometricFit
+        Function, overdispersion, levels and trials.
+    seed : int
+        Of the random numbers; keyed by replicate and level.
+    n_replicates : int
+        How many times all levels are judged.
+
+    Returns
+    -------
+    array (n_replicates, n_levels)
+        Whole numbers.
+
+    Raises
+    ------
+    InputError
+        If a number is not whole or not positive.
+    """
+    instance("fit", fit, PsychometricFit)
+    whole("n_replicates", n_replicates, at_least=1)
+    expected = fit.predict(fit.counts.levels)
+    shares = uniforms(seed, n_replicates, expected.size, Purpose.JUDGEMENT, 1)[..., 0]
+    counts = np.empty(shares.shape)
+    for level, (n, p) in enumerate(zip(fit.counts.n_trials, expected, strict=True)):
+        probabilities = np.exp(log_probability(np.arange(n + 1.0), n, p, fit.overdispersion))
+        # The last count takes what rounding left over.
+        counts[:, level] = np.searchsorted(np.cumsum(probabilities[:-1]), shares[:, level], side="right")
+    return counts
+
+
+def posterior(fit: PsychometricFit) -> FunctionCloud:
+    """Bayes's rule on a grid: what the counts say about the parameters that were fitted.
+
+    Parameters
+    ----------
+    fit : PsychometricFit
+        Counts, and the bounds that are the ends of the flat priors.
+
+    Returns
+    -------
+    FunctionCloud
+        Functions of the grid, weighted by their posterior probability.
+
+    Examples
+    --------
+    >>> from fingerpad.psychophysics.psychometric import fit_psychometric
+    >>> fit = fit_psychometric([296, 305, 316, 340, 365], [57, 64, 72, 88, 97], [100] * 5, lapse=0.0)
+    >>> [round(end) for end in posterior(fit).threshold_interval(0.75)]
+    [315, 328]
+    """
+    model = instance("fit", fit, PsychometricFit).model
+    n_free = int(model.free.sum())
+    if n_free == 0:
+        return _cloud(fit, fit.point[np.newaxis], np.ones(1))
+    lower, upper = model.lower[model.free], model.upper[model.free]
+    # The last grid but one shows where the posterior is; narrow ones need a second look.
+    for _ in range(REFINEMENTS):
+        axes, weights = _grid_posterior(
+            fit, lower, upper, (COARSE_POINTS,) * min(n_free, 3) + (9,) * (n_free - 3)
+        )
+        lower, upper = _where_it_is(axes, weights, lower, upper)
+    axes, weights = _grid_posterior(fit, lower, upper, FINE_POINTS[n_free])
+    points = _grid_points(model, axes)
+    kept = weights.ravel() > NEGLIGIBLE * weights.max() * 1e-3
+    return _cloud(fit, points[kept], weights.ravel()[kept] / weights.ravel()[kept].sum())
+
+
+def _grid_points(model: Model, axes: list[FloatArray]) -> FloatArray:
+    """Working coordinates (n_points, 5) of a grid over the free parameters."""
+    mesh = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+    points = np.tile(model.lower, (len(mesh), 1))
+    points[:, model.free] = mesh
+    return points
+
+
+def _grid_posterior(
+    fit: PsychometricFit, lower: FloatArray, upper: FloatArray, sizes: tuple[int, ...]
+) -> tuple[list[FloatArray], FloatArray]:
+    """Middles of the cells of a grid, and the posterior probability of each cell (by the midpoint rule)."""
+    axes = [
+        low + (high - low) * (np.arange(size) + 0.5) / size
+        for low, high, size in zip(lower, upper, sizes, strict=True)
+    ]
+    heights = fit.model.log_likelihood(fit.counts.n_correct, _grid_points(fit.model, axes))
+    weights = np.exp(heights - heights.max())
+    return axes, (weights / weights.sum()).reshape(sizes)
+
+
+def _where_it_is(
+    axes: list[FloatArray], weights: FloatArray, lower: FloatArray, upper: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Bounds of the cells that matter along each axis, one cell more on each side."""
+    ends = []
+    for index, axis in enumerate(axes):
+        others = tuple(other for other in range(len(axes)) if other != index)
+        matters = np.flatnonzero(weights.max(axis=others) > NEGLIGIBLE * weights.max())
+        cell = (upper[index] - lower[index]) / axis.size
+        ends.append(
+            (
+                max(lower[index], axis[matters[0]] - 1.5 * cell),
+                min(upper[index], axis[matters[-1]] + 1.5 * cell),
+            )
+        )
+    return np.array([low for low, _ in ends]), np.array([high for _, high in ends])
+
+
+def _cloud(fit: PsychometricFit, points: FloatArray, weights: FloatArray) -> FunctionCloud:
+    """Working coordinates as parameters."""
+    values = points.copy()
+    values[:, THRESHOLD] = fit.function.shape.level(points[:, THRESHOLD])
+    values[:, WIDTH] = np.exp(points[:, WIDTH])
+    columns = [THRESHOLD, WIDTH, GUESS, LAPSE, OVERDISPERSION]
+    return FunctionCloud(
+        fit.function.sigmoid, float_array("values", values[:, columns], 2), float_array("weights", weights, 1)
+    )
+
+
+def _share(name: str, value: float) -> float:
+    if not 0.0 < finite(name, value) < 1.0:
+        raise InputError(f"{name} must lie between 0 and 1: got {value!r}.")
+    return float(value)
