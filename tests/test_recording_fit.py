@@ -36,6 +36,7 @@ from fingerpad.studies import recording_session as session
 from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.studies.recording_methods import METHODS, check_spikes
 from fingerpad.studies.recording_posterior import posterior
+from fingerpad.studies.single_unit_methods import OFFSETS_MM
 from fingerpad.studies.spike_fit import soft_spikes
 from fingerpad.transduction import drive
 
@@ -340,12 +341,18 @@ class Pressed:
     """Stands for the skin under a touch: two humps of energy density where the edges of the bar are."""
 
     def __init__(self, touch):
-        shift = touch.at_mm[0] - RECEPTOR_X_MM
-        self.height = 3.0 * np.exp(-((abs(shift) - 1.5) ** 2)) * touch.stimulus.depth_mm
+        self.shift_mm, self.depth_mm = touch.at_mm[0] - RECEPTOR_X_MM, touch.stimulus.depth_mm
+
+    def height(self, offset_mm):
+        return 3.0 * np.exp(-((np.abs(self.shift_mm - offset_mm) - 1.5) ** 2)) * self.depth_mm
 
     def sed(self, sites, dynamic_quantity):
-        assert (sites, dynamic_quantity) == ([[RECEPTOR_X_MM, 0.0]], "stored")
-        return traces([self.height])
+        assert dynamic_quantity == "stored"
+        offsets = np.array(sites)[:, 0] - RECEPTOR_X_MM
+        assert [offset for offset, (_, across) in zip(offsets, sites, strict=True) if across == 0.0].count(
+            0.0
+        )
+        return traces(self.height(offsets))
 
 
 @pytest.fixture
@@ -408,13 +415,34 @@ def test_spikes_seed_and_what_else_is_asked_for_reach_the_fit(call, tmp_path, mo
     (tmp_path / "mine.csv").write_text(
         "shift_mm,spike_times_ms\n" + "".join(f"{shift},{spikes}\n" for shift in SHIFTS_MM)
     )
-    options = ("--method", "likelihood", "--posterior", "--seed", "7", "--folds", "2")
+    asked_for = ("--posterior", "--profiles", "--sensitivity")
+    options = ("--method", "likelihood", *asked_for, "--seed", "7", "--folds", "2")
     assert call("mine.csv", "--stimulus", "bar", *options)[0] == 0
     ((recordings, settings),) = asked
     assert isinstance(recordings, SpikeRecordings)
     assert recordings.trains.times_ms.size == 8 * len(SHIFTS_MM)
-    assert (settings["method"], settings["seed"], settings["with_posterior"]) == ("likelihood", 7, True)
+    assert (settings["method"], settings["seed"], settings["beside"]) == ("likelihood", 7, None)
+    assert all(settings[f"with_{option.removeprefix('--')}"] is True for option in asked_for)
     assert settings["positions_mm"] == list(SHIFTS_MM)
+
+
+def test_what_is_asked_for_beside_the_fit_is_on_its_page(call, tmp_path, monkeypatch):
+    (tmp_path / "mine.csv").write_text(ROWS)
+    profile = {"values": [1.0, 2.0, 3.0], "losses": [3.0, 0.0, 3.0], "low": 1.2, "high": None}
+    four = [profile | {"name": name} for name in IDENTIFIABLE_NAMES]
+    monkeypatch.setattr(study, "profiled", lambda *given: four)
+    options = ("--profiles", "--sensitivity", "--offset", "--folds", "2")
+    status, _, errors = call("mine.csv", "--stimulus", "bar", *options)
+    assert (status, errors) == (0, "")
+    fit = json.loads((tmp_path / "fit" / "fit.json").read_text())["fit"]
+    assert fit["profiles"] == four
+    assert len(fit["sensitivity"]["total"]) == 4
+    assert fit["offset"]["held"]["offset_mm"] == list(OFFSETS_MM)
+    figures = {path.stem for path in (tmp_path / "fit" / "figures").iterdir()}
+    assert figures == {"fit", "residuals", "profiles", "sensitivity", "offset"}
+    page = (tmp_path / "fit" / "fit.html").read_text()
+    for words in ("<td>1.2 … open</td>", "What the fit is sensitive to (Sobol)", "The place of the receptor"):
+        assert words in page
 
 
 def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_path):
@@ -471,6 +499,21 @@ def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_pa
             "method must be one of least_squares",
         ),
         (["mine.csv", "--stimulus", "bar", "--method", "likelihood"], ROWS, "likelihood needs spike times"),
+        (
+            ["mine.csv", "--stimulus", "bar", "--offset", "--method", "closed_form"],
+            ROWS,
+            "offset needs a method that fits it, least_squares or cma_es: got closed_form",
+        ),
+        (
+            ["mine.csv", "--stimulus", "list.csv", "--offset"],
+            "stimulus,static_rate_hz\n" + "".join(f"{name},9\n" for name in ("edge", "wide")),
+            "offset needs stimuli at several places along the finger",
+        ),
+        (
+            ["mine.csv", "--stimulus", "bar", "--offset", "--folds", "2"],
+            "shift_mm,static_rate_hz\n" + "".join(f"{row},9\n" for row in range(8)),
+            "recordings must leave at least 5 rates",
+        ),
         (["mine.csv", "--stimulus", "bar", "--jobs", "0"], ROWS, "jobs must be a whole number of at least 1"),
         (["mine.csv", "--stimulus", "bar", "--materials", "wood"], ROWS, "materials must be one of"),
         (["mine.csv", "--stimulus", "bar", "--resolution", "high"], ROWS, "resolution must be one of quick"),
@@ -510,7 +553,7 @@ def test_bad_input_is_one_sentence_and_status_2_and_nothing_is_written(
     call, tmp_path, arguments, content, said
 ):
     (tmp_path / "mine.csv").write_bytes(content if isinstance(content, bytes) else content.encode())
-    (tmp_path / "list.csv").write_text("stimulus,indenter\nedge,bar\n")
+    (tmp_path / "list.csv").write_text("stimulus,indenter\nedge,bar\nwide,bar\n")
     status, out, errors = call(*arguments)
     assert (status, out) == (2, "")
     assert said in errors

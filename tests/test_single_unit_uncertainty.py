@@ -11,7 +11,7 @@ from fingerpad.reference import bar_firing_rates
 from fingerpad.report import single_unit_uncertainty as report
 from fingerpad.report.appearance import png
 from fingerpad.signals import SedTraces
-from fingerpad.studies import single_unit, single_unit_uncertainty
+from fingerpad.studies import rate_uncertainty, single_unit, single_unit_uncertainty
 from fingerpad.studies.reproduction import plain
 from fingerpad.transduction import drive
 
@@ -87,7 +87,7 @@ def test_convergence_and_sensitivity_are_told(section: dict) -> None:
     np.testing.assert_allclose(found["lower"], 0.75 * identifiable(TRUTH), rtol=1e-12)
     # What a number does alone is part of what it does with others.
     assert (np.array(found["total"]) >= np.array(found["first"]) - 0.15).all()
-    assert found["evaluations"] == 6 * single_unit_uncertainty.SENSITIVITY_POINTS
+    assert found["evaluations"] == 6 * rate_uncertainty.SENSITIVITY_POINTS
 
 
 def test_the_figure_shows_bands_over_points_and_a_profile_of_each_number(section: dict) -> None:

@@ -200,6 +200,15 @@ def fit_command(
     posterior: Annotated[
         bool, typer.Option("--posterior", help="Draw credible intervals of parameters and rates as well.")
     ] = False,
+    profiles: Annotated[
+        bool, typer.Option("--profiles", help="Profile the likelihood of each number as well.")
+    ] = False,
+    sensitivity: Annotated[
+        bool, typer.Option("--sensitivity", help="Tell by Sobol's indices what the fit is sensitive to.")
+    ] = False,
+    offset: Annotated[
+        bool, typer.Option("--offset", help="Fit the receptor's place along the finger as well.")
+    ] = False,
     folds: Annotated[
         int | None,
         typer.Option(
@@ -255,7 +264,10 @@ def fit_command(
         (dynamic_window, static_window),
         jobs if jobs is not None else _cores(),
         dynamic_quantity,
-        posterior,
+        with_posterior=posterior,
+        with_profiles=profiles,
+        with_sensitivity=sensitivity,
+        with_offset=offset,
     )
     _make_writable(out)
     inputs = [recordings, *([] if stimulus == BAR else [Path(stimulus)])]

@@ -12,6 +12,7 @@ from fingerpad.checks import FloatArray
 from fingerpad.errors import InputError
 from fingerpad.estimation.closed_form import ClosedFormModel
 from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES
+from fingerpad.estimation.receptor_offset import OFFSET_NAME, ReceptorOffset
 from fingerpad.fitting.problem import IntArray
 from fingerpad.parameters import neuron, protocol
 from fingerpad.signals import SedTraces
@@ -124,6 +125,74 @@ class AnyMotion:
         for group, columns in zip(self.drives, self.stimuli, strict=True):
             dynamic[columns], static[columns] = afferent.rates(group, *self.windows_ms)
         return dynamic, static
+
+
+@dataclass(frozen=True)
+class AnyMotionBeside:
+    """The same stimuli felt by a receptor that may lie beside its place, along the finger; a `RateModel`.
+
+    Parameters
+    ----------
+    offsets_mm : array (n_offsets,)
+        Places at which the drive is known, distal positive, increasing. [mm]
+    places : sequence of AnyMotion
+        What a receptor in each place feels.
+
+    Raises
+    ------
+    InputError
+        If there are not two places at least, or they disagree in stimuli and times.
+
+    Examples
+    --------
+    >>> near, far = (SedTraces([0.0, 50.0, 1000.0], [[0.0], [peak], [peak]]) for peak in (2.0, 1.0))
+    >>> beside = AnyMotionBeside([-0.1, 0.1], [AnyMotion.under(near), AnyMotion.under(far)])
+    >>> beside.at(0.0).drives[0].sed_kpa[-1].tolist()
+    [1.5]
+    """
+
+    offsets_mm: FloatArray
+    places: Sequence[AnyMotion]
+
+    def __post_init__(self) -> None:
+        kinds = {tuple(columns.tobytes() for columns in place.stimuli) for place in self.places}
+        if len(kinds) != 1:
+            raise InputError(
+                f"AnyMotionBeside needs the same stimuli at every place: got {len(kinds)} kinds of places."
+            )
+        object.__setattr__(self, "offsets_mm", self._groups[0].offsets_mm)
+
+    @property
+    def _groups(self) -> list[ReceptorOffset]:
+        """One model per group of stimuli that move alike; making it checks its drives."""
+        return [
+            ReceptorOffset(self.offsets_mm, drives)
+            for drives in zip(*(place.drives for place in self.places), strict=True)
+        ]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The six parameters of an afferent, then the offset."""
+        return (*PARAMETER_NAMES, OFFSET_NAME)
+
+    @property
+    def n_stimuli(self) -> int:
+        """Number of stimuli."""
+        return self.places[0].n_stimuli
+
+    def at(self, offset_mm: float) -> AnyMotion:
+        """Return what a receptor feels that lies there, linear between two places.
+
+        Raises
+        ------
+        InputError
+            If the offset lies outside of the places at which the drive is known.
+        """
+        return replace(self.places[0], drives=tuple(group.drive_at(offset_mm) for group in self._groups))
+
+    def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Dynamic and static rates of the afferent with these seven parameters. [spikes/s]"""
+        return self.at(parameters[-1]).rates(parameters[:-1])
 
 
 @dataclass(frozen=True)

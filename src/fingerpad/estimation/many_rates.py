@@ -12,7 +12,7 @@ from numba import njit
 from fingerpad.blocks import in_blocks
 from fingerpad.checks import FloatArray
 from fingerpad.errors import InputError
-from fingerpad.estimation.rate_problem import AfferentModel, RateModel, Reparametrised
+from fingerpad.estimation.rate_problem import AfferentModel, RateModel, RateProblem, Reparametrised
 from fingerpad.exact_spikes import exact_trains
 from fingerpad.parameters import protocol
 from fingerpad.units import MS_PER_S
@@ -64,6 +64,39 @@ def rates_of_each(model: RateModel, points: FloatArray) -> tuple[FloatArray, Flo
 
     in_blocks(work, len(rows), ROWS_PER_TURN)
     return rates[0], rates[1]
+
+
+def scores_of_each(problem: RateProblem, points: FloatArray) -> FloatArray:
+    """FSS of Eqs. 12-14 over all stimuli, for every row of parameters.
+
+    Parameters
+    ----------
+    problem : RateProblem
+        What predicts, and what was observed.
+    points : array (n_points, n_parameters)
+        One set of parameters per row.
+
+    Returns
+    -------
+    array (n_points,)
+        `problem.score` of each row.
+
+    Examples
+    --------
+    >>> from fingerpad.afferent import Afferent
+    >>> from fingerpad.estimation.recordings import RateRecordings
+    >>> from fingerpad.signals import SedTraces
+    >>> from fingerpad.transduction import drive
+    >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    >>> problem = RateProblem(AfferentModel(drive(sed)), RateRecordings(("flat",), [217.0], [63.0]))
+    >>> scores_of_each(problem, Afferent().parameters * np.array([[1.0], [1.2]])).round(2).tolist()
+    [1.0, 0.98]
+    """
+    dynamic_hz, static_hz = rates_of_each(problem.model, points)
+    everything = np.arange(problem.n_observations)
+    return np.array(
+        [problem.score_of(rates, everything) for rates in zip(dynamic_hz, static_hz, strict=True)]
+    )
 
 
 def _prepared(model: RateModel):  # type: ignore[no-untyped-def]

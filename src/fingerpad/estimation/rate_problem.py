@@ -216,9 +216,13 @@ class RateProblem:
 
     def score(self, parameters: FloatArray, chosen: IntArray) -> float:
         """FSS of Eqs. 12-14 over the chosen stimuli, weighted where both phases were recorded."""
+        return self.score_of(self.model.rates(parameters), chosen)
+
+    def score_of(self, rates: tuple[FloatArray, FloatArray], chosen: IntArray) -> float:
+        """FSS over the chosen stimuli of dynamic and static rates that were predicted before."""
         return sum(
-            weight * fractional_sum_of_squares(observed, predicted)
-            for weight, observed, predicted in self._phases(parameters, chosen)
+            weight * fractional_sum_of_squares(observed, predicted[chosen])
+            for weight, observed, predicted in self._recorded(chosen, rates)
         )
 
     def score_by_phase(self, parameters: FloatArray, chosen: IntArray) -> dict[str, float]:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.checks import FloatArray
-from fingerpad.report import tables
+from fingerpad.report import recording_extras, tables
 from fingerpad.report.appearance import BLACK, BLUE, GREY, ORANGE, new_figure, numbers
 from fingerpad.report.page import Chapter, Drawing, write_page
 from fingerpad.report.tables import PARAMETERS, Row, Table
@@ -147,8 +147,56 @@ CHAPTERS = (
         ),
         fit_tables,
     ),
-    Chapter("manifest", "How this was made", (), tables.manifest),
 )
+"""The fit itself, which every page has."""
+
+BESIDE = (
+    Chapter(
+        "profiles",
+        "How far each number may move",
+        (
+            Drawing(
+                3,
+                "profiles",
+                "Profile likelihoods",
+                recording_extras.draw_profiles,
+                recording_extras.caption_profiles,
+            ),
+        ),
+        recording_extras.profile_tables,
+    ),
+    Chapter(
+        "sensitivity",
+        "What the fit is sensitive to",
+        (
+            Drawing(
+                4,
+                "sensitivity",
+                "Sobol's indices",
+                recording_extras.draw_sensitivity,
+                recording_extras.caption_sensitivity,
+            ),
+        ),
+        recording_extras.sensitivity_tables,
+    ),
+    Chapter(
+        "offset",
+        "The place of the receptor",
+        (
+            Drawing(
+                5,
+                "offset",
+                "A receptor beside its place",
+                recording_extras.draw_offset,
+                recording_extras.caption_offset,
+            ),
+        ),
+        recording_extras.offset_tables,
+    ),
+)
+"""What a page has if it was asked for, by the key of the fit's section that holds it."""
+
+MADE = Chapter("manifest", "How this was made", (), tables.manifest)
 
 
 def write_fit_page(results: Mapping[str, Any], folder: Path) -> Path:
@@ -166,9 +214,11 @@ def write_fit_page(results: Mapping[str, Any], folder: Path) -> Path:
     Path
         The page.
     """
+    section = results["fit"]
+    beside = [chapter for chapter in BESIDE if section.get(chapter.section)]
     return write_page(
-        results,
-        CHAPTERS,
+        {**results, **{chapter.section: section for chapter in beside}},
+        (*CHAPTERS, *beside, MADE),
         Path(folder) / PAGE,
         heading="An afferent fitted to recordings",
         subtitle="Strain energy density in a finite-element fingertip drives a leaky integrate-and-fire "

@@ -8,7 +8,8 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from fingerpad.parameters import protocol
-from fingerpad.report.appearance import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, numbers
+from fingerpad.report.appearance import BLACK, BLUE, PALE, new_figure, numbers
+from fingerpad.report.rate_uncertainty import draw_profile, profile_ends, sensitivity_table
 from fingerpad.report.tables import Row, Table
 from fingerpad.report.words import ABSENT, IDENTIFIABLE_SYMBOLS, PHASES, fixed, number, whole_percent
 
@@ -17,8 +18,6 @@ GAINS = {
     "dynamic_gain": ("k_d", "mA ms/kPa"),
     "static_gain": ("k_s", "mA/kPa"),
 }
-LARGEST_LOSS = 5.0
-"""Losses of log likelihood that are drawn; an interval of 95 % ends at 1.92."""
 
 
 def draw(section: Mapping[str, Any]) -> Figure:
@@ -56,29 +55,14 @@ def draw(section: Mapping[str, Any]) -> Figure:
         if column == 0:
             figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     for column, profile in enumerate(section["profiles"]):
-        _profile(figure.add_subplot(grid[1, column]), profile, section, "cdef"[column])
+        axes, name = figure.add_subplot(grid[1, column]), profile["name"]
+        found = section["posterior"][name]
+        ends = (found["low"], found["high"])
+        draw_profile(axes, profile, section["units"][name], section["fit"][name], ends)
+        axes.set_title(f"({'cdef'[column]}) {IDENTIFIABLE_SYMBOLS[name]}")
+        if column == 0:
+            axes.set_ylabel("loss of log likelihood")
     return figure
-
-
-def _profile(axes: Any, profile: Mapping[str, Any], section: Mapping[str, Any], letter: str) -> None:
-    name = profile["name"]
-    axes.plot(numbers(profile["values"]), numbers(profile["losses"]), ".-", color=BLACK, linewidth=1.2)
-    axes.axhline(1.92, color=GREY, linestyle="--", linewidth=1.0)
-    if section["fit"][name] is not None:
-        axes.axvline(section["fit"][name], color=ORANGE, linestyle="-.", linewidth=1.4)
-    found = section["posterior"][name]
-    axes.plot(
-        numbers([found["low"], found["high"]]),
-        [-0.25, -0.25],
-        color=BLUE,
-        linewidth=4.0,
-        solid_capstyle="butt",
-    )
-    axes.set_ylim(-0.5, LARGEST_LOSS)
-    axes.set_title(f"({letter}) {IDENTIFIABLE_SYMBOLS[name]}")
-    axes.set_xlabel(f"{IDENTIFIABLE_SYMBOLS[name]} [{section['units'][name]}]")
-    if letter == "c":
-        axes.set_ylabel("loss of log likelihood")
 
 
 def caption(section: Mapping[str, Any]) -> str:
@@ -101,7 +85,12 @@ def caption(section: Mapping[str, Any]) -> str:
 
 def tables(section: Mapping[str, Any]) -> list[Table]:
     """Return the numbers in both forms, the residuals, the sensitivity and the convergence."""
-    return [_determined(section), _residuals(section), _sensitivity(section), _convergence(section)]
+    return [
+        _determined(section),
+        _residuals(section),
+        sensitivity_table(section["sensitivity"], section["units"]),
+        _convergence(section),
+    ]
 
 
 def _determined(section: Mapping[str, Any]) -> Table:
@@ -112,7 +101,7 @@ def _determined(section: Mapping[str, Any]) -> Table:
                 f"{symbol} [{section['units'][name]}]",
                 number(section["fit"][name]),
                 *_interval(section["posterior"][name]),
-                *_ends(profiles[name]),
+                profile_ends(profiles[name]),
             )
         )
         for name, symbol in IDENTIFIABLE_SYMBOLS.items()
@@ -140,11 +129,6 @@ def _interval(found: Mapping[str, Any]) -> tuple[str, str]:
     return number(found["median"]), f"{number(found['low'])} … {number(found['high'])}"
 
 
-def _ends(profile: Mapping[str, Any]) -> tuple[str]:
-    ends = [profile["low"], profile["high"]]
-    return (" … ".join("open" if end is None else number(end) for end in ends),)
-
-
 def _residuals(section: Mapping[str, Any]) -> Table:
     rows = [
         Row(
@@ -167,28 +151,6 @@ def _residuals(section: Mapping[str, Any]) -> Table:
         f"by {number(section['evidence_for_alike_residuals'])}."
     )
     return Table("What the model leaves over", columns, rows, note)
-
-
-def _sensitivity(section: Mapping[str, Any]) -> Table:
-    found = section["sensitivity"]
-    rows = [
-        Row(
-            (
-                f"{symbol} [{section['units'][name]}]",
-                f"{number(found['lower'][index])} … {number(found['upper'][index])}",
-                f"{fixed(found['first'][index], 2)} ± {fixed(found['first_half_width'][index], 2)}",
-                f"{fixed(found['total'][index], 2)} ± {fixed(found['total_half_width'][index], 2)}",
-            )
-        )
-        for index, (name, symbol) in enumerate(IDENTIFIABLE_SYMBOLS.items())
-    ]
-    note = (
-        "Share of the variance of the weighted FSS when each number is uniform within its range: by itself, "
-        f"and with all that it does together with others. FSS is {fixed(found['mean_fss'], 3)} ± "
-        f"{fixed(found['deviation_fss'], 3)} over the ranges; {number(found['evaluations'])} evaluations."
-    )
-    columns = ("number", "range", "first-order index", "total index")
-    return Table("What the fit is sensitive to (Sobol)", columns, rows, note)
 
 
 def _convergence(section: Mapping[str, Any]) -> Table:

@@ -30,8 +30,10 @@ from fingerpad.fitting.problem import IntArray
 from fingerpad.parameters import protocol
 from fingerpad.signals import SedTraces
 from fingerpad.studies import single_unit
+from fingerpad.studies.rate_uncertainty import sensitivity
 from fingerpad.studies.recording_methods import METHODS, Prepared
-from fingerpad.studies.recording_posterior import posterior
+from fingerpad.studies.recording_offset import Beside, check_beside, fit_offset
+from fingerpad.studies.recording_posterior import four_numbers, posterior, profiled
 from fingerpad.studies.reproduction import plain
 
 
@@ -44,6 +46,9 @@ def fit_recordings(
     windows_ms: Windows = WINDOWS_MS,
     seed: int = 0,
     with_posterior: bool = False,
+    with_profiles: bool = False,
+    with_sensitivity: bool = False,
+    beside: Beside | None = None,
     positions_mm: ArrayLike | None = None,
 ) -> dict[str, Any]:
     """Fit an afferent to what was recorded under stimuli whose strain energy density is known.
@@ -66,8 +71,16 @@ def fit_recordings(
         Of methods that draw.
     with_posterior : bool, optional
         Whether credible intervals are drawn as well, of the four numbers and of the rates.
+    with_profiles : bool, optional
+        Whether the likelihood of each of the four numbers is profiled.
+    with_sensitivity : bool, optional
+        Whether Sobol's indices tell what FSS is sensitive to.
+    beside : mapping of float to SedTraces or to a sequence of SedTraces, optional
+        The same energy density at places beside the receptor, by their offset along the finger, distal
+        positive [mm], on both sides of 0: with it the receptor's offset is fitted as a seventh parameter,
+        by least squares or CMA-ES, and told beside the fit.
     positions_mm : array_like (n_stimuli,), optional
-        Where along a line each stimulus was: in the posterior, neighbours may miss alike. [mm]
+        Where along a line each stimulus was: in posterior and profiles, neighbours may miss alike. [mm]
 
     Returns
     -------
@@ -97,16 +110,15 @@ def fit_recordings(
     (True, True)
     """
     rates = recordings if isinstance(recordings, RateRecordings) else recordings.rates(windows_ms)
+    if beside is not None:
+        check_beside(beside)
     folds = dealt_folds(len(rates.stimuli)) if memberships is None else np.asarray(memberships)
-    check_enough(rates, folds)
+    check_enough(rates, folds, len(IDENTIFIABLE_NAMES) + (beside is not None))
     model = AnyMotion.under(sed, windows_ms)
     prepared = METHODS[one_of("method", method, tuple(METHODS))](model, recordings, rates, seed)
     best = prepared.method.fit(prepared.problem, np.arange(len(rates.stimuli)))
     validation = cross_validate(prepared.problem, prepared.method, folds)
-    drawn = None
-    if with_posterior:
-        four = identifiable(prepared.six(best.parameters))
-        drawn = posterior(model, rates, four, seed, positions_mm)
+    four = identifiable(prepared.six(best.parameters))
     return plain(
         {
             "method": method,
@@ -119,7 +131,12 @@ def fit_recordings(
         | {
             "folds": _folds(prepared, rates, validation),
             "spikes": prepared.spikes(best, validation),
-            "posterior": drawn,
+            "posterior": posterior(model, rates, four, seed, positions_mm) if with_posterior else None,
+            "profiles": profiled(model, rates, four, positions_mm) if with_profiles else None,
+            "sensitivity": (
+                sensitivity(RateProblem(four_numbers(model), rates), four, seed) if with_sensitivity else None
+            ),
+            "offset": None if beside is None else fit_offset(beside, rates, folds, method, windows_ms, seed),
         }
     )
 
@@ -138,7 +155,7 @@ def dealt_folds(n_stimuli: int, n_folds: int | None = None) -> IntArray:
     return interleaved_folds(n_stimuli, n_folds)
 
 
-def check_enough(rates: RateRecordings, memberships: IntArray) -> None:
+def check_enough(rates: RateRecordings, memberships: IntArray, n_free: int = len(IDENTIFIABLE_NAMES)) -> None:
     """Raise `InputError` if a training set cannot be fitted, or a set not be judged.
 
     Parameters
@@ -147,6 +164,8 @@ def check_enough(rates: RateRecordings, memberships: IntArray) -> None:
         What is to be fitted.
     memberships : int array (n_stimuli,)
         Fold of each stimulus.
+    n_free : int, optional
+        Free numbers.
     """
     if memberships.shape != (len(rates.stimuli),):
         raise InputError(
@@ -154,9 +173,9 @@ def check_enough(rates: RateRecordings, memberships: IntArray) -> None:
         )
     for fold in np.unique(memberships):
         training = rates.chosen(np.flatnonzero(memberships != fold))
-        if training.n_rates < len(IDENTIFIABLE_NAMES):
+        if training.n_rates < n_free:
             raise InputError(
-                f"recordings must leave at least {len(IDENTIFIABLE_NAMES)} rates, one per free parameter, "
+                f"recordings must leave at least {n_free} rates, one per free parameter, "
                 f"when a fold is left out: without fold {fold + 1} there are {training.n_rates}, record more."
             )
         for rows in (memberships == fold, memberships != fold):

@@ -129,18 +129,27 @@ def _scatter_of(six: Callable[[FloatArray], FloatArray]) -> Callable[[Fit, Cross
     )
 
 
-def _four_numbers(model: AnyMotion, rates: RateRecordings, method_of: MethodOf) -> Prepared:
-    """Prepare a method for the four numbers that firing can tell, all methods with the same bounds."""
-    problem = RateProblem(Reparametrised(model, IDENTIFIABLE_NAMES, six_parameters), rates)
-    # Bounds only ask how strong a drive becomes, whatever the motion.
+def four_number_problem(model: AnyMotion, rates: RateRecordings) -> RateProblem:
+    """Rates to be predicted from the four numbers that firing can tell."""
+    return RateProblem(Reparametrised(model, IDENTIFIABLE_NAMES, six_parameters), rates)
+
+
+def bounds_under(model: AnyMotion) -> Bounds:
+    """Bounds of the four numbers under all stimuli, the same for all methods."""
+    # They only ask how strong a drive becomes, whatever the motion.
     sed, rate = (
         np.array([[max(float(getattr(group, name).max()) for group in model.drives)]] * 2)
         for name in ("sed_kpa", "rate_kpa_per_ms")
     )
-    envelope = Drive(np.array([0.0, 1.0]), sed, rate)
+    return bounds_of(Drive(np.array([0.0, 1.0]), sed, rate))
+
+
+def _four_numbers(model: AnyMotion, rates: RateRecordings, method_of: MethodOf) -> Prepared:
+    """Prepare a method for the four numbers that firing can tell."""
+    problem = four_number_problem(model, rates)
     return Prepared(
         problem,
-        method_of(problem, bounds_of(envelope)),
+        method_of(problem, bounds_under(model)),
         six_parameters,
         _scatter_of(six_parameters),
     )
@@ -157,10 +166,11 @@ def _closed_form(
     model: AnyMotion, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
 ) -> Prepared:
     """Prepare least squares along the slopes of the rate in closed form."""
-    return _four_numbers(model, rates, lambda problem, bounds: _along_slopes(model, problem, bounds))
+    return _four_numbers(model, rates, lambda problem, bounds: along_slopes(model, problem, bounds))
 
 
-def _along_slopes(model: AnyMotion, problem: RateProblem, bounds: Bounds) -> LeastSquares:
+def along_slopes(model: AnyMotion, problem: RateProblem, bounds: Bounds) -> LeastSquares:
+    """Least squares in the four numbers, along the slopes of the rate in closed form."""
     slopes = problem.jacobian_of(AnyMotionInClosedForm(model))
     return replace(by_differences(bounds), jacobian=slopes, name="slopes in closed form")
 
@@ -171,20 +181,26 @@ def _evolution(
     """Prepare CMA-ES from where the slopes in closed form lead."""
 
     def method_of(problem: RateProblem, bounds: Bounds) -> Method:
-        def search(begun: FloatArray) -> CovarianceAdaptation:
-            return CovarianceAdaptation(
-                begun,
-                bounds.scales,
-                bounds.low,
-                bounds.high,
-                first_spread=FIRST_SPREAD,
-                most_evaluations=MOST_EVALUATIONS,
-                seed=seed,
-            )
-
-        return Continued(_along_slopes(model, problem, bounds), search, name="CMA-ES")
+        return Continued(
+            along_slopes(model, problem, bounds),
+            lambda begun: search_from(begun, bounds, seed),
+            name="CMA-ES",
+        )
 
     return _four_numbers(model, rates, method_of)
+
+
+def search_from(begun: FloatArray, bounds: Bounds, seed: int) -> CovarianceAdaptation:
+    """CMA-ES that begins where a quicker method ended."""
+    return CovarianceAdaptation(
+        begun,
+        bounds.scales,
+        bounds.low,
+        bounds.high,
+        first_spread=FIRST_SPREAD,
+        most_evaluations=MOST_EVALUATIONS,
+        seed=seed,
+    )
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What recorded rates leave uncertain: credible intervals of the four numbers, and bands of rates."""
+"""What recorded rates leave uncertain: intervals and profiles of the four numbers, and bands of rates."""
 
 from __future__ import annotations
 
@@ -10,15 +10,12 @@ from numpy.typing import ArrayLike
 from fingerpad.checks import FloatArray
 from fingerpad.estimation.afferent_posterior import afferent_posterior, four_number_model
 from fingerpad.estimation.any_motion import WINDOWS_MS, AnyMotion
-from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, identifiable
+from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.estimation.rate_likelihood import RateLikelihood
-from fingerpad.estimation.rate_problem import AfferentModel, RateModel
+from fingerpad.estimation.rate_problem import AfferentModel, Reparametrised
 from fingerpad.estimation.recordings import RateRecordings
 from fingerpad.fitting.posterior import credible_band
-from fingerpad.studies import single_unit
-
-LEVEL = 0.95
-"""Probability within every interval and band."""
+from fingerpad.studies.rate_uncertainty import LEVEL, likely_points, possible, profiles
 
 
 def posterior(
@@ -57,14 +54,8 @@ def posterior(
     ConvergenceError
         If the draws have not converged.
     """
-    fitted = np.asarray(four, dtype=np.float64)
-    # A gain that ended at its bound, 0, has no logarithm to begin at.
-    begin = np.where(
-        (fitted > 0.0) | (np.arange(4) == 0), fitted, identifiable(single_unit.start_points()[0])
-    )
-    places = None if positions_mm is None else np.asarray(positions_mm, dtype=np.float64)
-    likelihood = RateLikelihood(four_number_model(_fastest(model)), rates, places)
-    found = afferent_posterior(likelihood, begin, seed=seed, **settings)
+    likelihood = _likelihood(model, rates, positions_mm)
+    found = afferent_posterior(likelihood, possible(four), seed=seed, **settings)
     return {
         "level": LEVEL,
         "seed": seed,
@@ -82,11 +73,35 @@ def posterior(
     }
 
 
-def _fastest(model: AnyMotion) -> RateModel:
-    """Return the same model in the form that is quickest over many parameters."""
+def profiled(
+    model: AnyMotion, rates: RateRecordings, four: ArrayLike, positions_mm: ArrayLike | None = None
+) -> list[dict[str, Any]]:
+    """Profile the likelihood of each of the four identifiable numbers.
+
+    Parameters
+    ----------
+    model, rates, four, positions_mm
+        As of `posterior`.
+
+    Returns
+    -------
+    list of dict
+        What `fingerpad.studies.rate_uncertainty.profiles` returns.
+    """
+    likelihood = _likelihood(model, rates, positions_mm)
+    return profiles(likelihood, likely_points(likelihood, possible(four)))
+
+
+def four_numbers(model: AnyMotion) -> Reparametrised:
+    """Return the model in the four identifiable numbers, in the form that is quickest over many of them."""
     if len(model.drives) > 1 or model.windows_ms != WINDOWS_MS:
-        return model
-    return AfferentModel(model.drives[0], model.refractory_ms)
+        return four_number_model(model)
+    return four_number_model(AfferentModel(model.drives[0], model.refractory_ms))
+
+
+def _likelihood(model: AnyMotion, rates: RateRecordings, positions_mm: ArrayLike | None) -> RateLikelihood:
+    places = None if positions_mm is None else np.asarray(positions_mm, dtype=np.float64)
+    return RateLikelihood(four_numbers(model), rates, places)
 
 
 def _band(draws_hz: FloatArray) -> dict[str, FloatArray]:

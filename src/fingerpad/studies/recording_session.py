@@ -16,6 +16,7 @@ import numpy as np
 from fingerpad.checks import one_of, whole
 from fingerpad.errors import InputError
 from fingerpad.estimation.any_motion import WINDOWS_MS, Windows
+from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.estimation.reading import Recorded
 from fingerpad.estimation.recordings import RateRecordings
 from fingerpad.estimation.stimuli import TactileStimulus
@@ -31,7 +32,9 @@ from fingerpad.store import Store, solve_missing
 from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.studies.recording_fit import check_enough, dealt_folds, fit_recordings
 from fingerpad.studies.recording_methods import METHODS, check_spikes
+from fingerpad.studies.recording_offset import check_offset
 from fingerpad.studies.reproduction import STORE_FOLDER, NoProgress, Progress, plain, software
+from fingerpad.studies.single_unit_methods import OFFSETS_MM
 
 EXAMPLE = "bar.csv"
 """Name of the file of `example`."""
@@ -62,6 +65,12 @@ class RecordingFit:
         of `SkinResponse.sample` as an extension.
     with_posterior : bool
         Whether credible intervals are drawn as well.
+    with_profiles : bool
+        Whether the likelihood of each number is profiled.
+    with_sensitivity : bool
+        Whether Sobol's indices of FSS are told.
+    with_offset : bool
+        Whether the receptor's place along the finger is fitted as well.
 
     Raises
     ------
@@ -78,6 +87,9 @@ class RecordingFit:
     jobs: int = 1
     dynamic_quantity: str = STORED_ENERGY
     with_posterior: bool = False
+    with_profiles: bool = False
+    with_sensitivity: bool = False
+    with_offset: bool = False
 
     def __post_init__(self) -> None:
         one_of("method", self.method, tuple(METHODS))
@@ -95,7 +107,9 @@ class RecordingFit:
                     f"windows must end with the stimuli, not at {end:g} ms: {name} ends at "
                     f"{stimulus.motion.end_ms:g} ms."
                 )
-        check_enough(self.rates, self.memberships)
+        if self.with_offset:
+            check_offset(self.method, [stimulus.x_mm for stimulus in self.recorded.stimuli.values()])
+        check_enough(self.rates, self.memberships, len(IDENTIFIABLE_NAMES) + self.with_offset)
         if self.method == "likelihood":
             motions = {stimulus.motion for stimulus in self.recorded.stimuli.values()}
             check_spikes(self.recorded.recordings, len(motions))
@@ -208,19 +222,28 @@ def run(fit: RecordingFit, progress: Progress | None = None, **provenance: Any) 
     wanted = list(fit.touches.values())
     with progress.stage("indentations", sum(not store.holds(touch) for touch in wanted)) as advance:
         computed = solve_missing(wanted, store, fit.jobs, lambda seconds: advance())
-    site = [[RECEPTOR_X_MM, 0.0]]
-    sed = [store.load(touch).sed(site, fit.dynamic_quantity) for touch in wanted]
+    offsets_mm = OFFSETS_MM if fit.with_offset else (0.0,)
+    sites = [[RECEPTOR_X_MM + offset, 0.0] for offset in offsets_mm]
+    felt = [store.load(touch).sed(sites, fit.dynamic_quantity) for touch in wanted]
+    beside = {
+        offset: [traces.part(slice(place, place + 1)) for traces in felt]
+        for place, offset in enumerate(offsets_mm)
+    }
     shifts_mm = _shifts_mm(list(recorded.stimuli.values()))
     with progress.stage("fit", 1) as advance:
         found = fit_recordings(
-            sed,
+            beside[0.0],
             recorded.recordings,
             fit.memberships,
             method=fit.method,
             windows_ms=fit.windows_ms,
             seed=fit.conditions.seed,
             with_posterior=fit.with_posterior,
-            positions_mm=shifts_mm,
+            with_profiles=fit.with_profiles,
+            with_sensitivity=fit.with_sensitivity,
+            beside=beside if fit.with_offset else None,
+            # Two stimuli in one place have no distance over which residuals could be alike.
+            positions_mm=shifts_mm if shifts_mm and len(set(shifts_mm)) == len(shifts_mm) else None,
         )
         advance()
     return plain(

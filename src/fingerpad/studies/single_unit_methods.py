@@ -17,7 +17,7 @@ from scipy.stats import qmc
 from fingerpad.checks import FloatArray
 from fingerpad.estimation.closed_form import ClosedFormModel
 from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, six_parameters
-from fingerpad.estimation.rate_problem import AfferentModel, RateProblem, Reparametrised
+from fingerpad.estimation.rate_problem import AfferentModel, RateModel, RateProblem, Reparametrised
 from fingerpad.estimation.receptor_offset import OFFSET_NAME, receptor_offset
 from fingerpad.estimation.recordings import PHASES, RateRecordings
 from fingerpad.fitting import (
@@ -78,13 +78,26 @@ def four_numbers(driven: Drive, recordings: RateRecordings) -> RateProblem:
 
 def with_offset(traces: Mapping[float, SedTraces], recordings: RateRecordings) -> RateProblem:
     """Build the problem of the four numbers and the place of the receptor."""
-    model = receptor_offset(tuple(traces), tuple(traces.values()))
-    five = Reparametrised(
+    return RateProblem(five_numbers(receptor_offset(tuple(traces), tuple(traces.values()))), recordings)
+
+
+def five_numbers(model: RateModel) -> Reparametrised:
+    """Let the four numbers that firing can tell and the receptor's offset drive a model of all seven.
+
+    Parameters
+    ----------
+    model : RateModel
+        With the paper's six parameters and the offset behind them.
+
+    Returns
+    -------
+    Reparametrised
+    """
+    return Reparametrised(
         model,
         (*IDENTIFIABLE_NAMES, OFFSET_NAME),
         lambda numbers: np.append(six_parameters(numbers[:4]), numbers[4]),
     )
-    return RateProblem(five, recordings)
 
 
 @dataclass(frozen=True)
@@ -101,9 +114,9 @@ class Bounds:
     high: FloatArray
     scales: FloatArray
 
-    def and_offset(self) -> Bounds:
+    def and_offset(self, low_mm: float = OFFSETS_MM[0], high_mm: float = OFFSETS_MM[-1]) -> Bounds:
         """Return the bounds of the same parameters and the place of the receptor. [mm]"""
-        offset = (OFFSETS_MM[0], OFFSETS_MM[-1], OFFSET_SCALE_MM)
+        offset = (low_mm, high_mm, OFFSET_SCALE_MM)
         sides = (self.low, self.high, self.scales)
         return Bounds(*(np.append(side, entry) for side, entry in zip(sides, offset, strict=True)))
 

@@ -11,20 +11,15 @@ from fingerpad.afferent import PARAMETER_NAMES
 from fingerpad.checks import FloatArray
 from fingerpad.estimation.afferent_posterior import AfferentPosterior, afferent_posterior, four_number_model
 from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, identifiable
-from fingerpad.estimation.many_rates import rates_of_each
 from fingerpad.estimation.rate_likelihood import INDEPENDENT, RateLikelihood, ResidualDraws
 from fingerpad.estimation.rate_problem import AfferentModel, RateProblem
 from fingerpad.fitting.identifiability import identifiability
 from fingerpad.fitting.posterior import credible_band
-from fingerpad.fitting.profile_likelihood import Profile, profile_likelihoods
-from fingerpad.fitting.sensitivity import sobol_indices
 from fingerpad.reference import bar_firing_rates
 from fingerpad.signals import SedTraces
 from fingerpad.studies import single_unit
+from fingerpad.studies.rate_uncertainty import LEVEL, SEEDS_OF_PROFILES, profiles, sensitivity
 from fingerpad.transduction import drive
-
-LEVEL = 0.95
-"""Probability within every interval and band."""
 
 PIECES = 8
 """Linear pieces of the drive between two given times. Rates differ by less than 0.01 spikes/s on average from
@@ -35,15 +30,6 @@ THOROUGH: dict[str, Any] = {"smallest_effective_size": 200.0}
 
 QUICK: dict[str, Any] = {"n_walkers": 40, "smallest_effective_size": 100.0, "largest_r_hat": 1.02}
 """Settings for a look: the ends err by a fifth of a standard deviation."""
-
-SEEDS_OF_PROFILES = 300
-"""Draws from the posterior that profiles start from."""
-
-SENSITIVITY_SHARE = 0.25
-"""Sobol's ranges reach from this share below the fit to this share above. [1]"""
-
-SENSITIVITY_POINTS = 512
-"""Base points of Sobol's design."""
 
 
 def result(sed: SedTraces, fitted: ArrayLike, seed: int, *, quick: bool = False) -> dict[str, Any]:
@@ -98,8 +84,8 @@ def result(sed: SedTraces, fitted: ArrayLike, seed: int, *, quick: bool = False)
         "evidence_for_alike_residuals": (
             alike.log_likelihood(some).max() - independent.log_likelihood(some).max()
         ),
-        "profiles": _profiles(alike, some),
-        "sensitivity": _sensitivity(RateProblem(model, recordings), four, seed),
+        "profiles": profiles(alike, some),
+        "sensitivity": sensitivity(RateProblem(model, recordings), four, seed),
     }
 
 
@@ -159,69 +145,4 @@ def _phase(drawn: ResidualDraws, observed_hz: FloatArray) -> dict[str, Any]:
         "residual_deviation_hz": _summary(drawn.deviation_hz),
         "residual_length_mm": _summary(drawn.length_mm),
         "probability_of_independence": (drawn.length_mm == INDEPENDENT).mean(),
-    }
-
-
-def _profiles(likelihood: RateLikelihood, some: FloatArray) -> list[dict[str, Any]]:
-    """Profile likelihoods of the four numbers; those that are positive are profiled in their logarithm."""
-
-    def log_likelihood(points: FloatArray) -> FloatArray:
-        numbers = np.concatenate([points[:, :1], np.exp(points[:, 1:])], axis=1)
-        heights = np.full(len(points), -np.inf)
-        # As in the prior: untouched skin elicits no spike.
-        silent = numbers[:, 0] * numbers[:, 3] < 1.0
-        if silent.any():
-            heights[silent] = likelihood.log_likelihood(numbers[silent])
-        return heights
-
-    starts = np.concatenate([some[:, :1], np.log(some[:, 1:])], axis=1)
-    found = profile_likelihoods(log_likelihood, starts, starts.std(axis=0), IDENTIFIABLE_NAMES, level=LEVEL)
-    return [
-        _profile(profile, np.exp if index else lambda values: values)
-        for index, profile in enumerate(found.profiles)
-    ]
-
-
-def _profile(profile: Profile, natural: Any) -> dict[str, Any]:
-    low, high = (float(natural(end)) for end in profile.interval)
-    return {
-        "name": profile.name,
-        "values": natural(profile.values),
-        "losses": profile.losses,
-        # An open end is None: 0 and infinity are as far as a logarithm goes.
-        "low": low if np.isfinite(profile.interval[0]) else None,
-        "high": high if np.isfinite(profile.interval[1]) else None,
-    }
-
-
-def _sensitivity(problem: RateProblem, four: FloatArray, seed: int) -> dict[str, Any]:
-    """Sobol's indices of FSS, each number between so much less and so much more than the fit."""
-
-    def fss(points: FloatArray) -> FloatArray:
-        residuals = [
-            weight * ((observed - predicted) ** 2).sum(axis=1) / (observed @ observed)
-            for weight, observed, predicted in zip(
-                (problem.dynamic_weight, problem.static_weight),
-                (problem.recordings.dynamic_rate_hz, problem.recordings.static_rate_hz),
-                rates_of_each(problem.model, points),
-                strict=True,
-            )
-            if observed is not None
-        ]
-        return 1.0 - np.sum(residuals, axis=0)
-
-    lower, upper = np.sort(four * np.array([[1.0 - SENSITIVITY_SHARE], [1.0 + SENSITIVITY_SHARE]]), axis=0)
-    found = sobol_indices(
-        fss, lower, upper, IDENTIFIABLE_NAMES, seed=seed, n_base=SENSITIVITY_POINTS, level=LEVEL
-    )
-    return {
-        "lower": found.lower,
-        "upper": found.upper,
-        "first": found.first,
-        "first_half_width": found.first_half_width,
-        "total": found.total,
-        "total_half_width": found.total_half_width,
-        "mean_fss": found.mean,
-        "deviation_fss": found.standard_deviation,
-        "evaluations": found.n_evaluations,
     }
