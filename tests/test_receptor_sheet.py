@@ -72,18 +72,6 @@ def test_end_organs_lie_on_the_normal_and_on_the_border():
     assert off.max() < 0.12
 
 
-def test_pairs_are_the_volar_points_of_the_skin():
-    rng = np.random.default_rng(3)
-    x = rng.uniform(5.0, 29.0, 200)
-    z = rng.uniform(-0.9, 0.9, 200) * FINGER.section(x)[2]
-    sheet = SHEETS["full"]
-    from_pairs = sheet.read(sheet.below_volar(np.column_stack([x, z])), centres(FULL).T)
-    from_points = sheet.read(sheet.below(FINGER.skin_point(x, z)), centres(FULL).T)
-    # The skin of the mesh passes beside the finger's by microns, which a steep flank makes longer.
-    steep = 1.0 / np.abs(FINGER.skin_normal(FINGER.skin_point(x, z))[:, 1])
-    assert (np.linalg.norm(from_pairs - from_points, axis=0) < 0.004 * steep).all()
-
-
 @pytest.mark.parametrize("name", SHEETS)
 def test_mirrored_points_read_mirrored_fields_alike(name):
     sheet, points = SHEETS[name], random_skin(200, 5)
@@ -145,17 +133,22 @@ def test_points_beside_the_skin_are_refused(site, side):
     assert abs(away - side) < 0.15 * side
 
 
-def test_a_block_is_read_up_to_its_rim():
+def test_a_block_is_read_up_to_its_rim_and_no_farther():
     edges = np.cumsum([0.0, 0.5, 0.6, 0.7, 0.8])
     block = block_mesh(edges, [0.0, 0.371, 0.471, 2.0], edges, layers=[0, 1, 2])
     sheet, rim = ReceptorSheet(block), edges[-1]
-    sites = np.array([[0.0, 0.0], [rim, rim], [0.0, rim], [1.0, 0.3]])
+    sites = np.array([[0.0, 0.0, 0.0], [rim, 0.0, rim], [0.0, 0.0, rim], [1.0, 0.0, 0.3]])
     x, _, z = centres(block).T
-    expected = 2.0 * sites[:, 0] - sites[:, 1]
-    assert_allclose(sheet.read(sheet.below_volar(sites), [2.0 * x - z])[0], expected, rtol=0, atol=1e-8)
-    assert_allclose(
-        sheet.below(np.insert(sites, 1, 0.0, axis=1)), sheet.below_volar(sites), rtol=0, atol=1e-8
-    )
+    expected = 2.0 * sites[:, 0] - sites[:, 2]
+    assert_allclose(sheet.read(sheet.below(sites), [2.0 * x - z])[0], expected, rtol=0, atol=1e-8)
+    for beyond in ([-0.01, 0.0, 1.0], [1.0, 0.0, rim + 0.01]):
+        with pytest.raises(InputError, match="must lie on the skin"):
+            sheet.below(np.array([beyond]))
+
+
+def test_no_finger_before_its_cut():
+    with pytest.raises(InputError, match="must lie on the skin"):
+        SHEETS["half"].below(np.array([[-0.05, -9.7, 0.0]]))
 
 
 def test_a_sheet_of_one_row_is_refused():
@@ -164,9 +157,9 @@ def test_a_sheet_of_one_row_is_refused():
         ReceptorSheet(block)
 
 
-@pytest.mark.parametrize(("z", "distal", "outwards"), [(0.0, 0.07, 0.0), (2.5, 0.06, 0.12)])
-def test_straight_down_is_not_along_the_normal(z, distal, outwards):
+@pytest.mark.parametrize(("z", "proximal", "inwards"), [(0.0, 0.07, 0.0), (2.5, 0.06, 0.12)])
+def test_straight_down_is_not_along_the_normal(z, proximal, inwards):
     """The numbers of docs/decisions/depth-of-sampling.md."""
     sheet = SHEETS["full"]
-    organ = sheet._border(sheet.below_volar(np.array([[17.37, z]])))[0][0]
-    assert_allclose([17.37 - organ[0], z - organ[2]], [distal, outwards], rtol=0, atol=0.006)
+    organ = sheet._border(sheet.below(FINGER.skin_point([17.37], [z])))[0][0]
+    assert_allclose([17.37 - organ[0], z - organ[2]], [proximal, inwards], rtol=0, atol=0.006)

@@ -66,8 +66,8 @@ class Population:
     Parameters
     ----------
     positions_mm : array (n_receptors, 2) or (n_receptors, 3)
-        x (distal positive) and z (lateral) on the volar skin above each end organ, or x, y and z of the skin
-        anywhere. [mm]
+        x (distal positive) and z (lateral) of each end organ on the volar side, or x, y and z of the skin
+        above it on any side. [mm]
     pitch_mm : float
         Distance between neighbours of the layout. [mm]
     afferent : Afferent, optional

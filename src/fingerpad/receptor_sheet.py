@@ -36,6 +36,9 @@ _BEYOND_RIM = 0.9  # elements past the last middle that are tried; the mesh's bo
 _OFF_THE_SKIN = 0.25
 """How far beside the skin of the mesh a site may lie, over the size of its elements, which cut corners."""
 
+_MIRROR = np.array([1.0, 1.0, -1.0])
+"""What the plane of symmetry, z = 0, does to a point."""
+
 Equations = Callable[[FloatArray, np.ndarray], tuple[FloatArray, FloatArray]]
 """From (u, v) of some sites (n, 2) and their numbers to what is to vanish (n, 2) and its Jacobian."""
 
@@ -64,42 +67,6 @@ class ReceptorSheet:
         if 1 in shape:
             raise InputError(f"Sampling needs two elements along and around, or more: got {shape}.")
 
-    def below_volar(self, sites_mm: FloatArray) -> FloatArray:
-        """Find end organs below places of the volar skin.
-
-        Parameters
-        ----------
-        sites_mm : array (n_sites, 2)
-            x and z. [mm]
-
-        Returns
-        -------
-        array (n_sites, 2)
-            u and v, for `read`.
-
-        Raises
-        ------
-        InputError
-            If a site is not on the volar skin.
-        """
-        target = self._in_mesh(sites_mm)
-
-        def equations(uv: FloatArray, which: np.ndarray) -> tuple[FloatArray, FloatArray]:
-            point, *slopes = self._skin(uv)
-            return point[:, [0, 2]] - target[which], np.stack(slopes, axis=-1)[:, [0, 2]]
-
-        middles = self._middles
-        volar = np.flatnonzero(self._outward(middles)[:, 1] < 0.0)
-        tree = cKDTree(self._skin(middles[volar])[0][:, [0, 2]])
-        uv, missed = self._solve(equations, middles[volar[tree.query(target)[1]]])
-        missed |= (self._outward(uv)[:, 1] >= 0.0) | self._beside(target, [0, 2])
-        if missed.any():
-            x, z = sites_mm[np.argmax(missed)]
-            raise InputError(
-                f"sites must lie on the volar skin of the mesh: (x, z) = ({x:g}, {z:g}) mm does not."
-            )
-        return self._below(uv)
-
     def below(self, sites_mm: FloatArray) -> FloatArray:
         """Find end organs below points of the skin, on any side of the finger.
 
@@ -124,6 +91,7 @@ class ReceptorSheet:
         point, *slopes = self._skin(uv)
         away = np.linalg.norm(point - target, axis=1)
         missed |= away > _OFF_THE_SKIN * np.linalg.norm(slopes, axis=2).max(axis=0)
+        missed |= self._past_the_rim(target)
         if missed.any():
             first = np.argmax(missed)
             x, y, z = sites_mm[first]
@@ -139,7 +107,7 @@ class ReceptorSheet:
         Parameters
         ----------
         uv : array (n_sites, 2)
-            From `below_volar` or `below`.
+            From `below`.
         values : array (n_times, n_sheet)
             Of the elements `mesh.living_epidermis`, flattened.
 
@@ -198,11 +166,12 @@ class ReceptorSheet:
             around = -first, n_around - 1.0 + last
         return (-_BEYOND_RIM, n_along - 1.0 + (0.5 if self._ends_in_pole else _BEYOND_RIM)), around
 
-    def _beside(self, sites_mm: FloatArray, axes: list[int]) -> np.ndarray:
-        """Whether sites lie out of the bounds of the mesh's skin, bool (n,)."""
+    def _past_the_rim(self, sites_mm: FloatArray) -> np.ndarray:
+        """Whether sites lie beyond the cut, or beside a body that is open to its sides, bool (n,)."""
+        axes = [0] if self._closed or all(self._mirrors) else [0, 2]
         skin = self.mesh.nodes_mm[self.mesh.skin_nodes][:, axes]
-        away = np.maximum(skin.min(axis=0) - sites_mm, sites_mm - skin.max(axis=0))
-        return away.max(axis=1) > _EXACT_MM
+        beyond = np.maximum(skin.min(axis=0) - sites_mm[:, axes], sites_mm[:, axes] - skin.max(axis=0))
+        return beyond.max(axis=1) > _EXACT_MM
 
     def _in_mesh(self, sites_mm: FloatArray) -> FloatArray:
         """Sites, mirrored into the half that the mesh holds."""
@@ -242,9 +211,13 @@ class ReceptorSheet:
 
     @cached_property
     def _border_control(self) -> FloatArray:
-        first = self.mesh.elements[self.mesh.living_epidermis[0, 0]]
-        through = int(np.flatnonzero(self.mesh.grid[0, 0] == first[0])[0])
-        return self._padded_points(through)
+        return self._padded_points(self._through_border)
+
+    @cached_property
+    def _through_border(self) -> int:
+        """Level of the grid that is the epidermal-dermal border, where the sheet's elements begin."""
+        lower = self.mesh.elements[self.mesh.living_epidermis[0, 0], 0]
+        return int(np.flatnonzero(self.mesh.grid[0, 0] == lower)[0])
 
     def _padded_points(self, through: int) -> FloatArray:
         """Middles of the faces of one level of the grid, lifted onto the surface of its nodes, padded.
@@ -253,10 +226,9 @@ class ReceptorSheet:
         nodes tell how much, along and around the finger.
         """
         nodes = self.mesh.nodes_mm[self.mesh.grid[:, :, through]]
-        mirror = np.array([1.0, 1.0, -1.0])
         middles = 0.25 * (nodes[:-1, :-1] + nodes[1:, :-1] + nodes[1:, 1:] + nodes[:-1, 1:])
         bulge = np.zeros_like(middles)
-        wide = self._wider(nodes, mirror)
+        wide = self._wider(nodes)
         bulge += 0.5 * _bulge(wide, 1)[:-1] + 0.5 * _bulge(wide, 1)[1:]
         tall = np.concatenate([2 * nodes[:1] - nodes[1:2], nodes, 2 * nodes[-1:] - nodes[-2:-1]])
         bulge += 0.5 * _bulge(tall, 0)[:, :-1] + 0.5 * _bulge(tall, 0)[:, 1:]
@@ -264,14 +236,14 @@ class ReceptorSheet:
         normal /= np.linalg.norm(normal, axis=2, keepdims=True)
         # Along the skin the middle of an element stays where it is.
         middles += (bulge * normal).sum(axis=2, keepdims=True) * normal
-        return self._padded(middles, mirror, nodes[-1, 0])
+        return self._padded(middles, _MIRROR, nodes[-1, 0])
 
-    def _wider(self, nodes: FloatArray, mirror: FloatArray) -> FloatArray:
+    def _wider(self, nodes: FloatArray) -> FloatArray:
         """Nodes with one more column at either end."""
         if self._closed:
             return np.concatenate([nodes[:, -2:-1], nodes, nodes[:, 1:2]], axis=1)
         ends = [
-            mirror * inner if mirrored else 2.0 * end - inner
+            _MIRROR * inner if mirrored else 2.0 * end - inner
             for (end, inner), mirrored in zip(
                 ((nodes[:, :1], nodes[:, 1:2]), (nodes[:, -1:], nodes[:, -2:-1])), self._mirrors, strict=True
             )

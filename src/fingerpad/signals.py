@@ -26,7 +26,8 @@ class Skin(Protocol):
     def sed(self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY) -> SedTraces:
         """Strain energy density over time below `sites` of the skin. [mm]
 
-        These are x and z (n_sites, 2) on its volar side, or x, y and z (n_sites, 3) anywhere.
+        These are x and z of end organs on the volar side (n_sites, 2), or x, y and z of the skin above them
+        on any side (n_sites, 3).
 
         With it comes what the dynamic response follows, if that is another quantity.
         """
@@ -254,7 +255,7 @@ class ResponseMap:
     Parameters
     ----------
     positions_mm : array (n_receptors, 2) or (n_receptors, 3)
-        x (distal positive) and z (lateral) on the volar skin, or x, y and z of the skin anywhere. [mm]
+        x (distal positive) and z (lateral) of each end organ, or x, y and z of the skin above it. [mm]
     pitch_mm : float
         Distance between neighbours of the layout. [mm]
     spikes : SpikeTrains
