@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -13,6 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from fingerpad.checks import FloatArray
+from fingerpad.files import write_atomically
 
 RESOLUTION_DPI = 150
 
@@ -65,12 +67,38 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return figure
 
 
-def png(draw: Callable[[dict[str, Any]], Figure], section: dict[str, Any]) -> bytes:
+def png(draw: Callable[[Any], Figure], section: Any) -> bytes:
     """Return what `draw` makes of a section of the results, as PNG; settings elsewhere stay as they are."""
     buffer = io.BytesIO()
     with matplotlib.rc_context(STYLE):
         draw(section).savefig(buffer, format="png", metadata={"Software": None})
     return buffer.getvalue()
+
+
+def write_png(draw: Callable[[Any], Figure], section: Any, path: Path) -> Path:
+    """Write what `draw` makes of a section of the results, or of results of your own, as PNG.
+
+    Parameters
+    ----------
+    draw : callable
+        One of the report's, such as `responses.draw`.
+    section : Any
+        What it draws.
+    path : Path
+        The file; folders are made as needed, and it is there whole or not at all.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be written.
+    """
+    write_atomically(Path(path), png(draw, section))
+    return Path(path)
 
 
 def say_nothing_to_draw(axes: Axes, text: str) -> None:

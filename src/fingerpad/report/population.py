@@ -74,8 +74,14 @@ def _span(values: FloatArray) -> tuple[float, float]:
     return low, max(high, 1.001 * low, 1e-3)
 
 
-def _ticks(scale: Normalize) -> list[float]:
-    """Round numbers within a logarithmic scale."""
+def round_ticks(scale: Normalize) -> list[float]:
+    """Return the round numbers within a logarithmic scale.
+
+    Examples
+    --------
+    >>> round_ticks(LogNorm(4.0, 60.0))
+    [5.0, 10.0, 20.0, 50.0]
+    """
     return [tick for tick in TICKS_MS if 0.0 <= float(scale(tick, clip=False)) <= 1.0]
 
 
@@ -104,7 +110,7 @@ def _surface(
     )
     axes.locator_params(nbins=5)
     if logarithmic:
-        shown = _ticks(scale)
+        shown = round_ticks(scale)
         axes.set_zticks(np.log10(shown), labels=[f"{tick:g}" for tick in shown])
     axes.set_xlabel("along, x [mm]", labelpad=6.0)
     axes.set_ylabel("across, z [mm]", labelpad=6.0)
@@ -182,7 +188,7 @@ def _map(
     axes.set_ylabel("across, z [mm]")
     bar = axes.figure.colorbar(picture, ax=axes, label=label, shrink=0.85)
     if isinstance(scale, LogNorm):
-        bar.set_ticks(_ticks(scale))
+        bar.set_ticks(round_ticks(scale))
         bar.minorticks_off()
         bar.ax.yaxis.set_major_formatter("{x:g}")
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
