@@ -7,14 +7,13 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Protocol
 
-import yaml
-
 from fingerpad.checks import finite, one_of
 from fingerpad.edged_indenters import Edge, Gap, Grating
 from fingerpad.errors import InputError
 from fingerpad.estimation.tables import Line, read_csv, read_text
 from fingerpad.indenters import Bar, Cylinder, FlatPunch, Indenter, Plate, Sphere
 from fingerpad.indenters import Line as Wire
+from fingerpad.plain_yaml import read_yaml
 from fingerpad.stimulus import ForceRampAndHold, RampAndHold, Stimulus
 
 INDENTERS: dict[str, type[Indenter]] = {
@@ -201,27 +200,9 @@ def _given(line: Line, columns: Mapping[str, str]) -> dict[str, Any]:
     return {column: line.number(column, unit) for column, unit in columns.items() if line.has(column)}
 
 
-class _Loader(yaml.SafeLoader):
-    """Refuses a key that stands twice, of which YAML would keep the second in silence."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys = [key.value for key, _ in node.value]
-        for key in keys:
-            if keys.count(key) > 1:
-                raise InputError(f"line {node.start_mark.line + 1}: {key} stands twice, keep one.")
-        return super().construct_mapping(node, deep)
-
-
 def _yaml_lines(path: Path) -> list[Line]:
     """Entries of a YAML list as lines of a table."""
-    text = read_text(path)
-    try:
-        content = yaml.load(text, _Loader)  # a SafeLoader: plain values only
-    except yaml.YAMLError as error:
-        said = " ".join(str(error).split()).rstrip(".")
-        raise InputError(f"{path} cannot be read as YAML ({said}): correct it there.") from error
-    except InputError as error:
-        raise InputError(f"{path}, {error}") from error
+    content = read_yaml(read_text(path), str(path))
     if not isinstance(content, list) or not content:
         raise InputError(f"{path} must be a list of stimuli, each a mapping: got {type(content).__name__}.")
     lines = []
