@@ -1,4 +1,4 @@
-"""The command line: `fingerpad reproduce`, `fit`, `drives`, `refine`, `materials` and `export`."""
+"""The command line: `reproduce`, `fit`, `discriminate`, `drives`, `refine`, `materials` and `export`."""
 
 from __future__ import annotations
 
@@ -306,6 +306,69 @@ def _stimuli(stimulus: str, column: str | None, given: dict[str, float | None]) 
     motion = RampAndHold(depth_mm=sizes.pop("depth")) if "depth" in sizes else RampAndHold()
     bar = ShiftedBar(Bar(**{f"{key}_mm": size for key, size in sizes.items()}), motion)
     return bar if column is None else replace(bar, column=column)
+
+
+@app.command("discriminate")
+def discriminate_command(
+    question: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="QUESTION",
+            help="YAML file, see docs/discriminate.md, or the name of a ready-made question.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option(help="Folder for page, figures, results and stored indentations.")
+    ] = Path("discriminate"),
+    resolution: Annotated[
+        str | None, typer.Option(help=f"Instead of the question's: {', '.join(RESOLUTIONS)}.")
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(parser=_whole_number, metavar="INTEGER", help="Processes; one per core by default."),
+    ] = None,
+    ready_made: Annotated[
+        bool, typer.Option("--list", help="Name the questions that come with the package, and end.")
+    ] = False,
+    example: Annotated[
+        str | None, typer.Option(help="Print one of them, to make it your own, and end.")
+    ] = None,
+) -> None:
+    """Ask what a person could tell apart: any stimuli, any population, any code."""
+    from rich.console import Console
+
+    from fingerpad.checks import one_of
+    from fingerpad.report.discriminate import summary, write_discrimination_page
+    from fingerpad.studies import discriminate, question_file
+
+    known = question_file.ready_made()
+    if ready_made:
+        for name, text in known.items():
+            typer.echo(f"{name}: {question_file.title(text)}")
+        return
+    if example is not None:
+        typer.echo(known[one_of("--example", example, tuple(known))], nl=False)
+        return
+    if question is None:
+        raise InputError(
+            f"discriminate needs a question, a YAML file or one of {', '.join(known)}: see --help."
+        )
+    asked = question_file.read_question(question, resolution=resolution)
+    task = discriminate.Discrimination(asked, out, jobs if jobs is not None else _cores(), question)
+    _make_writable(out)
+    with _interruptible():
+        results = discriminate.run(
+            task,
+            _Bars(Console(stderr=True)),
+            command=shlex.join(["fingerpad", *sys.argv[1:]]),
+            inputs=question_file.provenance(question, asked),
+        )
+        write_atomically(out / "discriminate.json", json.dumps(results, indent=1, allow_nan=False).encode())
+        page = write_discrimination_page(results, out)
+    for paragraph in summary(results["discrimination"]):
+        typer.echo(paragraph)
+    typer.echo(f"Report: {page}")
+    typer.echo(f"Results: {out / 'discriminate.json'}")
 
 
 @app.command("drives")

@@ -1,0 +1,399 @@
+"""A question of one's own, answered: what codes make of known skins, what is refused, what is written."""
+
+import hashlib
+import json
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+
+from fingerpad import cli
+from fingerpad.discrimination import Experiment, discriminate_euclidean, discriminate_gradient_sum
+from fingerpad.encoding import neighbour_pairs
+from fingerpad.errors import InputError
+from fingerpad.report import discriminate as report
+from fingerpad.signals import SedTraces
+from fingerpad.studies import discriminate as study
+from fingerpad.studies.conditions import RECEPTOR_X_MM
+from fingerpad.studies.question import CurveSettings
+from fingerpad.studies.question_answers import Asked, result
+from fingerpad.studies.question_file import parsed, ready_made
+from fingerpad.studies.question_population import population_of
+from fingerpad.studies.question_stimuli import presented
+from fingerpad.studies.readings import SESSION, curves
+from fingerpad.studies.reproduction import plain
+
+ROOT = Path(__file__).parents[1]
+QUESTION = {
+    "question": "Which bumps?",
+    "common": {"indenter": "sphere"},
+    "stimuli": {"vary": "curvature_per_m", "values": [200, 220, 240, 280, 320]},
+    "standard": 200,
+    "population": {"rows": 4, "columns": 4},
+    "code": ["gradient_sum", "euclidean"],
+    "measure": ["static", "dynamic", "latency"],
+    "noise": 0.1,
+    "experiment": {"seed": 5, "distributions": 20, "hit_rates": 50},
+}
+
+
+class Bump:
+    """A skin that a sphere has pressed: the more it is curved, the higher and narrower its energy density."""
+
+    def __init__(self, curvature_per_m, peak_kpa=3.0):
+        self.peak_kpa = peak_kpa * curvature_per_m / 200.0
+        self.width_mm = 2.0 * np.sqrt(200.0 / curvature_per_m)
+
+    def sed(self, sites, dynamic_quantity="stored"):
+        squared = np.square(np.asarray(sites)[:, [0, -1]] - [RECEPTOR_X_MM, 0.0]).sum(axis=1)
+        peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
+        return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.9], peaks), kinks_ms=[50.0])
+
+
+def asked(**parts):
+    question = parsed(QUESTION | parts)
+    return Asked(question, presented(question), population_of(question))
+
+
+def bumps(question, **more):
+    return {stimulus.name: Bump(stimulus.indenter.curvature_per_m, **more) for stimulus in question.stimuli}
+
+
+@pytest.fixture(scope="module")
+def answered():
+    question = asked()
+    return result(question, bumps(question))
+
+
+def reading(section, code, measure):
+    return next(one for one in section["readings"] if (one["code"], one["measure"]) == (code, measure))
+
+
+# What a code makes of known skins
+
+
+def test_hit_rates_are_those_of_the_observers_with_the_questions_own_numbers(answered):
+    question = asked()
+    static = np.array(answered["responses"]["static"])
+    np.testing.assert_array_equal(
+        static,
+        [question.population.respond(skin).static_rate_hz for skin in bumps(question).values()],
+    )
+    plan = Experiment(distributions=20, hit_rates=50)
+    neighbours = neighbour_pairs(question.population.positions_mm, 1.0)
+    sums = discriminate_gradient_sum(static, neighbours, 0.1, 5, plan, session=SESSION)
+    distances = discriminate_euclidean(static, 0.1, 5, plan, session=SESSION)
+    for code, expected in (("gradient_sum", sums), ("euclidean", distances)):
+        found = reading(answered, code, "static")
+        np.testing.assert_array_equal(found["hit_rate"], expected.hit_rate)
+        np.testing.assert_array_equal(found["hit_rate_sd"], expected.hit_rate_sd)
+
+
+def test_every_code_reads_every_measure_in_the_order_of_the_question(answered):
+    assert [(one["code"], one["measure"]) for one in answered["readings"]] == [
+        (code, measure) for code in QUESTION["code"] for measure in QUESTION["measure"]
+    ]
+    assert answered["stimulus"] == ["200", "220", "240", "280", "320"]
+    assert answered["axis"] == "curvature [1/m]"
+    for one in answered["readings"]:
+        assert len(one["hit_rate"]) == 4
+        assert len(one["statistic"]["mean"]) == 5
+
+
+def test_the_statistic_rises_with_what_is_told_apart_and_distances_begin_above_zero(answered):
+    sums = reading(answered, "gradient_sum", "static")["statistic"]
+    distances = reading(answered, "euclidean", "static")["statistic"]
+    for statistic in (sums, distances):
+        assert (np.diff(statistic["mean"]) > 0.0).all()
+        assert (statistic["sd"] > 0.0).all()
+    assert distances["mean"][0] > 0.0
+
+
+def test_nobody_waits_longer_for_first_spikes_than_the_ramp_unless_told():
+    def latest_ms(**parts):
+        question = asked(measure="latency", code="gradient_sum", **parts)
+        return np.max(result(question, bumps(question, peak_kpa=0.3))["responses"]["latency"])
+
+    assert latest_ms() == 50.0
+    assert 50.0 < latest_ms(windows_ms={"latency": 900}) < 900.0
+    assert latest_ms(common={"indenter": "sphere", "ramp_ms": 40}) == 40.0
+
+
+def test_without_noise_every_difference_is_seen():
+    question = asked(noise=0)
+    found = result(question, bumps(question))
+    assert all((np.array(one["hit_rate"]) == 1.0).all() for one in found["readings"])
+    for one in found["readings"]:
+        assert all("why_not" in side for side in one["curves"])
+
+
+@pytest.mark.parametrize("code", ["gradient_sum", "euclidean"])
+def test_fitted_noise_meets_the_hit_rates_of_a_known_observer(code):
+    known = asked(noise=0.13, code=code, measure="static", experiment={"seed": 5})
+    rates = result(known, bumps(known))["readings"][0]["hit_rate"]
+    points = [{"at": 220, "hit_rate": float(rates[0])}, {"at": 320, "hit_rate": float(rates[3])}]
+    points.append({"at": 999, "hit_rate": 0.9})  # not pressed: drawn, not fitted
+    question = asked(noise="fitted", code=code, measure="static", observed={"points": points})
+    noise = result(question, bumps(question))["noise"]
+    assert noise["sigma"] == pytest.approx(0.13, rel=0.05)
+    assert noise["fitted_to"]["stimulus"] == ["220", "320"]
+    assert (noise["fitted_to"]["code"], noise["fitted_to"]["measure"]) == (code, "static")
+
+
+def test_observed_points_have_wilsons_interval_where_trials_are_known():
+    points = [{"at": "220", "hit_rate": 0.6, "trials": 50}, {"at": 250, "hit_rate": 0.7}]
+    question = asked(
+        observed={"points": points, "source": "two people"}, measure="static", code="gradient_sum"
+    )
+    observed = result(question, bumps(question))["observed"]
+    assert [point["level"] for point in observed["points"]] == [220.0, 250.0]
+    # p = 0.6, n = 50, z = 1.96: (p + z²/2n ± z sqrt(p(1-p)/n + z²/4n²)) / (1 + z²/n)
+    assert observed["points"][0]["interval"] == pytest.approx((0.4618, 0.7239), abs=1e-4)
+    assert observed["points"][1]["interval"] is None
+
+
+# Curves
+
+
+def weibull(difference, at_75, steepness):
+    return 1.0 - 0.5 * 0.5 ** ((np.asarray(difference) / at_75) ** steepness)
+
+
+def test_a_curve_finds_a_known_threshold_on_either_side_of_the_standard():
+    levels = [100.0, 104.0, 108.0, 112.0, 120.0, 97.0, 94.0, 88.0]
+    difference = np.abs(np.array(levels[1:]) - 100.0)
+    rates = weibull(difference, 8.0, 1.5)
+    above, below = curves(levels, rates, 2000, CurveSettings(), seed=1)
+    assert (above["side"], below["side"]) == ("above", "below")
+    np.testing.assert_array_equal(above["difference"], [4.0, 8.0, 12.0, 20.0])
+    np.testing.assert_array_equal(below["difference"], [3.0, 6.0, 12.0])
+    for side, sign in ((above, 1.0), (below, -1.0)):
+        threshold = side["threshold"]
+        assert threshold["difference"] == pytest.approx(8.0, abs=0.15)
+        assert threshold["level"] == pytest.approx(100.0 + sign * 8.0, abs=0.15)
+        assert threshold["over_standard"] == pytest.approx(0.08, abs=0.0015)
+        for kind in ("bootstrap", "posterior"):
+            low, high = threshold[f"{kind}_interval"]
+            assert low < threshold["difference"] < high
+        np.testing.assert_allclose(
+            side["curve"]["proportion"], weibull(side["curve"]["difference"], 8.0, 1.5), atol=0.01
+        )
+        assert (side["curve"]["low"] <= side["curve"]["proportion"]).all()
+        assert (side["curve"]["high"] >= side["curve"]["proportion"]).all()
+
+
+def test_more_trials_narrow_the_interval_as_their_root():
+    levels, rates = [0.0, 4.0, 8.0, 12.0, 20.0], weibull([4.0, 8.0, 12.0, 20.0], 8.0, 1.5)
+    few, many = (
+        curves(levels, rates, trials, CurveSettings(), seed=1)[0]["threshold"] for trials in (100, 1600)
+    )
+    ratio = np.diff(few["posterior_interval"]) / np.diff(many["posterior_interval"])
+    assert ratio[0] == pytest.approx(4.0, rel=0.25)
+    assert few["over_standard"] is None  # of nothing
+
+
+def test_where_there_is_no_curve_it_says_why():
+    (one,) = curves([1.0, 2.0], np.array([0.8]), 100, CurveSettings(), seed=1)
+    assert one["why_not"] == "A curve needs two comparisons on a side of the standard or more: got 1."
+    (low,) = curves([0.0, 1.0, 2.0], np.array([0.5, 0.5]), 100, CurveSettings(), seed=1)
+    assert "threshold" in low["why_not"]
+
+
+def test_stimuli_without_levels_have_hit_rates_and_no_curve():
+    listed = [{"name": "blunt", "curvature_per_m": 200}, {"name": "sharp", "curvature_per_m": 300}]
+    question = asked(stimuli=listed, standard="blunt", measure="static")
+    found = result(question, bumps(question))
+    assert found["level"] is None
+    assert [one["curves"] for one in found["readings"]] == [[], []]
+    for draw in (report.draw_curves, report.draw_statistics, report.draw_responses):
+        (*_, last) = draw(found).axes
+        assert last.get_figure()
+
+
+# Silence
+
+
+def test_a_population_that_stays_silent_has_no_hit_rate():
+    question = asked()
+    with pytest.raises(
+        InputError, match=r"stays silent: by static or dynamic or latency none of its 16 .* any stimulus"
+    ):
+        result(question, bumps(question, peak_kpa=0.01))
+
+
+def test_silence_under_one_stimulus_is_silence_of_that_measure_alone():
+    # The bluntest bump is too low for two spikes in the ramp, but not in the hold.
+    question = asked(code="gradient_sum", measure=["dynamic", "static"], standard=320)
+    skins = bumps(question) | {"200": Bump(200.0, peak_kpa=0.2)}
+    found = result(question, skins)
+    dynamic, static = found["readings"]
+    assert (dynamic["silent"], dynamic["hit_rate"]) == (["200"], None)
+    assert static["silent"] == []
+    assert len(static["hit_rate"]) == 4
+    assert "silent under 200" in report.answer_tables(found)[1].note
+    assert report.draw_curves(found)
+    assert report.summary(found)[0].startswith("Gradient Sum of static rates tells")
+
+
+def test_noise_is_not_fitted_to_silence():
+    question = asked(
+        noise="fitted", measure=["dynamic", "static"], observed={"points": [{"at": 320, "hit_rate": 0.9}]}
+    )
+    skins = bumps(question) | {"220": Bump(200.0, peak_kpa=0.2)}
+    with pytest.raises(
+        InputError, match=r"noise cannot be fitted: by the measure dynamic .* the stimulus 220"
+    ):
+        result(question, skins)
+
+
+# The command
+
+
+@pytest.fixture
+def call(monkeypatch, capsys, tmp_path):
+    """Run the command in an empty folder; presses take no time."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(study, "solve_missing", lambda touches, *_: len(touches))
+
+    def pressed(self, touch):
+        skin = Bump(touch.indenter.curvature_per_m)
+        skin.mesh = touch.mesh
+        return skin
+
+    monkeypatch.setattr(study.Store, "load", pressed)
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["fingerpad", "discriminate", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        said = capsys.readouterr()
+        return ended.value.code or 0, said.out, said.err
+
+    return run
+
+
+def written(folder):
+    return {str(path.relative_to(folder)) for path in folder.rglob("*.*")}
+
+
+# JSON is YAML.
+MINE = json.dumps(QUESTION | {"skin": {"resolution": "quick"}, "code": "gradient_sum", "measure": "static"})
+
+
+def test_an_answer_is_a_page_figures_and_numbers_with_their_origin(call, tmp_path):
+    (tmp_path / "mine.yaml").write_text(MINE)
+    status, said, errors = call("mine.yaml", "--jobs", "1")
+    assert (status, errors) == (0, "")
+    results = json.loads((tmp_path / "discriminate" / "discriminate.json").read_text())
+    section, manifest = results["discrimination"], results["manifest"]
+    lines = said.splitlines()
+    assert lines[0].startswith("Gradient Sum of static rates tells 220 from 200 in ")
+    assert lines[-2:] == ["Report: discriminate/discriminate.html", "Results: discriminate/discriminate.json"]
+    assert written(tmp_path / "discriminate") == {
+        "discriminate.html",
+        "discriminate.json",
+        *(f"figures/{name}.png" for name in ("curves", "responses", "statistics")),
+    }
+    assert manifest["command"] == "fingerpad discriminate mine.yaml --jobs 1"
+    assert manifest["inputs"] == [{"file": "mine.yaml", "sha256": hashlib.sha256(MINE.encode()).hexdigest()}]
+    assert (manifest["seed"], manifest["resolution"], manifest["materials"]) == (5, "quick", "trial3")
+    assert manifest["question"]["stimuli"]["values"] == [200.0, 220.0, 240.0, 280.0, 320.0]
+    assert parsed(manifest["question"]) == parsed(json.loads(MINE))  # what was asked can be asked again
+    page = (tmp_path / "discriminate" / "discriminate.html").read_text()
+    assert "<h1>Which bumps?</h1>" in page
+    assert page.count("data:image/png;base64,") == 3
+    threshold = section["readings"][0]["curves"][0]["threshold"]
+    assert f"<td>{threshold['difference']:.3g}</td>" in page
+
+
+def test_the_same_seed_gives_the_same_numbers_and_another_others():
+    def answer(seed):
+        question = asked(measure="static", experiment={"seed": seed, "distributions": 20})
+        return plain(result(question, bumps(question)))
+
+    first, again, other = answer(5), answer(5), answer(6)
+    assert first == again
+    assert first["responses"] == other["responses"]
+    for ours, theirs in zip(first["readings"], other["readings"], strict=True):
+        assert ours["hit_rate"] != theirs["hit_rate"]
+        assert (
+            ours["curves"][0]["threshold"]["bootstrap_interval"]
+            != theirs["curves"][0]["threshold"]["bootstrap_interval"]
+        )
+
+
+def test_a_ready_made_question_is_asked_by_name_or_made_ones_own(call, tmp_path):
+    status, said, _ = call("--list")
+    assert status == 0
+    assert [line.split(":")[0] for line in said.splitlines()] == list(ready_made())
+    status, said, _ = call("--example", "sphere_curvature")
+    assert (status, said) == (0, ready_made()["sphere_curvature"])
+    assert list(tmp_path.iterdir()) == []
+    assert call("sphere_curvature", "--resolution", "quick", "--out", "named")[0] == 0
+    (tmp_path / "mine.yaml").write_text(said)
+    assert call("mine.yaml", "--resolution", "quick", "--out", "own")[0] == 0
+    named, own = (
+        json.loads((tmp_path / folder / "discriminate.json").read_text()) for folder in ("named", "own")
+    )
+    assert named["discrimination"] == own["discrimination"]
+    assert named["manifest"]["inputs"][0]["sha256"] == own["manifest"]["inputs"][0]["sha256"]
+    assert named["manifest"]["resolution"] == "quick"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "discriminate needs a question, a YAML file or one of"),
+        (["none.yaml"], "none.yaml must be a file that can be read"),
+        (["bumps"], "bumps must be a YAML file or one of the ready-made questions"),
+        (["bad.yaml"], "bad.yaml, standard must be one of the stimuli"),
+        (["broken.yaml"], "broken.yaml cannot be read as YAML"),
+        (["empty.yaml"], "empty.yaml, a question must be a mapping"),
+        (["mine.yaml", "--jobs", "0"], "jobs must be a whole number of at least 1"),
+        (["mine.yaml", "--resolution", "high"], "skin.resolution must be one of quick"),
+        (["--example", "bumps"], "--example must be one of"),
+        (["mine.yaml", "--out", "mine.yaml"], "--out must be a folder that can be written"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_bad_input_is_one_sentence_and_status_2_and_nothing_is_written(call, tmp_path, arguments, said):
+    files = {
+        "mine.yaml": MINE,
+        "bad.yaml": MINE.replace('"standard": 200', '"standard": 201'),
+        "broken.yaml": "question: [",
+        "empty.yaml": "",
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    status, out, errors = call(*arguments)
+    assert (status, out) == (2, "")
+    assert said in errors
+    assert errors.startswith("fingerpad: ")
+    assert errors.endswith(".\n")
+    assert errors.count("\n") == 1
+    assert {path.name for path in tmp_path.iterdir()} == set(files)
+
+
+def test_a_silent_population_writes_no_answer(call, tmp_path, monkeypatch):
+    (tmp_path / "mine.yaml").write_text(MINE)
+    monkeypatch.setattr(
+        Bump, "sed", lambda self, sites, *_: SedTraces([0.0, 50.0, 1000.0], np.zeros((3, len(sites))))
+    )
+    status, _, errors = call("mine.yaml")
+    assert status == 2
+    assert "stays silent" in errors
+    assert written(tmp_path / "discriminate") == set()
+
+
+def test_the_guide_names_every_option_and_shows_commands_that_parse():
+    command = typer.main.get_command(cli.app).commands["discriminate"]
+    options = {name for option in command.params for name in option.opts if name.startswith("--")}
+    page = (ROOT / "docs" / "discriminate.md").read_text(encoding="utf-8")
+    shown = set(re.findall(r"^\| `(--\w+)", page, re.MULTILINE))
+    assert shown == options
+    for line in re.findall(r"^fingerpad discriminate (.*)$", page, re.MULTILINE):
+        arguments = line.split(">")[0].split()
+        assert command.make_context("discriminate", arguments, resilient_parsing=True)

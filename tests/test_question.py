@@ -1,0 +1,436 @@
+"""A question of one's own as a file: what it may say, what it means, and how it is refused."""
+
+import json
+import re
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fingerpad.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.errors import InputError
+from fingerpad.estimation.stimuli import INDENTERS
+from fingerpad.indenters import Bar, Sphere
+from fingerpad.plain_yaml import read_yaml
+from fingerpad.population import Population
+from fingerpad.stimulus import ForceRampAndHold, RampAndHold
+from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.studies.question import Question, StimulusSettings
+from fingerpad.studies.question_answers import Asked
+from fingerpad.studies.question_file import parsed, read_question, ready_made
+from fingerpad.studies.question_population import afferent_of, population_of
+from fingerpad.studies.question_stimuli import presented, touches
+from fingerpad.studies.sphere_discrimination import touches as sphere_touches
+
+ROOT = Path(__file__).parents[1]
+SPHERES = {
+    "question": "Which spheres?",
+    "common": {"indenter": "sphere"},
+    "stimuli": {"vary": "curvature_per_m", "values": [287, 296, 365]},
+    "standard": 287,
+    "noise": 0.1,
+}
+BARS = {
+    "question": "Which bars?",
+    "common": {"indenter": "bar", "fillet_mm": 0.2, "force_mn": 150.0},
+    "stimuli": [
+        {"name": "narrow", "width_mm": 2.0},
+        {"name": "wide", "width_mm": 4.0, "offset_mm": [0.5, 0.0]},
+        {"name": "deep", "width_mm": 2.0, "depth_mm": 0.8, "tilt_deg": 0.0, "friction": 0.3},
+    ],
+    "standard": "wide",
+    "noise": 0.1,
+}
+
+
+def changed(content, **parts):
+    """A question with other parts; None leaves a part out."""
+    return {key: part for key, part in (content | parts).items() if part is not None}
+
+
+def asked(content):
+    question = parsed(content)
+    touches(question)
+    return Asked(question, presented(question), population_of(question))
+
+
+# What a file means
+
+
+def test_what_varies_makes_one_stimulus_per_value_and_the_standard_comes_first():
+    stimuli = presented(parsed(changed(SPHERES, standard=296)))
+    assert [stimulus.name for stimulus in stimuli] == ["296", "287", "365"]
+    assert [stimulus.level for stimulus in stimuli] == [296.0, 287.0, 365.0]
+    assert [stimulus.indenter for stimulus in stimuli] == [Sphere(296.0), Sphere(287.0), Sphere(365.0)]
+    assert {stimulus.motion for stimulus in stimuli} == {RampAndHold()}
+
+
+def test_listed_stimuli_say_what_they_do_not_share():
+    wide, narrow, deep = presented(parsed(BARS))
+    assert (wide.name, wide.level, wide.indenter) == ("wide", None, Bar(4.0, 0.2))
+    assert (wide.motion, wide.offset_mm) == (ForceRampAndHold(150.0), (0.5, 0.0))
+    assert (narrow.indenter, narrow.offset_mm, narrow.tilt_deg) == (Bar(2.0, 0.2), (0.0, 0.0), None)
+    # Its own depth takes the place of the force that the others share.
+    assert (deep.motion, deep.tilt_deg, deep.friction) == (RampAndHold(0.8), 0.0, 0.3)
+
+
+def test_a_force_or_a_duration_may_vary_as_well_as_a_size():
+    forces = changed(SPHERES, stimuli={"vary": "force_mn", "values": [50, 80]}, standard=50)
+    assert [stimulus.motion for stimulus in presented(parsed(forces))] == [
+        ForceRampAndHold(50.0),
+        ForceRampAndHold(80.0),
+    ]
+    ramps = changed(SPHERES, stimuli={"vary": "ramp_ms", "values": [50, 25]}, standard=50)
+    assert [stimulus.motion.ramp_ms for stimulus in presented(parsed(ramps))] == [50.0, 25.0]
+
+
+def test_every_size_of_every_indenter_can_be_given():
+    sizes = {size.name for indenter in INDENTERS.values() for size in fields(indenter)}
+    assert sizes <= set(StimulusSettings.model_fields)
+
+
+def test_the_papers_spheres_are_the_very_touches_of_a_reproduction():
+    ours = touches(read_question("sphere_curvature", resolution="quick"))
+    theirs = {
+        f"{curvature:g}": touch
+        for (at, curvature), touch in sphere_touches(Conditions("quick")).items()
+        if at == 0.0
+    }
+    assert ours == theirs
+
+
+def test_all_stimuli_meet_one_mesh_that_is_fine_below_each_of_them():
+    pressed = touches(parsed(changed(BARS, skin={"resolution": "quick"})))
+    gradings = {touch.grading for touch in pressed.values()}
+    assert len(gradings) == 1
+    grading = gradings.pop()
+    for touch in pressed.values():
+        reach = touch.indenter.half_width_mm
+        assert grading.centre_mm - grading.half_length_mm < touch.at_mm[0] - reach
+        assert grading.centre_mm + grading.half_length_mm > touch.at_mm[0] + reach
+    assert pressed["wide"].at_mm == (RECEPTOR_X_MM + 0.5, 0.0)
+    assert pressed["deep"].tilt_deg == 0.0
+    assert pressed["narrow"].tilt_deg == Conditions("quick").skin_tilt_deg
+
+
+def test_beside_the_midline_both_halves_are_pressed():
+    beside = changed(
+        SPHERES, common={"indenter": "sphere", "offset_mm": [0.0, 1.0]}, skin={"resolution": "quick"}
+    )
+    assert all(touch.grading.full and touch.at_mm[1] == 1.0 for touch in touches(parsed(beside)).values())
+
+
+def test_a_population_without_further_words_is_the_papers():
+    population, paper = population_of(parsed(SPHERES)), Population.grid()
+    np.testing.assert_array_equal(population.positions_mm, paper.positions_mm)
+    assert population.afferent == Afferent()
+
+
+@pytest.mark.parametrize("layout", ["rectangular", "hexagonal", "uniform", "jittered", "poisson-disc"])
+def test_any_layout_fills_its_region_at_its_density(layout):
+    region = {"shape": "rectangle", "length_mm": 8.0, "width_mm": 6.0}
+    settings = {
+        "layout": layout,
+        "density_per_cm2": 150,
+        "region": region,
+        "offset_mm": [1.0, 0.0],
+        "seed": 3,
+    }
+    population = population_of(parsed(changed(SPHERES, population=settings)))
+    assert abs(len(population) - 0.48 * 150) <= 8
+    x, z = population.positions_mm[:, 0], population.positions_mm[:, -1]
+    assert abs(x.mean() - RECEPTOR_X_MM - 1.0) < 1.0
+    assert np.ptp(x) <= 8.5
+    assert np.ptp(z) <= 6.1
+    again = population_of(parsed(changed(SPHERES, population=settings)))
+    np.testing.assert_array_equal(again.positions_mm, population.positions_mm)
+
+
+def test_seed_and_spread_make_another_finger():
+    def sensitivity(**settings):
+        return population_of(parsed(changed(SPHERES, population=settings))).sensitivity
+
+    assert sensitivity() is None
+    first, other = sensitivity(sensitivity_spread=0.4), sensitivity(sensitivity_spread=0.4, seed=1)
+    assert first.shape == other.shape == (18,)
+    assert (first != other).all()
+
+
+def test_an_afferent_is_ours_or_ones_own_numbers_or_of_a_file_of_results(tmp_path):
+    assert afferent_of(parsed(SPHERES)) == Afferent()
+    own = parsed(changed(SPHERES, afferent={"static_gain": 1.1e-6, "dynamic_quantity": "von_mises"}))
+    assert afferent_of(own) == Afferent(static_gain=1.1e-6, dynamic_quantity="von_mises")
+    six = dict(zip(PARAMETER_NAMES, [2e-7, 1e-4, 9e-7, 60.0, 1e-6, 50.0], strict=True))
+    expected = Afferent.from_parameters(list(six.values()))
+    for name, results in (
+        ("fit.json", {"fit": {"parameters": six}, "manifest": {"dynamic_quantity": "stored"}}),
+        ("results.json", {"single_unit": {"parameters": six}, "manifest": {}}),
+    ):
+        (tmp_path / name).write_text(json.dumps(results))
+        assert afferent_of(parsed(changed(SPHERES, afferent=name)), tmp_path) == expected
+
+
+def test_the_resolution_can_be_replaced_and_nothing_else_changes(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(ready_made()["sphere_curvature"], encoding="utf-8")
+    quick, own = read_question(path, resolution="quick"), read_question(path)
+    assert (quick.skin.resolution, own.skin.resolution) == ("quick", "standard")
+    assert quick.model_copy(update={"skin": own.skin}) == own
+
+
+@pytest.mark.parametrize("name", ready_made())
+def test_ready_made_questions_can_be_asked(name):
+    question = read_question(name, resolution="quick")
+    found = Asked(question, presented(question), population_of(question))
+    assert found.stimuli[0].level == question.standard or found.stimuli[0].name == question.standard
+    assert all(
+        touch.grading == touches(question)[found.stimuli[0].name].grading
+        for touch in touches(question).values()
+    )
+
+
+# YAML as people mean it
+
+
+def test_numbers_without_a_point_are_numbers_and_words_are_words():
+    assert read_yaml("[1e-6, 1.5E3, -2e+1, .5e2]", "here") == [1e-6, 1500.0, -20.0, 50.0]
+    assert read_yaml("[yes, no, on, off, true, false, e5, 1e]", "here") == [
+        "yes", "no", "on", "off", True, False, "e5", "1e",
+    ]  # fmt: skip
+
+
+def test_other_readers_of_yaml_keep_their_own_words():
+    import yaml
+
+    assert yaml.safe_load("[yes, 1e-6]") == [True, "1e-6"]
+
+
+# How it is refused
+
+
+def refused(content):
+    with pytest.raises(InputError) as refusal:
+        asked(content)
+    said = str(refusal.value)
+    assert said.endswith((".", "?"))
+    assert "\n" not in said
+    assert "pydantic" not in said
+    return said
+
+
+REFUSALS = """
+question: null
+    question must be given: it is missing.
+question: 3
+    question must be a text: got 3.
+noise: null
+    noise must be given
+noise: -0.1
+    noise must be a number not below 0, or fitted: got -0.1.
+noise: much
+    noise must be a number not below 0, or fitted: got 'much'.
+noise: true
+    noise must be a number not below 0, or fitted: got True.
+noise: fitted
+    noise can only be fitted to observed hit rates of the comparisons, 296, 365
+{noise: fitted, observed: {points: [{at: 305, hit_rate: 0.7}]}}
+    noise can only be fitted to observed hit rates
+nois: 0.1
+    nois is unknown: did you mean noise?
+colour: red
+    colour is unknown: a question has question, axis,
+stimuli: null
+    stimuli must be given
+stimuli: []
+    stimuli must be two or more
+stimuli: {vary: curvature_per_m, values: [287]}
+    stimuli must be two or more
+stimuli: {vary: curvature_per_m, values: [287, 287]}
+    '287' stands twice
+stimuli: {vary: curvature_per_m, values: [287, x]}
+    stimuli.values[2] must be a finite
+stimuli: {vary: curvature_per_m, values: [287, 0]}
+    stimuli.values[2]: curvature_per_m must be a number greater than 0: got 0
+stimuli: {vary: curvature_per_m, values: 287}
+    stimuli.values must be a list: got 287.
+stimuli: {vary: colour, values: [1, 2]}
+    stimuli.vary must be one of curvature_per_m,
+stimuli: {vary: width_mm, values: [1, 2]}
+    stimuli.values[1].width_mm must not be given: a sphere has curvature_per_m.
+{stimuli: {vary: depth_mm, values: [1, 50]}, standard: 1}
+    stimulus '50' cannot be pressed: depth_mm must stay below
+stimuli: {vary: curvature_per_m}
+    stimuli.values must be given
+stimuli: spheres
+    stimuli must be a mapping of keys to values: got 'spheres'.
+stimuli: [{curvature_per_m: 300}]
+    stimuli[1].name must be given
+stimuli: [{name: a}, {name: a}]
+    'a' stands twice
+{stimuli: [{name: a, level: 1}, {name: b}], standard: a}
+    level must be given for all stimuli or for none: 'b' has none.
+stimuli: [{name: a, widht_mm: 3}, {name: b}]
+    stimuli[1].widht_mm is unknown: did you mean width_mm?
+standard: 300
+    standard must be one of the stimuli, 287, 296, 365: got 300.0.
+standard: flat
+    standard must be one of the stimuli, 287, 296, 365: got 'flat'.
+standard: [287]
+    standard must be a number or a name: got [287].
+common: {}
+    stimuli.values[1].indenter must be given, there or in common, one of sphere,
+common: {indenter: needle}
+    common.indenter must be one of sphere, cylinder
+common: {indenter: sphere, curvature_per_m: 3}
+    common.curvature_per_m must not be given where stimuli.vary
+{common: {indenter: sphere, name: x}, stimuli: [{name: a}, {name: b}]}
+    common.name must not be given
+common: {indenter: sphere, depth_mm: 1, force_mn: 1}
+    common: depth_mm and force_mn exclude each other
+common: {indenter: sphere, depth_mm: 0}
+    common.depth_mm must be a number greater than 0: got 0.
+common: {indenter: sphere, offset_mm: 1}
+    common.offset_mm must be a pair of numbers: got 1.
+common: {indenter: sphere, offset_mm: [90, 0]}
+    stimulus '287' cannot be pressed
+common: {indenter: sphere, tilt_deg: 80}
+    tilt_deg must lie within 45 degrees
+skin: {materials: wood}
+    skin.materials must be one of trial1
+skin: {resolution: high}
+    skin.resolution must be one of quick, standard, paper: got 'high'.
+skin: 3
+    skin must be a mapping of keys to values: got 3.
+population: {density_per_cm2: 0}
+    population.density_per_cm2 must be a number greater than 0: got 0.
+population: {density_per_cm2: .nan}
+    population.density_per_cm2 must be
+population: {rows: 0}
+    population.rows must be a whole number of at least 1: got 0.
+population: {rows: 2.5}
+    population.rows must be a whole number
+population: {layout: spiral}
+    population.layout must be one of grid, rectangular
+population: {layout: hexagonal}
+    population.region must be given for the layout hexagonal
+population: {layout: hexagonal, rows: 3, region: {shape: rectangle, length_mm: 3, width_mm: 6}}
+    population.rows must not be given: it belongs to the layout grid
+population: {region: {shape: rectangle, length_mm: 3, width_mm: 6}}
+    population.region must not be given: a grid has rows and columns.
+population: {layout: uniform, region: {shape: rectangle, length_mm: 0, width_mm: 6.0}}
+    population.region.length_mm must be a number greater than 0: got 0.
+population: {layout: uniform, region: {shape: rectangle, length_mm: 1}}
+    population.region.width_mm must be given for a rectangle
+population: {layout: uniform, region: {shape: rectangle, length_mm: 3, width_mm: 6, corners_mm: []}}
+    population.region.corners_mm must not be given: a rectangle has length_mm, width_mm.
+population: {layout: uniform, region: {shape: polygon, corners_mm: [[0, 0], [1, 1], [2, 2]]}}
+    population.region: corners_mm must enclose an area
+population: {layout: uniform, density_per_cm2: 0.1, region: {shape: rectangle, length_mm: 3, width_mm: 6}}
+    population: No receptor is to be expected
+population: {layout: uniform, density_per_cm2: 1.0e+9, region: {shape: rectangle, length_mm: 3, width_mm: 6}}
+    population: A layout may have
+population: {seed: -1}
+    population.seed must be a whole number of at least 0: got -1.
+population: {sensitivity_spread: -1}
+    population.sensitivity_spread must be a number not below 0: got -1.
+afferent: 3
+    afferent must be a mapping of keys to values: got 3.
+afferent: {tau: 3}
+    afferent.tau is unknown
+afferent: {time_constant_ms: 0}
+    afferent.time_constant_ms must be a number greater than 0: got 0.
+afferent: none.json
+    afferent: none.json must be a file that can be read
+code: guess
+    code[1] must be one of gradient_sum, euclidean
+code: []
+    code must have at least one entry: got [].
+code: [euclidean, 3]
+    code[2] must be one of
+measure: pressure
+    measure[1] must be one of static, dynamic, latency: got 'pressure'.
+windows_ms: {static: [900, 600]}
+    windows_ms.static must be a start from 0 on and a later end
+windows_ms: {static: [600, 1200]}
+    windows_ms.static must end with the stimuli, not at 1200 ms: '287' ends at 1000 ms.
+windows_ms: {static: [600]}
+    windows_ms.static must be a pair of numbers: got [600].
+experiment: {seed: -1}
+    experiment.seed must be a whole number of at least 0: got -1.
+experiment: {hit_rates: 1}
+    experiment.hit_rates must be a whole number of at least 2: got 1.
+experiment: {criterion: 2}
+    experiment.criterion must be a number within 0 ... 1: got 2.
+experiment: {trials: 0}
+    experiment.trials must be a whole number of at least 1: got 0.
+{experiment: {criterion_sigma: 0.1}, code: euclidean}
+    experiment.criterion_sigma must be 0 where code has euclidean
+curve: {sigmoid: step}
+    curve.sigmoid must be one of normal
+curve: {lapse: 0.6}
+    curve.lapse must be a number within 0 ... 0.5, or free: got 0.6.
+curve: {proportion: 0.5}
+    curve.proportion must be a number between 0.5 and 1: got 0.5.
+observed: {}
+    observed.points must be given
+observed: {points: []}
+    observed.points must have at least one entry
+observed: {points: [{at: 296, hit_rate: 58}]}
+    observed.points[1].hit_rate must be a number within 0 ... 1: got 58.
+observed: {points: [{at: flat, hit_rate: 0.5}]}
+    observed.points[1].at must be one of the stimuli
+"""
+LINES = REFUSALS.strip().splitlines()
+
+
+@pytest.mark.parametrize(("parts", "said"), list(zip(LINES[::2], LINES[1::2], strict=True)))
+def test_what_cannot_be_is_refused_in_one_sentence_that_says_where(parts, said):
+    assert said.strip() in refused(changed(SPHERES, **read_yaml(parts, "part")))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("question: a\nquestion: b\n", "mine.yaml, line 1: question stands twice, keep one."),
+        ("question: [a\n", "mine.yaml cannot be read as YAML"),
+        ("- 1\n- 2\n", "mine.yaml, a question must be a mapping of keys to values: got [1, 2]."),
+        ("", "mine.yaml, a question must be a mapping of keys to values: got None."),
+        ("question: &a [*a]\n", "mine.yaml, question must be a text"),
+        ("[" * 600, "mine.yaml cannot be read as YAML"),
+        ("{[1]: 2}", "mine.yaml cannot be read as YAML"),
+    ],
+)
+def test_a_file_that_is_no_question_is_refused_with_its_name(tmp_path, monkeypatch, text, said):
+    monkeypatch.chdir(tmp_path)
+    Path("mine.yaml").write_text(text)
+    with pytest.raises(InputError, match="^" + re.escape(said)):
+        read_question("mine.yaml")
+
+
+def test_neither_a_file_nor_a_ready_made_question_lists_those():
+    with pytest.raises(
+        InputError, match=r"must be a YAML file or one of .*sphere_curvature.*: it is neither"
+    ):
+        read_question("sphere_curvatur")
+    with pytest.raises(InputError, match=r"gone\.yaml must be a file that can be read"):
+        read_question("gone.yaml")
+
+
+@pytest.mark.parametrize("content", ["[1]", "{}", '{"fit": {"parameters": {"tau": 3}}}', "no json"])
+def test_a_file_without_fitted_parameters_is_refused(tmp_path, content):
+    (tmp_path / "fit.json").write_text(content)
+    question = parsed(changed(SPHERES, afferent="fit.json"))
+    with pytest.raises(InputError, match=r"^afferent.*fit\.json"):
+        afferent_of(question, tmp_path)
+
+
+def test_the_guide_names_every_key():
+    def keys(part, path=""):
+        for name, field in part.model_fields.items():
+            yield name
+            for inner in re.findall(r"\w+Settings|VariedStimuli|ObservedPoint", str(field.annotation)):
+                yield from keys(getattr(__import__("fingerpad.studies.question", fromlist=[inner]), inner))
+
+    guide = (ROOT / "docs" / "discriminate.md").read_text(encoding="utf-8")
+    assert [key for key in dict.fromkeys(keys(Question)) if f"`{key}`" not in guide] == []
