@@ -3,17 +3,67 @@
 from fingerpad.psychophysics.counts import JudgementCounts
 from fingerpad.psychophysics.functions import PsychometricFunction
 from fingerpad.psychophysics.goodness_of_fit import GoodnessOfFit, goodness_of_fit
+from fingerpad.psychophysics.ideal_observer import (
+    Discriminability,
+    Presentation,
+    discriminability,
+    efficiency,
+    gaussian_information,
+    poisson_information,
+    present,
+)
 from fingerpad.psychophysics.psychometric import PsychometricFit, fit_psychometric
+from fingerpad.psychophysics.response_models import (
+    GaussianResponses,
+    PoissonResponses,
+    ResponseModel,
+    multiplied_responses,
+)
+from fingerpad.psychophysics.sensitivity import (
+    Sensitivity,
+    d_prime_of_answers,
+    d_prime_of_populations,
+    sensitivity,
+)
+from fingerpad.psychophysics.tasks import (
+    TASKS,
+    d_prime_of_proportion,
+    forced_choice,
+    same_different_by_difference,
+    same_different_by_looks,
+    yes_no,
+)
 from fingerpad.psychophysics.uncertainty import FunctionCloud, bootstrap, posterior
 
 __all__ = [
+    "TASKS",
+    "Discriminability",
     "FunctionCloud",
+    "GaussianResponses",
     "GoodnessOfFit",
     "JudgementCounts",
+    "PoissonResponses",
+    "Presentation",
     "PsychometricFit",
     "PsychometricFunction",
+    "ResponseModel",
+    "Sensitivity",
     "bootstrap",
+    "d_prime_of_answers",
+    "d_prime_of_populations",
+    "d_prime_of_proportion",
+    "discriminability",
+    "efficiency",
     "fit_psychometric",
+    "forced_choice",
+    "gaussian_information",
     "goodness_of_fit",
+    "multiplied_responses",
+    "poisson_information",
     "posterior",
+    "present",
+    "same_different_by_difference",
+    "same_different_by_looks",
+    "sensitivity",
+    "yes_no",
 ]

@@ -1,0 +1,187 @@
+"""How responses of a population vary from trial to trial: what the ideal observer knows.
+
+    Gaussian    ln p(r) = -1/2 |L^-1 (r - mu)|^2 - sum ln L_ii - n/2 ln 2 pi,    S = L L^T
+    Poisson     ln p(r) = sum_i (r_i ln lambda_i - lambda_i - ln r_i!)
+
+The paper's noise multiplies each response by Normal(1, sigma_1): a Gaussian with the standard deviation
+sigma_1 mu_i, so that its spread tells of the stimulus as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import gammaln, xlogy
+from scipy.stats import poisson
+
+from fingerpad.checks import FloatArray, float_array, not_negative, positive
+from fingerpad.errors import InputError
+from fingerpad.psychophysics.sensitivity import cholesky, whitened
+from fingerpad.random_streams import IntArray, Purpose, normals, uniforms
+
+
+class ResponseModel(Protocol):
+    """What responses of a population to one stimulus are likely to be."""
+
+    @property
+    def n_receptors(self) -> int:
+        """How many receptors there are."""
+        ...
+
+    def log_likelihood(self, responses: FloatArray) -> FloatArray:
+        """Logarithm (...,) of the probability (density) of responses (..., n_receptors)."""
+        ...
+
+    def draw(self, seed: int, trials: IntArray) -> FloatArray:
+        """Draw responses (n_trials, n_receptors) with the random numbers of these trials."""
+        ...
+
+
+@dataclass(frozen=True)
+class GaussianResponses:
+    """Normally distributed responses.
+
+    Parameters
+    ----------
+    mean : array (n_receptors,)
+        mu. [any unit]
+    covariance : array (n_receptors, n_receptors)
+        S. [unit squared]
+
+    Raises
+    ------
+    InputError
+        If shapes do not match or the covariance is not positive definite.
+
+    Examples
+    --------
+    >>> one = GaussianResponses([0.0], [[1.0]])
+    >>> one.log_likelihood(np.array([0.0])).round(4).tolist()
+    -0.9189
+    """
+
+    mean: FloatArray
+    covariance: FloatArray
+
+    def __post_init__(self) -> None:
+        mean, covariance = float_array("mean", self.mean, 1), float_array("covariance", self.covariance, 2)
+        if covariance.shape != (mean.size, mean.size):
+            raise InputError(
+                f"covariance must have one row and column per receptor: got {covariance.shape} for "
+                f"{mean.size}."
+            )
+        object.__setattr__(self, "mean", mean)
+        object.__setattr__(self, "covariance", covariance)
+        self.factor  # noqa: B018
+
+    @cached_property
+    def factor(self) -> FloatArray:
+        """L, the lower factor of the covariance."""
+        return cholesky("covariance", self.covariance)
+
+    @property
+    def n_receptors(self) -> int:
+        """How many receptors there are."""
+        return self.mean.size
+
+    def log_likelihood(self, responses: FloatArray) -> FloatArray:
+        """Logarithm (...,) of the probability density of responses (..., n_receptors)."""
+        distance = np.square(whitened(responses - self.mean, self.factor)).sum(axis=-1)
+        volume = np.log(np.diagonal(self.factor)).sum() + 0.5 * self.n_receptors * np.log(2.0 * np.pi)
+        return -0.5 * distance - volume
+
+    def draw(self, seed: int, trials: IntArray) -> FloatArray:
+        """Draw responses (n_trials, n_receptors) with the random numbers of these trials."""
+        draws = normals(seed, trials, self.n_receptors, Purpose.RESPONSE, 1)[..., 0]
+        return self.mean + draws @ self.factor.T
+
+
+def multiplied_responses(
+    responses: ArrayLike, noise_sigma: float, smallest_spread: float = 0.0
+) -> GaussianResponses:
+    """Return responses under the paper's noise: each multiplied by its own Normal(1, sigma_1).
+
+    Parameters
+    ----------
+    responses : array_like (n_receptors,)
+        Without noise. [any unit]
+    noise_sigma : float
+        Standard deviation sigma_1.
+    smallest_spread : float, optional
+        Standard deviation of further noise that does not depend on the response. [unit of `responses`]
+
+    Returns
+    -------
+    GaussianResponses
+
+    Raises
+    ------
+    InputError
+        If a receptor is silent and no further noise is given: whoever fires nothing without fail tells a
+        stimulus from any that makes it fire with certainty.
+
+    Examples
+    --------
+    >>> multiplied_responses([10.0, 20.0], 0.1).covariance.round(6).tolist()
+    [[1.0, 0.0], [0.0, 4.0]]
+    """
+    values = float_array("responses", responses, 1)
+    sigma = positive("noise_sigma", noise_sigma)
+    floor = not_negative("smallest_spread", smallest_spread)
+    if floor == 0.0 and (values == 0.0).any():
+        raise InputError(
+            f"{np.count_nonzero(values == 0.0)} of {values.size} receptors are silent, and noise that "
+            "multiplies nothing is none: leave out those that no stimulus makes fire, or give "
+            "smallest_spread."
+        )
+    return GaussianResponses(values, np.diag(np.square(sigma * values) + floor**2))
+
+
+@dataclass(frozen=True)
+class PoissonResponses:
+    """Spike counts of Poisson processes.
+
+    Parameters
+    ----------
+    mean_counts : array (n_receptors,)
+        lambda, not negative: rates times the length of the window.
+
+    Raises
+    ------
+    InputError
+        If a mean is negative.
+
+    Examples
+    --------
+    >>> one = PoissonResponses([2.0])
+    >>> np.exp(one.log_likelihood(np.array([0.0]))).round(4).tolist()
+    0.1353
+    """
+
+    mean_counts: FloatArray
+
+    def __post_init__(self) -> None:
+        means = float_array("mean_counts", self.mean_counts, 1)
+        if (means < 0.0).any():
+            raise InputError(f"mean_counts must not be negative: the smallest is {means.min():g}.")
+        object.__setattr__(self, "mean_counts", means)
+
+    @property
+    def n_receptors(self) -> int:
+        """How many receptors there are."""
+        return self.mean_counts.size
+
+    def log_likelihood(self, responses: FloatArray) -> FloatArray:
+        """Logarithm (...,) of the probability of counts (..., n_receptors); -inf for impossible ones."""
+        each = xlogy(responses, self.mean_counts) - self.mean_counts - gammaln(responses + 1.0)
+        return each.sum(axis=-1)
+
+    def draw(self, seed: int, trials: IntArray) -> FloatArray:
+        """Draw counts (n_trials, n_receptors) with the random numbers of these trials."""
+        shares = uniforms(seed, trials, self.n_receptors, Purpose.SPIKE_COUNT, 1)[..., 0]
+        # A share of exactly 0 would be a count of -1.
+        return np.maximum(poisson.ppf(shares, self.mean_counts), 0.0)

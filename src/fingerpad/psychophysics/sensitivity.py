@@ -1,0 +1,204 @@
+"""d': by how many standard deviations two stimuli differ for an observer, whatever it prefers to say.
+
+    d' = z(H) - z(F)                            equal spread
+    d_a = sqrt(2 / (1 + s^2)) (z(H) - s z(F))   spread of no signal over that of signal, s
+    c  = -(z(H) + z(F)) / 2                     where the observer decides, from midway
+
+H and F are the rates of hits and false alarms, z the inverse of the normal distribution. Source: Macmillan &
+Creelman 2005, Detection Theory, chapters 1 and 3.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import ndtri
+
+from fingerpad.checks import FloatArray, float_array, one_of, positive, whole
+from fingerpad.errors import InputError
+
+CORRECTIONS = ("log-linear", "half", "none")
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """How well a signal is told from none, and where the observer decides.
+
+    Parameters
+    ----------
+    d_prime : float
+        d', or d_a where the spreads differ. [standard deviations]
+    criterion : float
+        c; positive for an observer who rarely says yes. [standard deviations]
+    hit_rate, false_alarm_rate : float
+        As corrected. [0-1]
+    """
+
+    d_prime: float
+    criterion: float
+    hit_rate: float
+    false_alarm_rate: float
+
+
+def sensitivity(
+    n_hits: int,
+    n_signals: int,
+    n_false_alarms: int,
+    n_others: int,
+    *,
+    correction: str = "log-linear",
+    spread_ratio: float = 1.0,
+) -> Sensitivity:
+    """Return d' from answers to "was it there?".
+
+    Parameters
+    ----------
+    n_hits, n_signals : int
+        Answers "yes" to how many presentations of the signal, or of the comparison.
+    n_false_alarms, n_others : int
+        Answers "yes" to how many presentations of no signal, or of the standard.
+    correction : {"log-linear", "half", "none"}, optional
+        What keeps rates of 0 and 1 from an infinite d': (k + 1/2) / (n + 1) for every rate (Hautus 1995),
+        1/2 in place of a count of 0 and n - 1/2 in place of n, or nothing: then such rates are refused.
+    spread_ratio : float, optional
+        s, standard deviation without the signal over that with it: 1 gives d', others d_a.
+
+    Returns
+    -------
+    Sensitivity
+
+    Raises
+    ------
+    InputError
+        If counts are not possible, the correction is unknown, or it is "none" and a rate is 0 or 1.
+
+    Examples
+    --------
+    >>> told = sensitivity(84, 100, 16, 100, correction="none")
+    >>> round(told.d_prime, 2), abs(round(told.criterion, 2))
+    (1.99, 0.0)
+    """
+    one_of("correction", correction, CORRECTIONS)
+    s = positive("spread_ratio", spread_ratio)
+    hits = _rate("n_hits", n_hits, "n_signals", n_signals, correction)
+    false_alarms = _rate("n_false_alarms", n_false_alarms, "n_others", n_others, correction)
+    z_hits, z_false_alarms = float(ndtri(hits)), float(ndtri(false_alarms))
+    return Sensitivity(
+        d_prime=math.sqrt(2.0 / (1.0 + s**2)) * (z_hits - s * z_false_alarms),
+        criterion=-0.5 * (z_hits + z_false_alarms),
+        hit_rate=hits,
+        false_alarm_rate=false_alarms,
+    )
+
+
+def _rate(of: str, count: int, among: str, total: int, correction: str) -> float:
+    k, n = whole(of, count, 0), whole(among, total, 1)
+    if k > n:
+        raise InputError(f"{of} must not exceed {among}: got {k} of {n}.")
+    if correction == "log-linear":
+        return (k + 0.5) / (n + 1.0)
+    if correction == "half":
+        return min(max(k, 0.5), n - 0.5) / n
+    if k in (0, n):
+        raise InputError(
+            f"{of} is {k} of {n}, for which d' is infinite: choose the correction 'log-linear' or 'half'."
+        )
+    return k / n
+
+
+def d_prime_of_answers(standard: ArrayLike, comparison: ArrayLike) -> float:
+    """Return d' of an observer's answers to two stimuli, any numbers such as Gradient Sums.
+
+    Parameters
+    ----------
+    standard, comparison : array_like (n_trials,)
+        Answers to either. [any unit]
+
+    Returns
+    -------
+    float
+        Difference of the means over the root of the mean variance, d_a; negative where answers to the
+        comparison are the smaller.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two answers, or none of them varies.
+
+    Examples
+    --------
+    >>> d_prime_of_answers([1.0, 2.0, 3.0], [3.0, 4.0, 5.0])
+    2.0
+    """
+    first, second = float_array("standard", standard, 1), float_array("comparison", comparison, 1)
+    if min(first.size, second.size) < 2:
+        raise InputError(f"d' needs two answers to each stimulus: got {first.size} and {second.size}.")
+    variance = 0.5 * (first.var(ddof=1) + second.var(ddof=1))
+    if variance == 0.0:
+        raise InputError("d' needs answers that vary: these are the same in every trial; add noise.")
+    return float((second.mean() - first.mean()) / math.sqrt(variance))
+
+
+def d_prime_of_populations(difference: ArrayLike, covariance: ArrayLike) -> float:
+    """Return d' of the best weighted sum of many receptors' responses.
+
+        d' = sqrt(dmu^T S^-1 dmu)
+
+    Parameters
+    ----------
+    difference : array_like (n_receptors,)
+        dmu, mean responses to the comparison less those to the standard. [any unit]
+    covariance : array_like (n_receptors, n_receptors)
+        S, of the responses; the mean of both where they differ. [unit squared]
+
+    Returns
+    -------
+    float
+        [standard deviations]
+
+    Raises
+    ------
+    InputError
+        If shapes do not match or the covariance is not positive definite.
+
+    Examples
+    --------
+    >>> d_prime_of_populations([3.0, 4.0], [[1.0, 0.0], [0.0, 1.0]])
+    5.0
+    """
+    change, spread = float_array("difference", difference, 1), float_array("covariance", covariance, 2)
+    if spread.shape != (change.size, change.size):
+        raise InputError(
+            f"covariance must have one row and column per receptor: got {spread.shape} for {change.size}."
+        )
+    return float(np.linalg.norm(whitened(change, cholesky("covariance", spread))))
+
+
+def cholesky(name: str, matrix: FloatArray) -> FloatArray:
+    """Return the lower factor L of a covariance, S = L L^T, or raise `InputError` if it has none.
+
+    Examples
+    --------
+    >>> cholesky("covariance", np.array([[4.0]])).tolist()
+    [[2.0]]
+    """
+    try:
+        return np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            f"{name} must be positive definite: a receptor has no noise, or two share it."
+        ) from error
+
+
+def whitened(vectors: FloatArray, factor: FloatArray) -> FloatArray:
+    """Return L^-1 x of vectors (..., n), whose noise then is that of independent standard normal numbers.
+
+    Examples
+    --------
+    >>> whitened(np.array([2.0]), np.array([[2.0]])).tolist()
+    [1.0]
+    """
+    return np.asarray(np.linalg.solve(factor, vectors[..., np.newaxis])[..., 0], dtype=np.float64)

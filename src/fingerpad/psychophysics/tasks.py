@@ -1,0 +1,234 @@
+"""From d' to the proportion of correct judgements in a task, for an observer without preference, and back.
+
+    yes-no                                 Phi(d'/2)
+    one of two (2AFC)                      Phi(d'/sqrt 2)
+    one of m (mAFC)                        integral of phi(x - d') Phi(x)^(m - 1) dx
+    same-different, two looks compared     (Phi((d' - k)/sqrt 2) + Phi((-d' - k)/sqrt 2)
+      (differencing)                        + 2 Phi(k/sqrt 2) - 1) / 2,    k the best
+    same-different, each look judged       Phi(d'/2)^2 + Phi(-d'/2)^2
+      (independent observations)
+
+Phi and phi are the normal distribution and its density. Source: Macmillan & Creelman 2005, Detection Theory,
+chapters 7, 9 and 10.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import ndtr, ndtri
+
+from fingerpad.checks import finite, not_negative, whole
+from fingerpad.errors import InputError
+
+LARGEST_D_PRIME = 20.0
+"""Beyond it no task is ever failed."""
+
+_REACH, _POINTS = 9.0, 361
+"""Of the integral: the trapezium rule on a normal density errs less than round-off."""
+
+
+def yes_no(d_prime: float) -> float:
+    """Return the proportion correct where one look is judged, "standard" or "comparison".
+
+    Parameters
+    ----------
+    d_prime : float
+        Not negative. [standard deviations]
+
+    Returns
+    -------
+    float
+        [0.5-1]
+
+    Raises
+    ------
+    InputError
+        If d' is negative.
+
+    Examples
+    --------
+    >>> round(yes_no(2.0), 4)
+    0.8413
+    """
+    return float(ndtr(0.5 * not_negative("d_prime", d_prime)))
+
+
+def forced_choice(d_prime: float, alternatives: int = 2) -> float:
+    """Return the proportion correct where one of several looks is the comparison, and is to be found.
+
+    Parameters
+    ----------
+    d_prime : float
+        Not negative. [standard deviations]
+    alternatives : int, optional
+        m, two or more.
+
+    Returns
+    -------
+    float
+        [1/m-1]
+
+    Raises
+    ------
+    InputError
+        If d' is negative or there are fewer than two alternatives.
+
+    Examples
+    --------
+    >>> round(forced_choice(1.0), 4), round(forced_choice(0.0, 4), 4)
+    (0.7602, 0.25)
+    """
+    d, m = not_negative("d_prime", d_prime), whole("alternatives", alternatives, 2)
+    if m == 2:
+        return float(ndtr(d / math.sqrt(2.0)))
+    around = np.linspace(-_REACH, _REACH, _POINTS)
+    density = np.exp(-0.5 * np.square(around)) / math.sqrt(2.0 * math.pi)
+    return float(np.trapezoid(density * ndtr(around + d) ** (m - 1), around))
+
+
+def same_different_by_difference(d_prime: float, criterion: float | None = None) -> float:
+    """Return the proportion correct in "same or different?" by the difference of the two looks.
+
+    The observer says "different" if the looks differ by more than k, either way.
+
+    Parameters
+    ----------
+    d_prime : float
+        Not negative. [standard deviations]
+    criterion : float, optional
+        k. Default: the best, at which the difference is as likely for either answer. [standard deviations]
+
+    Returns
+    -------
+    float
+        Mean of the rates correct for equal and for different pairs. [0.5-1 at the best criterion]
+
+    Raises
+    ------
+    InputError
+        If d' or k is negative.
+
+    Examples
+    --------
+    >>> round(same_different_by_difference(2.0), 3)
+    0.68
+    """
+    d = not_negative("d_prime", d_prime)
+    k = best_difference(d) if criterion is None else not_negative("criterion", criterion)
+    if math.isinf(k):
+        return 0.5
+    root = math.sqrt(2.0)
+    hits = ndtr((d - k) / root) + ndtr((-d - k) / root)
+    correct_rejections = 2.0 * ndtr(k / root) - 1.0
+    return float(0.5 * (hits + correct_rejections))
+
+
+def best_difference(d_prime: float) -> float:
+    """Return the difference k from which on "different" is the likelier answer.
+
+        exp(-d'^2 / 4) cosh(d' k / 2) = 1,    k = (2 / d') arcosh(exp(d'^2 / 4))
+
+    Parameters
+    ----------
+    d_prime : float
+        Not negative. [standard deviations]
+
+    Returns
+    -------
+    float
+        sqrt 2 where d' vanishes. [standard deviations]
+
+    Examples
+    --------
+    >>> round(best_difference(1e-6), 4), round(best_difference(2.0), 4)
+    (1.4142, 1.6575)
+    """
+    d = not_negative("d_prime", d_prime)
+    exponent = 0.25 * d * d
+    if exponent < _SMALL:
+        return math.sqrt(2.0)
+    # ln(e^x + sqrt(e^2x - 1)) without overflow.
+    return 2.0 / d * (exponent + math.log1p(math.sqrt(-math.expm1(-2.0 * exponent))))
+
+
+_SMALL = 1e-12
+
+
+def same_different_by_looks(d_prime: float) -> float:
+    """Return the proportion correct in "same or different?" where each look is judged by itself.
+
+    The likeliest answer there is, if the two stimuli stay the same from trial to trial.
+
+    Parameters
+    ----------
+    d_prime : float
+        Not negative. [standard deviations]
+
+    Returns
+    -------
+    float
+        [0.5-1]
+
+    Raises
+    ------
+    InputError
+        If d' is negative.
+
+    Examples
+    --------
+    >>> round(same_different_by_looks(2.0), 3)
+    0.733
+    """
+    right = yes_no(d_prime)
+    return right**2 + (1.0 - right) ** 2
+
+
+TASKS: dict[str, Callable[[float], float]] = {
+    "yes-no": yes_no,
+    "2afc": forced_choice,
+    "same-different by difference": same_different_by_difference,
+    "same-different by looks": same_different_by_looks,
+}
+"""Proportion correct of d', by the name of the task."""
+
+
+def d_prime_of_proportion(proportion_correct: float, task: Callable[[float], float] = forced_choice) -> float:
+    """Return the d' with which a task is judged correctly in a proportion of trials.
+
+    Parameters
+    ----------
+    proportion_correct : float
+        At least that of guessing, below 1. [0-1]
+    task : callable, optional
+        One of `TASKS`, or any rising function of d'.
+
+    Returns
+    -------
+    float
+        [standard deviations]
+
+    Raises
+    ------
+    InputError
+        If the proportion is below that of guessing, or so near 1 that d' is beyond all bounds.
+
+    Examples
+    --------
+    >>> round(d_prime_of_proportion(0.75), 4), round(d_prime_of_proportion(0.75, yes_no), 4)
+    (0.9539, 1.349)
+    """
+    wanted = finite("proportion_correct", proportion_correct)
+    guessing, never_failed = task(0.0), task(LARGEST_D_PRIME)
+    if not guessing - _SMALL <= wanted < never_failed:
+        raise InputError(
+            f"proportion_correct must lie between that of guessing, {guessing:g}, and 1: got {wanted:g}."
+        )
+    if wanted <= guessing:
+        return 0.0
+    if task is forced_choice:
+        return float(math.sqrt(2.0) * ndtri(wanted))
+    return float(brentq(lambda d: task(d) - wanted, 0.0, LARGEST_D_PRIME, xtol=1e-12))
