@@ -442,6 +442,23 @@ def test_an_explained_model_begins_at_the_scaled_start():
     assert_array_equal(model.rates(np.zeros(5)), at_start.rates(PATCH.drive(PATCH.at("stored"))))
 
 
+def test_the_last_drive_is_kept_and_no_other_taken_for_it():
+    (explanation,) = (explanation for explanation in EXPLANATIONS if explanation.name == "receptor elsewhere")
+    asked = []
+
+    def driven(patch, numbers):
+        asked.append(numbers.tolist())
+        return explanation.driven(patch, numbers)
+
+    model = ExplainedModel.from_start(replace(explanation, driven=driven), PATCH)
+    asked.clear()
+    places = ([0.1, 0.0, 0.0, 0.0, 0.25], [0.3, 0.2, 0.0, 0.0, 0.25], [0.3, 0.2, 0.0, 0.0, -0.25])
+    found = [model.rates(np.array(place)) for place in places]
+    assert asked == [[0.25], [-0.25]]
+    for place, rates in zip(places, found, strict=True):
+        assert_array_equal(rates, ExplainedModel.from_start(explanation, PATCH).rates(np.array(place)))
+
+
 def test_explanations_are_judged_alike_and_told_by_what_they_add(monkeypatch):
     def short(seed, n_added):
         return replace(drive_fits.quick_method(n_added), n_refined=1, difference_steps=(0.1,))

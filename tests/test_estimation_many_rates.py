@@ -8,6 +8,7 @@ from fingerpad.errors import InputError
 from fingerpad.estimation.afferent_posterior import four_number_model
 from fingerpad.estimation.identifiable import identifiable
 from fingerpad.estimation.many_rates import rates_of_each
+from fingerpad.estimation.quick_rates import rates_under
 from fingerpad.estimation.rate_problem import AfferentModel
 from fingerpad.signals import SedTraces
 from fingerpad.transduction import drive
@@ -40,6 +41,16 @@ def test_rows_equal_single_runs_to_the_bit(model, points: np.ndarray) -> None:
     assert (dynamic == 0.0).any(axis=1).sum() > 5
 
 
+def test_single_runs_equal_the_afferent_to_the_bit() -> None:
+    windows = ((20.0, 50.0), (500.0, 900.0))
+    quick, chosen = rates_under(MODEL.drive), rates_under(MODEL.drive, 2.0, windows)
+    for point in scattered(Afferent().parameters, 9):
+        np.testing.assert_array_equal(quick(point), Afferent.from_parameters(point).rates(MODEL.drive))
+        rested = Afferent.from_parameters(point, 2.0).rates(MODEL.drive, *windows)
+        np.testing.assert_array_equal(chosen(point), rested)
+        np.testing.assert_array_equal(MODEL.rates(point), quick(point))
+
+
 def test_any_other_model_is_asked_row_by_row() -> None:
     class Plain:
         names = ("a",)
@@ -58,5 +69,9 @@ def test_a_row_that_is_no_afferent_is_refused() -> None:
     points[1, 3] = -1.0
     with pytest.raises(InputError, match="time_constant_ms must be greater than 0"):
         rates_of_each(MODEL, points)
+    with pytest.raises(InputError, match="got 4 numbers"):
+        MODEL.rates(points[0, :4])
+    with pytest.raises(InputError, match="refractory_ms must not be negative"):
+        AfferentModel(MODEL.drive, -1.0)
     with pytest.raises(InputError, match=r"points must have 6 columns: got shape \(3, 4\)"):
         rates_of_each(MODEL, points[:, :4])

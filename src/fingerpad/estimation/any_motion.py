@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fingerpad.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.afferent import PARAMETER_NAMES
 from fingerpad.checks import FloatArray
 from fingerpad.errors import InputError
 from fingerpad.estimation.closed_form import ClosedFormModel
 from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES
+from fingerpad.estimation.quick_rates import rates_under
 from fingerpad.estimation.receptor_offset import OFFSET_NAME, ReceptorOffset
 from fingerpad.fitting.problem import IntArray
 from fingerpad.parameters import neuron, protocol
@@ -41,6 +42,7 @@ class AnyMotion:
 
     Examples
     --------
+    >>> from fingerpad.afferent import Afferent
     >>> short = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
     >>> longer = SedTraces([0.0, 50.0, 2000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
     >>> model = AnyMotion.under([short, longer, short])
@@ -119,11 +121,10 @@ class AnyMotion:
 
     def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Dynamic and static rates of the afferent with these six parameters. [spikes/s]"""
-        quantity = self.drives[0].dynamic_quantity
-        afferent = Afferent.from_parameters(parameters, self.refractory_ms, quantity)
         dynamic, static = np.empty((2, self.n_stimuli))
         for group, columns in zip(self.drives, self.stimuli, strict=True):
-            dynamic[columns], static[columns] = afferent.rates(group, *self.windows_ms)
+            rates = rates_under(group, self.refractory_ms, self.windows_ms)
+            dynamic[columns], static[columns] = rates(parameters)
         return dynamic, static
 
 

@@ -1,21 +1,17 @@
 """Rates for many sets of parameters at once, as samplers and sensitivity analyses ask for them.
 
-Rows are shared out to threads. For the paper's model one row is little more than the membrane's compiled
-walk through its current; the bits are those of `RateModel.rates`, row by row.
+Rows are shared out to threads; the bits are those of `RateModel.rates`, row by row.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fingerpad.blocks import in_blocks
 from fingerpad.checks import FloatArray
 from fingerpad.errors import InputError
+from fingerpad.estimation.quick_rates import Rates, rates_under
 from fingerpad.estimation.rate_problem import AfferentModel, RateModel, RateProblem, Reparametrised
-from fingerpad.exact_spikes import exact_trains
-from fingerpad.parameters import protocol
-from fingerpad.units import MS_PER_S
 
 ROWS_PER_TURN = 4
 """Rows that a thread takes at a time."""
@@ -99,50 +95,11 @@ def scores_of_each(problem: RateProblem, points: FloatArray) -> FloatArray:
     )
 
 
-def _prepared(model: RateModel):  # type: ignore[no-untyped-def]
+def _prepared(model: RateModel) -> Rates:
     """Return what gives the rates of one row, its memory made once."""
     if isinstance(model, Reparametrised):
         inner = _prepared(model.model)
         return lambda row: inner(model.translated(row))
-    if not isinstance(model, AfferentModel):
-        return model.rates
-    return _walk(model)
-
-
-def _walk(model: AfferentModel):  # type: ignore[no-untyped-def]
-    driven = model.drive
-    current, static_part = np.empty_like(driven.sed_kpa), np.empty_like(driven.sed_kpa)
-
-    def rates(row: FloatArray) -> tuple[FloatArray, FloatArray]:
-        intercept, dynamic_gain, static_gain, tau, capacitance, threshold = row.tolist()
-        if not (np.isfinite(row).all() and tau > 0.0 and capacitance > 0.0 and threshold > 0.0):
-            return model.rates(row)  # says what is wrong
-        # I = beta + k_d U' + k_s U, in the order of Transduction.current.
-        np.multiply(driven.rate_kpa_per_ms, dynamic_gain, out=current)
-        current.__iadd__(intercept)
-        current.__iadd__(np.multiply(driven.sed_kpa, static_gain, out=static_part))
-        times, offsets = exact_trains(
-            driven.times_ms, current, tau, capacitance, threshold, float(model.refractory_ms)
-        )
-        return (
-            _firing_rate_hz(times, offsets, *protocol.DYNAMIC_WINDOW.value),
-            _firing_rate_hz(times, offsets, *protocol.STATIC_WINDOW.value),
-        )
-
-    return rates
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _firing_rate_hz(times: FloatArray, offsets: np.ndarray, start: float, end: float) -> FloatArray:
-    """One over the mean of the intervals that close in the window, as `fingerpad.spikes.firing_rate_hz`."""
-    rates = np.zeros(offsets.size - 1)
-    for train in range(rates.size):
-        count = 0
-        total = 0.0
-        for spike in range(offsets[train] + 1, offsets[train + 1]):
-            if start < times[spike] <= end:
-                count += 1
-                total += times[spike] - times[spike - 1]
-        if count > 0:
-            rates[train] = MS_PER_S * (count / total)
-    return rates
+    if isinstance(model, AfferentModel):
+        return rates_under(model.drive, model.refractory_ms)
+    return model.rates

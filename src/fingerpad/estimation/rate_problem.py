@@ -12,9 +12,10 @@ from typing import Protocol
 
 import numpy as np
 
-from fingerpad.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.afferent import PARAMETER_NAMES
 from fingerpad.checks import FloatArray, not_negative
 from fingerpad.errors import InputError
+from fingerpad.estimation.quick_rates import rates_under
 from fingerpad.estimation.recordings import RateRecordings
 from fingerpad.fitting import fractional_sum_of_squares
 from fingerpad.fitting.problem import IntArray
@@ -62,6 +63,7 @@ class AfferentModel:
 
     Examples
     --------
+    >>> from fingerpad.afferent import Afferent
     >>> from fingerpad.signals import SedTraces
     >>> from fingerpad.transduction import drive
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
@@ -72,6 +74,9 @@ class AfferentModel:
 
     drive: Drive
     refractory_ms: float = neuron.REFRACTORY.value
+
+    def __post_init__(self) -> None:
+        not_negative("refractory_ms", self.refractory_ms, "ms")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -85,8 +90,7 @@ class AfferentModel:
 
     def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Dynamic and static rates of the afferent with these six parameters. [spikes/s]"""
-        afferent = Afferent.from_parameters(parameters, self.refractory_ms, self.drive.dynamic_quantity)
-        return afferent.rates(self.drive)
+        return rates_under(self.drive, self.refractory_ms)(parameters)
 
 
 @dataclass(frozen=True)
@@ -156,6 +160,7 @@ class RateProblem:
 
     Examples
     --------
+    >>> from fingerpad.afferent import Afferent
     >>> from fingerpad.signals import SedTraces
     >>> from fingerpad.transduction import drive
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])

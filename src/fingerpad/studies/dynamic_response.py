@@ -11,13 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from fingerpad.afferent import Afferent
 from fingerpad.checks import FloatArray
 from fingerpad.estimation.closed_form import ClosedFormModel
 from fingerpad.estimation.identifiable import identifiable
+from fingerpad.estimation.quick_rates import rates_under
 from fingerpad.sampling import SkinResponse
 from fingerpad.signals import STORED_ENERGY, SedTraces
 from fingerpad.studies.conditions import RECEPTOR_X_MM
@@ -79,10 +80,18 @@ class Patch:
 
     def drive(self, static: FloatArray, dynamic: FloatArray | None = None) -> Drive:
         """Drive of traces (n_times, n_shifts), the dynamic term following others if given."""
-        if dynamic is None:
-            return drive(SedTraces(self.times_ms, static, self.kinks_ms))
-        energy, followed = self.drive(static), self.drive(dynamic)
-        return replace(energy, rate_kpa_per_ms=followed.rate_kpa_per_ms)
+        driven = drive(SedTraces(self.times_ms, static, self.kinks_ms))
+        return driven if dynamic is None else self.following(dynamic, driven)
+
+    def following(self, dynamic: FloatArray, static: Drive | None = None) -> Drive:
+        """Let the dynamic term follow traces (n_times, n_shifts), the static one the receptor's energy."""
+        followed = drive(SedTraces(self.times_ms, dynamic, self.kinks_ms))
+        return replace(static or self.energy, rate_kpa_per_ms=followed.rate_kpa_per_ms)
+
+    @cached_property
+    def energy(self) -> Drive:
+        """What the paper's model feels, made once."""
+        return self.drive(self.at(STORED_ENERGY))
 
 
 def _normal(offsets_mm: FloatArray, width_mm: float) -> FloatArray:
@@ -189,15 +198,14 @@ def low_passed(driven: Drive, time_constant_ms: float) -> Drive:
     >>> low_passed(step, 10.0).rate_kpa_per_ms[:, 0].round(4).tolist()
     [0.0, 0.0, 0.6321, 0.8647]
     """
-    rate, filtered = driven.rate_kpa_per_ms, np.zeros_like(driven.rate_kpa_per_ms)
-    for knot, length in enumerate(np.diff(driven.times_ms)):
-        if length == 0.0:
-            filtered[knot + 1] = filtered[knot]
-            continue
-        x = length / time_constant_ms
-        gone = -math.expm1(-x)
-        slope = (rate[knot + 1] - rate[knot]) / x
-        filtered[knot + 1] = filtered[knot] * (1.0 - gone) + rate[knot] * gone + slope * (x - gone)
+    rate, x = driven.rate_kpa_per_ms, np.diff(driven.times_ms)[:, np.newaxis] / time_constant_ms
+    gone = -np.expm1(-x)
+    # Over a jump no time passes and nothing is gained.
+    slope = np.divide(np.diff(rate, axis=0), x, out=np.zeros_like(rate[1:]), where=x > 0.0)
+    gained = rate[:-1] * gone + slope * (x - gone)
+    filtered = np.zeros_like(rate)
+    for knot, (kept, more) in enumerate(zip(1.0 - gone, gained, strict=True)):
+        filtered[knot + 1] = filtered[knot] * kept + more
     return replace(driven, rate_kpa_per_ms=filtered)
 
 
@@ -214,16 +222,16 @@ def _energy_powered(patch: Patch, numbers: FloatArray) -> Drive:
 
 
 def _rate_powered(patch: Patch, numbers: FloatArray) -> Drive:
-    driven = patch.drive(patch.at(STORED_ENERGY))
+    driven = patch.energy
     return replace(driven, rate_kpa_per_ms=_powered(driven.rate_kpa_per_ms, numbers[0]))
 
 
 EXPLANATIONS: tuple[Explanation, ...] = (
-    Explanation("the paper's model", (), lambda patch, _: patch.drive(patch.at(STORED_ENERGY))),
+    Explanation("the paper's model", (), lambda patch, _: patch.energy),
     Explanation(
         "window of 20 ms cuts no interval",
         (),
-        lambda patch, _: patch.drive(patch.at(STORED_ENERGY)),
+        lambda patch, _: patch.energy,
         by_formula=True,
     ),
     Explanation(
@@ -242,7 +250,7 @@ EXPLANATIONS: tuple[Explanation, ...] = (
     Explanation(
         "mean of a cluster, dynamic term alone",
         (_WIDTH,),
-        lambda patch, n: patch.drive(patch.at(STORED_ENERGY), patch.mean(STORED_ENERGY, n[0])),
+        lambda patch, n: patch.following(patch.mean(STORED_ENERGY, n[0])),
     ),
     Explanation(
         "hardest driven of a cluster",
@@ -252,29 +260,29 @@ EXPLANATIONS: tuple[Explanation, ...] = (
     Explanation(
         "slow dynamic term or fast relaxation",
         (_FILTER,),
-        lambda patch, n: low_passed(patch.drive(patch.at(STORED_ENERGY)), n[0]),
+        lambda patch, n: low_passed(patch.energy, n[0]),
     ),
     Explanation("power law of both terms", (_EXPONENT,), _energy_powered),
     Explanation("power law of the dynamic term", (_EXPONENT,), _rate_powered),
     Explanation(
         "dynamic term follows von Mises stress",
         (),
-        lambda patch, _: patch.drive(patch.at(STORED_ENERGY), patch.at("von_mises")),
+        lambda patch, _: patch.following(patch.at("von_mises")),
     ),
     Explanation(
         "dynamic term follows compressive stress",
         (),
-        lambda patch, _: patch.drive(patch.at(STORED_ENERGY), patch.at(STRESS)),
+        lambda patch, _: patch.following(patch.at(STRESS)),
     ),
     Explanation(
         "compressive stress, power law",
         (replace(_EXPONENT, start=1.0),),
-        lambda patch, n: patch.drive(patch.at(STORED_ENERGY), _powered(patch.at(STRESS), n[0])),
+        lambda patch, n: patch.following(_powered(patch.at(STRESS), n[0])),
     ),
     Explanation(
         "compressive stress, cluster",
         (_WIDTH,),
-        lambda patch, n: patch.drive(patch.at(STORED_ENERGY), patch.mean(STRESS, n[0])),
+        lambda patch, n: patch.following(patch.mean(STRESS, n[0])),
     ),
     Explanation(
         "compressive stress, receptor elsewhere",
@@ -307,8 +315,7 @@ class ExplainedModel:
     def from_start(cls, explanation: Explanation, patch: Patch) -> ExplainedModel:
         """Begin at the paper's first start, its gains rescaled to the drive with which a fit begins."""
         numbers = np.array([added.start for added in explanation.added])
-        reference = patch.drive(patch.at(STORED_ENERGY))
-        return cls(explanation, patch, scaled_starts(explanation.driven(patch, numbers), reference)[0])
+        return cls(explanation, patch, scaled_starts(explanation.driven(patch, numbers), patch.energy)[0])
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -333,8 +340,20 @@ class ExplainedModel:
 
     def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Dynamic and static rates. [spikes/s]"""
-        driven = self.explanation.driven(self.patch, self.numbers(parameters))
+        driven = self._drive(self.numbers(parameters))
         six = six_of_relative(parameters[: len(RELATIVE_NAMES)], self.start)
         if self.explanation.by_formula:
             return ClosedFormModel(driven, bend=0.0).rates(identifiable(six))
-        return Afferent.from_parameters(six).rates(driven)
+        return rates_under(driven)(six)
+
+    def _drive(self, numbers: FloatArray) -> Drive:
+        """Drive for the added numbers; the last one is kept, since slopes mostly leave these as they are."""
+        key = numbers.tobytes()
+        if key not in self._last:
+            self._last.clear()
+            self._last[key] = self.explanation.driven(self.patch, numbers)
+        return self._last[key]
+
+    @cached_property
+    def _last(self) -> dict[bytes, Drive]:
+        return {}
