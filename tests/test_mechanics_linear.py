@@ -11,6 +11,7 @@ from fingerpad.mechanics.factors import PardisoFactor, SuperLuFactor, pypardiso
 from fingerpad.mechanics.linear import (
     KeptFactor,
     LinearSolver,
+    NotPositiveDefiniteError,
     choose_preconditioner,
     free_degrees_of_freedom,
 )
@@ -121,6 +122,29 @@ def test_tangent_that_turns_indefinite_under_a_kept_factor_is_refused(make):
     solver.solve(tangent(), residual_of(), 1e-8)
     with pytest.raises(ConvergenceError):
         solver.solve(tangent(shift=60.0), residual_of(), 1e-8)
+
+
+@pytest.mark.parametrize("stage", ["renew", "follow"])
+def test_a_node_without_stiffness_of_its_own_is_an_indefinite_tangent(stage):
+    """Multigrid inverts the block of every node, which may be exactly singular once it is rounded."""
+
+    class Singular(KeptFactor):
+        def renew(self, blocks):
+            super().renew(blocks)
+            if stage == "renew":
+                raise ZeroDivisionError
+
+        def follow(self, blocks):
+            if stage == "follow" and blocks is not started:
+                raise ZeroDivisionError
+            super().follow(blocks)
+
+    started = tangent()
+    solver = LinearSolver(Singular(SPARSITY, FREE, SuperLuFactor))
+    if stage == "follow":
+        solver.solve(started, residual_of(), 1e-8)
+    with pytest.raises(NotPositiveDefiniteError, match="The tangent is not positive definite"):
+        solver.solve(tangent(), residual_of(), 1e-8)
 
 
 class Useless(KeptFactor):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fingerpad.edged_indenters import Gap
 from fingerpad.errors import InputError
 from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.mechanics.contact import place
@@ -63,6 +64,19 @@ def test_balance_is_met_where_the_residual_alone_would_pass_as_solved():
     np.testing.assert_allclose(found.reaction_mn[1:, 1], found.force_mn[1:], rtol=1e-4)
     differs = np.abs(unbalanced.reaction_mn[1:, :2] - np.outer(unbalanced.force_mn[1:], [0.0, 1.0]))
     assert unbalanced.force_imbalance >= (differs.max(axis=1) / unbalanced.force_mn[1:]).max() * (1 - 1e-9)
+
+
+@pytest.mark.parametrize(
+    "indenter", [Bar(1.7, 0.1), Gap(0.75, 4.0, 0.3, 0.03)], ids=lambda body: type(body).__name__
+)
+def test_skin_that_slides_round_an_edge_is_followed(indenter):
+    """Edges much sharper than the spacing of the nodes: with their curvature the tangent is not definite."""
+    done = pressed(block(), indenter, NewtonSettings())
+    assert done.force_imbalance <= 1e-4
+    assert 0.0 < done.penetration_mm <= 0.005 * MOTION.depth_mm
+    blunt = {"fillet_mm": 0.3} if isinstance(indenter, Bar) else {"lip_mm": 0.3}
+    similar = pressed(block(), replace(indenter, **blunt), NewtonSettings())
+    np.testing.assert_allclose(done.force_mn[-1], similar.force_mn[-1], rtol=0.25)
 
 
 def test_balance_holds_beside_the_middle_of_a_whole_block():

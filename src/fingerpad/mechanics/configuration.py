@@ -147,6 +147,8 @@ class Configuration:
         Norm of the residual over the contact force.
     has_tangent : bool
         Whether the tangent was assembled.
+    is_curved : bool
+        Whether the indenter's curvature is part of it.
     pressures : Pressures, optional
         Of the elements, for a mixed method.
     """
@@ -161,6 +163,7 @@ class Configuration:
     residual_mn: FloatArray
     relative_residual: float
     has_tangent: bool
+    is_curved: bool
     pressures: Pressures | None = None
 
     @property
@@ -197,6 +200,7 @@ def evaluate(
     blocks: np.ndarray,
     before: Friction | None = None,
     pressure_kpa: FloatArray | None = None,
+    curved: bool = True,
 ) -> Configuration:
     """Potential, out-of-balance forces and tangent of one configuration.
 
@@ -216,6 +220,8 @@ def evaluate(
         Friction one Newton step ago, for the same anchors.
     pressure_kpa : array (n_elements,), optional
         Pressures in the tangent of a mixed method; those that belong to the displacements by default. [kPa]
+    curved : bool
+        Whether the tangent may have the indenter's curvature, near the solution.
 
     Returns
     -------
@@ -245,7 +251,8 @@ def evaluate(
         # Forces were left half summed, and could look balanced.
         relative_residual = np.inf
     stiffness = touch.stiffness
-    if relative_residual < CURVATURE_BELOW_RESIDUAL:
+    is_curved = curved and relative_residual < CURVATURE_BELOW_RESIDUAL
+    if is_curved:
         stiffness = stiffness + contact.curvature_stiffness(touch, positions, depth_mm)
     if has_tangent:
         blocks[body.sparsity.diagonal[contact.nodes]] += stiffness
@@ -260,5 +267,6 @@ def evaluate(
         residual_mn=residual,
         relative_residual=relative_residual,
         has_tangent=has_tangent,
+        is_curved=is_curved,
         pressures=pressures,
     )

@@ -35,8 +35,11 @@ SUPERLU_NODES = 20_000
 NO_NODES = np.empty(0, dtype=np.int64)
 
 
-class _NotPositiveDefiniteError(Exception):
-    """Conjugate gradients met a direction along which the tangent has no stiffness."""
+class NotPositiveDefiniteError(ConvergenceError):
+    """A tangent with a direction along which it has no stiffness."""
+
+    def __init__(self) -> None:
+        super().__init__("The tangent is not positive definite.")
 
 
 class Preconditioner(Protocol):
@@ -225,24 +228,25 @@ class LinearSolver:
 
         Raises
         ------
+        NotPositiveDefiniteError
+            If the tangent is not positive definite.
         ConvergenceError
-            If the tangent is not positive definite, or conjugate gradients do not converge even with a new
-            preconditioner.
+            If conjugate gradients do not converge even with a new preconditioner.
         """
         digits = -np.log10(relative_tolerance)
         for _ in range(2):
             fresh = self._stale
-            if self._stale:
-                self.approximate.renew(blocks)
-                self.renewals += 1
-                self._stale = False
-            else:
-                self.approximate.follow(blocks)
             try:
+                if fresh:
+                    self.approximate.renew(blocks)
+                    self.renewals += 1
+                    self._stale = False
+                else:
+                    self.approximate.follow(blocks)
                 solution, count, failed = _conjugate_gradients(self.approximate, residual, relative_tolerance)
-            except _NotPositiveDefiniteError:
+            except (NotPositiveDefiniteError, ZeroDivisionError):  # the latter of a node's own block
                 self._stale = True
-                raise ConvergenceError("The tangent is not positive definite.") from None
+                raise NotPositiveDefiniteError from None
             self.iterations += count
             if fresh:
                 self._renewed_rate = count / digits
@@ -269,7 +273,7 @@ def _conjugate_gradients(
         product = approximate.multiply(direction)
         # Conjugate gradients may run through an indefinite tangent unnoticed, to no minimum.
         if direction @ product < 0.0:
-            raise _NotPositiveDefiniteError
+            raise NotPositiveDefiniteError
         return product
 
     right = approximate.enter(residual)

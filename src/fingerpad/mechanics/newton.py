@@ -23,7 +23,7 @@ from fingerpad.errors import ConvergenceError
 from fingerpad.mechanics.configuration import Balance, Body, Configuration, Lagging, Load, evaluate
 from fingerpad.mechanics.contact import ContactState
 from fingerpad.mechanics.friction import Anchors, rubbing_heat
-from fingerpad.mechanics.linear import LinearSolver
+from fingerpad.mechanics.linear import LinearSolver, NotPositiveDefiniteError
 from fingerpad.mesh_quality import element_place, squeezed_most
 
 SUFFICIENT_DECREASE = 1e-4
@@ -208,8 +208,7 @@ class _Search:
                     continue  # only friction was renewed: the body may still be at rest
             enough = ENOUGH * settings.residual_tolerance / now.relative_residual
             forcing = float(np.clip(max(FORCING * now.relative_residual, enough), *FORCING_RANGE))
-            now = self.with_tangent(now)
-            direction = self.solver.solve(self.blocks, now.residual_mn, forcing)
+            now, direction = self.newton_direction(self.with_tangent(now), forcing)
             now = self.line_search(now, direction, max(potentials[-REMEMBERED_POTENTIALS:]))
             potentials.append(now.potential_uj)
             settled = not rubs
@@ -220,6 +219,21 @@ class _Search:
         if now.has_tangent:
             return now
         return evaluate(self.body, self.load, now.displacement_mm, now.depth_mm, self.lagging, self.blocks)
+
+    def newton_direction(self, now: Configuration, forcing: float) -> tuple[Configuration, FloatArray]:
+        """Solve for a Newton step, and return the configuration with the tangent that could be solved.
+
+        Skin that is about to slide round a sharp edge has no stiffness along it. Without the curvature of
+        the indenter the tangent still leads downhill.
+        """
+        try:
+            return now, self.solver.solve(self.blocks, now.residual_mn, forcing)
+        except NotPositiveDefiniteError:
+            if not now.is_curved:
+                raise
+        where = now.displacement_mm, now.depth_mm
+        straight = evaluate(self.body, self.load, *where, self.lagging, self.blocks, curved=False)
+        return straight, self.solver.solve(self.blocks, straight.residual_mn, forcing)
 
     def renewed(self, now: Configuration, augmented: bool) -> Lagging:
         """Multipliers and anchors of the contact found."""
