@@ -19,6 +19,7 @@ from fingerpad.files import write_atomically
 BENCHMARKS = (
     "startup",
     "population",
+    "receptors",
     "sphere",
     "fitting",
     "profiles",

@@ -74,6 +74,7 @@ TARGETS = (
     # "Linear" is read as an exponent of at most 1.05; the memory of Python itself flatters small meshes.
     Target("growth_memory_exponent", "growth", f"{_GROWTH} of memory", 1.05, ""),
     Target("afferents_s", "population", "100,000 afferents, 1 s, exact spikes", 1.0, "s"),
+    Target("receptors_s", "receptors", "10,000 receptors answer one touch, skin solved", 1.0, "s"),
     Target("gradient_sum_s", "population", "Gradient Sum, 7 spheres x 100 x 100 x 100", 0.1, "s"),
     Target("session_s", "fitting", "response surfaces, two starts, six folds, given the SED", 30.0, "s"),
     Target("felupe_ratio", "peers", f"{_BLOCK}: times faster than FElupe", 10.0, "x", at_least=True),
