@@ -214,6 +214,7 @@ class NailEdge:
         side = self._dorsal(backwards, np.full_like(backwards, half_width))
         # The edge goes from the middle to +z and then back: seen from outside, the nail is on its other side.
         leaving, going = self._leaving(front), self._leaving(side)
+        leaving[0, 2] = 0.0  # the middle one stays on the plane of symmetry
         turn = math.acos(float(np.clip(leaving[-1] @ going[0], -1.0, 1.0)))
         angles = np.linspace(0.0, turn, _FAN_LINES)[1:-1, None]
         fan = (np.sin(turn - angles) * leaving[-1] + np.sin(angles) * going[0]) / math.sin(turn)
