@@ -49,6 +49,7 @@ def synthetic_results() -> dict:
         "drive_quantities": _drive_quantities(),
         "spike_fit": _spike_fit(),
         "discrimination": _discrimination(),
+        "mesh_noise": _mesh_noise(),
         "population": _population(),
         "population_timing": _population_timing(),
         "nail": _nail(),
@@ -354,7 +355,44 @@ def _discrimination() -> dict:
         "curvature_per_m": CURVATURE_PER_M,
         "noise_sigma": 0.12,
         "noise_sigma_paper": 0.055,
-        "goodwin": {"curvature_per_m": [296.0, 365.0], "hit_rate": [0.58, 0.95]},
+        "sessions": 5,
+        "goodwin": {
+            "curvature_per_m": [296.0, 365.0],
+            "hit_rate": [0.58, 0.95],
+            "trials": 100,
+            "low": [0.48, 0.89],
+            "high": [0.68, 0.98],
+        },
+        "statistics": {
+            "sweep": {
+                "noise_sigma": [0.015, 0.055, 0.085],
+                "misfit": [
+                    [{"value": value + place, "error": 0.001} for value in (0.3, 0.15, 0.08)]
+                    for place in (0.0, 0.01)
+                ],
+            }
+        },
+        "reasons": {
+            "rise": {"static": [0.46, 0.43]},
+            "rise_for_paper_noise": {"static": [0.16, None]},
+            "misfit_curve": {
+                "noise_sigma": [0.01, 0.1, 0.2],
+                "misfit": {name: [0.3, 0.1, 0.2] for name in ("static", "latency", "euclidean")},
+            },
+            "readings": [
+                {
+                    "reading": name,
+                    "receptors": [18, 17],
+                    "rise": [0.46, 0.43],
+                    "hit_rate": [[0.6] * 6] * 2,
+                    "largest_shift": 0.01,
+                    "noise_sigma": noise,
+                    "misfit": noise,
+                    "own_largest_shift": noise,
+                }
+                for name, noise in (("eight neighbours (used)", 0.14), ("four neighbours", None))
+            ],
+        },
         "gradient_sum": {
             "static": rates(0.01, 0.02),
             "dynamic": rates(0.1, 0.03),
@@ -369,6 +407,19 @@ def _discrimination() -> dict:
             "criterion_0.01": rates(0.01, 0.03),
             "criterion_0.02": rates(0.01, 0.06),
         },
+    }
+
+
+def _mesh_noise() -> dict:
+    return {
+        "curvature_per_m": [287.0, 296.0],
+        "meshes": ["as in the study", "another"],
+        "static_sum": [[1400.0, 1460.0], [1410.0, 1467.0]],
+        "sed_kpa": [[1.4, 1.5], [1.4, 1.5]],
+        "step": [60.0, 57.0],
+        "difference": [0.0, -0.05],
+        "largest_difference": 0.05,
+        "limit": 0.1,
     }
 
 
@@ -850,20 +901,56 @@ def test_figure_7_keeps_the_papers_letters_and_shows_people_in_every_panel():
         "(g) Gradient Sum, static σ₁ = 0.12, 10 matrices",
     ]
     for axes in panels:
-        people = lines(axes)["people (Goodwin et al. 1991)"]
-        assert people.get_xydata().tolist() == [[296.0, 0.58], [365.0, 0.95]]
+        (people,) = [bars for bars in axes.containers if bars.get_label().startswith("people")]
+        points, _, (intervals,) = people.lines
+        assert points.get_xydata().tolist() == [[296.0, 0.58], [365.0, 0.95]]
+        ends = [sorted(bar[:, 1].round(9).tolist()) for bar in intervals.get_segments()]
+        assert ends == [[0.48, 0.68], [0.89, 0.98]]
 
 
 def test_figure_7_draws_solid_in_place_and_dotted_shifted_with_bars_of_one_deviation():
     section = _discrimination()
     axes = discrimination.draw_observers(section).axes[1]
     rates = section["gradient_sum"]["dynamic"]
-    for container, suffix, style in zip(axes.containers, ("", "_shifted"), ("-", ":"), strict=True):
+    ours = [bars for bars in axes.containers if bars.get_label().startswith("predicted")]
+    for container, suffix, style in zip(ours, ("", "_shifted"), ("-", ":"), strict=True):
         curve, _, (bars,) = container.lines
         assert curve.get_linestyle() == style
         assert curve.get_ydata().tolist() == rates[f"hit_rate{suffix}"]
         lengths = [bar[1, 1] - bar[0, 1] for bar in bars.get_segments()]
         np.testing.assert_allclose(lengths, 2.0 * np.array(rates[f"hit_rate{suffix}_sd"]))
+
+
+def test_figure_15_draws_every_code_that_answers_and_both_positions_of_the_sweep():
+    section = _discrimination()
+    codes, sweep = discrimination.draw_noise(section).axes
+    drawn = lines(codes)
+    assert set(drawn) == {
+        "Gradient Sum, static",
+        "Gradient Sum, latency",
+        "Euclidean, static",
+        "paper's best",
+        "our fit",
+    }
+    assert drawn["paper's best"].get_xdata() == [0.055, 0.055]
+    assert drawn["our fit"].get_xdata() == [0.12, 0.12]
+    labels = [bars.get_label() for bars in sweep.containers]
+    assert labels == ["sphere at 0.0 mm", "sphere at 0.2 mm"]
+    assert sweep.containers[1].lines[0].get_ydata().tolist() == [0.31, 0.16, 0.09]
+    assert "46 %" in discrimination.caption_noise(section)
+    assert "16 %" in discrimination.caption_noise(section)
+
+
+def test_readings_stand_in_their_table_and_what_was_used_is_marked():
+    (table,) = tables.readings(_discrimination())
+    assert [row.kind for row in table.rows] == ["final", ""]
+    assert table.rows[0].cells[:3] == ("eight neighbours (used)", "18 / 17", "0.460 / 0.430")
+    assert table.rows[1].cells[4] == table.rows[1].cells[6]
+
+
+def test_steps_on_other_meshes_are_shares_of_the_first():
+    (table,) = tables.mesh_noise(_mesh_noise())
+    assert [row.cells[-1] for row in table.rows] == ["0.000", "−0.050"]
 
 
 def test_figure_7_shows_rates_far_below_chance():

@@ -39,7 +39,7 @@ MEASURED = ("started", "wall_s", "peak_memory_mb", "stages")
 BALANCE = 0.01
 """Bound on the error of the balance of energy at quick resolution, where 0.0012 to 0.0034 are found."""
 
-BEYOND = {"drive_quantities", "spike_fit", "single_unit_uncertainty", "population_timing"}
+BEYOND = {"mesh_noise", "drive_quantities", "spike_fit", "single_unit_uncertainty", "population_timing"}
 """Sections that go beyond the paper, which a run at quick resolution leaves out unless asked."""
 
 DRAWINGS = [drawing for chapter in CHAPTERS if chapter.section not in BEYOND for drawing in chapter.drawings]
@@ -183,8 +183,9 @@ def test_what_goes_beyond_the_paper_comes_on_top(first, extended):
     assert set(theirs) == set(ours) | BEYOND
     assert set(theirs["single_unit"]) == set(ours["single_unit"]) | {"starts", "methods"}
     assert {name: theirs["single_unit"][name] for name in ours["single_unit"]} == ours["single_unit"]
-    for section in set(ours) - {"single_unit"}:
+    for section in set(ours) - {"single_unit", "comparison"}:
         assert theirs[section] == ours[section]
+    assert [row for row in theirs["comparison"] if row in ours["comparison"]] == ours["comparison"]
     assert all(math.isfinite(number) for number in numbers(extended.results))
     page = (extended.folder / "report.html").read_text(encoding="utf-8")
     assert Links(page).tags.count("img") == sum(len(chapter.drawings) for chapter in CHAPTERS)
@@ -206,6 +207,20 @@ def test_every_quantity_that_is_shown_is_judged_on_the_same_folds(extended):
     # The target of a fit by any method; the paper's model misses it.
     assert best["fit"]["fss_out_of_sample"] >= 0.92
     assert best["fit"]["fss_out_of_sample_dynamic"] > paper["fit"]["fss_out_of_sample_dynamic"] + 0.1
+
+
+def test_the_nearest_step_is_the_skins_and_not_the_meshs(extended):
+    """Two more meshes of the same resolution; at quick, steps differ by 2 %."""
+    found = extended.results["mesh_noise"]
+    assert np.shape(found["static_sum"]) == (3, 2)
+    assert found["step"] == pytest.approx(np.diff(found["static_sum"]).ravel(), rel=1e-9)
+    assert min(found["step"]) > 0.0
+    assert len(set(found["step"])) == 3
+    assert found["largest_difference"] < found["limit"] == 0.1
+    first, _ = found["static_sum"][0]
+    assert first == extended.results["discrimination"]["gradient_sums"]["static"][0][0]
+    (row,) = [row for row in extended.results["comparison"] if "other meshes" in row["quantity"]]
+    assert row["met"] is True
 
 
 def test_spike_trains_are_complete(extended):

@@ -160,6 +160,40 @@ def _in_order(pairs: np.ndarray) -> np.ndarray:
     return ordered[np.lexsort((ordered[:, 1], ordered[:, 0]))]
 
 
+def answering_neighbours(responses: ArrayLike, neighbours: np.ndarray) -> np.ndarray:
+    """Return the pairs of neighbours of which both answer every stimulus.
+
+    A receptor that is silent under one stimulus has no latency to compare with its neighbours'. Left out
+    under all of them, it cannot make two stimuli differ by falling silent.
+
+    Parameters
+    ----------
+    responses : array_like (..., n_receptors)
+        Response measure of every receptor to each stimulus; NaN where it has none. [any unit]
+    neighbours : int array (n_pairs, 2)
+        From `neighbour_pairs`.
+
+    Returns
+    -------
+    int array (n_answering_pairs, 2)
+
+    Raises
+    ------
+    InputError
+        If the pairs name receptors that are not there.
+
+    Examples
+    --------
+    >>> in_a_row = neighbour_pairs([[0.0, 0.0], [0.0, 1.0], [0.0, 2.0]], 1.0)
+    >>> answering_neighbours([[20.0, 25.0, np.nan], [20.0, 24.0, 90.0]], in_a_row).tolist()
+    [[0, 1]]
+    """
+    table = np.asarray(responses, dtype=np.float64)
+    pairs = check_neighbours(neighbours, table.shape[-1] if table.ndim else 0)
+    silent = np.flatnonzero(np.isnan(table).reshape(-1, table.shape[-1]).any(axis=0))
+    return pairs[~np.isin(pairs, silent).any(axis=1)]
+
+
 def gradient_sum(values: ArrayLike, neighbours: np.ndarray) -> FloatArray:
     """Gradient Sum: how much a response differs from place to place, steps (b) and (c) of Figure 3.
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
+from scipy.special import ndtr
 
 from fingerpad.checks import FloatArray, finite, float_array, not_negative, positive
 from fingerpad.discrimination import checked_responses
@@ -87,6 +88,49 @@ def expected_hit_rates(
     pairs = check_neighbours(neighbours, values.shape[1])
     sums = shared_noise_gradient_sums(values, pairs, not_negative("noise_sigma", noise_sigma), draws)
     means, spreads = moments(sums)
+    point = decision_point(means[0], means[1:], finite("criterion", criterion))
+    return hit_probability(point, means[1:], spreads[1:], side(means[np.newaxis]))
+
+
+def expected_euclidean_hit_rates(
+    responses: ArrayLike,
+    noise_sigma: float,
+    criterion: float = psychophysics.DECISION_CRITERION.value,
+    silent_value: float | None = None,
+) -> FloatArray:
+    """Predict the mean hit rates of `discriminate_euclidean`, city-block, in closed form.
+
+    Of one receptor the difference of two noisy responses a and b is normal, and its size has
+
+        m = s sqrt(2/pi) exp(-d^2 / 2 s^2) + d (1 - 2 Phi(-d/s)),    v = d^2 + s^2 - m^2,
+        d = b - a,    s = sigma_1 sqrt(a^2 + b^2)
+
+    as mean and variance (the folded normal distribution). Receptors are independent, so both add up, and
+    the sum over a population is close to normal.
+
+    Parameters
+    ----------
+    responses, noise_sigma, silent_value
+        As in `fingerpad.discrimination.discriminate_euclidean`.
+    criterion : float, optional
+        Decision point beta.
+
+    Returns
+    -------
+    array (n_comparisons,)
+        Expected hit rates, within two points with 18 receptors. [0-1]
+
+    Examples
+    --------
+    >>> expected_euclidean_hit_rates([[50.0, 60.0], [51.0, 62.0], [60.0, 80.0]], 0.02).round(1).tolist()
+    [0.6, 1.0]
+    """
+    values = checked_responses(responses, silent_value)
+    sigma = positive("noise_sigma", noise_sigma)
+    d = values - values[0]
+    s = np.maximum(sigma * np.hypot(values, values[0]), np.finfo(float).tiny)  # both silent: no difference
+    m = s * np.sqrt(2.0 / np.pi) * np.exp(-0.5 * np.square(d / s)) + d * (1.0 - 2.0 * ndtr(-d / s))
+    means, spreads = m.sum(axis=1), np.sqrt((np.square(d) + np.square(s) - np.square(m)).sum(axis=1))
     point = decision_point(means[0], means[1:], finite("criterion", criterion))
     return hit_probability(point, means[1:], spreads[1:], side(means[np.newaxis]))
 

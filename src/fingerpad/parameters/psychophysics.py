@@ -28,6 +28,13 @@ GOODWIN_CURVATURES = Published(
 GOODWIN_HIT_RATES = Published(
     "fraction of trials in which they were told from the standard", (0.58, 0.95), "1", _GOODWIN, "paper"
 )
+GOODWIN_TRIALS = Published(
+    "trials behind each of these fractions, for their binomial intervals",
+    100.0,
+    "1",
+    "not known to us; the smallest number of trials of which 58 % and 95 % are whole numbers",
+    "assumed",
+)
 
 NOISE_SIGMA = Published(
     "standard deviation sigma_1 of the multiplicative noise that fitted best",

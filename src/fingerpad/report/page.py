@@ -167,9 +167,17 @@ CHAPTERS = (
                 discrimination.draw_criterion,
                 discrimination.caption_criterion,
             ),
+            Drawing(
+                15,
+                "figure_15_noise",
+                "How much noise",
+                discrimination.draw_noise,
+                discrimination.caption_noise,
+            ),
         ),
-        tables.hit_rates,
+        lambda section: tables.hit_rates(section) + tables.readings(section),
     ),
+    Chapter("mesh_noise", "Level 3: noise of the mesh", (), tables.mesh_noise),
     Chapter(
         "nail",
         "The border of the nail",

@@ -240,6 +240,58 @@ def hit_rates(section: Mapping[str, Any]) -> list[Table]:
     return [Table("Hit rates, mean ± standard deviation", columns, rows)] if rows else []
 
 
+def readings(section: Mapping[str, Any]) -> list[Table]:
+    """Return what other readings of the paper's steps would give."""
+    rows = [
+        Row(
+            (
+                reading["reading"],
+                " / ".join(plain(count) for count in reading["receptors"]),
+                " / ".join(fixed(rise, 3) for rise in reading["rise"]),
+                fixed(reading["largest_shift"], 3),
+                *(fixed(reading[key], 3) for key in ("noise_sigma", "misfit", "own_largest_shift")),
+            ),
+            "final" if "(used)" in reading["reading"] else "",
+        )
+        for reading in section.get("reasons", {}).get("readings", [])
+    ]
+    columns = (
+        "reading",
+        "receptors",
+        "rise of the sum, 287 to 365 1/m",
+        "largest change by the shift",
+        "noise of its own",
+        "rms distance to people with it",
+        "largest change by the shift with it",
+    )
+    note = (
+        "Two numbers are for the spheres at 0.0 and at 0.2 mm. The noise is fitted to both positions "
+        "together; expected hit rates, without the chance of a session."
+    )
+    return [Table("Readings of steps that the paper leaves open", columns, rows, note)] if rows else []
+
+
+def mesh_noise(section: Mapping[str, Any]) -> list[Table]:
+    """Return the step from the standard to the nearest comparison on each mesh."""
+    rows = [
+        Row((mesh, *(fixed(value, 1) for value in sums), fixed(step, 2), fixed(difference, 3)))
+        for mesh, sums, step, difference in zip(
+            section["meshes"], section["static_sum"], section["step"], section["difference"], strict=True
+        )
+    ]
+    columns = (
+        "mesh",
+        *(f"static sum at {number(curvature)} 1/m" for curvature in section["curvature_per_m"]),
+        "step",
+        "step above the first, share",
+    )
+    note = (
+        "In spikes/s. All meshes have the resolution of the run; only where their lines lie differs. Steps "
+        f"shall agree within {number(section['limit'])} of the first."
+    )
+    return [Table("The nearest step on other meshes", columns, rows, note)]
+
+
 def _with_spread(rates: Mapping[str, Any], suffix: str) -> list[str]:
     means = rates[f"hit_rate{suffix}"]
     spreads = rates.get(f"hit_rate{suffix}_sd") or [None] * len(means)

@@ -18,7 +18,7 @@ from fingerpad.parameters import protocol, psychophysics
 from fingerpad.reference import bar_firing_rates
 from fingerpad.sampling import SkinResponse
 from fingerpad.spikes import firing_rate_hz, first_spike_latency_ms
-from fingerpad.studies import sphere_discrimination
+from fingerpad.studies.percept_reasons import PATIENCE_MS
 
 DRAWS = 5000
 """Common random presentations behind the hit rates."""
@@ -64,7 +64,7 @@ class Reading:
 
     def measures(self) -> dict[str, FloatArray]:
         """Return the response measures that an observer reads, latencies as far as he waits for them."""
-        return {**self.rate_hz, "latency": np.fmin(self.latency_ms, sphere_discrimination.PATIENCE_MS)}
+        return {**self.rate_hz, "latency": np.fmin(self.latency_ms, PATIENCE_MS)}
 
 
 def over_thickness(skin: SkinResponse, sheets: int) -> SkinResponse:

@@ -26,6 +26,7 @@ from fingerpad.sampling import SkinResponse
 from fingerpad.store import Store, code_hash, solve_missing
 from fingerpad.studies import (
     drive_quantities,
+    mesh_noise,
     nail_border,
     response_maps,
     single_unit,
@@ -78,8 +79,8 @@ class Reproduction:
         Processes to use; the numbers do not depend on it.
     extended : bool, optional
         Whether to go beyond the paper: other ways to fit, what else may drive the afferent, spike trains,
-        what the rates determine, and when a population fires. Default: unless the resolution is "quick",
-        which would take half as long again.
+        what the rates determine, when a population fires, and two spheres on other meshes. Default: unless
+        the resolution is "quick", which would take half as long again.
     """
 
     conditions: Conditions
@@ -132,6 +133,8 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
         "bar, 36 shifts": dict(enumerate(single_unit.touches(conditions))),
         "spheres": spheres,
     }
+    if run.goes_beyond:
+        wanted["spheres, other meshes"] = mesh_noise.touches(conditions)
     missing = {
         name: sum(not store.holds(touch) for touch in touches.values()) for name, touches in wanted.items()
     }
@@ -162,7 +165,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
         }
         advance()
     if run.goes_beyond:
-        with _timed("beyond the paper", 6, progress, stages) as advance:
+        with _timed("beyond the paper", 7, progress, stages) as advance:
             traces = drive_quantities.receptor_traces(bars, drive_quantities.SHOWN_QUANTITIES)
             results["single_unit"]["starts"] = single_unit_starts.result(problem, traces["von_mises"])
             advance()
@@ -171,6 +174,10 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
                 drive_quantities.traces_of(traces, drive_quantities.EXTENDED),
                 problem.recordings,
                 (best, folds),
+            )
+            advance()
+            results["mesh_noise"] = mesh_noise.result(
+                responses["spheres, other meshes"], sphere_responses, afferent
             )
             advance()
             results["drive_quantities"] = drive_quantities.result(

@@ -9,30 +9,28 @@ import numpy as np
 
 from fingerpad.afferent import Afferent
 from fingerpad.checks import FloatArray
-from fingerpad.discrimination import Experiment, discriminate_euclidean, discriminate_gradient_sum
-from fingerpad.encoding import gradient_sum, neighbour_pairs
+from fingerpad.encoding import answering_neighbours, gradient_sum, neighbour_pairs
 from fingerpad.indenters import Sphere
-from fingerpad.noise_fit import expected_hit_rates, fit_noise_sigma
 from fingerpad.parameters import protocol, psychophysics
 from fingerpad.population import Population
 from fingerpad.random_streams import Purpose, normals
 from fingerpad.sampling import SkinResponse
-from fingerpad.signals import HitRates, ResponseMap
+from fingerpad.signals import ResponseMap
+from fingerpad.studies import goodwin
 from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.studies.percept_reasons import first_spikes, fitted_noise, reasons
+from fingerpad.studies.percept_sessions import SESSIONS, Measured, Observers, observe
+from fingerpad.studies.percept_statistics import statistics
 
 CURVATURES = psychophysics.SPHERE_CURVATURES.value
 POSITIONS_MM = protocol.SPHERE_POSITIONS.value
 NOISE_DRAWS = 4000
 """Common random presentations behind the fit of the noise, which they leave uncertain by one percent."""
 
-PATIENCE_MS = protocol.RAMP.value
-"""How long the observer waits for first spikes. [ms]"""
-
-Measure = Callable[[ResponseMap], FloatArray]
-MEASURES: dict[str, Measure] = {
+RESPONSES: dict[str, Callable[[ResponseMap], FloatArray]] = {
     "static": lambda response: response.static_rate_hz,
     "dynamic": lambda response: response.dynamic_rate_hz,
-    "latency": lambda response: _waited(response.first_spike_latency_ms),
+    "latency": lambda response: response.first_spike_latency_ms,
 }
 
 
@@ -54,82 +52,102 @@ def touches(conditions: Conditions) -> dict[tuple[float, float], Touch]:
 
 
 def result(
-    responses: dict[tuple[float, float], SkinResponse], afferent: Afferent, seed: int
+    responses: dict[tuple[float, float], SkinResponse],
+    afferent: Afferent,
+    seed: int,
+    sessions: int = SESSIONS,
 ) -> dict[str, Any]:
-    """Hit rates of both strategies and all measures, at the noise that fits Goodwin's two points best."""
+    """Hit rates of both strategies and all measures, at the noise that fits Goodwin's two points best.
+
+    Parameters
+    ----------
+    responses : dict of SkinResponse
+        By position and curvature, from `touches`.
+    afferent : Afferent
+        What every receptor is.
+    seed : int
+        Of all noise.
+    sessions : int, optional
+        How often the protocol is repeated; the first session is drawn, all of them tell the Monte-Carlo
+        errors.
+
+    Returns
+    -------
+    dict
+        The noise; hit rates of the first session by strategy, measure and variant; what is known of people;
+        `statistics` behind each of the paper's statements; and `reasons`, why ours differ.
+    """
     population = Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0))
     neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
     answers = {key: population.respond(skin) for key, skin in responses.items()}
-
-    def table(measure: str, position: float) -> FloatArray:
-        return np.array([MEASURES[measure](answers[position, curvature]) for curvature in CURVATURES])
-
-    goodwin = [CURVATURES.index(curvature) - 1 for curvature in psychophysics.GOODWIN_CURVATURES.value]
+    tables = {
+        name: [
+            np.array([read(answers[position, curvature]) for curvature in CURVATURES])
+            for position in POSITIONS_MM
+        ]
+        for name, read in RESPONSES.items()
+    }
+    measures = {
+        name: _measured(name, both, neighbours)
+        for name, both in tables.items()
+        if name == "static" or _answers(name, both, neighbours)
+    }
     draws = normals(seed, 1, len(population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
-    static = table("static", POSITIONS_MM[0])
-    noise = fit_noise_sigma(lambda sigma: expected_hit_rates(static, neighbours, sigma, draws)[goodwin])
-
-    def gradient(
-        measure: str, sigma: float = noise.noise_sigma, experiment: Experiment | None = None
-    ) -> dict[str, Any]:
-        return _at_both_positions(
-            lambda position, session: discriminate_gradient_sum(
-                table(measure, position), neighbours, sigma, seed, experiment, session=session
-            )
-        )
-
-    variants = {f"sigma_{sigma:g}": gradient("static", sigma) for sigma in _shown_noise()}
-    variants["ten_matrices"] = gradient("static", experiment=Experiment(presentations=10))
-    for sigma in psychophysics.DECISION_CRITERION_SIGMA.value:
-        variants[f"criterion_{sigma:g}"] = gradient("static", experiment=Experiment(criterion_sigma=sigma))
+    noise = fitted_noise(measures["static"], CURVATURES, draws)
+    observers = observe(measures, noise.noise_sigma, seed, sessions)
+    drawn = {name: _first_session(observers, name) for name in observers.mean}
     return {
         "seed": seed,
+        "sessions": sessions,
         "curvature_per_m": CURVATURES,
         "noise_sigma": noise.noise_sigma,
         "noise_fit_error": noise.root_mean_square_error,
         "noise_sigma_paper": psychophysics.NOISE_SIGMA.value,
-        "goodwin": {
-            "curvature_per_m": psychophysics.GOODWIN_CURVATURES.value,
-            "hit_rate": psychophysics.GOODWIN_HIT_RATES.value,
-        },
+        "goodwin": goodwin.observed(CURVATURES[1:]),
         "gradient_sums": {
-            measure: [gradient_sum(table(measure, position), neighbours) for position in POSITIONS_MM]
-            for measure in MEASURES
+            name: [gradient_sum(one.responses, one.neighbours) for one in both]
+            for name, both in measures.items()
         },
-        "gradient_sum": {measure: gradient(measure) for measure in MEASURES},
-        "euclidean": {
-            "static": _at_both_positions(
-                lambda position, session: discriminate_euclidean(
-                    table("static", position), noise.noise_sigma, seed, session=session
-                )
-            )
+        "gradient_sum": {name: drawn[name] for name in measures},
+        "euclidean": {"static": drawn["euclidean"]},
+        "variants": {
+            name: rates for name, rates in drawn.items() if name not in measures and name != "euclidean"
         },
-        "variants": variants,
+        "silent": [name for name in RESPONSES if name not in measures],
+        "statistics": statistics(observers, CURVATURES, tuple(measures)),
+        "reasons": reasons(
+            measures,
+            tables["latency"],
+            population.positions_mm,
+            population.pitch_mm,
+            CURVATURES,
+            noise.noise_sigma,
+            draws,
+            seed,
+        ),
     }
 
 
-def _waited(latency_ms: FloatArray) -> FloatArray:
-    """Latencies of an observer who waits until the ramp ends: a later first spike, or none, counts as that.
-
-    The rule has no jump: a receptor that falls silent says the same before and after
-    (docs/decisions/silent-receptors.md).
-    """
-    return np.fmin(latency_ms, PATIENCE_MS)
+def _answers(name: str, tables: list[FloatArray], neighbours: np.ndarray) -> bool:
+    """Whether a measure is more than silence: otherwise it is left out, for zeros give no hit rate."""
+    if name == "latency":
+        return all(len(answering_neighbours(table, neighbours)) > 0 for table in tables)
+    return all(table.any() for table in tables)
 
 
-def _shown_noise() -> list[float]:
-    """Noise of Figure 7: the paper's best and those on either side of it."""
-    return sorted({psychophysics.NOISE_SIGMA.value, *psychophysics.NOISE_SIGMA_SHOWN.value})
+def _measured(name: str, tables: list[FloatArray], neighbours: np.ndarray) -> list[Measured]:
+    """Give a measure the pairs of receptors that its Gradient Sum goes over, position by position."""
+    if name == "latency":
+        return [first_spikes(table, neighbours) for table in tables]
+    return [Measured(table, neighbours) for table in tables]
 
 
-def _at_both_positions(discriminate: Callable[[float, int], HitRates]) -> dict[str, FloatArray]:
-    """Hit rates at both positions, each in a session of its own."""
-    first, shifted = (
-        discriminate(position, session) for session, position in enumerate(POSITIONS_MM, start=1)
-    )
+def _first_session(observers: Observers, name: str) -> dict[str, FloatArray]:
+    """Hit rates of one observer as the paper reports them, one session at both positions."""
+    (first, shifted), (spread, spread_shifted) = observers.mean[name][0], observers.spread[name][0]
     return {
-        "hit_rate": first.hit_rate,
-        "hit_rate_sd": first.hit_rate_sd,
-        "hit_rate_shifted": shifted.hit_rate,
-        "hit_rate_shifted_sd": shifted.hit_rate_sd,
+        "hit_rate": first,
+        "hit_rate_sd": spread,
+        "hit_rate_shifted": shifted,
+        "hit_rate_shifted_sd": spread_shifted,
     }

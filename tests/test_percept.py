@@ -1,0 +1,362 @@
+"""The percept: what is known of people, statistics of sessions, other readings, noise of the mesh."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.special import ndtri
+
+from fingerpad.discrimination import (
+    Experiment,
+    discriminate_euclidean,
+    discriminate_gradient_sum,
+)
+from fingerpad.encoding import gradient_sum, neighbour_pairs
+from fingerpad.errors import InputError
+from fingerpad.grading import lines_along
+from fingerpad.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
+from fingerpad.population import Population
+from fingerpad.random_streams import Purpose, normals
+from fingerpad.signals import SedTraces
+from fingerpad.studies import goodwin, mesh_noise, percept_reasons
+from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.studies.percept_reasons import (
+    expected,
+    first_spikes,
+    fitted_noise,
+    reasons,
+    rise_needed,
+)
+from fingerpad.studies.percept_sessions import SWEPT_NOISE, Measured, Observers, observe
+from fingerpad.studies.percept_statistics import estimate, extreme, statistics
+
+CURVATURES = (287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0)
+GRID = Population.grid()
+PAIRS = neighbour_pairs(GRID.positions_mm, GRID.pitch_mm)
+TWO = np.array([[0, 1]])
+
+
+def bumps(centre_mm=17.37, steepness=1.0):
+    """Rates that grow and sharpen with curvature, as under a sphere."""
+    x, z = (GRID.positions_mm - [centre_mm, 0.0]).T
+    width = 1.8 * (287.0 / np.array(CURVATURES)[:, np.newaxis]) ** steepness
+    return 40.0 * np.exp(-(x**2 + z**2) / (2.0 * width**2))
+
+
+# People
+
+
+@pytest.mark.parametrize(("hits", "trials"), [(58, 100), (95, 100), (3, 20)])
+def test_a_binomial_interval_leaves_half_of_the_doubt_on_either_side(hits, trials):
+    """Clopper & Pearson by their definition, summed term by term."""
+
+    def tail(chance, numbers):
+        return sum(math.comb(trials, k) * chance**k * (1.0 - chance) ** (trials - k) for k in numbers)
+
+    low, high = goodwin.binomial_interval(hits / trials, trials)
+    assert tail(float(low), range(hits, trials + 1)) == pytest.approx(0.025, rel=1e-9)
+    assert tail(float(high), range(hits + 1)) == pytest.approx(0.025, rel=1e-9)
+
+
+def test_a_binomial_interval_of_always_or_never_ends_there():
+    low, high = goodwin.binomial_interval([0.0, 1.0], 10)
+    assert (low[0], high[1]) == (0.0, 1.0)
+    assert low[1] == pytest.approx(0.025 ** (1 / 10))
+
+
+def test_the_number_of_trials_is_the_smallest_that_gives_both_fractions():
+    fits = [
+        n for n in range(1, 101) if all(abs(n * rate - round(n * rate)) < 1e-9 for rate in goodwin.HIT_RATES)
+    ]
+    assert fits[0] == goodwin.TRIALS == 100
+
+
+def test_the_line_is_straight_in_z_and_goes_through_both_points():
+    assert_allclose(goodwin.line_in_z(goodwin.CURVATURES), goodwin.HIT_RATES, rtol=1e-12)
+    slopes = np.diff(ndtri(goodwin.line_in_z([290.0, 310.0, 330.0, 350.0])))
+    assert_allclose(slopes, slopes[0], rtol=1e-9)
+    assert slopes[0] / 20.0 == pytest.approx((ndtri(0.95) - ndtri(0.58)) / 69.0)
+
+
+def test_what_is_known_of_people_has_intervals_around_the_points():
+    known = goodwin.observed(CURVATURES[1:])
+    assert (known["low"] < known["hit_rate"]).all()
+    assert (known["hit_rate"] < known["high"]).all()
+    assert known["line"].shape == (6,)
+
+
+# Sessions
+
+
+@pytest.fixture(scope="module")
+def sessions():
+    measures = {
+        "static": [Measured(bumps(), PAIRS), Measured(bumps(17.57), PAIRS)],
+        "dynamic": [Measured(3.0 * bumps(), PAIRS), Measured(2.0 * bumps(17.57), PAIRS)],
+    }
+    return measures, observe(measures, 0.06, seed=4, sessions=2)
+
+
+def test_every_observer_of_a_session_is_the_one_who_is_asked_alone(sessions):
+    measures, observers = sessions
+    assert observers.mean["static"].shape == (2, 2, 6)
+    for repeat in range(2):
+        for position in range(2):
+            session = 1 + 2 * repeat + position
+            static = measures["static"][position].responses
+            alone = {
+                "static": discriminate_gradient_sum(static, PAIRS, 0.06, 4, session=session),
+                "sigma_0.025": discriminate_gradient_sum(static, PAIRS, 0.025, 4, session=session),
+                "ten_matrices": discriminate_gradient_sum(
+                    static, PAIRS, 0.06, 4, Experiment(presentations=10), session=session
+                ),
+                "ten_hit_rates": discriminate_gradient_sum(
+                    static, PAIRS, 0.06, 4, Experiment(hit_rates=10), session=session
+                ),
+                "criterion_0.02": discriminate_gradient_sum(
+                    static, PAIRS, 0.06, 4, Experiment(criterion_sigma=0.02), session=session
+                ),
+                "euclidean": discriminate_euclidean(static, 0.06, 4, session=session),
+                "dynamic": discriminate_gradient_sum(
+                    measures["dynamic"][position].responses, PAIRS, 0.06, 4, session=session
+                ),
+            }
+            for name, rates in alone.items():
+                assert_allclose(observers.mean[name][repeat, position], rates.hit_rate, rtol=1e-12)
+                assert_allclose(observers.spread[name][repeat, position], rates.hit_rate_sd, rtol=1e-9)
+
+
+def test_the_mean_of_ten_hit_rates_is_unsteadier_by_the_root_of_ten(sessions):
+    few, many = (sessions[1].unsteadiness[count] for count in (10, 100))
+    assert_allclose(few / many, math.sqrt(10.0), rtol=0.25)
+
+
+def test_one_session_tells_no_error_and_pairs_without_an_answer_no_gradient():
+    measures = {"static": [Measured(bumps(), PAIRS)]}
+    with pytest.raises(InputError, match="sessions must be a whole number of at least 2"):
+        observe(measures, 0.06, seed=4, sessions=1)
+    with pytest.raises(InputError, match="there are none"):
+        Measured(bumps(), PAIRS[:0])
+
+
+# Statistics
+
+
+def made_up(seed=3, n_sessions=400, spread=0.05):
+    """Observers whose hit rates are known but for noise."""
+    draw = np.random.default_rng(seed).standard_normal
+    rising = np.array([0.58, 0.65, 0.73, 0.80, 0.87, 0.95])
+    known = {
+        "static": np.array([rising, rising + 0.01]),
+        "dynamic": np.array([rising + 0.1, rising - [0.1, 0.0, 0.0, 0.0, 0.0, 0.0]]),
+        "euclidean": np.array([rising, rising]),
+        "ten_matrices": np.array([rising, rising]),
+        "criterion_0.01": np.array([rising, rising]),
+        "criterion_0.02": np.array([rising, rising - 0.004]),
+    }
+    known |= {f"sigma_{sigma:g}": np.array([rising, rising]) - sigma for sigma in SWEPT_NOISE}
+    noisy = {name: rates + spread * draw((n_sessions, 2, 6)) for name, rates in known.items()}
+    widths = dict.fromkeys(known, 0.02) | {"ten_matrices": 0.06, "criterion_0.02": 0.03}
+    spreads = {name: np.full((n_sessions, 2, 6), width) for name, width in widths.items()}
+    unsteadiness = {10: np.full((n_sessions, 2), 0.006), 100: np.full((n_sessions, 2), 0.002)}
+    return Observers(noisy, spreads, unsteadiness)
+
+
+def test_an_estimate_is_a_mean_with_its_standard_error():
+    values = np.array([1.0, 2.0, 4.0, 5.0])
+    assert estimate(values) == {"value": 3.0, "error": pytest.approx(np.std(values, ddof=1) / 2.0)}
+
+
+def test_the_largest_of_noisy_changes_is_sought_in_their_means():
+    """Ten changes of 0 but one: in any session the largest is noise, over many it is the one."""
+    changes = np.random.default_rng(1).standard_normal((400, 10)) + np.eye(10)[3] * 0.5
+    assert extreme(changes, np.argmax)["value"] == pytest.approx(0.5, abs=0.15)
+    assert changes.max(axis=1).mean() > 1.4
+
+
+def test_statistics_are_those_of_known_hit_rates():
+    found = statistics(made_up(spread=1e-9), CURVATURES, ("static", "dynamic"))
+
+    def value(*path):
+        place = found
+        for key in path:
+            place = place[key]
+        return pytest.approx(place["value"], abs=1e-6)
+
+    assert value("misfit", "static") == math.sqrt((0.01**2 + 0.01**2) / 4)
+    assert value("misfit", "dynamic") == math.sqrt((3 * 0.1**2) / 4)
+    assert value("misfit_above_static", "euclidean") == -found["misfit"]["static"]["value"]
+    assert value("shift", "static") == 0.01
+    assert value("shift", "dynamic") == 0.2
+    assert value("shift_above_static", "dynamic") == 0.19
+    assert value("smallest_rise", "static", 0) == 0.07
+    assert value("smallest_rise", "dynamic", 1) == -0.02  # from chance to the first comparison
+    assert value("noise_lowers", "smallest_fall") == 0.01
+    assert value("ten_matrices", "ratio") == 3.0
+    assert value("criterion", "ratio") == 1.5
+    assert value("criterion", "change") == 0.004
+    assert value("unsteadiness", "ratio") == 3.0
+    assert value("targets", 1, "at_goodwin", 0) == 0.59
+    line = goodwin.line_in_z(CURVATURES[1:])
+    away = np.array([0.65, 0.73, 0.80, 0.87]) - line[1:5]
+    assert value("targets", 0, "largest_from_line") == np.abs(away).max()
+    assert value("sweep", "misfit", 0, 1) == 0.025
+
+
+def test_noise_of_sessions_stands_in_the_errors():
+    found = statistics(made_up(), CURVATURES, ("static", "dynamic"))
+    assert found["targets"][0]["at_goodwin"][0]["error"] == pytest.approx(0.05 / 20.0, rel=0.15)
+    assert found["shift"]["dynamic"]["error"] == pytest.approx(0.05 * math.sqrt(2.0) / 20.0, rel=0.15)
+
+
+# Readings
+
+
+def test_the_distance_of_many_receptors_is_judged_as_the_closed_form_says():
+    """Independent folded normals add up; with 200 receptors their sum is normal."""
+    generator = np.random.default_rng(2)
+    values = generator.uniform(20.0, 60.0, 200) * np.array([[1.0], [1.0], [1.0]])
+    values[1:] += np.array([[2.0], [4.0]]) * generator.standard_normal(200)
+    sampled = discriminate_euclidean(values, 0.1, 3, Experiment(hit_rates=400))
+    assert_allclose(sampled.hit_rate, expected_euclidean_hit_rates(values, 0.1), atol=0.02)
+    assert 0.6 < sampled.hit_rate[0] < sampled.hit_rate[1] < 0.999
+
+
+def test_a_receptor_silent_under_both_spheres_changes_no_distance():
+    values = bumps()
+    silent = np.column_stack([values, np.zeros(7)])
+    assert_allclose(expected_euclidean_hit_rates(silent, 0.1), expected_euclidean_hit_rates(values, 0.1))
+
+
+def test_receptors_that_are_silent_once_take_no_part_in_latencies():
+    latency_ms = 60.0 - bumps()
+    latency_ms[3, [0, 5]] = np.nan
+    measured = first_spikes(latency_ms, PAIRS)
+    assert not np.isin(measured.neighbours, [0, 5]).any()
+    assert len(measured.neighbours) == len(PAIRS) - 6  # two corners of the grid, three neighbours each
+    without = np.delete(np.arange(18), [0, 5])
+    fewer = neighbour_pairs(GRID.positions_mm[without], GRID.pitch_mm)
+    assert_allclose(
+        gradient_sum(measured.responses, measured.neighbours), gradient_sum(latency_ms[:, without], fewer)
+    )
+    with pytest.raises(InputError, match="no hit rate from zeros"):
+        first_spikes(np.full((7, 18), np.nan), PAIRS)
+
+
+def test_one_noise_for_two_positions_is_that_of_equal_ones():
+    draws = normals(0, 1, 18, Purpose.RESPONSE, 2000)[0].T
+    here = Measured(bumps(steepness=0.6), PAIRS)
+    columns = [0, 5]
+    alone = fitted_noise([here], CURVATURES, draws)
+    both = fitted_noise([here, here], CURVATURES, draws)
+    assert both.noise_sigma == pytest.approx(alone.noise_sigma, rel=1e-6)
+    assert_allclose(expected([here], alone.noise_sigma, draws)[0, columns], alone.hit_rates)
+
+
+def test_the_rise_that_a_noise_needs_has_its_closed_form():
+    """Sum of two receptors: Normal(2 (b - a), 2 sigma hypot(a, b)); z = (rise of b) / (2 sigma hypot)."""
+    sigma, z = 0.02, ndtri(0.95)
+    measured = Measured(np.array([[50.0, 80.0], [50.0, 81.0]]), TWO)
+    draws = np.random.default_rng(1).standard_normal((200_000, 2))
+    rise = rise_needed(measured, sigma, draws)
+    farther = 80.0 + 30.0 * rise
+    assert (farther - 80.0) / (2.0 * sigma * math.hypot(50.0, farther)) == pytest.approx(z, rel=0.01)
+    # So little noise that the usual rise is too much, and one that no such rise overcomes.
+    assert rise_needed(measured, 0.002, draws) < rise
+    assert rise_needed(measured, 0.9, draws) is None
+
+
+def test_reasons_name_every_reading_and_the_noise_that_it_would_choose():
+    static = [Measured(bumps(17.37, 0.6), PAIRS), Measured(bumps(17.57, 0.6), PAIRS)]
+    latency_ms = [60.0 - one.responses for one in static]
+    latency_ms[0][:, 0] = np.nan
+    measures = {
+        "static": static,
+        "dynamic": static,
+        "latency": [first_spikes(latency, PAIRS) for latency in latency_ms],
+    }
+    draws = normals(0, 1, 18, Purpose.RESPONSE, 1000)[0].T
+    found = reasons(measures, latency_ms, GRID.positions_mm, GRID.pitch_mm, CURVATURES, 0.06, draws, seed=1)
+    named = {reading["reading"]: reading for reading in found["readings"]}
+    assert len(named) == 7
+    assert named["latency of receptors that fire under every sphere (used)"]["receptors"] == [17, 18]
+    used = named["static, eight neighbours (used)"]
+    assert named["dynamic, eight neighbours (used)"]["noise_sigma"] == used["noise_sigma"]
+    at_own = expected(static, used["noise_sigma"], draws)[:, [0, 5]]
+    assert used["misfit"] == pytest.approx(np.sqrt(np.square(at_own - goodwin.HIT_RATES).mean()))
+    assert used["rise"][0] == pytest.approx(found["rise"]["static"][0])
+    curve = found["misfit_curve"]
+    lowest = curve["noise_sigma"][int(np.argmin(curve["misfit"]["static"]))]
+    assert lowest == pytest.approx(used["noise_sigma"], abs=0.01)
+    # A wavering fraction moves the point by a share of the small way between means, not of the point.
+    point, fraction = (np.array(found["criterion"][moves]) for moves in ("point", "fraction"))
+    assert (fraction < 0.2 * point).all()
+
+
+def test_the_patience_reading_has_nobody_wait_beyond_the_ramp():
+    late = np.where(bumps() > 20.0, 80.0 - bumps(), np.nan)
+    found = percept_reasons._readings({"static": [Measured(bumps(), PAIRS)]}, [late], GRID.positions_mm, 1.0)
+    waiting = found["latency, waiting until the ramp ends"][0].responses
+    assert waiting.max() == percept_reasons.PATIENCE_MS == 50.0
+    counted = found["latency, a silent receptor counting as the end of the stimulus"][0].responses
+    assert_array_equal(counted == 1000.0, np.isnan(late))
+
+
+# Noise of the mesh
+
+
+@pytest.mark.parametrize("resolution", ["quick", "standard"])
+def test_other_meshes_have_their_lines_half_an_element_away(resolution):
+    conditions = Conditions(resolution)
+    usual = conditions.sphere_grading()
+    along, across = mesh_noise.gradings(conditions).values()
+    assert along.centre_mm - usual.centre_mm == pytest.approx(0.5 * usual.size_x_mm)
+    assert across.size_z_mm == pytest.approx(usual.size_z_mm, rel=0.1)
+    lines = [np.arange(0.0, 3.2, grading.size_z_mm) for grading in (usual, across)]
+    last = int(np.ceil(usual.half_width_mm / usual.size_z_mm))
+    assert lines[0][last] - lines[1][last] == pytest.approx(0.5 * across.size_z_mm)
+    reach = [lines_along(grading, 12.0) for grading in (usual, across)]
+    fine = [int(np.isclose(np.diff(line), usual.size_x_mm).sum()) for line in reach]
+    assert fine[1] == fine[0] + mesh_noise.WIDER
+    assert len(mesh_noise.touches(conditions)) == 4
+
+
+class Skin:
+    """SED below a ball, scaled as another mesh might."""
+
+    def __init__(self, curvature_per_m, scale=1.0):
+        self.peak_kpa = 2.5 * scale * (curvature_per_m / 287.0) ** 1.5
+
+    def sed(self, sites):
+        squared = np.square(np.asarray(sites) - [RECEPTOR_X_MM, 0.0]).sum(axis=1)
+        peaks = self.peak_kpa * np.exp(-squared / 4.0)
+        return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.85], peaks), kinks_ms=[50.0])
+
+
+def test_mesh_noise_is_the_largest_difference_of_a_step():
+    conditions = Conditions("quick")
+    spheres = {(0.0, curvature): Skin(curvature) for curvature in mesh_noise.CURVATURES}
+    first, second = mesh_noise.gradings(conditions)
+    scales = {(first, 287.0): 1.0, (first, 296.0): 1.0, (second, 287.0): 1.0, (second, 296.0): 1.004}
+    responses = {key: Skin(key[1], scale) for key, scale in scales.items()}
+    found = mesh_noise.result(responses, spheres, GRID.afferent)
+    assert found["meshes"] == [mesh_noise.USUAL, first, second]
+    steps = found["step"]
+    assert_allclose(steps, np.diff(found["static_sum"]).ravel())
+    assert steps[0] == steps[1] < steps[2]
+    assert found["largest_difference"] == pytest.approx(steps[2] / steps[0] - 1.0)
+    assert_allclose(found["sed_kpa"][0, 0], 0.85 * 2.5 * math.exp(-0.25 / 4.0), rtol=1e-9)
+    population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0), afferent=GRID.afferent)
+    rates = population.respond(spheres[0.0, 287.0]).static_rate_hz
+    assert found["static_sum"][0, 0] == gradient_sum(rates, PAIRS)
+
+
+def test_hit_rates_without_noise_of_a_session_are_the_expected_ones(sessions):
+    """What a session scatters about is what the fit of the noise sees."""
+    measures, observers = sessions
+    draws = normals(9, 1, 18, Purpose.RESPONSE, 20_000)[0].T
+    for position in range(2):
+        static = measures["static"][position]
+        predicted = expected_hit_rates(static.responses, PAIRS, 0.06, draws)
+        assert_allclose(observers.mean["static"][:, position].mean(axis=0), predicted, atol=0.015)
