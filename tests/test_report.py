@@ -813,22 +813,20 @@ def test_figure_6_leaves_silent_places_open():
 
 def test_figure_6_colours_the_finger_where_afferents_fire_and_mirrors_half_of_it():
     section = _population()
-    solid = [
-        axes.collections[0]
-        for axes in population.draw(section).axes
-        if axes.name == "3d" and not axes.get_xlabel()
-    ]
-    assert len(solid) == 3
+    panels = [axes for axes in population.draw(section).axes if axes.name == "3d" and not axes.get_xlabel()]
+    assert len(panels) == 3
     finger = section["finger"]
     x, y = (np.array(finger[key]) for key in ("x_mm", "y_mm"))
     middle = [0.25 * (v[:-1, :-1] + v[1:, :-1] + v[1:, 1:] + v[:-1, 1:]) for v in (x, y)]
     drawn = (middle[0] > population.PAD_FROM_MM) & (middle[1] < population.PAD_BELOW_MM)
     known = np.array([[value is not None for value in row] for row in finger["first_spike_latency_ms"]])
     # The picture lists its faces by their distance from the eye: they are counted, not compared.
-    colours = solid[2].get_facecolor()[:, :3]
+    colours = panels[2].collections[0].get_facecolor()[:, :3]
     coloured = np.ptp(colours, axis=1) > 0.1  # grey has hardly a hue
     assert (len(coloured), coloured.sum()) == (2 * drawn.sum(), 2 * known[drawn].sum())
     assert 0 < coloured.sum() < len(coloured)
+    right, left = panels[2].get_ylim()
+    assert right == -left != 0.0
 
 
 def test_captions_say_what_afferents_do_without_a_touch():

@@ -582,6 +582,8 @@ def test_the_finger_carries_the_answers_of_the_afferents_below_its_faces(tiny_sk
             np.testing.assert_allclose(rates[along, around], static_hz[0], rtol=1e-9)
             dynamic = found["dynamic_rate_hz"][along, around]
             np.testing.assert_allclose(dynamic, dynamic_hz[0] or np.nan, rtol=1e-9)
+            first_ms = SENSITIVE.spikes(skin.sed([middle[along, around]]))[0][0]
+            np.testing.assert_allclose(found["first_spike_latency_ms"][along, around], first_ms, rtol=1e-9)
     assert np.nanmax(rates[np.abs(middle[..., 0] - 18.0) < 0.8]) == np.nanmax(rates)
     assert np.isnan(found["first_spike_latency_ms"][np.abs(middle[..., 0] - 18.0) > 5.0]).all()
 
