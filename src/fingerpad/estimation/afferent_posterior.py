@@ -1,13 +1,14 @@
 """What recorded rates leave uncertain of an afferent's four identifiable numbers.
 
-Draws are made in coordinates in which the numbers depend least on each other and none has a border: the
-potential at rest over the threshold, beta tau/(C v), and the logarithms of both gains and of tau.
+Draws are told in coordinates in which the numbers depend least on each other: the potential at rest over the
+threshold, beta tau/(C v), and the logarithms of both gains and of tau. Walkers see the logarithm of what the
+potential at rest lacks instead, where it must lack something: then no coordinate has a border, and recordings
+leave straight ridges. An afferent that fires from an energy density U on fixes k_s tau U/(C v) to what lacks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,14 +19,18 @@ from fingerpad.errors import InputError
 from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
 from fingerpad.estimation.rate_likelihood import RateLikelihood, ResidualDraws
 from fingerpad.estimation.rate_problem import RateModel, Reparametrised
-from fingerpad.fitting.posterior import Chains, sample
+from fingerpad.fitting.posterior import Chains, LogDensity, sample
 from fingerpad.parameters import neuron
 
 COORDINATE_NAMES = ("resting_share", "log_dynamic_gain", "log_static_gain", "log_time_constant")
 """beta tau/(C v) [1], and the logarithms of k_d/(C v), k_s/(C v) and tau in the units of the four numbers."""
 
-START_SPREAD = (0.05, 0.4, 0.2, 0.5)
-"""How far the walkers start from the fit, in the coordinates: about twice the posterior's width."""
+START_SPREAD = (0.8, 0.8, 0.4, 0.8)
+"""How far the walkers start from the fit, in their coordinates: no less than the width of posteriors seen, so
+that ensembles which have not forgotten their start disagree."""
+
+SMALLEST_LACK = 0.01
+"""A fit at rest nearer to the threshold than this share of it, or beyond, is no start; walkers start here."""
 
 N_PREDICTED = 1000
 """Draws that bands are made of."""
@@ -164,7 +169,7 @@ class AfferentPosterior:
         return six_parameters(self.four, capacitance_mf, threshold_mv)
 
 
-def log_posterior(likelihood: RateLikelihood, prior: AfferentPrior) -> Callable[[FloatArray], FloatArray]:
+def log_posterior(likelihood: RateLikelihood, prior: AfferentPrior) -> LogDensity:
     """Log posterior density of rows of coordinates, up to a constant.
 
     Parameters
@@ -228,14 +233,41 @@ def afferent_posterior(
     ConvergenceError
         If the draws have not converged.
     """
-    chains = sample(
-        log_posterior(likelihood, prior or AfferentPrior()),
-        to_coordinates(start),
-        START_SPREAD,
-        COORDINATE_NAMES,
-        seed=seed,
-        **settings,
-    )
+    believed = prior or AfferentPrior()
+    density, centre = log_posterior(likelihood, believed), to_coordinates(start)
+    if believed.silent_at_rest:
+        centre[0] = min(centre[0], 1.0 - SMALLEST_LACK)
+        chains = _told(
+            sample(
+                _of_walkers(density), _walked(centre), START_SPREAD, COORDINATE_NAMES, seed=seed, **settings
+            )
+        )
+    else:
+        chains = sample(density, centre, START_SPREAD, COORDINATE_NAMES, seed=seed, **settings)
     random = np.random.Generator(np.random.Philox([seed, 1]))
     some = from_coordinates(chains.spread_out(N_PREDICTED))
     return AfferentPosterior(chains, from_coordinates(chains.flat), likelihood.residual_draws(some, random))
+
+
+def _walked(coordinates: FloatArray) -> FloatArray:
+    """Replace the potential at rest u by ln(1 - u)."""
+    return np.concatenate([np.log(1.0 - coordinates[..., :1]), coordinates[..., 1:]], axis=-1)
+
+
+def _coordinates(walked: FloatArray) -> FloatArray:
+    """Replace ln(1 - u) by u: the inverse of `_walked`."""
+    return np.concatenate([1.0 - np.exp(walked[..., :1]), walked[..., 1:]], axis=-1)
+
+
+def _of_walkers(log_density: LogDensity) -> LogDensity:
+    """Turn a log density in u into one in ln(1 - u), of which du takes the share 1 - u."""
+    return lambda walked: log_density(_coordinates(walked)) + walked[:, 0]
+
+
+def _told(chains: Chains) -> Chains:
+    """Turn draws of what walkers see into coordinates; how ranks agree is the same in both."""
+    return replace(
+        chains,
+        draws=_coordinates(chains.draws),
+        log_densities=chains.log_densities - chains.draws[..., 0],
+    )

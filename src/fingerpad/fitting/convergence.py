@@ -88,6 +88,32 @@ def effective_size(draws: FloatArray) -> float:
     return float(min(variance / variance_of_mean, values.size))
 
 
+def bulk_effective_size(draws: FloatArray) -> float:
+    """Return how many independent draws would tell the middle as well: the effective size of their ranks.
+
+    Parameters
+    ----------
+    draws : array (n_ensembles, n_steps, n_walkers)
+        One quantity along the chains.
+
+    Returns
+    -------
+    float
+        The same for every increasing function of the quantity: a long tail does not count for more. [1]
+
+    Notes
+    -----
+    Ranks became normal scores (Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021).
+
+    Examples
+    --------
+    >>> draws = np.random.default_rng(1).normal(size=(4, 100, 20))
+    >>> bulk_effective_size(np.exp(5.0 * draws)) == bulk_effective_size(draws)
+    True
+    """
+    return effective_size(_normal_scores(_checked(draws)))
+
+
 def tail_effective_size(draws: FloatArray) -> float:
     """Return the smaller effective size of being beyond either end of the central 95 %.
 

@@ -1,15 +1,16 @@
 """Draw from any density of a few parameters, and stop only when the draws can be trusted.
 
-Several ensembles of walkers start from scattered points and never hear of each other. Within an ensemble one
-half moves by what the other half knows, by turns:
+Several ensembles of walkers start from scattered points and never hear of each other. An ensemble moves by
+turns in one of two ways:
 
-- stretch: along the line to a walker of the other half (Goodman & Weare 2010),
-- leap: from wherever the walker is to the neighbourhood of any walker of the other half. The other half is a
-  sketch of the density, so that many leaps succeed, and walkers exchange places that no path joins.
+- stretch: one half of the walkers, each along the line to a walker of the other half (Goodman & Weare 2010),
+- leap: from wherever a walker is to the neighbourhood of any place where its ensemble was during steps that
+  are discarded. These places are a sketch of the density, so that many leaps succeed, a walker soon forgets
+  where it started, and walkers exchange places that no path joins.
 
-Both leave the density as it is, whatever its shape, since the half that moves is unknown to what proposes.
-Both look the same in any units of the parameters. Steps of a density are no obstacle: nothing is
-differentiated.
+Both leave the density as it is, whatever its shape: what proposes a stretch knows nothing of the half that
+moves, and a sketch stays as it is through all the steps that are kept. Both look the same in any units of the
+parameters. Steps of a density are no obstacle: nothing is differentiated.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import logsumexp
+from scipy.spatial.distance import cdist
 
 from fingerpad.checks import FloatArray, finite, float_array, positive, whole
 from fingerpad.errors import ConvergenceError, InputError
-from fingerpad.fitting.convergence import effective_size, split_r_hat, tail_effective_size
+from fingerpad.fitting.convergence import bulk_effective_size, split_r_hat, tail_effective_size
 
 LogDensity = Callable[[FloatArray], FloatArray]
 """Called with points (n_points, n_parameters); returns their log densities up to a constant, -inf outside."""
@@ -34,6 +35,9 @@ DEGREES_OF_FREEDOM = 5.0
 
 LUMPINESS = 0.6
 """Bandwidth of the sketch over the one that suits a normal density; those of rates have many lumps. [1]"""
+
+PLACES = 400
+"""Places that the sketch of one ensemble is made of."""
 
 TRIES = 200
 
@@ -53,7 +57,7 @@ class Chains:
     r_hat : array (n_parameters,)
         Split R-hat over the ensembles. [1]
     effective_sizes, tail_effective_sizes : array (n_parameters,)
-        Independent draws that would tell the mean, and the ends of a 95 % interval, as well. [1]
+        Independent draws that would tell the middle, and the ends of a 95 % interval, as well. [1]
     autocorrelation_steps : array (n_parameters,)
         Draws made per effective one. [1]
     acceptance : float
@@ -167,7 +171,8 @@ def sample(
         `log_density(points)` for points (n_points, n_parameters): their log densities up to a constant,
         -inf where a point is impossible.
     centre, spread : array (n_parameters,)
-        Walkers start at normal points about the centre; make the spread wider than the density.
+        Walkers start at normal points about the centre; make the spread wider than the density, or walkers
+        that agree on where they started pass for converged.
     names : sequence of str
         Names of the parameters.
     seed : int
@@ -179,7 +184,7 @@ def sample(
         Steps before the first look at convergence; they double until `most_steps`. The first half of the
         steps is discarded at every look.
     largest_r_hat, smallest_effective_size : float, optional
-        Converged is what stays below the first and reaches the second, in the mean and in the tails of all
+        Converged is what stays below the first and reaches the second, in the middle and in the tails of all
         parameters.
 
     Returns
@@ -198,7 +203,7 @@ def sample(
     >>> def normal(points):
     ...     return -0.5 * ((points - [1.0, -2.0]) ** 2).sum(axis=1)
     >>> chains = sample(normal, [0.0, 0.0], [2.0, 2.0], ("a", "b"), seed=1)
-    >>> chains.mean.round(1).tolist(), (chains.interval() - chains.mean).round(0).tolist()
+    >>> chains.mean.round(0).tolist(), (chains.interval() - chains.mean).round(0).tolist()
     ([1.0, -2.0], [[-2.0, -2.0], [2.0, 2.0]])
     """
     labels = tuple(names)
@@ -220,20 +225,25 @@ def sample(
     taken: list[float] = []
     history: list[str] = []
     wanted = n_steps
+    sketch: _Sketch | None = None
     while True:
         while len(places) < wanted:
-            move = _stretch if len(places) % 2 else _leap
-            walkers, heights, share = _step(move, density, walkers, heights, random)
+            if sketch is None and len(places) >= wanted // 2:
+                sketch = _Sketch(_spread_out(places[len(places) // 2 :]))
+            if sketch is None or len(places) % 2:
+                walkers, heights, share = _stretch(density, walkers, heights, random)
+            else:
+                walkers, heights, share = _leap(density, walkers, heights, sketch, random)
             places.append(walkers)
             levels.append(heights)
             taken.append(share)
         # (n_steps, n_ensembles, n_walkers, ...) as they came; ensembles first as they are told.
         kept = np.swapaxes(np.array(places[wanted // 2 :]), 0, 1)
         r_hat = _per_parameter(split_r_hat, kept)
-        bulk, tail = _per_parameter(effective_size, kept), _per_parameter(tail_effective_size, kept)
+        bulk, tail = _per_parameter(bulk_effective_size, kept), _per_parameter(tail_effective_size, kept)
         history.append(
             f"{wanted} steps: R-hat at most {r_hat.max():.4f}, effective draws at least {bulk.min():.0f} in "
-            f"the mean and {tail.min():.0f} in the tails, of {kept[..., 0].size}"
+            f"the middle and {tail.min():.0f} in the tails, of {kept[..., 0].size}"
         )
         if r_hat.max() <= largest_r_hat and min(bulk.min(), tail.min()) >= smallest_effective_size:
             return Chains(
@@ -259,7 +269,8 @@ def sample(
                 "parameters at all.",
                 tuple(history),
             )
-        wanted = min(2 * wanted, most_steps)
+        # What is kept from now on begins here, or was discarded before: time for a better sketch.
+        wanted, sketch = min(2 * wanted, most_steps), None
 
 
 class _Counted:
@@ -314,65 +325,98 @@ def _start(
     )
 
 
-Move = Callable[[FloatArray, FloatArray, np.random.Generator], tuple[FloatArray, FloatArray]]
-"""From walkers and those that guide them to proposed points and the logarithm of Hastings' ratio."""
-
-
-def _step(
-    move: Move, density: _Counted, walkers: FloatArray, heights: FloatArray, random: np.random.Generator
-) -> tuple[FloatArray, FloatArray, float]:
-    """Move either half of every ensemble once; also return the share of walkers that moved."""
-    walkers, heights = walkers.copy(), heights.copy()
-    half = walkers.shape[1] // 2
-    taken = 0
-    for moving, guiding in ((slice(0, half), slice(half, None)), (slice(half, None), slice(0, half))):
-        proposed, log_ratio = move(walkers[:, moving], walkers[:, guiding], random)
-        there = density(proposed)
-        accepted = np.log(random.uniform(size=there.shape)) < there - heights[:, moving] + log_ratio
-        walkers[:, moving] = np.where(accepted[..., None], proposed, walkers[:, moving])
-        heights[:, moving] = np.where(accepted, there, heights[:, moving])
-        taken += int(accepted.sum())
-    return walkers, heights, taken / heights.size
-
-
 def _stretch(
-    walkers: FloatArray, guides: FloatArray, random: np.random.Generator
-) -> tuple[FloatArray, FloatArray]:
-    """Goodman & Weare's move: z of density 1/sqrt(z) between 1/a and a, y = guide + z (x - guide)."""
-    n_parameters = walkers.shape[-1]
-    partners = np.take_along_axis(
-        guides, random.integers(guides.shape[1], size=(*walkers.shape[:2], 1)), axis=1
-    )
-    a = LONGEST_STRETCH
-    z = ((a - 1.0) * random.uniform(size=walkers.shape[:2]) + 1.0) ** 2 / a
-    return partners + z[..., None] * (walkers - partners), (n_parameters - 1.0) * np.log(z)
+    density: _Counted, walkers: FloatArray, heights: FloatArray, random: np.random.Generator
+) -> tuple[FloatArray, FloatArray, float]:
+    """Move either half once; also return the share of walkers that moved.
+
+    Proposed is y = g + z (x - g), with g any walker of the other half, and z of density 1/sqrt(z) between 1/a
+    and a.
+    """
+    walkers, heights = walkers.copy(), heights.copy()
+    n_ensembles, n_walkers, n_parameters = walkers.shape
+    half, a = n_walkers // 2, LONGEST_STRETCH
+    shares = []
+    for moving, guiding in ((slice(0, half), slice(half, None)), (slice(half, None), slice(0, half))):
+        which = random.integers(half, size=(n_ensembles, half, 1))
+        x, g = walkers[:, moving], np.take_along_axis(walkers[:, guiding], which, axis=1)
+        z = ((a - 1.0) * random.uniform(size=(n_ensembles, half)) + 1.0) ** 2 / a
+        y, log_ratio = g + z[..., None] * (x - g), (n_parameters - 1.0) * np.log(z)
+        walkers[:, moving], heights[:, moving], share = _moved(
+            density, x, heights[:, moving], y, log_ratio, random
+        )
+        shares.append(share)
+    return walkers, heights, float(np.mean(shares))
 
 
 def _leap(
-    walkers: FloatArray, guides: FloatArray, random: np.random.Generator
-) -> tuple[FloatArray, FloatArray]:
-    """Propose near any of the guides: from a mixture of Student distributions, one about each of them.
+    density: _Counted, walkers: FloatArray, heights: FloatArray, sketch: _Sketch, random: np.random.Generator
+) -> tuple[FloatArray, FloatArray, float]:
+    """Let every walker leap to anywhere in the sketch; also return the share of those that did."""
+    proposed = sketch.draw(walkers.shape[1], random)
+    log_ratio = sketch.log_density(walkers) - sketch.log_density(proposed)
+    return _moved(density, walkers, heights, proposed, log_ratio, random)
 
-    Their scale is the guides' covariance, shrunk as for an estimate of a density from so few points.
+
+def _moved(
+    density: _Counted,
+    walkers: FloatArray,
+    heights: FloatArray,
+    proposed: FloatArray,
+    log_ratio: FloatArray,
+    random: np.random.Generator,
+) -> tuple[FloatArray, FloatArray, float]:
+    """Take what is proposed as often as Metropolis and Hastings say; also return the share that was taken.
+
+    `log_ratio` is the logarithm of how much rather the way back is proposed than the way there.
     """
-    n_guides, n_parameters = guides.shape[1:]
-    bandwidth = LUMPINESS * (4.0 / (n_guides * (n_parameters + 2.0))) ** (1.0 / (n_parameters + 4.0))
-    deviations = guides - guides.mean(axis=1, keepdims=True)
-    covariance = np.swapaxes(deviations, 1, 2) @ deviations / (n_guides - 1)
-    factor = bandwidth * np.linalg.cholesky(covariance)
-    chosen = random.integers(n_guides, size=(*walkers.shape[:2], 1))
-    chi_square = random.chisquare(DEGREES_OF_FREEDOM, size=chosen.shape)
-    student = random.normal(size=walkers.shape) / np.sqrt(chi_square / DEGREES_OF_FREEDOM)
-    proposed = np.take_along_axis(guides, chosen, axis=1) + student @ np.swapaxes(factor, 1, 2)
-    return proposed, _log_mixture(walkers, guides, factor) - _log_mixture(proposed, guides, factor)
+    there = density(proposed)
+    taken = np.log(random.uniform(size=there.shape)) < there - heights + log_ratio
+    return np.where(taken[..., None], proposed, walkers), np.where(taken, there, heights), float(taken.mean())
 
 
-def _log_mixture(points: FloatArray, guides: FloatArray, factor: FloatArray) -> FloatArray:
-    """Log density of the mixture about the guides, up to a constant that the points share."""
-    offsets = points[:, :, None, :] - guides[:, None, :, :]
-    standard = np.linalg.solve(factor[:, None, None], offsets[..., None])[..., 0]
-    degrees = DEGREES_OF_FREEDOM + points.shape[-1]
-    return logsumexp(-0.5 * degrees * np.log1p((standard**2).sum(axis=-1) / DEGREES_OF_FREEDOM), axis=-1)
+class _Sketch:
+    """A density of each ensemble's own: a mixture of Student distributions, one about each of its places.
+
+    Their scale is the covariance of the places, shrunk as for an estimate of a density from so many.
+
+    Parameters
+    ----------
+    places : array (n_ensembles, n_places, n_parameters)
+        Where walkers were.
+    """
+
+    def __init__(self, places: FloatArray):
+        self.places = places
+        n_places, n_parameters = places.shape[1:]
+        bandwidth = LUMPINESS * (4.0 / (n_places * (n_parameters + 2.0))) ** (1.0 / (n_parameters + 4.0))
+        deviations = places - places.mean(axis=1, keepdims=True)
+        covariance = np.swapaxes(deviations, 1, 2) @ deviations / (n_places - 1)
+        self.factor = bandwidth * np.swapaxes(np.linalg.cholesky(covariance), 1, 2)
+        self.inverse = np.linalg.inv(self.factor)
+
+    def draw(self, n_draws: int, random: np.random.Generator) -> FloatArray:
+        """So many draws for each ensemble, (n_ensembles, n_draws, n_parameters)."""
+        n_ensembles, n_places, n_parameters = self.places.shape
+        chosen = random.integers(n_places, size=(n_ensembles, n_draws, 1))
+        chi_square = random.chisquare(DEGREES_OF_FREEDOM, size=chosen.shape)
+        normal = random.normal(size=(n_ensembles, n_draws, n_parameters))
+        student = normal / np.sqrt(chi_square / DEGREES_OF_FREEDOM)
+        return np.take_along_axis(self.places, chosen, axis=1) + student @ self.factor
+
+    def log_density(self, points: FloatArray) -> FloatArray:
+        """Logarithm up to a constant, (n_ensembles, n_points)."""
+        white, centres = points @ self.inverse, self.places @ self.inverse
+        squares = np.array([cdist(*pair, "sqeuclidean") for pair in zip(white, centres, strict=True)])
+        power = -0.5 * (DEGREES_OF_FREEDOM + points.shape[-1])
+        return np.log(((1.0 + squares / DEGREES_OF_FREEDOM) ** power).sum(axis=-1))
+
+
+def _spread_out(steps: list[FloatArray]) -> FloatArray:
+    """Return `PLACES` of each ensemble, (n_ensembles, n_places, n_parameters), out of all steps alike."""
+    places = np.concatenate(steps, axis=1)
+    count = min(PLACES, places.shape[1])
+    return places[:, np.linspace(0, places.shape[1] - 1, count).round().astype(np.int64)]
 
 
 def _per_parameter(measure: Callable[[FloatArray], float], draws: FloatArray) -> FloatArray:
