@@ -5,6 +5,7 @@ import math
 import os
 import re
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -20,6 +21,9 @@ from fingerpad import __version__
 from fingerpad.compilation import NOTICE
 from fingerpad.parameters import all_published
 from fingerpad.report.page import CHAPTERS
+from fingerpad.store import Store
+from fingerpad.studies.question_file import read_question
+from fingerpad.studies.question_stimuli import touches
 from fingerpad.studies.reproduction import STORE_FOLDER
 
 COMMAND = (sys.executable, "-W", "error", "-m", "fingerpad", "reproduce")
@@ -410,4 +414,90 @@ def test_another_seed_changes_what_the_observer_draws_and_nothing_else(first, ot
         0,
         0,
         None,
+    ]
+
+
+# The paper's question as a question of one's own
+
+
+PAPERS_QUESTION = """
+question: Which spheres can be told from one of 287 /m?
+skin: {resolution: quick}
+common: {indenter: sphere, depth_mm: 1.0, ramp_ms: 50, hold_ms: 950}
+stimuli: {vary: curvature_per_m, values: [287, 296, 305, 316, 328, 340, 365]}
+standard: 287
+afferent: results.json
+measure: [static, dynamic]
+noise: fitted
+observed: {points: [{at: 296, hit_rate: 0.58}, {at: 365, hit_rate: 0.95}]}
+"""
+
+
+def discriminate(folder, *options, **more):
+    """Ask the paper's question in a subprocess whose warnings are errors."""
+    command = (*COMMAND[:-1], "discriminate", folder / "question.yaml", "--out", folder, *options)
+    return subprocess.Popen(
+        list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder, **more
+    )
+
+
+def prepared(first, folder):
+    """A folder with the question, the fitted afferent, and the presses of the reproduction."""
+    shutil.copytree(first.folder / STORE_FOLDER, folder / STORE_FOLDER)
+    shutil.copy(first.folder / "results.json", folder)
+    (folder / "question.yaml").write_text(PAPERS_QUESTION)
+    return folder
+
+
+def answer(folder):
+    results = json.loads((folder / "discriminate.json").read_text())
+    return results["discrimination"], results["manifest"]
+
+
+@pytest.fixture(scope="session")
+def asked(first, tmp_path_factory):
+    """The question asked where every press is stored already."""
+    folder = prepared(first, tmp_path_factory.mktemp("question"))
+    said, errors = (run := discriminate(folder, "--jobs", "1")).communicate()
+    assert (run.returncode, errors) == (0, "")
+    assert said.startswith("Gradient Sum of static rates tells 296 from 287 in ")
+    return folder
+
+
+def test_the_papers_question_asked_as_ones_own_has_the_papers_hit_rates(first, asked):
+    found, manifest = answer(asked)
+    theirs = first.results["discrimination"]
+    assert (manifest["computed"], manifest["indentations"]) == (0, 7)
+    assert found["noise"]["sigma"] == theirs["noise_sigma"]
+    for reading in found["readings"]:
+        rates = theirs["gradient_sum"][reading["measure"]]
+        assert reading["hit_rate"] == rates["hit_rate"]
+        assert reading["hit_rate_sd"] == rates["hit_rate_sd"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="kill -9 and process groups are POSIX")
+def test_a_question_killed_at_any_moment_goes_on_and_ends_with_the_same_bits(first, asked, tmp_path):
+    folder = prepared(first, tmp_path)
+    store = folder / STORE_FOLDER
+    spheres = [
+        Store(store).path(touch) for touch in touches(read_question(folder / "question.yaml")).values()
+    ]
+    for path in spheres[:3]:
+        path.unlink()
+    run = discriminate(folder, "--jobs", "2", start_new_session=True)
+    while run.poll() is None and not any(path.exists() for path in spheres[:3]):
+        time.sleep(0.02)
+    assert run.poll() is None
+    os.killpg(run.pid, signal.SIGKILL)
+    run.communicate()
+    assert not (folder / "discriminate.json").exists()
+    assert sum(path.exists() for path in spheres[:3]) < 3
+
+    _, errors = (again := discriminate(folder, "--jobs", "2")).communicate()
+    assert (again.returncode, errors) == (0, "")
+    found, manifest = answer(folder)
+    assert 0 < manifest["computed"] < 3
+    assert found == answer(asked)[0]
+    assert [path.read_bytes() for path in spheres] == [
+        (asked / STORE_FOLDER / path.name).read_bytes() for path in spheres
     ]
