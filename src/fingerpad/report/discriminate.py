@@ -139,8 +139,8 @@ def draw_statistics(section: dict[str, Any]) -> Figure:
     codes, measures = (
         list(dict.fromkeys(reading[key] for reading in readings)) for key in ("code", "measure")
     )
-    figure = new_figure(min(10.0, 4.0 * len(measures) + 1.5), 3.0 * len(codes) + 0.3)
-    grid = figure.subplots(len(codes), len(measures), squeeze=False)
+    figure = new_figure(min(10.0, 4.0 * len(codes) + 1.5), 3.0 * len(measures) + 0.3)
+    grid = figure.subplots(len(measures), len(codes), squeeze=False)
     for axes, reading in zip(grid.flat, readings, strict=True):
         axes.set_title(_titled(reading))
         if reading["hit_rate"] is None:
@@ -289,9 +289,8 @@ def caption_curves(section: Mapping[str, Any]) -> str:
 
 def answer_tables(section: Mapping[str, Any]) -> list[Table]:
     """Return thresholds, hit rates, statistics and the population."""
-    return [
-        table for table in (_thresholds(section), _hit_rates(section), _population(section)) if table.rows
-    ]
+    every = (_thresholds(section), _hit_rates(section), _efficiencies(section), _population(section))
+    return [table for table in every if table.rows]
 
 
 CHAPTERS = (
@@ -473,6 +472,27 @@ def _hit_rates(section: Mapping[str, Any]) -> Table:
     ]
     columns = ("reading", *section["stimulus"][1:])
     return Table("Hit rates, mean ± standard deviation", columns, rows, "; ".join(silent))
+
+
+def _efficiencies(section: Mapping[str, Any]) -> Table:
+    rows = [
+        Row(
+            (
+                _titled(reading),
+                *(
+                    f"{fixed(share, 3)} ± {fixed(error, 3)}"
+                    for share, error in zip(reading["efficiency"], reading["efficiency_error"], strict=True)
+                ),
+            )
+        )
+        for reading in section["readings"]
+        if reading.get("efficiency")
+    ]
+    note = (
+        "The share of its trials that the ideal observer would need to judge as well as the code; a dash where "
+        "the ideal observer guesses or never fails."
+    )
+    return Table("Efficiency ± standard error", ("reading", *section["stimulus"][1:]), rows, note)
 
 
 def _population(section: Mapping[str, Any]) -> Table:

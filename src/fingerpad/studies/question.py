@@ -31,7 +31,8 @@ from fingerpad.parameters import protocol, psychophysics
 from fingerpad.psychophysics.functions import SIGMOIDS
 from fingerpad.signals import STORED_ENERGY
 
-CODES = ("gradient_sum", "euclidean")
+IDEAL = "ideal"
+CODES = ("gradient_sum", "euclidean", IDEAL)
 MEASURES = ("static", "dynamic", "latency")
 FREE = "free"
 DEFAULT = "default"

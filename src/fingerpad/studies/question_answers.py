@@ -15,9 +15,11 @@ from fingerpad.discrimination import Experiment
 from fingerpad.encoding import neighbours_of
 from fingerpad.errors import InputError
 from fingerpad.population import Population
+from fingerpad.psychophysics import Presentation
 from fingerpad.random_streams import IntArray
 from fingerpad.signals import ResponseMap, Skin
-from fingerpad.studies.question import FITTED, GRID, UNITS, Question, VariedStimuli
+from fingerpad.studies.efficiencies import efficiencies, ideal_observer, presentations
+from fingerpad.studies.question import FITTED, GRID, IDEAL, UNITS, Question, VariedStimuli
 from fingerpad.studies.question_stimuli import Presented, which
 from fingerpad.studies.readings import (
     CREDIBLE,
@@ -65,6 +67,14 @@ class Asked:
             raise InputError(
                 "noise can only be fitted to observed hit rates of the comparisons, "
                 f"{', '.join(stimulus.name for stimulus in self.stimuli[1:])}: observed.points has none."
+            )
+        if IDEAL in question.code and question.noise == 0.0:
+            raise InputError(
+                "noise must be greater than 0 where code has ideal: got 0."
+            )
+        if question.noise == FITTED and question.code[0] == IDEAL:
+            raise InputError(
+                "code must not begin with ideal where noise is fitted: put another first."
             )
         if question.experiment.criterion_sigma > 0.0 and "euclidean" in question.code:
             raise InputError(
@@ -173,9 +183,9 @@ def result(asked: Asked, skins: Mapping[str, Skin]) -> dict[str, Any]:
         "noise": noise,
         "responses": tables,
         "readings": [
-            _reading(asked, code, measure, tables[measure], silent[measure], noise["sigma"])
-            for code in question.code
+            reading
             for measure in question.measure
+            for reading in _readings(asked, measure, tables[measure], silent[measure], noise["sigma"])
         ],
         "observed": _observed(asked),
     }
@@ -233,31 +243,39 @@ def _noise(asked: Asked, tables: Mapping[str, FloatArray], silent: Mapping[str, 
     }
 
 
+def _readings(asked: Asked, measure: str, table: FloatArray, silent: IntArray, sigma: float) -> list[dict]:
+    """Read one measure by every code; there is no hit rate from zeros."""
+    names, seed = [asked.stimuli[row].name for row in silent], asked.question.experiment.seed
+    shown = presentations(table, sigma, seed) if sigma > 0.0 and not names else []
+    return [
+        {"code": code, "measure": measure, "silent": names, "hit_rate": None}
+        | ({} if names else _reading(asked, code, table, sigma, shown))
+        for code in asked.question.code
+    ]
+
+
 def _reading(
-    asked: Asked, code: str, measure: str, table: FloatArray, silent: IntArray, sigma: float
+    asked: Asked, code: str, table: FloatArray, sigma: float, shown: list[Presentation]
 ) -> dict[str, Any]:
-    """Read one measure by one code; there is no hit rate from zeros."""
-    told: dict[str, Any] = {
-        "code": code,
-        "measure": measure,
-        "silent": [asked.stimuli[row].name for row in silent],
-        "hit_rate": None,
-    }
-    if silent.size:
-        return told
-    settings, levels = asked.question.experiment, [stimulus.level for stimulus in asked.stimuli]
-    rates = hit_rates(code, table, asked.neighbours, sigma, settings.seed, asked.plan)
-    known = [level for level in levels if level is not None]
-    return told | {
-        "hit_rate": rates.hit_rate,
-        "hit_rate_sd": rates.hit_rate_sd,
-        "statistic": statistic(code, table, asked.neighbours, sigma, settings.seed),
-        "curves": (
-            curves(known, rates.hit_rate, settings.trials, asked.question.curve, settings.seed)
-            if known
-            else []
-        ),
-    }
+    """Hit rates, what is behind them, and their curves."""
+    settings, neighbours = asked.question.experiment, asked.neighbours
+    if code == IDEAL:
+        told = ideal_observer(shown)
+    else:
+        rates = hit_rates(code, table, neighbours, sigma, settings.seed, asked.plan)
+        told = {
+            "hit_rate": rates.hit_rate,
+            "hit_rate_sd": rates.hit_rate_sd,
+            "statistic": statistic(code, table, neighbours, sigma, settings.seed),
+            **efficiencies(code, shown, table, neighbours, sigma, settings.seed),
+        }
+    levels = [stimulus.level for stimulus in asked.stimuli if stimulus.level is not None]
+    found = (
+        curves(levels, told["hit_rate"], settings.trials, asked.question.curve, settings.seed)
+        if levels
+        else []
+    )
+    return told | {"curves": found}
 
 
 def _observed(asked: Asked) -> dict[str, Any] | None:
