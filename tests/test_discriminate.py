@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
+from scipy.special import ndtr
 
 from fingerpad import cli
 from fingerpad.discrimination import Experiment, discriminate_euclidean, discriminate_gradient_sum
@@ -18,6 +19,7 @@ from fingerpad.report import discriminate as report
 from fingerpad.signals import SedTraces
 from fingerpad.studies import discriminate as study
 from fingerpad.studies.conditions import RECEPTOR_X_MM
+from fingerpad.studies.efficiencies import SMALLEST_SPREAD, efficiencies, ideal_observer, presentations
 from fingerpad.studies.question import CurveSettings
 from fingerpad.studies.question_answers import Asked, result
 from fingerpad.studies.question_file import parsed, ready_made
@@ -94,7 +96,7 @@ def test_hit_rates_are_those_of_the_observers_with_the_questions_own_numbers(ans
 
 def test_every_code_reads_every_measure_in_the_order_of_the_question(answered):
     assert [(one["code"], one["measure"]) for one in answered["readings"]] == [
-        (code, measure) for code in QUESTION["code"] for measure in QUESTION["measure"]
+        (code, measure) for measure in QUESTION["measure"] for code in QUESTION["code"]
     ]
     assert answered["stimulus"] == ["200", "220", "240", "280", "320"]
     assert answered["axis"] == "curvature [1/m]"
@@ -126,6 +128,7 @@ def test_without_noise_every_difference_is_seen():
     question = asked(noise=0)
     found = result(question, bumps(question))
     assert all((np.array(one["hit_rate"]) == 1.0).all() for one in found["readings"])
+    assert all(one["efficiency"] == [] for one in found["readings"])
     for one in found["readings"]:
         assert all("why_not" in side for side in one["curves"])
 
@@ -211,6 +214,41 @@ def test_stimuli_without_levels_have_hit_rates_and_no_curve():
     for draw in (report.draw_curves, report.draw_statistics, report.draw_responses):
         (*_, last) = draw(found).axes
         assert last.get_figure()
+
+
+# The ideal observer
+
+
+def test_no_code_beats_the_ideal_observer_and_what_it_makes_use_of_is_a_share():
+    question = asked(noise=0.2, code=["gradient_sum", "euclidean", "ideal"], measure=["static", "latency"])
+    found = result(question, bumps(question))
+    for measure in ("static", "latency"):
+        codes = [reading(found, code, measure) for code in ("gradient_sum", "euclidean")]
+        ideal = reading(found, "ideal", measure)
+        assert (np.diff(ideal["hit_rate"]) > -0.02).all()
+        for code in codes:
+            assert (np.array(code["d_prime"]) < ideal["d_prime"]).all()
+            assert (np.array(code["hit_rate"]) < ideal["hit_rate"] + 0.02).all()
+            shares = np.square(np.divide(code["d_prime"], ideal["d_prime"]))
+            np.testing.assert_allclose(np.array(code["efficiency"], dtype=float), shares, rtol=1e-12)
+            assert all(0.0 < error < 0.1 for error in code["efficiency_error"])
+
+
+def test_the_ideal_observer_of_one_afferent_is_known_in_closed_form():
+    # Two normal distributions of nearly one spread: d' = |mu_1 - mu_0| / sigma.
+    table = np.array([[50.0], [52.0]])
+    (shown,) = presentations(table, 0.05, seed=3)
+    expected = 2.0 / np.hypot(0.05 * 51.0, SMALLEST_SPREAD)
+    told = ideal_observer([shown])
+    assert told["d_prime"][0] == pytest.approx(expected, abs=4.0 * shown.ideal().d_prime_error)
+    assert told["hit_rate"][0] == pytest.approx(ndtr(expected / 2.0), abs=0.03)
+
+
+def test_where_the_ideal_observer_never_fails_there_is_no_efficiency():
+    table = np.array([[50.0, 60.0], [150.0, 10.0]])
+    shown = presentations(table, 0.01, seed=3)
+    found = efficiencies("gradient_sum", shown, table, np.array([[0, 1]]), 0.01, seed=3)
+    assert (found["efficiency"], found["efficiency_error"]) == ([None], [None])
 
 
 # Silence

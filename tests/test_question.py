@@ -12,6 +12,7 @@ from fingerpad.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.errors import InputError
 from fingerpad.estimation.stimuli import INDENTERS
 from fingerpad.indenters import Bar, Sphere
+from fingerpad.nail_edge import NailEdge
 from fingerpad.plain_yaml import read_yaml
 from fingerpad.population import Population
 from fingerpad.stimulus import ForceRampAndHold, RampAndHold
@@ -22,6 +23,7 @@ from fingerpad.studies.question_file import parsed, read_question, ready_made
 from fingerpad.studies.question_population import afferent_of, population_of
 from fingerpad.studies.question_stimuli import presented, touches
 from fingerpad.studies.sphere_discrimination import touches as sphere_touches
+from fingerpad.unrolled_skin import UnrolledSkin
 
 ROOT = Path(__file__).parents[1]
 SPHERES = {
@@ -147,6 +149,17 @@ def test_any_layout_fills_its_region_at_its_density(layout):
     np.testing.assert_array_equal(again.positions_mm, population.positions_mm)
 
 
+def test_afferents_fill_the_pad_at_the_density_of_its_skin_or_line_the_nail():
+    pad = {"layout": "poisson-disc", "density_per_cm2": 70, "region": {"shape": "pad"}}
+    population = population_of(parsed(changed(SPHERES, population=pad)))
+    assert len(population) == round(0.7 * UnrolledSkin().pad().area_mm2)
+    rows = population_of(parsed(changed(SPHERES, population={"layout": "nail rows", "rows": 2})))
+    np.testing.assert_array_equal(
+        rows.positions_mm, NailEdge().points(NailEdge().rows(2, density_per_cm2=100.0).places_mm)
+    )
+    assert len(Asked(parsed(SPHERES), presented(parsed(SPHERES)), rows).neighbours) > 2 * len(rows)
+
+
 def test_seed_and_spread_make_another_finger():
     def sensitivity(**settings):
         return population_of(parsed(changed(SPHERES, population=settings))).sensitivity
@@ -232,6 +245,10 @@ noise: much
     noise must be a number not below 0, or fitted: got 'much'.
 noise: true
     noise must be a number not below 0, or fitted: got True.
+{noise: 0, code: [gradient_sum, ideal]}
+    noise must be greater than 0 where code has ideal: got 0.
+{noise: fitted, code: [ideal, euclidean], observed: {points: [{at: 296, hit_rate: 0.6}]}}
+    code must not begin with ideal where noise is fitted
 noise: fitted
     noise can only be fitted to observed hit rates of the comparisons, 296, 365
 {noise: fitted, observed: {points: [{at: 305, hit_rate: 0.7}]}}
@@ -317,7 +334,7 @@ population: {layout: hexagonal}
 population: {layout: hexagonal, rows: 3, region: {shape: rectangle, length_mm: 3, width_mm: 6}}
     population.rows must not be given: it belongs to the layout grid
 population: {region: {shape: rectangle, length_mm: 3, width_mm: 6}}
-    population.region must not be given: a grid has rows and columns.
+    population.region must not be given: it belongs to the layout rectangular or hexagonal
 population: {layout: uniform, region: {shape: rectangle, length_mm: 0, width_mm: 6.0}}
     population.region.length_mm must be a number greater than 0: got 0.
 population: {layout: uniform, region: {shape: rectangle, length_mm: 1}}

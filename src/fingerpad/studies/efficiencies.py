@@ -104,6 +104,8 @@ def efficiencies(
     True
     """
     found: dict[str, Any] = {"d_prime": [], "efficiency": [], "efficiency_error": []}
+    if not shown:
+        return found
     statistic = _statistic(code, table, neighbours, noise_sigma, seed)
     for presentation in shown:
         of_code, of_ideal = presentation.of(statistic), presentation.ideal()

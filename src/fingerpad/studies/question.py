@@ -42,8 +42,10 @@ FITTED = "fitted"
 """What `noise` says where it shall be found from observed hit rates."""
 
 GRID = "grid"
-LAYOUTS = (GRID, *PATTERNS)
-SHAPES = ("rectangle", "ellipse", "polygon")
+NAIL_ROWS = "nail rows"
+LAYOUTS = (GRID, *PATTERNS, NAIL_ROWS)
+PAD = "pad"
+SHAPES = ("rectangle", "ellipse", "polygon", PAD)
 
 LISTED, VARIED, NAMED, SPELLED = "listed", "varied", "named", "spelled"
 """Forms that a part of a question may have; pydantic puts them into the places of errors."""
@@ -212,7 +214,7 @@ class RegionSettings(Part):
 
     Parameters
     ----------
-    shape : {"rectangle", "ellipse", "polygon"}
+    shape : {"rectangle", "ellipse", "polygon", "pad"}
         What it looks like.
     length_mm, width_mm : float
         Extent of a rectangle or an ellipse along the finger and across. [mm]
@@ -232,11 +234,12 @@ class PopulationSettings(Part):
     Parameters
     ----------
     layout : str
-        "grid": the paper's rows and columns; or a pattern that fills a region.
+        "grid": the paper's rows and columns; a pattern that fills a region; or "nail rows", along the edge of
+        the nail.
     density_per_cm2 : float
         Afferents per area of skin. [1/cm2]
     rows, columns : int
-        Of a grid: along the finger and across; the paper's by default.
+        Of a grid: along the finger and across, the paper's by default; or how many rows along the nail.
     region : RegionSettings
         What any other layout fills.
     offset_mm : (float, float)

@@ -19,7 +19,7 @@ from fingerpad.psychophysics import Presentation
 from fingerpad.random_streams import IntArray
 from fingerpad.signals import ResponseMap, Skin
 from fingerpad.studies.efficiencies import efficiencies, ideal_observer, presentations
-from fingerpad.studies.question import FITTED, GRID, IDEAL, UNITS, Question, VariedStimuli
+from fingerpad.studies.question import FITTED, GRID, IDEAL, NAIL_ROWS, UNITS, Question, VariedStimuli
 from fingerpad.studies.question_stimuli import Presented, which
 from fingerpad.studies.readings import (
     CREDIBLE,
@@ -69,13 +69,9 @@ class Asked:
                 f"{', '.join(stimulus.name for stimulus in self.stimuli[1:])}: observed.points has none."
             )
         if IDEAL in question.code and question.noise == 0.0:
-            raise InputError(
-                "noise must be greater than 0 where code has ideal: got 0."
-            )
+            raise InputError("noise must be greater than 0 where code has ideal: got 0.")
         if question.noise == FITTED and question.code[0] == IDEAL:
-            raise InputError(
-                "code must not begin with ideal where noise is fitted: put another first."
-            )
+            raise InputError("code must not begin with ideal where noise is fitted: put another first.")
         if question.experiment.criterion_sigma > 0.0 and "euclidean" in question.code:
             raise InputError(
                 "experiment.criterion_sigma must be 0 where code has euclidean, whose decision point "
@@ -109,7 +105,7 @@ class Asked:
     def neighbours(self) -> IntArray:
         """Who is whose neighbour, (n_pairs, 2)."""
         layout = self.question.population.layout
-        pattern = "rectangular" if layout == GRID else layout
+        pattern = "rectangular" if layout in (GRID, NAIL_ROWS) else layout
         return neighbours_of(np.asarray(self.population.places_mm), self.population.pitch_mm, pattern)
 
     @property

@@ -11,7 +11,8 @@ from pathlib import Path
 from fingerpad.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.errors import InputError
 from fingerpad.estimation.tables import read_text
-from fingerpad.layouts import Layout, hexagonal, jittered, poisson_disc, rectangular, uniform
+from fingerpad.layouts import PATTERNS, Layout, hexagonal, jittered, poisson_disc, rectangular, uniform
+from fingerpad.nail_edge import NailEdge
 from fingerpad.population import Population, sensitivities
 from fingerpad.regions import Ellipse, Polygon, Rectangle, Region
 from fingerpad.signals import STORED_ENERGY
@@ -19,17 +20,28 @@ from fingerpad.studies.conditions import RECEPTOR_X_MM
 from fingerpad.studies.question import (
     DEFAULT,
     GRID,
+    NAIL_ROWS,
+    PAD,
     AfferentSettings,
     PopulationSettings,
     Question,
     RegionSettings,
 )
+from fingerpad.unrolled_skin import UnrolledSkin
 
-_OF_LAYOUT = {"rows": GRID, "columns": GRID, "jitter": "jittered", "separation": "poisson-disc"}
+_OF_LAYOUT = {
+    "rows": (GRID, NAIL_ROWS),
+    "columns": (GRID,),
+    "region": PATTERNS,
+    "offset_mm": (GRID, *PATTERNS),
+    "jitter": ("jittered",),
+    "separation": ("poisson-disc",),
+}
 _OF_SHAPE = {
     "rectangle": ("length_mm", "width_mm"),
     "ellipse": ("length_mm", "width_mm"),
     "polygon": ("corners_mm",),
+    PAD: (),
 }
 
 
@@ -100,40 +112,49 @@ def population_of(question: Question, beside: Path = Path()) -> Population:
         has no area, or no receptor falls into it.
     """
     settings, afferent = question.population, afferent_of(question, beside)
-    for key, layout in _OF_LAYOUT.items():
-        if key in settings.given and settings.layout != layout:
+    for key, layouts in _OF_LAYOUT.items():
+        if key in settings.given and settings.layout not in layouts:
             raise InputError(
-                f"population.{key} must not be given: it belongs to the layout {layout}, and this one is "
-                f"{settings.layout}."
+                f"population.{key} must not be given: it belongs to the layout {' or '.join(layouts)}, and "
+                f"this one is {settings.layout}."
             )
-    along, across = settings.offset_mm
-    if settings.layout == GRID:
-        if settings.region is not None:
-            raise InputError("population.region must not be given: a grid has rows and columns.")
-        laid = Population.grid(
-            settings.density_per_cm2,
-            **settings.chosen("rows", "columns"),
-            centre_mm=(RECEPTOR_X_MM + along, across),
-            afferent=afferent,
-        )
-    else:
-        laid = _in_region(settings, afferent)
+    laid = _LAID.get(settings.layout, _in_region)(settings, afferent)
     if settings.sensitivity_spread == 0.0:
         return laid
     return replace(laid, sensitivity=sensitivities(len(laid), settings.sensitivity_spread, settings.seed))
 
 
+def _grid(settings: PopulationSettings, afferent: Afferent) -> Population:
+    """Lay the paper's rows and columns."""
+    along, across = settings.offset_mm
+    return Population.grid(
+        settings.density_per_cm2,
+        **settings.chosen("rows", "columns"),
+        centre_mm=(RECEPTOR_X_MM + along, across),
+        afferent=afferent,
+    )
+
+
+def _along_nail(settings: PopulationSettings, afferent: Afferent) -> Population:
+    """Lay rows along the edge of the nail."""
+    nail = NailEdge()
+    with _placed("population"):
+        rows = nail.rows(settings.rows or 1, settings.density_per_cm2)
+    return Population.of_layout(rows, nail.points, afferent)
+
+
 def _in_region(settings: PopulationSettings, afferent: Afferent) -> Population:
-    """Fill the region of any layout but the grid."""
+    """Fill a region of the unrolled skin."""
     if settings.region is None:
         raise InputError(f"population.region must be given for the layout {settings.layout}: it is missing.")
-    centre = RECEPTOR_X_MM + settings.offset_mm[0], settings.offset_mm[1]
-    layout = _layout(settings, _region(settings.region, centre))
-    return Population.of_layout(layout, None, afferent)
+    skin = UnrolledSkin(origin_x_mm=RECEPTOR_X_MM)
+    region = _region(settings.region, settings.offset_mm, skin)
+    with _placed("population"):
+        return Population.of_layout(_layout(settings, region, skin), skin.points, afferent)
 
 
-def _region(settings: RegionSettings, centre_mm: tuple[float, float]) -> Region:
-    """Part of the plane that a region means."""
+def _region(settings: RegionSettings, offset_mm: tuple[float, ...], skin: UnrolledSkin) -> Region:
+    """Part of the unrolled skin that is meant."""
     wanted = _OF_SHAPE[settings.shape]
     for key in wanted:
         if key not in settings.given:
@@ -141,31 +162,37 @@ def _region(settings: RegionSettings, centre_mm: tuple[float, float]) -> Region:
     for key in settings.given:
         if key not in ("shape", *wanted):
             raise InputError(
-                f"population.region.{key} must not be given: a {settings.shape} has {', '.join(wanted)}."
+                f"population.region.{key} must not be given: a {settings.shape} has "
+                f"{', '.join(wanted) or 'no size'}."
             )
+    along, across = offset_mm
+    length, width = settings.length_mm or 0.0, settings.width_mm or 0.0
     with _placed("population.region"):
+        if settings.shape == PAD:
+            return skin.pad()
         if settings.shape == "polygon":
-            corners = [(centre_mm[0] + x, centre_mm[1] + z) for x, z in settings.corners_mm or ()]
+            corners = [(along + x, across + z) for x, z in settings.corners_mm or ()]
             return Polygon(tuple(corners))
-        length, width = settings.length_mm or 0.0, settings.width_mm or 0.0
         if settings.shape == "ellipse":
-            return Ellipse(0.5 * length, 0.5 * width, centre_mm)
-        return Rectangle(length, width, centre_mm)
+            return Ellipse(0.5 * length, 0.5 * width, (along, across))
+        return Rectangle(length, width, (along, across))
 
 
-def _layout(settings: PopulationSettings, region: Region) -> Layout:
+def _layout(settings: PopulationSettings, region: Region, skin: UnrolledSkin) -> Layout:
     """Places in a region."""
     density, seed = settings.density_per_cm2, settings.seed
-    with _placed("population"):
-        if settings.layout == "rectangular":
-            return rectangular(region, density)
-        if settings.layout == "hexagonal":
-            return hexagonal(region, density)
-        if settings.layout == "uniform":
-            return uniform(region, density, seed)
-        if settings.layout == "jittered":
-            return jittered(region, density, seed, **settings.chosen("jitter"))
-        return poisson_disc(region, density, seed, **settings.chosen("separation"))
+    if settings.layout == "rectangular":
+        return rectangular(region, density)
+    if settings.layout == "hexagonal":
+        return hexagonal(region, density)
+    if settings.layout == "uniform":
+        return uniform(region, density, seed)
+    if settings.layout == "jittered":
+        return jittered(region, density, seed, **settings.chosen("jitter"))
+    return poisson_disc(region, density, seed, **settings.chosen("separation"), place=skin.points)
+
+
+_LAID = {GRID: _grid, NAIL_ROWS: _along_nail}
 
 
 @contextmanager
