@@ -340,7 +340,7 @@ class SphereSkin:
         self.peak_kpa, self.width_mm = 2.5 * sharpness**1.5, 2.0 / sharpness**0.5
 
     def sed(self, sites):
-        squared = np.square(np.asarray(sites) - self.centre).sum(axis=1)
+        squared = np.square(np.asarray(sites)[:, [0, -1]] - self.centre).sum(axis=1)
         peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
         return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.85], peaks), kinks_ms=[50.0])
 
@@ -510,12 +510,28 @@ def test_timing_asks_every_sphere_over_the_middle_and_the_standard_beside_it():
     names = [touch["name"] for touch in found["recruitment"]["touches"]]
     assert names == [*(f"{curvature:g} /m" for curvature in CURVATURES), "287 /m, 0.2 mm away"]
     assert [touch["name"] for touch in found["rates"]["touches"]] == ["287 /m", "365 /m"]
-    curved = response_maps.sheet(SENSITIVE).respond(SKINS[0.0, 365.0])
+    population = response_maps.disc(Fingertip(), SENSITIVE)
     shown = found["recruitment"]["afferents"]
     assert [touch["name"] for touch in shown] == ["287 /m", "365 /m", "287 /m, 0.2 mm away"]
-    np.testing.assert_array_equal(shown[1]["first_spike_latency_ms"], curved.first_spike_latency_ms)
-    moved = response_maps.sheet(SENSITIVE).respond(SKINS[0.2, 287.0])
-    np.testing.assert_array_equal(shown[2]["first_spike_latency_ms"], moved.first_spike_latency_ms)
+    for touch, key in zip(shown, ((0.0, 287.0), (0.0, 365.0), (0.2, 287.0)), strict=True):
+        latency = population.respond(SKINS[key]).first_spike_latency_ms
+        np.testing.assert_array_equal(touch["first_spike_latency_ms"], latency)
+    # Rings are those about the contact point on the curved skin.
+    away = np.linalg.norm(population.positions_mm - Fingertip().skin_point(RECEPTOR_X_MM, 0.0), axis=1)
+    np.testing.assert_array_equal(
+        found["rates"]["n_afferents"], np.histogram(away, response_maps.RINGS_MM)[0]
+    )
+
+
+def test_the_disc_has_its_density_on_the_skin_itself():
+    """A round patch of skin holds its area times the density, however far it turns to the side."""
+    population = response_maps.disc(Fingertip(), SENSITIVE)
+    assert abs(len(population) / (np.pi * 5.0**2 * 16.0) - 1.0) < 0.01
+    along, around = population.places_mm.T
+    assert np.hypot(along, around).max() <= 5.0
+    # The plane is true to area; seen from below, the rim is foreshortened.
+    z = population.positions_mm[:, 2]
+    assert np.abs(z).max() < 0.97 * np.abs(around).max()
 
 
 RESTLESS = Afferent(static_gain=1.2e-6, intercept_ma=8e-7)

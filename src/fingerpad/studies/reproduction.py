@@ -191,7 +191,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
                 bar_sed, best.parameters, conditions.seed
             )
             advance()
-            results["population_timing"] = response_maps.timing(sphere_responses, afferent)
+            results["population_timing"] = response_maps.timing(sphere_responses, afferent, conditions.finger)
             advance()
     results["comparison"] = comparison(results)
     results["inputs"] = [asdict(number) for number in all_published()]

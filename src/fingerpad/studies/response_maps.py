@@ -1,8 +1,9 @@
 """Level 3, Figure 6: what afferents all over the pad answer to a sphere, in which order and how fast.
 
 A dense sheet of afferents stands for the population of any density: whoever ends at a place answers what the
-sheet answers there. Beside the paper's three maps stands what it names and leaves open (section 4.2): the
-order of first spikes, which is a code of its own (Johansson & Birznieks 2004), and the population rate.
+sheet answers there. For maps it is square, seen from below; where skin is measured it is even by its area.
+Beside the paper's three maps stands what it names and leaves open (section 4.2): the order of first spikes,
+which is a code of its own (Johansson & Birznieks 2004), and the population rate.
 """
 
 from __future__ import annotations
@@ -17,8 +18,11 @@ from numpy.typing import ArrayLike
 from fingerpad.afferent import Afferent
 from fingerpad.checks import positive
 from fingerpad.errors import InputError
+from fingerpad.fingertip import Fingertip
+from fingerpad.layouts import MM2_PER_CM2, hexagonal
 from fingerpad.parameters import protocol, psychophysics
 from fingerpad.population import Population
+from fingerpad.regions import Ellipse
 from fingerpad.response_maps import (
     NO_GROUP,
     evoked_latency_ms,
@@ -32,9 +36,13 @@ from fingerpad.sampling import SkinResponse
 from fingerpad.signals import STORED_ENERGY, ResponseMap, SedTraces
 from fingerpad.spikes import first_spike_latency_ms
 from fingerpad.studies.conditions import RECEPTOR_X_MM
+from fingerpad.unrolled_skin import UnrolledSkin
 
 REACH_MM, STEP_MM = 5.0, 0.25
-"""Half the side of the sheet, and its pitch. [mm]"""
+"""Half the side of the sheet, and its pitch; also the radius of the disc. [mm]"""
+
+DISC_DENSITY_PER_CM2 = 1600.0
+"""As dense as the sheet: sixteen stand for one of the paper's. [1/cm2]"""
 
 RINGS_MM = (0.0, 1.0, 2.0, 3.0, 4.0)
 """Inner radius of the first ring about the contact, and the outer radius of each. [mm]"""
@@ -76,15 +84,21 @@ def result(standard: SkinResponse, afferent: Afferent) -> dict[str, Any]:
     }
 
 
-def timing(responses: Mapping[tuple[float, float], SkinResponse], afferent: Afferent) -> dict[str, Any]:
-    """Ask the same sheet who fires first and how much at a time, under every sphere.
+def timing(
+    responses: Mapping[tuple[float, float], SkinResponse],
+    afferent: Afferent,
+    finger: Fingertip | None = None,
+) -> dict[str, Any]:
+    """Ask afferents all around the contact who fires first and how much at a time, under every sphere.
 
     Parameters
     ----------
     responses : mapping of (position, curvature) to SkinResponse
         Skin under the spheres, as `sphere_discrimination.touches` names them. [mm], [1/m]
     afferent : Afferent
-        What every one of the sheet is.
+        What every one of them is.
+    finger : Fingertip, optional
+        Whose skin. Default: `Fingertip()`.
 
     Returns
     -------
@@ -92,9 +106,10 @@ def timing(responses: Mapping[tuple[float, float], SkinResponse], afferent: Affe
         "recruitment" (see `recruitment`) by every sphere over the middle and by the standard at the other
         position; "rates" (see `rates`) under the standard and the most curved.
     """
+    finger = finger or Fingertip()
     standard = protocol.STANDARD_CURVATURE.value
     here, shifted = protocol.SPHERE_POSITIONS.value
-    population, rest = sheet(afferent), at_rest(afferent)
+    population, rest = disc(finger, afferent), at_rest(afferent)
     answers = {
         touch_name(curvature): population.respond(responses[here, curvature])
         for position, curvature in sorted(responses)
@@ -106,17 +121,30 @@ def timing(responses: Mapping[tuple[float, float], SkinResponse], afferent: Affe
     return {
         "recruitment": recruitment(
             answers,
-            STEP_MM**2,
+            MM2_PER_CM2 / DISC_DENSITY_PER_CM2,
             resting_latency_ms=rest["first_spike_latency_ms"],
             shown=(*names, moved),
         ),
         "rates": rates(
             {name: answers[name] for name in names},
-            (RECEPTOR_X_MM + here, 0.0),
+            finger.skin_point(RECEPTOR_X_MM + here, 0.0),
             density_per_cm2=psychophysics.RECEPTOR_DENSITY.value,
             resting_latency_ms=rest["first_spike_latency_ms"],
         ),
     }
+
+
+def disc(finger: Fingertip, afferent: Afferent) -> Population:
+    """Lay afferents densely and evenly, by area of skin, over a disc about the contact point.
+
+    Examples
+    --------
+    >>> population = disc(Fingertip(), Afferent())
+    >>> round(len(population) / DISC_DENSITY_PER_CM2, 2), round(np.pi * 0.5**2, 2)  # cm2
+    (0.79, 0.79)
+    """
+    layout = hexagonal(Ellipse(REACH_MM, REACH_MM), DISC_DENSITY_PER_CM2)
+    return Population.of_layout(layout, UnrolledSkin(finger, RECEPTOR_X_MM).points, afferent)
 
 
 def at_rest(afferent: Afferent) -> dict[str, float]:
