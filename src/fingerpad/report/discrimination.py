@@ -235,13 +235,13 @@ def _people(axes: Axes, observed: dict[str, Any] | None) -> None:
             markerfacecolor="none",
             markeredgewidth=1.6,
             zorder=5,
-            label=f"people (Goodwin et al. 1991), {_interval(observed)}",
+            label="people (Goodwin et al. 1991)",
         )
 
 
 def _interval(observed: dict[str, Any]) -> str:
     """Say what the bars of people are."""
-    return f"95 % intervals if of {number(observed['trials'])} trials"
+    return f"binomial 95 % intervals as of {number(observed['trials'])} trials, a number that is assumed"
 
 
 def _label(figure: Figure, grid: np.ndarray, n_panels: int) -> None:
@@ -271,7 +271,7 @@ def caption_observers(section: dict[str, Any]) -> str:
         "Fraction of trials in which a sphere is told from the standard of "
         f"{number(section['curvature_per_m'][0])} 1/m; bars are one standard deviation. Solid: sphere over "
         "the middle of the receptors; dotted: 0.2 mm away. Diamonds: people, with "
-        f"{_interval(section['goodwin'])}, which is assumed. (a-c) Gradient Sum of static "
+        f"{_interval(section['goodwin'])}. (a-c) Gradient Sum of static "
         "rates, dynamic rates and first-spike latencies, (d) Euclidean Distance of static rates, all with "
         f"noise σ₁ = {number(ours)}; the paper's best noise is {number(theirs)}. The following panels vary "
         "the noise or the number of noise matrices, as their titles say. The paper found that the static "
@@ -286,5 +286,5 @@ def caption_criterion(section: dict[str, Any]) -> str:
         "Gradient Sum of static rates once more, but for each hit rate the decision point is multiplied by "
         "a new normal variable with mean 1 and the standard deviation in the title. The paper found that "
         "the wider distribution lengthens the error bars and leaves the means alone. Noise σ₁ = "
-        f"{number(section.get('noise_sigma'))}."
+        f"{number(section.get('noise_sigma'))}. Diamonds: people, with {_interval(section['goodwin'])}."
     )
