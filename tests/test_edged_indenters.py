@@ -62,7 +62,7 @@ def drawn_section(body):
 
 @pytest.mark.parametrize("body", ROUNDED + SHARP, ids=NAMES)
 def test_gap_is_the_distance_to_the_face_and_negative_behind_it(body):
-    points = points_about(n=150)
+    points = points_about(n=60)
     section = drawn_section(body)
     gap, _ = body.gap(points)
     distance = np.array([np.hypot(*(section - point).T).min() for point in points[:, :2]])

@@ -117,6 +117,15 @@ def test_half_an_edge_turned_round_is_the_edge_from_the_other_side():
         assert profile.at(-1.6 * side) < 0.5 * profile.at(0.8 * side)
 
 
+def test_a_positive_spin_turns_the_body_from_distal_towards_positive_z():
+    """An edge covers the proximal half; turned by a quarter it covers negative z."""
+    pressing = touch(Edge(), 90.0, FULL)
+    lateral = np.array([[17.37, 0.0, -2.0], [17.37, 0.0, 2.0]])
+    points = lateral + pressing.placement.origin_mm * [0.0, 1.0, 0.0] - [0.0, 1.0, 0.0]
+    gap, _ = Edge().gap(pressing.placement.to_local(points, 0.0))
+    assert gap[0] < 0.0 < gap[1]
+
+
 def test_force_control_turns_as_depth_does():
     skin = touch(Bar(), 90.0, stimulus=ForceRampAndHold(80.0)).solve()
     np.testing.assert_allclose(skin.force_mn, [0.0, 40.0, 80.0, 80.0], rtol=1e-5)
