@@ -15,6 +15,9 @@ from fingerpad.report.appearance import GREY, new_figure, numbers
 from fingerpad.report.population import QUANTITIES, round_ticks
 
 PANEL_IN = (3.9, 3.3)
+POINTS_PER_PANEL = 180.0
+"""Side of the picture within a panel. [1/72 inch]"""
+
 ROOM_MM = 0.5
 """Least skin to be seen about the receptors. [mm]"""
 
@@ -25,6 +28,10 @@ class Response(Protocol):
     @property
     def positions_mm(self) -> FloatArray:
         """Places of the receptors, (n, 2) or (n, 3). [mm]"""
+
+    @property
+    def pitch_mm(self) -> float:
+        """Distance between neighbours. [mm]"""
 
     @property
     def dynamic_rate_hz(self) -> FloatArray:
@@ -42,8 +49,8 @@ class Response(Protocol):
 def draw(responses: Mapping[str, Response]) -> Figure:
     """Draw populations, one per row, coloured by dynamic rate, static rate and first-spike latency.
 
-    Receptors known by x and z are seen from above, those known by x, y and z from below in perspective; a
-    hollow one stays silent. A column has one scale.
+    They are seen from below, x to the right; receptors on the dorsal side (y above 0) are squares, and hollow
+    ones stay silent. A column has one scale.
 
     Parameters
     ----------
@@ -61,23 +68,15 @@ def draw(responses: Mapping[str, Response]) -> Figure:
     """
     if not responses:
         raise InputError("responses must hold at least one population: it is empty.")
-    plane = np.concatenate([numbers(response.positions_mm)[:, [0, -1]] for response in responses.values()])
-    window = np.stack([plane.min(axis=0) - ROOM_MM, plane.max(axis=0) + ROOM_MM], axis=1)
     width, height = PANEL_IN
     figure = new_figure(3 * width, len(responses) * height)
-    grid = figure.add_gridspec(len(responses), 3)
-    for column, (key, (phase, label, colours, scaling)) in enumerate(QUANTITIES.items()):
+    grid = figure.subplots(len(responses), 3, squeeze=False)
+    for panels, (key, (phase, label, colours, scaling)) in zip(grid.T, QUANTITIES.items(), strict=True):
         scale = _scale([numbers(getattr(response, key)) for response in responses.values()], scaling)
-        panels = []
-        for row, (name, response) in enumerate(responses.items()):
-            solid = np.shape(response.positions_mm)[1] == 3
-            axes: Any = figure.add_subplot(grid[row, column], projection="3d" if solid else None)
-            axes.set_title(f"{name}: {phase}" if column == 0 else phase, pad=24.0 if solid else None)
-            values = numbers(getattr(response, key))
-            axes.set(xlim=window[0], ylim=window[1])
-            dots = _dots(axes, numbers(response.positions_mm), values, colours, scale)
-            panels.append(axes)
-        bar = figure.colorbar(dots, ax=panels, label=label, shrink=0.85, fraction=0.05, aspect=30)
+        for axes, (name, response) in zip(panels, responses.items(), strict=True):
+            axes.set_title(f"{name}: {phase}" if axes in grid[:, 0] else phase)
+            dots = _dots(axes, response, numbers(getattr(response, key)), colours, scale)
+        bar = figure.colorbar(dots, ax=panels.tolist(), label=label, shrink=0.85, fraction=0.05, aspect=30)
         if isinstance(scale, LogNorm):
             bar.set_ticks(round_ticks(scale))
             bar.minorticks_off()
@@ -94,26 +93,30 @@ def _scale(columns: list[FloatArray], scaling: type[Normalize]) -> Normalize:
     return scaling(low if low < high else 0.5 * high, high)
 
 
-def _dots(axes: Any, positions: FloatArray, values: FloatArray, colours: str, scale: Normalize) -> Any:
-    """Draw one dot per receptor; those that do not answer hollow."""
-    answers = values > 0.0
-    # The axes of a picture in space are x, z and y: y points up.
-    places = positions.T if positions.shape[1] == 2 else positions[:, [0, 2, 1]].T
-    size = float(np.clip(6_000.0 / len(values), 6.0, 60.0))
-    shown = {"s": size, "linewidths": 0.6} | ({"depthshade": False} if len(places) == 3 else {})
-    axes.scatter(*places[:, ~answers], facecolors="none", edgecolors=GREY, **shown)
-    dots = axes.scatter(
-        *places[:, answers], c=values[answers], cmap=colours, norm=scale, edgecolors=GREY, **shown
-    )
+def _dots(axes: Any, response: Response, values: FloatArray, colours: str, scale: Normalize) -> Any:
+    """Draw one mark per receptor; those that do not answer hollow."""
+    positions = numbers(response.positions_mm)
+    plane = positions[:, [0, -1]]
+    low, high = plane.min(axis=0) - ROOM_MM, plane.max(axis=0) + ROOM_MM
+    spacing_pt = POINTS_PER_PANEL * response.pitch_mm / float((high - low).max())
+    size = float(np.clip((0.5 * spacing_pt) ** 2, 4.0, 80.0))
+    dorsal = positions[:, 1] > 0.0 if positions.shape[1] == 3 else np.zeros(len(positions), dtype=bool)
+    for marker, side in (("o", ~dorsal), ("s", dorsal)):
+        silent, answers = plane[side & ~(values > 0.0)], plane[side & (values > 0.0)]
+        known = values[side & (values > 0.0)]
+        axes.scatter(*silent.T, s=size, marker=marker, facecolors="none", edgecolors=GREY, linewidths=0.6)
+        dots = axes.scatter(
+            *answers.T,
+            s=size,
+            marker=marker,
+            c=known,
+            cmap=colours,
+            norm=scale,
+            edgecolors=GREY,
+            linewidths=0.6,
+        )
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    axes.grid(visible=False)
     axes.set_xlabel("along, x [mm]")
     axes.set_ylabel("across, z [mm]")
-    if len(places) == 3:
-        limits = np.array([axes.get_xlim(), axes.get_ylim(), (places[2].min(), places[2].max())])
-        axes.set_box_aspect(np.maximum(np.ptp(limits, axis=1), ROOM_MM), zoom=0.85)
-        axes.view_init(elev=-60.0, azim=-75.0)
-        axes.locator_params(nbins=4)
-        axes.set(zlim=limits[2], zticks=())
-    else:
-        axes.set_aspect("equal")
-        axes.grid(visible=False)
     return dots
