@@ -389,7 +389,7 @@ def drives_command(
     """Compare what may drive the afferent: quantities in the skin, and explanations of the dynamic rates."""
     from rich.console import Console
 
-    from fingerpad.report.drive_quantities import write_drive_page
+    from fingerpad.report.drive_study import write_drive_page
     from fingerpad.studies.conditions import Conditions
     from fingerpad.studies.drive_study import DriveStudy, study_drives
 

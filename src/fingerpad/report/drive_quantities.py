@@ -1,22 +1,18 @@
-"""Which quantity drives the afferent: rates by quantity as small multiples, tables, a page in Markdown."""
+"""Which quantity drives the afferent: rates by quantity as small multiples, and tables."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.files import write_atomically
-from fingerpad.report.appearance import BLACK, BLUE, GREY, PALE, new_figure, numbers, png
-from fingerpad.report.markdown import table as markdown_table
+from fingerpad.report.appearance import BLACK, BLUE, GREY, PALE, new_figure, numbers
 from fingerpad.report.single_unit import BAR_HALF_WIDTH_MM
 from fingerpad.report.tables import Row, Table
 from fingerpad.report.words import ABSENT, PHASES, fixed
 
-FIGURE = "drive_quantities.png"
 QUANTITIES = {
     "stored": "strain energy density",
     "instantaneous": "instantaneous energy density",
@@ -106,17 +102,13 @@ def caption(section: Mapping[str, Any]) -> str:
 
 
 def table(section: Mapping[str, Any]) -> list[Table]:
-    """Return FSS by quantity, and what explains the dynamic rates where that was asked."""
+    """Return FSS by quantity, a table per method."""
     methods = {"fit": section["method"], "response_surface": "response surface"}
-    tables = [
+    return [
         Table(f"By quantity, {name}", _QUANTITY_COLUMNS, [_quantity_row(one, key) for one in fitted], _NOTE)
         for key, name in methods.items()
         if (fitted := [candidate for candidate in section["candidates"] if key in candidate])
     ]
-    if section.get("explanations"):
-        rows = [_explanation_row(row) for row in section["explanations"]]
-        tables.append(Table("What explains the dynamic rates", _EXPLANATION_COLUMNS, rows, _INFORMATION))
-    return tables
 
 
 _QUANTITY_COLUMNS = (
@@ -135,19 +127,6 @@ _NOTE = (
     "the first row, by a bootstrap over blocks of three shifts; an interval beside 0 is a difference that "
     "does not hang on single shifts."
 )
-_EXPLANATION_COLUMNS = (
-    "explanation",
-    "free numbers",
-    "those added",
-    "FSS in sample",
-    "out of sample",
-    "dynamic",
-    "static",
-    "gain, 95 %",
-    "ΔAIC",
-    "ΔBIC",
-)
-_INFORMATION = "ΔAIC, ΔBIC: against the first row, smaller is better. Gain: as above."
 
 
 def _quantity_row(candidate: Mapping[str, Any], key: str) -> Row:
@@ -155,34 +134,17 @@ def _quantity_row(candidate: Mapping[str, Any], key: str) -> Row:
     scores = [fixed(fit[name + phase], _DECIMALS) for name in FSS for phase in ("", "_dynamic", "_static")]
     folds = sorted(score for score in fit["fss_folds"] if score is not None)
     spread = f"{fixed(folds[0], 2)} … {fixed(folds[-1], 2)}" if folds else ABSENT
-    return Row((_words(candidate), *scores, spread, _interval(fit["gain_interval"])))
+    return Row((_words(candidate), *scores, spread, gain(fit["gain_interval"])))
 
 
-def _explanation_row(row: Mapping[str, Any]) -> Row:
-    added = ", ".join(f"{_spelled(name)} {fixed(value, 2)}" for name, value in row["added"].items())
-    return Row(
-        (
-            row["name"],
-            str(row["free_numbers"]),
-            added or ABSENT,
-            fixed(row["fss_in_sample"], _DECIMALS),
-            *(fixed(row[f"fss_out_of_sample{phase}"], _DECIMALS) for phase in ("", "_dynamic", "_static")),
-            _interval(row["gain_interval"]),
-            fixed(row["aic_difference"], 1),
-            fixed(row["bic_difference"], 1),
-        )
-    )
+def gain(bounds: Any) -> str:
+    """Return an interval of what is gained, with its signs.
 
-
-def _spelled(name: str) -> str:
-    """Return a number's name with its unit behind it."""
-    for ending, unit in (("_mm", " [mm]"), ("_ms", " [ms]")):
-        if name.endswith(ending):
-            return name.removesuffix(ending).replace("_", " ") + unit
-    return name.replace("_", " ")
-
-
-def _interval(bounds: Any) -> str:
+    Examples
+    --------
+    >>> gain((-0.02, 0.1)), gain((0.0, 0.0))
+    ('−0.020 … +0.100', '–')
+    """
     low, high = bounds
     # The row that others are compared with gains nothing, and nothing is known of an empty one.
     if not low and not high:
@@ -198,61 +160,3 @@ def _signed(value: float) -> str:
 def _words(candidate: Mapping[str, Any], between: str = ", dynamic term ") -> str:
     static, dynamic = (QUANTITIES.get(candidate[term], candidate[term]) for term in ("static", "dynamic"))
     return static if static == dynamic else f"{static}{between}{dynamic}"
-
-
-def page(results: Mapping[str, Any], command: str = "fingerpad drives") -> str:
-    """Write the page: every quantity by both methods, and every explanation.
-
-    Parameters
-    ----------
-    results : dict
-        What `studies.drive_study.study_drives` returns.
-    command : str, optional
-        The command that made them, to be told to the reader.
-
-    Returns
-    -------
-    str
-        Markdown.
-    """
-    manifest = results["manifest"]
-    parts = [
-        "# Which quantity drives the afferent",
-        f"Written by `{command}` on {manifest['date']}: {manifest['resolution']} resolution, seed "
-        f"{manifest['seed']}, mechanical code {manifest['code_hash']}. What is concluded from it stands in "
-        "[what the dynamic term follows](decisions/what-the-dynamic-term-follows.md) and "
-        "[one afferent, fitted](single-unit.md).",
-        f"![Rates by quantity](images/{FIGURE})",
-        caption(results),
-    ]
-    for one in table(results):
-        parts += [f"## {one.title}", markdown_table(one.columns, [row.cells for row in one.rows]), one.note]
-    return "\n\n".join(parts) + "\n"
-
-
-def write_drive_page(results: Mapping[str, Any], folder: Path, command: str = "fingerpad drives") -> Path:
-    """Write `drive-quantities.md` and its figure.
-
-    Parameters
-    ----------
-    results : dict
-        What `studies.drive_study.study_drives` returns.
-    folder : Path
-        Made if needed.
-    command : str, optional
-        The command that made them.
-
-    Returns
-    -------
-    Path
-        The page.
-
-    Raises
-    ------
-    StoreError
-        If the folder cannot be written.
-    """
-    write_atomically(Path(folder) / "images" / FIGURE, png(draw, dict(results)))
-    path = Path(folder) / "drive-quantities.md"
-    write_atomically(path, page(results, command).encode())
-    return path

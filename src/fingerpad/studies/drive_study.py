@@ -1,4 +1,4 @@
-"""The whole comparison of drives behind `fingerpad drives`: every quantity, and every explanation."""
+"""The whole comparison of drives behind `fingerpad drives`: every quantity, explanation and depth."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fingerpad.checks import FloatArray, whole
 from fingerpad.estimation.rate_problem import RateProblem
 from fingerpad.estimation.recordings import RateRecordings
 from fingerpad.store import Store, code_hash, solve_missing
-from fingerpad.studies import drive_fits, drive_quantities, dynamic_response, single_unit
+from fingerpad.studies import drive_depths, drive_fits, drive_quantities, dynamic_response, single_unit
 from fingerpad.studies.conditions import Conditions
 from fingerpad.studies.drive_fits import RELATIVE_NAMES, Judged
 from fingerpad.studies.dynamic_response import EXPLANATIONS, ExplainedModel, Explanation, Patch
@@ -62,7 +62,8 @@ def study_drives(study: DriveStudy, on_finished: Callable[[str], None] | None = 
     Returns
     -------
     dict
-        Plain numbers, strings and lists: what `drive_quantities.result` gives, `explanations` and `manifest`.
+        Plain numbers, strings and lists: what `drive_quantities.result` gives, `explanations`, `depths`
+        and `manifest`.
 
     Raises
     ------
@@ -93,6 +94,8 @@ def study_drives(study: DriveStudy, on_finished: Callable[[str], None] | None = 
     finished("quantities")
     patch = dynamic_response.sampled_patch(responses)
     results["explanations"] = explained(patch, recordings, conditions.seed, generator, finished)
+    results["depths"] = drive_depths.result(responses, recordings, generator)
+    finished("depths")
     results["manifest"] = {
         "date": datetime.now(UTC).date().isoformat(),
         "version": __version__,
