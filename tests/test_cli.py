@@ -18,7 +18,7 @@ from fingerpad.grading import RESOLUTIONS
 from fingerpad.indentation import touch_of
 from fingerpad.indenters import Indenter, Plate, Sphere
 from fingerpad.mechanics.tissues import TISSUES
-from fingerpad.report import drive_quantities as drives_report
+from fingerpad.report import drive_study as drives_report
 from fingerpad.report import mesh_refinement as report
 from fingerpad.report import paper_size as paper_report
 from fingerpad.stimulus import RampAndHold

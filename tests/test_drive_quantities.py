@@ -16,6 +16,7 @@ from fingerpad.estimation.rate_problem import AfferentModel, RateProblem
 from fingerpad.estimation.recordings import RateRecordings
 from fingerpad.fitting import Fit, interleaved_folds
 from fingerpad.report import drive_quantities as report
+from fingerpad.report import drive_study as drives_report
 from fingerpad.report.appearance import png
 from fingerpad.signals import SedTraces
 from fingerpad.studies import drive_fits, drive_quantities, drive_study, dynamic_response, single_unit
@@ -517,26 +518,51 @@ def test_words_name_the_best_and_tables_hold_its_scores(section):
     assert all(len(row.cells) == len(table.columns) for row in table.rows)
 
 
-def test_the_page_tells_every_explanation_and_both_methods(section, tmp_path):
+def explained(section):
+    """Results with two explanations that the page shows, and a depth."""
     fit = section["candidates"][0]["fit"]
-    explained = {
-        "name": "power law of the dynamic term",
-        "free_numbers": 5,
-        "added": {"exponent": 0.39},
-        "aic_difference": -50.9,
-        "bic_difference": -48.6,
-        **fit,
-    }
+    paper = {"name": "the paper's model", "free_numbers": 4, "added": {}} | fit
+    paper |= {"aic_difference": 0.0, "bic_difference": 0.0}
+    power = {"name": "power law of the dynamic term", "free_numbers": 5, "added": {"exponent": 0.39}} | fit
+    power |= {"aic_difference": -50.9, "bic_difference": -48.6, "gain_interval": [0.01, 0.2]}
     candidates = [candidate | {"response_surface": candidate["fit"]} for candidate in section["candidates"]]
-    manifest = {"date": "2026-01-01", "resolution": "quick", "seed": 3, "code_hash": "abc"}
-    results = section | {"candidates": candidates, "explanations": [explained], "manifest": manifest}
-    path = report.write_drive_page(results, tmp_path, "fingerpad drives --resolution quick")
+    layer = {"tissue": "dermis", "from_mm": 0.5, "to_mm": 1.0, "largest_sed_kpa": 2.0, **fit}
+    return section | {
+        "candidates": candidates,
+        "explanations": [paper, power],
+        "depths": {"method": "least squares", "own_layer": 0, "layers": [layer]},
+        "manifest": {"date": "2026-01-01", "resolution": "quick", "seed": 3, "code_hash": "abc"},
+    }
+
+
+def test_the_page_tells_every_explanation_and_both_methods(section, tmp_path):
+    results = explained(section)
+    path = drives_report.write_drive_page(results, tmp_path, "fingerpad drives --resolution quick")
     text = path.read_text(encoding="utf-8")
     assert "`fingerpad drives --resolution quick` on 2026-01-01" in text
     assert "## By quantity, response surface" in text
     assert "| power law of the dynamic term | 5 | exponent 0.39 |" in text
-    assert "| −50.9 | −48.6 |" in text
-    assert (tmp_path / "images" / report.FIGURE).read_bytes() == png(report.draw, results)
+    assert "| +0.010 … +0.200 | −50.9 | −48.6 |" in text
+    assert "| dermis | 0.50 | 1.00 | 2.00 |" in text
+    for name, draw in drives_report.DRAWN.items():
+        file = drives_report.FIGURES[name]
+        assert f"](images/{file})" in text
+        assert (tmp_path / "images" / file).read_bytes() == png(draw, results)
+
+
+def test_explanations_are_drawn_by_what_they_predict_and_gain(section):
+    results = explained(section)
+    scores, gains = drives_report.draw_explanations(results).axes
+    drawn = {line.get_label(): line.get_xdata().tolist() for line in scores.get_lines()}
+    rows = results["explanations"]
+    assert drawn["both, weighted"] == [row["fss_out_of_sample"] for row in rows]
+    assert drawn["dynamic rates"] == [row["fss_out_of_sample_dynamic"] for row in rows]
+    assert [label.get_text() for label in scores.get_yticklabels()][1] == "power law of the dynamic term (5)"
+    (intervals,) = gains.collections
+    assert [path[:, 0].tolist() for path in intervals.get_segments()] == [[0.0, 0.0], [0.01, 0.2]]
+    assert "Least AIC has: power law of the dynamic term; 0 more" in drives_report.caption_explanations(
+        results
+    )
 
 
 def test_numbers_that_a_run_does_not_have_are_dashes(section):

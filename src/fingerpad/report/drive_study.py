@@ -80,6 +80,7 @@ def draw_explanations(section: Mapping[str, Any]) -> Figure:
     gains.axvline(0.0, color=GREY, linewidth=1.0)
     gains.hlines(height, *ends.T, color=BLUE, linewidth=2.0)
     gains.plot(total - total[0], height, "o", color=BLACK)
+    gains.locator_params(axis="x", nbins=5)
     gains.set_xlabel("gain in FSS out of sample over the first row [1]")
     gains.set_title("(b) what is gained, 95 % by bootstrap")
     figure.legend(*scores.get_legend_handles_labels(), loc="outside lower center", ncols=2)
@@ -148,7 +149,7 @@ def draw_depths(section: Mapping[str, Any]) -> Figure:
     axes.minorticks_off()
     axes.set_xlabel("depth below the skin [mm]")
     axes.set_ylabel("FSS out of sample [1]")
-    axes.legend(loc="lower left")
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 
 
@@ -176,8 +177,8 @@ def tables(section: Mapping[str, Any]) -> list[Table]:
     if section.get("depths"):
         rows = [_depth_row(layer) for layer in section["depths"]["layers"]]
         note = (
-            "Stored energy density in both terms, four free numbers, least squares. Only this quantity is kept "
-            "outside the living epidermis. Gain: over the living epidermis."
+            "Stored energy density in both terms, four free numbers, least squares. Outside the living "
+            "epidermis no other quantity is kept. Gain: over the living epidermis."
         )
         made.append(Table("By depth", _DEPTH_COLUMNS, rows, note))
     return made

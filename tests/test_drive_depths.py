@@ -1,0 +1,138 @@
+"""How deep the end organ lies: layers of a block, a truth that lies in one of them, and what is said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from fingerpad.errors import InputError
+from fingerpad.estimation.identifiable import six_parameters
+from fingerpad.estimation.rate_problem import AfferentModel
+from fingerpad.estimation.recordings import RateRecordings
+from fingerpad.mesh import LAYERS, block_mesh
+from fingerpad.report import drive_study as report
+from fingerpad.report.appearance import png
+from fingerpad.sampling import SkinResponse
+from fingerpad.signals import SedTraces
+from fingerpad.studies import drive_depths
+from fingerpad.studies.conditions import RECEPTOR_X_MM
+from fingerpad.studies.drive_fits import quick_method
+from fingerpad.studies.reproduction import plain
+from fingerpad.transduction import drive
+
+DEPTHS_MM = np.array([0.0, 0.2, 0.371, 0.471, 1.0, 1.624, 5.0])
+TISSUE = [0, 0, 1, 2, 2, 3]
+TRUE_LAYER, OWN_LAYER = 4, 2
+TIMES_MS = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 100.0, 300.0, 1000.0])
+COURSE = np.clip(TIMES_MS / 50.0, 0.0, 1.0) ** 2
+SHIFT_MM = np.linspace(-2.4, 2.4, 12)
+FOUR_TRUE = [0.01, 3.0, 0.03, 50.0]
+
+
+def block():
+    lines = np.concatenate([[0.0], np.cumsum(0.25 * 1.1 ** np.arange(8))])
+    both = RECEPTOR_X_MM + np.concatenate([-lines[:0:-1], lines])
+    return block_mesh(both, DEPTHS_MM, lines, TISSUE, symmetric=True)
+
+
+MESH = block()
+WIDTH_MM = np.array([0.5, 0.5, 0.5, 1.0, 1.6, 3.0])
+"""Peaks of energy below the edges of a bar, the wider the deeper."""
+
+
+def felt_kpa(layer, distance_mm):
+    return 0.3 + 2.0 * np.exp(-(((np.abs(distance_mm) - 1.4) / WIDTH_MM[layer]) ** 2))
+
+
+def skin(shift_mm):
+    """Energy that depends on the layer and is flat about the receptor, so that it is read exactly."""
+    layer = np.arange(len(MESH.elements)) % MESH.shape[2]
+    return SkinResponse(
+        mesh=MESH,
+        times_ms=TIMES_MS,
+        kinks_ms=(50.0,),
+        force_mn=np.zeros(9),
+        depth_mm=COURSE,
+        skin_displacement_mm=np.zeros((9, MESH.skin_nodes.size, 3)),
+        displacement_mm=np.zeros_like(MESH.nodes_mm),
+        sed_kpa=np.outer(COURSE, felt_kpa(layer, shift_mm)),
+        axis_x_mm=RECEPTOR_X_MM,
+        direction=np.array([0.0, 1.0, 0.0]),
+        sheet={"work": np.zeros((9, MESH.living_epidermis.size))},
+        von_mises_kpa=np.zeros(len(MESH.elements)),
+        force_imbalance=0.0,
+        energy_imbalance=0.0,
+        penetration_mm=0.0,
+        newton_steps=0,
+        factorisations=0,
+        linear_solver="none",
+    )
+
+
+SKINS = [skin(shift) for shift in SHIFT_MM]
+
+
+def recordings():
+    sed = SedTraces(TIMES_MS, np.outer(COURSE, felt_kpa(TRUE_LAYER, SHIFT_MM)), [50.0])
+    rates = AfferentModel(drive(sed)).rates(six_parameters(FOUR_TRUE))
+    return RateRecordings(tuple(f"{shift:g}" for shift in SHIFT_MM), *rates)
+
+
+@pytest.fixture(scope="module")
+def found():
+    method = replace(quick_method(), n_refined=1, difference_steps=(0.1,))
+    return plain(drive_depths.result(SKINS, recordings(), np.random.default_rng(0), method))
+
+
+def test_borders_are_those_of_the_mesh_below_the_receptor():
+    assert_allclose(drive_depths.borders_mm(MESH), DEPTHS_MM, rtol=1e-12)
+
+
+def test_every_layer_is_read_and_no_other_leaks_in():
+    site = [[RECEPTOR_X_MM, 0.0]]
+    for layer in range(6):
+        read = drive_depths.read_in(SKINS[3], layer).sed(site).sed_kpa[:, 0]
+        assert_allclose(read, COURSE * felt_kpa(layer, SHIFT_MM[3]), rtol=1e-9)
+    own = drive_depths.read_in(SKINS[3], OWN_LAYER)
+    assert_array_equal(own.sed(site).sed_kpa, SKINS[3].sed(site).sed_kpa)
+
+
+def test_what_is_not_kept_there_is_not_made_up():
+    with pytest.raises(InputError, match="quantity must be one of stored: got 'work'"):
+        drive_depths.read_in(SKINS[0], 1).sample("work", [[RECEPTOR_X_MM, 0.0]])
+    for layer in (-1, 6):
+        with pytest.raises(InputError, match=f"one of the 6 of this mesh, from 0: got {layer}"):
+            drive_depths.read_in(SKINS[0], layer)
+
+
+def test_the_depth_that_made_the_rates_predicts_them_best(found):
+    layers = found["layers"]
+    assert [layer["tissue"] for layer in layers] == [LAYERS[tissue] for tissue in TISSUE]
+    assert found["own_layer"] == OWN_LAYER
+    scores = [layer["fss_out_of_sample"] for layer in layers]
+    assert np.argmax(scores) == TRUE_LAYER
+    assert scores[TRUE_LAYER] > 0.98
+    assert scores[OWN_LAYER] < scores[TRUE_LAYER] - 0.03
+    assert layers[TRUE_LAYER]["gain_interval"][0] > 0.0
+    assert layers[OWN_LAYER]["gain_interval"] == [0.0, 0.0]
+    assert [layer["from_mm"] for layer in layers[1:]] == [layer["to_mm"] for layer in layers[:-1]]
+    assert layers[5]["largest_sed_kpa"] == pytest.approx(felt_kpa(5, SHIFT_MM).max(), rel=1e-6)
+
+
+def test_the_figure_and_the_words_say_where(found):
+    section = {"depths": found}
+    (axes,) = report.draw_depths(section).axes
+    lines = {line.get_label(): line for line in axes.lines}
+    for label, phase in (("both, weighted", ""), ("dynamic rates", "_dynamic"), ("static rates", "_static")):
+        drawn = lines[label].get_ydata().tolist()
+        assert drawn == [layer[f"fss_out_of_sample{phase}"] for layer in found["layers"]]
+    assert_allclose(lines["both, weighted"].get_xdata(), (DEPTHS_MM[:-1] + DEPTHS_MM[1:]) / 2.0)
+    assert "[mm]" in axes.get_xlabel()
+    assert png(report.draw_depths, section).startswith(b"\x89PNG")
+    assert "between 1.00 and 1.62 mm, in the dermis" in report.caption_depths(section)
+    *_, table = report.tables({"candidates": [], "method": "least squares", **section})
+    assert table.title == "By depth"
+    assert [row.cells[0] for row in table.rows] == [LAYERS[tissue] for tissue in TISSUE]
+    assert table.rows[TRUE_LAYER].cells[5] == f"{found['layers'][TRUE_LAYER]['fss_out_of_sample']:.3f}"
+    assert all(len(row.cells) == len(table.columns) for row in table.rows)
