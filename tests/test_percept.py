@@ -148,7 +148,7 @@ def made_up(seed=3, n_sessions=400, spread=0.05):
     draw = np.random.default_rng(seed).standard_normal
     rising = np.array([0.58, 0.65, 0.73, 0.80, 0.87, 0.95])
     known = {
-        "static": np.array([rising, rising + [0.01, 0.01, 0.01, 0.01, 0.01, 0.03]]),
+        "static": np.array([rising, np.add(rising, [0.01, 0.01, 0.01, 0.01, 0.01, 0.03])]),
         "dynamic": np.array([rising + 0.1, rising - [0.1, 0.0, 0.0, 0.0, 0.0, 0.0]]),
         "euclidean": np.array([rising, rising]),
         "ten_matrices": np.array([rising, rising]),
