@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import typer
 from scipy.special import ndtr
+from scipy.stats import binom
 
 from fingerpad import cli
 from fingerpad.discrimination import Experiment, discriminate_euclidean, discriminate_gradient_sum
@@ -53,6 +54,14 @@ class Bump:
         squared = np.square(np.asarray(sites)[:, [0, -1]] - [RECEPTOR_X_MM, 0.0]).sum(axis=1)
         peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
         return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.9], peaks), kinks_ms=[50.0])
+
+
+class NearOnly(Bump):
+    """A skin that holds nothing beyond 2 mm."""
+
+    def sed(self, sites, dynamic_quantity="stored"):
+        far = np.linalg.norm(np.asarray(sites)[:, [0, -1]] - [RECEPTOR_X_MM, 0.0], axis=1) >= 2.0
+        return super().sed(sites).scaled(np.where(far, 1e-6, 1.0))
 
 
 def asked(**parts):
@@ -114,14 +123,29 @@ def test_the_statistic_rises_with_what_is_told_apart_and_distances_begin_above_z
     assert distances["mean"][0] > 0.0
 
 
-def test_nobody_waits_longer_for_first_spikes_than_the_ramp_unless_told():
-    def latest_ms(**parts):
-        question = asked(measure="latency", code="gradient_sum", **parts)
+def test_an_observer_who_waits_counts_later_spikes_as_the_end_of_his_patience():
+    def latest_ms(patience_ms):
+        question = asked(measure="latency", code="gradient_sum", windows_ms={"latency": patience_ms})
         return np.max(result(question, bumps(question, peak_kpa=0.3))["responses"]["latency"])
 
-    assert latest_ms() == 50.0
-    assert 50.0 < latest_ms(windows_ms={"latency": 900}) < 900.0
-    assert latest_ms(common={"indenter": "sphere", "ramp_ms": 40}) == 40.0
+    assert latest_ms(40) == 40.0
+    assert 50.0 < latest_ms(900) < 900.0
+
+
+def test_who_is_silent_under_one_stimulus_has_no_latency_under_any():
+    question = asked(measure="latency", windows_ms={"static": [600, 950]})
+    skins = bumps(question)
+    distance_mm = np.linalg.norm(question.population.positions_mm - [RECEPTOR_X_MM, 0.0], axis=1)
+    near = distance_mm < 2.0
+    assert 0 < near.sum() < 16
+    skins["240"] = NearOnly(240.0)
+    found = result(question, skins)
+    assert np.isnan(found["responses"]["latency"]).sum() == 16 - near.sum()
+    alone = result(asked(measure="latency", population={"rows": 2, "columns": 4}), bumps(question))
+    assert alone["readings"][0]["statistic"]["mean"].shape == (5,)
+    inner = reading(found, "gradient_sum", "latency")["statistic"]["mean"]
+    all_of_them = reading(result(question, bumps(question)), "gradient_sum", "latency")["statistic"]["mean"]
+    assert (inner < all_of_them).all()  # the outer ones, which fire late, are left out
 
 
 def test_without_noise_every_difference_is_seen():
@@ -146,15 +170,17 @@ def test_fitted_noise_meets_the_hit_rates_of_a_known_observer(code):
     assert (noise["fitted_to"]["code"], noise["fitted_to"]["measure"]) == (code, "static")
 
 
-def test_observed_points_have_wilsons_interval_where_trials_are_known():
+def test_observed_points_have_a_binomial_interval_where_trials_are_known():
     points = [{"at": "220", "hit_rate": 0.6, "trials": 50}, {"at": 250, "hit_rate": 0.7}]
     question = asked(
         observed={"points": points, "source": "two people"}, measure="static", code="gradient_sum"
     )
     observed = result(question, bumps(question))["observed"]
     assert [point["level"] for point in observed["points"]] == [220.0, 250.0]
-    # p = 0.6, n = 50, z = 1.96: (p + z²/2n ± z sqrt(p(1-p)/n + z²/4n²)) / (1 + z²/n)
-    assert observed["points"][0]["interval"] == pytest.approx((0.4618, 0.7239), abs=1e-4)
+    low, high = observed["points"][0]["interval"]
+    # Clopper and Pearson: so few, or so many, hits of 50 have a chance of 2.5 % there.
+    assert binom.sf(29, 50, low) == pytest.approx(0.025, rel=1e-9)
+    assert binom.cdf(30, 50, high) == pytest.approx(0.025, rel=1e-9)
     assert observed["points"][1]["interval"] is None
 
 

@@ -71,7 +71,7 @@ def draw_responses(section: dict[str, Any]) -> Figure:
     height = float(np.clip(8.0 / len(shown) * along / across, 0.5, 4.0))
     figure = new_figure(10.0, 2.0 * height + 1.4)
     grid = figure.subplots(2, len(shown), sharex=True, sharey=True, squeeze=False)
-    largest = float(np.abs(answers[shown] - answers[0]).max())
+    largest = float(np.nanmax(np.abs(answers[shown] - answers[0])))
     for column, row in enumerate(shown):
         name = section["stimulus"][row]
         picture = _answers(grid[0, column], places, answers[row], answers)
@@ -108,8 +108,8 @@ def _answers(axes: Axes, places: FloatArray, answers: FloatArray, of_all: FloatA
         c=answers,
         s=_marker_size(len(places)),
         cmap="viridis",
-        vmin=of_all.min(),
-        vmax=of_all.max(),
+        vmin=np.nanmin(of_all),
+        vmax=np.nanmax(of_all),
         edgecolors=GREY,
         linewidths=0.5,
     )
@@ -117,7 +117,7 @@ def _answers(axes: Axes, places: FloatArray, answers: FloatArray, of_all: FloatA
 
 def _differences(axes: Axes, places: FloatArray, difference: FloatArray, largest: float) -> None:
     """Draw upright triangles where there is more, hanging ones where there is less, by area."""
-    size = _marker_size(len(places)) * np.abs(difference) / (largest or 1.0)
+    size = _marker_size(len(places)) * np.abs(np.nan_to_num(difference)) / (largest or 1.0)
     for sign, marker, colour in ((1.0, "^", ORANGE), (-1.0, "v", BLUE)):
         there = sign * difference > 0.0
         axes.scatter(places[there, -1], places[there, 0], s=size[there], marker=marker, color=colour)

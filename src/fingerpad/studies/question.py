@@ -297,8 +297,8 @@ class WindowSettings(Part):
     dynamic, static : (float, float)
         Start and end of the windows of the two rates. [ms]
     latency : float
-        How long the observer waits for first spikes; a later one, or none, counts as that. Without it, until
-        the ramp ends. [ms]
+        How long the observer waits for first spikes; a later one, or none, counts as that. Without it,
+        receptors that are silent under one stimulus take no part. [ms]
     """
 
     dynamic: Pair = protocol.DYNAMIC_WINDOW.value

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
 
 from fingerpad.checks import FloatArray
 from fingerpad.discrimination import Experiment
@@ -19,17 +18,21 @@ from fingerpad.psychophysics import Presentation
 from fingerpad.random_streams import IntArray
 from fingerpad.signals import ResponseMap, Skin
 from fingerpad.studies.efficiencies import efficiencies, ideal_observer, presentations
+from fingerpad.studies.goodwin import binomial_interval
 from fingerpad.studies.question import FITTED, GRID, IDEAL, NAIL_ROWS, UNITS, Question, VariedStimuli
 from fingerpad.studies.question_stimuli import Presented, which
 from fingerpad.studies.readings import (
-    CREDIBLE,
     curves,
     fitted_noise,
     hit_rates,
     responses,
+    silent_stimuli,
     statistic,
-    who_is_silent,
+    taking_part,
 )
+
+Taken = tuple[FloatArray, np.ndarray]
+"""A measure of all receptors under every stimulus, and the pairs of neighbours that take part."""
 
 
 @dataclass(frozen=True)
@@ -114,11 +117,6 @@ class Asked:
         return Experiment(**self.question.experiment.model_dump(exclude={"seed", "trials"}))
 
     @property
-    def patience_ms(self) -> float:
-        """How long the observer waits for first spikes: by default until every ramp ends. [ms]"""
-        return self.question.windows_ms.latency or max(stimulus.motion.ramp_ms for stimulus in self.stimuli)
-
-    @property
     def axis(self) -> str:
         """Say what the levels are."""
         if self.question.axis or not isinstance(self.question.stimuli, VariedStimuli):
@@ -159,17 +157,18 @@ def result(asked: Asked, skins: Mapping[str, Skin]) -> dict[str, Any]:
     ConvergenceError
         If no noise meets the observed hit rates.
     """
-    question, stimuli = asked.question, asked.stimuli
+    question, stimuli, patience_ms = asked.question, asked.stimuli, asked.question.windows_ms.latency
     answers = asked.answers(skins)
-    tables = {measure: responses(answers, measure, asked.patience_ms) for measure in question.measure}
-    silent = {measure: who_is_silent(answers, measure, asked.patience_ms) for measure in question.measure}
+    tables = {measure: responses(answers, measure, patience_ms) for measure in question.measure}
+    silent = {measure: silent_stimuli(table, measure, patience_ms) for measure, table in tables.items()}
     if all(rows.size for rows in silent.values()):
         raise InputError(
             f"The population stays silent: by {' or '.join(silent)} none of its {len(asked.population)} "
             f"afferents answers {_named(stimuli, next(iter(silent.values())))}, and there is no hit rate "
             "from zeros; press deeper, or place it below the stimuli."
         )
-    noise = _noise(asked, tables, silent)
+    taken = {measure: taking_part(table, asked.neighbours) for measure, table in tables.items()}
+    noise = _noise(asked, taken, silent)
     return {
         "question": question.question,
         "axis": asked.axis,
@@ -181,7 +180,7 @@ def result(asked: Asked, skins: Mapping[str, Skin]) -> dict[str, Any]:
         "readings": [
             reading
             for measure in question.measure
-            for reading in _readings(asked, measure, tables[measure], silent[measure], noise["sigma"])
+            for reading in _readings(asked, measure, taken[measure], silent[measure], noise["sigma"])
         ],
         "observed": _observed(asked),
     }
@@ -206,7 +205,7 @@ def _population(asked: Asked) -> dict[str, Any]:
     }
 
 
-def _noise(asked: Asked, tables: Mapping[str, FloatArray], silent: Mapping[str, IntArray]) -> dict[str, Any]:
+def _noise(asked: Asked, taken: Mapping[str, Taken], silent: Mapping[str, IntArray]) -> dict[str, Any]:
     """Find the noise: as it is given, or as the first code and measure need it for the observed hit rates."""
     question, points = asked.question, asked.observed_comparisons
     if question.noise != FITTED:
@@ -219,8 +218,7 @@ def _noise(asked: Asked, tables: Mapping[str, FloatArray], silent: Mapping[str, 
         )
     fit = fitted_noise(
         code,
-        tables[measure],
-        asked.neighbours,
+        *taken[measure],
         [row - 1 for row in points],
         list(points.values()),
         question.experiment.seed,
@@ -239,22 +237,22 @@ def _noise(asked: Asked, tables: Mapping[str, FloatArray], silent: Mapping[str, 
     }
 
 
-def _readings(asked: Asked, measure: str, table: FloatArray, silent: IntArray, sigma: float) -> list[dict]:
+def _readings(asked: Asked, measure: str, taken: Taken, silent: IntArray, sigma: float) -> list[dict]:
     """Read one measure by every code; there is no hit rate from zeros."""
     names, seed = [asked.stimuli[row].name for row in silent], asked.question.experiment.seed
-    shown = presentations(table, sigma, seed) if sigma > 0.0 and not names else []
+    shown = presentations(taken[0], sigma, seed) if sigma > 0.0 and not names else []
     return [
         {"code": code, "measure": measure, "silent": names, "hit_rate": None}
-        | ({} if names else _reading(asked, code, table, sigma, shown))
+        | ({} if names else _reading(asked, code, taken, sigma, shown))
         for code in asked.question.code
     ]
 
 
 def _reading(
-    asked: Asked, code: str, table: FloatArray, sigma: float, shown: list[Presentation]
+    asked: Asked, code: str, taken: Taken, sigma: float, shown: list[Presentation]
 ) -> dict[str, Any]:
     """Hit rates, what is behind them, and their curves."""
-    settings, neighbours = asked.question.experiment, asked.neighbours
+    settings, (table, neighbours) = asked.question.experiment, taken
     if code == IDEAL:
         told = ideal_observer(shown)
     else:
@@ -291,14 +289,8 @@ def _observed(asked: Asked) -> dict[str, Any] | None:
                 ),
                 "hit_rate": point.hit_rate,
                 "trials": point.trials,
-                "interval": None if point.trials is None else _wilson(point.hit_rate, point.trials),
+                "interval": point.trials and binomial_interval(point.hit_rate, point.trials),
             }
             for point in observed.points
         ],
     }
-
-
-def _wilson(hit_rate: float, trials: int) -> tuple[float, float]:
-    """Wilson's interval of a proportion. [0-1]"""
-    interval = binomtest(round(hit_rate * trials), trials).proportion_ci(CREDIBLE, method="wilson")
-    return float(interval.low), float(interval.high)

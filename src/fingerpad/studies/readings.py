@@ -9,7 +9,7 @@ import numpy as np
 
 from fingerpad.checks import FloatArray
 from fingerpad.discrimination import Experiment, discriminate_euclidean, discriminate_gradient_sum
-from fingerpad.encoding import distance
+from fingerpad.encoding import answering_neighbours, distance
 from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.noise_fit import NoiseFit, expected_hit_rates, fit_noise_sigma
 from fingerpad.noisy_responses import noisy_gradient_sums, noisy_responses, session_trials
@@ -29,8 +29,8 @@ CURVE_POINTS = 61
 CREDIBLE = 0.95
 
 
-def responses(answers: Sequence[ResponseMap], measure: str, patience_ms: float) -> FloatArray:
-    """One measure of every receptor under every stimulus.
+def responses(answers: Sequence[ResponseMap], measure: str, patience_ms: float | None = None) -> FloatArray:
+    """Return one measure of every receptor under every stimulus.
 
     Parameters
     ----------
@@ -38,25 +38,65 @@ def responses(answers: Sequence[ResponseMap], measure: str, patience_ms: float) 
         Of the population, stimulus by stimulus.
     measure : {"static", "dynamic", "latency"}
         Rates in the hold or the ramp, or first-spike latency.
-    patience_ms : float
-        How long the observer waits for first spikes: a later one, or none, counts as that
-        (docs/decisions/silent-receptors.md). [ms]
+    patience_ms : float, optional
+        How long the observer waits for first spikes: a later one, or none, counts as that. [ms]
 
     Returns
     -------
     array (n_stimuli, n_receptors)
-        [spikes/s or ms]
+        NaN where a receptor has no latency. [spikes/s or ms]
     """
-    if measure == "latency":
-        return np.array([np.fmin(answer.first_spike_latency_ms, patience_ms) for answer in answers])
-    return np.array([getattr(answer, f"{measure}_rate_hz") for answer in answers])
+    if measure != "latency":
+        return np.array([getattr(answer, f"{measure}_rate_hz") for answer in answers])
+    latency_ms = np.array([answer.first_spike_latency_ms for answer in answers])
+    return latency_ms if patience_ms is None else np.fmin(latency_ms, patience_ms)
 
 
-def who_is_silent(answers: Sequence[ResponseMap], measure: str, patience_ms: float) -> IntArray:
-    """Numbers of the stimuli under which no receptor answers, as far as a measure tells."""
-    table = responses(answers, measure, patience_ms)
-    nothing = table == (patience_ms if measure == "latency" else 0.0)
-    return np.flatnonzero(nothing.all(axis=1))
+def silent_stimuli(table: FloatArray, measure: str, patience_ms: float | None = None) -> IntArray:
+    """Find the stimuli under which nobody answers, as far as a measure tells.
+
+    Parameters
+    ----------
+    table, measure, patience_ms
+        Of and as in `responses`.
+
+    Returns
+    -------
+    int array (n_silent,)
+        Rows of the table. For latencies, if nobody fires under every stimulus, those under which fewest do.
+    """
+    if measure != "latency" or patience_ms is not None:
+        return np.flatnonzero((table == (patience_ms if measure == "latency" else 0.0)).all(axis=1))
+    missing = np.isnan(table)
+    if not missing.any(axis=0).all():
+        return np.empty(0, dtype=np.int64)
+    return np.flatnonzero(missing.sum(axis=1) == missing.sum(axis=1).max())
+
+
+def taking_part(table: FloatArray, neighbours: np.ndarray) -> tuple[FloatArray, np.ndarray]:
+    """Let receptors that are silent under one stimulus take no part under any, as in the reproduction.
+
+    See docs/decisions/silent-receptors.md.
+
+    Parameters
+    ----------
+    table : array (n_stimuli, n_receptors)
+        From `responses`, NaN for silence.
+    neighbours : int array (n_pairs, 2)
+        Who is whose neighbour.
+
+    Returns
+    -------
+    (array (n_stimuli, n_receptors), int array (n_pairs, 2))
+        Zeros for those that take no part, and the pairs without them.
+
+    Examples
+    --------
+    >>> table, pairs = taking_part(np.array([[20.0, 25.0, np.nan], [20.0, 24.0, 90.0]]), [[0, 1], [1, 2]])
+    >>> table.tolist(), pairs.tolist()
+    ([[20.0, 25.0, 0.0], [20.0, 24.0, 0.0]], [[0, 1]])
+    """
+    return np.where(np.isnan(table).any(axis=0), 0.0, table), answering_neighbours(table, neighbours)
 
 
 def hit_rates(
