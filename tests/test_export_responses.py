@@ -1,13 +1,20 @@
-"""A response written as a table and read back by the standard library is the same response."""
+"""A response written as a table or as a session and read back is the same response."""
 
 import csv
+import sys
+import warnings
+from dataclasses import replace
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 from fingerpad.errors import InputError, StoreError
+from fingerpad.estimation.reading import read_recordings
+from fingerpad.estimation.stimuli import read_stimuli
 from fingerpad.export.responses import write_response_csv
+from fingerpad.export.responses_nwb import write_responses_nwb
 from fingerpad.response_maps import recruitment_rank
 from fingerpad.signals import ResponseMap, SpikeTrains
 
@@ -54,3 +61,62 @@ def test_a_file_in_the_way_of_a_folder_is_named(tmp_path):
     (tmp_path / "taken").write_text("")
     with pytest.raises(StoreError, match="taken"):
         write_response_csv(random_response(2), tmp_path / "taken" / "map.csv")
+
+
+def responses_to_two_touches() -> dict[str, ResponseMap]:
+    first = random_response(3)
+    later = SpikeTrains.from_lists([first.spikes[39 - receptor] + 1.5 for receptor in range(40)])
+    return {"edge": first, "flat": replace(first, spikes=later)}
+
+
+def test_a_session_is_read_back_as_recordings_of_every_receptor(tmp_path):
+    (tmp_path / "two.csv").write_text("stimulus,indenter\nedge,bar\nflat,bar\n", encoding="utf-8")
+    responses = responses_to_two_touches()
+    path = write_responses_nwb(responses, tmp_path / "deeper" / "session.nwb", pause_ms=250.0)
+    assert [entry.name for entry in path.parent.iterdir()] == ["session.nwb"]
+    stimuli = read_stimuli(tmp_path / "two.csv")
+    receptor = next(n for n in range(40) if all(answer.spikes[n].size > 1 for answer in responses.values()))
+    recorded = read_recordings(path, stimuli, unit=receptor).recordings
+    assert recorded.stimuli == ("edge", "flat")
+    for train, answer in zip(recorded.trains, responses.values(), strict=True):
+        np.testing.assert_allclose(train, answer.spikes[receptor], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(recorded.duration_ms, 1000.0, rtol=1e-12)
+
+
+def test_a_session_knows_where_its_receptors_lie(tmp_path):
+    responses = responses_to_two_touches()
+    started = datetime(2026, 3, 1, 12, tzinfo=UTC)
+    path = write_responses_nwb(responses, tmp_path / "session.nwb", started=started)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from pynwb import NWBHDF5IO
+
+        with NWBHDF5IO(str(path), mode="r") as file:
+            session = file.read()
+            places = np.transpose([session.units[name][:] for name in ("x_mm", "y_mm", "z_mm")])
+            began, names = session.session_start_time, list(session.trials["stimulus"][:])
+    assert_array_equal(places, responses["edge"].positions_mm)
+    assert (began, names) == (started, ["edge", "flat"])
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "message"),
+    [
+        (lambda touches: {}, {}, "at least one touch"),
+        (lambda touches: {**touches, "other": random_response(2)}, {}, "those of 'other' lie elsewhere"),
+        (lambda touches: touches, {"duration_ms": 1.0}, "duration_ms must reach to the last spike"),
+        (lambda touches: touches, {"pause_ms": -1.0}, "pause_ms must not be negative"),
+        (lambda touches: touches, {"started": datetime(2026, 3, 1)}, "started must have a time zone"),
+    ],
+)
+def test_a_session_that_cannot_be_is_refused_and_nothing_is_written(tmp_path, change, options, message):
+    with pytest.raises(InputError, match=message):
+        write_responses_nwb(change(responses_to_two_touches()), tmp_path / "session.nwb", **options)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_library_is_named_with_the_extra_that_brings_it(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pynwb", None)
+    with pytest.raises(InputError, match=r"pip install 'fingerpad\[nwb\]'"):
+        write_responses_nwb(responses_to_two_touches(), tmp_path / "session.nwb")
+    assert list(tmp_path.iterdir()) == []

@@ -834,7 +834,7 @@ def test_captions_say_what_afferents_do_without_a_touch():
     assert "without any touch too, 4 spikes/s from 251 ms on" in population.caption(section)
     silent = section | {"at_rest": {"static_rate_hz": 0.0, "first_spike_latency_ms": None}}
     assert "without any touch" not in population.caption(silent)
-    assert "first fire at 251 ms. All of them start" in population_rate.caption(timing["rates"])
+    assert "first fire at 251 ms. All start" in population_rate.caption(timing["rates"])
     assert "Without any touch" not in recruitment.caption(timing["recruitment"])
     firing = timing["recruitment"] | {"resting_latency_ms": 251.0}
     assert "first fire at 251 ms. They count as recruited" in recruitment.caption(firing)

@@ -94,5 +94,5 @@ def caption(section: Mapping[str, Any]) -> str:
         f"{number(inner)} to {number(outer)} mm together, under "
         + " and ".join(touch["name"] for touch in section["touches"])
         + ". The model has no noise here, so that neighbours fire almost together: ripples are theirs. "
-        + resting(section, "All of them start at onset: bumps at its multiples are not the touch's.")
+        + resting(section, "All start at onset: bumps shortly before its multiples are not the touch's.")
     )

@@ -155,9 +155,10 @@ def caption(section: Mapping[str, Any]) -> str:
     )
     return (
         "Recruitment by first spikes; one dot per afferent of a dense sheet. (a, b) Place in the order, the "
-        "first in yellow, with lines through afferents that fire at the same time; pale ones never do. (c) "
-        "Skin whose afferents have fired. (d) Latency of each afferent under one touch and another: on the "
-        "line nothing changes, and an order changes only where dots scatter about a rising curve. "
+        "first in yellow, with lines through afferents that fire at the same time; pale ones are not "
+        "recruited. (c) Skin whose afferents have fired. (d) Latency of each afferent under one touch and "
+        "another: on the line nothing changes, and an order changes only where dots scatter about a rising "
+        "curve. "
         + (f"Against {first['name']}: {changes}. " if changes else "")
         + resting(section, "They count as recruited if touch halves that time at least. ")
         + "The paper (section 4.2) names the order of first spikes as a code and does not use it."
@@ -204,8 +205,8 @@ def tables(section: Mapping[str, Any]) -> list[Table]:
                 "pairs in another order",
             ),
             rows,
-            "Skin times 100 per cm² is the number of afferents. Order is compared over the afferents that "
-            "fire under both touches.",
+            "With 100 afferents per cm², mm² of skin are numbers of afferents. Order is compared over those "
+            "that both touches recruit.",
         )
     ]
 

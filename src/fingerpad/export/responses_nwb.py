@@ -1,0 +1,130 @@
+"""What a population answered to several touches, as a session of Neurodata Without Borders (NWB)."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from fingerpad import __version__
+from fingerpad.checks import instance, not_negative, positive
+from fingerpad.errors import InputError
+from fingerpad.export.responses import PLACES
+from fingerpad.files import write_atomically
+from fingerpad.parameters import protocol
+from fingerpad.signals import ResponseMap
+from fingerpad.units import MS_PER_S
+
+DURATION_MS = protocol.RAMP.value + protocol.HOLD.value
+
+
+def write_responses_nwb(
+    responses: Mapping[str, ResponseMap],
+    path: Path,
+    duration_ms: float = DURATION_MS,
+    pause_ms: float = 1000.0,
+    started: datetime | None = None,
+) -> Path:
+    """Write a session: one trial per touch, one unit per receptor.
+
+    Trials follow each other, `stimulus` being the name of the touch; a unit has its place and the times of
+    all its spikes. `fingerpad fit` reads the file as it reads recordings, one unit at a time. It needs the
+    extra `fingerpad[nwb]`.
+
+    Parameters
+    ----------
+    responses : mapping of str to ResponseMap
+        Answers of the same receptors, by the names of the touches.
+    path : Path
+        The file; folders are made as needed, and it is there whole or not at all.
+    duration_ms : float, optional
+        How long each touch lasted. [ms]
+    pause_ms : float, optional
+        From the end of a touch to the onset of the next. [ms]
+    started : datetime, optional
+        Begin of the session, with its time zone. Default: now.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If there is no touch, receptors differ between touches, a duration is wrong, a spike comes later, the
+        begin has no time zone, or pynwb is not installed.
+    StoreError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> from fingerpad.signals import SpikeTrains
+    >>> trains = SpikeTrains.from_lists([[12.5, 40.0], []])
+    >>> response = ResponseMap([[17.0, 0.5], [17.0, 1.5]], 1.0, trains, [36.4, 0], [0, 0], [12.5, np.nan])
+    >>> with TemporaryDirectory() as folder:
+    ...     write_responses_nwb({"ball": response}, Path(folder) / "session.nwb").name
+    'session.nwb'
+    """
+    positive("duration_ms", duration_ms, "ms")
+    not_negative("pause_ms", pause_ms, "ms")
+    began = started or datetime.now(UTC)
+    if began.tzinfo is None:
+        raise InputError(f"started must have a time zone, such as datetime.UTC: got {began.isoformat()}.")
+    positions_mm = _places(responses, duration_ms)
+    onsets_ms = np.arange(len(responses)) * (duration_ms + pause_ms)
+    # What the library warns of is its own business: nothing of it is about what is written here.
+    with warnings.catch_warnings(), TemporaryDirectory() as folder:
+        warnings.simplefilter("ignore")
+        pynwb = _pynwb()
+        session = pynwb.NWBFile(f"simulated by fingerpad {__version__}", Path(path).stem, began)
+        session.add_trial_column("stimulus", "name of the touch")
+        for name, onset_ms in zip(responses, onsets_ms, strict=True):
+            session.add_trial(onset_ms / MS_PER_S, (onset_ms + duration_ms) / MS_PER_S, stimulus=name)
+        columns = PLACES[positions_mm.shape[1]]
+        for column in columns:
+            session.add_unit_column(column, f"{column[0]} of the receptor on the undeformed skin, in mm")
+        for receptor, place in enumerate(positions_mm.tolist()):
+            trains = [answer.spikes[receptor] for answer in responses.values()]
+            times_ms = [onset + train for onset, train in zip(onsets_ms, trains, strict=True)]
+            session.add_unit(
+                id=receptor,
+                spike_times=np.concatenate(times_ms) / MS_PER_S,
+                **dict(zip(columns, place, strict=True)),
+            )
+        unfinished = Path(folder) / "session.nwb"
+        with pynwb.NWBHDF5IO(str(unfinished), mode="w") as file:
+            file.write(session)
+        write_atomically(Path(path), unfinished.read_bytes())
+    return Path(path)
+
+
+def _places(responses: Mapping[str, ResponseMap], duration_ms: float) -> np.ndarray:
+    """Places of the receptors, after a check that all touches have the same ones. [mm]"""
+    if not responses:
+        raise InputError("responses must hold at least one touch: it is empty.")
+    first = next(iter(responses.values()))
+    for name, response in responses.items():
+        instance(f"responses[{name!r}]", response, ResponseMap)
+        if not np.array_equal(response.positions_mm, first.positions_mm):
+            raise InputError(f"responses must come from the same receptors: those of {name!r} lie elsewhere.")
+        latest_ms = response.spikes.times_ms.max(initial=0.0)
+        if latest_ms > duration_ms:
+            raise InputError(
+                f"duration_ms must reach to the last spike, at {latest_ms:g} ms under {name!r}: got "
+                f"{duration_ms:g} ms."
+            )
+    return first.positions_mm
+
+
+def _pynwb() -> Any:
+    try:
+        import pynwb
+    except ImportError as error:
+        raise InputError("NWB files need pynwb: install the extra, pip install 'fingerpad[nwb]'.") from error
+    return pynwb
