@@ -134,6 +134,10 @@ def test_a_square_layout_has_the_neighbours_of_its_lattice():
     assert_array_equal(pairs, neighbour_pairs(layout.places_mm, layout.pitch_mm, 8))
 
 
+def test_all_three_of_three_are_neighbours():
+    assert delaunay_pairs([[0.0, 0.0], [1.0, 0.2], [0.3, 0.9]], 1.0).tolist() == [[0, 1], [0, 2], [1, 2]]
+
+
 @pytest.mark.parametrize(
     "layout",
     [uniform(DISC, 100.0, 1), jittered(DISC, 100.0, 1), poisson_disc(DISC, 100.0, 1)],

@@ -99,7 +99,9 @@ def test_jitter_has_its_spread_and_none_leaves_the_lattice():
     assert_array_equal(jittered(PAD, 1000.0, seed=5, jitter=0.0).places_mm, square.places_mm)
     strayed = (jittered(PAD, 1000.0, seed=5, jitter=0.3).places_mm - square.places_mm) / square.pitch_mm
     inner = PAD.contains(square.places_mm + np.sign(square.places_mm - PAD.centre_mm))
-    assert kstest(strayed[inner].ravel() / 0.3, "norm").pvalue > 0.01
+    numbers = strayed[inner].ravel() / 0.3
+    assert kstest(numbers, "norm").pvalue > 0.01
+    assert abs(numbers.std() - 1.0) < 4.0 / math.sqrt(2.0 * numbers.size)
 
 
 @pytest.mark.parametrize("separation", [0.4, 0.75, 0.8])

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
+from fingerpad.grading import Grading, resolution_grading
 from fingerpad.mesh import block_mesh, finger_mesh
 from fingerpad.receptor_sheet import ReceptorSheet
 
@@ -163,3 +163,24 @@ def test_straight_down_is_not_along_the_normal(z, proximal, inwards):
     sheet = SHEETS["full"]
     organ = sheet._border(sheet.below(FINGER.skin_point([17.37], [z])))[0][0]
     assert_allclose([17.37 - organ[0], z - organ[2]], [proximal, inwards], rtol=0, atol=0.006)
+
+
+@pytest.mark.parametrize("name", ["full", "half", "coarse"])
+def test_columns_agree_at_the_pole(name):
+    """All around it, however wildly their last elements differ, on the mean of these."""
+    sheet = SHEETS.get(name) or ReceptorSheet(finger_mesh(FINGER, resolution_grading("quick", 17.37)))
+    pole = sheet.mesh.nodes_mm[sheet.mesh.skin_grid[-1, 0]]
+    angles = np.linspace(-np.pi, np.pi, 101)
+    sideways = np.array([0.0, 0.0, 1.0])
+    around = np.outer(np.cos(angles), np.cross(FINGER.skin_normal(pole), sideways))
+    ring = pole + 0.003 * (around + np.outer(np.sin(angles), sideways))
+    values = np.random.default_rng(8).random((1, sheet.mesh.living_epidermis.size))
+    read = sheet.read(sheet.below(ring), values)[0]
+    last = values.reshape(sheet.mesh.living_epidermis.shape)[-1]
+    assert last.std() > 0.2
+    assert_allclose(read, last.mean(), rtol=0, atol=0.02)
+
+
+def test_the_tip_itself_is_skin():
+    tip = np.array([[FINGER.length_mm, 0.0, 0.0]])
+    assert SHEETS["full"].below(tip).shape == (1, 2)

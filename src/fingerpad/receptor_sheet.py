@@ -147,10 +147,15 @@ class ReceptorSheet:
         return uv, missed
 
     def _kept(self, uv: FloatArray) -> FloatArray:
-        """(u, v) on the sheet: back to its rim, or on around."""
+        """(u, v) on the sheet: back to its rim, on around, or through the pole to the other side."""
         (first_u, last_u), (first_v, last_v) = self._limits
-        v = uv[:, 1] % last_v if self._closed else np.clip(uv[:, 1], first_v, last_v)
-        return np.stack([np.clip(uv[:, 0], first_u, last_u), v], axis=1)
+        u, v = uv.T
+        if self._ends_in_pole:
+            beyond, n_around = u > last_u, self.mesh.living_epidermis.shape[1]
+            opposite = v + 0.5 * n_around if self._closed else n_around - 1.0 - v
+            u, v = np.where(beyond, 2.0 * last_u - u, u), np.where(beyond, opposite, v)
+        v = v % last_v if self._closed else np.clip(v, first_v, last_v)
+        return np.stack([np.clip(u, first_u, last_u), v], axis=1)
 
     @cached_property
     def _limits(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -168,10 +173,14 @@ class ReceptorSheet:
 
     def _past_the_rim(self, sites_mm: FloatArray) -> np.ndarray:
         """Whether sites lie beyond the cut, or beside a body that is open to its sides, bool (n,)."""
-        axes = [0] if self._closed or all(self._mirrors) else [0, 2]
-        skin = self.mesh.nodes_mm[self.mesh.skin_nodes][:, axes]
-        beyond = np.maximum(skin.min(axis=0) - sites_mm[:, axes], sites_mm[:, axes] - skin.max(axis=0))
-        return beyond.max(axis=1) > _EXACT_MM
+        skin = self.mesh.nodes_mm[self.mesh.skin_nodes]
+        beyond = skin[:, 0].min() - sites_mm[:, 0]
+        if not self._ends_in_pole:
+            beyond = np.maximum(beyond, sites_mm[:, 0] - skin[:, 0].max())
+        if not (self._closed or all(self._mirrors)):
+            z = sites_mm[:, 2]
+            beyond = np.maximum(beyond, np.maximum(skin[:, 2].min() - z, z - skin[:, 2].max()))
+        return beyond > _EXACT_MM
 
     def _in_mesh(self, sites_mm: FloatArray) -> FloatArray:
         """Sites, mirrored into the half that the mesh holds."""
