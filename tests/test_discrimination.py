@@ -134,11 +134,11 @@ def test_the_varied_criterion_follows_the_printed_steps(moves):
     assert_allclose(rates.hit_rate_sd, [mean_and_sd(rate)[1] for rate in hits], rtol=1e-9)
 
 
-# Of two sets each has one other: were the standard to meet itself, half of its distances would be 0.
-@pytest.mark.parametrize("plan", [SMALL, Experiment(presentations=2, pairs=40, hit_rates=5)])
+# Few sets and many pairs: were a set of the standard to meet itself, a quarter of its distances would be 0.
+@pytest.mark.parametrize("plan", [SMALL, Experiment(presentations=4, pairs=60, hit_rates=8)])
 @pytest.mark.parametrize("norm", ["city-block", "euclidean"])
 def test_euclidean_distance_follows_the_printed_steps(norm, plan):
-    values, sigma, seed = bumps([287.0, 310.0, 330.0]), 0.05, 8
+    values, sigma, seed = bumps([287.0, 292.0, 330.0]), 0.05, 8
     repetitions = []
     for repetition in range(plan.hit_rates):
         trials = [3 * repetition + sphere for sphere in range(3)]
