@@ -490,7 +490,7 @@ def _efficiencies(section: Mapping[str, Any]) -> Table:
     ]
     note = (
         "The share of its trials that the ideal observer would need to judge as well as the code; a dash "
-        "where the ideal observer guesses or never fails."
+        "where the ideal observer nearly guesses or never fails."
     )
     return Table("Efficiency ± standard error", ("reading", *section["stimulus"][1:]), rows, note)
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from fingerpad.checks import FloatArray
 from fingerpad.encoding import distance, gradient_sum
-from fingerpad.errors import InputError
 from fingerpad.noisy_responses import session_trials
 from fingerpad.psychophysics import Presentation, efficiency, multiplied_responses, present
 from fingerpad.psychophysics.ideal_observer import Statistic
@@ -18,6 +18,9 @@ SESSION = 2
 
 TRIALS = 4000
 """Presentations of either stimulus behind one efficiency."""
+
+LEAST_KNOWN = 10.0
+"""How many of its standard errors the ideal observer's d' must have for a share of it to be told."""
 
 SMALLEST_SPREAD = 1.0
 """Noise beside that which multiplies: without it, an afferent that fires nothing would tell a stimulus with
@@ -90,8 +93,8 @@ def efficiencies(
     Returns
     -------
     dict of str to list (n_comparisons,)
-        `d_prime` of the code, `efficiency` and `efficiency_error`; None where the ideal observer guesses or
-        never fails. Empty where nothing is shown.
+        `d_prime` of the code, `efficiency` and `efficiency_error`; None where the ideal observer nearly
+        guesses or never fails. Empty where nothing is shown.
 
     Examples
     --------
@@ -109,10 +112,8 @@ def efficiencies(
     statistic = _statistic(code, table, neighbours, noise_sigma, seed)
     for presentation in shown:
         of_code, of_ideal = presentation.of(statistic), presentation.ideal()
-        try:
-            share, error = efficiency(of_code, of_ideal)
-        except InputError:
-            share, error = None, None
+        known = LEAST_KNOWN * of_ideal.d_prime_error <= of_ideal.d_prime < math.inf
+        share, error = efficiency(of_code, of_ideal) if known else (None, None)
         found["d_prime"].append(of_code.d_prime)
         found["efficiency"].append(share)
         found["efficiency_error"].append(error)

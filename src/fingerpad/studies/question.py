@@ -5,21 +5,9 @@ Each class is a part of the file that `studies.question_file` reads. docs/discri
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    Strict,
-    Tag,
-    ValidationError,
-    WrapValidator,
-)
-from pydantic_core import PydanticCustomError
+from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 
 from fingerpad.discrimination import WAVERING
 from fingerpad.estimation.stimuli import INDENTERS, MOTION, SIZES
@@ -30,6 +18,22 @@ from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.parameters import protocol, psychophysics
 from fingerpad.psychophysics.functions import SIGMOIDS
 from fingerpad.signals import STORED_ENERGY
+from fingerpad.studies.question_types import (
+    Count,
+    NotNegative,
+    Number,
+    Pair,
+    Part,
+    Place,
+    Positive,
+    Seed,
+    Several,
+    Share,
+    Text,
+    as_list,
+    expected,
+    one_of,
+)
 
 IDEAL = "ideal"
 CODES = ("gradient_sum", "euclidean", IDEAL)
@@ -56,72 +60,6 @@ UNITS = SIZES | MOTION | {"spin_deg": "degrees", "tilt_deg": "degrees", "frictio
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
 
 
-def expected(words: str, allowed: Collection[Any] | None = None) -> WrapValidator:
-    """Let a part of a question say in a few words what it must be, whatever is wrong with it.
-
-    Parameters
-    ----------
-    words : str
-        Goes on after "must be".
-    allowed : collection, optional
-        The values that it may have.
-
-    Returns
-    -------
-    WrapValidator
-        For the annotation of a field.
-    """
-
-    def checked(value: Any, handler: Callable[[Any], Any]) -> Any:
-        try:
-            found = handler(value)
-        except ValidationError as error:
-            raise PydanticCustomError("expected", "must be {words}", {"words": words}) from error
-        if allowed is not None and found not in allowed:
-            raise PydanticCustomError("expected", "must be {words}", {"words": words})
-        return found
-
-    return WrapValidator(checked)
-
-
-def _one_of(allowed: Collection[str]) -> WrapValidator:
-    return expected(f"one of {', '.join(allowed)}", allowed)
-
-
-Text = Annotated[str, Field(min_length=1), expected("a text")]
-Number = Annotated[float, Field(allow_inf_nan=False), expected("a finite number")]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), expected("a number greater than 0")]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), expected("a number not below 0")]
-Share = Annotated[float, Field(ge=0, le=1), expected("a number within 0 ... 1")]
-Seed = Annotated[int, Field(ge=0), expected("a whole number of at least 0")]
-Count = Annotated[int, Field(ge=1), expected("a whole number of at least 1")]
-Several = Annotated[int, Field(ge=2), expected("a whole number of at least 2")]
-Pair = Annotated[
-    tuple[Number, ...], Strict(False), Field(min_length=2, max_length=2), expected("a pair of numbers")
-]
-Place = Annotated[float | str, Field(union_mode="left_to_right"), expected("a number or a name")]
-
-
-def _as_list(value: Any) -> Any:
-    """Let one stand for a list of one."""
-    return [value] if isinstance(value, str) else value
-
-
-class Part(BaseModel):
-    """What all parts share: unknown keys are refused, nothing is converted, nothing changes."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-    @property
-    def given(self) -> dict[str, Any]:
-        """What the file says itself, without defaults."""
-        return self.chosen(*type(self).model_fields)
-
-    def chosen(self, *names: str) -> dict[str, Any]:
-        """Those of the names that the file gives, with their values."""
-        return {name: getattr(self, name) for name in names if name in self.model_fields_set}
-
-
 class SkinSettings(Part):
     """The finger that is pressed.
 
@@ -136,8 +74,8 @@ class SkinSettings(Part):
         it, as far as the indenters need. [mm]
     """
 
-    materials: Annotated[str, _one_of(TISSUES)] = "trial3"
-    resolution: Annotated[str, _one_of(RESOLUTIONS)] = "standard"
+    materials: Annotated[str, one_of(TISSUES)] = "trial3"
+    resolution: Annotated[str, one_of(RESOLUTIONS)] = "standard"
     reach_mm: Positive | None = None
 
 
@@ -171,7 +109,7 @@ class StimulusSettings(Part):
 
     name: Text | None = None
     level: Number | None = None
-    indenter: Annotated[str, _one_of(INDENTERS)] | None = None
+    indenter: Annotated[str, one_of(INDENTERS)] | None = None
     curvature_per_m: Positive | None = None
     diameter_mm: Positive | None = None
     width_mm: Positive | None = None
@@ -205,7 +143,7 @@ class VariedStimuli(Part):
         One per stimulus. [unit of what varies]
     """
 
-    vary: Annotated[str, _one_of(VARIABLE)]
+    vary: Annotated[str, one_of(VARIABLE)]
     values: Annotated[tuple[Number, ...], Strict(False)]
 
 
@@ -222,7 +160,7 @@ class RegionSettings(Part):
         Of a polygon: along the finger, distal positive, and across, from the middle of the pad. [mm]
     """
 
-    shape: Annotated[str, _one_of(SHAPES)]
+    shape: Annotated[str, one_of(SHAPES)]
     length_mm: Positive | None = None
     width_mm: Positive | None = None
     corners_mm: Annotated[tuple[Pair, ...], Strict(False)] | None = None
@@ -254,7 +192,7 @@ class PopulationSettings(Part):
         How much afferents differ in their gains, as of `fingerpad.population.sensitivities`.
     """
 
-    layout: Annotated[str, _one_of(LAYOUTS)] = GRID
+    layout: Annotated[str, one_of(LAYOUTS)] = GRID
     density_per_cm2: Positive = psychophysics.RECEPTOR_DENSITY.value
     rows: Count | None = None
     columns: Count | None = None
@@ -286,7 +224,7 @@ class AfferentSettings(Part):
     capacitance_mf: Positive | None = None
     threshold_mv: Positive | None = None
     refractory_ms: NotNegative | None = None
-    dynamic_quantity: Annotated[str, _one_of(QUANTITIES)] = STORED_ENERGY
+    dynamic_quantity: Annotated[str, one_of(QUANTITIES)] = STORED_ENERGY
 
 
 class WindowSettings(Part):
@@ -331,7 +269,7 @@ class ExperimentSettings(Part):
     seed: Seed = 0
     criterion: Share = psychophysics.DECISION_CRITERION.value
     criterion_sigma: NotNegative = 0.0
-    criterion_moves: Annotated[str, _one_of(WAVERING)] = WAVERING[0]
+    criterion_moves: Annotated[str, one_of(WAVERING)] = WAVERING[0]
     presentations: Several = _REPETITIONS
     distributions: Several = _REPETITIONS
     pairs: Several = _REPETITIONS
@@ -353,9 +291,9 @@ class CurveSettings(Part):
         Where the threshold is read. [0-1]
     """
 
-    sigmoid: Annotated[str, _one_of(SIGMOIDS)] = "weibull"
+    sigmoid: Annotated[str, one_of(SIGMOIDS)] = "weibull"
     lapse: Annotated[
-        Annotated[float, Field(ge=0, lt=0.5)] | Annotated[str, _one_of((FREE,))],
+        Annotated[float, Field(ge=0, lt=0.5)] | Annotated[str, one_of((FREE,))],
         expected(f"a number within 0 ... 0.5, or {FREE}"),
     ] = 0.0
     proportion: Annotated[float, Field(gt=0.5, lt=1.0), expected("a number between 0.5 and 1")] = 0.75
@@ -449,20 +387,20 @@ class Question(Part):
         Discriminator(lambda value: NAMED if isinstance(value, str) else SPELLED),
     ] = DEFAULT
     code: Annotated[
-        tuple[Annotated[str, _one_of(CODES)], ...],
+        tuple[Annotated[str, one_of(CODES)], ...],
         Strict(False),
         Field(min_length=1),
-        BeforeValidator(_as_list),
+        BeforeValidator(as_list),
     ] = ("gradient_sum",)
     measure: Annotated[
-        tuple[Annotated[str, _one_of(MEASURES)], ...],
+        tuple[Annotated[str, one_of(MEASURES)], ...],
         Strict(False),
         Field(min_length=1),
-        BeforeValidator(_as_list),
+        BeforeValidator(as_list),
     ] = ("static",)
     windows_ms: WindowSettings = WindowSettings()
     noise: Annotated[
-        NotNegative | Annotated[str, _one_of((FITTED,))], expected(f"a number not below 0, or {FITTED}")
+        NotNegative | Annotated[str, one_of((FITTED,))], expected(f"a number not below 0, or {FITTED}")
     ]
     experiment: ExperimentSettings = ExperimentSettings()
     curve: CurveSettings = CurveSettings()
