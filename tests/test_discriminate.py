@@ -389,7 +389,12 @@ def test_the_same_seed_gives_the_same_numbers_and_another_others():
         )
 
 
-def test_a_ready_made_question_is_asked_by_name_or_made_ones_own(call, tmp_path):
+def test_a_ready_made_question_is_asked_by_name_or_made_ones_own(call, tmp_path, answered, monkeypatch):
+    monkeypatch.setattr(
+        study,
+        "result",
+        lambda asked, skins: answered | {"question": asked.question.question, "skins": list(skins)},
+    )
     status, said, _ = call("--list")
     assert status == 0
     assert [line.split(":")[0] for line in said.splitlines()] == list(ready_made())
@@ -403,6 +408,7 @@ def test_a_ready_made_question_is_asked_by_name_or_made_ones_own(call, tmp_path)
         json.loads((tmp_path / folder / "discriminate.json").read_text()) for folder in ("named", "own")
     )
     assert named["discrimination"] == own["discrimination"]
+    assert named["discrimination"]["skins"] == ["287", "296", "305", "316", "328", "340", "365"]
     assert named["manifest"]["inputs"][0]["sha256"] == own["manifest"]["inputs"][0]["sha256"]
     assert named["manifest"]["resolution"] == "quick"
 
