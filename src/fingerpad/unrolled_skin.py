@@ -278,14 +278,14 @@ class UnrolledSkin:
 
     def _phi(self, s: FloatArray, around: FloatArray) -> FloatArray:
         """Angle at which `around` takes its value."""
-        volar, dorsal = self._quarters(s)
-        start, side = np.zeros_like(around), np.full_like(around, _HALF)
-        area, on_volar = around * self._midline_slope(s), volar.area(start, side)
-        return np.where(
-            area <= on_volar,
-            volar.reached(start, np.minimum(area, on_volar)),
-            dorsal.reached(side, np.maximum(area - on_volar, 0.0)),
-        )
+        volar, _ = self._quarters(s)
+        start = np.zeros_like(around)
+        area, on_volar = around * self._midline_slope(s), volar.area(start, start + _HALF)
+        phi = np.empty_like(around)
+        for part, before, first in ((area <= on_volar, start, 0), (area > on_volar, on_volar, 1)):
+            quarter = self._quarters(s[part])[first]
+            phi[part] = quarter.reached(start[part] + first * _HALF, (area - before)[part])
+        return phi
 
     @cached_property
     def _midline(self) -> tuple[CubicSpline, CubicSpline, float]:
