@@ -58,6 +58,25 @@ REPETITIONS_VARIED_CRITERION = Published(
     "gradient sums per sphere when the criterion varies", 5000.0, "1", _PAPER, "paper"
 )
 
+_GOODWIN_THRESHOLDS = "Goodwin, John & Marceglia 1991, abstract"
+THRESHOLD_STANDARDS = Published(
+    "standards of the curvature thresholds", (144.0, 287.0), "1/m", _GOODWIN_THRESHOLDS, "recalled"
+)
+THRESHOLD_COMPARISONS = Published(
+    "spheres told from these standards in 75 % of trials",
+    (158.0, 319.0),
+    "1/m",
+    _GOODWIN_THRESHOLDS,
+    "recalled",
+)
+WEBER_FRACTIONS = Published(
+    "range of the Weber fractions of curvature under a still finger",
+    (0.10, 0.14),
+    "1",
+    "Goodwin, John & Marceglia 1991 and later studies of passive touch",
+    "recalled",
+)
+
 RECEPTOR_DENSITY = Published(
     "density of SAI receptors", 100.0, "1/cm2", "Gerling et al. 2014, section 2.1.4", "paper"
 )

@@ -1,0 +1,202 @@
+"""Level 3, beyond the paper: curvature thresholds from standard to standard, and how good each code is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fingerpad.report.appearance import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, new_figure, numbers
+from fingerpad.report.tables import Row, Table
+from fingerpad.report.words import UNBROKEN, fixed, number
+
+PER_CENT = 100.0
+CHANCE = 50.0
+STYLES: tuple[dict[str, Any], ...] = (
+    {"color": BLACK, "linestyle": "-", "marker": "o"},
+    {"color": BLUE, "linestyle": "--", "marker": "s"},
+    {"color": ORANGE, "linestyle": "-.", "marker": "^"},
+    {"color": GREEN, "linestyle": ":", "marker": "v"},
+)
+
+
+def draw(section: Mapping[str, Any]) -> Figure:
+    """Draw Weber fractions by standard, and the curves behind them.
+
+    Parameters
+    ----------
+    section : mapping
+        `results["curvature_thresholds"]`.
+
+    Returns
+    -------
+    Figure
+    """
+    figure = new_figure(11.0, 4.6)
+    fractions, curves = figure.subplots(1, 2)
+    _fractions(fractions, section)
+    _curves(curves, section)
+    return figure
+
+
+def _fractions(axes: Axes, section: Mapping[str, Any]) -> None:
+    people, standards = section["literature"], section["standards"]
+    low, high = PER_CENT * numbers(people["weber_fractions"])
+    axes.axhspan(low, high, color=PALE, label=f"people, as reported: {low:.0f}-{high:.0f} %")
+    at = numbers([entry["standard_per_m"] for entry in standards])
+    fitted = PER_CENT * numbers([entry["fitted_weber_fraction"] for entry in standards])
+    interval = PER_CENT * numbers([entry["fitted_interval"] for entry in standards]).T
+    lengths = np.abs(interval - fitted)
+    ours = PER_CENT * numbers([entry["weber_fraction"] for entry in standards])
+    best = PER_CENT * numbers([entry["ideal_weber_fraction"] for entry in standards])
+    axes.errorbar(
+        at,
+        fitted,
+        yerr=lengths,
+        color=BLUE,
+        marker="s",
+        linestyle="none",
+        capsize=3.0,
+        markersize=5.0,
+        label=f"Gradient Sum, {number(section['judgements'])} judgements a sphere, 95 %",
+    )
+    axes.plot(at, ours, color=BLUE, label="Gradient Sum of static rates")
+    axes.plot(at, best, color=GREY, linestyle="--", marker=".", label="ideal observer of the same rates")
+    standard, comparison = numbers(people["standard_per_m"]), numbers(people["comparison_per_m"])
+    axes.plot(
+        standard,
+        PER_CENT * (comparison / standard - 1.0),
+        "D",
+        color=BLACK,
+        markerfacecolor="none",
+        markeredgewidth=1.6,
+        markersize=7.5,
+        zorder=5,
+        label="people (Goodwin et al. 1991)",
+    )
+    axes.set_title("(a) least difference told apart")
+    axes.set_xlabel("curvature of the standard [1/m]")
+    axes.set_ylabel("Weber fraction at 75 % [%]")
+    axes.set_ylim(bottom=0.0)
+    axes.legend(loc="upper right", fontsize=8.0)
+    lowest, highest = axes.get_ylim()
+    axes.set_ylim(lowest, highest * 1.35)  # room for the legend above the points
+
+
+def _curves(axes: Axes, section: Mapping[str, Any]) -> None:
+    axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)))
+    axes.axhline(PER_CENT * section["proportion"], color=GREY, linewidth=0.8)
+    for entry, style in zip(section["standards"], _cycled(len(section["standards"])), strict=True):
+        curve = entry["curve"]
+        axes.plot(
+            PER_CENT * numbers(curve["step"]),
+            PER_CENT * numbers(curve["hit_rate"]),
+            color=style["color"],
+            linestyle=style["linestyle"],
+        )
+        axes.plot(
+            PER_CENT * numbers(entry["step"]),
+            PER_CENT * numbers(entry["hit_rate"]),
+            color=style["color"],
+            marker=style["marker"],
+            linestyle=style["linestyle"],
+            linewidth=0.0,
+            markersize=5.0,
+        )
+        # The legend shows line and marker together.
+        axes.plot([], [], label=f"{number(entry['standard_per_m'])} 1/m", markersize=5.0, **style)
+    axes.set_title("(b) hit rates of the Gradient Sum and Weibull functions")
+    axes.set_xlabel("comparison above the standard [%]")
+    axes.set_ylabel("told from the standard [% of trials]")
+    axes.set_ylim(45.0, 102.0)
+    axes.legend(title="standard", loc="lower right")
+
+
+def _cycled(count: int) -> list[dict[str, Any]]:
+    return [STYLES[index % len(STYLES)] for index in range(count)]
+
+
+def caption(section: Mapping[str, Any]) -> str:
+    """Say what the figure shows, and how far to trust it."""
+    errors = [abs(entry["error_per_m"]) for entry in section["interpolation"]]
+    foretold = (
+        " Spheres of the paper, left out and foretold from the others, are met within "
+        f"{number(max(errors), 2)} 1/m."
+        if errors
+        else ""
+    )
+    return (
+        "(a) How much more curved a sphere must be to be told from a standard in 75 % of trials, as a share "
+        "of the standard: by the Gradient Sum of static rates with the noise that fits people at 287 1/m "
+        f"(line), in an experiment with {number(section['judgements'])} judgements of each comparison "
+        "(squares, with the 95 % interval of its threshold), by the ideal observer of the same noisy rates "
+        "(dashed), and by people (diamonds; recalled, not read in the original). (b) The hit rates of that "
+        "experiment and the psychometric functions through them. Rates are interpolated between "
+        f"{len(section['pressed_per_m'])} pressed spheres.{foretold}"
+    )
+
+
+def tables(section: Mapping[str, Any]) -> list[Table]:
+    """Return thresholds by standard, and efficiencies by code."""
+    thresholds = [
+        Row(
+            (
+                number(entry["standard_per_m"]),
+                fixed(entry["jnd_per_m"], 1),
+                _per_cent(entry["weber_fraction"]),
+                f"{_per_cent(entry['fitted_weber_fraction'])} "
+                f"({_per_cent(entry['fitted_interval'][0])} to {_per_cent(entry['fitted_interval'][1])})",
+                fixed(entry["fit_p_value"], 2),
+                _per_cent(entry["ideal_weber_fraction"]),
+            )
+        )
+        for entry in section["standards"]
+    ]
+    codes = [
+        Row(
+            (
+                row["code"],
+                row["measure"],
+                row["noise"],
+                number(row["receptors"]),
+                _with_error(row["d_prime"], row["d_prime_error"]),
+                _with_error(row["ideal_d_prime"], row["ideal_d_prime_error"]),
+                _with_error(row["efficiency"], row["efficiency_error"]),
+            )
+        )
+        for row in section["efficiency"]
+    ]
+    return [
+        Table(
+            "Curvature thresholds",
+            (
+                "standard [1/m]",
+                "JND [1/m]",
+                "Weber fraction",
+                "of an experiment, 95 %",
+                "p of its fit",
+                "ideal observer",
+            ),
+            thresholds,
+        ),
+        Table(
+            "How good the codes are",
+            ("code", "measure", "noise", "receptors", "d-prime", "that of the ideal observer", "efficiency"),
+            codes,
+            "Spheres of 287 and 316 1/m. Efficiency is the squared ratio of the two: the share of trials in "
+            "which the ideal observer, who knows how responses vary, would judge as well. Receptors that are "
+            "silent under one of the spheres are left out. The last rows take the spikes of the hold for "
+            "Poisson processes, without other noise.",
+        ),
+    ]
+
+
+def _per_cent(share: float | None) -> str:
+    return fixed(None if share is None else PER_CENT * share, 1) + f"{UNBROKEN}%"
+
+
+def _with_error(value: float | None, error: float | None) -> str:
+    return f"{fixed(value, 2)}{UNBROKEN}±{UNBROKEN}{fixed(error, 2)}"
