@@ -6,6 +6,7 @@ from fingerpad.psychophysics.goodness_of_fit import GoodnessOfFit, goodness_of_f
 from fingerpad.psychophysics.ideal_observer import (
     Discriminability,
     Presentation,
+    Statistic,
     discriminability,
     efficiency,
     gaussian_information,
@@ -48,6 +49,7 @@ __all__ = [
     "PsychometricFunction",
     "ResponseModel",
     "Sensitivity",
+    "Statistic",
     "bootstrap",
     "d_prime_of_answers",
     "d_prime_of_populations",

@@ -10,11 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.report.appearance import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, new_figure, numbers
-from fingerpad.report.tables import Row, Table
-from fingerpad.report.words import UNBROKEN, fixed, number
+from fingerpad.report.tables import UNBROKEN, Row, Table
+from fingerpad.report.words import fixed, number
 
 PER_CENT = 100.0
 CHANCE = 50.0
+_TOP = 45.0
+"""End of the axis of Weber fractions: an interval that no comparison bounds runs out of it. [%]"""
+
 STYLES: tuple[dict[str, Any], ...] = (
     {"color": BLACK, "linestyle": "-", "marker": "o"},
     {"color": BLUE, "linestyle": "--", "marker": "s"},
@@ -43,28 +46,24 @@ def draw(section: Mapping[str, Any]) -> Figure:
 
 
 def _fractions(axes: Axes, section: Mapping[str, Any]) -> None:
-    people, standards = section["literature"], section["standards"]
+    people, paper = section["literature"], section["populations"][0]
     low, high = PER_CENT * numbers(people["weber_fractions"])
     axes.axhspan(low, high, color=PALE, label=f"people, as reported: {low:.0f}-{high:.0f} %")
-    at = numbers([entry["standard_per_m"] for entry in standards])
-    fitted = PER_CENT * numbers([entry["fitted_weber_fraction"] for entry in standards])
-    interval = PER_CENT * numbers([entry["fitted_interval"] for entry in standards]).T
-    lengths = np.abs(interval - fitted)
-    ours = PER_CENT * numbers([entry["weber_fraction"] for entry in standards])
-    best = PER_CENT * numbers([entry["ideal_weber_fraction"] for entry in standards])
-    axes.errorbar(
-        at,
-        fitted,
-        yerr=lengths,
-        color=BLUE,
-        marker="s",
-        linestyle="none",
-        capsize=3.0,
-        markersize=5.0,
-        label=f"Gradient Sum, {number(section['judgements'])} judgements a sphere, 95 %",
-    )
-    axes.plot(at, ours, color=BLUE, label="Gradient Sum of static rates")
-    axes.plot(at, best, color=GREY, linestyle="--", marker=".", label="ideal observer of the same rates")
+    for population, style in zip(section["populations"], STYLES[1:], strict=False):
+        axes.plot(
+            numbers([entry["standard_per_m"] for entry in population["standards"]]),
+            PER_CENT * numbers([entry["weber_fraction"] for entry in population["standards"]]),
+            label=f"Gradient Sum, {population['rows']} by {population['columns']} receptors",
+            markersize=4.0,
+            **style,
+        )
+    at = numbers([entry["standard_per_m"] for entry in paper["standards"]])
+    fitted = PER_CENT * numbers([entry["fitted_weber_fraction"] for entry in paper["standards"]])
+    interval = PER_CENT * numbers([entry["fitted_interval"] for entry in paper["standards"]]).reshape(-1, 2).T
+    axes.errorbar(at, fitted, yerr=np.abs(interval - fitted), color=BLUE, linestyle="none", capsize=3.0)
+    best = PER_CENT * numbers([entry["ideal_weber_fraction"] for entry in paper["standards"]])
+    label = f"ideal observer, {paper['rows']} by {paper['columns']} receptors"
+    axes.plot(at, best, color=GREY, linestyle=(0, (5, 2)), marker=".", label=label)
     standard, comparison = numbers(people["standard_per_m"]), numbers(people["comparison_per_m"])
     axes.plot(
         standard,
@@ -80,16 +79,15 @@ def _fractions(axes: Axes, section: Mapping[str, Any]) -> None:
     axes.set_title("(a) least difference told apart")
     axes.set_xlabel("curvature of the standard [1/m]")
     axes.set_ylabel("Weber fraction at 75 % [%]")
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, _TOP)
     axes.legend(loc="upper right", fontsize=8.0)
-    lowest, highest = axes.get_ylim()
-    axes.set_ylim(lowest, highest * 1.35)  # room for the legend above the points
 
 
 def _curves(axes: Axes, section: Mapping[str, Any]) -> None:
+    standards = section["populations"][0]["standards"]
     axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)))
     axes.axhline(PER_CENT * section["proportion"], color=GREY, linewidth=0.8)
-    for entry, style in zip(section["standards"], _cycled(len(section["standards"])), strict=True):
+    for entry, style in zip(standards, _cycled(len(standards)), strict=True):
         curve = entry["curve"]
         axes.plot(
             PER_CENT * numbers(curve["step"]),
@@ -112,7 +110,7 @@ def _curves(axes: Axes, section: Mapping[str, Any]) -> None:
     axes.set_xlabel("comparison above the standard [%]")
     axes.set_ylabel("told from the standard [% of trials]")
     axes.set_ylim(45.0, 102.0)
-    axes.legend(title="standard", loc="lower right")
+    axes.legend(title="standard", loc="upper left")
 
 
 def _cycled(count: int) -> list[dict[str, Any]]:
@@ -130,11 +128,12 @@ def caption(section: Mapping[str, Any]) -> str:
     )
     return (
         "(a) How much more curved a sphere must be to be told from a standard in 75 % of trials, as a share "
-        "of the standard: by the Gradient Sum of static rates with the noise that fits people at 287 1/m "
-        f"(line), in an experiment with {number(section['judgements'])} judgements of each comparison "
-        "(squares, with the 95 % interval of its threshold), by the ideal observer of the same noisy rates "
-        "(dashed), and by people (diamonds; recalled, not read in the original). (b) The hit rates of that "
-        "experiment and the psychometric functions through them. Rates are interpolated between "
+        "of the standard: by the Gradient Sum of static rates of two populations, each with the noise that "
+        "fits people at 287 1/m; by the ideal observer of the same rates (dashed); by people "
+        "(diamonds; recalled, not read in the original). Bars: the 95 % interval of an experiment with "
+        f"{number(section['judgements'])} judgements of each comparison. (b) The hit rates of that "
+        "experiment and the psychometric functions through them, first population. Rates are interpolated "
+        "between "
         f"{len(section['pressed_per_m'])} pressed spheres.{foretold}"
     )
 
@@ -144,16 +143,21 @@ def tables(section: Mapping[str, Any]) -> list[Table]:
     thresholds = [
         Row(
             (
+                f"{population['rows']} by {population['columns']}",
+                fixed(population["noise_sigma"], 3),
                 number(entry["standard_per_m"]),
                 fixed(entry["jnd_per_m"], 1),
                 _per_cent(entry["weber_fraction"]),
                 f"{_per_cent(entry['fitted_weber_fraction'])} "
                 f"({_per_cent(entry['fitted_interval'][0])} to {_per_cent(entry['fitted_interval'][1])})",
-                fixed(entry["fit_p_value"], 2),
                 _per_cent(entry["ideal_weber_fraction"]),
             )
         )
-        for entry in section["standards"]
+        for population in section["populations"]
+        for entry in population["standards"]
+    ]
+    missed = [
+        entry["why_not"] for population in section["populations"] for entry in population["without_threshold"]
     ]
     codes = [
         Row(
@@ -173,14 +177,16 @@ def tables(section: Mapping[str, Any]) -> list[Table]:
         Table(
             "Curvature thresholds",
             (
+                "receptors",
+                "noise",
                 "standard [1/m]",
                 "JND [1/m]",
                 "Weber fraction",
                 "of an experiment, 95 %",
-                "p of its fit",
                 "ideal observer",
             ),
             thresholds,
+            " ".join(missed),
         ),
         Table(
             "How good the codes are",

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from fingerpad.errors import InputError
 from fingerpad.files import write_atomically
 from fingerpad.report import (
+    curvature_thresholds,
     discrimination,
     drive_quantities,
     nail,
@@ -178,6 +179,20 @@ CHAPTERS = (
         lambda section: tables.hit_rates(section) + tables.readings(section),
     ),
     Chapter("mesh_noise", "Level 3: noise of the mesh", (), tables.mesh_noise),
+    Chapter(
+        "curvature_thresholds",
+        "Level 3: thresholds and efficiency",
+        (
+            Drawing(
+                16,
+                "figure_16_curvature_thresholds",
+                "Least difference of curvature",
+                curvature_thresholds.draw,
+                curvature_thresholds.caption,
+            ),
+        ),
+        curvature_thresholds.tables,
+    ),
     Chapter(
         "nail",
         "The border of the nail",

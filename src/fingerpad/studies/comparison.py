@@ -8,6 +8,7 @@ from typing import Any
 from fingerpad.parameters import paper
 from fingerpad.parameters.published import Published
 from fingerpad.studies.claim_row import MATERIALS, claim_row, measured_row
+from fingerpad.studies.curvature_thresholds import weber_rows
 from fingerpad.studies.percept_claims import mesh_noise_rows, percept_rows
 
 LEAST_R2 = 0.93
@@ -33,6 +34,7 @@ def comparison(results: Mapping[str, Any]) -> list[dict[str, Any]]:
         *_single_unit(results["single_unit"]),
         *percept_rows(results["discrimination"]),
         *mesh_noise_rows(results.get("mesh_noise")),
+        *weber_rows(results.get("curvature_thresholds")),
         *_nail(results["nail"]),
     ]
 

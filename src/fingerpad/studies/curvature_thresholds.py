@@ -9,7 +9,8 @@ curvature (monotone cubic), so that any sphere can be a standard or a comparison
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,20 +20,20 @@ from scipy.optimize import brentq
 from fingerpad.afferent import Afferent
 from fingerpad.checks import FloatArray
 from fingerpad.encoding import distance, gradient_sum, neighbour_pairs
-from fingerpad.errors import ConvergenceError
+from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.indenters import Sphere
-from fingerpad.noise_fit import expected_hit_rates
+from fingerpad.noise_fit import expected_hit_rates, fit_noise_sigma
 from fingerpad.parameters import protocol, psychophysics
 from fingerpad.population import Population
 from fingerpad.psychophysics import (
     PoissonResponses,
     Presentation,
     ResponseModel,
+    Statistic,
     d_prime_of_proportion,
     efficiency,
     fit_psychometric,
     gaussian_information,
-    goodness_of_fit,
     multiplied_responses,
     posterior,
     present,
@@ -40,19 +41,24 @@ from fingerpad.psychophysics import (
 )
 from fingerpad.random_streams import Purpose, normals
 from fingerpad.sampling import SkinResponse
+from fingerpad.studies.claim_row import MATERIALS, ClaimRow, claim_row
 from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions, Touch
-from fingerpad.studies.sphere_discrimination import MEASURES, NOISE_DRAWS
+from fingerpad.studies.sphere_discrimination import NOISE_DRAWS, RESPONSES
 
 STANDARDS_PER_M = (144.0, 200.0, 287.0, 400.0)
-PRESSED_PER_M = (144.0, 165.0, 190.0, 218.0, 250.0, 400.0, 445.0, 495.0)
+PRESSED_PER_M = (144.0, 165.0, 190.0, 218.0, 250.0, 400.0, 445.0, 540.0)
 """Beside the paper's spheres: they reach from the least standard to beyond what the greatest is told from."""
+
+LAYOUTS = {"paper": (3, 6), "square": (6, 6)}
+"""Receptors along the finger and across: the paper's 18, and as many along as across, which see all sides of
+a sphere that is flat and touches more skin."""
 
 STEPS = (0.03, 0.06, 0.09, 0.12, 0.16, 0.21)
 """Comparisons of an experiment: how much more curved than the standard, as a share of it."""
 
 PROPORTION = 0.75
-JUDGEMENTS = 100
-"""Per comparison of an experiment; those of people are not known."""
+JUDGEMENTS = int(psychophysics.GOODWIN_TRIALS.value)
+"""Per comparison of an experiment."""
 
 LEFT_OUT_PER_M = (296.0, 305.0, 316.0, 328.0, 340.0)
 """Spheres that are also foretold from the others, to see what interpolation is worth."""
@@ -63,17 +69,23 @@ EFFICIENCY_PAIR_PER_M = (287.0, 316.0)
 TRIALS = 4000
 """Presentations of each sphere to the observers whose efficiency is measured."""
 
+MS_PER_S = 1000.0
 SESSION, REFERENCE_SESSION = 11, 12
 """Of the random numbers; other studies have others."""
 
 
 def touches(conditions: Conditions) -> dict[float, Touch]:
-    """Spheres that the paper does not have, pressed like its own at 0.0 mm; keys are curvatures."""
+    """Spheres that the paper does not have; keys are curvatures. [1/m]"""
+    return sphere_touches(conditions, PRESSED_PER_M)
+
+
+def sphere_touches(conditions: Conditions, curvatures_per_m: Sequence[float]) -> dict[float, Touch]:
+    """Spheres pressed like the paper's own at 0.0 mm; keys are curvatures. [1/m]"""
     return {
         curvature: conditions.touch(
             Sphere(curvature), RECEPTOR_X_MM, conditions.sphere_grading(), tilt_deg=conditions.skin_tilt_deg
         )
-        for curvature in PRESSED_PER_M
+        for curvature in curvatures_per_m
     }
 
 
@@ -98,22 +110,21 @@ def result(
     dict
         Plain numbers, units in the names.
     """
-    population = Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0))
     curvatures = np.array(sorted(responses))
-    answers = [population.respond(responses[curvature]) for curvature in curvatures.tolist()]
-    tables = {name: np.array([measure(answer) for answer in answers]) for name, measure in MEASURES.items()}
+    populations = [
+        _thresholds_of(name, responses, curvatures, afferent, noise_sigma if name == "paper" else None, seed)
+        for name in LAYOUTS
+    ]
+    population = _population("paper", afferent)
     neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
-    draws = normals(seed, 1, len(population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
-    rates = interpolated(curvatures, tables["static"])
-    observer = Observer(rates, neighbours, noise_sigma, draws)
-    thresholds = [threshold_at(observer, standard, seed) for standard in STANDARDS_PER_M]
+    answers = [population.respond(responses[curvature]) for curvature in curvatures.tolist()]
+    tables = {name: np.array([read(answer) for answer in answers]) for name, read in RESPONSES.items()}
     return {
         "seed": seed,
-        "noise_sigma": noise_sigma,
         "proportion": PROPORTION,
         "judgements": JUDGEMENTS,
         "pressed_per_m": curvatures,
-        "standards": thresholds,
+        "populations": populations,
         "literature": {
             "standard_per_m": psychophysics.THRESHOLD_STANDARDS.value,
             "comparison_per_m": psychophysics.THRESHOLD_COMPARISONS.value,
@@ -122,6 +133,73 @@ def result(
         "interpolation": interpolation_errors(curvatures, tables["static"], neighbours),
         "efficiency": efficiencies(curvatures, tables, neighbours, noise_sigma, seed),
     }
+
+
+def _population(name: str, afferent: Afferent) -> Population:
+    rows, columns = LAYOUTS[name]
+    return Population.grid(rows=rows, columns=columns, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=afferent)
+
+
+def _thresholds_of(
+    name: str,
+    responses: Mapping[float, SkinResponse],
+    curvatures: FloatArray,
+    afferent: Afferent,
+    noise_sigma: float | None,
+    seed: int,
+) -> dict[str, Any]:
+    """Thresholds of one population at every standard; its noise is fitted to people unless it is given."""
+    population = _population(name, afferent)
+    neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
+    static = np.array([population.respond(responses[c]).static_rate_hz for c in curvatures.tolist()])
+    draws = normals(seed, 1, len(population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
+    if noise_sigma is None:
+        spheres = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
+        table = static[[int(np.flatnonzero(curvatures == sphere)[0]) for sphere in spheres]]
+        noise_sigma = fit_noise_sigma(
+            lambda sigma: expected_hit_rates(table, neighbours, sigma, draws)
+        ).noise_sigma
+    observer = Observer(interpolated(curvatures, static), neighbours, noise_sigma, draws)
+    found: list[dict[str, Any]] = []
+    missed: list[dict[str, Any]] = []
+    for standard in STANDARDS_PER_M:
+        try:
+            found.append(threshold_at(observer, standard))
+        except ConvergenceError as error:
+            missed.append({"standard_per_m": standard, "why_not": str(error).splitlines()[0]})
+    return {
+        "layout": name,
+        "rows": LAYOUTS[name][0],
+        "columns": LAYOUTS[name][1],
+        "noise_sigma": noise_sigma,
+        "gradient_sum": gradient_sum(static, neighbours),
+        "standards": found,
+        "without_threshold": missed,
+    }
+
+
+def weber_rows(section: Mapping[str, Any] | None) -> list[ClaimRow]:
+    """Hold Weber fractions beside people's, a row per population; none where nothing was pressed."""
+    if not section:
+        return []
+    low, high = section["literature"]["weber_fractions"]
+    rows = []
+    for population in section["populations"]:
+        found = [entry["weber_fraction"] for entry in population["standards"]]
+        at = ", ".join(f"{entry['standard_per_m']:g}" for entry in population["standards"])
+        missed = [entry["why_not"] for entry in population["without_threshold"]]
+        rows.append(
+            claim_row(
+                f"Curvature told apart in 75 %, {population['rows']} by {population['columns']} receptors",
+                f"people: {low:.0%} to {high:.0%} of the standard",
+                ", ".join(f"{fraction:.1%}" for fraction in found),
+                "",
+                MATERIALS + "; people's fractions recalled",
+                bool(found) and not missed and all(low <= round(share, 2) <= high for share in found),
+                "; ".join([f"static Gradient Sum, standards {at} /m; judged in whole per cent", *missed]),
+            )
+        )
+    return rows
 
 
 def interpolated(curvature_per_m: FloatArray, table: FloatArray) -> PchipInterpolator:
@@ -163,7 +241,7 @@ class Observer:
         return float(expected_hit_rates(pair, self.neighbours, self.noise_sigma, self.draws)[0])
 
 
-def threshold_at(observer: Observer, standard_per_m: float, seed: int) -> dict[str, Any]:
+def threshold_at(observer: Observer, standard_per_m: float) -> dict[str, Any]:
     """Just noticeable difference at a standard, and what an experiment would find there.
 
     Parameters
@@ -172,15 +250,13 @@ def threshold_at(observer: Observer, standard_per_m: float, seed: int) -> dict[s
         Who judges.
     standard_per_m : float
         Curvature of the standard. [1/m]
-    seed : int
-        Of the goodness of fit.
 
     Returns
     -------
     dict
-        The model's own threshold, and threshold, interval and goodness of fit of a psychometric function of
-        the difference (Weibull's) through the counts of an experiment. The ideal observer's threshold is that
-        of Fisher's information.
+        The model's own threshold, and threshold and interval of a psychometric function of the difference
+        (Weibull's) through the counts of an experiment. The ideal observer's threshold is that of Fisher's
+        information.
 
     Raises
     ------
@@ -218,7 +294,6 @@ def threshold_at(observer: Observer, standard_per_m: float, seed: int) -> dict[s
         "hit_rate": hit_rate,
         "fitted_weber_fraction": fit.threshold(PROPORTION),
         "fitted_interval": posterior(fit).threshold_interval(PROPORTION),
-        "fit_p_value": goodness_of_fit(fit, seed, 400).p_value,
         "curve": {"step": at, "hit_rate": fit.predict(at)},
     }
 
@@ -293,37 +368,47 @@ def efficiencies(
     found = []
     for measure, table in tables.items():
         standard, comparison = table[rows]
+        # A latency of NaN, as of a silent receptor, is not above 0 either.
         heard = (standard > 0.0) & (comparison > 0.0)
-        if not heard.any():
-            continue
-        models = [multiplied_responses(rates[heard], noise_sigma) for rates in (standard, comparison)]
-        found += _observed(measure, "multiplied", models, heard, neighbours, seed)
+        # No rate is a rate; no latency is none, and has no difference to others.
+        pairs = neighbours[heard[neighbours].all(axis=1)] if measure == "latency" else neighbours
+        if heard.any() and len(pairs):
+            models = [multiplied_responses(rates[heard], noise_sigma) for rates in (standard, comparison)]
+            found += _observed(measure, "multiplied", (models[0], models[1]), heard, pairs, seed)
     window_ms = protocol.STATIC_WINDOW.value
-    seconds = (window_ms[1] - window_ms[0]) / 1000.0
+    seconds = (window_ms[1] - window_ms[0]) / MS_PER_S
     counts = [PoissonResponses(tables["static"][row] * seconds) for row in rows]
-    everyone = np.ones(len(tables["static"][0]), dtype=bool)
-    return found + _observed("static", "Poisson", counts, everyone, neighbours, seed)
+    everyone = np.ones(tables["static"].shape[1], dtype=bool)
+    return found + _observed("static", "Poisson", (counts[0], counts[1]), everyone, neighbours, seed)
 
 
 def _observed(
     measure: str,
     noise: str,
-    models: list[Any],
+    models: tuple[ResponseModel, ResponseModel],
     heard: np.ndarray,
     neighbours: np.ndarray,
     seed: int,
 ) -> list[dict[str, Any]]:
     """Measure both codes on responses with one kind of noise."""
-    standard: ResponseModel = models[0]
-    comparison: ResponseModel = models[1]
+    standard, comparison = models
     shown = present(standard, comparison, seed, TRIALS, SESSION)
     # The standard again, which Euclidean Distance compares every look with.
     reference = present(standard, standard, seed, TRIALS, REFERENCE_SESSION).standard
-    codes = {
+    codes: dict[str, Statistic] = {
         "Gradient Sum": lambda responses: gradient_sum(_placed(responses, heard), neighbours),
         "Euclidean Distance": lambda responses: distance(responses, reference),
     }
-    return [_row(code, measure, noise, shown, statistic, heard) for code, statistic in codes.items()]
+    return [
+        {
+            "code": code,
+            "measure": measure,
+            "noise": noise,
+            "receptors": int(heard.sum()),
+            **_judged(shown, of),
+        }
+        for code, of in codes.items()
+    ]
 
 
 def _placed(responses: FloatArray, heard: np.ndarray) -> FloatArray:
@@ -333,16 +418,14 @@ def _placed(responses: FloatArray, heard: np.ndarray) -> FloatArray:
     return everyone
 
 
-def _row(
-    code: str, measure: str, noise: str, shown: Presentation, statistic: Any, heard: np.ndarray
-) -> dict[str, Any]:
+def _judged(shown: Presentation, statistic: Statistic) -> dict[str, float | None]:
+    """D' of a code and of the ideal observer; no efficiency where that one never fails, or only guesses."""
     judged, ideal = shown.of(statistic), shown.ideal()
-    share, error = efficiency(judged, ideal)
+    try:
+        share, error = efficiency(judged, ideal)
+    except InputError:
+        share, error = math.nan, math.nan
     return {
-        "code": code,
-        "measure": measure,
-        "noise": noise,
-        "receptors": int(heard.sum()),
         "proportion_correct": judged.proportion_correct,
         "d_prime": judged.d_prime,
         "d_prime_error": judged.d_prime_error,

@@ -25,6 +25,7 @@ from fingerpad.parameters import all_published, protocol
 from fingerpad.sampling import SkinResponse
 from fingerpad.store import Store, code_hash, solve_missing
 from fingerpad.studies import (
+    curvature_thresholds,
     drive_quantities,
     mesh_noise,
     nail_border,
@@ -79,7 +80,8 @@ class Reproduction:
         Processes to use; the numbers do not depend on it.
     extended : bool, optional
         Whether to go beyond the paper: other ways to fit, what else may drive the afferent, spike trains,
-        what the rates determine, when a population fires, and two spheres on other meshes. Default: unless
+        what the rates determine, when a population fires, two spheres on other meshes, and the curvatures
+        that are told apart at other standards. Default: unless
         the resolution is "quick", which would take half as long again.
     """
 
@@ -135,6 +137,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
     }
     if run.goes_beyond:
         wanted["spheres, other meshes"] = mesh_noise.touches(conditions)
+        wanted["spheres, other curvatures"] = curvature_thresholds.touches(conditions)
     missing = {
         name: sum(not store.holds(touch) for touch in touches.values()) for name, touches in wanted.items()
     }
@@ -165,7 +168,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
         }
         advance()
     if run.goes_beyond:
-        with _timed("beyond the paper", 7, progress, stages) as advance:
+        with _timed("beyond the paper", 8, progress, stages) as advance:
             traces = drive_quantities.receptor_traces(bars, drive_quantities.SHOWN_QUANTITIES)
             results["single_unit"]["starts"] = single_unit_starts.result(problem, traces["von_mises"])
             advance()
@@ -189,6 +192,16 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
             advance()
             results["single_unit_uncertainty"] = single_unit_uncertainty.result(
                 bar_sed, best.parameters, conditions.seed
+            )
+            advance()
+            centred = {
+                curvature: skin for (position, curvature), skin in sphere_responses.items() if position == 0.0
+            }
+            results["curvature_thresholds"] = curvature_thresholds.result(
+                centred | responses["spheres, other curvatures"],
+                afferent,
+                discrimination["noise_sigma"],
+                conditions.seed,
             )
             advance()
             results["population_timing"] = response_maps.timing(sphere_responses, afferent, conditions.finger)

@@ -1,0 +1,211 @@
+"""Curvature thresholds and efficiencies: on skins with a formula, and interpolation against a press."""
+
+import numpy as np
+import pytest
+
+from fingerpad.afferent import Afferent
+from fingerpad.encoding import gradient_sum, neighbour_pairs
+from fingerpad.errors import ConvergenceError
+from fingerpad.grading import Grading
+from fingerpad.noise_fit import expected_hit_rates
+from fingerpad.population import Population
+from fingerpad.psychophysics import yes_no
+from fingerpad.random_streams import Purpose, normals
+from fingerpad.report import curvature_thresholds as page
+from fingerpad.report.appearance import png
+from fingerpad.signals import SedTraces
+from fingerpad.studies import curvature_thresholds as study
+from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.studies.reproduction import plain
+from fingerpad.studies.sphere_discrimination import CURVATURES
+
+AFFERENT = Afferent(static_gain=1.2e-6)
+POPULATION = Population.grid(rows=3, columns=4, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
+PAIRS = neighbour_pairs(POPULATION.positions_mm, POPULATION.pitch_mm)
+DRAWS = normals(0, 1, 12, Purpose.RESPONSE, 2000)[0].T
+
+
+class BallSkin:
+    """SED below a ball: the more curved, the higher and narrower."""
+
+    def __init__(self, curvature_per_m):
+        sharpness = curvature_per_m / 287.0
+        self.peak_kpa, self.width_mm = 2.5 * sharpness, 2.5 / sharpness**0.25
+
+    def sed(self, sites):
+        squared = np.square(np.asarray(sites) - (RECEPTOR_X_MM, 0.0)).sum(axis=1)
+        peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
+        return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.85], peaks), kinks_ms=[50.0])
+
+
+SKINS = {curvature: BallSkin(curvature) for curvature in (*CURVATURES, *study.PRESSED_PER_M)}
+
+
+@pytest.fixture(scope="module")
+def found():
+    return plain(study.result(SKINS, AFFERENT, 0.06, seed=0))
+
+
+def proportional(power):
+    """Rates that go with a power of the curvature, at four receptors, and an observer of them."""
+    at = np.geomspace(100.0, 700.0, 200)
+    rates = np.outer((at / 287.0) ** power, POPULATION.positions_mm[:, 1] ** 2 + 20.0)
+    return study.Observer(study.interpolated(at, rates), PAIRS, 0.03, DRAWS)
+
+
+def test_rates_that_scale_with_curvature_obey_webers_law():
+    observer = proportional(0.7)
+    fractions = [study.threshold_at(observer, s)["weber_fraction"] for s in (144.0, 287.0, 400.0)]
+    assert fractions == pytest.approx([fractions[0]] * 3, rel=2e-3)
+    steeper = study.threshold_at(proportional(1.4), 287.0)["weber_fraction"]
+    assert steeper == pytest.approx((1.0 + fractions[1]) ** 0.5 - 1.0, rel=2e-3)
+
+
+def test_threshold_is_where_three_quarters_are_told_apart(found):
+    entry = found["populations"][1]["standards"][2]
+    assert entry["standard_per_m"] == 287.0
+    population = Population.grid(rows=6, columns=6, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
+    pairs = neighbour_pairs(population.positions_mm, population.pitch_mm)
+    table = [
+        population.respond(BallSkin(curvature)).static_rate_hz
+        for curvature in (287.0, 287.0 + entry["jnd_per_m"])
+    ]
+    draws = normals(0, 1, 36, Purpose.RESPONSE, 4000)[0].T
+    noise = found["populations"][1]["noise_sigma"]
+    # The comparison answers here by itself, not by interpolation.
+    assert expected_hit_rates(table, pairs, noise, draws)[0] == pytest.approx(0.75, abs=0.01)
+    lower, upper = entry["fitted_interval"]
+    assert lower < entry["weber_fraction"] < upper
+
+
+def test_second_population_has_the_noise_that_fits_people(found):
+    population = found["populations"][1]
+    at = found["pressed_per_m"]
+    layout = Population.grid(rows=6, columns=6, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
+    table = [layout.respond(BallSkin(curvature)).static_rate_hz for curvature in (287.0, 296.0, 365.0)]
+    pairs = neighbour_pairs(layout.positions_mm, layout.pitch_mm)
+    draws = normals(0, 1, 36, Purpose.RESPONSE, 4000)[0].T
+    near, far = expected_hit_rates(table, pairs, population["noise_sigma"], draws)
+    assert abs(near - 0.58) < 0.05
+    assert abs(far - 0.95) < 0.05
+    assert population["gradient_sum"][at.index(287.0)] == pytest.approx(gradient_sum(table[0], pairs))
+    assert found["populations"][0]["noise_sigma"] == 0.06
+
+
+def test_the_ideal_observer_needs_the_least_difference(found):
+    entries = [entry for population in found["populations"] for entry in population["standards"]]
+    assert len(entries) == 8
+    for entry in entries:
+        assert entry["ideal_weber_fraction"] < entry["weber_fraction"]
+
+
+def test_ideal_threshold_is_fishers(found):
+    """The ideal observer of two spheres that far apart judges three quarters of single looks correctly."""
+    observer = proportional(0.7)
+    entry = study.threshold_at(observer, 287.0)
+    step = entry["ideal_weber_fraction"]
+    rates = [observer.responses(287.0 * (1.0 + side * step)) for side in (-0.5, 0.5)]
+    d = np.sqrt(np.square((rates[1] - rates[0]) / observer.responses(287.0)).sum() * (0.03**-2 + 2.0))
+    assert yes_no(float(d)) == pytest.approx(0.75, abs=1e-3)
+
+
+def test_no_code_is_more_efficient_than_the_ideal_observer(found):
+    rows = found["efficiency"]
+    assert {(row["code"], row["measure"], row["noise"]) for row in rows} >= {
+        ("Gradient Sum", "static", "multiplied"),
+        ("Euclidean Distance", "latency", "multiplied"),
+        ("Gradient Sum", "static", "Poisson"),
+    }
+    for row in rows:
+        assert row["efficiency"] < 1.0 + 3.0 * row["efficiency_error"]
+        assert row["proportion_correct"] <= row["ideal_proportion_correct"] + 0.01
+
+
+def test_silent_receptors_are_left_out_of_efficiencies():
+    curvatures = np.array(study.EFFICIENCY_PAIR_PER_M)
+    static = np.array([[30.0, 0.0, 20.0, 10.0], [33.0, 0.0, 21.0, 9.0]])
+    latency = np.array([[10.0, np.nan, 12.0, 30.0], [10.0, 70.0, 11.0, 33.0]])
+    pairs = np.array([[0, 1], [1, 2], [0, 3]])
+    rows = study.efficiencies(curvatures, {"static": static, "latency": latency}, pairs, 0.1, seed=0)
+    assert [row["receptors"] for row in rows] == [3, 3, 3, 3, 4, 4]
+    alone = study.efficiencies(
+        curvatures, {"static": static, "latency": latency[:, [0, 3]]}, np.array([[0, 1]]), 0.1, seed=0
+    )
+    # Of the pairs of latencies only that of receptors 0 and 3 has both.
+    assert alone[2]["code"] == rows[2]["code"] == "Gradient Sum"
+    assert rows[2]["d_prime"] == pytest.approx(alone[2]["d_prime"], abs=0.1)
+
+
+def test_a_threshold_out_of_reach_is_said_and_costs_only_its_own_row(found):
+    noisy = study.Observer(proportional(0.1).rates, PAIRS, 0.5, DRAWS)
+    with pytest.raises(ConvergenceError, match="No sphere up to 700 /m is told from 287 /m in 75%"):
+        study.threshold_at(noisy, 287.0)
+    loud = plain(study.result(SKINS, AFFERENT, 3.0, seed=0))
+    reached, missed = (loud["populations"][0][name] for name in ("standards", "without_threshold"))
+    assert [entry["standard_per_m"] for entry in reached] == [144.0, 200.0]
+    assert [entry["standard_per_m"] for entry in missed] == [287.0, 400.0]
+    rows = study.weber_rows(loud)
+    assert rows[0]["met"] is False
+    assert "No sphere" in rows[0]["note"]
+    assert png(page.draw, loud)[:4] == b"\x89PNG"
+    assert "No sphere" in page.tables(loud)[0].note
+
+
+def test_weber_rows_are_judged_in_whole_per_cent(found):
+    assert study.weber_rows(None) == []
+    section = {**found, "populations": [dict(found["populations"][0])]}
+    for fractions, met in (([0.0951, 0.144], True), ([0.0949, 0.12], False), ([0.12, 0.146], False)):
+        section["populations"][0]["standards"] = [
+            {"standard_per_m": 287.0, "weber_fraction": fraction} for fraction in fractions
+        ]
+        assert study.weber_rows(section)[0]["met"] is met
+
+
+def test_page_shows_and_names_what_was_found(found):
+    figure = page.draw(found)
+    fractions, curves = figure.axes
+    labels = fractions.get_legend_handles_labels()[1]
+    assert set(labels) == {
+        "people, as reported: 10-14 %",
+        "Gradient Sum, 3 by 6 receptors",
+        "Gradient Sum, 6 by 6 receptors",
+        "ideal observer, 3 by 6 receptors",
+        "people (Goodwin et al. 1991)",
+    }
+    assert "1/m" in fractions.get_xlabel()
+    assert "%" in curves.get_xlabel()
+    thresholds, codes = page.tables(found)
+    assert len(thresholds.rows) == 8
+    assert len(codes.rows) == len(found["efficiency"])
+    assert "15 pressed spheres" in page.caption(found)
+
+
+class Coarse(Conditions):
+    """A mesh of a few hundred elements."""
+
+    def sphere_grading(self):
+        return Grading(RECEPTOR_X_MM, 4.0, 1.5, 1.0, 0.75, stratum_corneum=1, dermis=1, subcutis=2)
+
+
+def test_spheres_are_pressed_like_the_papers():
+    conditions = Coarse("quick")
+    touches = study.touches(conditions)
+    assert tuple(touches) == study.PRESSED_PER_M
+    assert min(study.STANDARDS_PER_M) >= min(touches)
+    first, last = touches[144.0], touches[540.0]
+    assert first.indenter.curvature_per_m == 144.0
+    assert first.at_mm == last.at_mm == (RECEPTOR_X_MM, 0.0)
+    assert first.tilt_deg == last.tilt_deg == conditions.skin_tilt_deg
+
+
+def test_interpolation_agrees_with_a_press():
+    """A sphere foretold from others 10 % flatter and more curved, as far as those of the study are apart.
+
+    A tenth of the threshold, 25 /m, is allowed for on this mesh; 0.2 /m is what elements of 0.1 mm leave.
+    """
+    curvatures = np.array([250.0, 287.0, 316.0, 345.0, 380.0])
+    skins = [touch.solve(1) for touch in study.sphere_touches(Coarse("quick"), curvatures.tolist()).values()]
+    table = np.array([POPULATION.respond(skin).static_rate_hz for skin in skins])
+    (error,) = study.interpolation_errors(curvatures, table, PAIRS)
+    assert error["curvature_per_m"] == 316.0
+    assert abs(error["error_per_m"]) < 2.5
