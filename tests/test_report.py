@@ -50,6 +50,7 @@ def synthetic_results() -> dict:
         "spike_fit": _spike_fit(),
         "discrimination": _discrimination(),
         "mesh_noise": _mesh_noise(),
+        "curvature_thresholds": _curvature_thresholds(),
         "population": _population(),
         "population_timing": _population_timing(),
         "nail": _nail(),
@@ -420,6 +421,65 @@ def _mesh_noise() -> dict:
         "difference": [0.0, -0.05],
         "largest_difference": 0.05,
         "limit": 0.1,
+    }
+
+
+def _curvature_thresholds() -> dict:
+    steps = [0.03, 0.06, 0.12]
+
+    def at(standard: float) -> dict:
+        return {
+            "standard_per_m": standard,
+            "jnd_per_m": 0.1 * standard,
+            "weber_fraction": 0.1,
+            "ideal_weber_fraction": 0.06,
+            "step": steps,
+            "hit_rate": [0.58, 0.66, 0.79],
+            "fitted_weber_fraction": 0.101,
+            "fitted_interval": [0.08, 0.13],
+            "curve": {"step": steps, "hit_rate": [0.57, 0.67, 0.78]},
+        }
+
+    return {
+        "seed": 0,
+        "proportion": 0.75,
+        "judgements": 100,
+        "pressed_per_m": [144.0, 287.0, 400.0],
+        "populations": [
+            {
+                "layout": "paper",
+                "rows": 3,
+                "columns": 6,
+                "noise_sigma": 0.14,
+                "gradient_sum": [600.0, 1400.0, 2300.0],
+                "standards": [at(144.0), at(287.0)],
+                "without_threshold": [{"standard_per_m": 400.0, "why_not": "No sphere is told from 400 /m."}],
+            }
+        ],
+        "literature": {
+            "standard_per_m": [144.0, 287.0],
+            "comparison_per_m": [158.0, 319.0],
+            "weber_fractions": [0.10, 0.14],
+        },
+        "interpolation": [
+            {"curvature_per_m": 287.0, "pressed": 1400.0, "foretold": 1402.0, "error_per_m": 0.2}
+        ],
+        "efficiency": [
+            {
+                "code": "Gradient Sum",
+                "measure": "static",
+                "noise": "multiplied",
+                "receptors": 18,
+                "proportion_correct": 0.88,
+                "d_prime": 1.64,
+                "d_prime_error": 0.03,
+                "ideal_proportion_correct": 0.93,
+                "ideal_d_prime": 2.12,
+                "ideal_d_prime_error": 0.03,
+                "efficiency": 0.6,
+                "efficiency_error": 0.03,
+            }
+        ],
     }
 
 

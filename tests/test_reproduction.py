@@ -43,7 +43,14 @@ MEASURED = ("started", "wall_s", "peak_memory_mb", "stages")
 BALANCE = 0.01
 """Bound on the error of the balance of energy at quick resolution, where 0.0012 to 0.0034 are found."""
 
-BEYOND = {"mesh_noise", "drive_quantities", "spike_fit", "single_unit_uncertainty", "population_timing"}
+BEYOND = {
+    "mesh_noise",
+    "curvature_thresholds",
+    "drive_quantities",
+    "spike_fit",
+    "single_unit_uncertainty",
+    "population_timing",
+}
 """Sections that go beyond the paper, which a run at quick resolution leaves out unless asked."""
 
 DRAWINGS = [drawing for chapter in CHAPTERS if chapter.section not in BEYOND for drawing in chapter.drawings]

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from fingerpad.report.appearance import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, new_figure, numbers
 from fingerpad.report.tables import UNBROKEN, Row, Table
-from fingerpad.report.words import fixed, number
+from fingerpad.report.words import fixed, number, plain
 
 PER_CENT = 100.0
 CHANCE = 50.0
@@ -48,12 +48,12 @@ def draw(section: Mapping[str, Any]) -> Figure:
 def _fractions(axes: Axes, section: Mapping[str, Any]) -> None:
     people, paper = section["literature"], section["populations"][0]
     low, high = PER_CENT * numbers(people["weber_fractions"])
-    axes.axhspan(low, high, color=PALE, label=f"people, as reported: {low:.0f}-{high:.0f} %")
+    axes.axhspan(low, high, color=PALE, label=f"people, as reported: {number(low, 2)}-{number(high, 2)} %")
     for population, style in zip(section["populations"], STYLES[1:], strict=False):
         axes.plot(
             numbers([entry["standard_per_m"] for entry in population["standards"]]),
             PER_CENT * numbers([entry["weber_fraction"] for entry in population["standards"]]),
-            label=f"Gradient Sum, {population['rows']} by {population['columns']} receptors",
+            label=f"Gradient Sum, {_layout(population)} receptors",
             markersize=4.0,
             **style,
         )
@@ -62,7 +62,7 @@ def _fractions(axes: Axes, section: Mapping[str, Any]) -> None:
     interval = PER_CENT * numbers([entry["fitted_interval"] for entry in paper["standards"]]).reshape(-1, 2).T
     axes.errorbar(at, fitted, yerr=np.abs(interval - fitted), color=BLUE, linestyle="none", capsize=3.0)
     best = PER_CENT * numbers([entry["ideal_weber_fraction"] for entry in paper["standards"]])
-    label = f"ideal observer, {paper['rows']} by {paper['columns']} receptors"
+    label = f"ideal observer, {_layout(paper)} receptors"
     axes.plot(at, best, color=GREY, linestyle=(0, (5, 2)), marker=".", label=label)
     standard, comparison = numbers(people["standard_per_m"]), numbers(people["comparison_per_m"])
     axes.plot(
@@ -86,7 +86,7 @@ def _fractions(axes: Axes, section: Mapping[str, Any]) -> None:
 def _curves(axes: Axes, section: Mapping[str, Any]) -> None:
     standards = section["populations"][0]["standards"]
     axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)))
-    axes.axhline(PER_CENT * section["proportion"], color=GREY, linewidth=0.8)
+    axes.axhline(PER_CENT * float(numbers(section["proportion"])), color=GREY, linewidth=0.8)
     for entry, style in zip(standards, _cycled(len(standards)), strict=True):
         curve = entry["curve"]
         axes.plot(
@@ -119,11 +119,11 @@ def _cycled(count: int) -> list[dict[str, Any]]:
 
 def caption(section: Mapping[str, Any]) -> str:
     """Say what the figure shows, and how far to trust it."""
-    errors = [abs(entry["error_per_m"]) for entry in section["interpolation"]]
+    errors = np.abs(numbers([entry["error_per_m"] for entry in section["interpolation"]]))
     foretold = (
         " Spheres of the paper, left out and foretold from the others, are met within "
-        f"{number(max(errors), 2)} 1/m."
-        if errors
+        f"{number(float(errors.max()), 2)} 1/m."
+        if errors.size
         else ""
     )
     return (
@@ -143,7 +143,7 @@ def tables(section: Mapping[str, Any]) -> list[Table]:
     thresholds = [
         Row(
             (
-                f"{population['rows']} by {population['columns']}",
+                _layout(population),
                 fixed(population["noise_sigma"], 3),
                 number(entry["standard_per_m"]),
                 fixed(entry["jnd_per_m"], 1),
@@ -157,14 +157,16 @@ def tables(section: Mapping[str, Any]) -> list[Table]:
         for entry in population["standards"]
     ]
     missed = [
-        entry["why_not"] for population in section["populations"] for entry in population["without_threshold"]
+        plain(entry["why_not"])
+        for population in section["populations"]
+        for entry in population["without_threshold"]
     ]
     codes = [
         Row(
             (
-                row["code"],
-                row["measure"],
-                row["noise"],
+                plain(row["code"]),
+                plain(row["measure"]),
+                plain(row["noise"]),
                 number(row["receptors"]),
                 _with_error(row["d_prime"], row["d_prime_error"]),
                 _with_error(row["ideal_d_prime"], row["ideal_d_prime_error"]),
@@ -198,6 +200,10 @@ def tables(section: Mapping[str, Any]) -> list[Table]:
             "Poisson processes, without other noise.",
         ),
     ]
+
+
+def _layout(population: Mapping[str, Any]) -> str:
+    return f"{number(population['rows'])} by {number(population['columns'])}"
 
 
 def _per_cent(share: float | None) -> str:
