@@ -242,6 +242,36 @@ def test_stimuli_without_levels_have_hit_rates_and_no_curve():
         assert last.get_figure()
 
 
+# The page
+
+
+def test_curves_show_every_code_people_with_their_intervals_and_thresholds():
+    points = [{"at": 220, "hit_rate": 0.6, "trials": 50}, {"at": 300, "hit_rate": 0.9}]
+    question = asked(
+        code=["gradient_sum", "ideal"], measure="static", observed={"points": points, "source": "two people"}
+    )
+    found = plain(result(question, bumps(question)))
+    figure = report.draw_curves(found)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert sorted(labels) == ["Gradient Sum", "ideal observer", "people (two people)"]
+    (axes,) = figure.axes
+    drawn = {tuple(np.round(line.get_xdata(), 6)) for line in axes.lines}
+    assert (220.0, 220.0) in drawn  # the interval of the first point
+    assert (300.0, 300.0) not in drawn
+    for code in ("gradient_sum", "ideal"):
+        level = round(reading(found, code, "static")["curves"][0]["threshold"]["level"], 6)
+        assert (level, level) in drawn
+    table = {row.cells[0]: row.cells for row in report.answer_tables(found)[0].rows}
+    threshold = reading(found, "gradient_sum", "static")["curves"][0]["threshold"]
+    assert table["Gradient Sum, static rate"][3] == f"{threshold['difference']:.3g}"
+
+
+def test_maps_leave_out_who_has_no_latency():
+    question = asked(measure="latency", code="gradient_sum")
+    skins = bumps(question) | {"240": NearOnly(240.0)}
+    assert report.draw_responses(plain(result(question, skins)))
+
+
 # The ideal observer
 
 
