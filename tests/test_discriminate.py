@@ -25,7 +25,7 @@ from fingerpad.studies.question import CurveSettings
 from fingerpad.studies.question_answers import Asked, result
 from fingerpad.studies.question_file import parsed, ready_made
 from fingerpad.studies.question_population import population_of
-from fingerpad.studies.question_stimuli import presented
+from fingerpad.studies.question_stimuli import presented, touches
 from fingerpad.studies.readings import SESSION, curves
 from fingerpad.studies.reproduction import plain
 
@@ -395,7 +395,9 @@ def test_an_answer_is_a_page_figures_and_numbers_with_their_origin(call, tmp_pat
     assert manifest["inputs"] == [{"file": "mine.yaml", "sha256": hashlib.sha256(MINE.encode()).hexdigest()}]
     assert (manifest["seed"], manifest["resolution"], manifest["materials"]) == (5, "quick", "trial3")
     assert manifest["question"]["stimuli"]["values"] == [200.0, 220.0, 240.0, 280.0, 320.0]
-    assert parsed(manifest["question"]) == parsed(json.loads(MINE))  # what was asked can be asked again
+    again = parsed(manifest["question"])  # what was asked can be asked again
+    assert again == parsed(json.loads(MINE))
+    assert touches(again) == touches(parsed(json.loads(MINE)))
     page = (tmp_path / "discriminate" / "discriminate.html").read_text()
     assert "<h1>Which bumps?</h1>" in page
     assert page.count("data:image/png;base64,") == 3

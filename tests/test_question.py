@@ -442,6 +442,25 @@ def test_a_file_without_fitted_parameters_is_refused(tmp_path, content):
         afferent_of(question, tmp_path)
 
 
+def test_null_is_as_good_as_nothing():
+    empty = {"layout": "nail rows", "jitter": None, "rows": None}
+    with_null = changed(
+        SPHERES, population=empty, common={"indenter": "sphere", "force_mn": None, "depth_mm": 1.0}
+    )
+    assert len(asked(with_null).population) == len(NailEdge().rows(1, 100.0))
+
+
+@pytest.mark.parametrize(
+    "block",
+    re.findall(
+        r"^```yaml\n(.*?)^```", (ROOT / "docs" / "discriminate.md").read_text(encoding="utf-8"), re.M | re.S
+    ),
+)
+def test_what_the_guide_shows_can_be_asked(block):
+    part = read_yaml(block, "the guide")
+    assert asked(part if "question" in part else changed(SPHERES, **part))
+
+
 def test_the_guide_names_every_key():
     def keys(part, path=""):
         for name, field in part.model_fields.items():

@@ -113,7 +113,7 @@ def run(task: Discrimination, progress: Progress | None = None, **provenance: An
                 "nodes": len(next(iter(skins.values())).mesh.nodes_mm),
                 "indentations": len(wanted),
                 "computed": computed,
-                "question": task.question.model_dump(mode="json"),
+                "question": task.question.model_dump(mode="json", exclude_unset=True),
                 "started": started.isoformat(timespec="seconds"),
                 "wall_s": round(time.perf_counter() - clock, 2),
             }

@@ -66,7 +66,7 @@ def afferent_of(question: Question, beside: Path = Path()) -> Afferent:
     """
     chosen = question.afferent
     if isinstance(chosen, AfferentSettings):
-        return Afferent(**{name: value for name, value in chosen.given.items() if value is not None})
+        return Afferent(**chosen.given)
     return Afferent() if chosen == DEFAULT else _fitted(Path(beside) / chosen)
 
 

@@ -88,5 +88,6 @@ class Part(BaseModel):
         return self.chosen(*type(self).model_fields)
 
     def chosen(self, *names: str) -> dict[str, Any]:
-        """Those of the names that the file gives, with their values."""
-        return {name: getattr(self, name) for name in names if name in self.model_fields_set}
+        """Those of the names that the file gives a value, and not null, with that value."""
+        values = {name: getattr(self, name) for name in names if name in self.model_fields_set}
+        return {name: value for name, value in values.items() if value is not None}
