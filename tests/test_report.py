@@ -20,6 +20,7 @@ from fingerpad.report import (
     population_rate,
     recruitment,
     single_unit,
+    single_unit_methods,
     skin_deflection,
     summary,
     tables,
@@ -185,6 +186,40 @@ def _single_unit() -> dict:
         ],
         "modulation": {phase: {"observed": observed, "ours": ours} for phase in ("dynamic", "static")},
         "edge_response": {"peak_distance_mm": 1.6, "profile_hz": SHIFT_MM.tolist()},
+        "methods": _methods(),
+    }
+
+
+def _methods() -> dict:
+    def scores(mean: float) -> dict:
+        return {"fss_in_sample": mean + 0.02, "fss_out_of_sample": mean, "fss_training_mean": mean + 0.03}
+
+    places = ("dynamic_flat", "dynamic_elsewhere", "static_flat", "static_elsewhere")
+    phases = {"dynamic": 0.95, "static": 0.98, "weighted": 0.97}
+    return {
+        "methods": [
+            {
+                "method": name,
+                "free_numbers": free,
+                **scores(mean),
+                "fss_train": [mean + 0.03 - 0.002 * fold for fold in range(6)],
+                "fss_test": [mean - 0.05 + 0.02 * fold for fold in range(6)],
+                "runs": runs,
+            }
+            for name, free, mean, runs in (("response surface", 6, 0.87, 5474), ("CMA-ES", 4, 0.88, 500))
+        ],
+        "models": [
+            {
+                "model": "receptor beside its place",
+                **scores(0.88),
+                "fss_in_sample_dynamic": 0.75,
+                "fss_in_sample_static": 0.96,
+                "residual_share": dict.fromkeys(places, 0.25),
+                "parameters": {"offset_mm": 0.05},
+            }
+        ],
+        "models_fitted_by": "CMA-ES",
+        "ceilings": {"symmetric": phases, "rising": phases},
     }
 
 
@@ -823,12 +858,28 @@ def test_hit_rates_stand_in_the_table_as_they_are_drawn():
 
 
 def test_every_table_is_rectangular():
-    results = synthetic_results()
+    results = page.sections(synthetic_results())
     made = [table for chapter in page.CHAPTERS for table in chapter.tables(results[chapter.section])]
     made.append(tables.comparison(results["comparison"]))
     assert len(made) > 12
     for table in made:
         assert {len(row.cells) for row in table.rows} == {len(table.columns)}, table.title
+
+
+def test_methods_are_drawn_fold_by_fold_with_their_effort():
+    found = _methods()
+    scores, effort = single_unit_methods.draw(found).axes
+    by_height = {line.get_ydata()[0]: line.get_xdata().tolist() for line in scores.get_lines()}
+    for height, row in enumerate(found["methods"]):
+        assert by_height[height - 0.14] == row["fss_train"]
+        assert by_height[height + 0.14] == row["fss_test"]
+    means = [segments.get_segments()[0][0, 0] for segments in scores.collections]
+    keys = ("fss_training_mean", "fss_out_of_sample")
+    assert means == [row[key] for key in keys for row in found["methods"]]
+    assert [bar.get_width() for bar in effort.patches] == [row["runs"] for row in found["methods"]]
+    assert "lie within 0.010 of each other out of sample, the folds within 0.11" in (
+        single_unit_methods.caption(found)
+    )
 
 
 def lines(axes):

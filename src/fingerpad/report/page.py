@@ -60,6 +60,9 @@ def _no_tables(_: Any) -> list[tables.Table]:
     return []
 
 
+METHODS = "single_unit_methods"
+"""What a page calls the part of the section single_unit that compares methods; its tables stand there."""
+
 CHAPTERS = (
     Chapter(
         "skin_deflection",
@@ -80,6 +83,20 @@ CHAPTERS = (
         "Level 2: single afferent",
         (Drawing(5, "figure_5_single_unit", "Rates under a bar", single_unit.draw, single_unit.caption),),
         lambda section: tables.single_unit(section) + single_unit_methods.tables(section),
+    ),
+    Chapter(
+        METHODS,
+        "Level 2: methods of fitting",
+        (
+            Drawing(
+                17,
+                "figure_17_methods",
+                "Methods of fitting on the same folds",
+                single_unit_methods.draw,
+                single_unit_methods.caption,
+            ),
+        ),
+        _no_tables,
     ),
     Chapter(
         "single_unit_uncertainty",
@@ -242,7 +259,7 @@ def write_report(results: Mapping[str, Any], folder: Path) -> Path:
     rows = results.get("comparison")
     others = {key: value for key, value in results.items() if key not in _KNOWN}
     return write_page(
-        results,
+        sections(results),
         CHAPTERS,
         Path(folder) / "report.html",
         heading="From a touch to a percept",
@@ -252,6 +269,17 @@ def write_report(results: Mapping[str, Any], folder: Path) -> Path:
         comparison=tables.comparison(rows) if rows else None,
         others=[tables.generic(tables.spelled(key), others[key]) for key in others],
     )
+
+
+def sections(results: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the results by chapter: a part that has a chapter of its own beside its section.
+
+    Examples
+    --------
+    >>> sections({"single_unit": {"methods": {"methods": []}}})["single_unit_methods"]
+    {'methods': []}
+    """
+    return {**results, METHODS: (results.get("single_unit") or {}).get("methods")}
 
 
 def write_page(

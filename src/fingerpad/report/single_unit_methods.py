@@ -1,11 +1,15 @@
-"""Level 2, beyond the paper: tables of starts and units, methods of fitting, and what limits them."""
+"""Level 2, beyond the paper: starts and units, methods of fitting, and what limits them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+from matplotlib.figure import Figure
+
 from fingerpad.parameters import paper
+from fingerpad.report.appearance import BLACK, BLUE, ORANGE, new_figure, numbers
 from fingerpad.report.tables import Row, Table
 from fingerpad.report.words import fixed, number, plain, whole_percent
 
@@ -19,6 +23,76 @@ CEILINGS = {
     "symmetric": "any prediction that is the same on both sides",
     "rising": "any rate that rises with strain energy density",
 }
+
+
+def draw(section: Mapping[str, Any]) -> Figure:
+    """Draw how well each method fits and predicts, fold by fold, and what it takes.
+
+    Parameters
+    ----------
+    section : mapping
+        `results["single_unit"]["methods"]`.
+
+    Returns
+    -------
+    Figure
+    """
+    rows = section["methods"]
+    figure = new_figure(10.0, 1.8 + 0.62 * len(rows))
+    scores, effort = figure.subplots(1, 2, sharey=True, width_ratios=(2.2, 1.0))
+    kinds = {
+        "fitted to": ("fss_train", "fss_training_mean", "s", ORANGE, ORANGE, -0.14),
+        "left out": ("fss_test", "fss_out_of_sample", "o", BLACK, "white", 0.14),
+    }
+    for label, (folds, mean, marker, edge, face, side) in kinds.items():
+        for height, row in enumerate(rows):
+            values = numbers(row[folds])
+            scores.plot(
+                values,
+                np.full(values.size, height + side),
+                marker,
+                color=edge,
+                markerfacecolor=face,
+                markersize=5.5,
+                linestyle="none",
+                label=f"positions {label}, one mark per fold" if height == 0 else None,
+            )
+            scores.vlines(
+                numbers(row[mean]),
+                height + side - 0.12,
+                height + side + 0.12,
+                color=edge,
+                linewidth=2.4,
+                label=f"positions {label}, mean" if height == 0 else None,
+            )
+    names = [f"{row['method']}\n({plain(row['free_numbers'])} numbers)" for row in rows]
+    scores.set_yticks(range(len(rows)), names)
+    scores.set_ylim(len(rows) - 0.5, -0.5)
+    scores.set_xlabel("FSS [1]")
+    scores.set_title("(a) score")
+    effort.barh(range(len(rows)), numbers([row["runs"] for row in rows]), 0.5, color=BLUE)
+    effort.locator_params(axis="x", nbins=4)
+    effort.set_xlabel("runs of the model, all folds [1]")
+    effort.set_title("(b) effort")
+    figure.legend(*scores.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return figure
+
+
+def caption(section: Mapping[str, Any]) -> str:
+    """Say how far the methods lie apart."""
+    rows = section["methods"]
+    means = [row["fss_out_of_sample"] for row in rows]
+    known = [mean for mean in means if mean is not None]
+    apart = max(known) - min(known) if known else None
+    folds = [fold for row in rows for fold in row["fss_test"] if fold is not None]
+    spread = max(folds) - min(folds) if folds else None
+    return (
+        "Methods of fitting one afferent on the same folds. (a) Fractional sum of squares (FSS) on the "
+        "positions that a fold was fitted to, and on those that it left out. (b) How often each ran the "
+        "model in all folds; times are in the benchmarks. The methods' means lie within "
+        f"{fixed(apart, 3)} of each other out of sample, the folds within {fixed(spread, 2)}: which "
+        "positions are left out matters more than how the others are fitted."
+    )
 
 
 def tables(section: Mapping[str, Any]) -> list[Table]:

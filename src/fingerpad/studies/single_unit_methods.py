@@ -243,6 +243,7 @@ def _method(name: str, best: Fit, crossed: CrossValidation) -> dict[str, Any]:
         "fss_in_sample": best.score,
         "fss_training_mean": crossed.score_train,
         "fss_out_of_sample": crossed.score_test,
+        "fss_train": [fold.score_train for fold in crossed.folds],
         "fss_test": [fold.score_test for fold in crossed.folds],
         "runs": sum(fold.fit.n_evaluations for fold in crossed.folds),
     }
