@@ -11,15 +11,15 @@ from scipy.special import erfcx
 from fingerpad import blocks
 from fingerpad.errors import InputError
 from fingerpad.lif import LeakyIntegrateAndFire
-from fingerpad.noisy_lif import (
+from fingerpad.membrane_noise import (
     CorrelatedCurrentNoise,
     GainNoise,
     MembraneNoise,
     ThresholdNoise,
     WhiteCurrentNoise,
     log_spread,
-    noisy_spikes,
 )
+from fingerpad.noisy_lif import noisy_spikes
 from fingerpad.random_streams import Presentations, Purpose, normals
 from fingerpad.signals import CurrentTraces
 from fingerpad.spikes import interval_statistics

@@ -27,7 +27,8 @@ from fingerpad.blocks import in_blocks
 from fingerpad.checks import FloatArray, float_array, positive
 from fingerpad.errors import InputError
 from fingerpad.lif import LeakyIntegrateAndFire
-from fingerpad.random_streams import Presentations, Purpose, four_uniforms
+from fingerpad.philox import four_uniforms
+from fingerpad.random_streams import Presentations, Purpose
 from fingerpad.signals import CurrentTraces, SpikeTrains
 
 ESCAPE_TIME_MS = 1.0

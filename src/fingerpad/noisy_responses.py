@@ -16,7 +16,8 @@ from numba import njit
 from fingerpad.blocks import in_blocks
 from fingerpad.checks import FloatArray, whole
 from fingerpad.errors import InputError
-from fingerpad.random_streams import LARGEST_SEED, IntArray, Purpose, four_normals, normals
+from fingerpad.philox import four_normals
+from fingerpad.random_streams import LARGEST_SEED, IntArray, Purpose, normals
 
 SESSION = 2**32
 """Trials of one session. Sessions of one seed have no random number in common."""

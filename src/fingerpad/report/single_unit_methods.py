@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from fingerpad.parameters import paper
 from fingerpad.report.appearance import BLACK, BLUE, ORANGE, new_figure, numbers
 from fingerpad.report.tables import Row, Table
-from fingerpad.report.words import fixed, number, plain, whole_percent
+from fingerpad.report.words import ABSENT, fixed, number, plain, whole_percent
 
 PLACES = {
     "dynamic_flat": "ramp, flat face over the receptor",
@@ -86,12 +86,16 @@ def caption(section: Mapping[str, Any]) -> str:
     apart = max(known) - min(known) if known else None
     folds = [fold for row in rows for fold in row["fss_test"] if fold is not None]
     spread = max(folds) - min(folds) if folds else None
+    more = (
+        ": which positions are left out matters more than how the others are fitted"
+        if apart is not None and spread is not None and spread > apart
+        else ""
+    )
     return (
         "Methods of fitting one afferent on the same folds. (a) Fractional sum of squares (FSS) on the "
         "positions that a fold was fitted to, and on those that it left out. (b) How often each ran the "
         "model in all folds; times are in the benchmarks. The methods' means lie within "
-        f"{fixed(apart, 3)} of each other out of sample, the folds within {fixed(spread, 2)}: which "
-        "positions are left out matters more than how the others are fitted."
+        f"{fixed(apart, 3)} of each other out of sample, the folds within {fixed(spread, 2)}{more}."
     )
 
 
@@ -230,7 +234,7 @@ def _residuals(rows: Sequence[Mapping[str, Any]]) -> Table:
         Row(
             (
                 row["model"],
-                fixed(1.0 - row["fss_in_sample"], 3),
+                ABSENT if row["fss_in_sample"] is None else fixed(1.0 - row["fss_in_sample"], 3),
                 *(whole_percent(row["residual_share"][place]) for place in PLACES),
             )
         )

@@ -19,14 +19,14 @@ from fingerpad.blocks import in_blocks
 from fingerpad.checks import FloatArray
 from fingerpad.escape_rate import EscapeRate
 from fingerpad.lif import LeakyIntegrateAndFire
-from fingerpad.noisy_lif import (
+from fingerpad.membrane_noise import (
     CorrelatedCurrentNoise,
     GainNoise,
     MembraneNoise,
     ThresholdNoise,
     WhiteCurrentNoise,
-    noisy_spikes,
 )
+from fingerpad.noisy_lif import noisy_spikes
 from fingerpad.parameters import neuron
 from fingerpad.random_streams import Presentations
 from fingerpad.signals import CurrentTraces, SpikeTrains

@@ -26,13 +26,13 @@ from fingerpad.estimation.spike_parameters import (
     SPIKE_PARAMETER_NAMES,
     SPIKE_PARAMETER_UNITS,
 )
-from fingerpad.noisy_lif import (
+from fingerpad.membrane_noise import (
     CorrelatedCurrentNoise,
     MembraneNoise,
     ThresholdNoise,
     WhiteCurrentNoise,
-    noisy_spikes,
 )
+from fingerpad.noisy_lif import noisy_spikes
 from fingerpad.parameters import neuron, protocol
 from fingerpad.random_streams import Presentations
 from fingerpad.signals import SedTraces, SpikeTrains
