@@ -26,7 +26,7 @@ from fingerpad.report.appearance import (
 )
 from fingerpad.report.page import Chapter, Drawing, write_page
 from fingerpad.report.tables import Row, Table
-from fingerpad.report.words import fixed, joined, number, plain, whole_percent
+from fingerpad.report.words import ABSENT, fixed, joined, number, plain, whole_percent
 
 PAGE = "discriminate.html"
 CHANCE = 0.5
@@ -42,6 +42,7 @@ MEASURES = {
     "dynamic": ("dynamic rate", "spikes/s"),
     "latency": ("first-spike latency", "ms"),
 }
+SEVERAL = {"static": "static rates", "dynamic": "dynamic rates", "latency": "first-spike latencies"}
 _STYLES = (
     (BLUE, "o", "-"),
     (ORANGE, "s", (0, (6, 2))),
@@ -340,11 +341,12 @@ def summary(section: Mapping[str, Any]) -> list[str]:
     Examples
     --------
     >>> summary({
-    ...     "stimulus": ["287", "365"], "axis": "curvature [1/m]", "observed": None,
+    ...     "stimulus": ["287", "365"], "level": [287.0, 365.0], "axis": "curvature [1/m]",
     ...     "noise": {"sigma": 0.137, "fitted_to": None},
     ...     "readings": [{"code": "gradient_sum", "measure": "static", "hit_rate": [0.93], "curves": []}],
     ... })
-    ['Gradient Sum of static rates tells 365 from 287 in 93 % of trials, with noise σ₁ = 0.137.']
+    ['Gradient Sum of static rates tells 365 from 287 in 93 % of trials (curvature [1/m]), with noise
+    σ₁ = 0.137.']
     """
     main, noise = _main(section), section["noise"]
     standard, *others = section["stimulus"]
@@ -354,9 +356,11 @@ def summary(section: Mapping[str, Any]) -> list[str]:
         if noise["fitted_to"]
         else ""
     )
-    told = joined([f"{name} from {standard} in {rate}" for name, rate in rates])
+    (nearest, rate), *farther = rates
+    told = joined([f"{nearest} from {standard} in {rate}", *(f"{name} in {rate}" for name, rate in farther)])
+    of = "" if section["level"] is None else f" ({section['axis']})"
     found = [
-        f"{CODES[main['code']]} of {MEASURES[main['measure']][0]}s tells {told} of trials, with noise "
+        f"{CODES[main['code']]} of {SEVERAL[main['measure']]} tells {told} of trials{of}, with noise "
         f"σ₁ = {number(noise['sigma'])}{fitted}."
     ]
     return found + [_threshold_sentence(section, side) for side in main["curves"]]
@@ -417,6 +421,10 @@ def _name_axis(axes: Axes, section: Mapping[str, Any]) -> None:
         axes.set_xlabel("stimulus")
 
 
+def _with_error(value: float | None, error: float | None) -> str:
+    return ABSENT if value is None else f"{fixed(value, 3)} ± {fixed(error, 3)}"
+
+
 def _interval(ends: Sequence[float | None]) -> str:
     return " … ".join(number(end) for end in ends)
 
@@ -436,7 +444,9 @@ def _thresholds(section: Mapping[str, Any]) -> Table:
                     number(threshold["difference"]),
                     _interval(threshold["posterior_interval"]),
                     _interval(threshold["bootstrap_interval"]),
-                    whole_percent(threshold["over_standard"]),
+                    ABSENT
+                    if threshold["over_standard"] is None
+                    else whole_percent(threshold["over_standard"]),
                     number(side["slope"]),
                 ]
             rows.append(Row(cells))
@@ -457,7 +467,7 @@ def _hit_rates(section: Mapping[str, Any]) -> Table:
             (
                 _titled(reading),
                 *(
-                    f"{fixed(mean, 3)} ± {fixed(spread, 3)}"
+                    _with_error(mean, spread)
                     for mean, spread in zip(reading["hit_rate"], reading["hit_rate_sd"], strict=True)
                 ),
             )
@@ -480,7 +490,7 @@ def _efficiencies(section: Mapping[str, Any]) -> Table:
             (
                 _titled(reading),
                 *(
-                    f"{fixed(share, 3)} ± {fixed(error, 3)}"
+                    _with_error(share, error)
                     for share, error in zip(reading["efficiency"], reading["efficiency_error"], strict=True)
                 ),
             )
