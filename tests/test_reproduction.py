@@ -20,7 +20,7 @@ import pytest
 from fingerpad import __version__
 from fingerpad.compilation import NOTICE
 from fingerpad.parameters import all_published
-from fingerpad.report.page import CHAPTERS
+from fingerpad.report.page import CHAPTERS, METHODS
 from fingerpad.store import Store
 from fingerpad.studies.question_file import read_question
 from fingerpad.studies.question_stimuli import touches
@@ -53,7 +53,13 @@ BEYOND = {
 }
 """Sections that go beyond the paper, which a run at quick resolution leaves out unless asked."""
 
-DRAWINGS = [drawing for chapter in CHAPTERS if chapter.section not in BEYOND for drawing in chapter.drawings]
+DRAWINGS = [
+    drawing
+    for chapter in CHAPTERS
+    # Methods of fitting are part of the section of the afferent, where a run goes beyond the paper.
+    if chapter.section not in BEYOND | {METHODS}
+    for drawing in chapter.drawings
+]
 INDENTATIONS = 6 + 36 + 14 + 1
 
 
