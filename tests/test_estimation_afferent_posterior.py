@@ -1,8 +1,17 @@
-"""Recovery before real data: simulated afferents lie within their intervals as often as they should."""
+"""Recovery before real data, by simulation-based calibration: truths take every rank equally often.
+
+Truths are drawn from the prior and recordings from the likelihood's own noise, its unknown deviation and
+length included. Then the rank of a truth among draws from its posterior is uniform if prior and likelihood
+say what they claim (Talts, Betancourt, Simpson, Vehtari & Gelman 2018, arXiv:1804.06788). Ranks that crowd at
+the ends tell of intervals that are too narrow, ranks that crowd in the middle of some that are too wide.
+
+Any of a set of places that cover the prior is the truth. The posterior is then a weight for each place, is
+exact, and asks for no sampler. What the sampler draws is compared with importance sampling of its density.
+"""
 
 import numpy as np
 import pytest
-from scipy.stats import binom, chi2
+from scipy.stats import binom, chi2, multivariate_t, norm
 
 from fingerpad.errors import ConvergenceError, InputError
 from fingerpad.estimation.afferent_posterior import (
@@ -10,9 +19,11 @@ from fingerpad.estimation.afferent_posterior import (
     afferent_posterior,
     four_number_model,
     from_coordinates,
+    log_posterior,
     to_coordinates,
 )
-from fingerpad.estimation.rate_likelihood import RateLikelihood
+from fingerpad.estimation.many_rates import rates_of_each
+from fingerpad.estimation.rate_likelihood import LENGTHS_MM, RateLikelihood
 from fingerpad.estimation.rate_problem import AfferentModel
 from fingerpad.estimation.recordings import RateRecordings
 from fingerpad.fitting.posterior import credible_band
@@ -23,7 +34,16 @@ SHIFTS = np.linspace(0.0, 2.7, 10)
 PEAKS = 0.25 + 1.6 * np.exp(-(((SHIFTS - 1.4) / 0.7) ** 2)) + 0.4 * (SHIFTS < 1.0)
 TIMES = np.array([0.0, 15.0, 30.0, 40.0, 50.0, 60.0, 100.0, 200.0, 500.0, 1000.0])
 COURSE = np.where(TIMES <= 50.0, (TIMES / 50.0) ** 2, 0.75 + 0.25 * np.exp(-(TIMES - 50.0) / 150.0))
-MODEL = four_number_model(AfferentModel(drive(SedTraces(TIMES, COURSE[:, None] * PEAKS, [50.0]), pieces=3)))
+
+
+def under(peaks: np.ndarray):
+    """The model under stimuli of these peaks of energy density [kPa]."""
+    return four_number_model(
+        AfferentModel(drive(SedTraces(TIMES, COURSE[:, None] * peaks, [50.0]), pieces=3))
+    )
+
+
+MODEL = under(PEAKS)
 DEVIATIONS_HZ = {"dynamic": 8.0, "static": 2.0}
 PRIOR = AfferentPrior(
     resting_share_sd=0.3,
@@ -33,6 +53,14 @@ PRIOR = AfferentPrior(
     gain_factor=1.5,
     time_constant_factor=1.4,
 )
+# The same once more, by hand: truths come from these.
+CENTRE = np.array([0.0, np.log(5.0), np.log(0.03), np.log(50.0)])
+SPREAD = np.array([0.3, np.log(1.5), np.log(1.5), np.log(1.4)])
+COVER = 2.0
+EXPECTED_HZ = 10.0
+# Recorded rates end at 0, normal residuals do not: on a pedestal under prediction and recording none is cut.
+PEDESTAL_HZ = 1e6
+N_PLACES, N_DRAWS = 4000, 49
 EFFORT = {
     "n_walkers": 40,
     "n_steps": 32,
@@ -50,28 +78,107 @@ def simulated(four: np.ndarray, random: np.random.Generator) -> RateRecordings:
     return RateRecordings(tuple(f"{shift:g}" for shift in SHIFTS), *rates)
 
 
-def test_truth_lies_within_its_intervals_as_often_as_they_say() -> None:
-    """Truths drawn from the prior: of 8 afferents the 80 % intervals hold a binomial number."""
-    random = np.random.default_rng(11)
-    inside, distances = [], []
-    for data_set in range(8):
-        truth = PRIOR.centre + PRIOR.spread * random.normal(size=4)
-        likelihood = RateLikelihood(MODEL, simulated(from_coordinates(truth), random), deviation_hz=4.0)
-        posterior = afferent_posterior(
-            likelihood, from_coordinates(truth), seed=data_set, prior=PRIOR, **EFFORT
-        )
-        low, high = posterior.chains.interval(0.8)
-        inside.append((low <= truth) & (truth <= high))
-        off = truth - posterior.chains.mean
-        distances.append(off @ np.linalg.solve(posterior.chains.covariance, off))
-        # The recordings taught something: intervals are narrower than the prior's.
-        assert (high - low < 2.0 * 1.2816 * PRIOR.spread).all()
-    counts = np.sum(inside, axis=0)
-    # Outside of these numbers lies 1 % of the binomial law, for each of the four.
-    assert (counts >= binom.ppf(0.005, 8, 0.8)).all()
-    assert binom.ppf(0.005, 32, 0.8) <= counts.sum() <= binom.ppf(0.995, 32, 0.8)
-    # Nor is the truth farther off than draws are: squared distances in the posterior's own measure.
-    assert np.sum(distances) <= chi2.ppf(0.995, 32)
+@pytest.fixture(scope="module")
+def places():
+    """Coordinates that cover the prior twice as wide, their rates, and the log density of the cover."""
+    wide = CENTRE + COVER * SPREAD * np.random.default_rng(1).normal(size=(N_PLACES, 4))
+    wide = wide[wide[:, 0] < 1.0]
+    rates = rates_of_each(MODEL, from_coordinates(wide))
+    return wide, rates, norm.logpdf(wide, CENTRE, COVER * SPREAD).sum(axis=1)
+
+
+def noisy(
+    rates: list[np.ndarray], random: np.random.Generator, noise: float
+) -> tuple[RateRecordings, list[float]]:
+    """Rates with residuals of the likelihood's own law, and their deviations and lengths."""
+    distances = np.abs(SHIFTS[:, None] - SHIFTS)
+    deviations = EXPECTED_HZ / np.sqrt(random.chisquare(1.0, size=2))
+    lengths = random.choice(LENGTHS_MM, size=2)
+    observed = []
+    for rate, deviation, length in zip(rates, deviations, lengths, strict=True):
+        correlation = np.exp(-distances / length) if length else np.eye(SHIFTS.size)
+        residuals = np.linalg.cholesky(correlation) @ random.normal(size=SHIFTS.size)
+        observed.append(np.maximum(rate + noise * deviation * residuals, 0.0))
+    return RateRecordings(tuple(map(str, SHIFTS)), *observed), [*deviations, *lengths]
+
+
+def ranks(
+    places, n_recordings: int, width: float = 1.0, noise: float = 1.0, pedestal_hz: float = PEDESTAL_HZ
+) -> np.ndarray:
+    """Ranks, 0 to 1, of four coordinates, two deviations, two lengths (n_recordings, 8).
+
+    Truths spread `width` times as far as the prior says, and noise is `noise` times what it says it is.
+    """
+    wide, rates, log_cover = places
+    rates = [rate + pedestal_hz for rate in rates]
+    random = np.random.default_rng(2)
+    of_truth = np.exp(norm.logpdf(wide, CENTRE, width * SPREAD).sum(axis=1) - log_cover)
+    log_prior = PRIOR.log_density(wide) - log_cover
+    found = np.empty((n_recordings, 8))
+    for row in found:
+        truth = random.choice(len(wide), p=of_truth / of_truth.sum())
+        recordings, true_values = noisy([rate[truth] for rate in rates], random, noise)
+        likelihood = RateLikelihood(MODEL, recordings, SHIFTS, deviation_hz=EXPECTED_HZ)
+        heights = log_prior + likelihood.log_likelihood_of_rates(*rates)
+        weights = np.exp(heights - heights.max())
+        weights /= weights.sum()
+        row[:4] = weights @ (wide < wide[truth]) + random.uniform(size=4) * weights[truth]
+        some = random.choice(len(wide), size=N_DRAWS, p=weights)
+        drawn = likelihood.residual_draws_of_rates(*(rate[some] for rate in rates), random).values()
+        values = np.array([*(phase.deviation_hz for phase in drawn), *(phase.length_mm for phase in drawn)])
+        below, ties = ((sign == np.sign(values.T - true_values)).sum(axis=0) for sign in (-1, 0))
+        row[4:] = (below + random.uniform(size=4) * (ties + 1)) / (N_DRAWS + 1)
+    return found
+
+
+def calibrated(found: np.ndarray) -> tuple[bool, bool]:
+    """Whether ranks are uniform, and whether 80 % intervals hold neither too few truths nor too many.
+
+    One in a hundred sets of eight ranks would be refused by chance, on either ground.
+    """
+    n, chance = len(found), 0.01 / found.shape[1]
+    counts = np.array([np.histogram(column, bins=10, range=(0.0, 1.0))[0] for column in found.T])
+    statistics = ((counts - n / 10.0) ** 2 / (n / 10.0)).sum(axis=1)
+    held = (np.abs(found - 0.5) < 0.4).sum(axis=0)
+    fewest, most = binom.ppf([chance / 2.0, 1.0 - chance / 2.0], n, 0.8)
+    return bool((statistics < chi2.ppf(1.0 - chance, 9)).all()), bool(
+        ((fewest <= held) & (held <= most)).all()
+    )
+
+
+def test_truths_take_every_rank_and_lie_within_their_intervals_as_often_as_they_say(places) -> None:
+    assert calibrated(ranks(places, n_recordings=300)) == (True, True)
+
+
+@pytest.mark.parametrize(("width", "noise"), [(2.0, 1.0), (0.4, 1.0), (1.0, 1.5), (1.0, 1.0 / 1.5)])
+def test_calibration_sees_what_is_too_narrow_and_what_is_too_wide(places, width, noise) -> None:
+    assert calibrated(ranks(places, 100, width, noise)) == (False, False)
+
+
+def test_rates_that_end_at_zero_make_intervals_somewhat_too_narrow(places) -> None:
+    """A known departure, docs/decisions/likelihood-of-rates.md: whoever mends it will see it here."""
+    held = (np.abs(ranks(places, 300, pedestal_hz=0.0)[:, :4] - 0.5) < 0.4).mean()
+    assert 0.70 < held < 0.78
+
+
+def test_walkers_draw_what_importance_sampling_finds() -> None:
+    """Means and spreads agree within four of their errors, of a wide density; walkers start far off."""
+    two = RateRecordings(("low", "high"), [60.0, 150.0], [20.0, 50.0])
+    likelihood = RateLikelihood(under(np.array([0.6, 1.7])), two, deviation_hz=4.0)
+    start = from_coordinates(PRIOR.centre + 2.0 * PRIOR.spread * [-1.0, 1.0, 1.0, 1.0])
+    chains = afferent_posterior(
+        likelihood, start, seed=0, prior=PRIOR, **EFFORT | {"smallest_effective_size": 500.0}
+    ).chains
+    proposal = multivariate_t(chains.mean, 1.5 * chains.covariance, df=5, seed=np.random.default_rng(3))
+    points = proposal.rvs(4000)
+    heights = log_posterior(likelihood, PRIOR)(points) - proposal.logpdf(points)
+    weights = np.exp(heights - heights.max())
+    weights /= weights.sum()
+    mean = weights @ points
+    spread = np.sqrt(weights @ (points - mean) ** 2)
+    four_errors = 4.0 * np.sqrt(1.0 / chains.effective_sizes + (weights**2).sum())
+    np.testing.assert_array_less(np.abs(chains.mean - mean) / spread, four_errors)
+    np.testing.assert_array_less(np.abs(chains.flat.std(axis=0) / spread - 1.0), four_errors)
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +191,12 @@ def one_posterior():
 def test_draws_bands_and_deviations_belong_together(one_posterior) -> None:
     likelihood, posterior = one_posterior
     np.testing.assert_array_equal(posterior.four, from_coordinates(posterior.chains.flat))
+    heights = log_posterior(likelihood, AfferentPrior())(posterior.chains.flat[::500])
+    np.testing.assert_allclose(posterior.chains.log_densities.ravel()[::500], heights, rtol=1e-9)
     assert (posterior.four[:, 0] * posterior.four[:, 3] < 1.0).all()
+    # The recordings taught something: intervals are narrower than the prior's.
+    width = np.diff(posterior.chains.interval(0.8), axis=0)[0]
+    assert (width < 2.0 * norm.ppf(0.9) * AfferentPrior().spread).all()
     six = posterior.six(6.0e-7, 30.0)
     np.testing.assert_allclose(six[:, 0] / (6.0e-7 * 30.0), posterior.four[:, 0], rtol=1e-12)
     for phase, truth_hz in DEVIATIONS_HZ.items():
@@ -118,7 +230,7 @@ def test_coordinates_go_there_and_back() -> None:
 
 def test_the_prior_is_centred_on_the_papers_start_and_silent_at_rest() -> None:
     prior = AfferentPrior()
-    np.testing.assert_allclose(np.exp(prior.centre[1:]), [4.8, 0.014, 68.0], rtol=1e-12)
+    np.testing.assert_allclose(np.exp(prior.centre[1:]), [4.8, 0.042, 68.0], rtol=1e-12)
     one_off = prior.centre + np.diag(prior.spread) * -1.0
     np.testing.assert_allclose(prior.log_density(one_off), prior.log_density(prior.centre) - 0.5, rtol=1e-12)
     fires_at_rest = prior.centre + np.eye(4)[0]

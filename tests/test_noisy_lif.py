@@ -215,7 +215,7 @@ def test_each_source_draws_its_own_numbers():
         (lambda: noisy_spikes(NEURON, steady(1.0), 0.1, SEED), "noise must be of type MembraneNoise"),
         (
             lambda: noisy_spikes(NEURON, steady(1.0), MembraneNoise(), SEED, Presentations([1], [0], [0])),
-            "presentations must name sites within 0 ... 0: got 1",
+            "sites must be within 0 ... 0: got 1",
         ),
         (lambda: Presentations([0, 0], [0, 0], [3, 3]), "another trial for each train of a receptor"),
         (lambda: Presentations([0, 0], [0], [3]), "one site, trial and receptor per train"),

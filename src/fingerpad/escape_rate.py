@@ -28,7 +28,7 @@ from fingerpad.checks import FloatArray, float_array, positive
 from fingerpad.errors import InputError
 from fingerpad.lif import LeakyIntegrateAndFire
 from fingerpad.philox import four_uniforms
-from fingerpad.random_streams import Presentations, Purpose
+from fingerpad.random_streams import Presentations, Purpose, checked_sites
 from fingerpad.signals import CurrentTraces, SpikeTrains
 
 ESCAPE_TIME_MS = 1.0
@@ -131,7 +131,7 @@ class EscapeRate:
             If a presentation names a site that is not there.
         """
         everyone = presentations or Presentations.of_population(current.n_sites)
-        _check_sites(everyone.sites, current.n_sites)
+        checked_sites(everyone.sites, current.n_sites)
         drives = self._relative_drive(current)
         numbers = (
             float(self.membrane.time_constant_ms),
@@ -173,7 +173,7 @@ class EscapeRate:
         InputError
             If shapes disagree or a time lies outside.
         """
-        chosen = _check_sites(np.asarray(sites, np.int64), current.n_sites)
+        chosen = checked_sites(np.asarray(sites, np.int64), current.n_sites)
         wanted = float_array("times_ms", times_ms, 1)
         first, last = current.times_ms[0], current.times_ms[-1]
         if chosen.size != len(spikes):
@@ -197,12 +197,6 @@ class EscapeRate:
         """I/(C v), a row for each site. [1/ms]"""
         scale = self.membrane.capacitance_mf * self.membrane.threshold_mv
         return np.ascontiguousarray(current.current_ma.T) / scale
-
-
-def _check_sites(sites: np.ndarray, n_sites: int) -> np.ndarray:
-    if sites.size and (sites.min() < 0 or sites.max() >= n_sites):
-        raise InputError(f"sites must be within 0 ... {n_sites - 1}: got {sites.min()} ... {sites.max()}.")
-    return sites
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -21,7 +21,6 @@ from numba import njit
 
 from fingerpad.blocks import in_blocks
 from fingerpad.checks import FloatArray, finite, instance
-from fingerpad.errors import InputError
 from fingerpad.exact_spikes import first_crossing
 from fingerpad.lif import LeakyIntegrateAndFire
 from fingerpad.membrane_noise import (
@@ -31,7 +30,7 @@ from fingerpad.membrane_noise import (
     log_spread,
 )
 from fingerpad.philox import four_normals
-from fingerpad.random_streams import Presentations, Purpose
+from fingerpad.random_streams import Presentations, Purpose, checked_sites
 from fingerpad.signals import CurrentTraces, SpikeTrains
 
 TRAINS_PER_BLOCK = 32
@@ -86,10 +85,7 @@ def noisy_spikes(
     """
     instance("noise", noise, MembraneNoise)
     everyone = presentations or Presentations.of_population(current.n_sites)
-    if everyone.sites.max(initial=0) >= current.n_sites:
-        raise InputError(
-            f"presentations must name sites within 0 ... {current.n_sites - 1}: got {everyone.sites.max()}."
-        )
+    checked_sites(everyone.sites, current.n_sites)
     resting = finite("intercept_ma", intercept_ma, "mA")
     gains = noise.gain.factors(seed, everyone) if noise.gain else np.ones(len(everyone))
     # A train runs through its own row: neighbours in time must be neighbours in memory.

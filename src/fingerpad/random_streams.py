@@ -129,6 +129,35 @@ class Presentations:
         return Presentations(self.sites[trains], self.trials[trains], self.receptors[trains])
 
 
+def checked_sites(sites: IntArray, n_sites: int) -> IntArray:
+    """Return the sites that trains answer if a current has as many columns, else raise `InputError`.
+
+    Parameters
+    ----------
+    sites : int array (n_trains,)
+        Of presentations, or chosen by the user.
+    n_sites : int
+        Columns that there are.
+
+    Returns
+    -------
+    int array (n_trains,)
+
+    Raises
+    ------
+    InputError
+        If one lies outside.
+
+    Examples
+    --------
+    >>> checked_sites(np.array([1, 0, 1]), n_sites=2).tolist()
+    [1, 0, 1]
+    """
+    if sites.size and (sites.min() < 0 or sites.max() >= n_sites):
+        raise InputError(f"sites must be within 0 ... {n_sites - 1}: got {sites.min()} ... {sites.max()}.")
+    return sites
+
+
 def generator(seed: int, trial: int, receptor: int, purpose: Purpose) -> np.random.Generator:
     """Make NumPy's generator of one stream.
 

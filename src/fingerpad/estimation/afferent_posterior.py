@@ -39,7 +39,7 @@ _START = identifiable(
     [
         neuron.INTERCEPT_START.value,
         neuron.DYNAMIC_GAIN_SCALE.value * neuron.DYNAMIC_GAIN_START_1.value,
-        neuron.STATIC_GAIN_START_1.value,
+        neuron.STATIC_GAIN_SCALE.value * neuron.STATIC_GAIN_START_1.value,
         neuron.TIME_CONSTANT.value,
         neuron.CAPACITANCE.value,
         neuron.THRESHOLD.value,
@@ -98,8 +98,8 @@ def four_number_model(model: RateModel) -> Reparametrised:
 class AfferentPrior:
     """What is believed of an afferent before it is recorded, weak enough for the recordings to decide.
 
-    The potential at rest is normal about 0; gains and time constant are log-normal about the paper's start
-    point. See docs/decisions/priors.md.
+    The potential at rest is normal about 0; gains and time constant are log-normal about the start point of
+    fits, the paper's first one with its gains rescaled. See docs/decisions/priors.md.
 
     Parameters
     ----------

@@ -132,9 +132,26 @@ class RateLikelihood:
         -------
         array (n_points,)
         """
+        return self.log_likelihood_of_rates(*rates_of_each(self.model, points))
+
+    def log_likelihood_of_rates(self, dynamic_hz: FloatArray, static_hz: FloatArray) -> FloatArray:
+        """Log likelihood as above, where the rates that points predict are known already.
+
+        Parameters
+        ----------
+        dynamic_hz, static_hz : array (n_points, n_stimuli)
+            Predicted rates; those of a phase that was not recorded have no part. [spikes/s]
+
+        Returns
+        -------
+        array (n_points,)
+        """
         return sum(
-            (logsumexp(self._log_shares(squares), axis=1) for _, _, squares in self._phases(points)),
-            start=np.zeros(len(points)),
+            (
+                logsumexp(self._log_shares(squares), axis=1)
+                for _, _, squares in self._phases(dynamic_hz, static_hz)
+            ),
+            start=np.zeros(len(dynamic_hz)),
         )
 
     def residual_draws(self, points: FloatArray, random: np.random.Generator) -> dict[str, ResidualDraws]:
@@ -152,9 +169,28 @@ class RateLikelihood:
         dict of str to ResidualDraws
             By phase.
         """
+        return self.residual_draws_of_rates(*rates_of_each(self.model, points), random)
+
+    def residual_draws_of_rates(
+        self, dynamic_hz: FloatArray, static_hz: FloatArray, random: np.random.Generator
+    ) -> dict[str, ResidualDraws]:
+        """Draw as above, where the rates that points predict are known already.
+
+        Parameters
+        ----------
+        dynamic_hz, static_hz : array (n_points, n_stimuli)
+            Predicted rates. [spikes/s]
+        random : Generator
+            Source of the random numbers.
+
+        Returns
+        -------
+        dict of str to ResidualDraws
+            By phase.
+        """
         return {
             phase: self._residuals_of(predicted, squares, random)
-            for phase, predicted, squares in self._phases(points)
+            for phase, predicted, squares in self._phases(dynamic_hz, static_hz)
         }
 
     def _residuals_of(
@@ -169,9 +205,11 @@ class RateLikelihood:
         new = np.maximum(predicted + deviation[:, None] * random.normal(size=predicted.shape), 0.0)
         return ResidualDraws(predicted, new, deviation, np.array(self.lengths_mm)[which])
 
-    def _phases(self, points: FloatArray) -> Iterator[tuple[str, FloatArray, FloatArray]]:
+    def _phases(
+        self, dynamic_hz: FloatArray, static_hz: FloatArray
+    ) -> Iterator[tuple[str, FloatArray, FloatArray]]:
         """Name, predicted rates (n_points, n_stimuli) and q (n_points, n_lengths) of each recorded phase."""
-        predicted = dict(zip(("dynamic", "static"), rates_of_each(self.model, points), strict=True))
+        predicted = {"dynamic": dynamic_hz, "static": static_hz}
         for phase in self.phases:
             residuals = getattr(self.recordings, f"{phase}_rate_hz") - predicted[phase]
             white = residuals @ np.swapaxes(self._whitening, 1, 2)  # (n_lengths, n_points, n_stimuli)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import norm, qmc
 
 from fingerpad.checks import FloatArray
-from fingerpad.estimation.afferent_posterior import START_SPREAD, from_coordinates, to_coordinates
+from fingerpad.estimation.afferent_posterior import from_coordinates, to_coordinates
 from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.estimation.many_rates import scores_of_each
 from fingerpad.estimation.rate_likelihood import RateLikelihood
@@ -27,6 +27,9 @@ SEEDS_OF_PROFILES = 300
 
 CLOUDS, POINTS_OF_CLOUD, BEST_POINTS, MOST_LOSS = 5, 1200, 150, 4.0
 """Of `likely_points`: nine draws of ten from a posterior of four numbers lose less than that."""
+
+FIRST_CLOUD = (0.05, 0.4, 0.2, 0.5)
+"""Standard deviations of the first cloud of `likely_points`, in the coordinates of the posterior."""
 
 SENSITIVITY_SHARE = 0.25
 """Sobol's ranges reach from this share below the fit to this share above. [1]"""
@@ -83,7 +86,7 @@ def likely_points(likelihood: RateLikelihood, four: ArrayLike) -> FloatArray:
     array (n_points, 4)
         Points whose log likelihood is less than the highest one by `MOST_LOSS` at most.
     """
-    middle, reach = to_coordinates(four), np.diag(START_SPREAD)
+    middle, reach = to_coordinates(four), np.diag(FIRST_CLOUD)
     design = norm.ppf(qmc.Halton(middle.size, scramble=False).random(CLOUDS * POINTS_OF_CLOUD + 1)[1:])
     points, heights = middle[None], likelihood.log_likelihood(from_coordinates(middle[None]))
     for offsets in np.split(design, CLOUDS):

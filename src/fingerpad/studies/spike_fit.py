@@ -33,10 +33,10 @@ from fingerpad.membrane_noise import (
     WhiteCurrentNoise,
 )
 from fingerpad.noisy_lif import noisy_spikes
-from fingerpad.parameters import neuron, protocol
+from fingerpad.parameters import protocol
 from fingerpad.random_streams import Presentations
 from fingerpad.signals import SedTraces, SpikeTrains
-from fingerpad.studies import interval_variability, single_unit_starts
+from fingerpad.studies import interval_variability, single_unit
 from fingerpad.studies.interval_variability import CORRELATION_MS, SOFT_THRESHOLD, STEP_MS
 from fingerpad.transduction import Drive, drive
 from fingerpad.units import MS_PER_S
@@ -59,15 +59,14 @@ SHOWN_STEP_MS = 0.5
 
 
 def start() -> FloatArray:
-    """Return where every fit begins: the paper's first start point, its dynamic gain rescaled, and soft.
+    """Return where every fit begins: the paper's first start point, its gains rescaled, and soft.
 
     Returns
     -------
     array (5,)
         In the order of `fingerpad.estimation.spike_parameters.SPIKE_PARAMETER_NAMES`.
     """
-    paper = single_unit_starts.scaled_start(1, 1.0, neuron.DYNAMIC_GAIN_SCALE.value)
-    return np.array([*identifiable(paper), START_WIDTH])
+    return np.array([*identifiable(single_unit.start_points()[0]), START_WIDTH])
 
 
 def truth(driven: Drive, afferent: Afferent, seed: int) -> FloatArray:
