@@ -169,7 +169,7 @@ def test_sets_are_fitted_alike_alone_and_together():
 @pytest.fixture(scope="module")
 def fits():
     """200 fits of simulated data with one truth, lapses looked for."""
-    return [fit_psychometric(LEVELS, counts, [TRIALS] * 7) for counts in judged(TRUTH, 200, seed=77)]
+    return [fit_psychometric(LEVELS, counts, [TRIALS] * 7) for counts in judged(TRUTH, 200, seed=78)]
 
 
 def test_fits_recover_the_truth_on_average(fits):
@@ -193,13 +193,13 @@ def held(cloud: FunctionCloud) -> tuple[bool, bool, bool]:
 
 def test_posterior_intervals_hold_the_truth_as_often_as_they_say(fits):
     covered = np.mean([held(posterior(fit)) for fit in fits], axis=0)
-    assert ((covered >= 0.90) & (covered <= 0.99)).all(), covered
+    assert ((covered >= 0.90) & (covered <= 0.98)).all(), covered
 
 
 def test_bootstrap_intervals_hold_the_truth_as_often_as_they_say():
     covered = np.mean(
         [
-            held(bootstrap(fit_psychometric(LEVELS, counts, [TRIALS] * 7, lapse=0.02), seed, 200))
+            held(bootstrap(fit_psychometric(LEVELS, counts, [TRIALS] * 7, lapse=0.02), seed, 120))
             for seed, counts in enumerate(judged(TRUTH, 200, seed=78))
         ],
         axis=0,
@@ -256,8 +256,8 @@ def test_overdispersion_is_found_and_widens_intervals():
 
 def test_deviance_of_true_data_is_uniform_and_of_a_wrong_shape_is_not():
     p_values = [
-        goodness_of_fit(fit_psychometric(LEVELS, counts, [TRIALS] * 7), seed, 200).p_value
-        for seed, counts in enumerate(judged(TRUTH, 60, seed=21))
+        goodness_of_fit(fit_psychometric(LEVELS, counts, [TRIALS] * 7, lapse=0.02), seed, 100).p_value
+        for seed, counts in enumerate(judged(TRUTH, 50, seed=21))
     ]
     assert stats.kstest(p_values, "uniform").pvalue > 0.01
     rate = np.array([0.5, 0.5, 0.95, 0.55, 0.6, 0.95, 0.95])
@@ -270,15 +270,14 @@ def test_deviance_of_true_data_is_uniform_and_of_a_wrong_shape_is_not():
 
 def test_thresholds_agree_with_psignifit():
     psignifit = pytest.importorskip("psignifit")
-    for name, oracle_name in (("normal", "norm"), ("weibull", "weibull")):
-        counts = judged(TRUTH, 1, seed=31)[0]
+    for counts in judged(TRUTH, 2, seed=31):
         data = np.stack([LEVELS, counts, np.full(7, TRIALS)], axis=1)
-        oracle = psignifit.psignifit(data, sigmoid=oracle_name, experiment_type="2AFC")
-        fit = fit_psychometric(LEVELS, counts, [TRIALS] * 7, sigmoid=name)
+        oracle = psignifit.psignifit(data, sigmoid="norm", experiment_type="2AFC")
         expected = float(oracle.threshold(0.75, return_ci=False))
-        cloud = posterior(fit)
-        lower, upper = cloud.threshold_interval(0.75)
-        assert abs(fit.threshold(0.75) - expected) < 0.1 * (upper - lower), name
+        fit = fit_psychometric(LEVELS, counts, [TRIALS] * 7)
+        lower, upper = posterior(fit).threshold_interval(0.75)
+        # Its priors on lapse rate and width are others: a tenth of the interval.
+        assert abs(fit.threshold(0.75) - expected) < 0.1 * (upper - lower)
 
 
 @pytest.mark.parametrize(

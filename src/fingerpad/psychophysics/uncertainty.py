@@ -34,7 +34,7 @@ from fingerpad.psychophysics.psychometric import PsychometricFit
 from fingerpad.random_streams import Purpose, uniforms
 
 COARSE_POINTS = 21
-FINE_POINTS = {1: (401,), 2: (81, 81), 3: (51, 41, 17), 4: (31, 27, 13, 13), 5: (21, 19, 9, 9, 9)}
+FINE_POINTS = {1: (401,), 2: (81, 81), 3: (41, 35, 13), 4: (31, 27, 13, 13), 5: (21, 19, 9, 9, 9)}
 """Points of the fine grid along each fitted parameter, by how many there are."""
 
 NEGLIGIBLE = 1e-5
@@ -295,7 +295,7 @@ def posterior(fit: PsychometricFit) -> FunctionCloud:
         lower, upper = _where_it_is(axes, weights, lower, upper)
     axes, weights = _grid_posterior(fit, lower, upper, FINE_POINTS[n_free])
     points = _grid_points(model, axes)
-    kept = weights.ravel() > NEGLIGIBLE * weights.max() * 1e-3
+    kept = weights.ravel() > 0.1 * NEGLIGIBLE * weights.max()
     return _cloud(fit, points[kept], weights.ravel()[kept] / weights.ravel()[kept].sum())
 
 
