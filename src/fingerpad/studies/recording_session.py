@@ -24,7 +24,7 @@ from fingerpad.fitting.problem import IntArray
 from fingerpad.grading import Grading, covering
 from fingerpad.indentation import Touch, touch_of
 from fingerpad.indenter_grading import grading_about
-from fingerpad.indenters import FlatPunch, Line, Sphere
+from fingerpad.indenters import Bar, FlatPunch, Line, Sphere
 from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.reference import bar_firing_rates
 from fingerpad.signals import STORED_ENERGY
@@ -186,7 +186,9 @@ def _grading(stimulus: TactileStimulus, conditions: Conditions) -> Grading:
     indenter, spin_deg = stimulus.indenter, stimulus.spin_deg
     is_round = isinstance(indenter, Sphere | FlatPunch)
     grading = conditions.sphere_grading() if is_round else conditions.bar_grading()
-    if not is_round and (indenter.edge_reach_mm > 0.0 or spin_deg != 0.0):
+    # The bar of the paper keeps the mesh of the reproduction, whose touches are then those of a fit.
+    as_reproduced = isinstance(indenter, Bar) and spin_deg == 0.0
+    if not (is_round or as_reproduced) and (indenter.edge_reach_mm > 0.0 or spin_deg != 0.0):
         about = grading_about(indenter, conditions.resolution, RECEPTOR_X_MM, stimulus.z_mm, spin_deg)
         grading = covering([grading, about])
     return replace(grading, full=True) if stimulus.z_mm != 0.0 else grading
