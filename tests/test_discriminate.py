@@ -269,7 +269,10 @@ def test_curves_show_every_code_people_with_their_intervals_and_thresholds():
 def test_maps_leave_out_who_has_no_latency():
     question = asked(measure="latency", code="gradient_sum")
     skins = bumps(question) | {"240": NearOnly(240.0)}
-    assert report.draw_responses(plain(result(question, skins)))
+    found = plain(result(question, skins))
+    known = [latency for row in found["responses"]["latency"] for latency in row if latency is not None]
+    colours = report.draw_responses(found).axes[0].collections[0]
+    assert colours.get_clim() == (min(known), max(known))
 
 
 # The ideal observer
