@@ -151,6 +151,27 @@ def test_a_threshold_out_of_reach_is_said_and_costs_only_its_own_row(found):
     assert "No sphere" in page.tables(loud)[0].note
 
 
+def test_receptors_that_are_silent_under_a_standard_tell_its_threshold_nothing():
+    at = np.geomspace(100.0, 700.0, 200)
+    rates = np.outer((at / 287.0) ** 0.7, POPULATION.positions_mm[:, 1] ** 2 + 20.0)
+    with_silent = np.hstack([rates, np.zeros((200, 1))])
+    draws = np.hstack([DRAWS, DRAWS[:, :1]])
+    observer = study.Observer(study.interpolated(at, with_silent), PAIRS, 0.03, draws)
+    found, expected = (study.threshold_at(one, 287.0) for one in (observer, proportional(0.7)))
+    assert found["ideal_weber_fraction"] == pytest.approx(expected["ideal_weber_fraction"], rel=1e-9)
+    assert found["jnd_per_m"] == pytest.approx(expected["jnd_per_m"], rel=1e-9)
+
+
+def test_noise_that_meets_no_person_is_said_where_thresholds_would_stand():
+    same = plain(study.result(dict.fromkeys(SKINS, BallSkin(287.0)), AFFERENT, 0.06, seed=0))
+    paper, square = same["populations"]
+    assert len(paper["without_threshold"]) == 4
+    assert square["noise_sigma"] is None
+    assert "No noise within" in square["without_threshold"][0]["why_not"]
+    assert png(page.draw, same)[:4] == b"\x89PNG"
+    assert page.caption(same)
+
+
 def test_weber_rows_are_judged_in_whole_per_cent(found):
     assert study.weber_rows(None) == []
     section = {**found, "populations": [dict(found["populations"][0])]}

@@ -153,29 +153,40 @@ def _thresholds_of(
     neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
     static = np.array([population.respond(responses[c]).static_rate_hz for c in curvatures.tolist()])
     draws = normals(seed, 1, len(population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
-    if noise_sigma is None:
-        spheres = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
-        table = static[[int(np.flatnonzero(curvatures == sphere)[0]) for sphere in spheres]]
-        noise_sigma = fit_noise_sigma(
-            lambda sigma: expected_hit_rates(table, neighbours, sigma, draws)
-        ).noise_sigma
-    observer = Observer(interpolated(curvatures, static), neighbours, noise_sigma, draws)
     found: list[dict[str, Any]] = []
     missed: list[dict[str, Any]] = []
-    for standard in STANDARDS_PER_M:
+    try:
+        noise = _fitted_noise(curvatures, static, neighbours, draws) if noise_sigma is None else noise_sigma
+    except ConvergenceError as error:
+        noise, missed = math.nan, [{"standard_per_m": None, "why_not": _first_line(error)}]
+    observer = Observer(interpolated(curvatures, static), neighbours, noise, draws)
+    for standard in STANDARDS_PER_M if math.isfinite(noise) else ():
         try:
             found.append(threshold_at(observer, standard))
         except ConvergenceError as error:
-            missed.append({"standard_per_m": standard, "why_not": str(error).splitlines()[0]})
+            missed.append({"standard_per_m": standard, "why_not": _first_line(error)})
     return {
         "layout": name,
         "rows": LAYOUTS[name][0],
         "columns": LAYOUTS[name][1],
-        "noise_sigma": noise_sigma,
+        "noise_sigma": noise,
         "gradient_sum": gradient_sum(static, neighbours),
         "standards": found,
         "without_threshold": missed,
     }
+
+
+def _fitted_noise(
+    curvatures: FloatArray, static: FloatArray, neighbours: np.ndarray, draws: FloatArray
+) -> float:
+    """Noise with which a population meets Goodwin's two points."""
+    spheres = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
+    table = static[[int(np.flatnonzero(curvatures == sphere)[0]) for sphere in spheres]]
+    return fit_noise_sigma(lambda sigma: expected_hit_rates(table, neighbours, sigma, draws)).noise_sigma
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).splitlines()[0]
 
 
 def weber_rows(section: Mapping[str, Any] | None) -> list[ClaimRow]:
@@ -273,17 +284,16 @@ def threshold_at(observer: Observer, standard_per_m: float) -> dict[str, Any]:
             f"No sphere up to {farthest:g} /m is told from {standard_per_m:g} /m in {PROPORTION:.0%} of "
             "trials: press spheres that are more curved, or lower the noise."
         )
-    nearest = 1.001 * standard_per_m
-    jnd_per_m = float(brentq(missing, nearest, farthest, xtol=1e-3)) - standard_per_m
+    jnd_per_m = float(brentq(missing, standard_per_m, farthest, xtol=1e-3)) - standard_per_m
 
     steps = np.array([step for step in STEPS if standard_per_m * (1.0 + step) <= farthest])
     hit_rate = np.array([observer.hit_rate(standard_per_m, standard_per_m * (1.0 + step)) for step in steps])
     counts = np.round(JUDGEMENTS * hit_rate)
     fit = fit_psychometric(steps, counts, np.full(steps.size, JUDGEMENTS), sigmoid="weibull", lapse=0.0)
     at = np.linspace(0.0, 1.05 * steps[-1], 61)[1:]
-    information = gaussian_information(
-        observer.responses(standard_per_m), observer.slopes(standard_per_m), observer.noise_sigma
-    )
+    rates, slopes = observer.responses(standard_per_m), observer.slopes(standard_per_m)
+    heard = rates > 0.0  # noise that multiplies silence is none: docs/decisions/ideal-observer.md
+    information = gaussian_information(rates[heard], slopes[heard], observer.noise_sigma)
     ideal_jnd_per_m = d_prime_of_proportion(PROPORTION, yes_no) / np.sqrt(information)
     return {
         "standard_per_m": standard_per_m,
@@ -330,7 +340,7 @@ def interpolation_errors(
                 "curvature_per_m": float(curvature_per_m[row]),
                 "pressed": float(sums[row]),
                 "foretold": foretold,
-                "error_per_m": float((foretold - sums[row]) / rise[row]),
+                "error_per_m": float((foretold - sums[row]) / rise[row]) if rise[row] else math.nan,
             }
         )
     return found
