@@ -9,7 +9,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.report.appearance import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, new_figure, numbers
+from fingerpad.report.appearance import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PALE,
+    new_figure,
+    numbers,
+    say_nothing_to_draw,
+)
 from fingerpad.report.tables import UNBROKEN, Row, Table
 from fingerpad.report.words import fixed, number, plain
 
@@ -85,6 +95,9 @@ def _fractions(axes: Axes, section: Mapping[str, Any]) -> None:
 
 def _curves(axes: Axes, section: Mapping[str, Any]) -> None:
     standards = section["populations"][0]["standards"]
+    if not standards:
+        say_nothing_to_draw(axes, "no sphere is told from any standard")
+        return
     axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)))
     axes.axhline(PER_CENT * float(numbers(section["proportion"])), color=GREY, linewidth=0.8)
     for entry, style in zip(standards, _cycled(len(standards)), strict=True):
