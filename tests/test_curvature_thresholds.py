@@ -14,6 +14,7 @@ from fingerpad.random_streams import Purpose, normals
 from fingerpad.report import curvature_thresholds as page
 from fingerpad.report.appearance import png
 from fingerpad.signals import SedTraces
+from fingerpad.studies import code_efficiency
 from fingerpad.studies import curvature_thresholds as study
 from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.studies.reproduction import plain
@@ -122,13 +123,15 @@ def test_no_code_is_more_efficient_than_the_ideal_observer(found):
 
 
 def test_silent_receptors_are_left_out_of_efficiencies():
-    curvatures = np.array(study.EFFICIENCY_PAIR_PER_M)
+    curvatures = np.array(code_efficiency.PAIR_PER_M)
     static = np.array([[30.0, 0.0, 20.0, 10.0], [33.0, 0.0, 21.0, 9.0]])
     latency = np.array([[10.0, np.nan, 12.0, 30.0], [10.0, 70.0, 11.0, 33.0]])
     pairs = np.array([[0, 1], [1, 2], [0, 3]])
-    rows = study.efficiencies(curvatures, {"static": static, "latency": latency}, pairs, 0.1, seed=0)
+    rows = code_efficiency.efficiencies(
+        curvatures, {"static": static, "latency": latency}, pairs, 0.1, seed=0
+    )
     assert [row["receptors"] for row in rows] == [3, 3, 3, 3, 4, 4]
-    alone = study.efficiencies(
+    alone = code_efficiency.efficiencies(
         curvatures, {"static": static, "latency": latency[:, [0, 3]]}, np.array([[0, 1]]), 0.1, seed=0
     )
     # Of the pairs of latencies only that of receptors 0 and 3 has both.
