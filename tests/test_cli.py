@@ -11,6 +11,7 @@ import pytest
 
 import fingerpad as fp
 from fingerpad import __version__, cli, studies
+from fingerpad.cli import choices
 from fingerpad.errors import ConvergenceError, FingerpadError, StoreError
 from fingerpad.export import formats
 from fingerpad.fingertip import Fingertip
@@ -59,10 +60,10 @@ def test_help_names_every_option_and_resolution(call):
 
 
 def test_the_help_names_what_the_modules_know():
-    assert cli.RESOLUTIONS == RESOLUTIONS
-    assert tuple(TISSUES) == cli.MATERIALS
-    assert tuple(formats.FORMATS) == cli.FORMATS
-    assert all(issubclass(getattr(fp, name), Indenter) for name in cli.INDENTERS.values())
+    assert choices.RESOLUTIONS == RESOLUTIONS
+    assert tuple(TISSUES) == choices.MATERIALS
+    assert tuple(formats.FORMATS) == choices.FORMATS
+    assert all(issubclass(getattr(fp, name), Indenter) for name in choices.INDENTERS.values())
 
 
 @pytest.mark.parametrize(

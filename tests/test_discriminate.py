@@ -17,6 +17,7 @@ from fingerpad.discrimination import Experiment, discriminate_euclidean, discrim
 from fingerpad.encoding import neighbour_pairs
 from fingerpad.errors import InputError
 from fingerpad.report import discriminate as report
+from fingerpad.report import discriminate_figures as figures
 from fingerpad.signals import SedTraces
 from fingerpad.studies import discriminate as study
 from fingerpad.studies.conditions import RECEPTOR_X_MM
@@ -237,7 +238,7 @@ def test_stimuli_without_levels_have_hit_rates_and_no_curve():
     found = result(question, bumps(question))
     assert found["level"] is None
     assert [one["curves"] for one in found["readings"]] == [[], []]
-    for draw in (report.draw_curves, report.draw_statistics, report.draw_responses):
+    for draw in (figures.draw_curves, figures.draw_statistics, figures.draw_responses):
         (*_, last) = draw(found).axes
         assert last.get_figure()
 
@@ -251,7 +252,7 @@ def test_curves_show_every_code_people_with_their_intervals_and_thresholds():
         code=["gradient_sum", "ideal"], measure="static", observed={"points": points, "source": "two people"}
     )
     found = plain(result(question, bumps(question)))
-    figure = report.draw_curves(found)
+    figure = figures.draw_curves(found)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert sorted(labels) == ["Gradient Sum", "ideal observer", "people (two people)"]
     (axes,) = figure.axes
@@ -271,7 +272,7 @@ def test_maps_leave_out_who_has_no_latency():
     skins = bumps(question) | {"240": NearOnly(240.0)}
     found = plain(result(question, skins))
     known = [latency for row in found["responses"]["latency"] for latency in row if latency is not None]
-    colours = report.draw_responses(found).axes[0].collections[0]
+    colours = figures.draw_responses(found).axes[0].collections[0]
     assert colours.get_clim() == (min(known), max(known))
 
 
@@ -331,7 +332,7 @@ def test_silence_under_one_stimulus_is_silence_of_that_measure_alone():
     assert static["silent"] == []
     assert len(static["hit_rate"]) == 4
     assert "silent under 200" in report.answer_tables(found)[1].note
-    assert report.draw_curves(found)
+    assert figures.draw_curves(found)
     assert report.summary(found)[0].startswith("Gradient Sum of static rates tells")
 
 

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 import typer
 
-from fingerpad.cli import EXPECTED_TIME, app
+from fingerpad.cli import app
+from fingerpad.cli.reproduce import EXPECTED_TIME
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -14,6 +14,7 @@ import typer
 
 from fingerpad import cli
 from fingerpad.afferent import Afferent
+from fingerpad.cli import choices
 from fingerpad.compilation import NOTICE
 from fingerpad.edged_indenters import Gap
 from fingerpad.errors import ConvergenceError, InputError
@@ -572,9 +573,9 @@ def test_the_example_can_be_tried_as_it_says(call, tmp_path):
 
 
 def test_options_and_their_defaults_are_those_of_the_modules():
-    assert tuple(METHODS) == cli.FITTING_METHODS
-    assert tuple(QUANTITIES) == cli.QUANTITIES
-    assert set(INDENTERS) == set(cli.INDENTERS)
+    assert tuple(METHODS) == choices.FITTING_METHODS
+    assert tuple(QUANTITIES) == choices.QUANTITIES
+    assert set(INDENTERS) == set(choices.INDENTERS)
     defaults = {option.name: option.default for option in command().params}
     assert defaults["dynamic_window"] == protocol.DYNAMIC_WINDOW.value
     assert defaults["static_window"] == protocol.STATIC_WINDOW.value

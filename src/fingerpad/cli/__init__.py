@@ -1,0 +1,70 @@
+"""The command line: `reproduce`, `fit`, `discriminate`, `drives`, `refine`, `materials` and `export`."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated, Any
+
+import typer
+
+from fingerpad import __version__
+from fingerpad.cli.discriminate import discriminate_command
+from fingerpad.cli.drives import drives_command
+from fingerpad.cli.export import export_command
+from fingerpad.cli.fit import fit_command
+from fingerpad.cli.materials import materials_command
+from fingerpad.cli.refine import refine_command
+from fingerpad.cli.reproduce import reproduce_command
+from fingerpad.errors import FingerpadError
+
+# What a command runs is imported where it runs: help and version need none of it and come at once.
+
+app = typer.Typer(
+    help="From a touch on a finite-element human fingertip to the spikes of SAI afferents to a percept.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+MISUSE: Any = typer.BadParameter.__base__
+"""What typer raises for options that it does not know or cannot read; it names only this child of it."""
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"fingerpad {__version__}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _options(
+    context: typer.Context,
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit."),
+    ] = False,
+) -> None:
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+        raise typer.Exit(2)
+
+
+# In the order of the help.
+app.command("reproduce")(reproduce_command)
+app.command("fit")(fit_command)
+app.command("discriminate")(discriminate_command)
+app.command("drives")(drives_command)
+app.command("refine")(refine_command)
+app.command("materials")(materials_command)
+app.command("export")(export_command)
+
+
+def main() -> None:
+    """Run the command line; a failure is one sentence on standard error and exit status 2."""
+    try:
+        sys.exit(app(standalone_mode=False))
+    except FingerpadError as error:
+        print(f"fingerpad: {error}", file=sys.stderr)
+        sys.exit(2)
+    except MISUSE as error:
+        print(f"fingerpad: {error.format_message().rstrip('.')}.", file=sys.stderr)
+        sys.exit(2)

@@ -1,0 +1,32 @@
+"""What options may be, as the help names them. The modules behind them decide."""
+
+RESOLUTIONS = ("quick", "standard", "paper")
+INDENTERS = {
+    "sphere": "Sphere",
+    "cylinder": "Cylinder",
+    "bar": "Bar",
+    "line": "Line",
+    "punch": "FlatPunch",
+    "plate": "Plate",
+    "edge": "Edge",
+    "gap": "Gap",
+    "grating": "Grating",
+}
+"""Each with its class."""
+
+MATERIALS = (
+    "trial1",
+    "trial2",
+    "trial3",
+    "trial2_wu",
+    "trial3_wu",
+    "trial3_stiffening",
+    "maeno1998",
+    "wu2007",
+    "gerling2014_fit",
+)
+FORMATS = ("vtu", "abaqus", "calculix", "febio")
+FITTING_METHODS = ("least_squares", "response_surface", "closed_form", "cma_es", "likelihood")
+QUANTITIES = ("stored", "instantaneous", "work", "von_mises", "compressive_strain", "compressive_stress")
+REFINEMENTS = {"fine": "mesh_refinement", "paper": "paper_size"}
+"""Each with its study and report."""

@@ -1,0 +1,55 @@
+"""`fingerpad export`: one touch for another program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fingerpad.cli.choices import FORMATS, INDENTERS
+from fingerpad.cli.options import Materials, Resolution, number
+from fingerpad.cli.running import INTERRUPTED, make_writable
+from fingerpad.errors import InputError
+
+
+def export_command(
+    folder: Annotated[Path, typer.Argument(help="Where to write; made if need be.")],
+    indenter: Annotated[str, typer.Option(help=f"One of {', '.join(INDENTERS)}.")] = "sphere",
+    curvature: Annotated[
+        float | None,
+        typer.Option(parser=number, metavar="NUMBER", help="Curvature of the sphere; 287 by default. [1/m]"),
+    ] = None,
+    depth: Annotated[
+        float, typer.Option(parser=number, metavar="NUMBER", help="Depth of the hold. [mm]")
+    ] = 1.0,
+    materials: Materials = "trial3",
+    resolution: Resolution = "quick",
+    format_name: Annotated[str, typer.Option("--format", help=f"One of {', '.join(FORMATS)}.")] = "vtu",
+    elastic_moduli: Annotated[
+        str | None,
+        typer.Option(help="For calculix, which cannot relax tissue: long_term or instantaneous."),
+    ] = None,
+) -> None:
+    """Press one indenter into the finger and write the touch for another program, ParaView by default."""
+    import fingerpad
+    from fingerpad.checks import one_of
+    from fingerpad.export.formats import export_touch
+    from fingerpad.fingertip import Fingertip
+    from fingerpad.indentation import touch_of
+    from fingerpad.stimulus import RampAndHold
+
+    one_of("indenter", indenter, tuple(INDENTERS))
+    one_of("format", format_name, FORMATS)
+    if curvature is not None and indenter != "sphere":
+        raise InputError(f"--curvature is that of a sphere, and a {indenter} has none: leave it out.")
+    shape = {} if curvature is None else {"curvature_per_m": curvature}
+    body = getattr(fingerpad, INDENTERS[indenter])(**shape)
+    touch = touch_of(Fingertip(), body, RampAndHold(depth_mm=depth), materials, resolution)
+    make_writable(folder, "FOLDER")
+    try:
+        files = export_touch(touch, folder, format_name, elastic_moduli)
+    except KeyboardInterrupt as error:
+        typer.echo("fingerpad: stopped; what was written is whole, the rest is not there.", err=True)
+        raise typer.Exit(INTERRUPTED) from error
+    typer.echo(f"Open: {files[0]}")

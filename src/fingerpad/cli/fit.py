@@ -1,0 +1,170 @@
+"""`fingerpad fit`: an afferent from recordings of one's own."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from fingerpad.cli.choices import FITTING_METHODS, QUANTITIES
+from fingerpad.cli.options import Jobs, Materials, Resolution, number, whole_number
+from fingerpad.cli.running import Bars, cores, interruptible, make_writable
+from fingerpad.errors import InputError
+from fingerpad.files import write_atomically
+
+if TYPE_CHECKING:
+    from fingerpad.estimation.stimuli import Stimuli
+
+BAR = "bar"
+"""What `--stimulus` calls the bar of the paper; anything else is a file."""
+
+
+def fit_command(
+    recordings: Annotated[
+        Path | None, typer.Argument(help="CSV or NWB file, see docs/fit.md; not needed with --example.")
+    ] = None,
+    stimulus: Annotated[
+        str | None,
+        typer.Option(help="bar (shifted along the finger), or a CSV or YAML file that lists the stimuli."),
+    ] = None,
+    stimulus_column: Annotated[
+        str | None, typer.Option(help="Column that names the stimulus; shift_mm or stimulus by default.")
+    ] = None,
+    unit: Annotated[
+        int | None,
+        typer.Option(parser=whole_number, metavar="INTEGER", help="Id of the spike unit of an NWB file."),
+    ] = None,
+    width: Annotated[
+        float | None, typer.Option(parser=number, metavar="NUMBER", help="Width of the bar; 3 mm. [mm]")
+    ] = None,
+    fillet: Annotated[
+        float | None,
+        typer.Option(parser=number, metavar="NUMBER", help="Radius of the bar's edges; 0.3 mm. [mm]"),
+    ] = None,
+    depth: Annotated[
+        float | None, typer.Option(parser=number, metavar="NUMBER", help="Depth of the bar; 1 mm. [mm]")
+    ] = None,
+    dynamic_window: Annotated[
+        tuple[float, float], typer.Option(help="Start and end of the window of the dynamic rate. [ms]")
+    ] = (30.0, 50.0),
+    static_window: Annotated[
+        tuple[float, float], typer.Option(help="Start and end of the window of the static rate. [ms]")
+    ] = (600.0, 950.0),
+    dynamic_quantity: Annotated[
+        str,
+        typer.Option(
+            help=f"What the dynamic term follows: {QUANTITIES[0]} as in the paper, or as an extension "
+            f"{', '.join(QUANTITIES[1:])}."
+        ),
+    ] = "stored",
+    method: Annotated[str, typer.Option(help=f"One of {', '.join(FITTING_METHODS)}.")] = "least_squares",
+    posterior: Annotated[
+        bool, typer.Option("--posterior", help="Draw credible intervals of parameters and rates as well.")
+    ] = False,
+    profiles: Annotated[
+        bool, typer.Option("--profiles", help="Profile the likelihood of each number as well.")
+    ] = False,
+    sensitivity: Annotated[
+        bool, typer.Option("--sensitivity", help="Tell by Sobol's indices what the fit is sensitive to.")
+    ] = False,
+    offset: Annotated[
+        bool, typer.Option("--offset", help="Fit the receptor's place along the finger as well.")
+    ] = False,
+    folds: Annotated[
+        int | None,
+        typer.Option(
+            parser=whole_number,
+            metavar="INTEGER",
+            help="Folds dealt out in turn; 6 by default, unless the recordings have a column fold.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option(help="Folder for page, figures, results and stored indentations.")
+    ] = Path("fit"),
+    resolution: Resolution = "standard",
+    materials: Materials = "trial3",
+    jobs: Jobs = None,
+    seed: Annotated[
+        int, typer.Option(parser=whole_number, metavar="INTEGER", help="Seed of methods that draw.")
+    ] = 0,
+    example: Annotated[
+        Path | None, typer.Option(help="Write recordings to try it with into this folder, and end.")
+    ] = None,
+) -> None:
+    """Fit an afferent to recordings of your own: rates or spikes under known stimuli."""
+    from rich.console import Console
+
+    from fingerpad.estimation.reading import read_recordings
+    from fingerpad.report.recording_fit import summary, write_fit_page
+    from fingerpad.studies import recording_session
+    from fingerpad.studies.conditions import Conditions
+
+    if example is not None:
+        make_writable(example, "--example")
+        for file, content in recording_session.example().items():
+            write_atomically(example / file, content)
+        typer.echo(
+            f"Try: fingerpad fit {example / recording_session.EXAMPLE} --stimulus bar --resolution quick"
+        )
+        return
+    if recordings is None or stimulus is None:
+        raise InputError(
+            "fit needs recordings and --stimulus, or --example FOLDER: see fingerpad fit --help."
+        )
+    sizes = {"width": width, "fillet": fillet, "depth": depth}
+    stimuli = _stimuli(stimulus, stimulus_column, sizes)
+    task = recording_session.RecordingFit(
+        read_recordings(recordings, stimuli, unit),
+        Conditions(resolution=resolution, seed=seed, materials=materials),
+        out,
+        method,
+        folds,
+        (dynamic_window, static_window),
+        jobs if jobs is not None else cores(),
+        dynamic_quantity,
+        with_posterior=posterior,
+        with_profiles=profiles,
+        with_sensitivity=sensitivity,
+        with_offset=offset,
+    )
+    make_writable(out)
+    inputs = [recordings, *([] if stimulus == BAR else [Path(stimulus)])]
+    with interruptible():
+        results = recording_session.run(
+            task,
+            Bars(Console(stderr=True)),
+            command=shlex.join(["fingerpad", *sys.argv[1:]]),
+            inputs=[{"file": str(path), "sha256": recording_session.sha256(path)} for path in inputs],
+        )
+        write_atomically(out / "fit.json", json.dumps(results, indent=1, allow_nan=False).encode())
+        page = write_fit_page(results, out)
+    for paragraph in summary(results["fit"]):
+        typer.echo(paragraph)
+    typer.echo(f"Report: {page}")
+    typer.echo(f"Results: {out / 'fit.json'}")
+
+
+def _stimuli(stimulus: str, column: str | None, given: dict[str, float | None]) -> Stimuli:
+    """Make what `--stimulus` names, with the sizes that are given where it is the bar."""
+    from dataclasses import replace
+
+    from fingerpad.estimation.stimuli import ShiftedBar, read_stimuli
+    from fingerpad.indenters import Bar
+    from fingerpad.stimulus import RampAndHold
+
+    sizes = {key: size for key, size in given.items() if size is not None}
+    if stimulus != BAR:
+        if sizes:
+            raise InputError(
+                f"--{next(iter(sizes))} is that of the bar, and {stimulus} lists stimuli with their own: "
+                "leave it out."
+            )
+        listed = read_stimuli(Path(stimulus))
+        return listed if column is None else replace(listed, column=column)
+    motion = RampAndHold(depth_mm=sizes.pop("depth")) if "depth" in sizes else RampAndHold()
+    bar = ShiftedBar(Bar(**{f"{key}_mm": size for key, size in sizes.items()}), motion)
+    return bar if column is None else replace(bar, column=column)

@@ -1,0 +1,60 @@
+"""`fingerpad reproduce`: the paper again, beside its numbers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fingerpad.cli.options import Jobs, Resolution, whole_number
+from fingerpad.cli.running import Bars, cores, interruptible, make_writable
+from fingerpad.files import write_atomically
+
+EXPECTED_TIME = {"quick": "a minute and a half", "standard": "about 5 minutes", "paper": "some hours"}
+"""On two cores, nothing stored yet."""
+
+
+def reproduce_command(
+    resolution: Resolution = "standard",
+    out: Annotated[
+        Path, typer.Option(help="Folder for report, figures, results and stored indentations.")
+    ] = Path("reproduction"),
+    jobs: Jobs = None,
+    seed: Annotated[
+        int, typer.Option(parser=whole_number, metavar="INTEGER", help="Seed of the observer's noise.")
+    ] = 0,
+    extended: Annotated[
+        bool | None,
+        typer.Option(
+            "--extended/--no-extended",
+            help="Go beyond the paper: other fits and drives, spikes, uncertainty; not at quick by default.",
+        ),
+    ] = None,
+) -> None:
+    """Press, fire, fit and discriminate as in Gerling et al. 2014, and report beside the paper's numbers."""
+    from rich.console import Console
+
+    from fingerpad.report import write_report
+    from fingerpad.studies import Reproduction, reproduce
+    from fingerpad.studies.conditions import Conditions
+
+    conditions = Conditions(resolution=resolution, seed=seed)
+    run = Reproduction(conditions, out, jobs if jobs is not None else cores(), extended)
+    make_writable(out)
+    console = Console(stderr=True)
+    if console.is_terminal:
+        console.print(
+            f"Reproducing at {resolution} resolution with {run.jobs} process(es): "
+            f"{EXPECTED_TIME[resolution]} on two cores. "
+            "Stop it at any time; it goes on from the last finished indentation."
+        )
+    with interruptible():
+        results = reproduce(run, Bars(console))
+        write_atomically(out / "results.json", json.dumps(results, indent=1, allow_nan=False).encode())
+        report = write_report(results, out)
+    missed = [row["quantity"] for row in results["comparison"] if row["met"] is False]
+    typer.echo(f"Report: {report}")
+    typer.echo(f"Results: {out / 'results.json'}")
+    typer.echo(f"Missed: {'; '.join(missed) if missed else 'nothing'}")

@@ -1,0 +1,77 @@
+"""What a command needs while it runs: a folder to write into, processes, progress, an end after Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from fingerpad.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, by convention."""
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """End after Ctrl-C with a sentence on how the run goes on."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        typer.echo(
+            "fingerpad: stopped; the same command goes on from the last finished indentation.", err=True
+        )
+        raise typer.Exit(INTERRUPTED) from error
+
+
+def cores() -> int:
+    """Count the cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def make_writable(folder: Path, name: str = "--out") -> None:
+    """Make `folder` if need be, and see whether a file can be written into it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise InputError(
+            f"{name} must be a folder that can be written: {folder} cannot ({error.strerror})."
+        ) from error
+
+
+class Bars:
+    """A bar per stage on a terminal, silence elsewhere."""
+
+    def __init__(self, console: Console):
+        self._console = console
+
+    @contextmanager
+    def stage(self, name: str, total: int) -> Iterator[Callable[[], None]]:
+        """Show one stage with its expected time."""
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            TextColumn,
+            TimeElapsedColumn,
+            TimeRemainingColumn,
+        )
+
+        bars = Progress(
+            TextColumn(f"{name:<24}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+            TextColumn("left"), TimeRemainingColumn(),
+            console=self._console, disable=not self._console.is_terminal,
+        )  # fmt: skip
+        with bars:
+            task = bars.add_task(name, total=total)
+            yield lambda: bars.advance(task)
