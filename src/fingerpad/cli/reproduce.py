@@ -12,7 +12,7 @@ from fingerpad.cli.options import Jobs, Resolution, whole_number
 from fingerpad.cli.running import Bars, cores, interruptible, make_writable
 from fingerpad.files import write_atomically
 
-EXPECTED_TIME = {"quick": "a minute and a half", "standard": "about 5 minutes", "paper": "some hours"}
+EXPECTED_TIME = {"quick": "a minute and a half", "standard": "about 6 minutes", "paper": "some hours"}
 """On two cores, nothing stored yet."""
 
 
