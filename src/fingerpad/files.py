@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import secrets
 from pathlib import Path
+from typing import Any
 
 from fingerpad.errors import StoreError
 
@@ -55,6 +57,36 @@ def write_atomically(path: Path, content: bytes) -> None:
         raise StoreError(
             f"{path} cannot be written ({error.strerror or error}): free it or choose another."
         ) from error
+
+
+def write_json(path: Path, results: Any) -> None:
+    """Write results as JSON, whole or not at all; a number that is not finite is an error.
+
+    Parameters
+    ----------
+    path : Path
+        Where the file shall be; folders are made as needed.
+    results : nested dicts and lists of plain values
+        Such as `studies.reproduction.plain` returns.
+
+    Raises
+    ------
+    StoreError
+        As `write_atomically`.
+    ValueError
+        If a number is not finite.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     write_json(Path(folder) / "found.json", {"rate_hz": 2.5})
+    ...     print((Path(folder) / "found.json").read_text())
+    {
+     "rate_hz": 2.5
+    }
+    """
+    write_atomically(path, json.dumps(results, indent=1, allow_nan=False).encode())
 
 
 def _sync_folder(folder: Path) -> None:

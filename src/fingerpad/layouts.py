@@ -102,10 +102,10 @@ def rectangular(region: Region, density_per_cm2: float) -> Layout:
     (18, 1.0, [-1.0, -2.5])
     """
     _expected(region, density_per_cm2)
-    pitch = _mean_spacing(density_per_cm2)
+    pitch = mean_spacing_mm(density_per_cm2)
     middle, extent = _middle_and_extent(region)
     columns = [
-        centre + pitch * _around_zero(max(1, round(length / pitch)))
+        centre + pitch * around_zero(max(1, round(length / pitch)))
         for centre, length in zip(middle, extent, strict=True)
     ]
     return _lattice(region, np.stack(np.meshgrid(*columns, indexing="ij"), axis=-1), pitch, "rectangular")
@@ -138,7 +138,7 @@ def hexagonal(region: Region, density_per_cm2: float) -> Layout:
     (7, 1.0)
     """
     _expected(region, density_per_cm2)
-    pitch = math.sqrt(2.0 / math.sqrt(3.0)) * _mean_spacing(density_per_cm2)
+    pitch = math.sqrt(2.0 / math.sqrt(3.0)) * mean_spacing_mm(density_per_cm2)
     step = 0.5 * math.sqrt(3.0) * pitch
     middle, (length, width) = _middle_and_extent(region)
     rows, columns = (math.ceil(0.5 * extent / size) + 1 for extent, size in ((length, step), (width, pitch)))
@@ -177,7 +177,7 @@ def uniform(region: Region, density_per_cm2: float, seed: int) -> Layout:
     """
     count = _expected(region, density_per_cm2)
     places = _inside(region, count, lambda who, attempt: _anywhere(region, seed, attempt, who))
-    return Layout(places, _mean_spacing(density_per_cm2), "uniform", seed)
+    return Layout(places, mean_spacing_mm(density_per_cm2), "uniform", seed)
 
 
 def jittered(region: Region, density_per_cm2: float, seed: int, jitter: float = 0.2) -> Layout:
@@ -271,7 +271,7 @@ def poisson_disc(
             f"separation must not exceed {LARGEST_SEPARATION:g} of 1/sqrt(density), beyond which discs jam: "
             f"got {separation:g}."
         )
-    pitch = _mean_spacing(density_per_cm2)
+    pitch = mean_spacing_mm(density_per_cm2)
     least = separation * pitch
     places, points = np.empty((0, 2)), np.empty((0, 2))
     batch = 2 * count + 16
@@ -360,8 +360,14 @@ def _expected(region: Region, density_per_cm2: float) -> int:
     return count
 
 
-def _mean_spacing(density_per_cm2: float) -> float:
-    """1/sqrt(density). [mm]"""
+def mean_spacing_mm(density_per_cm2: float) -> float:
+    """Side of the square that belongs to one receptor, 1/sqrt(density). [mm]
+
+    Examples
+    --------
+    >>> mean_spacing_mm(25.0)
+    2.0
+    """
     return math.sqrt(MM2_PER_CM2 / density_per_cm2)
 
 
@@ -370,5 +376,12 @@ def _middle_and_extent(region: Region) -> tuple[FloatArray, FloatArray]:
     return 0.5 * (lower + upper), upper - lower
 
 
-def _around_zero(count: int) -> FloatArray:
+def around_zero(count: int) -> FloatArray:
+    """Places of a row of so many, one apart, with their middle at 0, (count,).
+
+    Examples
+    --------
+    >>> around_zero(2).tolist(), around_zero(3).tolist()
+    ([-0.5, 0.5], [-1.0, 0.0, 1.0])
+    """
     return np.arange(count, dtype=np.float64) - 0.5 * (count - 1)

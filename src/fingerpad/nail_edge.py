@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from fingerpad.checks import FloatArray, float_array, positive, whole
 from fingerpad.errors import InputError
 from fingerpad.fingertip import Fingertip
-from fingerpad.layouts import MM2_PER_CM2, Layout
+from fingerpad.layouts import Layout, mean_spacing_mm
 from fingerpad.regions import Polygon
 
 REACH_MM = 4.0
@@ -171,7 +171,7 @@ class NailEdge:
         >>> len(NailEdge().rows(1, density_per_cm2=25.0))
         21
         """
-        pitch = math.sqrt(MM2_PER_CM2 / positive("density_per_cm2", density_per_cm2, "1/cm²"))
+        pitch = mean_spacing_mm(positive("density_per_cm2", density_per_cm2, "1/cm²"))
         distances = pitch * (np.arange(whole("count", count, 1)) + 0.5)
         self._within_reach("The distance of the last row", distances[-1])
         rows = []

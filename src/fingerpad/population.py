@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from fingerpad.afferent import Afferent
 from fingerpad.checks import FloatArray, finite, float_array, not_negative, positive, whole
 from fingerpad.errors import InputError
-from fingerpad.layouts import Layout, Place
+from fingerpad.layouts import Layout, Place, around_zero
 from fingerpad.parameters import fingertip, protocol, psychophysics
 from fingerpad.random_streams import Purpose, normals
 from fingerpad.signals import STORED_ENERGY, ResponseMap, Skin
@@ -197,8 +197,8 @@ class Population:
         """
         pitch_mm = MM_PER_CM / math.sqrt(positive("density_per_cm2", density_per_cm2, "1/cm2"))
         centre_x, centre_z = (finite("centre_mm", value, "mm") for value in centre_mm)
-        x = centre_x + pitch_mm * _around_zero(whole("rows", rows, 1))
-        z = centre_z + pitch_mm * _around_zero(whole("columns", columns, 1))
+        x = centre_x + pitch_mm * around_zero(whole("rows", rows, 1))
+        z = centre_z + pitch_mm * around_zero(whole("columns", columns, 1))
         positions = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
         return cls(positions, pitch_mm, afferent or Afferent())
 
@@ -245,7 +245,3 @@ class Population:
             static_rate_hz=firing_rate_hz(spikes, static_window_ms),
             first_spike_latency_ms=first_spike_latency_ms(spikes),
         )
-
-
-def _around_zero(count: int) -> FloatArray:
-    return np.arange(count, dtype=np.float64) - 0.5 * (count - 1)

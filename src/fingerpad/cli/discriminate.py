@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import sys
 from pathlib import Path
@@ -12,9 +11,9 @@ import typer
 
 from fingerpad.cli.choices import RESOLUTIONS
 from fingerpad.cli.options import Jobs
-from fingerpad.cli.running import Bars, cores, interruptible, make_writable
+from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.errors import InputError
-from fingerpad.files import write_atomically
+from fingerpad.files import write_json
 
 
 def discriminate_command(
@@ -59,7 +58,7 @@ def discriminate_command(
             f"discriminate needs a question, a YAML file or one of {', '.join(known)}: see --help."
         )
     asked = question_file.read_question(question, resolution=resolution)
-    task = discriminate.Discrimination(asked, out, jobs if jobs is not None else cores(), question)
+    task = discriminate.Discrimination(asked, out, processes(jobs), question)
     make_writable(out)
     with interruptible():
         results = discriminate.run(
@@ -68,7 +67,7 @@ def discriminate_command(
             command=shlex.join(["fingerpad", *sys.argv[1:]]),
             inputs=question_file.provenance(question, asked),
         )
-        write_atomically(out / "discriminate.json", json.dumps(results, indent=1, allow_nan=False).encode())
+        write_json(out / "discriminate.json", results)
         page = write_discrimination_page(results, out)
     for paragraph in summary(results["discrimination"]):
         typer.echo(paragraph)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -10,8 +9,8 @@ from typing import Annotated
 import typer
 
 from fingerpad.cli.options import Jobs, Resolution, whole_number
-from fingerpad.cli.running import cores, interruptible, make_writable
-from fingerpad.files import write_atomically
+from fingerpad.cli.running import interruptible, make_writable, processes
+from fingerpad.files import write_json
 
 
 def drives_command(
@@ -32,15 +31,13 @@ def drives_command(
     from fingerpad.studies.conditions import Conditions
     from fingerpad.studies.drive_study import DriveStudy, study_drives
 
-    study = DriveStudy(
-        Conditions(resolution=resolution, seed=seed), out, jobs if jobs is not None else cores()
-    )
+    study = DriveStudy(Conditions(resolution=resolution, seed=seed), out, processes(jobs))
     make_writable(out)
     console = Console(stderr=True, quiet=not sys.stderr.isatty())
     with interruptible():
         results = study_drives(study, lambda part: console.print(f"done: {part}"))
         numbers = out / "drive_quantities.json"
-        write_atomically(numbers, json.dumps(results, indent=1, allow_nan=False).encode())
+        write_json(numbers, results)
         page = write_drive_page(results, out, f"fingerpad drives --resolution {resolution}")
     typer.echo(f"Page: {page}")
     typer.echo(f"Results: {numbers}")

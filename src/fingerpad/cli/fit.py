@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import sys
 from pathlib import Path
@@ -12,9 +11,9 @@ import typer
 
 from fingerpad.cli.choices import FITTING_METHODS, QUANTITIES
 from fingerpad.cli.options import Jobs, Materials, Resolution, number, whole_number
-from fingerpad.cli.running import Bars, cores, interruptible, make_writable
+from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.errors import InputError
-from fingerpad.files import write_atomically
+from fingerpad.files import write_atomically, write_json
 
 if TYPE_CHECKING:
     from fingerpad.estimation.stimuli import Stimuli
@@ -124,7 +123,7 @@ def fit_command(
         method,
         folds,
         (dynamic_window, static_window),
-        jobs if jobs is not None else cores(),
+        processes(jobs),
         dynamic_quantity,
         with_posterior=posterior,
         with_profiles=profiles,
@@ -140,7 +139,7 @@ def fit_command(
             command=shlex.join(["fingerpad", *sys.argv[1:]]),
             inputs=[{"file": str(path), "sha256": recording_session.sha256(path)} for path in inputs],
         )
-        write_atomically(out / "fit.json", json.dumps(results, indent=1, allow_nan=False).encode())
+        write_json(out / "fit.json", results)
         page = write_fit_page(results, out)
     for paragraph in summary(results["fit"]):
         typer.echo(paragraph)

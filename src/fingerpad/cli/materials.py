@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -10,8 +9,8 @@ from typing import Annotated
 import typer
 
 from fingerpad.cli.options import Jobs, Resolution, whole_number
-from fingerpad.cli.running import cores, interruptible, make_writable
-from fingerpad.files import write_atomically
+from fingerpad.cli.running import interruptible, make_writable, processes
+from fingerpad.files import write_json
 
 
 def materials_command(
@@ -41,7 +40,7 @@ def materials_command(
     study = MaterialStudy(
         Conditions(resolution=resolution, seed=seed),
         out,
-        jobs if jobs is not None else cores(),
+        processes(jobs),
         Effort(shifted_bars=shifted_bars),
         **({"names": tuple(name)} if name else {}),
     )
@@ -52,7 +51,7 @@ def materials_command(
     with interruptible():
         results = study_materials(study, lambda part: console.print(f"done: {part}"))
         numbers = out / "material_sets.json"
-        write_atomically(numbers, json.dumps(results, indent=1, allow_nan=False).encode())
+        write_json(numbers, results)
         page = write_material_page(results, out, command)
     typer.echo(f"Page: {page}")
     typer.echo(f"Results: {numbers}")

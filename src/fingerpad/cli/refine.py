@@ -9,7 +9,7 @@ import typer
 
 from fingerpad.cli.choices import REFINEMENTS
 from fingerpad.cli.options import Jobs
-from fingerpad.cli.running import Bars, cores, interruptible, make_writable
+from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.files import write_atomically
 
 
@@ -34,10 +34,10 @@ def refine_command(
     study, report = (
         import_module(f"fingerpad.{part}.{REFINEMENTS[against]}") for part in ("studies", "report")
     )
-    processes = whole("jobs", jobs if jobs is not None else cores(), at_least=1)
+    workers = whole("jobs", processes(jobs), at_least=1)
     make_writable(out)
     with interruptible():
-        results = study.run(out, processes, Bars(Console(stderr=True)))
+        results = study.run(out, workers, Bars(Console(stderr=True)))
         for file, content in report.documents(results).items():
             write_atomically(out / file, content)
     typer.echo(f"Report: {out / report.PAGE}")

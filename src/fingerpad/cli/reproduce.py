@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from fingerpad.cli.options import Jobs, Resolution, whole_number
-from fingerpad.cli.running import Bars, cores, interruptible, make_writable
-from fingerpad.files import write_atomically
+from fingerpad.cli.running import Bars, interruptible, make_writable, processes
+from fingerpad.files import write_json
 
 EXPECTED_TIME = {"quick": "a minute and a half", "standard": "about 6 minutes", "paper": "some hours"}
 """On two cores, nothing stored yet."""
@@ -41,7 +40,7 @@ def reproduce_command(
     from fingerpad.studies.conditions import Conditions
 
     conditions = Conditions(resolution=resolution, seed=seed)
-    run = Reproduction(conditions, out, jobs if jobs is not None else cores(), extended)
+    run = Reproduction(conditions, out, processes(jobs), extended)
     make_writable(out)
     console = Console(stderr=True)
     if console.is_terminal:
@@ -52,7 +51,7 @@ def reproduce_command(
         )
     with interruptible():
         results = reproduce(run, Bars(console))
-        write_atomically(out / "results.json", json.dumps(results, indent=1, allow_nan=False).encode())
+        write_json(out / "results.json", results)
         report = write_report(results, out)
     missed = [row["quantity"] for row in results["comparison"] if row["met"] is False]
     typer.echo(f"Report: {report}")

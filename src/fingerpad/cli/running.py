@@ -37,6 +37,11 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def processes(jobs: int | None) -> int:
+    """Return what `--jobs` says, or one process per core."""
+    return cores() if jobs is None else jobs
+
+
 def make_writable(folder: Path, name: str = "--out") -> None:
     """Make `folder` if need be, and see whether a file can be written into it."""
     try:

@@ -21,6 +21,7 @@ from fingerpad.psychophysics import (
     multiplied_responses,
     present,
 )
+from fingerpad.units import MS_PER_S
 
 PAIR_PER_M = (287.0, 316.0)
 """Two spheres near the threshold of people, at which codes are measured."""
@@ -28,7 +29,6 @@ PAIR_PER_M = (287.0, 316.0)
 TRIALS = 4000
 """Presentations of each sphere to the observers whose efficiency is measured."""
 
-MS_PER_S = 1000.0
 SESSION, REFERENCE_SESSION = 11, 12
 """Of the random numbers; other studies have others."""
 

@@ -12,7 +12,7 @@ from fingerpad.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.indentation import CONTACT_POINT_MM, touch_of
 from fingerpad.indentation import Touch as Touch
 from fingerpad.indenter_grading import grading_about
-from fingerpad.indenters import Indenter
+from fingerpad.indenters import Indenter, Sphere
 from fingerpad.mechanics.materials import Tissues
 
 RECEPTOR_X_MM = CONTACT_POINT_MM[0]
@@ -78,6 +78,35 @@ class Conditions:
             grading=grading,
             tilt_deg=tilt_deg,
         )
+
+    def sphere_touch(
+        self, curvature_per_m: float, position_mm: float = 0.0, grading: Grading | None = None
+    ) -> Touch:
+        """One touch of the population study: a sphere along the skin's normal, centred on the receptors.
+
+        Parameters
+        ----------
+        curvature_per_m : float
+            Of the sphere. [1/m]
+        position_mm : float, optional
+            Along the finger, from the middle of the population, distal positive. [mm]
+        grading : Grading, optional
+            Mesh; default: that of all spheres.
+
+        Returns
+        -------
+        Touch
+        """
+        return self.touch(
+            Sphere(curvature_per_m),
+            RECEPTOR_X_MM + position_mm,
+            grading or self.sphere_grading(),
+            tilt_deg=self.skin_tilt_deg,
+        )
+
+    def tilt_deg(self, indenter: Indenter) -> float:
+        """Tilt of an indenter that presses straight: none of a wire, which grips the skin. [degrees]"""
+        return 0.0 if indenter.grips else self.skin_tilt_deg
 
     def deflection_grading(self, indenter: Indenter) -> Grading:
         """Mesh of the skin deflection study: fine about the indenter."""

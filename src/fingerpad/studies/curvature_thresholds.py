@@ -21,7 +21,6 @@ from fingerpad.afferent import Afferent
 from fingerpad.checks import FloatArray
 from fingerpad.encoding import gradient_sum, neighbour_pairs
 from fingerpad.errors import ConvergenceError
-from fingerpad.indenters import Sphere
 from fingerpad.noise_fit import expected_hit_rates, fit_noise_sigma
 from fingerpad.parameters import psychophysics
 from fingerpad.population import Population
@@ -65,12 +64,7 @@ def touches(conditions: Conditions) -> dict[float, Touch]:
 
 def sphere_touches(conditions: Conditions, curvatures_per_m: Sequence[float]) -> dict[float, Touch]:
     """Spheres pressed like the paper's own at 0.0 mm; keys are curvatures. [1/m]"""
-    return {
-        curvature: conditions.touch(
-            Sphere(curvature), RECEPTOR_X_MM, conditions.sphere_grading(), tilt_deg=conditions.skin_tilt_deg
-        )
-        for curvature in curvatures_per_m
-    }
+    return {curvature: conditions.sphere_touch(curvature) for curvature in curvatures_per_m}
 
 
 def result(

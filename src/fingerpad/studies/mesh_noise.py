@@ -16,7 +16,6 @@ from fingerpad.afferent import Afferent
 from fingerpad.checks import FloatArray
 from fingerpad.encoding import gradient_sum, neighbour_pairs
 from fingerpad.grading import Grading
-from fingerpad.indenters import Sphere
 from fingerpad.population import Population
 from fingerpad.sampling import SkinResponse
 from fingerpad.studies import sphere_discrimination
@@ -61,9 +60,7 @@ def gradings(conditions: Conditions) -> dict[str, Grading]:
 def touches(conditions: Conditions) -> dict[tuple[str, float], Touch]:
     """Press the standard and the nearest comparison on the other meshes; keys are mesh and curvature."""
     return {
-        (mesh, curvature): conditions.touch(
-            Sphere(curvature), RECEPTOR_X_MM + POSITION_MM, grading, tilt_deg=conditions.skin_tilt_deg
-        )
+        (mesh, curvature): conditions.sphere_touch(curvature, POSITION_MM, grading)
         for mesh, grading in gradings(conditions).items()
         for curvature in CURVATURES
     }

@@ -18,7 +18,6 @@ import numpy as np
 from fingerpad.checks import FloatArray
 from fingerpad.errors import InputError
 from fingerpad.grading import resolution_grading
-from fingerpad.indenters import Sphere
 from fingerpad.mesh import Mesh
 from fingerpad.parameters import protocol
 from fingerpad.sampling import SkinResponse
@@ -40,8 +39,7 @@ def touch(conditions: Conditions) -> Touch:
     grading = replace(
         resolution_grading("quick", RECEPTOR_X_MM), largest_mm=ELEMENT_MM[conditions.resolution]
     )
-    sphere = Sphere(protocol.STANDARD_CURVATURE.value)
-    return conditions.touch(sphere, RECEPTOR_X_MM, grading, tilt_deg=conditions.skin_tilt_deg)
+    return conditions.sphere_touch(protocol.STANDARD_CURVATURE.value, grading=grading)
 
 
 @dataclass(frozen=True)

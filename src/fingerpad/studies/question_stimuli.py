@@ -13,7 +13,7 @@ from fingerpad.estimation.stimuli import INDENTERS
 from fingerpad.grading import Grading, covering
 from fingerpad.indentation import Touch, touch_of
 from fingerpad.indenter_grading import grading_about
-from fingerpad.indenters import Indenter, Line, Sphere
+from fingerpad.indenters import Indenter, Sphere
 from fingerpad.parameters import protocol
 from fingerpad.stimulus import ForceRampAndHold, RampAndHold, Stimulus
 from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
@@ -222,9 +222,7 @@ def touches(question: Question) -> dict[str, Touch]:
     grading = _grading(stimuli, conditions, question.skin.reach_mm)
     found = {}
     for stimulus in stimuli:
-        wire = isinstance(stimulus.indenter, Line)
         along, across = stimulus.offset_mm
-        perpendicular = 0.0 if wire else conditions.skin_tilt_deg
         try:
             found[stimulus.name] = touch_of(
                 conditions.finger,
@@ -234,7 +232,7 @@ def touches(question: Question) -> dict[str, Touch]:
                 conditions.resolution,
                 (RECEPTOR_X_MM + along, across),
                 grading,
-                perpendicular if stimulus.tilt_deg is None else stimulus.tilt_deg,
+                conditions.tilt_deg(stimulus.indenter) if stimulus.tilt_deg is None else stimulus.tilt_deg,
                 friction=stimulus.friction,
                 spin_deg=stimulus.spin_deg,
             )

@@ -17,7 +17,7 @@ from fingerpad.psychophysics import bootstrap, fit_psychometric, posterior
 from fingerpad.random_streams import IntArray, Purpose, normals
 from fingerpad.signals import HitRates, ResponseMap
 from fingerpad.studies.question import CurveSettings
-from fingerpad.studies.sphere_discrimination import NOISE_DRAWS
+from fingerpad.studies.sphere_discrimination import NOISE_DRAWS, RESPONSES
 
 SESSION = 1
 """Session of the random numbers: that of the reproduction's spheres at 0.0 mm."""
@@ -46,10 +46,8 @@ def responses(answers: Sequence[ResponseMap], measure: str, patience_ms: float |
     array (n_stimuli, n_receptors)
         NaN where a receptor has no latency. [spikes/s or ms]
     """
-    if measure != "latency":
-        return np.array([getattr(answer, f"{measure}_rate_hz") for answer in answers])
-    latency_ms = np.array([answer.first_spike_latency_ms for answer in answers])
-    return latency_ms if patience_ms is None else np.fmin(latency_ms, patience_ms)
+    table = np.array([RESPONSES[measure](answer) for answer in answers])
+    return table if measure != "latency" or patience_ms is None else np.fmin(table, patience_ms)
 
 
 def silent_stimuli(table: FloatArray, measure: str, patience_ms: float | None = None) -> IntArray:

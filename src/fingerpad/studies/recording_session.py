@@ -159,7 +159,6 @@ def touches(stimuli: Mapping[str, TactileStimulus], conditions: Conditions) -> d
 
     def touch(stimulus: TactileStimulus) -> Touch:
         wire = isinstance(stimulus.indenter, Line)
-        perpendicular = 0.0 if wire else conditions.skin_tilt_deg
         return touch_of(
             conditions.finger,
             stimulus.indenter,
@@ -168,7 +167,7 @@ def touches(stimuli: Mapping[str, TactileStimulus], conditions: Conditions) -> d
             conditions.resolution,
             (RECEPTOR_X_MM + stimulus.x_mm * along, stimulus.z_mm),
             None if wire else _grading(stimulus, conditions),
-            perpendicular if stimulus.tilt_deg is None else stimulus.tilt_deg,
+            conditions.tilt_deg(stimulus.indenter) if stimulus.tilt_deg is None else stimulus.tilt_deg,
             spin_deg=stimulus.spin_deg,
         )
 

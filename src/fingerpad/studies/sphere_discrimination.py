@@ -10,7 +10,6 @@ import numpy as np
 from fingerpad.afferent import Afferent
 from fingerpad.checks import FloatArray
 from fingerpad.encoding import answering_neighbours, gradient_sum, neighbour_pairs
-from fingerpad.indenters import Sphere
 from fingerpad.parameters import protocol, psychophysics
 from fingerpad.population import Population
 from fingerpad.random_streams import Purpose, normals
@@ -40,12 +39,7 @@ def touches(conditions: Conditions) -> dict[tuple[float, float], Touch]:
     They press along the skin's normal, so that a sphere at 0.0 mm is centred on the population.
     """
     return {
-        (position, curvature): conditions.touch(
-            Sphere(curvature),
-            RECEPTOR_X_MM + position,
-            conditions.sphere_grading(),
-            tilt_deg=conditions.skin_tilt_deg,
-        )
+        (position, curvature): conditions.sphere_touch(curvature, position)
         for position in POSITIONS_MM
         for curvature in CURVATURES
     }
