@@ -966,3 +966,9 @@ def test_plain_values_are_json_and_say_none_where_there_is_no_number():
     assert isinstance(found["287.0"][1], int)
     assert json.loads(json.dumps(found, allow_nan=False)) == expected
     assert np.isnan(value["rates"][0, 1])  # the input is left as it was
+
+
+def test_a_wire_presses_straight_and_every_other_body_along_the_normal_of_the_skin():
+    conditions = Conditions("quick")
+    assert conditions.tilt_deg(Line()) == 0.0
+    assert conditions.tilt_deg(Sphere(287.0)) == conditions.skin_tilt_deg != 0.0
