@@ -66,7 +66,7 @@ _ARRAYS = (
 _SHEET = tuple(name for name in QUANTITIES if name != "stored")
 _SINGLE_PRECISION = ("skin_displacement_mm", "displacement_mm", "sed_kpa", "von_mises_kpa", *_SHEET)
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-_LOOK_FOR_PARENT_S = 1.0
+_LOOK_FOR_PARENT_S = 0.1
 
 
 @lru_cache(maxsize=1)
