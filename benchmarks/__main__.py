@@ -13,7 +13,7 @@ from dataclasses import replace
 from benchmarks import machine
 from benchmarks.page import PAGE, rewritten
 from benchmarks.results import aligned, read_all, write
-from fingerpad.files import write_atomically
+from fingerpad.core.files import write_atomically
 
 # Short ones first; `peers` installs other programs, and CalculiX alone runs for a quarter of an hour.
 BENCHMARKS = (

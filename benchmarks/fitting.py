@@ -11,12 +11,12 @@ import numpy as np
 
 from benchmarks.measuring import Spread, run_job
 from benchmarks.results import Report, Table
-from fingerpad.fitting import cross_validate, interleaved_folds
-from fingerpad.signals import SedTraces
-from fingerpad.store import Store, solve_missing
-from fingerpad.studies import single_unit, single_unit_methods
-from fingerpad.studies.conditions import Conditions
-from fingerpad.transduction import drive
+from fingerpad.core.signals import SedTraces
+from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.gerling2014 import single_unit, single_unit_methods
+from fingerpad.inference.fitting import cross_validate, interleaved_folds
+from fingerpad.neuron.transduction import drive
+from fingerpad.skin.store import Store, solve_missing
 
 JOBS, REPEATS = 2, 3
 RESOLUTION = "quick"

@@ -15,15 +15,15 @@ import numpy as np
 from scipy.optimize import brentq
 from threadpoolctl import threadpool_limits
 
+from fingerpad.core.units import MM_PER_M
 from fingerpad.export.calculix import write_calculix
 from fingerpad.export.job import Job
-from fingerpad.indenters import Sphere
+from fingerpad.geometry.indenters import Sphere
+from fingerpad.geometry.mesh import Mesh, block_mesh
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.press import PressSettings, press
-from fingerpad.mesh import Mesh, block_mesh
-from fingerpad.stimulus import RampAndHold
-from fingerpad.units import MM_PER_M
 
 LENGTH_MM, WIDTH_MM = 14.0, 12.0
 BORDERS_MM = (0.0, 0.471, 1.624, 5.0)

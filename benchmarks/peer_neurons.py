@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from fingerpad.lif import LeakyIntegrateAndFire
-from fingerpad.signals import CurrentTraces, SpikeTrains
+from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.neuron.lif import LeakyIntegrateAndFire
 
 TIME_CONSTANT_MS, CAPACITANCE_MF, THRESHOLD_MV, REFRACTORY_MS = 68.0, 1e-6, 50.0, 1.0
 """The paper's membrane."""

@@ -9,13 +9,17 @@ import numpy as np
 
 from benchmarks.measuring import Spread, run_job
 from benchmarks.results import Report, Table
-from fingerpad.afferent import Afferent
-from fingerpad.discrimination import Experiment, discriminate_euclidean, discriminate_gradient_sum
-from fingerpad.encoding import neighbour_pairs
-from fingerpad.parameters import psychophysics
-from fingerpad.population import Population
-from fingerpad.signals import SedTraces
-from fingerpad.transduction import drive
+from fingerpad.core.signals import SedTraces
+from fingerpad.data import psychophysics
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.population import Population
+from fingerpad.neuron.transduction import drive
+from fingerpad.psychophysics.discrimination import (
+    Experiment,
+    discriminate_euclidean,
+    discriminate_gradient_sum,
+)
+from fingerpad.psychophysics.encoding import neighbour_pairs
 
 AFFERENTS = 100_000
 THREADS, REPEATS = (1, 2), 3

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import psutil
 
 if TYPE_CHECKING:  # a benchmark is listed and reported without importing what it measures
-    from fingerpad.indentation import Touch
-    from fingerpad.sampling import SkinResponse
+    from fingerpad.skin.indentation import Touch
+    from fingerpad.skin.sampling import SkinResponse
 
 CURVATURE_PER_M = 287.0
 PRESSED = f"A sphere of {CURVATURE_PER_M:g} per m pressed 1.0 mm deep, ramp of 50 ms and hold of 950 ms"

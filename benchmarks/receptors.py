@@ -23,10 +23,10 @@ def respond(receptors: int) -> dict[str, Any]:
     dict
         By kind of site, seconds of `Population.respond`, those of `SkinResponse.sed` in it, and spikes.
     """
-    from fingerpad.fingertip import Fingertip
-    from fingerpad.layouts import MM2_PER_CM2, hexagonal
-    from fingerpad.population import Population
-    from fingerpad.unrolled_skin import UnrolledSkin
+    from fingerpad.core.layouts import MM2_PER_CM2, hexagonal
+    from fingerpad.geometry.fingertip import Fingertip
+    from fingerpad.neuron.population import Population
+    from fingerpad.skin.unrolled_skin import UnrolledSkin
 
     solved = touch_of_sphere("standard").solve()
     unrolled = UnrolledSkin(Fingertip())

@@ -10,7 +10,7 @@ from typing import Any
 
 from benchmarks import machine
 from benchmarks.targets import TARGETS
-from fingerpad.files import write_atomically
+from fingerpad.core.files import write_atomically
 
 RESULTS = Path(__file__).parent / "results"
 

@@ -64,10 +64,10 @@ class Aggregation:
 
 def preconditioner(name: str, sparsity: Any, free: np.ndarray, mesh: Any) -> Any:
     """Make the preconditioner of a name of `RUNS` for a mesh."""
+    from fingerpad.geometry.mesh_quality import rigid_motions
     from fingerpad.mechanics.factors import PardisoFactor, SuperLuFactor
     from fingerpad.mechanics.linear import KeptFactor
     from fingerpad.mechanics.multigrid import Multigrid
-    from fingerpad.mesh_quality import rigid_motions
 
     if name in (MULTIGRID, MULTIGRID_WITHOUT_MKL):
         coarsest = PardisoFactor if name == MULTIGRID else SuperLuFactor

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.afferent import PARAMETER_NAMES, Afferent
-from fingerpad.blocks import BLOCK
-from fingerpad.errors import InputError
-from fingerpad.parameters import neuron
-from fingerpad.signals import SedTraces
-from fingerpad.spikes import firing_rate_hz
-from fingerpad.transduction import drive
+from fingerpad.core.blocks import BLOCK
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.data import neuron
+from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.neuron.spikes import firing_rate_hz
+from fingerpad.neuron.transduction import drive
 
 
 def ramp_and_hold(*peaks_kpa):

@@ -16,8 +16,8 @@ from benchmarks.page import PAGE, rewritten, targets_table
 from benchmarks.pressing import touch_of_sphere
 from benchmarks.results import Report, Table, read_all, write
 from benchmarks.targets import TARGETS, Target
-from fingerpad.mesh import finger_lines
-from fingerpad.signals import SpikeTrains
+from fingerpad.core.signals import SpikeTrains
+from fingerpad.geometry.mesh import finger_lines
 
 TEXT = PAGE.read_text(encoding="utf-8")
 MACHINE = {

@@ -12,18 +12,18 @@ import pytest
 import fingerpad as fp
 from fingerpad import __version__, cli, studies
 from fingerpad.cli import choices
-from fingerpad.errors import ConvergenceError, FingerpadError, StoreError
+from fingerpad.core.errors import ConvergenceError, FingerpadError, StoreError
 from fingerpad.export import formats
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import RESOLUTIONS
-from fingerpad.indentation import touch_of
-from fingerpad.indenters import Indenter, Plate, Sphere
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import RESOLUTIONS
+from fingerpad.geometry.indenters import Indenter, Plate, Sphere
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.tissues import TISSUES
-from fingerpad.report import drive_study as drives_report
-from fingerpad.report import mesh_refinement as report
-from fingerpad.report import paper_size as paper_report
-from fingerpad.stimulus import RampAndHold
-from fingerpad.studies import drive_study, mesh_refinement, paper_size
+from fingerpad.skin.indentation import touch_of
+from studies import drive_study, mesh_refinement, paper_size
+from studies.pages import drive_study as drives_report
+from studies.pages import mesh_refinement as report
+from studies.pages import paper_size as paper_report
 
 COMMAND = [sys.executable, "-W", "error", "-m", "fingerpad"]
 

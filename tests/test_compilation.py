@@ -7,7 +7,7 @@ import textwrap
 
 import pytest
 
-from fingerpad.compilation import NOTICE, announce_compilation, is_compiled
+from fingerpad.core.compilation import NOTICE, announce_compilation, is_compiled
 
 KERNEL = """
 from numba import njit
@@ -43,7 +43,7 @@ def say(tmp_path):
 
 LOOK = """
     from kernels import twice
-    from fingerpad.compilation import is_compiled
+    from fingerpad.core.compilation import is_compiled
     print(is_compiled(twice), twice(1), is_compiled(twice))
 """
 
@@ -105,7 +105,7 @@ def test_workers_leave_it_to_their_parent(say):
     code = """
         import logging, os
         from fingerpad import store
-        from fingerpad.compilation import announce_compilation
+        from fingerpad.core.compilation import announce_compilation
         from kernels import twice
         store._begin(os.getppid())
         announce_compilation(twice)

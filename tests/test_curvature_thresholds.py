@@ -3,22 +3,22 @@
 import numpy as np
 import pytest
 
-from fingerpad.afferent import Afferent
-from fingerpad.encoding import gradient_sum, neighbour_pairs
-from fingerpad.errors import ConvergenceError
-from fingerpad.grading import Grading
-from fingerpad.noise_fit import expected_hit_rates
-from fingerpad.population import Population
+from fingerpad.core.errors import ConvergenceError
+from fingerpad.core.random_streams import Purpose, normals
+from fingerpad.core.signals import SedTraces
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.gerling2014 import code_efficiency
+from fingerpad.experiments.gerling2014 import curvature_thresholds as study
+from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.experiments.gerling2014.sphere_discrimination import CURVATURES
+from fingerpad.geometry.grading import Grading
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.population import Population
 from fingerpad.psychophysics import yes_no
-from fingerpad.random_streams import Purpose, normals
+from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
+from fingerpad.psychophysics.noise_fit import expected_hit_rates
 from fingerpad.report import curvature_thresholds as page
-from fingerpad.report.appearance import png
-from fingerpad.signals import SedTraces
-from fingerpad.studies import code_efficiency
-from fingerpad.studies import curvature_thresholds as study
-from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.studies.reproduction import plain
-from fingerpad.studies.sphere_discrimination import CURVATURES
+from fingerpad.report.style import png
 
 AFFERENT = Afferent(static_gain=1.2e-6)
 POPULATION = Population.grid(rows=3, columns=4, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)

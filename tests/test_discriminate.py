@@ -13,22 +13,31 @@ from scipy.special import ndtr
 from scipy.stats import binom
 
 from fingerpad import cli
-from fingerpad.discrimination import Experiment, discriminate_euclidean, discriminate_gradient_sum
-from fingerpad.encoding import neighbour_pairs
-from fingerpad.errors import InputError
-from fingerpad.report import discriminate as report
-from fingerpad.report import discriminate_figures as figures
-from fingerpad.signals import SedTraces
-from fingerpad.studies import discriminate as study
-from fingerpad.studies.conditions import RECEPTOR_X_MM
-from fingerpad.studies.efficiencies import SMALLEST_SPREAD, efficiencies, ideal_observer, presentations
-from fingerpad.studies.question import CurveSettings
-from fingerpad.studies.question_answers import Asked, result
-from fingerpad.studies.question_file import parsed, ready_made
-from fingerpad.studies.question_population import population_of
-from fingerpad.studies.question_stimuli import presented, touches
-from fingerpad.studies.readings import SESSION, curves
-from fingerpad.studies.reproduction import plain
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.experiments.conditions import RECEPTOR_X_MM
+from fingerpad.experiments.discrimination import discriminate as study
+from fingerpad.experiments.discrimination.decoding import SESSION, curves
+from fingerpad.experiments.discrimination.efficiencies import (
+    SMALLEST_SPREAD,
+    efficiencies,
+    ideal_observer,
+    presentations,
+)
+from fingerpad.experiments.discrimination.judgements import Asked, result
+from fingerpad.experiments.discrimination.task import CurveSettings
+from fingerpad.experiments.discrimination.task_files import parsed, ready_made
+from fingerpad.experiments.discrimination.task_population import population_of
+from fingerpad.experiments.discrimination.task_stimuli import presented, touches
+from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.psychophysics.discrimination import (
+    Experiment,
+    discriminate_euclidean,
+    discriminate_gradient_sum,
+)
+from fingerpad.psychophysics.encoding import neighbour_pairs
+from fingerpad.report import discrimination_task as report
+from fingerpad.report import discrimination_task_figures as figures
 
 ROOT = Path(__file__).parents[1]
 QUESTION = {

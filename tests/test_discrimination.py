@@ -9,17 +9,19 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import ndtr
 
-from fingerpad.discrimination import (
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.random_streams import Purpose, normals, uniforms
+from fingerpad.neuron.population import Population
+from fingerpad.psychophysics.discrimination import (
     END_OF_STIMULUS_MS,
     Experiment,
     discriminate_euclidean,
     discriminate_gradient_sum,
     hit_rates_of_sums,
 )
-from fingerpad.encoding import distance, gradient_sum, neighbour_pairs
-from fingerpad.errors import ConvergenceError, InputError
-from fingerpad.noise_fit import expected_hit_rates, fit_noise_sigma
-from fingerpad.noisy_responses import (
+from fingerpad.psychophysics.encoding import distance, gradient_sum, neighbour_pairs
+from fingerpad.psychophysics.noise_fit import expected_hit_rates, fit_noise_sigma
+from fingerpad.psychophysics.noisy_responses import (
     LARGEST_SESSION,
     SESSION,
     noisy_gradient_sums,
@@ -27,8 +29,6 @@ from fingerpad.noisy_responses import (
     session_trials,
     shared_noise_gradient_sums,
 )
-from fingerpad.population import Population
-from fingerpad.random_streams import Purpose, normals, uniforms
 
 GRID = Population.grid()
 PAIRS = neighbour_pairs(GRID.positions_mm, GRID.pitch_mm)
@@ -200,7 +200,7 @@ def test_the_number_of_threads_changes_no_bit():
     """Threads share the trials; the same numbers come from a process that has only one."""
     program = (
         "import numpy as np\n"
-        "from fingerpad.noisy_responses import noisy_gradient_sums, session_trials\n"
+        "from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, session_trials\n"
         "values = np.arange(1.0, 15.0).reshape(2, 7)\n"
         "pairs = np.stack([np.arange(6), np.arange(1, 7)], axis=1)\n"
         "sums = noisy_gradient_sums(values, pairs, 0.1, 3, session_trials(0, 2, 100), 10)\n"

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.errors import InputError
-from fingerpad.estimation.identifiable import six_parameters
-from fingerpad.estimation.rate_problem import AfferentModel
-from fingerpad.estimation.recordings import RateRecordings
-from fingerpad.mesh import LAYERS, block_mesh
-from fingerpad.report import drive_study as report
-from fingerpad.report.appearance import png
-from fingerpad.sampling import SkinResponse
-from fingerpad.signals import SedTraces
-from fingerpad.studies import drive_depths
-from fingerpad.studies.conditions import RECEPTOR_X_MM
-from fingerpad.studies.drive_fits import quick_method
-from fingerpad.studies.reproduction import plain
-from fingerpad.transduction import drive
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.experiments.conditions import RECEPTOR_X_MM
+from fingerpad.experiments.gerling2014.drive_fits import quick_method
+from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.geometry.mesh import LAYERS, block_mesh
+from fingerpad.inference.identifiable import six_parameters
+from fingerpad.inference.rate_problem import AfferentModel
+from fingerpad.inference.recordings import RateRecordings
+from fingerpad.neuron.transduction import drive
+from fingerpad.report.style import png
+from fingerpad.skin.sampling import SkinResponse
+from studies import drive_depths
+from studies.pages import drive_study as report
 
 DEPTHS_MM = np.array([0.0, 0.2, 0.371, 0.471, 1.0, 1.624, 5.0])
 TISSUE = [0, 0, 1, 2, 2, 3]

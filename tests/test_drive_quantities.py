@@ -9,22 +9,23 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.stats import norm
 
-from fingerpad.afferent import Afferent
-from fingerpad.errors import InputError
-from fingerpad.estimation.identifiable import identifiable, six_parameters
-from fingerpad.estimation.rate_problem import AfferentModel, RateProblem
-from fingerpad.estimation.recordings import RateRecordings
-from fingerpad.fitting import Fit, interleaved_folds
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.experiments.conditions import RECEPTOR_X_MM
+from fingerpad.experiments.gerling2014 import drive_fits, drive_quantities, single_unit
+from fingerpad.experiments.gerling2014.drive_quantities import ALONE, APART, EXTENDED, PAPER, SHOWN, Drivers
+from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.inference.fitting import Fit, interleaved_folds
+from fingerpad.inference.identifiable import identifiable, six_parameters
+from fingerpad.inference.rate_problem import AfferentModel, RateProblem
+from fingerpad.inference.recordings import RateRecordings
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.report import drive_quantities as report
-from fingerpad.report import drive_study as drives_report
-from fingerpad.report.appearance import png
-from fingerpad.signals import SedTraces
-from fingerpad.studies import drive_fits, drive_quantities, drive_study, dynamic_response, single_unit
-from fingerpad.studies.conditions import RECEPTOR_X_MM
-from fingerpad.studies.drive_quantities import ALONE, APART, EXTENDED, PAPER, SHOWN, Drivers
-from fingerpad.studies.dynamic_response import EXPLANATIONS, ExplainedModel, Patch, low_passed
-from fingerpad.studies.reproduction import plain
-from fingerpad.transduction import Drive, drive
+from fingerpad.report.style import png
+from studies import drive_study, dynamic_response
+from studies.dynamic_response import EXPLANATIONS, ExplainedModel, Patch, low_passed
+from studies.pages import drive_study as drives_report
 
 TIMES_MS = np.concatenate([np.linspace(0.0, 50.0, 5), [60.0, 100.0, 300.0, 1000.0]])
 SHIFT_MM = np.round(np.linspace(-3.45, 3.45, 24), 2)

@@ -5,16 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fingerpad.edged_indenters import Edge, Gap, Grating
-from fingerpad.errors import InputError
+from fingerpad.core.errors import InputError
 from fingerpad.export.outline import outline_of
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
-from fingerpad.indentation import Touch
-from fingerpad.indenters import Bar, Plate
+from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenters import Bar, Plate
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.stimulus import RampAndHold
+from fingerpad.skin.indentation import Touch
 
 EDGE, GAP, GRATING = Edge(0.3), Gap(1.0, 6.0, 0.4, 0.2), Grating(0.9, 0.7, 0.2)
 SHARP = [Edge(0.0), Gap(1.0, 6.0, 0.0, 0.0), Grating(0.9, 0.7, 0.0)]

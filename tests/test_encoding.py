@@ -5,11 +5,17 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 
-from fingerpad.encoding import delaunay_pairs, distance, gradient_sum, neighbour_pairs, neighbours_of
-from fingerpad.errors import InputError
-from fingerpad.layouts import hexagonal, jittered, poisson_disc, rectangular, uniform
-from fingerpad.population import Population
-from fingerpad.regions import Ellipse
+from fingerpad.core.errors import InputError
+from fingerpad.core.layouts import hexagonal, jittered, poisson_disc, rectangular, uniform
+from fingerpad.core.regions import Ellipse
+from fingerpad.neuron.population import Population
+from fingerpad.psychophysics.encoding import (
+    delaunay_pairs,
+    distance,
+    gradient_sum,
+    neighbour_pairs,
+    neighbours_of,
+)
 
 GRID = Population.grid()
 EIGHT = neighbour_pairs(GRID.positions_mm, GRID.pitch_mm, 8)

@@ -9,12 +9,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad, solve_ivp
 from scipy.stats import kstest
 
-from fingerpad import blocks
-from fingerpad.errors import InputError
-from fingerpad.escape_rate import EscapeRate, _integral, panels, relative_potential
-from fingerpad.lif import LeakyIntegrateAndFire
-from fingerpad.random_streams import Presentations, Purpose, uniforms
-from fingerpad.signals import CurrentTraces, SpikeTrains
+from fingerpad.core import blocks
+from fingerpad.core.errors import InputError
+from fingerpad.core.random_streams import Presentations, Purpose, uniforms
+from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.neuron.escape_rate import EscapeRate, _integral, panels, relative_potential
+from fingerpad.neuron.lif import LeakyIntegrateAndFire
 
 TAU, CAPACITANCE, THRESHOLD, REFRACTORY = 30.0, 1e-6, 50.0, 3.0
 NEURON = LeakyIntegrateAndFire(TAU, CAPACITANCE, THRESHOLD, REFRACTORY)

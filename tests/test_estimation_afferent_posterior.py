@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2, multivariate_t, norm
 
-from fingerpad.errors import ConvergenceError, InputError
-from fingerpad.estimation.afferent_posterior import (
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.inference.afferent_posterior import (
     AfferentPrior,
     afferent_posterior,
     four_number_model,
@@ -22,13 +23,12 @@ from fingerpad.estimation.afferent_posterior import (
     log_posterior,
     to_coordinates,
 )
-from fingerpad.estimation.many_rates import rates_of_each
-from fingerpad.estimation.rate_likelihood import LENGTHS_MM, RateLikelihood
-from fingerpad.estimation.rate_problem import AfferentModel
-from fingerpad.estimation.recordings import RateRecordings
-from fingerpad.fitting.posterior import credible_band
-from fingerpad.signals import SedTraces
-from fingerpad.transduction import drive
+from fingerpad.inference.fitting.posterior import credible_band
+from fingerpad.inference.many_rates import rates_of_each
+from fingerpad.inference.rate_likelihood import LENGTHS_MM, RateLikelihood
+from fingerpad.inference.rate_problem import AfferentModel
+from fingerpad.inference.recordings import RateRecordings
+from fingerpad.neuron.transduction import drive
 
 SHIFTS = np.linspace(0.0, 2.7, 10)
 PEAKS = 0.25 + 1.6 * np.exp(-(((SHIFTS - 1.4) / 0.7) ** 2)) + 0.4 * (SHIFTS < 1.0)

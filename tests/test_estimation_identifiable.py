@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from fingerpad.afferent import Afferent
-from fingerpad.errors import InputError
-from fingerpad.estimation.identifiable import (
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.inference.identifiable import (
     IDENTIFIABLE_NAMES,
     IDENTIFIABLE_UNITS,
     identifiable,
     six_parameters,
 )
-from fingerpad.signals import SedTraces
+from fingerpad.neuron.afferent import Afferent
 
 SIX = np.array([2.3e-7, 1.0e-4, 5.6e-7, 72.0, 6.0e-7, 30.0])
 SED = SedTraces([0.0, 25.0, 50.0, 1000.0], [[0.0, 0.0], [0.4, 0.9], [1.0, 2.0], [0.8, 1.7]], [50.0])

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from fingerpad.afferent import Afferent
-from fingerpad.errors import InputError
-from fingerpad.estimation.afferent_posterior import four_number_model
-from fingerpad.estimation.identifiable import identifiable
-from fingerpad.estimation.many_rates import rates_of_each
-from fingerpad.estimation.quick_rates import rates_under
-from fingerpad.estimation.rate_problem import AfferentModel
-from fingerpad.signals import SedTraces
-from fingerpad.transduction import drive
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.inference.afferent_posterior import four_number_model
+from fingerpad.inference.identifiable import identifiable
+from fingerpad.inference.many_rates import rates_of_each
+from fingerpad.inference.quick_rates import rates_under
+from fingerpad.inference.rate_problem import AfferentModel
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.transduction import drive
 
 PEAKS = np.array([0.0, 0.3, 0.8, 1.4, 1.9, 2.5])
 TIMES = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 100.0, 200.0, 500.0, 1000.0])

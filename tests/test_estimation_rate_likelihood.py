@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import gammaln, logsumexp
 
-from fingerpad.errors import InputError
-from fingerpad.estimation.rate_likelihood import RateLikelihood
-from fingerpad.estimation.recordings import RateRecordings
+from fingerpad.core.errors import InputError
+from fingerpad.inference.rate_likelihood import RateLikelihood
+from fingerpad.inference.recordings import RateRecordings
 
 PLACES = np.array([-1.0, -0.4, 0.0, 0.6, 1.5])
 STIMULI = ("a", "b", "c", "d", "e")

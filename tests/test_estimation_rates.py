@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.afferent import Afferent
-from fingerpad.errors import InputError
-from fingerpad.estimation.closed_form import ClosedFormModel, constant_drive_rate
-from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
-from fingerpad.estimation.rate_problem import AfferentModel, RateProblem, Reparametrised
-from fingerpad.estimation.receptor_offset import ReceptorOffset, receptor_offset
-from fingerpad.estimation.recordings import RateRecordings
-from fingerpad.fitting import weighted_fractional_sum_of_squares
-from fingerpad.fitting.least_squares import LeastSquares
-from fingerpad.lif import LeakyIntegrateAndFire
-from fingerpad.signals import CurrentTraces, SedTraces
-from fingerpad.spikes import firing_rate_hz
-from fingerpad.transduction import drive
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import CurrentTraces, SedTraces
+from fingerpad.inference.closed_form import ClosedFormModel, constant_drive_rate
+from fingerpad.inference.fitting import weighted_fractional_sum_of_squares
+from fingerpad.inference.fitting.least_squares import LeastSquares
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
+from fingerpad.inference.rate_problem import AfferentModel, RateProblem, Reparametrised
+from fingerpad.inference.receptor_offset import ReceptorOffset, receptor_offset
+from fingerpad.inference.recordings import RateRecordings
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.lif import LeakyIntegrateAndFire
+from fingerpad.neuron.spikes import firing_rate_hz
+from fingerpad.neuron.transduction import drive
 
 SHIFT_MM = np.linspace(-2.0, 2.0, 21)
 FOUR = np.array([0.012, 3.2, 0.03, 45.0])

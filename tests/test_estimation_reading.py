@@ -6,12 +6,12 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.estimation.reading import read_recordings
-from fingerpad.estimation.recordings import RateRecordings, SpikeRecordings
-from fingerpad.estimation.stimuli import ListedStimuli, ShiftedBar, TactileStimulus, read_stimuli
-from fingerpad.indenters import Bar, FlatPunch, Sphere
-from fingerpad.stimulus import ForceRampAndHold, RampAndHold
+from fingerpad.core.errors import InputError
+from fingerpad.experiments.recording_files import read_recordings
+from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar, TactileStimulus, read_stimuli
+from fingerpad.geometry.indenters import Bar, FlatPunch, Sphere
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 
 TWO = ListedStimuli({"edge": TactileStimulus(Bar()), "flat": TactileStimulus(Bar(), x_mm=1.0)}, "two.csv")
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.estimation.recordings import RateRecordings, SpikeRecordings
-from fingerpad.signals import SpikeTrains
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SpikeTrains
+from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 
 
 def test_chosen_rows_keep_names_rates_and_a_phase_that_was_not_recorded():

@@ -10,26 +10,26 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad, solve_ivp
 from scipy.stats import binom
 
-from fingerpad import blocks
-from fingerpad.afferent import Afferent
-from fingerpad.errors import ConvergenceError, InputError
-from fingerpad.escape_rate import EscapeRate
-from fingerpad.estimation.identifiable import six_parameters
-from fingerpad.estimation.spike_fit import SpikeFit, fit_spikes
-from fingerpad.estimation.spike_likelihood import (
+from fingerpad.core import blocks
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.random_streams import Presentations
+from fingerpad.core.signals import SedTraces, SpikeTrains
+from fingerpad.inference.identifiable import six_parameters
+from fingerpad.inference.spike_fit import SpikeFit, fit_spikes
+from fingerpad.inference.spike_likelihood import (
     SpikeLikelihood,
     time_rescaling,
 )
-from fingerpad.estimation.spike_parameters import (
+from fingerpad.inference.spike_parameters import (
     SPIKE_PARAMETER_NAMES,
     SPIKE_PARAMETER_UNITS,
     canonical,
     canonical_jacobian,
     from_canonical,
 )
-from fingerpad.random_streams import Presentations
-from fingerpad.signals import SedTraces, SpikeTrains
-from fingerpad.transduction import Drive, drive
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.escape_rate import EscapeRate
+from fingerpad.neuron.transduction import Drive, drive
 
 TRUTH = np.array([0.0127, 5.6, 0.031, 40.0, 0.25])
 """Like our fit to the recordings, but for a shorter memory, which fewer spikes determine."""

@@ -11,21 +11,21 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
-from fingerpad.edged_indenters import Edge, Gap, Grating
-from fingerpad.errors import InputError
+from fingerpad.core.errors import InputError
 from fingerpad.export.abaqus import abaqus_deck, write_abaqus
 from fingerpad.export.calculix import calculix_deck, write_calculix
 from fingerpad.export.febio import febio_deck, write_febio
 from fingerpad.export.formats import export_touch
 from fingerpad.export.job import Job, job_of
 from fingerpad.export.outline import outline_of, rigid_mesh
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
-from fingerpad.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.geometry.mesh import block_mesh, finger_mesh
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.laws import Hencky, Hyperfoam, Polynomial
 from fingerpad.mechanics.materials import Material, Prony
-from fingerpad.mesh import block_mesh, finger_mesh
 
 PRONY = Prony(shares=(0.1, 0.3), times_ms=(20.0, 700.0))
 BALL = Sphere(curvature_per_m=1000.0 / 3.0)

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from fingerpad.errors import InputError, StoreError
-from fingerpad.estimation.reading import read_recordings
-from fingerpad.estimation.stimuli import read_stimuli
+from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.signals import ResponseMap, SpikeTrains
+from fingerpad.experiments.recording_files import read_recordings
+from fingerpad.experiments.stimuli import read_stimuli
 from fingerpad.export.responses import write_response_csv
 from fingerpad.export.responses_nwb import write_responses_nwb
-from fingerpad.response_maps import recruitment_rank
-from fingerpad.signals import ResponseMap, SpikeTrains
+from fingerpad.neuron.response_maps import recruitment_rank
 
 
 def random_response(columns: int) -> ResponseMap:

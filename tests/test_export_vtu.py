@@ -10,18 +10,18 @@ from vtkmodules.vtkFiltersGeneral import vtkCellValidator
 from vtkmodules.vtkFiltersVerdict import vtkCellSizeFilter
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
-from fingerpad.errors import InputError, StoreError
+from fingerpad.core.errors import InputError, StoreError
 from fingerpad.export.formats import FORMATS, export_touch
 from fingerpad.export.vtu import HEXAHEDRON, WEDGE, cells_of, write_vtu_series
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
-from fingerpad.indentation import Touch
-from fingerpad.indenters import Sphere
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenters import Sphere
+from fingerpad.geometry.mesh import Mesh, block_mesh
+from fingerpad.geometry.mesh_quality import jacobian_at_gauss
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.mesh import Mesh, block_mesh
-from fingerpad.mesh_quality import jacobian_at_gauss
-from fingerpad.stimulus import RampAndHold
+from fingerpad.skin.indentation import Touch
 
 TOUCH = Touch(
     finger=Fingertip(),

@@ -6,8 +6,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from fingerpad.errors import StoreError
-from fingerpad.files import write_atomically, write_json
+from fingerpad.core.errors import StoreError
+from fingerpad.core.files import write_atomically, write_json
 
 
 def test_content_arrives_byte_by_byte_and_nothing_else_is_left(tmp_path):

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.fingertip import Fingertip, Profile
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.fingertip import Fingertip, Profile
 
 LENGTH, DEPTH, HEIGHT, WIDTH = 30.0, 9.0, 6.0, 8.0
 

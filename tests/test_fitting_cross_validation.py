@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.fitting import (
+from fingerpad.core.errors import InputError
+from fingerpad.inference.fitting import (
     ResponseSurface,
     coding_increments,
     cross_validate,

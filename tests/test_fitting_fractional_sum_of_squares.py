@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fingerpad.errors import InputError
-from fingerpad.fitting import fractional_sum_of_squares, weighted_fractional_sum_of_squares
-from fingerpad.reference import bar_firing_rates
+from fingerpad.core.errors import InputError
+from fingerpad.data import bar_firing_rates
+from fingerpad.inference.fitting import fractional_sum_of_squares, weighted_fractional_sum_of_squares
 
 RATES = np.array([0.0, 20.0, 135.0, 210.0, 72.0, 5.0])
 

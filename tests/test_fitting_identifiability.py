@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from fingerpad.afferent import PARAMETER_NAMES, Afferent
-from fingerpad.errors import InputError
-from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
-from fingerpad.estimation.rate_problem import AfferentModel
-from fingerpad.fitting.identifiability import identifiability, jacobian
-from fingerpad.signals import SedTraces
-from fingerpad.transduction import drive
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.inference.fitting.identifiability import identifiability, jacobian
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
+from fingerpad.inference.rate_problem import AfferentModel
+from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.neuron.transduction import drive
 
 PEAKS = np.array([0.3, 0.8, 1.4, 1.9, 2.5])
 TIMES = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 100.0, 200.0, 500.0, 1000.0])

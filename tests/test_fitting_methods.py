@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.fitting import Fit, Step, best_of
-from fingerpad.fitting.covariance_adaptation import CovarianceAdaptation
-from fingerpad.fitting.least_squares import LeastSquares
+from fingerpad.core.errors import InputError
+from fingerpad.inference.fitting import Fit, Step, best_of
+from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
+from fingerpad.inference.fitting.least_squares import LeastSquares
 
 TIMES = np.linspace(0.0, 4.0, 24)
 TRUTH = np.array([2.0, 0.8])

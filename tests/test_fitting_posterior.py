@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fingerpad.errors import ConvergenceError, InputError
-from fingerpad.fitting.convergence import effective_size, split_r_hat, tail_effective_size
-from fingerpad.fitting.posterior import Chains, credible_band, sample
-from fingerpad.threads import compiled_threads
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.threads import compiled_threads
+from fingerpad.inference.fitting.convergence import effective_size, split_r_hat, tail_effective_size
+from fingerpad.inference.fitting.posterior import Chains, credible_band, sample
 
 COVARIANCE = np.array([[4.0, 1.9, 0.0], [1.9, 1.0, 0.0], [0.0, 0.0, 0.01]])
 CENTRE = np.array([3.0, -1.0, 0.5])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.fitting.profile_likelihood import Profiles, profile_likelihoods
+from fingerpad.core.errors import InputError
+from fingerpad.inference.fitting.profile_likelihood import Profiles, profile_likelihoods
 
 COVARIANCE = np.array([[1.0, 1.2], [1.2, 4.0]])
 CENTRE = np.array([2.0, -3.0])

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fingerpad.errors import ConvergenceError, InputError
-from fingerpad.fitting import coding_increments, factorial_design, maximise, regression_slopes
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.inference.fitting import coding_increments, factorial_design, maximise, regression_slopes
 
 
 class Counted:

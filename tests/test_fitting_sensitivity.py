@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.fitting.sensitivity import sobol_indices
+from fingerpad.core.errors import InputError
+from fingerpad.inference.fitting.sensitivity import sobol_indices
 
 NAMES = ("a", "b", "c")
 

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from fingerpad.edged_indenters import Edge, Gap
-from fingerpad.errors import ConvergenceError, InputError
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
-from fingerpad.indentation import Touch
-from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.geometry.edged_indenters import Edge, Gap
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics import press as press_module
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.linear import free_degrees_of_freedom
@@ -16,9 +17,8 @@ from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import PressSettings, press
 from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.mesh import block_mesh
-from fingerpad.stimulus import ForceRampAndHold, RampAndHold
-from fingerpad.store import Store, touch_key
+from fingerpad.skin.indentation import Touch
+from fingerpad.skin.store import Store, touch_key
 
 BALL = Sphere(curvature_per_m=500.0)
 BODIES = [Line(), Cylinder(3.0), Bar(2.0, 0.3), BALL, FlatPunch(2.0, 0.3), Plate(), Edge(0.3), Gap(0.8, 4.0)]

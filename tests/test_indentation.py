@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
-from fingerpad.indentation import Touch, indent, settings_of, touch_of
-from fingerpad.indenter_grading import THIN_SIZE_MM, grading_about
-from fingerpad.indenters import Bar, Cylinder, Line, Plate, Sphere
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenter_grading import THIN_SIZE_MM, grading_about
+from fingerpad.geometry.indenters import Bar, Cylinder, Line, Plate, Sphere
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.mechanics.materials import Material, MaterialTable, Tissues
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.stimulus import RampAndHold
+from fingerpad.skin.indentation import Touch, indent, settings_of, touch_of
 
 FINGER, BALL = Fingertip(), Sphere(curvature_per_m=287)
 NAMES = ["Sphere", "Cylinder", "Bar", "Line", "Plate"]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from fingerpad.errors import InputError
-from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 
 RADIUS = 1.5
 CYLINDER, SPHERE = Cylinder(diameter_mm=2 * RADIUS), Sphere(curvature_per_m=1000.0 / RADIUS)

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 from scipy.stats import chisquare, kstest
 
-from fingerpad.errors import InputError
-from fingerpad.layouts import (
+from fingerpad.core.errors import InputError
+from fingerpad.core.layouts import (
     MOST_RECEPTORS,
     PATTERNS,
     Layout,
@@ -21,8 +21,8 @@ from fingerpad.layouts import (
     rectangular,
     uniform,
 )
-from fingerpad.population import Population
-from fingerpad.regions import Ellipse, Polygon, Rectangle
+from fingerpad.core.regions import Ellipse, Polygon, Rectangle
+from fingerpad.neuron.population import Population
 
 PAD = Ellipse(6.0, 5.0, (17.0, 0.5))
 MAKERS = {

@@ -10,12 +10,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from fingerpad import blocks
-from fingerpad.blocks import BLOCK
-from fingerpad.errors import InputError
-from fingerpad.exact_spikes import _next_guess
-from fingerpad.lif import LeakyIntegrateAndFire
-from fingerpad.signals import CurrentTraces
+from fingerpad.core import blocks
+from fingerpad.core.blocks import BLOCK
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import CurrentTraces
+from fingerpad.neuron.exact_spikes import _next_guess
+from fingerpad.neuron.lif import LeakyIntegrateAndFire
 
 TAU, CAPACITANCE, THRESHOLD, REFRACTORY = 68.0, 1e-6, 50.0, 1.0
 NEURON = LeakyIntegrateAndFire(TAU, CAPACITANCE, THRESHOLD, REFRACTORY)

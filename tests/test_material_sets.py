@@ -9,26 +9,25 @@ import numpy as np
 import pytest
 
 from fingerpad import cli
-from fingerpad.afferent import Afferent
-from fingerpad.errors import ConvergenceError, InputError
-from fingerpad.grading import Grading
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.data import protocol
+from fingerpad.data import tissues as published
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.geometry.grading import Grading
 from fingerpad.mechanics.laws import Hyperfoam, Polynomial
 from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.parameters import protocol
-from fingerpad.parameters import tissues as published
-from fingerpad.report.material_sets import FIGURE, page, write_material_page
-from fingerpad.sampling import SurfaceProfile
-from fingerpad.signals import SedTraces
-from fingerpad.store import Store
-from fingerpad.studies import material_sets, material_study, trial_order
-from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.studies.hyperfoam_fit import (
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.skin.sampling import SurfaceProfile
+from fingerpad.skin.store import Store
+from studies import material_sets, material_study, trial_order
+from studies.hyperfoam_fit import (
     hyperfoam_stress_kpa,
     polynomial_of_hyperfoam,
     polynomial_stress_terms,
 )
-from fingerpad.studies.material_candidates import candidates, deflection_candidates, layered, wu_polynomials
-from fingerpad.studies.material_sets import (
+from studies.material_candidates import candidates, deflection_candidates, layered, wu_polynomials
+from studies.material_sets import (
     Effort,
     Levels,
     MaterialSet,
@@ -37,7 +36,8 @@ from fingerpad.studies.material_sets import (
     pareto_front,
     touches,
 )
-from fingerpad.studies.material_study import MaterialStudy, meets, study_materials
+from studies.material_study import MaterialStudy, meets, study_materials
+from studies.pages.material_sets import FIGURE, page, write_material_page
 
 WU_SKIN = (published.WU_SKIN_HYPERFOAM_MU.value, published.WU_SKIN_HYPERFOAM_ALPHA.value)
 
@@ -402,7 +402,7 @@ def test_a_stiff_epidermis_spreads_the_deflection_at_equal_depth(tiny):
 
 
 def test_a_second_run_presses_nothing_and_says_the_same(tiny, monkeypatch):
-    monkeypatch.setattr("fingerpad.store._compute", pytest.fail)
+    monkeypatch.setattr("fingerpad.skin.store._compute", pytest.fail)
     use_few(monkeypatch)
     again = study_materials(tiny.study)
     for results in (again, tiny.results):

@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import resolution_grading
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import resolution_grading
+from fingerpad.geometry.mesh import block_mesh, finger_mesh
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.chunks import FEWEST_ELEMENTS, MANY_CHUNKS, coloured_chunks
 from fingerpad.mechanics.element import element_system
 from fingerpad.mechanics.materials import Hyperfoam, Material, MaterialTable, Ogden, Polynomial
-from fingerpad.mesh import block_mesh, finger_mesh
 
 TABLE = MaterialTable.of(
     (

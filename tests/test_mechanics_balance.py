@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fingerpad.fingertip import Fingertip
-from fingerpad.indentation import touch_of
-from fingerpad.indenters import FlatPunch, Plate, Sphere
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.indenters import FlatPunch, Plate, Sphere
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.mesh_quality import jacobian_at_gauss
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.balance import (
     DissipationCoefficients,
     EnergyBalance,
@@ -19,9 +21,7 @@ from fingerpad.mechanics.element import SHAPE_DERIVATIVES
 from fingerpad.mechanics.materials import Hyperfoam, Material, MaterialTable, Prony
 from fingerpad.mechanics.press import PressSettings, press
 from fingerpad.mechanics.viscoelastic import StepCoefficients, StressHistory, instantaneous_state
-from fingerpad.mesh import block_mesh
-from fingerpad.mesh_quality import jacobian_at_gauss
-from fingerpad.stimulus import RampAndHold
+from fingerpad.skin.indentation import touch_of
 
 PRONY = Prony(shares=(0.25, 0.35), times_ms=(40.0, 900.0))
 CUBE = block_mesh([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], layers=[0])

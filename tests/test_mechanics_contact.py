@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.mechanics.contact import Contact, Placement, place
 
 RADIUS = 2.0

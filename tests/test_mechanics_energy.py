@@ -6,12 +6,12 @@ import warnings
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError, MaterialWarning
+from fingerpad.core.errors import InputError, MaterialWarning
+from fingerpad.data import tissues
 from fingerpad.mechanics.energy import SECOND, translate
 from fingerpad.mechanics.laws import Energy, Hencky, Hyperfoam, Ogden, Polynomial
 from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.stability import instability
-from fingerpad.parameters import tissues
 
 LOGS = np.array([0.21, -0.34, 0.13, 0.17])
 STEP = 1e-20

@@ -5,7 +5,8 @@ import pytest
 from scipy.linalg import logm, polar
 from scipy.spatial.transform import Rotation
 
-from fingerpad.errors import InputError
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.mesh import Mesh, block_mesh
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.element import SHAPE_DERIVATIVES
 from fingerpad.mechanics.fields import (
@@ -24,7 +25,6 @@ from fingerpad.mechanics.viscoelastic import (
     instantaneous_state,
     stored_energy_density,
 )
-from fingerpad.mesh import Mesh, block_mesh
 
 PRONY = Prony(shares=(0.25, 0.35), times_ms=(40.0, 900.0))
 LAWS = {

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.fingertip import Fingertip
-from fingerpad.indentation import touch_of
-from fingerpad.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics import press as press_module
 from fingerpad.mechanics.contact import Contact, Placement, place
 from fingerpad.mechanics.friction import Anchors, dragged, friction, rubbing_heat
@@ -16,9 +17,8 @@ from fingerpad.mechanics.linear import free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import PressSettings, press
-from fingerpad.mesh import block_mesh
-from fingerpad.stimulus import ForceRampAndHold, RampAndHold
-from fingerpad.store import touch_key
+from fingerpad.skin.indentation import touch_of
+from fingerpad.skin.store import touch_key
 
 PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))
 RELAXING = tuple(Material.neo_hooke(shear, 0.45, PRONY) for shear in (40.0, 40.0, 20.0, 8.0))

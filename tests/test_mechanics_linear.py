@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from fingerpad.errors import ConvergenceError, InputError
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.geometry.mesh import block_mesh
 from fingerpad.mechanics import linear
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.factors import PardisoFactor, SuperLuFactor, pypardiso
@@ -17,7 +18,6 @@ from fingerpad.mechanics.linear import (
 )
 from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.multigrid import Multigrid
-from fingerpad.mesh import block_mesh
 
 needs_pardiso = pytest.mark.skipif(pypardiso is None, reason="MKL has no wheel for this processor")
 BLOCK = block_mesh(np.arange(7.0), np.arange(5.0), np.arange(5.0), layers=[0, 1, 2, 3], symmetric=True)

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
+from fingerpad.core.errors import InputError
 from fingerpad.mechanics.materials import Material, MaterialTable, Polynomial, Prony
 from fingerpad.mechanics.tissues import TISSUES, named_tissues
 

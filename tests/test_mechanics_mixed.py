@@ -5,7 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.indenters import Sphere
+from fingerpad.geometry.indenters import Sphere
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.mesh_quality import jacobian_at_gauss
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics import press as press_module
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.contact import place
@@ -14,9 +17,6 @@ from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.mixed import Pressures, exchange_pressure
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import PressSettings, press
-from fingerpad.mesh import block_mesh
-from fingerpad.mesh_quality import jacobian_at_gauss
-from fingerpad.stimulus import ForceRampAndHold, RampAndHold
 
 SHEAR, BULK = 3.0, 700.0
 BLOCK = block_mesh([0.0, 1.0, 2.2], [0.0, 0.7, 1.9], [0.0, 1.3], layers=[0, 1])

@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import resolution_grading
-from fingerpad.indenters import Sphere
+from fingerpad.core.threads import available_threads, compiled_threads
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import resolution_grading
+from fingerpad.geometry.indenters import Sphere
+from fingerpad.geometry.mesh import block_mesh, finger_mesh
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics import linear, multigrid
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.columns import find_scales, round_matrix, to_columns, to_nodes
@@ -17,9 +20,6 @@ from fingerpad.mechanics.materials import Material, MaterialTable, Prony
 from fingerpad.mechanics.multigrid import Multigrid
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import PressSettings, press
-from fingerpad.mesh import block_mesh, finger_mesh
-from fingerpad.stimulus import RampAndHold
-from fingerpad.threads import available_threads, compiled_threads
 
 SMALL = block_mesh(
     np.arange(7.0), [0.0, 0.3, 0.5, 1.5], np.array([0.0, 0.5, 1.0, 1.5, 2.5, 3.5]), [0, 2, 3], symmetric=True

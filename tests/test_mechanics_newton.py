@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.edged_indenters import Gap
-from fingerpad.errors import InputError
-from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.edged_indenters import Gap
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import PressSettings, press
-from fingerpad.mesh import block_mesh
-from fingerpad.stimulus import RampAndHold
 
 BALL = Sphere(curvature_per_m=500.0)
 SIX = [Line(), Cylinder(3.0), Bar(2.0, 0.3), BALL, FlatPunch(2.0, 0.3), Plate()]

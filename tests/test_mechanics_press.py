@@ -6,8 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.errors import ConvergenceError, InputError
-from fingerpad.indenters import FlatPunch, Line, Plate, Sphere
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.geometry.indenters import FlatPunch, Line, Plate, Sphere
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.mesh_quality import jacobian_at_gauss
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics import linear
 from fingerpad.mechanics import press as press_module
 from fingerpad.mechanics.assembly import Sparsity
@@ -19,9 +22,6 @@ from fingerpad.mechanics.materials import Material, MaterialTable, Prony
 from fingerpad.mechanics.newton import NewtonSettings, find_equilibrium
 from fingerpad.mechanics.press import PressSettings, press
 from fingerpad.mechanics.viscoelastic import StepCoefficients
-from fingerpad.mesh import block_mesh
-from fingerpad.mesh_quality import jacobian_at_gauss
-from fingerpad.stimulus import RampAndHold
 
 PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))
 LAYERS = tuple(Material.neo_hooke(shear, 0.45) for shear in (40.0, 40.0, 20.0, 8.0))

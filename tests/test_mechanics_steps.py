@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from fingerpad.errors import ConvergenceError
+from fingerpad.core.errors import ConvergenceError
 from fingerpad.mechanics.steps import LENGTHEN_AFTER, Phase, adaptive_steps, interpolation_error, steps_at
 
 RAMP_MS, END_MS = 50.0, 1000.0

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from fingerpad.geometry.mesh import block_mesh
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.materials import Material, MaterialTable, Polynomial, Prony
 from fingerpad.mechanics.viscoelastic import (
@@ -13,7 +14,6 @@ from fingerpad.mechanics.viscoelastic import (
     instantaneous_state,
     stored_energy_density,
 )
-from fingerpad.mesh import block_mesh
 
 PRONY = Prony(shares=(0.25, 0.35), times_ms=(40.0, 900.0))
 SKIN = Material(Polynomial(c10=4.0, c01=1.5, c20=2.5, c11=0.7, c02=0.9, bulk_linear=130.0), prony=PRONY)

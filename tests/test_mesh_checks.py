@@ -7,11 +7,11 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
-from fingerpad.mesh import CORNERS, block_mesh, finger_mesh
-from fingerpad.mesh_checks import check_mesh
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.mesh import CORNERS, block_mesh, finger_mesh
+from fingerpad.geometry.mesh_checks import check_mesh
 
 NONE = np.empty(0, dtype=np.int64)
 COARSE = Grading(

@@ -7,21 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingerpad.encoding import neighbour_pairs
-from fingerpad.errors import InputError
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
-from fingerpad.indentation import touch_of
-from fingerpad.indenters import Sphere
+from fingerpad.core.errors import InputError
+from fingerpad.data import bar_firing_rates
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.gerling2014 import single_unit, sphere_discrimination
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenters import Sphere
+from fingerpad.geometry.mesh import finger_mesh
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press import PressSettings
-from fingerpad.mesh import finger_mesh
-from fingerpad.population import Population
-from fingerpad.reference import bar_firing_rates
-from fingerpad.report import mesh_refinement as report
-from fingerpad.stimulus import RampAndHold
-from fingerpad.studies import mesh_refinement, single_unit, sphere_discrimination
-from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.studies.mesh_errors import (
+from fingerpad.neuron.population import Population
+from fingerpad.psychophysics.encoding import neighbour_pairs
+from fingerpad.skin.indentation import touch_of
+from studies import mesh_refinement
+from studies.mesh_errors import (
     Reading,
     compare,
     differences,
@@ -31,6 +31,7 @@ from fingerpad.studies.mesh_errors import (
     over_thickness,
     read,
 )
+from studies.pages import mesh_refinement as report
 
 RESULTS = Path(__file__).parents[1] / "docs" / "verification" / "mesh_refinement.json"
 COARSE = Grading(RECEPTOR_X_MM, 1.0, 1.0, 1.0, 1.0, stratum_corneum=1, dermis=1, subcutis=1)

@@ -7,14 +7,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 
-from fingerpad.errors import InputError
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import resolution_grading
-from fingerpad.layouts import uniform
-from fingerpad.mesh import finger_mesh
-from fingerpad.nail_edge import NailEdge
-from fingerpad.population import Population
-from fingerpad.receptor_sheet import ReceptorSheet
+from fingerpad.core.errors import InputError
+from fingerpad.core.layouts import uniform
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import resolution_grading
+from fingerpad.geometry.mesh import finger_mesh
+from fingerpad.neuron.population import Population
+from fingerpad.skin.nail_edge import NailEdge
+from fingerpad.skin.receptor_sheet import ReceptorSheet
 
 NAIL = NailEdge()
 FINGER = NAIL.finger

@@ -8,10 +8,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 from scipy.special import erfcx
 
-from fingerpad import blocks
-from fingerpad.errors import InputError
-from fingerpad.lif import LeakyIntegrateAndFire
-from fingerpad.membrane_noise import (
+from fingerpad.core import blocks
+from fingerpad.core.errors import InputError
+from fingerpad.core.random_streams import Presentations, Purpose, normals
+from fingerpad.core.signals import CurrentTraces
+from fingerpad.neuron.lif import LeakyIntegrateAndFire
+from fingerpad.neuron.membrane_noise import (
     CorrelatedCurrentNoise,
     GainNoise,
     MembraneNoise,
@@ -19,10 +21,8 @@ from fingerpad.membrane_noise import (
     WhiteCurrentNoise,
     log_spread,
 )
-from fingerpad.noisy_lif import noisy_spikes
-from fingerpad.random_streams import Presentations, Purpose, normals
-from fingerpad.signals import CurrentTraces
-from fingerpad.spikes import interval_statistics
+from fingerpad.neuron.noisy_lif import noisy_spikes
+from fingerpad.neuron.spikes import interval_statistics
 
 TAU, CAPACITANCE, THRESHOLD, REFRACTORY = 68.0, 1e-6, 50.0, 1.0
 NEURON = LeakyIntegrateAndFire(TAU, CAPACITANCE, THRESHOLD, REFRACTORY)

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 from scipy.special import ndtr, ndtri
 
-from fingerpad.encoding import distance, gradient_sum, neighbour_pairs
-from fingerpad.errors import InputError
+from fingerpad.core.errors import InputError
 from fingerpad.psychophysics import (
     TASKS,
     GaussianResponses,
@@ -30,6 +29,7 @@ from fingerpad.psychophysics import (
     sensitivity,
     yes_no,
 )
+from fingerpad.psychophysics.encoding import distance, gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.tasks import best_difference
 
 LOOKS = 400_000

@@ -7,17 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
-from fingerpad.indentation import touch_of
-from fingerpad.indenters import Sphere
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.gerling2014 import single_unit, skin_deflection, sphere_discrimination
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenters import Sphere
+from fingerpad.geometry.mesh import block_mesh, finger_mesh
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press import PressSettings
-from fingerpad.mesh import block_mesh, finger_mesh
-from fingerpad.report import paper_size as report
-from fingerpad.stimulus import RampAndHold
-from fingerpad.studies import paper_size, single_unit, skin_deflection, sphere_discrimination
-from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.studies.mesh_refinement import PEAK_SHIFT
+from fingerpad.skin.indentation import touch_of
+from studies import paper_size
+from studies.mesh_refinement import PEAK_SHIFT
+from studies.pages import paper_size as report
 
 COARSE = Grading(RECEPTOR_X_MM, 1.0, 1.0, 1.0, 1.0, stratum_corneum=1, dermis=1, subcutis=1)
 ERRORS = {"quick": 0.2, "standard": 0.05, "paper": 0.0, "deeper": -0.1}

@@ -5,8 +5,8 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.parameters import (
+from fingerpad.core.errors import InputError
+from fingerpad.data import (
     STATUSES,
     Published,
     all_published,

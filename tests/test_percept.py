@@ -7,29 +7,30 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import ndtri
 
-from fingerpad.discrimination import (
-    Experiment,
-    discriminate_euclidean,
-    discriminate_gradient_sum,
-)
-from fingerpad.encoding import gradient_sum, neighbour_pairs
-from fingerpad.errors import InputError
-from fingerpad.grading import lines_along
-from fingerpad.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
-from fingerpad.population import Population
-from fingerpad.random_streams import Purpose, normals
-from fingerpad.signals import SedTraces
-from fingerpad.studies import goodwin, mesh_noise, percept_reasons
-from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.studies.percept_reasons import (
+from fingerpad.core.errors import InputError
+from fingerpad.core.random_streams import Purpose, normals
+from fingerpad.core.signals import SedTraces
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.gerling2014 import discrepancy as percept_reasons
+from fingerpad.experiments.gerling2014 import goodwin, mesh_noise
+from fingerpad.experiments.gerling2014.discrepancy import (
     expected,
     first_spikes,
     fitted_noise,
     reasons,
     rise_needed,
 )
-from fingerpad.studies.percept_sessions import SWEPT_NOISE, Measured, Observers, observe
-from fingerpad.studies.percept_statistics import estimate, extreme, statistics
+from fingerpad.experiments.gerling2014.percept_sessions import SWEPT_NOISE, Measured, Observers, observe
+from fingerpad.experiments.gerling2014.percept_statistics import estimate, extreme, statistics
+from fingerpad.geometry.grading import lines_along
+from fingerpad.neuron.population import Population
+from fingerpad.psychophysics.discrimination import (
+    Experiment,
+    discriminate_euclidean,
+    discriminate_gradient_sum,
+)
+from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
+from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
 
 CURVATURES = (287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0)
 GRID = Population.grid()

@@ -5,12 +5,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import kstest
 
-from fingerpad.afferent import Afferent
-from fingerpad.errors import InputError
-from fingerpad.layouts import jittered
-from fingerpad.population import Population, sensitivities
-from fingerpad.regions import Ellipse
-from fingerpad.signals import SedTraces
+from fingerpad.core.errors import InputError
+from fingerpad.core.layouts import jittered
+from fingerpad.core.regions import Ellipse
+from fingerpad.core.signals import SedTraces
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.population import Population, sensitivities
 
 
 class Bump:

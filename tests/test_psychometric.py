@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 from scipy.optimize import approx_fprime, differential_evolution
 
-from fingerpad.errors import ConvergenceError, InputError
+from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.psychophysics import (
     FunctionCloud,
     JudgementCounts,

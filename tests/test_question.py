@@ -8,22 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingerpad.afferent import PARAMETER_NAMES, Afferent
-from fingerpad.errors import InputError
-from fingerpad.estimation.stimuli import INDENTERS
-from fingerpad.indenters import Bar, Sphere
-from fingerpad.nail_edge import NailEdge
-from fingerpad.plain_yaml import read_yaml
-from fingerpad.population import Population
-from fingerpad.stimulus import ForceRampAndHold, RampAndHold
-from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.studies.question import Question, StimulusSettings
-from fingerpad.studies.question_answers import Asked
-from fingerpad.studies.question_file import parsed, read_question, ready_made
-from fingerpad.studies.question_population import afferent_of, population_of
-from fingerpad.studies.question_stimuli import presented, touches
-from fingerpad.studies.sphere_discrimination import touches as sphere_touches
-from fingerpad.unrolled_skin import UnrolledSkin
+from fingerpad.core.errors import InputError
+from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.discrimination.judgements import Asked
+from fingerpad.experiments.discrimination.task import Question, StimulusSettings
+from fingerpad.experiments.discrimination.task_files import parsed, read_question, ready_made
+from fingerpad.experiments.discrimination.task_population import afferent_of, population_of
+from fingerpad.experiments.discrimination.task_stimuli import presented, touches
+from fingerpad.experiments.gerling2014.sphere_discrimination import touches as sphere_touches
+from fingerpad.experiments.stimuli import INDENTERS
+from fingerpad.geometry.indenters import Bar, Sphere
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.neuron.population import Population
+from fingerpad.skin.nail_edge import NailEdge
+from fingerpad.skin.unrolled_skin import UnrolledSkin
 
 ROOT = Path(__file__).parents[1]
 SPHERES = {
@@ -466,7 +466,9 @@ def test_the_guide_names_every_key():
         for name, field in part.model_fields.items():
             yield name
             for inner in re.findall(r"\w+Settings|VariedStimuli|ObservedPoint", str(field.annotation)):
-                yield from keys(getattr(__import__("fingerpad.studies.question", fromlist=[inner]), inner))
+                yield from keys(
+                    getattr(__import__("fingerpad.experiments.discrimination.task", fromlist=[inner]), inner)
+                )
 
     guide = (ROOT / "docs" / "discriminate.md").read_text(encoding="utf-8")
     assert [key for key in dict.fromkeys(keys(Question)) if f"`{key}`" not in guide] == []

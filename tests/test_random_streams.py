@@ -7,9 +7,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import chi2, kstest
 
-from fingerpad.errors import InputError
-from fingerpad.philox import words as scrambled
-from fingerpad.random_streams import Purpose, generator, normals, numbered, uniforms
+from fingerpad.core.errors import InputError
+from fingerpad.core.philox import words as scrambled
+from fingerpad.core.random_streams import Purpose, generator, normals, numbered, uniforms
 
 
 def test_the_scrambler_gives_the_published_answer():

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.errors import InputError
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading, resolution_grading
-from fingerpad.mesh import block_mesh, finger_mesh
-from fingerpad.receptor_sheet import ReceptorSheet
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading, resolution_grading
+from fingerpad.geometry.mesh import block_mesh, finger_mesh
+from fingerpad.skin.receptor_sheet import ReceptorSheet
 
 FINGER = Fingertip()
 EVEN = Grading(

@@ -4,22 +4,22 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.errors import InputError
-from fingerpad.estimation.any_motion import AnyMotion, AnyMotionBeside
-from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.estimation.many_rates import scores_of_each
-from fingerpad.estimation.rate_likelihood import RateLikelihood
-from fingerpad.estimation.rate_problem import RateProblem
-from fingerpad.estimation.recordings import RateRecordings
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.experiments.fit import rate_uncertainty
+from fingerpad.experiments.fit.fit import fit_recordings
+from fingerpad.experiments.fit.offset import check_offset, fit_offset
+from fingerpad.experiments.fit.posterior import four_numbers, profiled
+from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.inference.any_motion import AnyMotion, AnyMotionBeside
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
+from fingerpad.inference.many_rates import scores_of_each
+from fingerpad.inference.rate_likelihood import RateLikelihood
+from fingerpad.inference.rate_problem import RateProblem
+from fingerpad.inference.recordings import RateRecordings
 from fingerpad.report import recording_extras as report
-from fingerpad.report.appearance import png
 from fingerpad.report.rate_uncertainty import ALLOWED_LOSS
-from fingerpad.signals import SedTraces
-from fingerpad.studies import rate_uncertainty
-from fingerpad.studies.recording_fit import fit_recordings
-from fingerpad.studies.recording_offset import check_offset, fit_offset
-from fingerpad.studies.recording_posterior import four_numbers, profiled
-from fingerpad.studies.reproduction import plain
+from fingerpad.report.style import png
 
 TIMES_MS = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 80.0, 200.0, 1000.0])
 COURSE = np.minimum(TIMES_MS / 50.0, 1.0) ** 2 * (0.8 + 0.2 * np.exp(-np.maximum(TIMES_MS - 50.0, 0.0) / 200))

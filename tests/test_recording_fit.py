@@ -13,33 +13,33 @@ import pytest
 import typer
 
 from fingerpad import cli
-from fingerpad.afferent import Afferent
 from fingerpad.cli import choices
-from fingerpad.compilation import NOTICE
-from fingerpad.edged_indenters import Gap
-from fingerpad.errors import ConvergenceError, InputError
-from fingerpad.estimation.any_motion import AnyMotion, AnyMotionInClosedForm
-from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.estimation.reading import read_recordings
-from fingerpad.estimation.recordings import RateRecordings, SpikeRecordings
-from fingerpad.estimation.stimuli import INDENTERS, ShiftedBar, TactileStimulus
-from fingerpad.indenters import Bar, Line, Sphere
+from fingerpad.core.compilation import NOTICE
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.random_streams import Presentations
+from fingerpad.core.signals import SedTraces, SpikeTrains
+from fingerpad.data import bar_firing_rates, protocol
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.fit import fit as study
+from fingerpad.experiments.fit import posterior as recording_posterior
+from fingerpad.experiments.fit import session
+from fingerpad.experiments.fit.methods import METHODS, check_spikes
+from fingerpad.experiments.fit.posterior import posterior
+from fingerpad.experiments.gerling2014 import single_unit
+from fingerpad.experiments.gerling2014.single_unit_methods import OFFSETS_MM
+from fingerpad.experiments.gerling2014.spike_fit import soft_spikes
+from fingerpad.experiments.recording_files import read_recordings
+from fingerpad.experiments.stimuli import INDENTERS, ShiftedBar, TactileStimulus
+from fingerpad.geometry.edged_indenters import Gap
+from fingerpad.geometry.indenters import Bar, Line, Sphere
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad.inference.any_motion import AnyMotion, AnyMotionInClosedForm
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
+from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 from fingerpad.mechanics.fields import QUANTITIES
-from fingerpad.parameters import protocol
-from fingerpad.random_streams import Presentations
-from fingerpad.reference import bar_firing_rates
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.transduction import drive
 from fingerpad.report import recording_fit as report
-from fingerpad.signals import SedTraces, SpikeTrains
-from fingerpad.stimulus import ForceRampAndHold, RampAndHold
-from fingerpad.studies import recording_fit as study
-from fingerpad.studies import recording_posterior, single_unit
-from fingerpad.studies import recording_session as session
-from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.studies.recording_methods import METHODS, check_spikes
-from fingerpad.studies.recording_posterior import posterior
-from fingerpad.studies.single_unit_methods import OFFSETS_MM
-from fingerpad.studies.spike_fit import soft_spikes
-from fingerpad.transduction import drive
 
 ROOT = Path(__file__).parents[1]
 KNOWN = [2e-7, 1.2e-4, 9e-7, 60.0, 1e-6, 50.0]

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.parameters import protocol, psychophysics
-from fingerpad.reference import bar_firing_rates, cylinder_deflection, goodwin_hit_rates
-from fingerpad.reference.table import parsed_table
+from fingerpad.core.errors import InputError
+from fingerpad.data import bar_firing_rates, cylinder_deflection, goodwin_hit_rates, protocol, psychophysics
+from fingerpad.data.table import parsed_table
 
 STORY = "# content: a\n# source: b\n# status: read\n"
 

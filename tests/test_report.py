@@ -10,8 +10,8 @@ import matplotlib
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.parameters import all_published
+from fingerpad.core.errors import InputError
+from fingerpad.data import all_published
 from fingerpad.report import (
     discrimination,
     nail,
@@ -24,10 +24,10 @@ from fingerpad.report import (
     skin_deflection,
     summary,
     tables,
-    words,
     write_report,
 )
-from fingerpad.report.appearance import BLUE, GREEN, ORANGE, RESOLUTION_DPI
+from fingerpad.report import formatting as words
+from fingerpad.report.style import BLUE, GREEN, ORANGE, RESOLUTION_DPI
 
 SHIFT_MM = np.linspace(-3.5, 3.5, 36)
 CURVATURE_PER_M = [287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0]

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from fingerpad.errors import InputError
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import ResponseMap, SpikeTrains
 from fingerpad.report import responses
-from fingerpad.report.appearance import png, write_png
-from fingerpad.signals import ResponseMap, SpikeTrains
+from fingerpad.report.style import png, write_png
 
 
 def response(columns: int = 2, count: int = 12, gain: float = 1.0) -> ResponseMap:

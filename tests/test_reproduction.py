@@ -18,13 +18,13 @@ import numpy as np
 import pytest
 
 from fingerpad import __version__
-from fingerpad.compilation import NOTICE
-from fingerpad.parameters import all_published
+from fingerpad.core.compilation import NOTICE
+from fingerpad.data import all_published
+from fingerpad.experiments.discrimination.task_files import read_question
+from fingerpad.experiments.discrimination.task_stimuli import touches
+from fingerpad.experiments.gerling2014.reproduction import STORE_FOLDER
 from fingerpad.report.page import CHAPTERS, METHODS
-from fingerpad.store import Store
-from fingerpad.studies.question_file import read_question
-from fingerpad.studies.question_stimuli import touches
-from fingerpad.studies.reproduction import STORE_FOLDER
+from fingerpad.skin.store import Store
 
 COMMAND = (sys.executable, "-W", "error", "-m", "fingerpad", "reproduce")
 MEASURES = ("static", "dynamic", "latency")

@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.errors import InputError
-from fingerpad.response_maps import (
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SpikeTrains
+from fingerpad.neuron.response_maps import (
     NO_GROUP,
     evoked_latency_ms,
     order_change,
@@ -18,7 +19,6 @@ from fingerpad.response_maps import (
     recruitment_rank,
     rings,
 )
-from fingerpad.signals import SpikeTrains
 
 # Few values, so that ties are common.
 latencies = st.lists(st.one_of(st.just(np.nan), st.integers(1, 8).map(float)), min_size=1, max_size=12)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fingerpad.errors import InputError
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import resolution_grading
-from fingerpad.mesh import LAYERS, block_mesh, finger_mesh
-from fingerpad.sampling import SkinResponse, SurfaceProfile
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import resolution_grading
+from fingerpad.geometry.mesh import LAYERS, block_mesh, finger_mesh
+from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
 
 TIMES_MS = np.array([0.0, 50.0, 1000.0])
 DEPTHS_MM = np.array([0.0, 0.2, 0.371, 0.471, 1.0, 1.624, 5.0])

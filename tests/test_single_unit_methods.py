@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.estimation.recordings import RateRecordings
-from fingerpad.fitting import interleaved_folds
-from fingerpad.parameters import neuron, paper, protocol
+from fingerpad.core.signals import SedTraces
+from fingerpad.data import neuron, paper, protocol
+from fingerpad.experiments.conditions import RECEPTOR_X_MM
+from fingerpad.experiments.gerling2014 import single_unit, single_unit_methods, single_unit_starts
+from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.inference.fitting import interleaved_folds
+from fingerpad.inference.recordings import RateRecordings
+from fingerpad.neuron.transduction import drive
 from fingerpad.report import single_unit_methods as report
-from fingerpad.signals import SedTraces
-from fingerpad.studies import single_unit, single_unit_methods, single_unit_starts
-from fingerpad.studies.conditions import RECEPTOR_X_MM
-from fingerpad.studies.reproduction import plain
-from fingerpad.transduction import drive
 
 SHIFT_MM = np.array(protocol.BAR_SHIFTS.value)
 TIMES_MS = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 100.0, 300.0, 1000.0])

@@ -3,17 +3,18 @@
 import numpy as np
 import pytest
 
-from fingerpad.afferent import Afferent
-from fingerpad.estimation.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.estimation.rate_problem import AfferentModel
-from fingerpad.estimation.recordings import RateRecordings
-from fingerpad.reference import bar_firing_rates
+from fingerpad.core.signals import SedTraces
+from fingerpad.data import bar_firing_rates
+from fingerpad.experiments.fit import rate_uncertainty
+from fingerpad.experiments.gerling2014 import single_unit, single_unit_uncertainty
+from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
+from fingerpad.inference.rate_problem import AfferentModel
+from fingerpad.inference.recordings import RateRecordings
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.transduction import drive
 from fingerpad.report import single_unit_uncertainty as report
-from fingerpad.report.appearance import png
-from fingerpad.signals import SedTraces
-from fingerpad.studies import rate_uncertainty, single_unit, single_unit_uncertainty
-from fingerpad.studies.reproduction import plain
-from fingerpad.transduction import drive
+from fingerpad.report.style import png
 
 SHIFTS = bar_firing_rates().shift_mm
 TIMES = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 100.0, 200.0, 500.0, 1000.0])

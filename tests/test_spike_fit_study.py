@@ -6,19 +6,19 @@ import math
 import numpy as np
 import pytest
 
-from fingerpad.afferent import Afferent
-from fingerpad.estimation.spike_parameters import (
+from fingerpad.core.random_streams import Presentations
+from fingerpad.core.signals import SedTraces
+from fingerpad.experiments.gerling2014 import interval_variability, spike_fit
+from fingerpad.experiments.gerling2014.interval_variability import SETTLED_MS, SOURCES, held_at_its_rate
+from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.inference.spike_parameters import (
     SPIKE_PARAMETER_NAMES,
 )
-from fingerpad.random_streams import Presentations
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.spikes import interval_statistics
+from fingerpad.neuron.transduction import drive
 from fingerpad.report import spike_fit as report
-from fingerpad.report.appearance import png
-from fingerpad.signals import SedTraces
-from fingerpad.spikes import interval_statistics
-from fingerpad.studies import interval_variability, spike_fit
-from fingerpad.studies.interval_variability import SETTLED_MS, SOURCES, held_at_its_rate
-from fingerpad.studies.reproduction import plain
-from fingerpad.transduction import drive
+from fingerpad.report.style import png
 
 SHIFT_MM = np.linspace(-3.5, 3.5, 8)
 AFFERENT = Afferent()

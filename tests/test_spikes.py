@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.errors import InputError
-from fingerpad.signals import SpikeTrains
-from fingerpad.spikes import (
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SpikeTrains
+from fingerpad.neuron.spikes import (
     firing_rate_hz,
     first_spike_latency_ms,
     interval_statistics,

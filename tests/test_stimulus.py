@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fingerpad.errors import InputError
-from fingerpad.stimulus import ForceRampAndHold, RampAndHold
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 
 
 def test_depth_rises_linearly_then_stays():

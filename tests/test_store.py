@@ -13,21 +13,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingerpad import store as store_module
-from fingerpad.edged_indenters import Edge
-from fingerpad.errors import ConvergenceError, StoreError
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
-from fingerpad.indentation import Touch
-from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.core.errors import ConvergenceError, StoreError
+from fingerpad.geometry.edged_indenters import Edge
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.mechanics.materials import Prony
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.sampling import SkinResponse
-from fingerpad.stimulus import RampAndHold
-from fingerpad.store import Store, solve_missing, touch_key
+from fingerpad.skin import store as store_module
+from fingerpad.skin.indentation import Touch
+from fingerpad.skin.sampling import SkinResponse
+from fingerpad.skin.store import Store, solve_missing, touch_key
 
 COARSE = Grading(
     17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=6.0, stratum_corneum=1, living_epidermis=1, dermis=1, subcutis=1
@@ -170,7 +170,7 @@ def test_equal_touches_have_one_key_whatever_their_numbers_were_written_as():
 
 
 def test_key_is_the_same_in_another_process():
-    code = "import pickle, sys; from fingerpad.store import touch_key as key; "
+    code = "import pickle, sys; from fingerpad.skin.store import touch_key as key; "
     code += "print(key(pickle.load(sys.stdin.buffer)))"
     done = subprocess.run(
         [sys.executable, "-c", code],
@@ -456,7 +456,7 @@ def test_what_does_not_converge_raises_and_is_not_stored(tmp_path, skin, jobs):
 SCRIPT = """
 import pickle, sys
 from pathlib import Path
-from fingerpad.store import Store, solve_missing
+from fingerpad.skin.store import Store, solve_missing
 
 if __name__ == "__main__":
     touches = pickle.loads(Path(sys.argv[1]).read_bytes())

@@ -7,21 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.afferent import Afferent
-from fingerpad.errors import InputError
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
-from fingerpad.indentation import Touch
-from fingerpad.indenters import Bar, Cylinder, Line, Sphere
-from fingerpad.mechanics.press import PressSettings
-from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.mesh import finger_mesh
-from fingerpad.parameters import neuron, paper, psychophysics
-from fingerpad.reference import bar_firing_rates, cylinder_deflection
-from fingerpad.sampling import SurfaceProfile
-from fingerpad.signals import SedTraces
-from fingerpad.stimulus import RampAndHold
-from fingerpad.studies import (
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.data import bar_firing_rates, cylinder_deflection, neuron, paper, psychophysics
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.gerling2014 import (
     Reproduction,
     comparison,
     nail_border,
@@ -31,8 +21,17 @@ from fingerpad.studies import (
     skin_deflection,
     sphere_discrimination,
 )
-from fingerpad.studies.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.studies.reproduction import plain
+from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenters import Bar, Cylinder, Line, Sphere
+from fingerpad.geometry.mesh import finger_mesh
+from fingerpad.geometry.motion import RampAndHold
+from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.skin.indentation import Touch
+from fingerpad.skin.sampling import SurfaceProfile
 
 RESOLUTIONS = ["quick", "standard", "paper"]
 CURVATURES = [287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
-from fingerpad.errors import InputError
-from fingerpad.threads import available_threads, compiled_threads, current_threads, worker_threads
+from fingerpad.core.errors import InputError
+from fingerpad.core.threads import available_threads, compiled_threads, current_threads, worker_threads
 
 needs_two_threads = pytest.mark.skipif(available_threads() < 2, reason="this machine has one core")
 
@@ -101,7 +101,7 @@ def test_python_threads_may_share_out_work_at_once():
 
 FORKED = """
 import os
-from fingerpad.threads import compiled_threads, worker_threads
+from fingerpad.core.threads import compiled_threads, worker_threads
 
 def shared():
     with compiled_threads(2), worker_threads() as each:

@@ -3,10 +3,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import PchipInterpolator
 
-from fingerpad.errors import InputError
-from fingerpad.lif import LeakyIntegrateAndFire
-from fingerpad.signals import CurrentTraces, SedTraces
-from fingerpad.transduction import Drive, Transduction, drive
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import CurrentTraces, SedTraces
+from fingerpad.neuron.lif import LeakyIntegrateAndFire
+from fingerpad.neuron.transduction import Drive, Transduction, drive
 
 RAMP_MS = 50.0
 TIMES_MS = np.concatenate([np.linspace(0.0, RAMP_MS, 9), RAMP_MS + np.geomspace(1.0, 950.0, 12)])

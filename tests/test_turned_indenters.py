@@ -5,25 +5,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from fingerpad.edged_indenters import Edge, Gap, Grating
-from fingerpad.errors import InputError
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading, covering
-from fingerpad.indentation import Touch, touch_of
-from fingerpad.indenter_grading import (
+from fingerpad.core.errors import InputError
+from fingerpad.core.units import cosine_and_sine
+from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading, covering
+from fingerpad.geometry.indenter_grading import (
     ACROSS_GROOVE,
     EDGE_SIZE_MM,
     OBLIQUE_SIZE_MM,
     grading_about,
     sizes_across,
 )
-from fingerpad.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.stimulus import ForceRampAndHold, RampAndHold
-from fingerpad.store import touch_key
-from fingerpad.units import cosine_and_sine
+from fingerpad.skin.indentation import Touch, touch_of
+from fingerpad.skin.store import touch_key
 
 ALL = [Cylinder(), Bar(), Sphere(), FlatPunch(), Plate(), Line(), Edge(), Gap(), Grating()]
 HALF = Grading(17.37, 1.6, 1.6, 0.8, 0.8, largest_mm=5.0, stratum_corneum=1, dermis=1, subcutis=2)

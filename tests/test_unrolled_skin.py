@@ -8,15 +8,15 @@ from numpy.testing import assert_allclose
 from scipy.spatial import cKDTree
 from scipy.stats import poisson
 
-from fingerpad.errors import InputError
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
-from fingerpad.layouts import hexagonal, jittered, poisson_disc, rectangular, uniform
-from fingerpad.mesh import finger_mesh
-from fingerpad.population import Population
-from fingerpad.receptor_sheet import ReceptorSheet
-from fingerpad.regions import Ellipse, Rectangle
-from fingerpad.unrolled_skin import PAD_FACES_DEG, PAD_X_MM, UnrolledSkin
+from fingerpad.core.errors import InputError
+from fingerpad.core.layouts import hexagonal, jittered, poisson_disc, rectangular, uniform
+from fingerpad.core.regions import Ellipse, Rectangle
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.mesh import finger_mesh
+from fingerpad.neuron.population import Population
+from fingerpad.skin.receptor_sheet import ReceptorSheet
+from fingerpad.skin.unrolled_skin import PAD_FACES_DEG, PAD_X_MM, UnrolledSkin
 
 SKIN = UnrolledSkin()
 FINGER = SKIN.finger

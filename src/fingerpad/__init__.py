@@ -20,13 +20,19 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from fingerpad.afferent import Afferent
-    from fingerpad.edged_indenters import Edge, Gap, Grating
-    from fingerpad.errors import ConvergenceError, FingerpadError, InputError, MaterialWarning, StoreError
-    from fingerpad.fingertip import Fingertip
-    from fingerpad.grading import Grading
-    from fingerpad.indentation import Touch, indent, touch_of
-    from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+    from fingerpad.core.errors import (
+        ConvergenceError,
+        FingerpadError,
+        InputError,
+        MaterialWarning,
+        StoreError,
+    )
+    from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
+    from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
+    from fingerpad.geometry.fingertip import Fingertip
+    from fingerpad.geometry.grading import Grading
+    from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+    from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
     from fingerpad.mechanics.materials import (
         Energy,
         Hencky,
@@ -39,10 +45,10 @@ if TYPE_CHECKING:
     )
     from fingerpad.mechanics.press import PressSettings
     from fingerpad.mechanics.tissues import named_tissues
-    from fingerpad.population import Population
-    from fingerpad.sampling import SkinResponse, SurfaceProfile
-    from fingerpad.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
-    from fingerpad.stimulus import ForceRampAndHold, RampAndHold
+    from fingerpad.neuron.afferent import Afferent
+    from fingerpad.neuron.population import Population
+    from fingerpad.skin.indentation import Touch, indent, touch_of
+    from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
 
 __all__ = [
     "Afferent",
@@ -88,13 +94,13 @@ __all__ = [
 ]
 
 _HOMES = {
-    "afferent": ("Afferent",),
-    "edged_indenters": ("Edge", "Gap", "Grating"),
-    "errors": ("ConvergenceError", "FingerpadError", "InputError", "MaterialWarning", "StoreError"),
-    "fingertip": ("Fingertip",),
-    "grading": ("Grading",),
-    "indentation": ("Touch", "indent", "touch_of"),
-    "indenters": ("Bar", "Cylinder", "FlatPunch", "Line", "Plate", "Sphere"),
+    "neuron.afferent": ("Afferent",),
+    "geometry.edged_indenters": ("Edge", "Gap", "Grating"),
+    "core.errors": ("ConvergenceError", "FingerpadError", "InputError", "MaterialWarning", "StoreError"),
+    "geometry.fingertip": ("Fingertip",),
+    "geometry.grading": ("Grading",),
+    "skin.indentation": ("Touch", "indent", "touch_of"),
+    "geometry.indenters": ("Bar", "Cylinder", "FlatPunch", "Line", "Plate", "Sphere"),
     "mechanics.materials": (
         "Energy",
         "Hencky",
@@ -107,10 +113,10 @@ _HOMES = {
     ),
     "mechanics.press": ("PressSettings",),
     "mechanics.tissues": ("named_tissues",),
-    "population": ("Population",),
-    "sampling": ("SkinResponse", "SurfaceProfile"),
-    "signals": ("CurrentTraces", "HitRates", "ResponseMap", "SedTraces", "SpikeTrains"),
-    "stimulus": ("ForceRampAndHold", "RampAndHold"),
+    "neuron.population": ("Population",),
+    "skin.sampling": ("SkinResponse", "SurfaceProfile"),
+    "core.signals": ("CurrentTraces", "HitRates", "ResponseMap", "SedTraces", "SpikeTrains"),
+    "geometry.motion": ("ForceRampAndHold", "RampAndHold"),
 }
 """Public names by the module that defines them."""
 

@@ -6,15 +6,15 @@ from functools import lru_cache
 
 import numpy as np
 
-from fingerpad.edged_indenters import Edge, Gap
-from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.geometry.edged_indenters import Edge, Gap
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.mesh_quality import jacobian_at_gauss
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import PressSettings, press
-from fingerpad.mesh import block_mesh
-from fingerpad.mesh_quality import jacobian_at_gauss
-from fingerpad.stimulus import RampAndHold
 
 from .case import Row, at_least, at_most, case, near
 from .solid import Solid

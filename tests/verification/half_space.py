@@ -13,7 +13,9 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from fingerpad.indenters import Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.geometry.indenters import Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.geometry.mesh import Mesh, block_mesh
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics.configuration import Body, Load
 from fingerpad.mechanics.contact import Contact, place
 from fingerpad.mechanics.fields import cauchy_stress
@@ -28,8 +30,6 @@ from fingerpad.mechanics.viscoelastic import (
     instantaneous_state,
     stored_energy_density,
 )
-from fingerpad.mesh import Mesh, block_mesh
-from fingerpad.stimulus import ForceRampAndHold, RampAndHold
 
 from .case import Row, case, near
 from .solid import Solid

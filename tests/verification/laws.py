@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from fingerpad.geometry.mesh import block_mesh
 from fingerpad.mechanics.materials import Material, Polynomial
-from fingerpad.mesh import block_mesh
 
 from .case import Row, at_most, case, near
 from .solid import Solid

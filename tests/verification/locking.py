@@ -7,8 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from fingerpad.geometry.mesh import block_mesh
 from fingerpad.mechanics.materials import Material
-from fingerpad.mesh import block_mesh
 
 from .case import Row, at_least, at_most, case, near
 from .plane_reference import PlaneBody, lagrange, lobatto

@@ -12,11 +12,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from fingerpad.geometry.mesh import block_mesh
 from fingerpad.mechanics.fields import cauchy_stress
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.tensors import INDEX
 from fingerpad.mechanics.viscoelastic import StressHistory, instantaneous_state
-from fingerpad.mesh import block_mesh
 
 from .case import Row, at_least, at_most, case, equal
 from .laws import bulk_modulus

@@ -13,14 +13,14 @@ from functools import lru_cache
 import numpy as np
 
 from fingerpad.export.job import Job
-from fingerpad.grading import graded_lines
-from fingerpad.indenters import Sphere
+from fingerpad.geometry.grading import graded_lines
+from fingerpad.geometry.indenters import Sphere
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import Deformation, PressSettings, press
-from fingerpad.mesh import block_mesh
-from fingerpad.stimulus import RampAndHold
 
 YOUNG_KPA, POISSON = (136.0, 136.0, 80.0, 34.0), 0.48
 LAYERS = (0, 0, 1, 2, 2, 2, 3, 3, 3, 3)

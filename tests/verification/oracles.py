@@ -12,20 +12,20 @@ from pathlib import Path
 
 import numpy as np
 
-from fingerpad.edged_indenters import Edge, Gap
 from fingerpad.export import cards
 from fingerpad.export.calculix import calculix_deck
 from fingerpad.export.job import Job, job_of
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
-from fingerpad.indentation import Touch
-from fingerpad.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.geometry.edged_indenters import Edge, Gap
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.laws import Polynomial
 from fingerpad.mechanics.materials import Material, Tissues
 from fingerpad.mechanics.press import PressSettings, press
-from fingerpad.mesh import block_mesh
-from fingerpad.stimulus import RampAndHold
+from fingerpad.skin.indentation import Touch
 
 from . import calculix
 from .case import Row, at_most, case, near

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from fingerpad.geometry.mesh import Mesh, block_mesh
+from fingerpad.geometry.mesh_quality import jacobian_at_gauss
 from fingerpad.mechanics.materials import Material
-from fingerpad.mesh import Mesh, block_mesh
-from fingerpad.mesh_quality import jacobian_at_gauss
 
 from .case import Row, at_least, at_most, case
 from .solid import Solid, at_points

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import interp1d
 
-from fingerpad.indenters import Sphere
+from fingerpad.geometry.indenters import Sphere
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Polynomial, Prony
 from fingerpad.mechanics.newton import NewtonSettings
@@ -16,8 +18,6 @@ from fingerpad.mechanics.viscoelastic import (
     instantaneous_state,
     stored_energy_density,
 )
-from fingerpad.mesh import block_mesh
-from fingerpad.stimulus import RampAndHold
 
 from . import balance
 from .case import Row, at_most, case, near

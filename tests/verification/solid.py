@@ -13,10 +13,10 @@ from itertools import product
 import numpy as np
 from scipy.sparse.linalg import splu
 
+from fingerpad.geometry.mesh import CORNERS, Mesh
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.viscoelastic import StepCoefficients, StressHistory
-from fingerpad.mesh import CORNERS, Mesh
 
 POINTS = CORNERS / np.sqrt(3.0)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from fingerpad.report import mesh_refinement, paper_size
+from studies.pages import mesh_refinement, paper_size
 
 from .page import IMAGES, PAGE
 

@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from fingerpad.fingertip import Fingertip
-from fingerpad.grading import Grading
-from fingerpad.indenters import Cylinder, Sphere
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenters import Cylinder, Sphere
+from fingerpad.geometry.mesh import finger_mesh
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import PressSettings, press
 from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.mesh import finger_mesh
-from fingerpad.stimulus import RampAndHold
 
 from .balance import RELAXING, block, pressed
 from .case import Row, at_most, case, near

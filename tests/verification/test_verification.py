@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.report import paper_size
+from studies.pages import paper_size
 
 from .case import at_least, at_most, equal, near
 from .cases import ORDERED, THEMES

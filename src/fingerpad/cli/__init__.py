@@ -1,4 +1,4 @@
-"""The command line: `reproduce`, `fit`, `discriminate`, `drives`, `refine`, `materials` and `export`."""
+"""The command line: `reproduce`, `fit`, `discriminate` and `export`."""
 
 from __future__ import annotations
 
@@ -9,13 +9,10 @@ import typer
 
 from fingerpad import __version__
 from fingerpad.cli.discriminate import discriminate_command
-from fingerpad.cli.drives import drives_command
 from fingerpad.cli.export import export_command
 from fingerpad.cli.fit import fit_command
-from fingerpad.cli.materials import materials_command
-from fingerpad.cli.refine import refine_command
 from fingerpad.cli.reproduce import reproduce_command
-from fingerpad.errors import FingerpadError
+from fingerpad.core.errors import FingerpadError
 
 # What a command runs is imported where it runs: help and version need none of it and come at once.
 
@@ -52,9 +49,6 @@ def _options(
 app.command("reproduce")(reproduce_command)
 app.command("fit")(fit_command)
 app.command("discriminate")(discriminate_command)
-app.command("drives")(drives_command)
-app.command("refine")(refine_command)
-app.command("materials")(materials_command)
 app.command("export")(export_command)
 
 

@@ -12,8 +12,8 @@ import typer
 from fingerpad.cli.choices import RESOLUTIONS
 from fingerpad.cli.options import Jobs
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
-from fingerpad.errors import InputError
-from fingerpad.files import write_json
+from fingerpad.core.errors import InputError
+from fingerpad.core.files import write_json
 
 
 def discriminate_command(
@@ -41,9 +41,10 @@ def discriminate_command(
     """Ask what a person could tell apart: any stimuli, any population, any code."""
     from rich.console import Console
 
-    from fingerpad.checks import one_of
-    from fingerpad.report.discriminate import summary, write_discrimination_page
-    from fingerpad.studies import discriminate, question_file
+    from fingerpad.core.checks import one_of
+    from fingerpad.experiments.discrimination import discriminate
+    from fingerpad.experiments.discrimination import task_files as question_file
+    from fingerpad.report.discrimination_task import summary, write_discrimination_page
 
     known = question_file.ready_made()
     if ready_made:

@@ -10,7 +10,7 @@ import typer
 from fingerpad.cli.choices import FORMATS, INDENTERS
 from fingerpad.cli.options import Materials, Resolution, number
 from fingerpad.cli.running import INTERRUPTED, make_writable
-from fingerpad.errors import InputError
+from fingerpad.core.errors import InputError
 
 
 def export_command(
@@ -33,11 +33,11 @@ def export_command(
 ) -> None:
     """Press one indenter into the finger and write the touch for another program, ParaView by default."""
     import fingerpad
-    from fingerpad.checks import one_of
+    from fingerpad.core.checks import one_of
     from fingerpad.export.formats import export_touch
-    from fingerpad.fingertip import Fingertip
-    from fingerpad.indentation import touch_of
-    from fingerpad.stimulus import RampAndHold
+    from fingerpad.geometry.fingertip import Fingertip
+    from fingerpad.geometry.motion import RampAndHold
+    from fingerpad.skin.indentation import touch_of
 
     one_of("indenter", indenter, tuple(INDENTERS))
     one_of("format", format_name, FORMATS)

@@ -12,11 +12,11 @@ import typer
 from fingerpad.cli.choices import FITTING_METHODS, QUANTITIES
 from fingerpad.cli.options import Jobs, Materials, Resolution, number, whole_number
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
-from fingerpad.errors import InputError
-from fingerpad.files import write_atomically, write_json
+from fingerpad.core.errors import InputError
+from fingerpad.core.files import write_atomically, write_json
 
 if TYPE_CHECKING:
-    from fingerpad.estimation.stimuli import Stimuli
+    from fingerpad.experiments.stimuli import Stimuli
 
 BAR = "bar"
 """What `--stimulus` calls the bar of the paper; anything else is a file."""
@@ -97,10 +97,10 @@ def fit_command(
     """Fit an afferent to recordings of your own: rates or spikes under known stimuli."""
     from rich.console import Console
 
-    from fingerpad.estimation.reading import read_recordings
+    from fingerpad.experiments.conditions import Conditions
+    from fingerpad.experiments.fit import session as recording_session
+    from fingerpad.experiments.recording_files import read_recordings
     from fingerpad.report.recording_fit import summary, write_fit_page
-    from fingerpad.studies import recording_session
-    from fingerpad.studies.conditions import Conditions
 
     if example is not None:
         make_writable(example, "--example")
@@ -151,9 +151,9 @@ def _stimuli(stimulus: str, column: str | None, given: dict[str, float | None]) 
     """Make what `--stimulus` names, with the sizes that are given where it is the bar."""
     from dataclasses import replace
 
-    from fingerpad.estimation.stimuli import ShiftedBar, read_stimuli
-    from fingerpad.indenters import Bar
-    from fingerpad.stimulus import RampAndHold
+    from fingerpad.experiments.stimuli import ShiftedBar, read_stimuli
+    from fingerpad.geometry.indenters import Bar
+    from fingerpad.geometry.motion import RampAndHold
 
     sizes = {key: size for key, size in given.items() if size is not None}
     if stimulus != BAR:

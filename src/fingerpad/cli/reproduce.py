@@ -9,7 +9,7 @@ import typer
 
 from fingerpad.cli.options import Jobs, Resolution, whole_number
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
-from fingerpad.files import write_json
+from fingerpad.core.files import write_json
 
 EXPECTED_TIME = {"quick": "a minute and a half", "standard": "about 6 minutes", "paper": "some hours"}
 """On two cores, nothing stored yet."""
@@ -35,9 +35,9 @@ def reproduce_command(
     """Press, fire, fit and discriminate as in Gerling et al. 2014, and report beside the paper's numbers."""
     from rich.console import Console
 
+    from fingerpad.experiments.conditions import Conditions
+    from fingerpad.experiments.gerling2014 import Reproduction, reproduce
     from fingerpad.report import write_report
-    from fingerpad.studies import Reproduction, reproduce
-    from fingerpad.studies.conditions import Conditions
 
     conditions = Conditions(resolution=resolution, seed=seed)
     run = Reproduction(conditions, out, processes(jobs), extended)

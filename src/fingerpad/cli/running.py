@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from fingerpad.errors import InputError
+from fingerpad.core.errors import InputError
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from fingerpad.core.files import write_atomically
 from fingerpad.export import cards
 from fingerpad.export.cards import INDENTER, SKIN, data
 from fingerpad.export.job import CONTACT_KPA_PER_MM, Job, Phase
-from fingerpad.files import write_atomically
 from fingerpad.mechanics.laws import Hyperfoam
 from fingerpad.mechanics.materials import Material
 

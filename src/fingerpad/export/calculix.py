@@ -13,15 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
-from fingerpad.checks import FloatArray, one_of
-from fingerpad.errors import InputError
+from fingerpad.core.checks import FloatArray, one_of
+from fingerpad.core.errors import InputError
+from fingerpad.core.files import write_atomically
 from fingerpad.export import cards
 from fingerpad.export.cards import INDENTER, SKIN
 from fingerpad.export.job import CONTACT_KPA_PER_MM, Job, Phase
-from fingerpad.files import write_atomically
+from fingerpad.geometry.mesh import IntArray
 from fingerpad.mechanics.laws import Hyperfoam, Law
 from fingerpad.mechanics.materials import Material
-from fingerpad.mesh import IntArray
 
 UPPER_FACE, OUTER_FACE = 2, 1
 """Faces that touch: the skin's side of our elements, and the outer side of the indenter's."""
@@ -101,7 +101,7 @@ def calculix_deck(job: Job, elastic_moduli: str | None = None, element: str = "C
     >>> calculix_deck(job)
     Traceback (most recent call last):
     ...
-    fingerpad.errors.InputError: CalculiX cannot relax the hyperelastic layer stratum_corneum: give \
+    fingerpad.core.errors.InputError: CalculiX cannot relax the hyperelastic layer stratum_corneum: give \
 elastic_moduli ("long_term" or "instantaneous"), or export for Abaqus or FEBio.
     >>> deck = calculix_deck(job, elastic_moduli="long_term")
     >>> [line for line in deck.splitlines() if line.startswith("*STATIC")]

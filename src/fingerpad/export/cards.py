@@ -6,12 +6,12 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from fingerpad.checks import FloatArray
-from fingerpad.errors import InputError
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import InputError
 from fingerpad.export.job import Job
+from fingerpad.geometry.mesh import IntArray
 from fingerpad.mechanics.laws import Hyperfoam, Ogden, Polynomial
 from fingerpad.mechanics.materials import Material
-from fingerpad.mesh import IntArray
 
 PER_LINE, PER_LINE_OF_ELEMENT = 8, 16
 """Values on a data line, after which both programs want a new one."""

@@ -13,14 +13,14 @@ from xml.etree import ElementTree as xml
 
 import numpy as np
 
-from fingerpad.checks import FloatArray
-from fingerpad.errors import InputError
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import InputError
+from fingerpad.core.files import write_atomically
 from fingerpad.export.cards import FIXED, GRIPPED, INDENTER, SKIN, SYMMETRY, number
 from fingerpad.export.job import CONTACT_KPA_PER_MM, Job
-from fingerpad.files import write_atomically
+from fingerpad.geometry.mesh import IntArray
 from fingerpad.mechanics.laws import Ogden, Polynomial
 from fingerpad.mechanics.materials import Material
-from fingerpad.mesh import IntArray
 
 MOST_PRONY_TERMS = 6
 """What FEBio's viscoelastic material holds."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from fingerpad.checks import one_of
-from fingerpad.errors import InputError
+from fingerpad.core.checks import one_of
+from fingerpad.core.errors import InputError
 from fingerpad.export.abaqus import write_abaqus
 from fingerpad.export.calculix import write_calculix
 from fingerpad.export.febio import write_febio
 from fingerpad.export.job import job_of
 from fingerpad.export.vtu import load_vtk, write_vtu_series
-from fingerpad.indentation import Touch
+from fingerpad.skin.indentation import Touch
 
 
 def _vtu(touch: Touch, folder: Path) -> tuple[Path, ...]:

@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad import __version__
-from fingerpad.checks import FloatArray, float_array, increasing, instance
-from fingerpad.errors import InputError
+from fingerpad.core.checks import FloatArray, float_array, increasing, instance
+from fingerpad.core.errors import InputError
 from fingerpad.export.outline import Outline, RigidMesh, outline_of, rigid_mesh
-from fingerpad.indentation import Touch
-from fingerpad.indenters import Indenter
+from fingerpad.geometry.indenters import Indenter
+from fingerpad.geometry.mesh import LAYERS, IntArray, Mesh
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import Placement, check_friction
 from fingerpad.mechanics.materials import Material
-from fingerpad.mesh import LAYERS, IntArray, Mesh
-from fingerpad.stimulus import RampAndHold
-from fingerpad.store import code_hash
+from fingerpad.skin.indentation import Touch
+from fingerpad.skin.store import code_hash
 
 CONTACT_KPA_PER_MM = 50_000.0
 """Penalty of the exported contact. Other solvers do not augment it as ours does: 50 kPa penetrate by 1 µm."""

@@ -1,6 +1,7 @@
 """Rigid indenters for other solvers: an exact outline of lines and arcs, and facets that follow it.
 
-An outline is drawn in the indenter's own frame (see `fingerpad.indenters`): u is the distance from the axis
+An outline is drawn in the indenter's own frame (see `fingerpad.geometry.indenters`): u is the distance from
+the axis
 of pressing, y the direction of pressing, and the tip is at (0, 0). Turned about y it makes a sphere or a
 punch, swept along z a cylinder, a bar or a plate. It runs so that the skin is on its left.
 """
@@ -12,11 +13,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from fingerpad.checks import FloatArray, positive
-from fingerpad.edged_indenters import Edge, Gap, Grating
-from fingerpad.errors import InputError
-from fingerpad.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
-from fingerpad.mesh import IntArray
+from fingerpad.core.checks import FloatArray, positive
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.geometry.mesh import IntArray
 
 Point = tuple[float, float]
 

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fingerpad.checks import instance
-from fingerpad.files import write_atomically
-from fingerpad.response_maps import recruitment_rank
-from fingerpad.signals import ResponseMap
+from fingerpad.core.checks import instance
+from fingerpad.core.files import write_atomically
+from fingerpad.core.signals import ResponseMap
+from fingerpad.neuron.response_maps import recruitment_rank
 
 PLACES = {2: ("x_mm", "z_mm"), 3: ("x_mm", "y_mm", "z_mm")}
 """Columns of a position by the number of its coordinates."""
@@ -56,7 +56,7 @@ def write_response_csv(response: ResponseMap, path: Path) -> Path:
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> from fingerpad.signals import SpikeTrains
+    >>> from fingerpad.core.signals import SpikeTrains
     >>> trains = SpikeTrains.from_lists([[12.5, 40.0], []])
     >>> response = ResponseMap([[17.0, 0.5], [17.0, 1.5]], 1.0, trains, [36.4, 0], [0, 0], [12.5, np.nan])
     >>> with TemporaryDirectory() as folder:

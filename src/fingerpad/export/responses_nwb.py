@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from fingerpad import __version__
-from fingerpad.checks import instance, not_negative, positive
-from fingerpad.errors import InputError
+from fingerpad.core.checks import instance, not_negative, positive
+from fingerpad.core.errors import InputError
+from fingerpad.core.files import write_atomically
+from fingerpad.core.signals import ResponseMap
+from fingerpad.core.units import MS_PER_S
+from fingerpad.data import protocol
 from fingerpad.export.responses import PLACES
-from fingerpad.files import write_atomically
-from fingerpad.parameters import protocol
-from fingerpad.signals import ResponseMap
-from fingerpad.units import MS_PER_S
 
 DURATION_MS = protocol.RAMP.value + protocol.HOLD.value
 
@@ -64,7 +64,7 @@ def write_responses_nwb(
 
     Examples
     --------
-    >>> from fingerpad.signals import SpikeTrains
+    >>> from fingerpad.core.signals import SpikeTrains
     >>> trains = SpikeTrains.from_lists([[12.5, 40.0], []])
     >>> response = ResponseMap([[17.0, 0.5], [17.0, 1.5]], 1.0, trains, [36.4, 0], [0, 0], [12.5, np.nan])
     >>> with TemporaryDirectory() as folder:

@@ -14,10 +14,10 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from fingerpad.errors import InputError
-from fingerpad.files import write_atomically
+from fingerpad.core.errors import InputError
+from fingerpad.core.files import write_atomically
+from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.press import Deformation
-from fingerpad.mesh import Mesh
 
 HEXAHEDRON, WEDGE = 12, 13
 """VTK's numbers of the two cells."""

@@ -8,10 +8,10 @@ import numpy as np
 from numba import njit
 from scipy import sparse
 
-from fingerpad.checks import FloatArray
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.threads import worker_threads
 from fingerpad.mechanics.chunks import Chunk, coloured_chunks, even_chunks
 from fingerpad.mechanics.element import N_NODES, element_system
-from fingerpad.threads import worker_threads
 
 
 @dataclass(frozen=True)

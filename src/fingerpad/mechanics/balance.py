@@ -21,14 +21,14 @@ import numpy as np
 from numba import njit
 from scipy.interpolate import CubicSpline
 
-from fingerpad.checks import FloatArray
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.threads import worker_threads
 from fingerpad.mechanics.chunks import even_chunks
 from fingerpad.mechanics.element import N_NODES, N_POINTS, frame_scale, gradients_at_points
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
 from fingerpad.mechanics.small_arrays import small_array
 from fingerpad.mechanics.tensors import invert, push_forward
 from fingerpad.mechanics.viscoelastic import StressHistory
-from fingerpad.threads import worker_threads
 
 FEW_STEPS = 3
 """Points of a phase below which a cubic cannot be drawn and straight lines take its place."""

@@ -29,7 +29,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fingerpad.checks import FloatArray
+from fingerpad.core.checks import FloatArray
 from fingerpad.mechanics.small_arrays import small_single_array
 
 SingleArray = NDArray[np.float32]

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.checks import FloatArray
+from fingerpad.core.checks import FloatArray
+from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import Contact, ContactState
 from fingerpad.mechanics.friction import Anchors, Friction
 from fingerpad.mechanics.materials import MaterialTable
 from fingerpad.mechanics.mixed import Pressures, exchange_pressure
 from fingerpad.mechanics.viscoelastic import StepCoefficients
-from fingerpad.mesh import Mesh
 
 SMALLEST_FORCE_MN = 1e-6
 """Below it residuals are no longer taken relative to the force of contact. [mN]"""

@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fingerpad.checks import FloatArray, not_negative
-from fingerpad.errors import InputError
-from fingerpad.indenters import Indenter
+from fingerpad.core.checks import FloatArray, not_negative
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.indenters import Indenter
 from fingerpad.mechanics.friction import Anchors, Friction, dragged, friction
 
 PENALTY_KPA_PER_MM = 15_000.0
@@ -88,7 +88,7 @@ def check_friction(friction: float, indenter: Indenter) -> float:
 
     Examples
     --------
-    >>> from fingerpad.indenters import Plate
+    >>> from fingerpad.geometry.indenters import Plate
     >>> check_friction(0.5, Plate())
     0.5
     """

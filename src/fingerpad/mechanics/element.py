@@ -26,7 +26,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fingerpad.checks import FloatArray
+from fingerpad.core.checks import FloatArray
 from fingerpad.mechanics.energy import CARRIED, SECOND, differentiate
 from fingerpad.mechanics.materials import COUPLED, N_COEFFICIENTS, POLYNOMIAL
 from fingerpad.mechanics.small_arrays import small_array

@@ -16,8 +16,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from fingerpad.checks import FloatArray
-from fingerpad.errors import ConvergenceError
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import ConvergenceError
 
 try:
     import pypardiso

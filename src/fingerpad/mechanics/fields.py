@@ -23,14 +23,14 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fingerpad.checks import FloatArray, one_of
+from fingerpad.core.checks import FloatArray, one_of
+from fingerpad.core.threads import worker_threads
+from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.chunks import even_chunks
 from fingerpad.mechanics.element import N_NODES, N_POINTS, element_state, frame_scale, gradients_at_points
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
 from fingerpad.mechanics.tensors import COLUMN, INDEX, ROW, invert, push_forward
 from fingerpad.mechanics.viscoelastic import StressHistory
-from fingerpad.mesh import Mesh
-from fingerpad.threads import worker_threads
 
 
 @dataclass(frozen=True)

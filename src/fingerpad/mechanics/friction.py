@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.checks import FloatArray
+from fingerpad.core.checks import FloatArray
 
 
 @dataclass(frozen=True)

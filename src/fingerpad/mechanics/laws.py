@@ -22,8 +22,8 @@ from typing import Protocol
 
 import numpy as np
 
-from fingerpad.checks import FloatArray, finite, not_negative, positive
-from fingerpad.errors import InputError
+from fingerpad.core.checks import FloatArray, finite, not_negative, positive
+from fingerpad.core.errors import InputError
 from fingerpad.mechanics.energy import CARRIED, SECOND, differentiate, translate
 
 

@@ -13,13 +13,13 @@ from typing import Protocol
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, cg
 
-from fingerpad.checks import FloatArray
-from fingerpad.errors import ConvergenceError, InputError
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.columns import MOST_LANES
 from fingerpad.mechanics.factors import MakeFactor, PardisoFactor, SuperLuFactor, pypardiso
 from fingerpad.mechanics.multigrid import Multigrid
-from fingerpad.mesh import Mesh
 
 MOST_ITERATIONS = 400
 DIRECT_POISSON, MULTIGRID_POISSON = 0.4999, 0.495

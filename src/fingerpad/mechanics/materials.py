@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from fingerpad.checks import FloatArray, float_array, instance, not_negative, one_of, positive
-from fingerpad.errors import InputError, MaterialWarning
+from fingerpad.core.checks import FloatArray, float_array, instance, not_negative, one_of, positive
+from fingerpad.core.errors import InputError, MaterialWarning
 from fingerpad.mechanics.laws import (
     Energy,
     Hencky,

@@ -24,14 +24,14 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from fingerpad.checks import FloatArray
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.threads import worker_threads
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.chunks import even_chunks
 from fingerpad.mechanics.element import N_NODES, N_POINTS, gradients_at_points
 from fingerpad.mechanics.energy import CARRIED, differentiate
 from fingerpad.mechanics.materials import COUPLED, N_COEFFICIENTS, POLYNOMIAL
 from fingerpad.mechanics.tensors import invert
-from fingerpad.threads import worker_threads
 
 MIXED_POISSON = 0.49
 """Poisson's ratio above which it pays: a Newton step takes a quarter more time. There a block takes 15 of

@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from fingerpad.checks import FloatArray
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.threads import current_threads, worker_threads
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.columns import (
     ColumnGraph,
@@ -40,7 +41,6 @@ from fingerpad.mechanics.columns import (
     to_nodes,
 )
 from fingerpad.mechanics.factors import MakeFactor
-from fingerpad.threads import current_threads, worker_threads
 
 MERGED_OVER_FINEST = 4.0
 """Largest distance of two lines that become one step, over the smallest distance on the grid."""

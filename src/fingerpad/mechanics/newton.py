@@ -18,13 +18,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fingerpad.checks import FloatArray, positive, whole
-from fingerpad.errors import ConvergenceError
+from fingerpad.core.checks import FloatArray, positive, whole
+from fingerpad.core.errors import ConvergenceError
+from fingerpad.geometry.mesh_quality import element_place, squeezed_most
 from fingerpad.mechanics.configuration import Balance, Body, Configuration, Lagging, Load, evaluate
 from fingerpad.mechanics.contact import ContactState
 from fingerpad.mechanics.friction import Anchors, rubbing_heat
 from fingerpad.mechanics.linear import LinearSolver, NotPositiveDefiniteError
-from fingerpad.mesh_quality import element_place, squeezed_most
 
 SUFFICIENT_DECREASE = 1e-4
 SHORTEST_STEP = 1.0 / 64

@@ -8,9 +8,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from fingerpad.checks import FloatArray, positive, whole
-from fingerpad.errors import ConvergenceError, InputError
-from fingerpad.indenters import Indenter
+from fingerpad.core.checks import FloatArray, positive, whole
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.geometry.indenters import Indenter
+from fingerpad.geometry.mesh import Mesh
+from fingerpad.geometry.mesh_checks import check_mesh
+from fingerpad.geometry.mesh_quality import element_place, squeezed_most
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Stimulus
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.balance import (
     EnergyBalance,
@@ -46,10 +50,6 @@ from fingerpad.mechanics.viscoelastic import (
     instantaneous_state,
     stored_energy_density,
 )
-from fingerpad.mesh import Mesh
-from fingerpad.mesh_checks import check_mesh
-from fingerpad.mesh_quality import element_place, squeezed_most
-from fingerpad.stimulus import ForceRampAndHold, RampAndHold, Stimulus
 
 PENETRATION_SHARE = 0.1
 """Largest penetration over depth, as a share of the tolerance of SED: SED grows as the square of depth or

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.checks import FloatArray
-from fingerpad.mesh import Mesh
+from fingerpad.core.checks import FloatArray
+from fingerpad.geometry.mesh import Mesh
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import brentq
 
-from fingerpad.checks import FloatArray
+from fingerpad.core.checks import FloatArray
 from fingerpad.mechanics.energy import SECOND
 from fingerpad.mechanics.laws import Energy, Law
 

@@ -20,8 +20,8 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from fingerpad.checks import FloatArray
-from fingerpad.errors import ConvergenceError
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import ConvergenceError
 
 SMALLEST_CUT = 1.0 / 32
 """Shortest step that is tried, over the step asked for."""

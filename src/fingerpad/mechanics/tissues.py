@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fingerpad.checks import one_of
+from fingerpad.core.checks import one_of
+from fingerpad.core.units import MS_PER_S
+from fingerpad.data import tissues as published
+from fingerpad.data.published import Published
 from fingerpad.mechanics.materials import Material, Prony, Tissues
-from fingerpad.parameters import tissues as published
-from fingerpad.parameters.published import Published
-from fingerpad.units import MS_PER_S
 
 NU = published.POISSON_RATIO.value
 

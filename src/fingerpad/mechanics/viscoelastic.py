@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from fingerpad.checks import FloatArray
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.threads import worker_threads
 from fingerpad.mechanics.chunks import even_chunks
 from fingerpad.mechanics.element import N_POINTS, element_state, relaxing_norms
 from fingerpad.mechanics.materials import MaterialTable
-from fingerpad.threads import worker_threads
 
 
 @dataclass(frozen=True)

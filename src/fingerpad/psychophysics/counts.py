@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import betaln, gammaln, xlog1py, xlogy
 
-from fingerpad.checks import FloatArray, float_array
-from fingerpad.errors import InputError
+from fingerpad.core.checks import FloatArray, float_array
+from fingerpad.core.errors import InputError
 
 SMALLEST_OVERDISPERSION = 1e-5
 """Below it the beta-binomial formula loses precision; the binomial one takes over."""

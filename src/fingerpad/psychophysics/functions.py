@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import expit, logit, ndtr, ndtri
 
-from fingerpad.checks import FloatArray, finite, float_array, one_of, positive
-from fingerpad.errors import InputError
+from fingerpad.core.checks import FloatArray, finite, float_array, one_of, positive
+from fingerpad.core.errors import InputError
 
 LOWER, HALF, UPPER = 0.05, 0.5, 0.95
 """Shares of F at the start of its width, at its threshold and at the end of its width."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.checks import FloatArray
+from fingerpad.core.checks import FloatArray
 from fingerpad.psychophysics.counts import log_probability
 from fingerpad.psychophysics.maximum_likelihood import OVERDISPERSION, maximise
 from fingerpad.psychophysics.psychometric import PsychometricFit

@@ -23,9 +23,9 @@ from numpy.typing import ArrayLike
 from scipy.special import ndtri
 from scipy.stats import rankdata
 
-from fingerpad.checks import FloatArray, float_array, positive, whole
-from fingerpad.errors import InputError
-from fingerpad.noisy_responses import session_trials
+from fingerpad.core.checks import FloatArray, float_array, positive, whole
+from fingerpad.core.errors import InputError
+from fingerpad.psychophysics.noisy_responses import session_trials
 from fingerpad.psychophysics.response_models import ResponseModel
 
 Statistic = Callable[[FloatArray], FloatArray]

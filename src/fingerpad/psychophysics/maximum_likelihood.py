@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import digamma
 
-from fingerpad.checks import FloatArray
-from fingerpad.errors import ConvergenceError
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import ConvergenceError
 from fingerpad.psychophysics.counts import SMALLEST_OVERDISPERSION, log_probability
 from fingerpad.psychophysics.functions import Sigmoid
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.checks import FloatArray, finite, one_of
-from fingerpad.errors import ConvergenceError, InputError
+from fingerpad.core.checks import FloatArray, finite, one_of
+from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.psychophysics.counts import SMALLEST_OVERDISPERSION, JudgementCounts, log_probability
 from fingerpad.psychophysics.functions import SIGMOIDS, PsychometricFunction, checked_levels
 from fingerpad.psychophysics.maximum_likelihood import (

@@ -18,10 +18,10 @@ from numpy.typing import ArrayLike
 from scipy.special import gammaln, xlogy
 from scipy.stats import poisson
 
-from fingerpad.checks import FloatArray, float_array, not_negative, positive
-from fingerpad.errors import InputError
+from fingerpad.core.checks import FloatArray, float_array, not_negative, positive
+from fingerpad.core.errors import InputError
+from fingerpad.core.random_streams import IntArray, Purpose, normals, uniforms
 from fingerpad.psychophysics.sensitivity import cholesky, whitened
-from fingerpad.random_streams import IntArray, Purpose, normals, uniforms
 
 
 class ResponseModel(Protocol):

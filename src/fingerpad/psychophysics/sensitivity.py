@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from fingerpad.checks import FloatArray, float_array, one_of, positive, whole
-from fingerpad.errors import InputError
+from fingerpad.core.checks import FloatArray, float_array, one_of, positive, whole
+from fingerpad.core.errors import InputError
 
 CORRECTIONS = ("log-linear", "half", "none")
 

@@ -21,8 +21,8 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
-from fingerpad.checks import finite, not_negative, whole
-from fingerpad.errors import InputError
+from fingerpad.core.checks import finite, not_negative, whole
+from fingerpad.core.errors import InputError
 
 LARGEST_D_PRIME = 20.0
 """Beyond it no task is ever failed."""

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.checks import FloatArray, finite, float_array, instance, one_of, whole
-from fingerpad.errors import InputError
+from fingerpad.core.checks import FloatArray, finite, float_array, instance, one_of, whole
+from fingerpad.core.errors import InputError
+from fingerpad.core.random_streams import Purpose, uniforms
 from fingerpad.psychophysics.counts import log_probability
 from fingerpad.psychophysics.functions import SIGMOIDS, Sigmoid, checked_levels, level_at, proportion
 from fingerpad.psychophysics.maximum_likelihood import (
@@ -31,7 +32,6 @@ from fingerpad.psychophysics.maximum_likelihood import (
     maximise,
 )
 from fingerpad.psychophysics.psychometric import PsychometricFit
-from fingerpad.random_streams import Purpose, uniforms
 
 COARSE_POINTS = 21
 FINE_POINTS = {1: (401,), 2: (81, 81), 3: (41, 35, 13), 4: (31, 27, 13, 13), 5: (21, 19, 9, 9, 9)}

@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.report.appearance import (
+from fingerpad.report.formatting import fixed, number, plain
+from fingerpad.report.style import (
     BLACK,
     BLUE,
     GREEN,
@@ -21,7 +22,6 @@ from fingerpad.report.appearance import (
     say_nothing_to_draw,
 )
 from fingerpad.report.tables import UNBROKEN, Row, Table
-from fingerpad.report.words import fixed, number, plain
 
 PER_CENT = 100.0
 CHANCE = 50.0

@@ -8,9 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.checks import FloatArray
-from fingerpad.parameters import psychophysics
-from fingerpad.report.appearance import (
+from fingerpad.core.checks import FloatArray
+from fingerpad.data import psychophysics
+from fingerpad.report.formatting import number
+from fingerpad.report.style import (
     BLACK,
     BLUE,
     GREEN,
@@ -20,7 +21,6 @@ from fingerpad.report.appearance import (
     numbers,
     say_nothing_to_draw,
 )
-from fingerpad.report.words import number
 
 CHANCE = 0.5
 POSITIONS: tuple[tuple[str, dict[str, Any], str], ...] = (

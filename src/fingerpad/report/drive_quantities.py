@@ -8,10 +8,10 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.report.appearance import BLACK, BLUE, GREY, PALE, new_figure, numbers
+from fingerpad.report.formatting import ABSENT, PHASES, fixed
 from fingerpad.report.single_unit import BAR_HALF_WIDTH_MM
+from fingerpad.report.style import BLACK, BLUE, GREY, PALE, new_figure, numbers
 from fingerpad.report.tables import Row, Table
-from fingerpad.report.words import ABSENT, PHASES, fixed
 
 QUANTITIES = {
     "stored": "strain energy density",

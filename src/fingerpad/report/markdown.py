@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fingerpad.report.words import fixed
+from fingerpad.report.formatting import fixed
 
 PERCENT = 100.0
 

@@ -11,9 +11,9 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from fingerpad.checks import FloatArray
-from fingerpad.report.appearance import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, numbers
-from fingerpad.report.words import number
+from fingerpad.core.checks import FloatArray
+from fingerpad.report.formatting import number
+from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, numbers
 
 DECADES = 4.0
 LABEL = "von Mises stress [kPa]"

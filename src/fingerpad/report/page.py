@@ -11,8 +11,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from matplotlib.figure import Figure
 
-from fingerpad.errors import InputError
-from fingerpad.files import write_atomically
+from fingerpad.core.errors import InputError
+from fingerpad.core.files import write_atomically
 from fingerpad.report import (
     curvature_thresholds,
     discrimination,
@@ -28,7 +28,7 @@ from fingerpad.report import (
     spike_fit,
     tables,
 )
-from fingerpad.report.appearance import png
+from fingerpad.report.style import png
 from fingerpad.report.summary import summary
 
 

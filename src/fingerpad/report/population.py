@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from fingerpad.checks import FloatArray
-from fingerpad.parameters import protocol
-from fingerpad.report.appearance import GREY, PALE, new_figure, numbers, say_nothing_to_draw
-from fingerpad.report.words import number
+from fingerpad.core.checks import FloatArray
+from fingerpad.data import protocol
+from fingerpad.report.formatting import number
+from fingerpad.report.style import GREY, PALE, new_figure, numbers, say_nothing_to_draw
 
 QUANTITIES = {
     "dynamic_rate_hz": ("dynamic ramp", "rate [spikes/s]", "viridis", Normalize),

@@ -10,11 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.checks import FloatArray
-from fingerpad.parameters import protocol
-from fingerpad.report.appearance import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, numbers
+from fingerpad.core.checks import FloatArray
+from fingerpad.data import protocol
+from fingerpad.report.formatting import number
 from fingerpad.report.recruitment import resting
-from fingerpad.report.words import number
+from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, numbers
 
 LINES: tuple[dict[str, Any], ...] = (
     {"color": BLACK, "linestyle": "-"},

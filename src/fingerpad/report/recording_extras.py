@@ -7,10 +7,10 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from fingerpad.report.appearance import BLACK, BLUE, GREY, ORANGE, new_figure, numbers
+from fingerpad.report.formatting import ABSENT, IDENTIFIABLE_SYMBOLS, fixed, number
 from fingerpad.report.rate_uncertainty import draw_indices, draw_profile, profile_ends, sensitivity_table
+from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, numbers
 from fingerpad.report.tables import Row, Table
-from fingerpad.report.words import ABSENT, IDENTIFIABLE_SYMBOLS, fixed, number
 
 FSS = ("fss_in_sample", "fss_in_sample_dynamic", "fss_in_sample_static", "fss_out_of_sample")
 

@@ -10,12 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.checks import FloatArray
+from fingerpad.core.checks import FloatArray
 from fingerpad.report import recording_extras, tables
-from fingerpad.report.appearance import BLACK, BLUE, GREY, ORANGE, new_figure, numbers
+from fingerpad.report.formatting import ABSENT, IDENTIFIABLE_SYMBOLS, PHASES, fixed, number, plain
 from fingerpad.report.page import Chapter, Drawing, write_page
+from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, numbers
 from fingerpad.report.tables import PARAMETERS, Row, Table
-from fingerpad.report.words import ABSENT, IDENTIFIABLE_SYMBOLS, PHASES, fixed, number, plain
 
 PAGE = "fit.html"
 IDENTIFIABLE = IDENTIFIABLE_SYMBOLS | {"time_constant_ms": "time constant τ"}

@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.checks import FloatArray
-from fingerpad.parameters import protocol
-from fingerpad.report.appearance import (
+from fingerpad.core.checks import FloatArray
+from fingerpad.data import protocol
+from fingerpad.report.formatting import fixed, number
+from fingerpad.report.style import (
     BLACK,
     BLUE,
     GREEN,
@@ -23,7 +24,6 @@ from fingerpad.report.appearance import (
     say_nothing_to_draw,
 )
 from fingerpad.report.tables import Row, Table
-from fingerpad.report.words import fixed, number
 
 CONTOURS_MS = (10.0, 20.0, 30.0, 50.0, 100.0, 200.0)
 LEAST_FOR_CONTOURS = 12

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from fingerpad.checks import FloatArray
-from fingerpad.errors import InputError
-from fingerpad.report.appearance import GREY, new_figure, numbers
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import InputError
 from fingerpad.report.population import QUANTITIES, round_ticks
+from fingerpad.report.style import GREY, new_figure, numbers
 
 PANEL_IN = (3.9, 3.3)
 POINTS_PER_PANEL = 180.0

@@ -6,9 +6,9 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from fingerpad.parameters import paper, protocol
-from fingerpad.report.appearance import BLACK, BLUE, new_figure, numbers
-from fingerpad.report.words import PHASES, fixed, number
+from fingerpad.data import paper, protocol
+from fingerpad.report.formatting import PHASES, fixed, number
+from fingerpad.report.style import BLACK, BLUE, new_figure, numbers
 
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from fingerpad.parameters import paper
-from fingerpad.report.appearance import BLACK, BLUE, ORANGE, new_figure, numbers
+from fingerpad.data import paper
+from fingerpad.report.formatting import ABSENT, fixed, number, plain, whole_percent
+from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure, numbers
 from fingerpad.report.tables import Row, Table
-from fingerpad.report.words import ABSENT, fixed, number, plain, whole_percent
 
 PLACES = {
     "dynamic_flat": "ramp, flat face over the receptor",

@@ -7,11 +7,11 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from fingerpad.parameters import protocol
-from fingerpad.report.appearance import BLACK, BLUE, PALE, new_figure, numbers
+from fingerpad.data import protocol
+from fingerpad.report.formatting import ABSENT, IDENTIFIABLE_SYMBOLS, PHASES, fixed, number, whole_percent
 from fingerpad.report.rate_uncertainty import draw_profile, profile_ends, sensitivity_table
+from fingerpad.report.style import BLACK, BLUE, PALE, new_figure, numbers
 from fingerpad.report.tables import Row, Table
-from fingerpad.report.words import ABSENT, IDENTIFIABLE_SYMBOLS, PHASES, fixed, number, whole_percent
 
 GAINS = {
     "intercept_ma": ("β", "mA"),

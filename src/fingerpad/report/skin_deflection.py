@@ -7,8 +7,8 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.parameters import protocol
-from fingerpad.report.appearance import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, numbers
+from fingerpad.data import protocol
+from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, numbers
 
 UM_PER_MM = 1000.0
 TRIALS = {

@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.checks import FloatArray
-from fingerpad.report.appearance import (
+from fingerpad.core.checks import FloatArray
+from fingerpad.report.formatting import IDENTIFIABLE_SYMBOLS, fixed, number, whole_percent
+from fingerpad.report.style import (
     BLACK,
     BLUE,
     GREEN,
@@ -22,7 +23,6 @@ from fingerpad.report.appearance import (
     say_nothing_to_draw,
 )
 from fingerpad.report.tables import Row, Table
-from fingerpad.report.words import IDENTIFIABLE_SYMBOLS, fixed, number, whole_percent
 
 NAMES = IDENTIFIABLE_SYMBOLS | {"escape_width": "width δ/v"}
 STYLES = ((BLUE, "-"), (GREEN, "--"), (ORANGE, "-."), (BLACK, ":"), (GREY, "-"))

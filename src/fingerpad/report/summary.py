@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from fingerpad.parameters import paper
-from fingerpad.report.words import fixed, joined, number
+from fingerpad.data import paper
+from fingerpad.report.formatting import fixed, joined, number
 
 
 def summary(results: Mapping[str, Any]) -> list[str]:

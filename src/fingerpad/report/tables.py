@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from fingerpad.parameters import STATUSES, paper
+from fingerpad.data import STATUSES, paper
 from fingerpad.report import discrimination
+from fingerpad.report.formatting import fixed, number, plain, spelled
 from fingerpad.report.skin_deflection import INDENTERS, TRIALS
-from fingerpad.report.words import fixed, number, plain, spelled
 
 Kind = Literal["", "met", "missed", "open", "assumed", "final"]
 VERDICTS: dict[bool | None, tuple[Kind, str]] = {

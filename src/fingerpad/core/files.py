@@ -1,0 +1,100 @@
+"""Files that are whole or absent: a run may be killed at any moment."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+from pathlib import Path
+from typing import Any
+
+from fingerpad.core.errors import StoreError
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a file so that its name never stands for half of it.
+
+    The bytes go to a temporary file in the same folder, reach the disk, and only then take the name.
+    Whoever reads meanwhile finds the old file or the new one.
+
+    Parameters
+    ----------
+    path : Path
+        Where the file shall be; folders are made as needed.
+    content : bytes
+        All of it.
+
+    Raises
+    ------
+    StoreError
+        If the folder cannot be made or the file not be written; a file that was there before is untouched.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     write_atomically(Path(folder) / "deeper" / "note.txt", b"whole")
+    ...     (Path(folder) / "deeper" / "note.txt").read_bytes()
+    b'whole'
+    """
+    path = Path(path)
+    # Same folder, hence same file system: only there is a rename atomic. Hidden, and unique among processes.
+    unfinished = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            with open(unfinished, "xb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(unfinished, path)
+        except BaseException:
+            unfinished.unlink(missing_ok=True)
+            raise
+        _sync_folder(path.parent)
+    except OSError as error:
+        raise StoreError(
+            f"{path} cannot be written ({error.strerror or error}): free it or choose another."
+        ) from error
+
+
+def write_json(path: Path, results: Any) -> None:
+    """Write results as JSON, whole or not at all; a number that is not finite is an error.
+
+    Parameters
+    ----------
+    path : Path
+        Where the file shall be; folders are made as needed.
+    results : nested dicts and lists of plain values
+        Such as `studies.reproduction.plain` returns.
+
+    Raises
+    ------
+    StoreError
+        As `write_atomically`.
+    ValueError
+        If a number is not finite.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     write_json(Path(folder) / "found.json", {"rate_hz": 2.5})
+    ...     print((Path(folder) / "found.json").read_text())
+    {
+     "rate_hz": 2.5
+    }
+    """
+    write_atomically(path, json.dumps(results, indent=1, allow_nan=False).encode())
+
+
+def _sync_folder(folder: Path) -> None:
+    """Let the new name itself reach the disk, where the system can open folders."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,387 @@
+"""How receptors are strewn over a region of the skin: in lattices, or at random, at a given density.
+
+Lattices have a pitch, the distance of nearest neighbours; random layouts one too, 1/sqrt(density), the length
+that belongs to each receptor. Every random number has a key, the seed and the receptor's own number: the same
+seed gives the same places, whatever else is drawn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fingerpad.core.checks import FloatArray, float_array, not_negative, positive
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.random_streams import Purpose, normals, uniforms
+from fingerpad.core.regions import Region
+
+Place = Callable[[FloatArray], FloatArray]
+"""From places in the plane (n, 2) to points of the skin (n, 3), both in mm."""
+
+PATTERNS = ("rectangular", "hexagonal", "uniform", "jittered", "poisson-disc")
+
+MM2_PER_CM2 = 100.0
+MOST_RECEPTORS = 1_000_000
+"""A layout of more is a slip of the pen: the whole finger has some thousands."""
+
+SEPARATION = 0.75
+"""Least distance in a Poisson-disc layout over 1/sqrt(density). Discs dropped at random jam at 0.83."""
+
+LARGEST_SEPARATION = 0.8
+_MOST_ATTEMPTS = 1000
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Places of receptors in a plane.
+
+    Parameters
+    ----------
+    places_mm : array (n_receptors, 2)
+        In the plane of the region. [mm]
+    pitch_mm : float
+        Distance of neighbours in a lattice; 1/sqrt(density) where they lie at random. [mm]
+    pattern : str
+        One of `PATTERNS`.
+    seed : int, optional
+        What random places were drawn with; None for a lattice.
+
+    Raises
+    ------
+    InputError
+        If there is no place or they are not pairs of finite numbers.
+    """
+
+    places_mm: FloatArray
+    pitch_mm: float
+    pattern: str
+    seed: int | None = None
+
+    def __post_init__(self) -> None:
+        places = float_array("places_mm", self.places_mm, 2)
+        if places.shape[1] != 2 or len(places) == 0:
+            raise InputError(f"places_mm must have rows of two numbers: got shape {places.shape}.")
+        positive("pitch_mm", self.pitch_mm, "mm")
+        object.__setattr__(self, "places_mm", places)
+
+    def __len__(self) -> int:
+        return len(self.places_mm)
+
+
+def rectangular(region: Region, density_per_cm2: float) -> Layout:
+    """Square lattice, the pitch being 1/sqrt(density).
+
+    Parameters
+    ----------
+    region : Region
+        Where receptors may lie.
+    density_per_cm2 : float
+        Receptors per area. [1/cm²]
+
+    Returns
+    -------
+    Layout
+        Symmetric about the middle of the region's bounds, ordered by the first, then by the second
+        coordinate. A rectangle of whole pitches holds one receptor per cell.
+
+    Raises
+    ------
+    InputError
+        If the density is not positive, no receptor falls into the region, or there would be more than
+        `MOST_RECEPTORS`.
+
+    Examples
+    --------
+    >>> from fingerpad.core.regions import Rectangle
+    >>> paper = rectangular(Rectangle(length_mm=3.0, width_mm=6.0), density_per_cm2=100.0)
+    >>> len(paper), paper.pitch_mm, paper.places_mm[0].tolist()
+    (18, 1.0, [-1.0, -2.5])
+    """
+    _expected(region, density_per_cm2)
+    pitch = mean_spacing_mm(density_per_cm2)
+    middle, extent = _middle_and_extent(region)
+    columns = [
+        centre + pitch * around_zero(max(1, round(length / pitch)))
+        for centre, length in zip(middle, extent, strict=True)
+    ]
+    return _lattice(region, np.stack(np.meshgrid(*columns, indexing="ij"), axis=-1), pitch, "rectangular")
+
+
+def hexagonal(region: Region, density_per_cm2: float) -> Layout:
+    """Triangular lattice of six neighbours each, the densest there is: pitch^2 = 2/(sqrt(3) density).
+
+    Parameters
+    ----------
+    region, density_per_cm2
+        As in `rectangular`.
+
+    Returns
+    -------
+    Layout
+        With a receptor in the middle of the region's bounds, one of three directions of neighbours being
+        the second axis.
+
+    Raises
+    ------
+    InputError
+        As `rectangular`.
+
+    Examples
+    --------
+    >>> from fingerpad.core.regions import Ellipse
+    >>> seven = hexagonal(Ellipse(1.2, 1.2), density_per_cm2=200.0 / math.sqrt(3.0))
+    >>> len(seven), round(seven.pitch_mm, 12)
+    (7, 1.0)
+    """
+    _expected(region, density_per_cm2)
+    pitch = math.sqrt(2.0 / math.sqrt(3.0)) * mean_spacing_mm(density_per_cm2)
+    step = 0.5 * math.sqrt(3.0) * pitch
+    middle, (length, width) = _middle_and_extent(region)
+    rows, columns = (math.ceil(0.5 * extent / size) + 1 for extent, size in ((length, step), (width, pitch)))
+    row, column = np.meshgrid(np.arange(-rows, rows + 1), np.arange(-columns, columns + 1), indexing="ij")
+    across = pitch * (column + 0.5 * (row % 2))
+    return _lattice(region, np.stack([step * row, across], axis=-1) + middle, pitch, "hexagonal")
+
+
+def uniform(region: Region, density_per_cm2: float, seed: int) -> Layout:
+    """Independent places, each as likely as any other.
+
+    Parameters
+    ----------
+    region, density_per_cm2
+        As in `rectangular`.
+    seed : int
+        Of the random numbers.
+
+    Returns
+    -------
+    Layout
+        Of density times area receptors, rounded.
+
+    Raises
+    ------
+    InputError
+        As `rectangular`, or if the seed is negative.
+
+    Examples
+    --------
+    >>> from fingerpad.core.regions import Ellipse
+    >>> disc = Ellipse(5.0, 5.0)
+    >>> strewn = uniform(disc, density_per_cm2=100.0, seed=7)
+    >>> len(strewn), bool(disc.contains(strewn.places_mm).all())
+    (79, True)
+    """
+    count = _expected(region, density_per_cm2)
+    places = _inside(region, count, lambda who, attempt: _anywhere(region, seed, attempt, who))
+    return Layout(places, mean_spacing_mm(density_per_cm2), "uniform", seed)
+
+
+def jittered(region: Region, density_per_cm2: float, seed: int, jitter: float = 0.2) -> Layout:
+    """Square lattice whose receptors stray: each coordinate by Normal(0, jitter times the pitch).
+
+    Parameters
+    ----------
+    region, density_per_cm2
+        As in `rectangular`.
+    seed : int
+        Of the random numbers.
+    jitter : float, optional
+        Standard deviation over the pitch; 0 leaves the lattice as it is.
+
+    Returns
+    -------
+    Layout
+        A receptor that would leave the region strays anew.
+
+    Raises
+    ------
+    InputError
+        As `rectangular`, or if the jitter or the seed is negative.
+
+    Examples
+    --------
+    >>> from fingerpad.core.regions import Rectangle
+    >>> patch = Rectangle(3.0, 6.0)
+    >>> strayed = jittered(patch, 100.0, seed=7, jitter=0.1).places_mm - rectangular(patch, 100.0).places_mm
+    >>> 0.05 < float(strayed.std()) < 0.15
+    True
+    """
+    lattice = rectangular(region, density_per_cm2)
+    spread = not_negative("jitter", jitter) * lattice.pitch_mm
+    places = _inside(
+        region,
+        len(lattice),
+        lambda who, attempt: (
+            lattice.places_mm[who] + spread * normals(seed, [attempt], who, Purpose.LAYOUT, 2)[0]
+        ),
+    )
+    return Layout(places, lattice.pitch_mm, "jittered", seed)
+
+
+def poisson_disc(
+    region: Region,
+    density_per_cm2: float,
+    seed: int,
+    separation: float = SEPARATION,
+    place: Place | None = None,
+) -> Layout:
+    """Random places that keep a distance from each other.
+
+    Places are drawn one after the other, anywhere in the region; one too close to an earlier one is dropped.
+
+    Parameters
+    ----------
+    region, density_per_cm2
+        As in `rectangular`.
+    seed : int
+        Of the random numbers.
+    separation : float, optional
+        Least distance, over 1/sqrt(density).
+    place : callable, optional
+        Points of the skin (n, 3) at places in the plane (n, 2), such as `UnrolledSkin.points`: distances are
+        then straight lines between those, however the plane distorts them.
+
+    Returns
+    -------
+    Layout
+        Of density times area receptors, rounded.
+
+    Raises
+    ------
+    InputError
+        As `rectangular`, or if the separation is not within 0 ... `LARGEST_SEPARATION`.
+    ConvergenceError
+        If no more receptors find room.
+
+    Examples
+    --------
+    >>> from fingerpad.core.regions import Rectangle
+    >>> strewn = poisson_disc(Rectangle(8.0, 8.0), density_per_cm2=100.0, seed=7)
+    >>> nearest_mm, _ = cKDTree(strewn.places_mm).query(strewn.places_mm, k=[2])
+    >>> len(strewn), bool(nearest_mm.min() >= 0.75)
+    (64, True)
+    """
+    count = _expected(region, density_per_cm2)
+    if not_negative("separation", separation) > LARGEST_SEPARATION:
+        raise InputError(
+            f"separation must not exceed {LARGEST_SEPARATION:g} of 1/sqrt(density), beyond which discs jam: "
+            f"got {separation:g}."
+        )
+    pitch = mean_spacing_mm(density_per_cm2)
+    least = separation * pitch
+    places, points = np.empty((0, 2)), np.empty((0, 2))
+    batch = 2 * count + 16
+    drawn = 0
+    while len(places) < count:
+        if drawn > _MOST_ATTEMPTS * count:
+            raise ConvergenceError(
+                f"Only {len(places)} of {count} receptors found room {least:.3g} mm apart after {drawn} "
+                "attempts: lower the separation or the density."
+            )
+        candidates = _anywhere(region, seed, 0, np.arange(drawn, drawn + batch))
+        drawn += batch
+        candidates = candidates[region.contains(candidates)]
+        there = candidates if place is None else place(candidates)
+        kept = _apart(points, there, least)
+        places = np.vstack([places, candidates[kept]])
+        points = there[kept] if not len(points) else np.vstack([points, there[kept]])
+    return Layout(places[:count], pitch, "poisson-disc", seed)
+
+
+def _apart(settled: FloatArray, candidates: FloatArray, least: float) -> np.ndarray:
+    """Which candidates keep the distance from the settled and from the candidates kept before them."""
+    free = np.ones(len(candidates), dtype=bool)
+    if len(settled) and len(candidates):
+        distance, _ = cKDTree(settled).query(candidates, distance_upper_bound=least)
+        free = ~(distance < least)
+    numbers = np.flatnonzero(free)
+    if numbers.size == 0:
+        return numbers
+    neighbours = cKDTree(candidates[numbers]).query_ball_point(candidates[numbers], least * (1.0 - 1e-12))
+    kept = np.zeros(numbers.size, dtype=bool)
+    for number, near in enumerate(neighbours):
+        kept[number] = not kept[near].any()
+    return numbers[kept]
+
+
+def _inside(region: Region, count: int, draw: Callable[[np.ndarray, int], FloatArray]) -> FloatArray:
+    """Places of receptors, drawn again where they miss; `draw` takes their numbers and the attempt."""
+    places = np.empty((count, 2))
+    missing = np.arange(count)
+    for attempt in range(_MOST_ATTEMPTS):
+        drawn = draw(missing, attempt)
+        hits = region.contains(drawn)
+        places[missing[hits]] = drawn[hits]
+        missing = missing[~hits]
+        if not missing.size:
+            return places
+    raise ConvergenceError(
+        f"{missing.size} of {count} receptors missed the region {_MOST_ATTEMPTS} times: it fills too little "
+        "of its bounds, or receptors stray too far; cut it into parts or lower the jitter."
+    )
+
+
+def _anywhere(region: Region, seed: int, attempt: int, receptors: np.ndarray) -> FloatArray:
+    """Places within the bounds of the region, (n, 2)."""
+    lower, upper = np.array(region.bounds_mm)
+    return lower + (upper - lower) * uniforms(seed, [attempt], receptors, Purpose.LAYOUT, 2)[0]
+
+
+def _lattice(region: Region, points: FloatArray, pitch: float, pattern: str) -> Layout:
+    places = points.reshape(-1, 2)
+    inside = places[region.contains(places)]
+    if not len(inside):
+        raise InputError(
+            f"No receptor of a {pattern} lattice with a pitch of {pitch:.3g} mm falls into the region of "
+            f"{region.area_mm2:.3g} mm²: raise the density or enlarge the region."
+        )
+    return Layout(inside, pitch, pattern)
+
+
+def _expected(region: Region, density_per_cm2: float) -> int:
+    """Receptors to expect, density times area, after a check that there is at least one and not too many."""
+    density = positive("density_per_cm2", density_per_cm2, "1/cm²")
+    area_mm2 = region.area_mm2
+    count = round(density * area_mm2 / MM2_PER_CM2)
+    if count < 1:
+        raise InputError(
+            f"No receptor is to be expected at {density:g} /cm² on {area_mm2:.3g} mm²: raise the density or "
+            "enlarge the region."
+        )
+    if count > MOST_RECEPTORS:
+        raise InputError(
+            f"A layout may have {MOST_RECEPTORS:,} receptors: {density:g} /cm² on {area_mm2:.3g} mm² would "
+            f"be {count:,}; is the density per cm²?"
+        )
+    return count
+
+
+def mean_spacing_mm(density_per_cm2: float) -> float:
+    """Side of the square that belongs to one receptor, 1/sqrt(density). [mm]
+
+    Examples
+    --------
+    >>> mean_spacing_mm(25.0)
+    2.0
+    """
+    return math.sqrt(MM2_PER_CM2 / density_per_cm2)
+
+
+def _middle_and_extent(region: Region) -> tuple[FloatArray, FloatArray]:
+    lower, upper = np.array(region.bounds_mm)
+    return 0.5 * (lower + upper), upper - lower
+
+
+def around_zero(count: int) -> FloatArray:
+    """Places of a row of so many, one apart, with their middle at 0, (count,).
+
+    Examples
+    --------
+    >>> around_zero(2).tolist(), around_zero(3).tolist()
+    ([-0.5, 0.5], [-1.0, 0.0, 1.0])
+    """
+    return np.arange(count, dtype=np.float64) - 0.5 * (count - 1)

@@ -1,0 +1,75 @@
+"""YAML as people mean it: plain values, numbers in any form, and no key that replaces another in silence."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import yaml
+
+from fingerpad.core.errors import InputError
+
+
+def read_yaml(text: str, source: str) -> Any:
+    """Plain values of a text in YAML.
+
+    Parameters
+    ----------
+    text : str
+        One document.
+    source : str
+        Where it comes from, for errors.
+
+    Returns
+    -------
+    mappings, lists, texts, numbers, booleans and None
+
+    Raises
+    ------
+    InputError
+        If it is no YAML, or a key stands twice in a mapping.
+
+    Examples
+    --------
+    Numbers such as 1e-6, which YAML takes for text where a point or a sign is missing, are numbers here:
+
+    >>> read_yaml("{gain: 1e-6, name: edge, off: [1, 2.5]}", "an example")
+    {'gain': 1e-06, 'name': 'edge', 'off': [1, 2.5]}
+    """
+    try:
+        return yaml.load(text, _Loader)  # a SafeLoader: plain values only
+    except yaml.YAMLError as error:
+        said = " ".join(str(error).split()).rstrip(".")
+        raise InputError(f"{source} cannot be read as YAML ({said}): correct it there.") from error
+    except InputError as error:
+        raise InputError(f"{source}, {error}") from error
+    except RecursionError as error:
+        raise InputError(f"{source} cannot be read as YAML (nested too deep): correct it there.") from error
+
+
+class _Loader(yaml.SafeLoader):
+    """Refuses a key that stands twice, of which YAML would keep the second in silence."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [key.value for key, _ in node.value]
+        for key in keys:
+            if keys.count(key) > 1:
+                raise InputError(f"line {node.start_mark.line + 1}: {key} stands twice, keep one.")
+        return super().construct_mapping(node, deep)
+
+
+# A copy of the table of resolvers: that of SafeLoader belongs to every program in this process.
+_Loader.yaml_implicit_resolvers = {
+    first: [
+        (tag, form)
+        for tag, form in resolvers
+        # `on`, `off`, `yes` and `no` are words; only `true` and `false` are not.
+        if tag != "tag:yaml.org,2002:bool" or first in "tTfF"
+    ]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$"),
+    list("-+.0123456789"),
+)

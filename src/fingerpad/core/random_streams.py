@@ -1,0 +1,375 @@
+"""Random numbers by key: the same key gives the same numbers, on any number of threads and in any order.
+
+A key says what a number is for: the seed of the run, the presentation, the receptor and the purpose. The
+generator is counter-based (Philox 4x64, 10 rounds; Salmon, Moraes, Dror & Shaw 2011): it scrambles the
+key and a counter into four words of 64 bits, so that any number of any stream is made at once, without the
+ones before it.
+
+    key     = (seed, purpose)
+    counter = (block, 0, receptor, trial),    block = 1, 2, ...
+
+NumPy has the same generator and counts the same way: `generator` and `uniforms` agree to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fingerpad.core.checks import FloatArray, instance, whole
+from fingerpad.core.errors import InputError
+from fingerpad.core.philox import WORDS, four_normals, four_uniforms
+
+IntArray = NDArray[np.int64]
+Numbers = int | Sequence[int] | np.ndarray
+"""Which trials or receptors: their own numbers, or how many of them from 0."""
+
+LARGEST_SEED = 2**63 - 1
+"""Seeds, trials and receptors fit into a signed word, as NumPy's integers do."""
+
+
+class Purpose(IntEnum):
+    """What random numbers are for. Streams of different purposes have nothing in common.
+
+    The numbers are part of every key: a new purpose takes a new one, and none ever changes.
+    """
+
+    CURRENT = 1
+    """Noise of the current through a membrane."""
+    THRESHOLD = 2
+    """Threshold of each interval between spikes."""
+    GAIN = 3
+    """How strongly an end organ answers."""
+    ESCAPE = 4
+    """When a membrane with an escape rate fires."""
+    RESPONSE = 5
+    """Noise that multiplies a finished response, such as a rate."""
+    SENSITIVITY = 6
+    """How one end organ's sensitivity differs from the others', for good."""
+    LAYOUT = 7
+    """Where an end organ lies."""
+    PICK = 8
+    """Which of many distributions or sets an observer compares."""
+    CRITERION = 9
+    """Where an observer decides, if that wavers."""
+    JUDGEMENT = 10
+    """Whether a judge who follows a psychometric function is right."""
+    SPIKE_COUNT = 11
+    """How many spikes a Poisson process has in a window."""
+
+
+@dataclass(frozen=True)
+class Presentations:
+    """Which drive each spike train answers, and whose random numbers it draws.
+
+    Parameters
+    ----------
+    sites : int array (n_trains,)
+        Column of the current or drive.
+    trials : int array (n_trains,)
+        Number of the presentation; trains of one receptor need different ones.
+    receptors : int array (n_trains,)
+        Number of the end organ.
+
+    Raises
+    ------
+    InputError
+        If the three differ in length, a number is negative, or two trains have the same trial and receptor.
+
+    Examples
+    --------
+    >>> Presentations.of_population(n_receptors=2, n_trials=2).trials.tolist()
+    [0, 0, 1, 1]
+    >>> Presentations.of_one_afferent(n_stimuli=2, n_repeats=2).trials.tolist()
+    [0, 1, 2, 3]
+    """
+
+    sites: IntArray
+    trials: IntArray
+    receptors: IntArray
+
+    def __post_init__(self) -> None:
+        for name in ("sites", "trials", "receptors"):
+            numbers = numbered(name, np.asarray(getattr(self, name)))
+            numbers.setflags(write=False)
+            object.__setattr__(self, name, numbers)
+        sizes = self.sites.size, self.trials.size, self.receptors.size
+        if len(set(sizes)) > 1:
+            raise InputError(f"Presentations needs one site, trial and receptor per train: got {sizes}.")
+        if len(np.unique(np.stack([self.trials, self.receptors]), axis=1).T) < len(self):
+            raise InputError(
+                "Presentations needs another trial for each train of a receptor, or they draw the same "
+                f"numbers: got trials {self.trials[:8].tolist()} of receptors {self.receptors[:8].tolist()}."
+            )
+
+    @classmethod
+    def of_population(cls, n_receptors: int, n_trials: int = 1) -> Presentations:
+        """Present one touch `n_trials` times to as many receptors as there are sites, trial by trial."""
+        receptors, trials = numbered("n_receptors", n_receptors), numbered("n_trials", n_trials)
+        sites = np.tile(receptors, trials.size)
+        return cls(sites, np.repeat(trials, receptors.size), sites)
+
+    @classmethod
+    def of_one_afferent(cls, n_stimuli: int, n_repeats: int = 1) -> Presentations:
+        """Present one stimulus per site to one afferent, all of them `n_repeats` times in turn."""
+        stimuli, repeats = numbered("n_stimuli", n_stimuli), numbered("n_repeats", n_repeats)
+        sites = np.tile(stimuli, repeats.size)
+        return cls(sites, np.arange(sites.size), np.zeros_like(sites))
+
+    def __len__(self) -> int:
+        return self.sites.size
+
+    def part(self, trains: slice) -> Presentations:
+        """Return what belongs to some of the trains."""
+        return Presentations(self.sites[trains], self.trials[trains], self.receptors[trains])
+
+
+def checked_sites(sites: IntArray, n_sites: int) -> IntArray:
+    """Return the sites that trains answer if a current has as many columns, else raise `InputError`.
+
+    Parameters
+    ----------
+    sites : int array (n_trains,)
+        Of presentations, or chosen by the user.
+    n_sites : int
+        Columns that there are.
+
+    Returns
+    -------
+    int array (n_trains,)
+
+    Raises
+    ------
+    InputError
+        If one lies outside.
+
+    Examples
+    --------
+    >>> checked_sites(np.array([1, 0, 1]), n_sites=2).tolist()
+    [1, 0, 1]
+    """
+    if sites.size and (sites.min() < 0 or sites.max() >= n_sites):
+        raise InputError(f"sites must be within 0 ... {n_sites - 1}: got {sites.min()} ... {sites.max()}.")
+    return sites
+
+
+def generator(seed: int, trial: int, receptor: int, purpose: Purpose) -> np.random.Generator:
+    """Make NumPy's generator of one stream.
+
+    Parameters
+    ----------
+    seed : int
+        Of the whole run; written down with its results.
+    trial, receptor : int
+        Which presentation and which end organ, from 0.
+    purpose : Purpose
+        What the numbers are for.
+
+    Returns
+    -------
+    numpy.random.Generator
+        At the beginning of the stream.
+
+    Raises
+    ------
+    InputError
+        If a number is negative or not whole, or the purpose is none.
+
+    Examples
+    --------
+    >>> first = generator(7, trial=0, receptor=3, purpose=Purpose.GAIN).random()
+    >>> first == generator(7, trial=0, receptor=3, purpose=Purpose.GAIN).random()
+    True
+    """
+    key = [_number("seed", seed), int(instance("purpose", purpose, Purpose))]
+    counter = [0, 0, _number("receptor", receptor), _number("trial", trial)]
+    return np.random.Generator(
+        np.random.Philox(counter=np.array(counter, dtype=np.uint64), key=np.array(key, dtype=np.uint64))
+    )
+
+
+def uniforms(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, count: int) -> FloatArray:
+    """Draw uniform numbers of many streams at once.
+
+    Parameters
+    ----------
+    seed : int
+        Of the whole run.
+    trials, receptors : int or sequence of int
+        Which presentations and which end organs: their own numbers, such as `range(3, 5)`, or how many of
+        them from 0.
+    purpose : Purpose
+        What the numbers are for.
+    count : int
+        How many each stream gives.
+
+    Returns
+    -------
+    array (n_trials, n_receptors, count)
+        Within 0 ... 1, without 1; what `generator` of the same key gives by `random`.
+
+    Raises
+    ------
+    InputError
+        As in `generator`.
+
+    Examples
+    --------
+    >>> two_trials = uniforms(7, trials=2, receptors=[3, 5], purpose=Purpose.GAIN, count=4)
+    >>> two_trials.shape
+    (2, 2, 4)
+    >>> alone = uniforms(7, trials=[1], receptors=[5], purpose=Purpose.GAIN, count=1)
+    >>> bool(alone[0, 0, 0] == two_trials[1, 1, 0])
+    True
+    """
+    numbers = np.empty(_shape(trials, receptors, count))
+    _fill(*_key(seed, trials, receptors, purpose), False, numbers)
+    return numbers
+
+
+def normals(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, count: int) -> FloatArray:
+    """Draw standard normal numbers of many streams at once.
+
+    Parameters
+    ----------
+    seed, trials, receptors, purpose, count
+        As in `uniforms`.
+
+    Returns
+    -------
+    array (n_trials, n_receptors, count)
+        Mean 0, variance 1.
+
+    Raises
+    ------
+    InputError
+        As in `generator`.
+
+    Notes
+    -----
+    Box & Muller 1958. `generator` makes normal numbers in another way: they differ from these.
+
+    Examples
+    --------
+    >>> numbers = normals(7, trials=100, receptors=10, purpose=Purpose.GAIN, count=10)
+    >>> abs(float(numbers.mean())) < 0.05, 0.95 < float(numbers.std()) < 1.05
+    (True, True)
+    """
+    numbers = np.empty(_shape(trials, receptors, count))
+    _fill(*_key(seed, trials, receptors, purpose), True, numbers)
+    return numbers
+
+
+@njit(cache=True, nogil=True)
+def _fill(seed, trials, receptors, purpose, normal, numbers):  # type: ignore[no-untyped-def]
+    """Write the first numbers of every stream."""
+    count = numbers.shape[2]
+    for i in range(trials.size):
+        for j in range(receptors.size):
+            for first in range(0, count, WORDS):
+                block = first // WORDS + 1
+                if normal:
+                    four = four_normals(seed, trials[i], receptors[j], purpose, block)
+                else:
+                    four = four_uniforms(seed, trials[i], receptors[j], purpose, block)
+                for k in range(min(WORDS, count - first)):
+                    numbers[i, j, first + k] = four[k]
+
+
+def normals_of(seed: int, presentations: Presentations, purpose: Purpose, count: int) -> FloatArray:
+    """Draw standard normal numbers for each train of a set of presentations.
+
+    Parameters
+    ----------
+    seed, purpose, count
+        As in `uniforms`.
+    presentations : Presentations
+        Whose numbers to draw.
+
+    Returns
+    -------
+    array (n_trains, count)
+        The numbers that `normals` gives to the trial and receptor of each train.
+
+    Raises
+    ------
+    InputError
+        As in `generator`.
+
+    Examples
+    --------
+    >>> one = Presentations(sites=[0], trials=[1], receptors=[5])
+    >>> every = normals(7, trials=2, receptors=6, purpose=Purpose.GAIN, count=3)
+    >>> bool((normals_of(7, one, Purpose.GAIN, 3)[0] == every[1, 5]).all())
+    True
+    """
+    numbers = np.empty((len(presentations), whole("count", count, 0)))
+    key = _number("seed", seed), int(instance("purpose", purpose, Purpose))
+    _fill_trains(key[0], presentations.trials, presentations.receptors, key[1], numbers)
+    return numbers
+
+
+@njit(cache=True, nogil=True)
+def _fill_trains(seed, trials, receptors, purpose, numbers):  # type: ignore[no-untyped-def]
+    """Write the first numbers of one stream per train."""
+    for train in range(trials.size):
+        some = slice(train, train + 1)
+        _fill(seed, trials[some], receptors[some], purpose, True, numbers[some].reshape((1, 1, -1)))
+
+
+def numbered(name: str, which: Numbers) -> IntArray:
+    """Return the numbers of trials or receptors: the ones given, or so many from 0.
+
+    Parameters
+    ----------
+    name : str
+        What they are, for the message.
+    which : int or sequence of int
+        How many, or which.
+
+    Returns
+    -------
+    int array (n,)
+
+    Raises
+    ------
+    InputError
+        If one is negative or not whole.
+
+    Examples
+    --------
+    >>> numbered("trials", 3).tolist(), numbered("trials", [4, 2]).tolist()
+    ([0, 1, 2], [4, 2])
+    """
+    if isinstance(which, int | np.integer):
+        return np.arange(whole(name, int(which), 1), dtype=np.int64)
+    if isinstance(which, np.ndarray) and np.issubdtype(which.dtype, np.integer) and which.min(initial=0) >= 0:
+        return which.astype(np.int64)
+    return np.array([_number(name, number) for number in which], dtype=np.int64)
+
+
+def _key(
+    seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose
+) -> tuple[int, IntArray, IntArray, int]:
+    return (
+        _number("seed", seed),
+        numbered("trials", trials),
+        numbered("receptors", receptors),
+        int(instance("purpose", purpose, Purpose)),
+    )
+
+
+def _shape(trials: Numbers, receptors: Numbers, count: int) -> tuple[int, int, int]:
+    return numbered("trials", trials).size, numbered("receptors", receptors).size, whole("count", count, 0)
+
+
+def _number(name: str, value: int) -> int:
+    number = whole(name, value, 0)
+    if number > LARGEST_SEED:
+        raise InputError(f"{name} must not exceed {LARGEST_SEED}: got {number}.")
+    return number

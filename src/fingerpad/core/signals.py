@@ -1,0 +1,331 @@
+"""What one stage of the chain hands to the next: frozen, read-only, checked on construction.
+
+Skin -> `SedTraces` -> `CurrentTraces` -> `SpikeTrains` -> `ResponseMap` -> `HitRates`.
+The mechanical and the neural half of the package meet in `SedTraces` and nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import FloatArray, float_array, increasing, positive
+from fingerpad.core.errors import InputError
+
+STORED_ENERGY = "stored"
+"""Name of the quantity that both terms of the current follow in the paper: strain energy density."""
+
+
+class Skin(Protocol):
+    """Anything that can tell the strain energy density below points of its surface."""
+
+    def sed(self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY) -> SedTraces:
+        """Strain energy density over time below `sites` of the skin. [mm]
+
+        These are x and z of end organs on the volar side (n_sites, 2), or x, y and z of the skin above them
+        on any side (n_sites, 3).
+
+        With it comes what the dynamic response follows, if that is another quantity.
+        """
+        ...
+
+
+def _freeze(signal: object, **arrays: np.ndarray) -> None:
+    for name, array in arrays.items():
+        object.__setattr__(signal, name, array)
+
+
+def _traces(kind: str, name: str, times_ms: ArrayLike, values: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    times = float_array("times_ms", times_ms, 1)
+    table = float_array(name, values, 2)
+    if table.shape[0] != times.size or times.size < 2:
+        raise InputError(
+            f"{kind} needs one row of {name} per time and at least two times: "
+            f"got {table.shape} for {times.size} times."
+        )
+    return times, table
+
+
+@dataclass(frozen=True)
+class SedTraces:
+    """Strain energy density at receptor sites, known at some times.
+
+    Parameters
+    ----------
+    times_ms : array (n_times,)
+        Strictly increasing, from the onset of the indentation. [ms]
+    sed_kpa : array (n_times, n_sites)
+        Strain energy density; not negative. [kPa = µJ/mm³]
+    kinks_ms : array (n_kinks,), optional
+        Those of `times_ms` at which the motion changes abruptly, as from ramp to hold: there the
+        rate of change of SED jumps, and whoever interpolates must not smooth across. [ms]
+    dynamic_kpa : array (n_times, n_sites), optional
+        What the dynamic response follows instead of SED, an extension of the paper's model; not negative.
+        [kPa, a strain in mm/mm]
+    dynamic_quantity : str, optional
+        Its name, one of those of `SkinResponse.sample`; "stored" is SED itself.
+
+    Raises
+    ------
+    InputError
+        If shapes disagree, a value is not finite or negative, a kink is not among the times, or one of
+        `dynamic_kpa` and its name comes without the other.
+
+    Examples
+    --------
+    >>> SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [1.8]]).n_sites
+    1
+    """
+
+    times_ms: FloatArray
+    sed_kpa: FloatArray
+    kinks_ms: FloatArray = field(default_factory=lambda: np.empty(0))
+    dynamic_kpa: FloatArray | None = None
+    dynamic_quantity: str = STORED_ENERGY
+
+    def __post_init__(self) -> None:
+        times, sed = _traces("SedTraces", "sed_kpa", self.times_ms, self.sed_kpa)
+        increasing("times_ms", times)
+        if (sed < 0.0).any():
+            raise InputError(f"sed_kpa must not be negative: the smallest value is {sed.min():.3g} kPa.")
+        kinks = increasing("kinks_ms", float_array("kinks_ms", self.kinks_ms, 1))
+        if not np.isin(kinks, times).all():
+            raise InputError(f"kinks_ms must be among times_ms: got {kinks[~np.isin(kinks, times)]}.")
+        _freeze(self, times_ms=times, sed_kpa=sed, kinks_ms=kinks)
+        if (self.dynamic_kpa is None) != (self.dynamic_quantity == STORED_ENERGY):
+            raise InputError(
+                f"dynamic_kpa is needed for every dynamic_quantity but {STORED_ENERGY!r}, and for no other: "
+                f"got {self.dynamic_quantity!r} {'without' if self.dynamic_kpa is None else 'with'} it."
+            )
+        if self.dynamic_kpa is not None:
+            _, dynamic = _traces("SedTraces", "dynamic_kpa", times, self.dynamic_kpa)
+            if dynamic.shape != sed.shape or (dynamic < 0.0).any():
+                raise InputError(
+                    "dynamic_kpa must match sed_kpa and must not be negative: got shape "
+                    f"{dynamic.shape} for {sed.shape} and a smallest value of {dynamic.min():.3g}."
+                )
+            _freeze(self, dynamic_kpa=dynamic)
+
+    @property
+    def n_sites(self) -> int:
+        """Number of receptor sites."""
+        return self.sed_kpa.shape[1]
+
+    def part(self, sites: slice) -> SedTraces:
+        """Traces of some of the sites."""
+        if sites == slice(0, self.n_sites):
+            return self
+        dynamic = None if self.dynamic_kpa is None else self.dynamic_kpa[:, sites]
+        return SedTraces(self.times_ms, self.sed_kpa[:, sites], self.kinks_ms, dynamic, self.dynamic_quantity)
+
+    def scaled(self, factors: ArrayLike) -> SedTraces:
+        """Traces with each site's values multiplied by a factor of its own, (n_sites,), not negative.
+
+        Examples
+        --------
+        >>> SedTraces([0.0, 50.0], [[0.0, 0.0], [2.0, 2.0]]).scaled([1.0, 1.5]).sed_kpa[-1].tolist()
+        [2.0, 3.0]
+        """
+        each = float_array("factors", factors, 1)
+        if each.size != self.n_sites:
+            raise InputError(f"factors needs one number per site: got {each.size} for {self.n_sites}.")
+        dynamic = None if self.dynamic_kpa is None else self.dynamic_kpa * each
+        return SedTraces(self.times_ms, self.sed_kpa * each, self.kinks_ms, dynamic, self.dynamic_quantity)
+
+
+@dataclass(frozen=True)
+class CurrentTraces:
+    """Membrane current at receptor sites, piecewise linear between its times.
+
+    A time that stands twice is a jump: its first row is the current just before, its second just after.
+
+    Parameters
+    ----------
+    times_ms : array (n_times,)
+        Knots, in order; a time may stand twice, not more often. [ms]
+    current_ma : array (n_times, n_sites)
+        Current at the knots. [mA]
+
+    Examples
+    --------
+    A current that drops from 2 to 1 µA after 50 ms:
+
+    >>> CurrentTraces([0.0, 50.0, 50.0, 1000.0], [[2e-3], [2e-3], [1e-3], [1e-3]]).n_sites
+    1
+    """
+
+    times_ms: FloatArray
+    current_ma: FloatArray
+
+    def __post_init__(self) -> None:
+        times, current = _traces("CurrentTraces", "current_ma", self.times_ms, self.current_ma)
+        if (np.diff(times) < 0.0).any() or (times[2:] == times[:-2]).any():
+            raise InputError(f"times_ms must not decrease, nor repeat more than once: got {times[:4]} ...")
+        _freeze(self, times_ms=times, current_ma=current)
+
+    @property
+    def n_sites(self) -> int:
+        """Number of receptor sites."""
+        return self.current_ma.shape[1]
+
+    def part(self, sites: slice) -> CurrentTraces:
+        """Currents of some of the sites."""
+        if sites == slice(0, self.n_sites):
+            return self
+        return CurrentTraces(self.times_ms, self.current_ma[:, sites])
+
+
+@dataclass(frozen=True)
+class SpikeTrains:
+    """Spike times of several afferents, one after the other in one array.
+
+    Parameters
+    ----------
+    times_ms : array (n_spikes,)
+        Spike times, afferent by afferent, increasing within each. [ms]
+    offsets : int array (n_afferents + 1,)
+        Afferent `i` owns `times_ms[offsets[i]:offsets[i + 1]]`.
+
+    Examples
+    --------
+    >>> trains = SpikeTrains.from_lists([[1.0, 2.5], [], [4.0]])
+    >>> [train.tolist() for train in trains]
+    [[1.0, 2.5], [], [4.0]]
+    """
+
+    times_ms: FloatArray
+    offsets: np.ndarray
+
+    def __post_init__(self) -> None:
+        times = float_array("times_ms", self.times_ms, 1)
+        offsets = np.array(self.offsets, dtype=np.int64)
+        if offsets.ndim != 1 or offsets.size == 0 or offsets[0] != 0 or offsets[-1] != times.size:
+            raise InputError(f"offsets must run from 0 to the number of spikes, {times.size}: got {offsets}.")
+        if (np.diff(offsets) < 0).any():
+            raise InputError(f"offsets must not decrease: got {offsets}.")
+        offsets.setflags(write=False)
+        _freeze(self, times_ms=times, offsets=offsets)
+        falls = np.diff(times) <= 0.0
+        falls[offsets[(offsets > 0) & (offsets < times.size)] - 1] = False  # from one train to the next
+        if falls.any():
+            raise InputError(
+                f"times_ms must increase within each afferent: it does not at {times[1:][falls][:4]}."
+            )
+
+    @classmethod
+    def from_lists(cls, trains: Sequence[ArrayLike]) -> SpikeTrains:
+        """Spike trains from one sequence of spike times per afferent. [ms]"""
+        arrays = [np.asarray(train, dtype=np.float64) for train in trains]
+        offsets = np.concatenate([[0], np.cumsum([array.size for array in arrays])])
+        return cls(np.concatenate(arrays) if arrays else np.empty(0), offsets)
+
+    @classmethod
+    def joined(cls, parts: Sequence[SpikeTrains]) -> SpikeTrains:
+        """Trains of several groups of afferents, one group after the other.
+
+        Examples
+        --------
+        >>> halves = SpikeTrains.from_lists([[1.0], []]), SpikeTrains.from_lists([[4.0, 5.0]])
+        >>> [train.tolist() for train in SpikeTrains.joined(halves)]
+        [[1.0], [], [4.0, 5.0]]
+        """
+        if len(parts) == 1:
+            return parts[0]
+        counts = [np.diff(part.offsets) for part in parts]
+        offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]) if parts else np.zeros(1)
+        return cls(np.concatenate([part.times_ms for part in parts]) if parts else np.empty(0), offsets)
+
+    def __len__(self) -> int:
+        return self.offsets.size - 1
+
+    def __getitem__(self, afferent: int) -> FloatArray:
+        if not 0 <= afferent < len(self):
+            raise IndexError(f"afferent must be within 0 ... {len(self) - 1}: got {afferent}.")
+        return self.times_ms[self.offsets[afferent] : self.offsets[afferent + 1]]
+
+
+@dataclass(frozen=True)
+class ResponseMap:
+    """What a population of afferents answers to one touch.
+
+    Parameters
+    ----------
+    positions_mm : array (n_receptors, 2) or (n_receptors, 3)
+        x (distal positive) and z (lateral) of each end organ, or x, y and z of the skin above it. [mm]
+    pitch_mm : float
+        Distance between neighbours of the layout. [mm]
+    spikes : SpikeTrains
+        One train per receptor.
+    dynamic_rate_hz, static_rate_hz : array (n_receptors,)
+        Firing rates in the two windows, Eqs. 6-10; 0 without an interval. [spikes/s]
+    first_spike_latency_ms : array (n_receptors,)
+        Time of the first spike after onset; NaN without a spike. [ms]
+    """
+
+    positions_mm: FloatArray
+    pitch_mm: float
+    spikes: SpikeTrains
+    dynamic_rate_hz: FloatArray
+    static_rate_hz: FloatArray
+    first_spike_latency_ms: FloatArray
+
+    def __post_init__(self) -> None:
+        positions = float_array("positions_mm", self.positions_mm, 2)
+        if positions.shape[1] not in (2, 3):
+            raise InputError(
+                f"positions_mm needs columns x and z, or x, y and z: got shape {positions.shape}."
+            )
+        positive("pitch_mm", self.pitch_mm, "mm")
+        dynamic = float_array("dynamic_rate_hz", self.dynamic_rate_hz, 1)
+        static = float_array("static_rate_hz", self.static_rate_hz, 1)
+        latency = np.array(self.first_spike_latency_ms, dtype=np.float64)
+        latency.setflags(write=False)
+        n = positions.shape[0]
+        for name, size in (
+            ("spikes", len(self.spikes)),
+            ("dynamic_rate_hz", dynamic.size),
+            ("static_rate_hz", static.size),
+            ("first_spike_latency_ms", latency.size),
+        ):
+            if size != n:
+                raise InputError(f"ResponseMap needs one entry of {name} per receptor: got {size} for {n}.")
+        _freeze(
+            self,
+            positions_mm=positions,
+            dynamic_rate_hz=dynamic,
+            static_rate_hz=static,
+            first_spike_latency_ms=latency,
+        )
+
+
+@dataclass(frozen=True)
+class HitRates:
+    """How often each comparison is told from the standard.
+
+    Parameters
+    ----------
+    hit_rate : array (n_comparisons,)
+        Mean fraction of correct judgements, mu_3. [0-1]
+    hit_rate_sd : array (n_comparisons,)
+        Its standard deviation over repetitions, sigma_3. [0-1]
+    seed, session : int, optional
+        Whose random numbers the noise and the observer drew.
+    """
+
+    hit_rate: FloatArray
+    hit_rate_sd: FloatArray
+    seed: int | None = None
+    session: int = 0
+
+    def __post_init__(self) -> None:
+        mean = float_array("hit_rate", self.hit_rate, 1)
+        spread = float_array("hit_rate_sd", self.hit_rate_sd, 1)
+        if mean.shape != spread.shape:
+            raise InputError(f"hit_rate and hit_rate_sd must match: got {mean.shape} and {spread.shape}.")
+        if ((mean < 0) | (mean > 1)).any() or (spread < 0).any():
+            raise InputError("hit_rate must lie within 0 ... 1 and hit_rate_sd must not be negative.")
+        _freeze(self, hit_rate=mean, hit_rate_sd=spread)

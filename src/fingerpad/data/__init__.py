@@ -1,0 +1,56 @@
+"""Published parameters and reference observations, each with unit, source and status; no algorithm.
+
+`fingertip`, `tissues`, `neuron`, `protocol` and `psychophysics` are what the chain starts from, `paper` is
+what its results are compared with.
+"""
+
+from types import ModuleType
+
+from fingerpad.data import fingertip, neuron, paper, protocol, psychophysics, tissues
+from fingerpad.data.observations import (
+    BarObservations,
+    DeflectionObservations,
+    HitRateObservations,
+    bar_firing_rates,
+    cylinder_deflection,
+    goodwin_hit_rates,
+)
+from fingerpad.data.published import STATUSES, Published
+
+__all__ = [
+    "STATUSES",
+    "BarObservations",
+    "DeflectionObservations",
+    "HitRateObservations",
+    "Published",
+    "all_published",
+    "bar_firing_rates",
+    "cylinder_deflection",
+    "fingertip",
+    "goodwin_hit_rates",
+    "neuron",
+    "paper",
+    "protocol",
+    "psychophysics",
+    "tissues",
+]
+
+_MODULES: tuple[ModuleType, ...] = (fingertip, tissues, protocol, neuron, psychophysics, paper)
+
+
+def all_published() -> tuple[Published, ...]:
+    """Every published number of the package, module by module, in the order of definition.
+
+    Returns
+    -------
+    tuple of Published
+
+    Examples
+    --------
+    >>> from fingerpad.data import all_published
+    >>> {number.status for number in all_published()} == {"paper", "read", "recalled", "assumed"}
+    True
+    """
+    return tuple(
+        value for module in _MODULES for value in vars(module).values() if isinstance(value, Published)
+    )

@@ -1,0 +1,153 @@
+"""What was observed in skin, nerve and people: one loader per experiment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.data.table import packaged_table
+
+
+@dataclass(frozen=True)
+class BarObservations:
+    """Firing rates of one SAI afferent under a bar at several lateral positions.
+
+    Parameters
+    ----------
+    shift_mm : array (n_shifts,)
+        Position of the bar relative to the centre of the receptive field. [mm]
+    dynamic_rate_hz, static_rate_hz : array (n_shifts,)
+        Observed rates during the ramp and the hold. [spikes/s]
+    source, status : str
+        Who published them, and how far the numbers can be trusted.
+    """
+
+    shift_mm: FloatArray
+    dynamic_rate_hz: FloatArray
+    static_rate_hz: FloatArray
+    source: str
+    status: str
+
+
+@dataclass(frozen=True)
+class DeflectionObservations:
+    """Deflection of the skin's surface along the finger.
+
+    Parameters
+    ----------
+    distance_mm : array (n_points,)
+        Along the finger from the axis of the indenter. [mm]
+    deflection_mm : array (n_points,)
+        Towards the bone. [mm]
+    is_artefact : bool array (n_points,)
+        Points that digitising left and the skin did not have; leave them out of comparisons.
+    source, status : str
+        Who published them, and how far the numbers can be trusted.
+    """
+
+    distance_mm: FloatArray
+    deflection_mm: FloatArray
+    is_artefact: NDArray[np.bool_]
+    source: str
+    status: str
+
+
+@dataclass(frozen=True)
+class HitRateObservations:
+    """How often people tell spheres from a standard.
+
+    Parameters
+    ----------
+    standard_per_m : float
+        Curvature of the standard sphere. [1/m]
+    curvature_per_m : array (n_comparisons,)
+        Curvatures of the comparison spheres. [1/m]
+    hit_rate : array (n_comparisons,)
+        Fraction of correct trials. [0-1]
+    source, status : str
+        Who published them, and how far the numbers can be trusted.
+    """
+
+    standard_per_m: float
+    curvature_per_m: FloatArray
+    hit_rate: FloatArray
+    source: str
+    status: str
+
+
+def bar_firing_rates() -> BarObservations:
+    """Rates under a 3.0 mm bar pressed in by 1.0 mm at 36 positions (Phillips & Johnson 1981).
+
+    Returns
+    -------
+    BarObservations
+
+    Examples
+    --------
+    >>> observed = bar_firing_rates()
+    >>> observed.shift_mm.size, observed.dynamic_rate_hz.max(), observed.static_rate_hz.max()
+    (36, np.float64(210.0), np.float64(61.0))
+    """
+    table = packaged_table("bar_firing_rates")
+    columns = table.columns
+    return BarObservations(
+        shift_mm=columns["shift_mm"],
+        dynamic_rate_hz=columns["dynamic_rate_hz"],
+        static_rate_hz=columns["static_rate_hz"],
+        source=table.source,
+        status=table.status,
+    )
+
+
+def cylinder_deflection() -> DeflectionObservations:
+    """Deflection under a 3.17 mm cylinder pressed in by 1.0 mm (Dandekar 1995, Srinivasan's laboratory).
+
+    The observations under the 50 µm line, which the paper also uses, are not available to us.
+
+    Returns
+    -------
+    DeflectionObservations
+
+    Examples
+    --------
+    >>> observed = cylinder_deflection()
+    >>> observed.distance_mm[observed.is_artefact].tolist()
+    [-9.25]
+    """
+    table = packaged_table("cylinder_deflection")
+    columns = table.columns
+    is_artefact = columns["is_artefact"] == 1.0
+    is_artefact.setflags(write=False)
+    return DeflectionObservations(
+        distance_mm=columns["distance_mm"],
+        deflection_mm=columns["deflection_mm"],
+        is_artefact=is_artefact,
+        source=table.source,
+        status=table.status,
+    )
+
+
+def goodwin_hit_rates() -> HitRateObservations:
+    """Hit rates of people who compare spheres with a standard of 287 /m (Goodwin et al. 1991).
+
+    Returns
+    -------
+    HitRateObservations
+
+    Examples
+    --------
+    >>> goodwin_hit_rates().hit_rate.tolist()
+    [0.58, 0.95]
+    """
+    table = packaged_table("goodwin_hit_rates")
+    columns = table.columns
+    return HitRateObservations(
+        standard_per_m=float(columns["standard_per_m"][0]),
+        curvature_per_m=columns["curvature_per_m"],
+        hit_rate=columns["hit_rate"],
+        source=table.source,
+        status=table.status,
+    )

@@ -1,0 +1,70 @@
+"""One published number: value, unit, source and how far it can be trusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic, Literal, TypeVar
+
+from fingerpad.core.checks import finite, one_of
+from fingerpad.core.errors import InputError
+
+Status = Literal["paper", "read", "recalled", "assumed"]
+STATUSES: dict[str, str] = {
+    "paper": "printed in Gerling et al. 2014",
+    "read": "read in later public material of the authors' laboratory or in other published data",
+    "recalled": "believed to be the published value, not checked against the publication",
+    "assumed": "our stand-in for a value that is lost or was never stated",
+}
+
+Value = TypeVar("Value", float, tuple[float, ...])
+
+
+@dataclass(frozen=True)
+class Published(Generic[Value]):
+    """A number, or a row of numbers, with its unit and its story.
+
+    Parameters
+    ----------
+    name : str
+        What it is, in words; unique within the package.
+    value : float or tuple of float
+        The number(s), in `unit`.
+    unit : str
+        Unit of `value`; "1" for pure numbers.
+    source : str
+        Where the value comes from.
+    status : {"paper", "read", "recalled", "assumed"}
+        How far it can be trusted; the four words are explained in `STATUSES`.
+
+    Raises
+    ------
+    InputError
+        If a text is empty, a number is not finite or the status is unknown.
+
+    Examples
+    --------
+    >>> Published("time constant", 68, "ms", "Gerling et al. 2014, section 2.2.2", "paper").value
+    68.0
+    """
+
+    name: str
+    value: Value
+    unit: str
+    source: str
+    status: Status
+
+    def __post_init__(self) -> None:
+        for field in ("name", "unit", "source"):
+            text = getattr(self, field)
+            if not isinstance(text, str) or not text.strip():
+                raise InputError(f"Published needs a text as {field}: got {text!r}.")
+        one_of(f"status of {self.name}", self.status, tuple(STATUSES))
+        object.__setattr__(self, "value", _numbers(self.name, self.value))
+
+
+def _numbers(name: str, value: float | tuple[float, ...]) -> float | tuple[float, ...]:
+    if not isinstance(value, tuple):
+        return finite(name, value)
+    if not value:
+        raise InputError(f"{name} must hold at least one number: got an empty tuple.")
+    return tuple(finite(name, number) for number in value)

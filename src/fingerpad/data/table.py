@@ -1,0 +1,92 @@
+"""Reads the package's own tables of observations: comment lines first, then columns of numbers."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from importlib.resources import files
+
+from fingerpad.core.checks import FloatArray, float_array, one_of
+from fingerpad.core.errors import InputError
+from fingerpad.data.published import STATUSES
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of numbers with their story.
+
+    Parameters
+    ----------
+    columns : dict of str to array (n_rows,)
+        Values by column name; the name carries the unit.
+    content, source, status : str
+        What was observed, who published it, and how far the numbers can be trusted.
+    """
+
+    columns: dict[str, FloatArray]
+    content: str
+    source: str
+    status: str
+
+
+def packaged_table(name: str) -> Table:
+    """Table `name` of the data that come with the package.
+
+    Parameters
+    ----------
+    name : str
+        File name without extension.
+
+    Returns
+    -------
+    Table
+
+    Examples
+    --------
+    >>> packaged_table("goodwin_hit_rates").status
+    'paper'
+    """
+    return parsed_table(
+        name, (files("fingerpad.data") / "tables" / f"{name}.csv").read_text(encoding="utf-8")
+    )
+
+
+def parsed_table(name: str, text: str) -> Table:
+    r"""Table from the text of a file with lines `# source: ...`, `# status: ...`, a header and numbers.
+
+    Raises
+    ------
+    InputError
+        If the story is incomplete, a row has too few or too many entries, or an entry is not a number.
+
+    Examples
+    --------
+    >>> text = "# content: two rates\n# source: nobody\n# status: assumed\nrate_hz\n1\n2\n"
+    >>> parsed_table("rates", text).columns["rate_hz"].tolist()
+    [1.0, 2.0]
+    """
+    lines = [line for line in text.splitlines() if line.strip()]
+    story = dict(_labelled(line) for line in lines if line.startswith("#"))
+    for label in ("content", "source", "status"):
+        if not story.get(label):
+            raise InputError(f"{name} needs a line '# {label}: ...': it has {sorted(story)}.")
+    one_of(f"status of {name}", story["status"], tuple(STATUSES))
+    records = list(csv.reader(line for line in lines if not line.startswith("#")))
+    if len(records) < 2:
+        raise InputError(
+            f"{name} needs a header and at least one row of numbers: got {len(records)} line(s)."
+        )
+    header, *rows = records
+    for row in rows:
+        if len(row) != len(header):
+            raise InputError(f"{name} needs {len(header)} entries per row: got {row}.")
+    columns = {
+        column: float_array(f"{column} of {name}", list(values), 1)
+        for column, values in zip(header, zip(*rows, strict=True), strict=True)
+    }
+    return Table(columns, story["content"], story["source"], story["status"])
+
+
+def _labelled(line: str) -> tuple[str, str]:
+    label, _, said = line.removeprefix("#").partition(":")
+    return label.strip(), said.strip()

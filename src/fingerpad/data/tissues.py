@@ -1,0 +1,100 @@
+"""Stiffness and relaxation of the tissues: moduli in kPa, times in s as published.
+
+The paper's Tables 1 and 2 are lost in every copy at hand. The hyperelastic coefficients of its
+Trials 2 and 3 (polynomial N = 2) are therefore not here; what stands in for them says so.
+"""
+
+from fingerpad.data.published import Published
+
+_MAENO = "Maeno et al. 1998"
+_WU = "Wu et al. 2004"
+_LABORATORY = "the authors' laboratory, EuroHaptics 2014: fit to deflection and force, mean of four subjects"
+_IDENTIFIED = (
+    "found by us with a reduced model of this fingertip from the observed deflection under a cylinder"
+)
+
+POISSON_RATIO = Published("Poisson's ratio of every skin layer", 0.48, "1", _MAENO, "recalled")
+
+MAENO_EPIDERMIS_YOUNG = Published("Young's modulus of the epidermis, Maeno", 136.0, "kPa", _MAENO, "recalled")
+MAENO_DERMIS_YOUNG = Published("Young's modulus of the dermis, Maeno", 80.0, "kPa", _MAENO, "recalled")
+MAENO_SUBCUTIS_YOUNG = Published("Young's modulus of the subcutis, Maeno", 34.0, "kPa", _MAENO, "recalled")
+
+WU_EPIDERMIS_YOUNG = Published(
+    "Young's modulus of the stiff epidermis of Trial 2",
+    2000.0,
+    "kPa",
+    "the paper only says that it is stiffer than Maeno's; 1-4 MPa is usual for stratum corneum",
+    "assumed",
+)
+
+BONE_YOUNG = Published("Young's modulus of bone", 17.0e6, "kPa", _MAENO, "recalled")
+BONE_POISSON = Published("Poisson's ratio of bone", 0.30, "1", _MAENO, "recalled")
+NAIL_YOUNG = Published("Young's modulus of nail", 170.0e3, "kPa", _MAENO, "recalled")
+NAIL_POISSON = Published("Poisson's ratio of nail", 0.30, "1", _MAENO, "recalled")
+
+WU_SKIN_HYPERFOAM_MU = Published(
+    "hyperfoam moduli mu_1..3 of skin, Wu", (-75.94, 11.38, 65.72), "kPa", _WU, "recalled"
+)
+WU_SKIN_HYPERFOAM_ALPHA = Published(
+    "hyperfoam exponents alpha_1..3 of skin, Wu", (4.941, 6.425, 4.712), "1", _WU, "recalled"
+)
+WU_SUBCUTIS_HYPERFOAM_MU = Published(
+    "hyperfoam moduli mu_1..3 of subcutis, Wu", (-48.95, 9.89, 39.64), "kPa", _WU, "recalled"
+)
+WU_SUBCUTIS_HYPERFOAM_ALPHA = Published(
+    "hyperfoam exponents alpha_1..3 of subcutis, Wu", (5.511, 6.571, 5.262), "1", _WU, "recalled"
+)
+WU_HYPERFOAM_POISSON = Published("Poisson's ratio of the hyperfoams, Wu", 0.40, "1", _WU, "recalled")
+
+_WU_FITTED = (
+    "fitted by us to Wu's hyperfoam (recalled) at Poisson's ratio 0.48, in uniaxial compression to 50 %; "
+    "least squares with no negative coefficient"
+)
+WU_SKIN_POLYNOMIAL = Published(
+    "polynomial C10, C01, C20, C11, C02 of skin after Wu",
+    (0.5159, 0.0, 0.0, 0.0798, 0.0558),
+    "kPa",
+    _WU_FITTED,
+    "assumed",
+)
+WU_SUBCUTIS_POLYNOMIAL = Published(
+    "polynomial C10, C01, C20, C11, C02 of subcutis after Wu",
+    (0.2581, 0.0, 0.0, 0.0227, 0.0403),
+    "kPa",
+    _WU_FITTED,
+    "assumed",
+)
+
+LABORATORY_EPIDERMIS_SHEAR = Published(
+    "neo-Hookean shear modulus of the epidermis, laboratory 2014", 1211.6, "kPa", _LABORATORY, "read"
+)
+LABORATORY_DERMIS_SHEAR = Published(
+    "neo-Hookean shear modulus of the dermis, laboratory 2014", 50.70, "kPa", _LABORATORY, "read"
+)
+LABORATORY_SUBCUTIS_SHEAR = Published(
+    "neo-Hookean shear modulus of the subcutis, laboratory 2014", 2.373, "kPa", _LABORATORY, "read"
+)
+
+SOFT_MIX_EPIDERMIS_SHEAR = Published(
+    "neo-Hookean shear modulus of the epidermis, stand-in for Trial 3", 46.0, "kPa", _IDENTIFIED, "assumed"
+)
+SOFT_MIX_DERMIS_SHEAR = Published(
+    "neo-Hookean shear modulus of the dermis, stand-in for Trial 3", 25.4, "kPa", _IDENTIFIED, "assumed"
+)
+SOFT_MIX_SUBCUTIS_SHEAR = Published(
+    "neo-Hookean shear modulus of the subcutis, stand-in for Trial 3", 4.75, "kPa", _IDENTIFIED, "assumed"
+)
+
+STIFFENING_RATIO = Published(
+    "C20 over C10 of dermis and subcutis in the stiffening Trial 3",
+    5.0,
+    "1",
+    "tried by us: deflection hardly sees it, firing rates and hit rates do",
+    "assumed",
+)
+
+SKIN_PRONY_SHARES = Published("Prony shares g_1..2 of skin, Wu", (0.148, 0.252), "1", _WU, "recalled")
+SKIN_PRONY_TIMES = Published("Prony times tau_1..2 of skin, Wu", (2.123, 9.371), "s", _WU, "recalled")
+_MOUSE = "mouse skin, measured in the authors' laboratory (another species)"
+MOUSE_PRONY_SHARES = Published("Prony shares g_1..2 of mouse skin", (0.391, 0.226), "1", _MOUSE, "read")
+MOUSE_PRONY_TIMES = Published("Prony times tau_1..2 of mouse skin", (0.25, 9.371), "s", _MOUSE, "read")

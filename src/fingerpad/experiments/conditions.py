@@ -1,0 +1,125 @@
+"""What the studies have in common: finger, tissues, meshes and steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fingerpad.core.checks import one_of, whole
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
+from fingerpad.geometry.indenter_grading import grading_about
+from fingerpad.geometry.indenters import Indenter, Sphere
+from fingerpad.mechanics.materials import Tissues
+from fingerpad.skin.indentation import CONTACT_POINT_MM, touch_of
+from fingerpad.skin.indentation import Touch as Touch
+
+RECEPTOR_X_MM = CONTACT_POINT_MM[0]
+"""Where the single receptor of the bar study lies, and the middle of the population. [mm]"""
+
+BAR_REACH_MM = 2.6
+"""Fine zone about the receptor in the bar study: an edge farther away hardly reaches it. [mm]"""
+
+BAR_SIZE_MM = {"quick": (0.2, 0.6), "standard": (0.1, 0.5)}
+"""Elements along and across under the bar. The shifts of 0.2 mm are whole elements, so that the mesh under
+an edge looks the same from shift to shift. [mm]"""
+
+SPHERE_REACH_MM = 2.8
+"""Fine zone about the spheres, along and across: the contact and the population's outermost receptor. [mm]"""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Finger, tissues and accuracy of a reproduction.
+
+    Parameters
+    ----------
+    resolution : {"quick", "standard", "paper"}
+        How fine meshes and steps are.
+    seed : int
+        Seed of the observer's noise.
+    materials : str or Tissues
+        Tissues of the single-unit and the population study: a name, see `mechanics.tissues`, or your own.
+    finger : Fingertip
+        The finger.
+    """
+
+    resolution: str = "standard"
+    seed: int = 0
+    materials: str | Tissues = "trial3"
+    finger: Fingertip = field(default_factory=Fingertip)
+
+    def __post_init__(self) -> None:
+        one_of("resolution", self.resolution, RESOLUTIONS)
+        whole("seed", self.seed, at_least=0)
+
+    @property
+    def skin_tilt_deg(self) -> float:
+        """Tilt at which an indenter presses along the inward normal of the skin at the receptor. [degrees]"""
+        x, y, _ = np.ravel(self.finger.skin_normal(self.finger.skin_point(RECEPTOR_X_MM, 0.0)))
+        return float(np.rad2deg(np.arctan2(x, -y)))
+
+    def touch(
+        self,
+        indenter: Indenter,
+        x_mm: float,
+        grading: Grading,
+        materials: str | Tissues | None = None,
+        tilt_deg: float = 0.0,
+    ) -> Touch:
+        """One touch of the paper's protocol, 1.0 mm in 50 ms, held for 950 ms, on the midline at x."""
+        return touch_of(
+            self.finger,
+            indenter,
+            materials=materials or self.materials,
+            resolution=self.resolution,
+            at_mm=(x_mm, 0.0),
+            grading=grading,
+            tilt_deg=tilt_deg,
+        )
+
+    def sphere_touch(
+        self, curvature_per_m: float, position_mm: float = 0.0, grading: Grading | None = None
+    ) -> Touch:
+        """One touch of the population study: a sphere along the skin's normal, centred on the receptors.
+
+        Parameters
+        ----------
+        curvature_per_m : float
+            Of the sphere. [1/m]
+        position_mm : float, optional
+            Along the finger, from the middle of the population, distal positive. [mm]
+        grading : Grading, optional
+            Mesh; default: that of all spheres.
+
+        Returns
+        -------
+        Touch
+        """
+        return self.touch(
+            Sphere(curvature_per_m),
+            RECEPTOR_X_MM + position_mm,
+            grading or self.sphere_grading(),
+            tilt_deg=self.skin_tilt_deg,
+        )
+
+    def tilt_deg(self, indenter: Indenter) -> float:
+        """Tilt of an indenter that presses straight: none of a wire, which grips the skin. [degrees]"""
+        return 0.0 if indenter.grips else self.skin_tilt_deg
+
+    def deflection_grading(self, indenter: Indenter) -> Grading:
+        """Mesh of the skin deflection study: fine about the indenter."""
+        return grading_about(indenter, self.resolution, RECEPTOR_X_MM)
+
+    def bar_grading(self) -> Grading:
+        """Mesh of the single-unit study: fine about the receptor, the same for all shifts."""
+        grading = resolution_grading(self.resolution, RECEPTOR_X_MM, BAR_REACH_MM, half_width_mm=0.6)
+        if self.resolution in BAR_SIZE_MM:
+            size_x, size_z = BAR_SIZE_MM[self.resolution]
+            grading = replace(grading, size_x_mm=size_x, size_z_mm=size_z)
+        return grading
+
+    def sphere_grading(self) -> Grading:
+        """Mesh of the population study: fine about both positions, the same for all spheres."""
+        return resolution_grading(self.resolution, RECEPTOR_X_MM, SPHERE_REACH_MM, SPHERE_REACH_MM)

@@ -1,0 +1,1 @@
+"""Discrimination tasks: which stimuli can an observer of a population tell apart?"""

@@ -1,0 +1,407 @@
+"""A question of one's own: which stimuli, met by which afferents, read by which code, shall be told apart.
+
+Each class is a part of the file that `studies.question_file` reads. docs/discriminate.md explains every key.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
+
+from fingerpad.core.layouts import PATTERNS
+from fingerpad.core.signals import STORED_ENERGY
+from fingerpad.data import protocol, psychophysics
+from fingerpad.experiments.discrimination.task_types import (
+    Count,
+    NotNegative,
+    Number,
+    Pair,
+    Part,
+    Place,
+    Positive,
+    Seed,
+    Several,
+    Share,
+    Text,
+    as_list,
+    expected,
+    one_of,
+)
+from fingerpad.experiments.stimuli import INDENTERS, MOTION, SIZES
+from fingerpad.geometry.grading import RESOLUTIONS
+from fingerpad.mechanics.fields import QUANTITIES
+from fingerpad.mechanics.tissues import TISSUES
+from fingerpad.psychophysics.discrimination import WAVERING
+from fingerpad.psychophysics.functions import SIGMOIDS
+
+IDEAL = "ideal"
+CODES = ("gradient_sum", "euclidean", IDEAL)
+MEASURES = ("static", "dynamic", "latency")
+FREE = "free"
+DEFAULT = "default"
+"""What `afferent` says for our fit to the recordings under the shifted bar."""
+
+FITTED = "fitted"
+"""What `noise` says where it shall be found from observed hit rates."""
+
+GRID = "grid"
+NAIL_ROWS = "nail rows"
+LAYOUTS = (GRID, *PATTERNS, NAIL_ROWS)
+PAD = "pad"
+SHAPES = ("rectangle", "ellipse", "polygon", PAD)
+
+LISTED, VARIED, NAMED, SPELLED = "listed", "varied", "named", "spelled"
+"""Forms that a part of a question may have; pydantic puts them into the places of errors."""
+
+UNITS = SIZES | MOTION | {"spin_deg": "degrees", "tilt_deg": "degrees", "friction": ""}
+"""What can be varied from stimulus to stimulus, and in which unit."""
+
+_REPETITIONS = int(psychophysics.REPETITIONS.value)
+
+
+class SkinSettings(Part):
+    """The finger that is pressed.
+
+    Parameters
+    ----------
+    materials : str
+        A set of tissues by name, as of `fingerpad.indent`.
+    resolution : {"quick", "standard", "paper"}
+        How fine mesh and steps are.
+    reach_mm : float
+        How far to either side of the middle, along the finger and across, the mesh is fine at most; without
+        it, as far as the indenters need. [mm]
+    """
+
+    materials: Annotated[str, one_of(TISSUES)] = "trial3"
+    resolution: Annotated[str, one_of(RESOLUTIONS)] = "standard"
+    reach_mm: Positive | None = None
+
+
+class StimulusSettings(Part):
+    """One stimulus, or what all have in common. What is absent is the paper's.
+
+    Parameters
+    ----------
+    name : str
+        Of a listed stimulus.
+    level : float
+        Where a listed stimulus stands on the axis of the psychometric curve.
+    indenter : str
+        Body that is pressed in.
+    curvature_per_m, diameter_mm, width_mm, gap_mm, ridge_mm, groove_mm, fillet_mm, lip_mm : float
+        Sizes, those that the indenter has. [1/m, mm]
+    spin_deg : float
+        Turn about the direction of pressing: the orientation of a bar, an edge, a gap or a grating. [degrees]
+    tilt_deg : float
+        As of `fingerpad.Touch`; without it the indenter presses perpendicular to the skin. [degrees]
+    offset_mm : (float, float)
+        Where its axis meets the skin, from the middle of the pad: along the finger, distal positive, and
+        across. [mm]
+    depth_mm, force_mn : float
+        How far or how hard it is pressed; one of them. [mm, mN]
+    ramp_ms, hold_ms : float
+        Durations. [ms]
+    friction : float
+        Coulomb's coefficient.
+    """
+
+    name: Text | None = None
+    level: Number | None = None
+    indenter: Annotated[str, one_of(INDENTERS)] | None = None
+    curvature_per_m: Positive | None = None
+    diameter_mm: Positive | None = None
+    width_mm: Positive | None = None
+    gap_mm: NotNegative | None = None
+    ridge_mm: Positive | None = None
+    groove_mm: Positive | None = None
+    fillet_mm: NotNegative | None = None
+    lip_mm: NotNegative | None = None
+    spin_deg: Number | None = None
+    tilt_deg: Number | None = None
+    offset_mm: Pair | None = None
+    depth_mm: Positive | None = None
+    force_mn: Positive | None = None
+    ramp_ms: Positive | None = None
+    hold_ms: Positive | None = None
+    friction: NotNegative | None = None
+
+
+VARIABLE = tuple(name for name in StimulusSettings.model_fields if name in UNITS)
+"""What may differ from stimulus to stimulus by a number."""
+
+
+class VariedStimuli(Part):
+    """Stimuli that differ in one number.
+
+    Parameters
+    ----------
+    vary : str
+        Which of `VARIABLE`.
+    values : list of float
+        One per stimulus. [unit of what varies]
+    """
+
+    vary: Annotated[str, one_of(VARIABLE)]
+    values: Annotated[tuple[Number, ...], Strict(False)]
+
+
+class RegionSettings(Part):
+    """Part of the skin that afferents lie in, unrolled; an area there is the same area of skin.
+
+    Parameters
+    ----------
+    shape : {"rectangle", "ellipse", "polygon", "pad"}
+        What it looks like.
+    length_mm, width_mm : float
+        Extent of a rectangle or an ellipse along the finger and across. [mm]
+    corners_mm : list of (float, float)
+        Of a polygon: along the finger, distal positive, and across, from the middle of the pad. [mm]
+    """
+
+    shape: Annotated[str, one_of(SHAPES)]
+    length_mm: Positive | None = None
+    width_mm: Positive | None = None
+    corners_mm: Annotated[tuple[Pair, ...], Strict(False)] | None = None
+
+
+class PopulationSettings(Part):
+    """The afferents that meet every stimulus.
+
+    Parameters
+    ----------
+    layout : str
+        "grid": the paper's rows and columns; a pattern that fills a region; or "nail rows", along the edge of
+        the nail.
+    density_per_cm2 : float
+        Afferents per area of skin. [1/cm2]
+    rows, columns : int
+        Of a grid: along the finger and across, the paper's by default; or how many rows along the nail.
+    region : RegionSettings
+        What any other layout fills.
+    offset_mm : (float, float)
+        Middle of grid, rectangle or ellipse from the middle of the pad, along the finger and across. [mm]
+    jitter : float
+        How far afferents of a jittered layout stray: standard deviation over the pitch.
+    separation : float
+        Least distance in a Poisson-disc layout over 1/sqrt(density).
+    seed : int
+        Of random places and sensitivities; another one is another finger.
+    sensitivity_spread : float
+        How much afferents differ in their gains, as of `fingerpad.neuron.population.sensitivities`.
+    """
+
+    layout: Annotated[str, one_of(LAYOUTS)] = GRID
+    density_per_cm2: Positive = psychophysics.RECEPTOR_DENSITY.value
+    rows: Count | None = None
+    columns: Count | None = None
+    region: RegionSettings | None = None
+    offset_mm: Pair = (0.0, 0.0)
+    jitter: NotNegative | None = None
+    separation: NotNegative | None = None
+    seed: Seed = 0
+    sensitivity_spread: NotNegative = 0.0
+
+
+class AfferentSettings(Part):
+    """The afferent by its numbers; what is absent is as in `fingerpad.Afferent`.
+
+    Parameters
+    ----------
+    intercept_ma, dynamic_gain, static_gain, time_constant_ms, capacitance_mf, threshold_mv : float
+        As of `fingerpad.Afferent`.
+    refractory_ms : float
+        Rest after each spike. [ms]
+    dynamic_quantity : str
+        What the dynamic term follows.
+    """
+
+    intercept_ma: Number | None = None
+    dynamic_gain: Number | None = None
+    static_gain: Number | None = None
+    time_constant_ms: Positive | None = None
+    capacitance_mf: Positive | None = None
+    threshold_mv: Positive | None = None
+    refractory_ms: NotNegative | None = None
+    dynamic_quantity: Annotated[str, one_of(QUANTITIES)] = STORED_ENERGY
+
+
+class WindowSettings(Part):
+    """When spikes count.
+
+    Parameters
+    ----------
+    dynamic, static : (float, float)
+        Start and end of the windows of the two rates. [ms]
+    latency : float
+        How long the observer waits for first spikes; a later one, or none, counts as that. Without it,
+        receptors that are silent under one stimulus take no part. [ms]
+    """
+
+    dynamic: Pair = protocol.DYNAMIC_WINDOW.value
+    static: Pair = protocol.STATIC_WINDOW.value
+    latency: Positive | None = None
+
+
+class ExperimentSettings(Part):
+    """How often the model's observer decides, and where.
+
+    Parameters
+    ----------
+    seed : int
+        Of every random number.
+    criterion : float
+        Decision point, as a fraction of the way from the standard to the comparison.
+    criterion_sigma : float
+        Spread of the criterion from one hit rate to the next.
+    criterion_moves : {"point", "fraction"}
+        What that spread multiplies: the decision point itself, or the fraction.
+    presentations, distributions, pairs, hit_rates : int
+        As of `fingerpad.psychophysics.discrimination.Experiment`.
+    presentations_varied : int
+        Presentations of each stimulus when the criterion varies.
+    trials : int
+        Judgements per comparison of an experiment with people: intervals of the psychometric curve are those
+        that such an experiment would have.
+    """
+
+    seed: Seed = 0
+    criterion: Share = psychophysics.DECISION_CRITERION.value
+    criterion_sigma: NotNegative = 0.0
+    criterion_moves: Annotated[str, one_of(WAVERING)] = WAVERING[0]
+    presentations: Several = _REPETITIONS
+    distributions: Several = _REPETITIONS
+    pairs: Several = _REPETITIONS
+    hit_rates: Several = _REPETITIONS
+    presentations_varied: Several = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
+    trials: Count = _REPETITIONS
+
+
+class CurveSettings(Part):
+    """The psychometric curve through the hit rates.
+
+    Parameters
+    ----------
+    sigmoid : str
+        Its shape over the distance from the standard, by the names of `fingerpad.psychophysics`.
+    lapse : float or "free"
+        What is missing to 1 far above threshold, or that it shall be fitted. [0-1]
+    proportion : float
+        Where the threshold is read. [0-1]
+    """
+
+    sigmoid: Annotated[str, one_of(SIGMOIDS)] = "weibull"
+    lapse: Annotated[
+        Annotated[float, Field(ge=0, lt=0.5)] | Annotated[str, one_of((FREE,))],
+        expected(f"a number within 0 ... 0.5, or {FREE}"),
+    ] = 0.0
+    proportion: Annotated[float, Field(gt=0.5, lt=1.0), expected("a number between 0.5 and 1")] = 0.75
+
+
+class ObservedPoint(Part):
+    """How often people told one stimulus from the standard.
+
+    Parameters
+    ----------
+    at : float or str
+        Level or name of the stimulus; a level may lie between those that are pressed.
+    hit_rate : float
+        Fraction of trials. [0-1]
+    trials : int
+        How many there were, for the interval.
+    """
+
+    at: Place
+    hit_rate: Share
+    trials: Count | None = None
+
+
+class ObservedSettings(Part):
+    """What is known of people.
+
+    Parameters
+    ----------
+    points : list of ObservedPoint
+        One per stimulus.
+    source : str
+        Who observed it.
+    """
+
+    points: Annotated[tuple[ObservedPoint, ...], Strict(False), Field(min_length=1)]
+    source: Text = "people"
+
+
+class Question(Part):
+    """Everything that a file of a question says.
+
+    Parameters
+    ----------
+    question : str
+        In words: the title of the page.
+    axis : str
+        What the levels are, for the axes of figures; by default the parameter that varies.
+    skin : SkinSettings
+        The finger.
+    common : StimulusSettings
+        What all stimuli share, unless they say otherwise.
+    stimuli : VariedStimuli or list of StimulusSettings
+        What is to be told apart.
+    standard : float or str
+        Level or name of the stimulus that all others are compared with.
+    population : PopulationSettings
+        The afferents.
+    afferent : AfferentSettings or str
+        "default", a file of results (`fit.json` of `fingerpad fit`, `results.json` of
+        `fingerpad reproduce`), or numbers.
+    code : str or list of str
+        How the population is read, by the names of `CODES`; the first is the main one.
+    measure : str or list of str
+        What is read of each afferent, by the names of `MEASURES`; the first is the main one.
+    windows_ms : WindowSettings
+        When spikes count.
+    noise : float or "fitted"
+        Standard deviation of the multiplicative noise, or that which brings the main code and measure
+        closest to the observed hit rates.
+    experiment : ExperimentSettings
+        Repetitions, criterion and seed.
+    curve : CurveSettings
+        The psychometric curve.
+    observed : ObservedSettings
+        Hit rates of people.
+    """
+
+    question: Text
+    axis: Text | None = None
+    skin: SkinSettings = SkinSettings()
+    common: StimulusSettings = StimulusSettings()
+    stimuli: Annotated[
+        Annotated[tuple[StimulusSettings, ...], Strict(False), Tag(LISTED)]
+        | Annotated[VariedStimuli, Tag(VARIED)],
+        Discriminator(lambda value: LISTED if isinstance(value, list | tuple) else VARIED),
+    ]
+    standard: Place
+    population: PopulationSettings = PopulationSettings()
+    afferent: Annotated[
+        Annotated[Text, Tag(NAMED)] | Annotated[AfferentSettings, Tag(SPELLED)],
+        Discriminator(lambda value: NAMED if isinstance(value, str) else SPELLED),
+    ] = DEFAULT
+    code: Annotated[
+        tuple[Annotated[str, one_of(CODES)], ...],
+        Strict(False),
+        Field(min_length=1),
+        BeforeValidator(as_list),
+    ] = ("gradient_sum",)
+    measure: Annotated[
+        tuple[Annotated[str, one_of(MEASURES)], ...],
+        Strict(False),
+        Field(min_length=1),
+        BeforeValidator(as_list),
+    ] = ("static",)
+    windows_ms: WindowSettings = WindowSettings()
+    noise: Annotated[
+        NotNegative | Annotated[str, one_of((FITTED,))], expected(f"a number not below 0, or {FITTED}")
+    ]
+    experiment: ExperimentSettings = ExperimentSettings()
+    curve: CurveSettings = CurveSettings()
+    observed: ObservedSettings | None = None

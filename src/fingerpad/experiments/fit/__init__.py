@@ -1,0 +1,1 @@
+"""Fit an afferent to recordings."""

@@ -1,0 +1,109 @@
+"""What recorded rates leave uncertain: intervals and profiles of the four numbers, and bands of rates."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.experiments.fit.rate_uncertainty import LEVEL, likely_points, possible, profiles
+from fingerpad.inference.afferent_posterior import afferent_posterior, four_number_model
+from fingerpad.inference.any_motion import WINDOWS_MS, AnyMotion
+from fingerpad.inference.fitting.posterior import credible_band
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
+from fingerpad.inference.rate_likelihood import RateLikelihood
+from fingerpad.inference.rate_problem import AfferentModel, Reparametrised
+from fingerpad.inference.recordings import RateRecordings
+
+
+def posterior(
+    model: AnyMotion,
+    rates: RateRecordings,
+    four: ArrayLike,
+    seed: int,
+    positions_mm: ArrayLike | None = None,
+    **settings: Any,
+) -> dict[str, Any]:
+    """Draw the four identifiable numbers from what the rates leave possible.
+
+    Parameters
+    ----------
+    model : AnyMotion
+        The afferent under all stimuli.
+    rates : RateRecordings
+        What was observed.
+    four : array_like (4,)
+        A fit, near which the draws begin.
+    seed : int
+        Of the random numbers.
+    positions_mm : array_like (n_stimuli,), optional
+        Where along a line each stimulus was: residuals of neighbours may then be alike. [mm]
+    **settings
+        Those of `fingerpad.inference.fitting.posterior.sample`.
+
+    Returns
+    -------
+    dict
+        Median and ends of the credible interval of each number, their covariance, and by phase the bands of
+        predicted rates and of new recordings, `low_hz` and `high_hz`.
+
+    Raises
+    ------
+    ConvergenceError
+        If the draws have not converged.
+    """
+    likelihood = _likelihood(model, rates, positions_mm)
+    found = afferent_posterior(likelihood, possible(four), seed=seed, **settings)
+    return {
+        "level": LEVEL,
+        "seed": seed,
+        "n_draws": len(found.four),
+        "n_evaluations": found.chains.n_evaluations,
+        "largest_r_hat": found.chains.r_hat.max(),
+        "smallest_effective_size": found.chains.effective_sizes.min(),
+        "median": dict(zip(IDENTIFIABLE_NAMES, np.median(found.four, axis=0), strict=True)),
+        "interval": dict(zip(IDENTIFIABLE_NAMES, credible_band(found.four, LEVEL).T, strict=True)),
+        "covariance": np.cov(found.four, rowvar=False),
+        "bands": {
+            phase: {"predicted": _band(drawn.predicted_hz), "new": _band(drawn.new_hz)}
+            for phase, drawn in found.rates.items()
+        },
+    }
+
+
+def profiled(
+    model: AnyMotion, rates: RateRecordings, four: ArrayLike, positions_mm: ArrayLike | None = None
+) -> list[dict[str, Any]]:
+    """Profile the likelihood of each of the four identifiable numbers.
+
+    Parameters
+    ----------
+    model, rates, four, positions_mm
+        As of `posterior`.
+
+    Returns
+    -------
+    list of dict
+        What `fingerpad.experiments.fit.rate_uncertainty.profiles` returns.
+    """
+    likelihood = _likelihood(model, rates, positions_mm)
+    return profiles(likelihood, likely_points(likelihood, possible(four)))
+
+
+def four_numbers(model: AnyMotion) -> Reparametrised:
+    """Return the model in the four identifiable numbers, in the form that is quickest over many of them."""
+    if len(model.drives) > 1 or model.windows_ms != WINDOWS_MS:
+        return four_number_model(model)
+    return four_number_model(AfferentModel(model.drives[0], model.refractory_ms))
+
+
+def _likelihood(model: AnyMotion, rates: RateRecordings, positions_mm: ArrayLike | None) -> RateLikelihood:
+    places = None if positions_mm is None else np.asarray(positions_mm, dtype=np.float64)
+    return RateLikelihood(four_numbers(model), rates, places)
+
+
+def _band(draws_hz: FloatArray) -> dict[str, FloatArray]:
+    low, high = credible_band(draws_hz, LEVEL)
+    return {"low_hz": low, "high_hz": high}

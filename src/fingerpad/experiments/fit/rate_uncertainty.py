@@ -1,0 +1,195 @@
+"""What rates leave uncertain, beside draws: profile likelihoods, and what the fit is sensitive to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import norm, qmc
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.experiments.gerling2014 import single_unit
+from fingerpad.inference.afferent_posterior import from_coordinates, to_coordinates
+from fingerpad.inference.fitting.profile_likelihood import Profile, profile_likelihoods
+from fingerpad.inference.fitting.sensitivity import sobol_indices
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
+from fingerpad.inference.many_rates import scores_of_each
+from fingerpad.inference.rate_likelihood import RateLikelihood
+from fingerpad.inference.rate_problem import RateProblem
+
+LEVEL = 0.95
+"""Probability within every interval and band."""
+
+SEEDS_OF_PROFILES = 300
+"""Draws from the posterior that profiles start from."""
+
+CLOUDS, POINTS_OF_CLOUD, BEST_POINTS, MOST_LOSS = 5, 1200, 150, 4.0
+"""Of `likely_points`: nine draws of ten from a posterior of four numbers lose less than that."""
+
+FIRST_CLOUD = (0.05, 0.4, 0.2, 0.5)
+"""Standard deviations of the first cloud of `likely_points`, in the coordinates of the posterior."""
+
+SENSITIVITY_SHARE = 0.25
+"""Sobol's ranges reach from this share below the fit to this share above. [1]"""
+
+SENSITIVITY_POINTS = 512
+"""Base points of Sobol's design."""
+
+MOST_RESTING_SHARE = 0.9
+"""Potential at rest over the threshold, at most, where a search begins: untouched skin elicits no spike."""
+
+
+def possible(four: ArrayLike) -> FloatArray:
+    """Return the numbers of a fit, moved to where a likelihood can begin.
+
+    A gain that ended at its bound, 0, has no logarithm; the paper's start stands in for it. A current of its
+    own that would make the afferent fire untouched is lowered.
+
+    Parameters
+    ----------
+    four : array_like (4,)
+        In the order of `fingerpad.inference.identifiable.IDENTIFIABLE_NAMES`.
+
+    Returns
+    -------
+    array (4,)
+
+    Examples
+    --------
+    >>> possible([0.05, 4.0, 0.0, 50.0]).round(3).tolist()
+    [0.018, 4.0, 0.042, 50.0]
+    """
+    fitted = np.array(four, dtype=np.float64)
+    usual = identifiable(single_unit.start_points()[0])
+    fitted[1:] = np.where(fitted[1:] > 0.0, fitted[1:], usual[1:])
+    fitted[0] = min(fitted[0], MOST_RESTING_SHARE / fitted[3])
+    return fitted
+
+
+def likely_points(likelihood: RateLikelihood, four: ArrayLike) -> FloatArray:
+    """Find points all over the region that rates leave likely, the same ones each time.
+
+    A likelihood of rates has many lumps, and the fit may stand on a low one. Clouds of points are laid
+    about the best ones of all clouds before, and whatever is not much less likely than the best is kept.
+
+    Parameters
+    ----------
+    likelihood : RateLikelihood
+        Of a model of the four identifiable numbers.
+    four : array_like (4,)
+        A fit, about which the first cloud lies; `possible` says where it can be.
+
+    Returns
+    -------
+    array (n_points, 4)
+        Points whose log likelihood is less than the highest one by `MOST_LOSS` at most.
+    """
+    middle, reach = to_coordinates(four), np.diag(FIRST_CLOUD)
+    design = norm.ppf(qmc.Halton(middle.size, scramble=False).random(CLOUDS * POINTS_OF_CLOUD + 1)[1:])
+    points, heights = middle[None], likelihood.log_likelihood(from_coordinates(middle[None]))
+    for offsets in np.split(design, CLOUDS):
+        cloud = middle + offsets @ reach.T
+        cloud = cloud[cloud[:, 0] < 1.0]  # untouched skin elicits no spike
+        points = np.vstack([points, cloud])
+        heights = np.append(heights, likelihood.log_likelihood(from_coordinates(cloud)))
+        best = points[np.argsort(-heights, kind="stable")[:BEST_POINTS]]
+        # Wider than the best ones lie, so that the next cloud may find better ones beside them.
+        middle, reach = best.mean(axis=0), np.linalg.cholesky(2.0 * np.cov(best, rowvar=False))
+    return from_coordinates(points[heights >= heights.max() - MOST_LOSS])
+
+
+def profiles(likelihood: RateLikelihood, starts: FloatArray) -> list[dict[str, Any]]:
+    """Profile the likelihood of the four numbers; those that are positive in their logarithm.
+
+    Parameters
+    ----------
+    likelihood : RateLikelihood
+        Of a model of the four identifiable numbers.
+    starts : array (n_starts, 4)
+        Draws from the posterior, or `likely_points`.
+
+    Returns
+    -------
+    list of dict
+        Per number its `name`, where it was held, `values`, the `losses` of log likelihood there, and `low`
+        and `high`, the ends of the interval, None where the rates set none.
+
+    Raises
+    ------
+    ConvergenceError
+        If a fit does not end.
+    """
+
+    def log_likelihood(points: FloatArray) -> FloatArray:
+        numbers = np.concatenate([points[:, :1], np.exp(points[:, 1:])], axis=1)
+        heights = np.full(len(points), -np.inf)
+        # As in the prior: untouched skin elicits no spike.
+        silent = numbers[:, 0] * numbers[:, 3] < 1.0
+        if silent.any():
+            heights[silent] = likelihood.log_likelihood(numbers[silent])
+        return heights
+
+    begun = np.concatenate([starts[:, :1], np.log(starts[:, 1:])], axis=1)
+    found = profile_likelihoods(log_likelihood, begun, begun.std(axis=0), IDENTIFIABLE_NAMES, level=LEVEL)
+    return [
+        _profile(profile, np.exp if index else lambda values: values)
+        for index, profile in enumerate(found.profiles)
+    ]
+
+
+def _profile(profile: Profile, natural: Callable[[Any], Any]) -> dict[str, Any]:
+    low, high = (float(natural(end)) for end in profile.interval)
+    return {
+        "name": profile.name,
+        "values": natural(profile.values),
+        "losses": profile.losses,
+        # An open end is None: 0 and infinity are as far as a logarithm goes.
+        "low": low if np.isfinite(profile.interval[0]) else None,
+        "high": high if np.isfinite(profile.interval[1]) else None,
+    }
+
+
+def sensitivity(problem: RateProblem, four: ArrayLike, seed: int) -> dict[str, Any]:
+    """Find Sobol's indices of FSS, each number between so much less and so much more than the fit.
+
+    Parameters
+    ----------
+    problem : RateProblem
+        Of a model of the four identifiable numbers.
+    four : array_like (4,)
+        The fit. The range of a number that is 0 is a share of the paper's start, an intercept's of the
+        current that just fires.
+    seed : int
+        Of the design and the bootstrap.
+
+    Returns
+    -------
+    dict
+        Ranges, `first` and `total` indices with their half widths, and FSS over the ranges.
+    """
+    fitted, sizes = np.asarray(four, dtype=np.float64), identifiable(single_unit.start_points()[0])
+    sizes[0] = 1.0 / sizes[3]  # beta tau/(C v) = 1 just fires
+    reach = SENSITIVITY_SHARE * np.where(fitted == 0.0, sizes, np.abs(fitted))
+    found = sobol_indices(
+        lambda points: scores_of_each(problem, points),
+        # A gain is never negative.
+        np.maximum(fitted - reach, [-np.inf, 0.0, 0.0, 0.0]),
+        fitted + reach,
+        IDENTIFIABLE_NAMES,
+        seed=seed,
+        n_base=SENSITIVITY_POINTS,
+        level=LEVEL,
+    )
+    return {
+        "lower": found.lower,
+        "upper": found.upper,
+        "first": found.first,
+        "first_half_width": found.first_half_width,
+        "total": found.total,
+        "total_half_width": found.total_half_width,
+        "mean_fss": found.mean,
+        "deviation_fss": found.standard_deviation,
+        "evaluations": found.n_evaluations,
+    }

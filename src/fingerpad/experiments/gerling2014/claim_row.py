@@ -1,0 +1,64 @@
+"""One row of the table that holds our numbers beside the paper's."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fingerpad.data.published import Published
+
+CLOSE = 0.2
+"""A number of the paper counts as met within this share of it, unless more is better."""
+
+MATERIALS = "materials assumed (Tables 1 and 2 are lost), geometry read"
+
+ClaimRow = dict[str, Any]
+
+
+def claim_row(
+    quantity: str,
+    published: str,
+    ours: str,
+    difference: str = "",
+    status: str = "",
+    met: bool | None = None,
+    note: str = "",
+) -> ClaimRow:
+    """Return a row: what, the paper's, ours, their difference, what it rests on, the verdict and a note.
+
+    Examples
+    --------
+    >>> claim_row("hit rate", "0.58", "0.60", met=True)["met"]
+    True
+    """
+    return {
+        "quantity": quantity,
+        "paper": published,
+        "ours": ours,
+        "difference": difference,
+        "status": status,
+        "met": met,
+        "note": note,
+    }
+
+
+def measured_row(
+    quantity: str,
+    published: Published[float],
+    ours: float,
+    status: str,
+    digits: int = 3,
+    at_least: bool = False,
+    note: str = "",
+) -> ClaimRow:
+    """Return the row of a number that the paper prints: met from it on, or close to it."""
+    close = abs(ours - published.value) <= CLOSE * published.value
+    judged = "" if at_least else f"judged: within {CLOSE:.0%}"
+    return claim_row(
+        quantity,
+        f"{published.value:g}",
+        f"{ours:.{digits}f}",
+        f"{ours - published.value:+.{digits}f}",
+        status,
+        bool(ours >= published.value if at_least else close),
+        "; ".join(text for text in (judged, note) if text),
+    )

@@ -1,0 +1,134 @@
+"""Beyond the paper: how much of what a population's responses tell each code makes use of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import InputError
+from fingerpad.core.units import MS_PER_S
+from fingerpad.data import protocol
+from fingerpad.psychophysics import (
+    PoissonResponses,
+    Presentation,
+    ResponseModel,
+    Statistic,
+    efficiency,
+    multiplied_responses,
+    present,
+)
+from fingerpad.psychophysics.encoding import distance, gradient_sum
+
+PAIR_PER_M = (287.0, 316.0)
+"""Two spheres near the threshold of people, at which codes are measured."""
+
+TRIALS = 4000
+"""Presentations of each sphere to the observers whose efficiency is measured."""
+
+SESSION, REFERENCE_SESSION = 11, 12
+"""Of the random numbers; other studies have others."""
+
+
+def efficiencies(
+    curvature_per_m: FloatArray,
+    tables: Mapping[str, FloatArray],
+    neighbours: np.ndarray,
+    noise_sigma: float,
+    seed: int,
+) -> list[dict[str, Any]]:
+    """Measure codes against the ideal observer of the same responses, on two spheres near people's threshold.
+
+    Parameters
+    ----------
+    curvature_per_m : array (n_spheres,)
+        Increasing, both spheres of `PAIR_PER_M` among them. [1/m]
+    tables : mapping of str to array (n_spheres, n_receptors)
+        Static and dynamic rates, and latencies. [spikes/s or ms]
+    neighbours : int array (n_pairs, 2)
+        Of the population.
+    noise_sigma : float
+        Standard deviation of the multiplicative noise.
+    seed : int
+        Of the random numbers.
+
+    Returns
+    -------
+    list of dict
+        One row per code, measure and kind of noise. A receptor that is silent under one of the spheres has no
+        noise that multiplies, and would tell them apart for certain: it is left out, for all observers.
+    """
+    rows = [int(np.flatnonzero(curvature_per_m == curvature)[0]) for curvature in PAIR_PER_M]
+    found = []
+    for measure, table in tables.items():
+        standard, comparison = table[rows]
+        # A latency of NaN, as of a silent receptor, is not above 0 either.
+        heard = (standard > 0.0) & (comparison > 0.0)
+        # No rate is a rate; no latency is none, and has no difference to others.
+        pairs = neighbours[heard[neighbours].all(axis=1)] if measure == "latency" else neighbours
+        if heard.any() and len(pairs):
+            models = [multiplied_responses(rates[heard], noise_sigma) for rates in (standard, comparison)]
+            found += _observed(measure, "multiplied", (models[0], models[1]), heard, pairs, seed)
+    window_ms = protocol.STATIC_WINDOW.value
+    seconds = (window_ms[1] - window_ms[0]) / MS_PER_S
+    counts = [PoissonResponses(tables["static"][row] * seconds) for row in rows]
+    everyone = np.ones(tables["static"].shape[1], dtype=bool)
+    return found + _observed("static", "Poisson", (counts[0], counts[1]), everyone, neighbours, seed)
+
+
+def _observed(
+    measure: str,
+    noise: str,
+    models: tuple[ResponseModel, ResponseModel],
+    heard: np.ndarray,
+    neighbours: np.ndarray,
+    seed: int,
+) -> list[dict[str, Any]]:
+    """Measure both codes on responses with one kind of noise."""
+    standard, comparison = models
+    shown = present(standard, comparison, seed, TRIALS, SESSION)
+    # The standard again, which Euclidean Distance compares every look with.
+    reference = present(standard, standard, seed, TRIALS, REFERENCE_SESSION).standard
+    codes: dict[str, Statistic] = {
+        "Gradient Sum": lambda responses: gradient_sum(_placed(responses, heard), neighbours),
+        "Euclidean Distance": lambda responses: distance(responses, reference),
+    }
+    return [
+        {
+            "code": code,
+            "measure": measure,
+            "noise": noise,
+            "receptors": int(heard.sum()),
+            **_judged(shown, of),
+        }
+        for code, of in codes.items()
+    ]
+
+
+def _placed(responses: FloatArray, heard: np.ndarray) -> FloatArray:
+    """Responses (n_trials, n_receptors) of all receptors, 0 for those that are left out."""
+    everyone = np.zeros((len(responses), heard.size))
+    everyone[:, heard] = responses
+    return everyone
+
+
+def _judged(shown: Presentation, statistic: Statistic) -> dict[str, float | None]:
+    """D' of a code and of the ideal observer; no efficiency where that one never fails, or only guesses."""
+    judged, ideal = shown.of(statistic), shown.ideal()
+    try:
+        share, error = efficiency(judged, ideal)
+    except InputError:
+        share, error = math.nan, math.nan
+    return {
+        "proportion_correct": judged.proportion_correct,
+        "d_prime": judged.d_prime,
+        "d_prime_error": judged.d_prime_error,
+        "ideal_proportion_correct": ideal.proportion_correct,
+        "ideal_d_prime": ideal.d_prime,
+        "ideal_d_prime_error": ideal.d_prime_error,
+        "efficiency": share,
+        "efficiency_error": error,
+    }

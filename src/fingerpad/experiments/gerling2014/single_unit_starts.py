@@ -1,0 +1,139 @@
+"""Level 2, where the fit starts: what the printed gains mean, and the paper's session, fold 3, start 2."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.signals import SedTraces
+from fingerpad.core.units import MS_PER_S
+from fingerpad.data import neuron, paper
+from fingerpad.experiments.gerling2014 import single_unit
+from fingerpad.inference.fitting import interleaved_folds
+from fingerpad.inference.rate_problem import AfferentModel, RateProblem
+from fingerpad.neuron.transduction import drive
+
+PER_KPA = {"MPa": 1.0e-3, "kPa": 1.0, "Pa": 1.0e3}
+"""Energy density in each unit for one in kPa."""
+
+SESSION_FOLD, SESSION_START = 3, 2
+"""The session of the paper's Table 4, counted from 1."""
+
+PRINTED = np.array([1.0, 1.0])
+ENERGY_SCALES = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
+DYNAMIC_RATIOS = (1.0, 1.0e3, 2.5e3, 5.0e3, 1.0e4, 1.5e4, 2.5e4)
+"""Factors on energy density, which multiply both gains, and further factors on k_d. [1]"""
+
+SEARCHED_SCALES = np.arange(1.0, 12.01, 0.1)
+"""Factors on energy density among which the one is sought that gives the paper's FSS at the start."""
+
+
+def result(problem: RateProblem, von_mises: SedTraces) -> dict[str, Any]:
+    """Try the printed starts in each unit, and the paper's session from several starts.
+
+    Parameters
+    ----------
+    problem : RateProblem
+        Observed rates under the bar, and the paper's model driven by strain energy density.
+    von_mises : SedTraces
+        Von Mises stress at the receptor in place of the energy density. [kPa]
+
+    Returns
+    -------
+    dict
+        `units`: one row per reading of the unit; `scales`: FSS of the first start with its gains rescaled;
+        `sessions`: one row per start of the paper's session.
+    """
+    stress = replace(problem, model=AfferentModel(drive(von_mises)))
+    readings = [("strain energy density", problem, unit) for unit in PER_KPA]
+    readings += [("von Mises stress", stress, unit) for unit in PER_KPA]
+    return {
+        "units": [_reading(quantity, read, unit) for quantity, read, unit in readings],
+        "scales": _scales(problem),
+        "sessions": [_session(problem, name, scales) for name, scales in _session_scales(problem).items()],
+    }
+
+
+def scaled_start(start: int, static_scale: float, dynamic_scale: float) -> FloatArray:
+    """One of the paper's start points, its gains multiplied.
+
+    Parameters
+    ----------
+    start : int
+        1 or 2.
+    static_scale, dynamic_scale : float
+        Factors on the printed k_s and k_d. [1]
+    """
+    printed = single_unit.printed_starts()[start - 1]
+    return printed * [1.0, dynamic_scale, static_scale, 1.0, 1.0, 1.0]
+
+
+def _reading(quantity: str, problem: RateProblem, unit: str) -> dict[str, Any]:
+    """FSS and largest rates at the printed starts if the drive is counted in `unit`."""
+    everything = np.arange(problem.n_observations)
+    row: dict[str, Any] = {"quantity": quantity, "unit": unit}
+    for start in (1, 2):
+        parameters = scaled_start(start, PER_KPA[unit], PER_KPA[unit])
+        dynamic, static = problem.model.rates(parameters)
+        row[f"start_{start}"] = {
+            "fss": problem.score(parameters, everything),
+            "largest_dynamic_hz": dynamic.max(),
+            "largest_static_hz": static.max(),
+        }
+    return row
+
+
+def _scales(problem: RateProblem) -> dict[str, Any]:
+    """FSS of the first start over all shifts, (n_energy_scales, n_dynamic_ratios)."""
+    everything = np.arange(problem.n_observations)
+    fss = [
+        [problem.score(scaled_start(1, scale, scale * ratio), everything) for ratio in DYNAMIC_RATIOS]
+        for scale in ENERGY_SCALES
+    ]
+    return {"energy_scale": ENERGY_SCALES, "dynamic_ratio": DYNAMIC_RATIOS, "fss_start_1": np.array(fss)}
+
+
+def _session_scales(problem: RateProblem) -> dict[str, FloatArray]:
+    """Factors on k_s and k_d of the sessions to be run."""
+    training = _training(problem)
+
+    def at_start(scale: float) -> float:
+        return problem.score(scaled_start(SESSION_START, scale, scale * MS_PER_S), training)
+
+    reached = np.array([at_start(scale) for scale in SEARCHED_SCALES])
+    nearest = float(SEARCHED_SCALES[np.argmin(np.abs(reached - paper.FOLD_3_FSS_START.value))])
+    defaults = np.array([neuron.STATIC_GAIN_SCALE.value, neuron.DYNAMIC_GAIN_SCALE.value])
+    return {
+        "as printed, in kPa and ms": PRINTED,
+        "k_d per second, energy scaled to the paper's start": nearest * np.array([1.0, MS_PER_S]),
+        "the starts used here": defaults,
+    }
+
+
+def _session(problem: RateProblem, name: str, scales: FloatArray) -> dict[str, Any]:
+    """Fold 3 from start 2, both gains scaled."""
+    training = _training(problem)
+    testing = np.setdiff1d(np.arange(problem.n_observations), training)
+    method = single_unit.response_surface(np.array([scaled_start(SESSION_START, *scales)]))
+    fit = method.fit(problem, training)
+    dynamic, static = problem.model.rates(fit.parameters)
+    return {
+        "start": name,
+        "static_scale": scales[0],
+        "dynamic_scale": scales[1],
+        "fss_start": fit.history[0].score,
+        "fss_train": fit.score,
+        "fss_test": problem.score(fit.parameters, testing),
+        "iterations": len(fit.history) - 1,
+        "runs": fit.n_evaluations,
+        "largest_dynamic_hz": dynamic.max(),
+        "largest_static_hz": static.max(),
+    }
+
+
+def _training(problem: RateProblem) -> np.ndarray:
+    folds = interleaved_folds(problem.n_observations)
+    return np.flatnonzero(folds != SESSION_FOLD - 1)

@@ -1,0 +1,286 @@
+"""Spike trains of the fitted afferent, made noisy, and the afferent found again in them.
+
+No spike times of this experiment are public, only rates. What a fit to spikes could tell is therefore shown
+on spikes whose parameters are known: the afferent that was fitted to the rates, with a soft threshold, under
+the bar at all its positions. The same fit is then tried on spikes that other noise made.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.stats import kstwo
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.random_streams import Presentations
+from fingerpad.core.signals import SedTraces, SpikeTrains
+from fingerpad.core.units import MS_PER_S
+from fingerpad.data import protocol
+from fingerpad.experiments.gerling2014 import interval_variability, single_unit
+from fingerpad.experiments.gerling2014.interval_variability import CORRELATION_MS, SOFT_THRESHOLD, STEP_MS
+from fingerpad.inference.identifiable import identifiable, six_parameters
+from fingerpad.inference.spike_fit import SpikeFit, fit_spikes
+from fingerpad.inference.spike_likelihood import (
+    SpikeLikelihood,
+    time_rescaling,
+)
+from fingerpad.inference.spike_parameters import (
+    SPIKE_PARAMETER_NAMES,
+    SPIKE_PARAMETER_UNITS,
+)
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.escape_rate import EscapeRate
+from fingerpad.neuron.membrane_noise import (
+    CorrelatedCurrentNoise,
+    MembraneNoise,
+    ThresholdNoise,
+    WhiteCurrentNoise,
+)
+from fingerpad.neuron.noisy_lif import noisy_spikes
+from fingerpad.neuron.transduction import Drive, drive
+
+WIDTH = 0.2
+"""Width of the true threshold over the threshold."""
+
+START_WIDTH = 0.5
+N_REPEATS = 5
+LEVEL = 0.95
+PIECES = 8
+"""Linear pieces of the drive per interval of mechanics: spikes are made and fitted with the same ones."""
+
+OTHER_AMOUNT = 0.3
+"""Of each other noise; its meaning is that of `fingerpad.experiments.gerling2014.interval_variability`."""
+
+N_QUANTILES = 100
+SHOWN_MS = (0.0, 250.0)
+SHOWN_STEP_MS = 0.5
+
+
+def start() -> FloatArray:
+    """Return where every fit begins: the paper's first start point, its gains rescaled, and soft.
+
+    Returns
+    -------
+    array (5,)
+        In the order of `fingerpad.inference.spike_parameters.SPIKE_PARAMETER_NAMES`.
+    """
+    return np.array([*identifiable(single_unit.start_points()[0]), START_WIDTH])
+
+
+def truth(driven: Drive, afferent: Afferent, seed: int) -> FloatArray:
+    """Return the true parameters: those of the afferent, with its gains rescaled to a soft threshold.
+
+    A soft threshold fires early. The three gains are multiplied by what keeps the rate of the held afferent.
+
+    Parameters
+    ----------
+    driven : Drive
+        Strain energy density under each position of the bar.
+    afferent : Afferent
+        Fitted to the rates.
+    seed : int
+        Of the run.
+
+    Returns
+    -------
+    array (5,)
+    """
+    current_ma = interval_variability.largest_held_current_ma(driven, afferent)
+    kept = interval_variability.held_at_its_rate(SOFT_THRESHOLD, afferent.membrane, current_ma, WIDTH, seed)
+    four = identifiable(afferent.parameters)
+    return np.array([*(kept.current_factor * four[:3]), four[3], WIDTH])
+
+
+def result(sed: SedTraces, afferent: Afferent, shift_mm: FloatArray, seed: int) -> dict[str, Any]:
+    """Noise, recovery and what other noise does to a fit.
+
+    Parameters
+    ----------
+    sed : SedTraces
+        Strain energy density at the receptor, one column per position of the bar.
+    afferent : Afferent
+        Fitted to the rates; it has to fire in the hold.
+    shift_mm : array (n_sites,)
+        Positions of the bar. [mm]
+    seed : int
+        Of the run.
+
+    Returns
+    -------
+    dict
+        `variability` as `fingerpad.experiments.gerling2014.interval_variability.result`; `recovery` and
+        `raster`, None for an
+        afferent that is silent or spikes that cannot be fitted; `other_noise`, a row per source.
+    """
+    driven = drive(sed, pieces=PIECES)
+    found: dict[str, Any] = {
+        "n_repeats": N_REPEATS,
+        "n_positions": sed.n_sites,
+        "names": SPIKE_PARAMETER_NAMES,
+        "units": SPIKE_PARAMETER_UNITS,
+        "variability": interval_variability.result(driven, afferent, seed),
+        "recovery": None,
+        "raster": None,
+        "other_noise": [],
+    }
+    if found["variability"]["rate_hz"] == 0.0:
+        return found
+    true = truth(driven, afferent, seed)
+    presentations = Presentations.of_one_afferent(sed.n_sites, N_REPEATS)
+    recorded = SpikeLikelihood(driven, soft_spikes(driven, true, presentations, seed), presentations.sites)
+    fit = _fit_if_possible(recorded)
+    if fit is not None:
+        found["recovery"] = _recovery(recorded, fit, true)
+        found["raster"] = _raster(recorded, fit, true, shift_mm)
+    found["other_noise"] = _other_noise(driven, afferent, presentations, seed)
+    return found
+
+
+def soft_spikes(
+    driven: Drive, parameters: FloatArray, presentations: Presentations, seed: int
+) -> SpikeTrains:
+    """Let an afferent with a soft threshold fire.
+
+    Parameters
+    ----------
+    driven : Drive
+        One column per stimulus.
+    parameters : array (5,)
+        In the order of `fingerpad.inference.spike_parameters.SPIKE_PARAMETER_NAMES`.
+    presentations : Presentations
+        Which stimulus each train answers.
+    seed : int
+        Of the run.
+
+    Returns
+    -------
+    SpikeTrains
+    """
+    soft, current = _soft_afferent(driven, parameters)
+    return soft.spikes(current, seed, presentations)
+
+
+def _soft_afferent(driven: Drive, parameters: FloatArray) -> tuple[EscapeRate, Any]:
+    """Soft membrane and current of five numbers."""
+    afferent = Afferent.from_parameters(six_parameters(parameters[:4]))
+    return EscapeRate(afferent.membrane, parameters[4]), afferent.transduction.current(driven)
+
+
+def _fit_if_possible(recorded: SpikeLikelihood) -> SpikeFit | None:
+    """Fit, or None for spikes that are too few or too regular: that is a finding, not a failure."""
+    try:
+        return fit_spikes(recorded, start())
+    except (ConvergenceError, InputError):
+        return None
+
+
+def _recovery(recorded: SpikeLikelihood, fit: SpikeFit, true: FloatArray) -> dict[str, Any]:
+    interval = fit.interval(LEVEL)
+    rescaled = time_rescaling(recorded, fit.parameters)
+    shares = (np.arange(N_QUANTILES) + 0.5) / N_QUANTILES
+    return {
+        "n_spikes": fit.n_spikes,
+        "level": LEVEL,
+        "start": start(),
+        "truth": true,
+        "estimate": fit.parameters,
+        "standard_error": fit.standard_errors,
+        "low": interval[:, 0],
+        "high": interval[:, 1],
+        "n_held": int(((interval[:, 0] < true) & (interval[:, 1] > true)).sum()),
+        "correlation": fit.correlation,
+        "log_likelihood": fit.log_likelihood,
+        "log_likelihood_of_truth": recorded.log_likelihood(true),
+        "n_steps": len(fit.history) - 1,
+        "rescaled": {
+            "share": shares,
+            "quantile": np.quantile(rescaled.quantiles, shares),
+            "distance": rescaled.statistic,
+            "p_value": rescaled.p_value,
+            "distance_of_truth": time_rescaling(recorded, true).statistic,
+            "limit": float(kstwo.ppf(LEVEL, fit.n_spikes)),
+        },
+    }
+
+
+def _raster(
+    recorded: SpikeLikelihood, fit: SpikeFit, true: FloatArray, shift_mm: FloatArray
+) -> dict[str, Any]:
+    """First presentation of each position, and the intensity at the one that makes the afferent fire most."""
+    n_sites = recorded.drive.n_sites
+    first = [recorded.trains[number] for number in range(n_sites)]
+    busiest = int(np.argmax([train.size for train in first]))
+    times = np.arange(SHOWN_MS[0], SHOWN_MS[1], SHOWN_STEP_MS)
+    train = SpikeTrains.from_lists([first[busiest]])
+    intensity_hz = {}
+    for name, parameters in (("truth", true), ("fitted", fit.parameters)):
+        soft, current = _soft_afferent(recorded.drive, parameters)
+        intensity_hz[name] = MS_PER_S * soft.intensity_per_ms(current, train, [busiest], times)[:, 0]
+    return {
+        "shift_mm": shift_mm,
+        "spikes_ms": first,
+        "shown": busiest,
+        "times_ms": times,
+        "intensity_hz": intensity_hz,
+    }
+
+
+def _other_noise(
+    driven: Drive, afferent: Afferent, presentations: Presentations, seed: int
+) -> list[dict[str, Any]]:
+    """Fit a soft threshold to spikes that the afferent made with a hard one and other noise."""
+    current = afferent.transduction.current(driven)
+    held_ma = interval_variability.largest_held_current_ma(driven, afferent)
+    sources = {
+        "white noise of the current": MembraneNoise(
+            current=WhiteCurrentNoise(OTHER_AMOUNT * held_ma * CORRELATION_MS**0.5, STEP_MS)
+        ),
+        f"noise of the current, correlated over {CORRELATION_MS:g} ms": MembraneNoise(
+            current=CorrelatedCurrentNoise(OTHER_AMOUNT * held_ma, CORRELATION_MS, STEP_MS)
+        ),
+        "threshold, new for each interval": MembraneNoise(threshold=ThresholdNoise(OTHER_AMOUNT)),
+    }
+    rows = []
+    for name, noise in sources.items():
+        trains = noisy_spikes(afferent.membrane, current, noise, seed, presentations, afferent.intercept_ma)
+        recorded = SpikeLikelihood(driven, trains, presentations.sites)
+        fit = _fit_if_possible(recorded)
+        row: dict[str, Any] = {"name": name, "amount": OTHER_AMOUNT, "n_spikes": recorded.n_spikes}
+        if fit is not None:
+            row |= {
+                "estimate": fit.parameters,
+                "over_truth": fit.parameters[:4] / identifiable(afferent.parameters),
+                "distance": time_rescaling(recorded, fit.parameters).statistic,
+                "limit": float(kstwo.ppf(LEVEL, fit.n_spikes)),
+                **_rate_errors(recorded, fit, presentations, seed),
+            }
+        rows.append(row)
+    return rows
+
+
+def _rate_errors(
+    recorded: SpikeLikelihood, fit: SpikeFit, presentations: Presentations, seed: int
+) -> dict[str, float]:
+    """Root mean square over the positions of the difference in mean rate, fitted less recorded. [spikes/s]"""
+    again = soft_spikes(recorded.drive, fit.parameters, presentations, seed + 1)
+    windows = {"dynamic": protocol.DYNAMIC_WINDOW.value, "static": protocol.STATIC_WINDOW.value}
+    errors = {}
+    for phase, window in windows.items():
+        ours, theirs = (_mean_rates_hz(trains, presentations, window) for trains in (again, recorded.trains))
+        errors[f"{phase}_rate_error_hz"] = float(np.sqrt(np.mean((ours - theirs) ** 2)))
+    return errors
+
+
+def _mean_rates_hz(
+    trains: SpikeTrains, presentations: Presentations, window_ms: tuple[float, ...]
+) -> FloatArray:
+    """Spikes per time in a window, at each site over all its presentations."""
+    owners = np.repeat(np.arange(len(trains)), np.diff(trains.offsets))
+    inside = (trains.times_ms > window_ms[0]) & (trains.times_ms <= window_ms[1])
+    counts = np.bincount(owners[inside], minlength=len(trains))
+    n_sites = int(presentations.sites.max()) + 1
+    totals = np.bincount(presentations.sites, weights=counts, minlength=n_sites)
+    repeats = np.bincount(presentations.sites, minlength=n_sites)
+    return MS_PER_S * totals / (repeats * (window_ms[1] - window_ms[0]))

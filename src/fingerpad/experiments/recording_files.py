@@ -1,0 +1,256 @@
+"""Recordings that users bring, from CSV and NWB files: rates or spikes, stimulus by stimulus."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingerpad.core.checks import FloatArray, not_negative, positive
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SpikeTrains
+from fingerpad.core.units import MS_PER_S
+from fingerpad.experiments.stimuli import Stimuli, TactileStimulus
+from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
+from fingerpad.inference.tables import Line, read_csv
+
+RATES = tuple(f"{phase}_rate_hz" for phase in PHASES)
+SPIKES = "spike_times_ms"
+DURATION = "duration_ms"
+FOLD = "fold"
+SUFFIXES_OF_NWB = (".nwb", ".h5", ".hdf5")
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Recordings with the stimuli they belong to.
+
+    Parameters
+    ----------
+    recordings : RateRecordings or SpikeRecordings
+        What the afferent answered.
+    stimuli : mapping of str to TactileStimulus
+        What touched it, in the order of their first presentations.
+    memberships : int array (n_stimuli,) or None
+        Fold of each stimulus, from 0, if the file says so.
+    presentations : mapping of str to int
+        How often each was presented.
+    spikes_after_hold : int
+        Spikes that came after the motion had ended and are not used, since the model ends there.
+    """
+
+    recordings: RateRecordings | SpikeRecordings
+    stimuli: Mapping[str, TactileStimulus]
+    memberships: NDArray[np.int64] | None
+    presentations: Mapping[str, int]
+    spikes_after_hold: int = 0
+
+
+def read_recordings(path: Path, stimuli: Stimuli, unit: int | None = None) -> Recorded:
+    r"""Read what an afferent answered to known stimuli.
+
+    Parameters
+    ----------
+    path : Path
+        A CSV file with one row per presentation: the column of `stimuli`, then `dynamic_rate_hz`,
+        `static_rate_hz` or both, or `spike_times_ms` (times from the onset, separated by spaces); optionally
+        `duration_ms` (of the recording of spikes, by default until the end of the motion) and `fold`
+        (from 1). Or an NWB file (.nwb, .h5, .hdf5), whose table of trials has the column of `stimuli` and
+        optionally `fold`, and whose trials start with the onset of the indentation.
+    stimuli : Stimuli
+        `ShiftedBar()` or `read_stimuli(...)`.
+    unit : int, optional
+        Id of the spike unit of an NWB file; not needed if it has one.
+
+    Returns
+    -------
+    Recorded
+        Rates are means over the presentations of a stimulus; spikes stay as they are.
+
+    Raises
+    ------
+    InputError
+        If anything in the file cannot be; with the line and the column.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from fingerpad.experiments.stimuli import ShiftedBar
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "rates.csv"
+    ...     _ = path.write_text("shift_mm,static_rate_hz\n-1.5,60\n0,10\n-1.5,62\n", encoding="utf-8")
+    ...     recorded = read_recordings(path, ShiftedBar())
+    >>> recorded.recordings.stimuli, recorded.recordings.static_rate_hz.tolist()
+    (('-1.5', '0'), [61.0, 10.0])
+    """
+    if path.suffix in SUFFIXES_OF_NWB:
+        lines = _nwb_lines(path, stimuli.column, unit)
+    elif unit is None:
+        lines = read_csv(path, (stimuli.column, *RATES, SPIKES, DURATION, FOLD))
+    else:
+        raise InputError(f"unit belongs to NWB files ({', '.join(SUFFIXES_OF_NWB)}): {path} is none.")
+    _check_columns(path, stimuli.column, lines[0])
+    presented = [_presented(line, stimuli) for line in lines]
+    names = [name for name, _ in presented]
+    found = dict(presented)
+    memberships = _memberships(path, lines, names) if FOLD in lines[0].entries else None
+    presentations = {name: names.count(name) for name in found}
+    if SPIKES not in lines[0].entries:
+        rates = _mean_rates(lines, names, str(path))
+        return Recorded(rates, found, memberships, presentations)
+    spikes, after = _spikes(lines, presented, str(path))
+    return Recorded(spikes, found, memberships, presentations, after)
+
+
+def _check_columns(path: Path, column: str, first: Line) -> None:
+    given = first.entries
+    if column not in given:
+        raise InputError(f"{path} must have the column {column}: it has {', '.join(given)}.")
+    rates = [name for name in RATES if name in given]
+    if SPIKES in given and rates:
+        raise InputError(f"{path} must have {SPIKES} or rates, not both: leave {' and '.join(rates)} out.")
+    if SPIKES not in given and not rates:
+        raise InputError(f"{path} must have {', '.join(RATES)} or {SPIKES}: it has {', '.join(given)}.")
+    if DURATION in given and SPIKES not in given:
+        raise InputError(f"{path} has {DURATION}, which belongs to {SPIKES}: leave it out.")
+
+
+def _presented(line: Line, stimuli: Stimuli) -> tuple[str, TactileStimulus]:
+    entry = line.text(stimuli.column)
+    with line.placed():
+        return stimuli.named(entry)
+
+
+def _mean_rates(lines: Sequence[Line], names: Sequence[str], source: str) -> RateRecordings:
+    unique = tuple(dict.fromkeys(names))
+    means: dict[str, FloatArray | None] = dict.fromkeys(RATES)
+    for column in RATES:
+        if column in lines[0].entries:
+            rates = np.array([line.number(column, "spikes/s", not_negative) for line in lines])
+            owner = np.array(names)
+            means[column] = np.array([rates[owner == name].mean() for name in unique])
+    return RateRecordings(unique, **means, source=source)
+
+
+def _spikes(
+    lines: Sequence[Line], presented: Sequence[tuple[str, TactileStimulus]], source: str
+) -> tuple[SpikeRecordings, int]:
+    """Trains until the motion or the recording ends, and the number of spikes after the motion."""
+    trains, durations, after = [], [], 0
+    for line, (_, stimulus) in zip(lines, presented, strict=True):
+        end = stimulus.motion.end_ms
+        recorded = line.number(DURATION, "ms", positive) if line.has(DURATION) else np.inf
+        times = _spike_times(line)
+        if times.size and times[-1] > recorded:
+            raise InputError(
+                f"{line.place}: {SPIKES} must end with {DURATION}, {recorded:g} ms: got {times[-1]:g} ms."
+            )
+        trains.append(times[times <= end])
+        durations.append(min(end, recorded))
+        after += int((times > end).sum())
+    recordings = SpikeRecordings(
+        tuple(name for name, _ in presented), SpikeTrains.from_lists(trains), np.array(durations), source
+    )
+    return recordings, after
+
+
+def _spike_times(line: Line) -> FloatArray:
+    """Spike times of a presentation, none if the entry is empty; checked for their order."""
+    entry = line.entries[SPIKES]
+    with line.placed():
+        if isinstance(entry, str):
+            entry = [not_negative(SPIKES, time, "ms") for time in entry.split()]  # type: ignore[arg-type]
+        times = np.asarray(entry, dtype=np.float64)
+        backwards = np.flatnonzero(np.diff(times) <= 0.0)
+        if backwards.size:
+            before, behind = times[backwards[0] : backwards[0] + 2]
+            raise InputError(f"{SPIKES} must increase: {behind:g} ms follows {before:g} ms, sort them.")
+    return times
+
+
+def _memberships(path: Path, lines: Sequence[Line], names: Sequence[str]) -> NDArray[np.int64]:
+    """Fold of each stimulus from 0; every fold is a set of stimuli, so that none is fitted and judged."""
+    first: dict[str, tuple[int, Line]] = {}
+    for line, name in zip(lines, names, strict=True):
+        fold = line.number(FOLD)
+        if fold != int(fold) or fold < 1:
+            raise InputError(f"{line.place}: {FOLD} must be a whole number from 1: got {line.text(FOLD)!r}.")
+        before, where = first.setdefault(name, (int(fold), line))
+        if before != fold:
+            raise InputError(
+                f"{line.place}: {FOLD} must be the same for all presentations of {name}, which would be "
+                f"fitted and judged at once: got {fold:g}, and {before} in {where.place}."
+            )
+    folds = np.array([fold for fold, _ in first.values()], dtype=np.int64)
+    n_folds = int(folds.max())
+    missing = sorted(set(range(1, n_folds + 1)) - set(folds.tolist()))
+    if missing or n_folds < 2:
+        raise InputError(
+            f"{path}: {FOLD} must number at least two folds from 1 without a gap: "
+            f"no row is in fold {missing[0] if missing else 2}."
+        )
+    return folds - 1
+
+
+def _nwb_lines(path: Path, column: str, unit: int | None) -> list[Line]:
+    """Trials of an NWB file as lines of a table, with the spikes of one unit."""
+    if not path.is_file():
+        raise InputError(f"{path} must be a file that can be read: there is none.")
+    try:
+        from pynwb import NWBHDF5IO
+    except ImportError as error:
+        raise InputError(f"{path} needs pynwb: install the extra, pip install 'fingerpad[nwb]'.") from error
+    try:
+        # What the libraries warn of (cached namespaces, types of old files) is not about what is read here.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with NWBHDF5IO(str(path), mode="r") as file:
+                content = file.read()
+                return _trials(path, content.trials, content.units, column, unit)
+    except InputError:
+        raise
+    except Exception as error:  # a file of any other kind may fail in any way
+        said = " ".join(str(error).split()).rstrip(".")
+        raise InputError(f"{path} cannot be read as NWB ({said}): check it with nwbinspector.") from error
+
+
+def _trials(path: Path, trials: Any, units: Any, column: str, unit: int | None) -> list[Line]:
+    if trials is None or not len(trials):
+        raise InputError(f"{path} must have a table of trials with start_time and {column}: it has none.")
+    if column not in trials.colnames:
+        raise InputError(f"{path}: trials must have the column {column}: got {', '.join(trials.colnames)}.")
+    spikes_s = _unit_spikes(path, units, unit)
+    starts, stops = (np.asarray(trials[name][:], dtype=np.float64) for name in ("start_time", "stop_time"))
+    lines = []
+    for trial, (start, stop) in enumerate(zip(starts, stops, strict=True)):
+        within = spikes_s[(spikes_s >= start) & (spikes_s <= stop)]
+        entries = {
+            column: trials[column][trial],
+            SPIKES: (within - start) * MS_PER_S,
+            DURATION: (stop - start) * MS_PER_S,
+        }
+        if FOLD in trials.colnames:
+            entries[FOLD] = trials[FOLD][trial]
+        lines.append(Line(f"{path}, trial {trials.id[trial]}", entries))
+    return lines
+
+
+def _unit_spikes(path: Path, units: Any, unit: int | None) -> FloatArray:
+    """Spike times of one unit. [s]"""
+    ids = [] if units is None else [int(number) for number in units.id[:]]
+    if not ids or "spike_times" not in units.colnames:
+        raise InputError(f"{path} must have a table of units with spike_times: it has none.")
+    if unit is None and len(ids) > 1:
+        raise InputError(f"{path} has the units {', '.join(map(str, ids))}: choose one by --unit.")
+    chosen = ids[0] if unit is None else unit
+    if chosen not in ids:
+        raise InputError(f"{path}: unit must be one of {', '.join(map(str, ids))}: got {chosen}.")
+    times = np.asarray(units["spike_times"][ids.index(chosen)], dtype=np.float64)
+    if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
+        raise InputError(f"{path}: spike_times of unit {chosen} must be finite and increase, sort them.")
+    return times

@@ -1,0 +1,1 @@
+"""Fingertip, indenters, motion, grading, mesh and its quality: shape and motion; nothing deforms."""

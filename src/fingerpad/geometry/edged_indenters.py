@@ -1,0 +1,242 @@
+"""Rigid bodies whose edges are the question: a flat body that ends, a bar with a gap, a grating.
+
+Their frame is that of `fingerpad.geometry.indenters`. All three are made of one piece, the corner: all
+points with
+u <= 0 and y <= 0, its edge rounded. Where two corners bound one ridge, the ridge is what both have in common,
+and its gap is the larger of the two: exact on both sides of its face, as long as the flat between the two
+roundings is not negative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray, not_negative, positive
+from fingerpad.core.errors import InputError
+from fingerpad.data import protocol
+from fingerpad.geometry.indenters import BESIDE_EDGE_MM, Bar, Indenter, fillet_within, round_front, rounded
+
+
+def _corner(
+    u_mm: FloatArray, y_mm: FloatArray, radius_mm: float, outward: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Gap and normal of all points with u <= 0 and y <= 0, from u along the unit vectors `outward` (n, 3)."""
+    return rounded(u_mm + radius_mm, y_mm + radius_mm, outward, radius_mm)
+
+
+def _along_x(signs: FloatArray) -> FloatArray:
+    """Vectors (n, 3) along x with these signs, that of 0 taken as positive."""
+    return np.where(signs < 0.0, -1.0, 1.0)[:, None] * [1.0, 0.0, 0.0]
+
+
+@dataclass(frozen=True)
+class Edge(Indenter):
+    """Flat body over the proximal half of the finger that ends in one rounded edge at x = 0, long in z.
+
+    Parameters
+    ----------
+    fillet_mm : float
+        Radius of the edge. [mm]
+
+    Examples
+    --------
+    >>> gap, _ = Edge(fillet_mm=0.3).gap(np.array([[-5.0, 0.2, 0.0], [0.5, -1.0, 2.0]]))
+    >>> gap.round(3).tolist()
+    [0.2, 0.5]
+    """
+
+    fillet_mm: float = protocol.BAR_FILLET.value
+
+    def __post_init__(self) -> None:
+        not_negative("fillet_mm", self.fillet_mm, "mm")
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the extent along x: no limit."""
+        return np.inf
+
+    @property
+    def edge_reach_mm(self) -> float:
+        """How far to either side of x = 0 skin bends about the edge. [mm]"""
+        return self.fillet_mm + BESIDE_EDGE_MM
+
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
+        return round_front(points_mm[:, 0] + self.fillet_mm, self.fillet_mm)
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        x, y = points_mm[:, 0], points_mm[:, 1]
+        return _corner(x, y, self.fillet_mm, _along_x(np.ones_like(x)))
+
+
+@dataclass(frozen=True)
+class Gap(Indenter):
+    """Flat bar across the finger with a gap along its middle: two ridges that one body holds.
+
+    The gap is deeper than skin can bulge. Its lips are never rounder than half of it, so that a gap that
+    closes leaves the bar without one.
+
+    Parameters
+    ----------
+    gap_mm : float
+        Width of the gap between its two walls; 0 for a bar without a gap. [mm]
+    width_mm : float
+        Full width along x, gap and fillets included. [mm]
+    fillet_mm : float
+        Radius of the two outer edges. [mm]
+    lip_mm : float
+        Radius of the two lips of the gap, if the gap is at least twice as wide. [mm]
+
+    Raises
+    ------
+    InputError
+        If a size is negative, or gap, lips and fillets leave no flat ridge.
+
+    References
+    ----------
+    Johnson & Phillips 1981: stimuli of one overall size, much larger than their gaps, told from those
+    without a gap.
+
+    Examples
+    --------
+    >>> gap, _ = Gap(gap_mm=1.0).gap(np.array([[0.0, -0.5, 0.0], [2.0, -0.1, 0.0]]))
+    >>> gap.round(3).tolist()
+    [0.5, -0.1]
+    """
+
+    gap_mm: float = protocol.GAP_WIDTH.value
+    width_mm: float = protocol.GAPPED_BAR_WIDTH.value
+    fillet_mm: float = protocol.BAR_FILLET.value
+    lip_mm: float = protocol.LIP_RADIUS.value
+
+    def __post_init__(self) -> None:
+        not_negative("gap_mm", self.gap_mm, "mm")
+        positive("width_mm", self.width_mm, "mm")
+        fillet_within(self.fillet_mm, self.width_mm, "width_mm")
+        not_negative("lip_mm", self.lip_mm, "mm")
+        widest = self.width_mm - 2 * self.fillet_mm - 2 * self.lip_radius_mm
+        if self.gap_mm > 0.0 and self.gap_mm >= widest:
+            raise InputError(
+                f"gap_mm must leave two flat ridges of the bar, so be below {widest:g} mm: "
+                f"got {self.gap_mm:g} mm."
+            )
+
+    @property
+    def lip_radius_mm(self) -> float:
+        """Radius of the lips, at most half of the gap. [mm]"""
+        return min(self.lip_mm, self.gap_mm / 2)
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the full width. [mm]"""
+        return self.width_mm / 2
+
+    def mirrors(self, spin_deg: float) -> bool:
+        """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0."""
+        return spin_deg % 90.0 == 0.0
+
+    @property
+    def edge_reach_mm(self) -> float:
+        """How far to either side of x = 0 skin bends about the lips; 0 without a gap. [mm]"""
+        return self.gap_mm / 2 + BESIDE_EDGE_MM if self.gap_mm > 0.0 else 0.0
+
+    @property
+    def narrowest_mm(self) -> float:
+        """Width of the gap; no limit without one. [mm]"""
+        return self.gap_mm if self.gap_mm > 0.0 else np.inf
+
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """Height y of the body's face above the x and z of points (n, 3), -inf beside and in the gap. [mm]"""
+        u = np.abs(points_mm[:, 0])
+        face = round_front(u - self.width_mm / 2 + self.fillet_mm, self.fillet_mm)
+        if self.gap_mm == 0.0:
+            return face
+        return np.minimum(face, round_front(self.gap_mm / 2 - u + self.lip_radius_mm, self.lip_radius_mm))
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        if self.gap_mm == 0.0:
+            return Bar(self.width_mm, self.fillet_mm).gap(points_mm)
+        x, y = points_mm[:, 0], points_mm[:, 1]
+        u, outward = np.abs(x), _along_x(x)
+        outer, outer_normal = _corner(u - self.width_mm / 2, y, self.fillet_mm, outward)
+        inner, inner_normal = _corner(self.gap_mm / 2 - u, y, self.lip_radius_mm, -outward)
+        return np.maximum(inner, outer), np.where((inner > outer)[:, None], inner_normal, outer_normal)
+
+
+@dataclass(frozen=True)
+class Grating(Indenter):
+    """Grating larger than the finger: flat ridges across it, a groove between any two, a ridge over x = 0.
+
+    Parameters
+    ----------
+    ridge_mm : float
+        Width of a ridge, lips included. [mm]
+    groove_mm : float
+        Width of a groove between its walls; grooves are deeper than skin can bulge. [mm]
+    lip_mm : float
+        Radius of the lips, at most half of a ridge. [mm]
+
+    Examples
+    --------
+    >>> gap, _ = Grating(ridge_mm=1.0, groove_mm=1.0).gap(np.array([[2.0, 0.3, 0.0], [1.0, -0.5, 0.0]]))
+    >>> gap.round(3).tolist()
+    [0.3, 0.5]
+    """
+
+    ridge_mm: float = protocol.RIDGE_WIDTH.value
+    groove_mm: float = protocol.RIDGE_WIDTH.value
+    lip_mm: float = protocol.LIP_RADIUS.value
+
+    def __post_init__(self) -> None:
+        positive("ridge_mm", self.ridge_mm, "mm")
+        positive("groove_mm", self.groove_mm, "mm")
+        if not_negative("lip_mm", self.lip_mm, "mm") > self.ridge_mm / 2:
+            raise InputError(
+                f"lip_mm must not exceed half of ridge_mm, {self.ridge_mm / 2:g} mm: got {self.lip_mm:g} mm."
+            )
+
+    @property
+    def period_mm(self) -> float:
+        """From one ridge to the next. [mm]"""
+        return self.ridge_mm + self.groove_mm
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the extent along x: no limit."""
+        return np.inf
+
+    def mirrors(self, spin_deg: float) -> bool:
+        """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0."""
+        return spin_deg % 90.0 == 0.0
+
+    @property
+    def edge_reach_mm(self) -> float:
+        """How far to either side of x = 0 skin bends about edges: no limit."""
+        return np.inf
+
+    @property
+    def narrowest_mm(self) -> float:
+        """Width of ridge or groove, whichever is narrower. [mm]"""
+        return min(self.ridge_mm, self.groove_mm)
+
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """Height y of the body's face above the x and z of points (n, 3), -inf over a groove. [mm]"""
+        return self._ridge.front(self._beside_ridge(points_mm))
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        return self._ridge.gap(self._beside_ridge(points_mm))
+
+    @property
+    def _ridge(self) -> Bar:
+        return Bar(self.ridge_mm, self.lip_mm)
+
+    def _beside_ridge(self, points_mm: FloatArray) -> FloatArray:
+        """Points in the frame of the ridge next to each."""
+        beside = points_mm.copy()
+        beside[:, 0] -= self.period_mm * np.round(points_mm[:, 0] / self.period_mm)
+        return beside

@@ -1,0 +1,364 @@
+"""The finger as geometry: outline, layer depths, bone and nail, with no mesh and no mechanics.
+
+Axes: x from the cut at the middle phalanx to the tip, y towards the nail, z to the side. Every cross-section
+of the skin is two half-ellipses joined at y = 0, so three profiles of x are the whole outline: volar depth a,
+dorsal height b and half-width c. With s = sqrt(1 - x / L), as on an ellipsoid, each is s times a smooth
+function of s; the level function below is written without the factor s, so it stays smooth at the tip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import BSpline, make_smoothing_spline
+
+from fingerpad.core.checks import FloatArray, finite, float_array, increasing, not_negative, positive
+from fingerpad.core.errors import InputError
+from fingerpad.data import fingertip as published
+
+# Readings carry two decimals. Interpolated, that noise would tilt the skin's normals by degrees; this much
+# smoothing moves the profiles by about 0.01 mm and leaves slopes true to a quarter of a degree on the pad.
+SMOOTHING = 5e-7
+_MOST_RAY_STEPS = 60
+
+Readings = tuple[tuple[float, float], ...]
+
+
+def _readings(stations: tuple[float, ...], values: tuple[float, ...]) -> Readings:
+    return tuple(zip(stations, (abs(value) for value in values), strict=True))
+
+
+VOLAR_READINGS = _readings(published.STATIONS_X.value, published.VOLAR_Y.value)
+DORSAL_READINGS = _readings(published.STATIONS_X.value, published.DORSAL_Y.value)
+HALF_WIDTH_READINGS = _readings(published.HALF_WIDTH_X.value, published.HALF_WIDTH_Z.value)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """One dimension of the finger's sections, a smooth function of x that closes at the tip.
+
+    The function is s g(s) with s = sqrt(1 - x / L); g is a smoothing spline through the readings, continued
+    linearly beyond them.
+
+    Parameters
+    ----------
+    readings_mm : tuple of (x, value)
+        At least five readings with x increasing from 0 or more to less than `length_mm`, values above 0. [mm]
+    length_mm : float
+        x of the tip, L. [mm]
+
+    Raises
+    ------
+    InputError
+        If there are too few readings, x does not increase or leaves the finger, or a value is not positive.
+
+    Examples
+    --------
+    >>> sphere = Profile(tuple((x, 10.0 * (1.0 - x / 30.0) ** 0.5) for x in (0, 5, 10, 15, 20, 25)), 30.0)
+    >>> sphere.at([0.0, 22.5, 30.0]).round(6).tolist()
+    [10.0, 5.0, 0.0]
+    """
+
+    readings_mm: Readings
+    length_mm: float
+
+    def __post_init__(self) -> None:
+        length = positive("length_mm", self.length_mm, "mm")
+        table = float_array("readings_mm", self.readings_mm, 2)
+        if table.shape[1] != 2 or table.shape[0] < 5:
+            raise InputError(f"readings_mm needs at least five pairs (x, value): got shape {table.shape}.")
+        stations = increasing("x of readings_mm", table[:, 0])
+        if stations[0] < 0.0 or stations[-1] >= length:
+            raise InputError(
+                f"x of readings_mm must lie from 0 to below the length {length} mm: "
+                f"got {stations[0]} to {stations[-1]} mm."
+            )
+        if (table[:, 1] <= 0.0).any():
+            raise InputError(f"readings_mm must be greater than 0: the smallest is {table[:, 1].min()} mm.")
+
+    @cached_property
+    def _spline(self) -> tuple[BSpline, BSpline, float, float]:
+        x, value = np.array(self.readings_mm)[::-1].T
+        s = np.sqrt(1.0 - x / self.length_mm)
+        spline = make_smoothing_spline(s, value / s, w=s**2, lam=SMOOTHING)
+        return spline, spline.derivative(), s[0], s[-1]
+
+    def over_s(self, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """g(s) and its derivative; the profile itself is s g(s) [mm]."""
+        spline, slope, first, last = self._spline
+        s = np.asarray(s, dtype=np.float64)
+        inside = np.clip(s, first, last)
+        return spline(inside) + slope(inside) * (s - inside), slope(inside)
+
+    def at(self, x_mm: ArrayLike) -> FloatArray:
+        """Value of the profile at `x_mm`, 0 at the tip and beyond [mm]."""
+        s = np.sqrt(np.maximum(1.0 - np.asarray(x_mm, dtype=np.float64) / self.length_mm, 0.0))
+        return s * self.over_s(s)[0]
+
+
+@dataclass(frozen=True)
+class Fingertip:
+    """Outline, layers, bone and nail of a fingertip.
+
+    Parameters
+    ----------
+    length_mm : float
+        x of the tip, L. [mm]
+    volar_readings_mm, dorsal_readings_mm, half_width_readings_mm : tuple of (x, value)
+        Volar depth, dorsal height and half-width of the skin, all positive. [mm]
+    stratum_corneum_mm, living_epidermis_mm, dermis_mm : float
+        Layer thicknesses along the skin's normal; the subcutis fills the rest down to the bone. [mm]
+    spine_y_mm, spine_end_x_mm : float
+        Height and distal end of the bone's straight axis. [mm]
+    bone_height_mm, bone_width_mm, bone_tip_x_mm : float
+        Semi-axes of the bone along y and z, and x of its tip: a tube closed by half an ellipsoid. [mm]
+    nail_x_mm : (float, float)
+        Proximal and distal end of the nail. [mm]
+    nail_half_width_mm : float
+        Extent of the nail to either side. [mm]
+
+    Raises
+    ------
+    InputError
+        If a value is out of its range or bone and layers do not fit into the outline.
+
+    Examples
+    --------
+    >>> finger = Fingertip()
+    >>> volar, dorsal, half_width = finger.section(17.37)
+    >>> print(f"{volar:.2f} {half_width:.2f}")
+    9.85 9.75
+    """
+
+    length_mm: float = published.LENGTH.value
+    volar_readings_mm: Readings = VOLAR_READINGS
+    dorsal_readings_mm: Readings = DORSAL_READINGS
+    half_width_readings_mm: Readings = HALF_WIDTH_READINGS
+    stratum_corneum_mm: float = published.STRATUM_CORNEUM.value
+    living_epidermis_mm: float = published.LIVING_EPIDERMIS.value
+    dermis_mm: float = published.DERMIS.value
+    spine_y_mm: float = published.SPINE_Y.value
+    spine_end_x_mm: float = published.SPINE_END_X.value
+    bone_height_mm: float = published.BONE_HEIGHT.value
+    bone_width_mm: float = published.BONE_WIDTH.value
+    bone_tip_x_mm: float = published.BONE_TIP_X.value
+    nail_x_mm: tuple[float, ...] = published.NAIL_X.value
+    nail_half_width_mm: float = published.NAIL_HALF_WIDTH.value
+
+    def __post_init__(self) -> None:
+        for name in ("stratum_corneum_mm", "living_epidermis_mm", "dermis_mm", "spine_end_x_mm"):
+            positive(name, getattr(self, name), "mm")
+        for name in ("bone_height_mm", "bone_width_mm", "nail_half_width_mm"):
+            positive(name, getattr(self, name), "mm")
+        if finite("spine_y_mm", self.spine_y_mm, "mm") >= 0.0:
+            raise InputError(f"spine_y_mm must lie below 0, the widest height: got {self.spine_y_mm!r}.")
+        nail = float_array("nail_x_mm", self.nail_x_mm, 1)
+        if nail.size != 2 or not nail[0] < nail[1]:
+            raise InputError(f"nail_x_mm must be two increasing numbers: got {self.nail_x_mm}.")
+        if not self.spine_end_x_mm < self.bone_tip_x_mm < self.length_mm:
+            raise InputError(
+                "spine_end_x_mm, bone_tip_x_mm and length_mm must increase: "
+                f"got {self.spine_end_x_mm}, {self.bone_tip_x_mm} and {self.length_mm}."
+            )
+        self._check_that_the_bone_fits()
+
+    def _check_that_the_bone_fits(self) -> None:
+        x = np.linspace(0.0, self.spine_end_x_mm, 41)
+        volar, dorsal, _ = self.section(x)
+        layers = self.layer_depths_mm[-1]
+        room = np.minimum(
+            volar + self.spine_y_mm - self.bone_height_mm, dorsal - self.spine_y_mm - self.bone_height_mm
+        )
+        if room.min() <= layers:
+            raise InputError(
+                f"Bone and skin layers of {layers:.3f} mm must fit into the outline: "
+                f"only {room.min():.3f} mm are left at x = {x[room.argmin()]:.1f} mm."
+            )
+
+    @cached_property
+    def profiles(self) -> tuple[Profile, Profile, Profile]:
+        """Volar depth, dorsal height and half-width as functions of x."""
+        return (
+            Profile(self.volar_readings_mm, self.length_mm),
+            Profile(self.dorsal_readings_mm, self.length_mm),
+            Profile(self.half_width_readings_mm, self.length_mm),
+        )
+
+    @property
+    def layer_depths_mm(self) -> tuple[float, float, float]:
+        """Depth of the lower border of stratum corneum, living epidermis and dermis [mm]."""
+        epidermis = self.stratum_corneum_mm + self.living_epidermis_mm
+        return self.stratum_corneum_mm, epidermis, epidermis + self.dermis_mm
+
+    def section(self, x_mm: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Volar depth, dorsal height and half-width of the cross-section at `x_mm` [mm]."""
+        volar, dorsal, half_width = self.profiles
+        return volar.at(x_mm), dorsal.at(x_mm), half_width.at(x_mm)
+
+    def level(self, points_mm: ArrayLike) -> FloatArray:
+        """Below 0 inside the skin, 0 on it, above 0 outside: (y / g_y)² + (z / g_z)² - s².
+
+        Here s² = 1 - x / L; g is a / s (volar) or b / s (dorsal) for y and c / s for z, the profiles
+        without their factor s.
+
+        Parameters
+        ----------
+        points_mm : array (..., 3)
+            x, y and z. [mm]
+
+        Returns
+        -------
+        array (...)
+        """
+        return self._level_and_gradient(np.asarray(points_mm, dtype=np.float64))[0]
+
+    def level_gradient(self, points_mm: ArrayLike) -> FloatArray:
+        """Analytic gradient of `level`, (..., 3), pointing out of the finger [1/mm]."""
+        return self._level_and_gradient(np.asarray(points_mm, dtype=np.float64))[1]
+
+    def _level_and_gradient(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        x, y, z = points[..., 0], points[..., 1], points[..., 2]
+        s_squared = 1.0 - x / self.length_mm
+        s = np.sqrt(np.maximum(s_squared, 0.0))
+        volar, dorsal, half_width = (profile.over_s(s) for profile in self.profiles)
+        g_y = np.where(y < 0.0, volar[0], dorsal[0])
+        slope_y = np.where(y < 0.0, volar[1], dorsal[1])
+        g_z, slope_z = half_width
+        level = (y / g_y) ** 2 + (z / g_z) ** 2 - s_squared
+        by_s = -2.0 * (y**2 * slope_y / g_y**3 + z**2 * slope_z / g_z**3)
+        # ds/dx = -1 / (2 L s) is infinite at the tip, where y and z vanish like s and so does by_s ds/dx.
+        s_by_x = np.where(s > 0.0, -0.5 / (self.length_mm * np.maximum(s, 1e-9)), 0.0)
+        gradient = np.stack(
+            [by_s * s_by_x + 1.0 / self.length_mm, 2.0 * y / g_y**2, 2.0 * z / g_z**2], axis=-1
+        )
+        return level, gradient
+
+    def skin_normal(self, points_mm: ArrayLike) -> FloatArray:
+        """Outward unit normal, (..., 3), of the level surface through each point of the skin."""
+        gradient = self.level_gradient(points_mm)
+        return gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
+
+    def skin_point(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
+        """Point of the volar skin at each (x, z).
+
+        Parameters
+        ----------
+        x_mm, z_mm : array (...)
+            Position seen from the volar side. [mm]
+
+        Returns
+        -------
+        array (..., 3)
+            Points of the skin. [mm]
+
+        Raises
+        ------
+        InputError
+            If a position lies beside the finger.
+
+        Examples
+        --------
+        >>> Fingertip().skin_point(17.37, 0.0).round(1).tolist()
+        [17.4, -9.8, 0.0]
+        """
+        x, z = np.broadcast_arrays(np.asarray(x_mm, dtype=np.float64), np.asarray(z_mm, dtype=np.float64))
+        volar, _, half_width = self.section(x)
+        outside = ~((x >= 0.0) & (x <= self.length_mm) & (np.abs(z) <= half_width))
+        if outside.any():
+            raise InputError(
+                f"A position must lie on the finger, x within 0 ... {self.length_mm} mm and |z| within its "
+                f"half-width: got x = {x[outside].flat[0]}, z = {z[outside].flat[0]} mm."
+            )
+        # At the very tip width and depth are 0 together; the quotient is then taken as 0.
+        share = z / np.where(half_width > 0.0, half_width, 1.0)
+        return np.stack([x, -volar * np.sqrt(1.0 - share**2), z], axis=-1)
+
+    def subsurface(self, skin_points_mm: ArrayLike, depth_mm: float) -> FloatArray:
+        """Points `depth_mm` below points of the skin, along the inward normal, (..., 3) [mm]."""
+        points = np.asarray(skin_points_mm, dtype=np.float64)
+        return points - not_negative("depth_mm", depth_mm, "mm") * self.skin_normal(points)
+
+    def depth_available_mm(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
+        """Distance along y from the volar skin at (x, z) to the bone or, beside it, the dorsal skin [mm].
+
+        Raises
+        ------
+        InputError
+            If a position lies beside the finger.
+
+        Examples
+        --------
+        >>> float(Fingertip().depth_available_mm(17.37, 0.0).round(1))
+        5.5
+        """
+        x, y, z = np.moveaxis(self.skin_point(x_mm, z_mm), -1, 0)
+        volar, dorsal, _ = self.section(x)
+        past = np.maximum(x - self.spine_end_x_mm, 0.0) / (self.bone_tip_x_mm - self.spine_end_x_mm)
+        square = 1.0 - past**2 - (z / self.bone_width_mm) ** 2
+        bone_y = self.spine_y_mm - self.bone_height_mm * np.sqrt(np.maximum(square, 0.0))
+        through = -y * dorsal / np.where(volar > 0.0, volar, 1.0) - y
+        return np.where(square > 0.0, bone_y - y, through)
+
+    def skin_distance_mm(self, origins_mm: FloatArray, directions: FloatArray) -> FloatArray:
+        """Distance from points inside to the skin along unit directions: Newton's method in a bracket.
+
+        Parameters
+        ----------
+        origins_mm, directions : array (..., 3)
+            Rays; every origin lies inside the skin. [mm], [1]
+
+        Returns
+        -------
+        array (...)
+            Distance to the skin. [mm]
+
+        Raises
+        ------
+        InputError
+            If an origin lies outside.
+        """
+        if (self.level(origins_mm) >= 0.0).any():
+            raise InputError("Every origin of a ray must lie inside the skin: at least one does not.")
+        near = np.zeros(directions.shape[:-1])
+        far = np.full_like(near, 2.0 * self.length_mm)
+        distance = np.full_like(near, 0.25 * self.length_mm)
+        for _ in range(_MOST_RAY_STEPS):
+            level, gradient = self._level_and_gradient(origins_mm + distance[..., None] * directions)
+            near = np.where(level < 0.0, distance, near)
+            far = np.where(level < 0.0, far, distance)
+            slope = (gradient * directions).sum(axis=-1)
+            newton = distance - level / np.where(slope > 0.0, slope, 1.0)
+            safe = (slope > 0.0) & (newton >= near) & (newton <= far)
+            step = np.where(safe, newton, 0.5 * (near + far)) - distance
+            distance = distance + step
+            if np.abs(step).max(initial=0.0) < 1e-13 * self.length_mm:
+                break
+        return distance
+
+    def bone_distance_mm(self, origins_mm: FloatArray, directions: FloatArray) -> FloatArray:
+        """Distance from points of the bone's axis to its surface along unit directions, closed form.
+
+        Parameters
+        ----------
+        origins_mm, directions : array (..., 3)
+            Rays at right angles to the axis, or from its end in any distal direction. [mm], [1]
+
+        Returns
+        -------
+        array (...)
+            Distance to the surface of the bone. [mm]
+        """
+        cap_mm = self.bone_tip_x_mm - self.spine_end_x_mm
+        length = np.where(origins_mm[..., 0] < self.spine_end_x_mm, np.inf, cap_mm)
+        along, up, across = np.moveaxis(directions, -1, 0)
+        height, width = self.bone_height_mm, self.bone_width_mm
+        return 1.0 / np.sqrt((along / length) ** 2 + (up / height) ** 2 + (across / width) ** 2)
+
+    def is_under_nail(self, skin_points_mm: ArrayLike) -> np.ndarray:
+        """Whether points of the skin lie in the footprint of the nail, bool (...)."""
+        x, y, z = np.moveaxis(np.asarray(skin_points_mm, dtype=np.float64), -1, 0)
+        proximal, distal = self.nail_x_mm
+        return (y > 0.0) & (x >= proximal) & (x <= distal) & (np.abs(z) <= self.nail_half_width_mm)

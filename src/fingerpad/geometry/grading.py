@@ -1,0 +1,251 @@
+"""Where a finger's mesh is fine and where it may be coarse."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import brentq
+
+from fingerpad.core.checks import FloatArray, finite, one_of, positive, whole
+from fingerpad.core.errors import InputError
+
+RESOLUTIONS = ("quick", "standard", "paper")
+
+
+@dataclass(frozen=True)
+class Grading:
+    """Where the mesh of a finger is fine, and how fine.
+
+    Parameters
+    ----------
+    centre_mm : float
+        x of the middle of the fine zone on the volar midline. [mm]
+    half_length_mm, half_width_mm : float
+        Fine zone on the skin: to either side along the finger, and across from the midline. [mm]
+    size_x_mm, size_z_mm : float
+        Size of the elements in the fine zone along and across. [mm]
+    largest_mm : float
+        Largest size of an element on the skin away from the fine zone. [mm]
+    growth : float
+        Largest ratio of neighbouring sizes, above 1 and at most 1.3.
+    stratum_corneum, living_epidermis, dermis, subcutis : int
+        Number of elements through each layer.
+    full : bool
+        Both halves of the finger, or only z >= 0.
+    core_half_length_mm, core_size_mm : float
+        Part of the fine zone with elements that are smaller still along the finger, under a wire: extent to
+        either side of its middle, and their size. Both 0 for none. [mm]
+
+    Raises
+    ------
+    InputError
+        If a value is out of its range, or the core is not a part of the fine zone with smaller elements.
+    """
+
+    centre_mm: float
+    half_length_mm: float
+    half_width_mm: float
+    size_x_mm: float
+    size_z_mm: float
+    largest_mm: float = 3.0
+    growth: float = 1.3
+    stratum_corneum: int = 4
+    living_epidermis: int = 1
+    dermis: int = 4
+    subcutis: int = 4
+    full: bool = False
+    core_half_length_mm: float = 0.0
+    core_size_mm: float = 0.0
+
+    def __post_init__(self) -> None:
+        finite("centre_mm", self.centre_mm, "mm")
+        for name in ("half_length_mm", "half_width_mm", "size_x_mm", "size_z_mm", "largest_mm"):
+            positive(name, getattr(self, name), "mm")
+        if not 1.0 < finite("growth", self.growth) <= 1.3:
+            raise InputError(f"growth must be above 1 and at most 1.3: got {self.growth!r}.")
+        for name in ("stratum_corneum", "living_epidermis", "dermis", "subcutis"):
+            whole(name, getattr(self, name), 1)
+        core = self.core_half_length_mm, self.core_size_mm
+        if core != (0.0, 0.0) and not (
+            0.0 < core[0] < self.half_length_mm and 0.0 < core[1] < self.size_x_mm
+        ):
+            raise InputError(
+                f"core_half_length_mm and core_size_mm must both be 0, or lie between 0 and "
+                f"{self.half_length_mm:g} and {self.size_x_mm:g} mm: got {core[0]!r} and {core[1]!r}."
+            )
+
+    @property
+    def counts(self) -> tuple[int, int, int, int]:
+        """Number of elements through each of `LAYERS`."""
+        return self.stratum_corneum, self.living_epidermis, self.dermis, self.subcutis
+
+
+def resolution_grading(
+    resolution: str, centre_mm: float, half_length_mm: float = 5.0, half_width_mm: float = 1.0
+) -> Grading:
+    """Grading of a named resolution.
+
+    Parameters
+    ----------
+    resolution : {"quick", "standard", "paper"}
+        "quick" for a look, "standard" for results, "paper" for the published size: both halves, at least
+        232,000 nodes, edges of 0.1 mm (none above 0.106 mm) over an oval pad of 11 by 9 mm, at the skin and
+        at the epidermal-dermal border.
+    centre_mm, half_length_mm, half_width_mm : float
+        The fine zone, as in `Grading`; "paper" widens it to the whole pad. [mm]
+
+    Returns
+    -------
+    Grading
+
+    Examples
+    --------
+    >>> resolution_grading("quick", 17.37).size_x_mm
+    0.45
+    """
+    one_of("resolution", resolution, RESOLUTIONS)
+    zone = Grading(centre_mm, half_length_mm, half_width_mm, 0.25, 0.25)
+    if resolution == "quick":
+        return replace(zone, size_x_mm=0.45, size_z_mm=0.45, stratum_corneum=2, dermis=3, subcutis=3)
+    if resolution == "standard":
+        return zone
+    length, width = max(half_length_mm, 6.0), max(half_width_mm, 5.0)
+    pad = replace(zone, half_length_mm=length, half_width_mm=width)
+    return replace(pad, size_x_mm=0.1, size_z_mm=0.1, full=True)
+
+
+def covering(gradings: Sequence[Grading]) -> Grading:
+    """One grading that is as fine as each of several, wherever that one is fine.
+
+    What is told apart should be pressed into one mesh: the error of a mesh is then the same for all.
+
+    Parameters
+    ----------
+    gradings : sequence of Grading
+        At least one.
+
+    Returns
+    -------
+    Grading
+        Its fine zone reaches over all of theirs; of both halves if one of them is.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+
+    Examples
+    --------
+    >>> near, far = resolution_grading("quick", 16.0, 1.0), resolution_grading("standard", 18.0, 2.0)
+    >>> both = covering([near, far])
+    >>> both.centre_mm, both.half_length_mm, both.size_x_mm, both.dermis
+    (17.5, 2.5, 0.25, 4)
+    """
+    if not gradings:
+        raise InputError("covering needs at least one grading: got none.")
+    first = gradings[0].centre_mm
+    proximal = min(grading.centre_mm - grading.half_length_mm - first for grading in gradings)
+    distal = max(grading.centre_mm + grading.half_length_mm - first for grading in gradings)
+    same_centre = all(grading.centre_mm == first for grading in gradings)  # then nothing is rounded
+    centre = first if same_centre else first + 0.5 * (proximal + distal)
+
+    def reach(name: str, parts: Sequence[Grading]) -> float:
+        return max((abs(part.centre_mm - centre) + getattr(part, name) for part in parts), default=0.0)
+
+    cores = [grading for grading in gradings if grading.core_size_mm]
+    core_reach = reach("core_half_length_mm", cores)
+    core_size = min((grading.core_size_mm for grading in cores), default=0.0)
+    joint = Grading(
+        centre_mm=centre,
+        half_length_mm=reach("half_length_mm", gradings),
+        half_width_mm=max(grading.half_width_mm for grading in gradings),
+        size_x_mm=min(grading.size_x_mm for grading in gradings),
+        size_z_mm=min(grading.size_z_mm for grading in gradings),
+        largest_mm=min(grading.largest_mm for grading in gradings),
+        growth=min(grading.growth for grading in gradings),
+        stratum_corneum=max(grading.stratum_corneum for grading in gradings),
+        living_epidermis=max(grading.living_epidermis for grading in gradings),
+        dermis=max(grading.dermis for grading in gradings),
+        subcutis=max(grading.subcutis for grading in gradings),
+        full=any(grading.full for grading in gradings),
+    )
+    if not cores or joint.size_x_mm <= core_size:
+        return joint
+    if core_reach >= joint.half_length_mm:
+        return replace(joint, size_x_mm=core_size)
+    return replace(joint, core_half_length_mm=core_reach, core_size_mm=core_size)
+
+
+def lines_along(grading: Grading, length: float) -> FloatArray:
+    """Lines from the middle of the fine zone to one end of the finger.
+
+    Parameters
+    ----------
+    grading : Grading
+        Sizes and zones along the finger.
+    length : float
+        Where the last line lies. [mm]
+
+    Returns
+    -------
+    array (n_steps + 1,)
+        Lines, from 0, an even number of steps. [mm]
+
+    Examples
+    --------
+    >>> wire = Grading(17.0, 0.5, 1.0, 0.2, 0.2, 0.2, core_half_length_mm=0.1, core_size_mm=0.1)
+    >>> lines_along(wire, 1.3).round(3).tolist()
+    [0.0, 0.1, 0.215, 0.348, 0.5, 0.7, 0.9, 1.1, 1.3]
+    """
+    fine, size = grading.half_length_mm, grading.size_x_mm
+    growth, largest = grading.growth, grading.largest_mm
+    if not grading.core_size_mm:
+        return graded_lines(fine, size, length, growth, largest)
+    if length < fine + size:  # the finger ends with its fine zone, not with slivers beyond it
+        fine = length
+    core = graded_lines(grading.core_half_length_mm, grading.core_size_mm, fine, growth, size)
+    beyond = graded_lines(0.0, size, length - fine, growth, largest)
+    return np.concatenate([core, fine + beyond[1:]])
+
+
+def graded_lines(fine: float, size: float, length: float, growth: float, largest: float) -> FloatArray:
+    """Lines from 0 to `length`: equal steps over the fine zone, then growing ones, an even number in all.
+
+    Parameters
+    ----------
+    fine, size : float
+        Extent of the fine zone and the step in it. [mm]
+    length : float
+        Where the last line lies. [mm]
+    growth, largest : float
+        Largest ratio of neighbouring steps, and largest step [mm].
+
+    Returns
+    -------
+    array (n_steps + 1,)
+        Lines, from 0. [mm]
+
+    Examples
+    --------
+    >>> graded_lines(1.0, 0.5, 3.2, 1.3, 2.0).round(2).tolist()
+    [0.0, 0.5, 1.0, 1.52, 2.06, 2.62, 3.2]
+    """
+    n_fine = int(np.ceil(min(fine, length) / size - 1e-9))
+    rest = length - n_fine * size
+    if rest < size:
+        n_even = 2 * int(np.ceil(0.5 * length / size))
+        return np.linspace(0.0, length, n_even + 1)
+
+    def outer(ratio: float, count: int) -> FloatArray:
+        return np.minimum(size * ratio ** np.arange(1, count + 1), largest)
+
+    count = 1
+    while outer(growth, count).sum() < rest or (n_fine + count) % 2:
+        count += 1
+    ratio = brentq(lambda ratio: outer(ratio, count).sum() - rest, 1e-3, growth, xtol=1e-15)
+    steps = np.concatenate([np.full(n_fine, size), outer(ratio, count)])
+    lines = np.concatenate([[0.0], np.cumsum(steps)])
+    lines[-1] = length
+    return lines

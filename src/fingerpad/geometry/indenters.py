@@ -1,0 +1,372 @@
+"""Rigid indenters as signed gaps: how far a point of the skin is from the body, and which way it is pushed.
+
+Every indenter lives in its own frame: its face touches y = 0, y runs along the direction of pressing (into
+the skin), x along the finger and z across it, unless a touch turns it. The body fills y < 0 below its face.
+`gap` is positive outside the body and negative inside; the normal points out of the body, along which a
+frictionless contact pushes. Bodies whose edges are the question stand in
+`fingerpad.geometry.edged_indenters`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray, not_negative, positive
+from fingerpad.core.errors import InputError
+from fingerpad.core.units import radius_mm
+from fingerpad.data import protocol
+
+BESIDE_EDGE_MM = 0.4
+"""How far beside the wall of an edge skin bends sharply about it. [mm]"""
+
+
+class Indenter(ABC):
+    """A rigid body with a signed gap; derive from it to press a body of your own."""
+
+    @abstractmethod
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward unit normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+
+    @abstractmethod
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """Y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+
+    @property
+    @abstractmethod
+    def half_width_mm(self) -> float:
+        """Half of the body's extent along x where it can touch. [mm]"""
+
+    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
+        """Which of the undeformed points (n, 3) can come into contact at all; bool (n,)."""
+        return np.ones(len(undeformed_mm), dtype=bool)
+
+    @property
+    def grips(self) -> bool:
+        """Whether the skin that may touch cannot slide along the finger; most bodies are frictionless."""
+        return False
+
+    def mirrors(self, spin_deg: float) -> bool:
+        """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0.
+
+        Half a finger can be solved only then. A body of your own is taken to be one as it stands.
+        """
+        return spin_deg % 180.0 == 0.0
+
+    @property
+    def edge_reach_mm(self) -> float:
+        """How far to either side of x = 0 the mesh is finer, for the edges there; 0 if it is not. [mm]"""
+        return 0.0
+
+    @property
+    def narrowest_mm(self) -> float:
+        """Width of the narrowest groove or ridge, which a mesh must resolve; no limit without. [mm]"""
+        return np.inf
+
+
+def _norm_and_direction(offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Length and unit direction of each row; a zero row points along y, the direction of pressing."""
+    length = np.linalg.norm(offsets, axis=1)
+    unit = offsets / np.where(length, length, 1.0)[:, None]
+    return length, np.where(length[:, None] > 0.0, unit, [0.0, 1.0, 0.0])
+
+
+def round_front(beside: FloatArray, radius: float) -> FloatArray:
+    """Height y of a rounded edge or ball beside its centre line: 0 on it, -inf beyond `radius`."""
+    height = np.sqrt(np.maximum(radius**2 - np.maximum(beside, 0.0) ** 2, 0.0)) - radius
+    return np.where(beside <= radius, height, -np.inf)
+
+
+def _ball(centred: FloatArray, lateral: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
+    """Gap and normal of a ball or cylinder from offsets (n, 3) to its centre or axis.
+
+    A thin body moves past a node within one step. A node behind the widest section is therefore measured
+    along the direction of pressing, so that it is pushed out in front and not out at the back.
+    """
+    distance, normal = _norm_and_direction(centred)
+    passed = (centred[:, 1] < 0.0) & (lateral < radius)
+    forward = np.sqrt(np.maximum(radius**2 - lateral**2, 0.0)) / radius
+    front_normal = centred / radius
+    front_normal[:, 1] = forward
+    gap = np.where(passed, (centred[:, 1] - radius * forward) * forward, distance - radius)
+    return gap, np.where(passed[:, None], front_normal, normal)
+
+
+def rounded(
+    inside: FloatArray, depth: FloatArray, outward: FloatArray, fillet: float
+) -> tuple[FloatArray, FloatArray]:
+    """Gap of a body with a flat top and rounded edges, from coordinates relative to its un-rounded core.
+
+    The body is all points within `fillet` of the core {inside <= 0, depth <= 0}: `inside` runs outwards
+    along the unit vector `outward` (n, 3), `depth` along y.
+    """
+    up = np.array([0.0, 1.0, 0.0])
+    beyond_side, beyond_top = np.maximum(inside, 0.0), np.maximum(depth, 0.0)
+    distance, direction = _norm_and_direction(beyond_side[:, None] * outward + beyond_top[:, None] * up)
+    within = (inside <= 0.0) & (depth <= 0.0)
+    nearest_face_is_top = depth >= inside
+    gap = np.where(within, np.maximum(inside, depth), distance) - fillet
+    normal = np.where(
+        within[:, None], np.where(nearest_face_is_top[:, None], up[None, :], outward), direction
+    )
+    return gap, normal
+
+
+@dataclass(frozen=True)
+class Cylinder(Indenter):
+    """Cylinder that lies across the finger, its axis along z.
+
+    Parameters
+    ----------
+    diameter_mm : float
+        Diameter; the paper's is 3.17 mm. [mm]
+
+    Examples
+    --------
+    >>> gap, normal = Cylinder(diameter_mm=2.0).gap(np.array([[0.0, 0.5, 7.0]]))
+    >>> gap.tolist(), normal.tolist()
+    ([0.5], [[0.0, 1.0, 0.0]])
+    """
+
+    diameter_mm: float = protocol.CYLINDER_DIAMETER.value
+
+    def __post_init__(self) -> None:
+        positive("diameter_mm", self.diameter_mm, "mm")
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the body's extent along x. [mm]"""
+        return self.diameter_mm / 2
+
+    def mirrors(self, spin_deg: float) -> bool:
+        """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0."""
+        return spin_deg % 90.0 == 0.0
+
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
+        return round_front(np.abs(points_mm[:, 0]), self.diameter_mm / 2)
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        radius = self.diameter_mm / 2
+        centred = (points_mm + np.array([0.0, radius, 0.0])) * [1.0, 1.0, 0.0]
+        return _ball(centred, np.abs(centred[:, 0]), radius)
+
+
+@dataclass(frozen=True)
+class Line(Indenter):
+    """Line load across the finger: a wire thinner than the elements of the skin, taken as a blade.
+
+    Nodes cannot resolve the roundness of a body as thin as their spacing: one node would balance on its top
+    and slide off. The strip of skin that lies under the undeformed wire is therefore pushed along the
+    direction of pressing and does not slide along the finger (docs/decisions/line-load.md).
+
+    Parameters
+    ----------
+    diameter_mm : float
+        Diameter of the wire; the paper's is 50 µm. [mm]
+
+    Examples
+    --------
+    >>> Line().may_touch(np.array([[0.0, 0.3, 1.0], [0.05, 0.0, 1.0]])).tolist()
+    [True, False]
+    """
+
+    diameter_mm: float = protocol.LINE_DIAMETER.value
+
+    def __post_init__(self) -> None:
+        positive("diameter_mm", self.diameter_mm, "mm")
+
+    @property
+    def grips(self) -> bool:
+        """The skin under the wire does not slide along the finger."""
+        return True
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the body's extent along x. [mm]"""
+        return self.diameter_mm / 2
+
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """Height y of the blade's edge above the x and z of points (n, 3), -inf beside it. [mm]"""
+        return np.where(np.abs(points_mm[:, 0]) <= self.diameter_mm / 2, 0.0, -np.inf)
+
+    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
+        """Only the points below the undeformed wire; bool (n,)."""
+        return np.abs(undeformed_mm[:, 0]) <= self.diameter_mm / 2 * (1 + 1e-6)
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Gap along y (n,) and that direction (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        return Plate().gap(points_mm)
+
+
+@dataclass(frozen=True)
+class Sphere(Indenter):
+    """Sphere given by its curvature, as in the psychophysics literature.
+
+    Parameters
+    ----------
+    curvature_per_m : float
+        1/radius; the paper writes "RC ... 1/m" and means this. [1/m]
+
+    Examples
+    --------
+    >>> round(Sphere(curvature_per_m=287).radius_mm, 3)
+    3.484
+    """
+
+    curvature_per_m: float = protocol.STANDARD_CURVATURE.value
+
+    def __post_init__(self) -> None:
+        positive("curvature_per_m", self.curvature_per_m, "1/m")
+
+    @property
+    def radius_mm(self) -> float:
+        """Radius. [mm]"""
+        return radius_mm(self.curvature_per_m)
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the body's extent along x. [mm]"""
+        return self.radius_mm
+
+    def mirrors(self, spin_deg: float) -> bool:
+        """Whether the body, turned about y, is its own mirror image across z = 0: however it is turned."""
+        return True
+
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
+        return round_front(np.hypot(points_mm[:, 0], points_mm[:, 2]), self.radius_mm)
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        centred = points_mm + np.array([0.0, self.radius_mm, 0.0])
+        return _ball(centred, np.hypot(centred[:, 0], centred[:, 2]), self.radius_mm)
+
+
+@dataclass(frozen=True)
+class Bar(Indenter):
+    """Flat bar across the finger, long in z, its two edges rounded.
+
+    Parameters
+    ----------
+    width_mm : float
+        Full width along x, fillets included. [mm]
+    fillet_mm : float
+        Radius of the two edges. [mm]
+
+    Examples
+    --------
+    >>> gap, _ = Bar(width_mm=3.0, fillet_mm=0.3).gap(np.array([[0.0, -0.1, 0.0], [1.5, -0.3, 2.0]]))
+    >>> gap.round(3).tolist()
+    [-0.1, 0.0]
+    """
+
+    width_mm: float = protocol.BAR_WIDTH.value
+    fillet_mm: float = protocol.BAR_FILLET.value
+
+    def __post_init__(self) -> None:
+        positive("width_mm", self.width_mm, "mm")
+        fillet_within(self.fillet_mm, self.width_mm, "width_mm")
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the width. [mm]"""
+        return self.width_mm / 2
+
+    def mirrors(self, spin_deg: float) -> bool:
+        """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0."""
+        return spin_deg % 90.0 == 0.0
+
+    @property
+    def edge_reach_mm(self) -> float:
+        """How far to either side of x = 0 skin bends about the edges. [mm]"""
+        return self.width_mm / 2 + BESIDE_EDGE_MM
+
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
+        return round_front(np.abs(points_mm[:, 0]) - self.width_mm / 2 + self.fillet_mm, self.fillet_mm)
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        x, y = points_mm[:, 0], points_mm[:, 1]
+        outward = np.zeros_like(points_mm)
+        outward[:, 0] = np.where(x < 0.0, -1.0, 1.0)
+        inside = np.abs(x) - (self.width_mm / 2 - self.fillet_mm)
+        return rounded(inside, y + self.fillet_mm, outward, self.fillet_mm)
+
+
+@dataclass(frozen=True)
+class FlatPunch(Indenter):
+    """Flat-ended round probe with a rounded rim.
+
+    Parameters
+    ----------
+    diameter_mm : float
+        Full diameter, rim included. [mm]
+    fillet_mm : float
+        Radius of the rim. [mm]
+    """
+
+    diameter_mm: float = protocol.PUNCH_DIAMETER.value
+    fillet_mm: float = protocol.BAR_FILLET.value
+
+    def __post_init__(self) -> None:
+        positive("diameter_mm", self.diameter_mm, "mm")
+        fillet_within(self.fillet_mm, self.diameter_mm, "diameter_mm")
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the diameter. [mm]"""
+        return self.diameter_mm / 2
+
+    def mirrors(self, spin_deg: float) -> bool:
+        """Whether the body, turned about y, is its own mirror image across z = 0: however it is turned."""
+        return True
+
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
+        return round_front(
+            np.hypot(points_mm[:, 0], points_mm[:, 2]) - self.diameter_mm / 2 + self.fillet_mm, self.fillet_mm
+        )
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        radial, outward = _norm_and_direction(points_mm * [1.0, 0.0, 1.0])
+        # On the axis any radial direction serves; x is taken, since y would not be radial.
+        outward = np.where(radial[:, None] > 0.0, outward, [1.0, 0.0, 0.0])
+        inside = radial - (self.diameter_mm / 2 - self.fillet_mm)
+        return rounded(inside, points_mm[:, 1] + self.fillet_mm, outward, self.fillet_mm)
+
+
+@dataclass(frozen=True)
+class Plate(Indenter):
+    """Flat plate without edges, larger than the finger."""
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the extent along x: no limit."""
+        return np.inf
+
+    def mirrors(self, spin_deg: float) -> bool:
+        """Whether the body, turned about y, is its own mirror image across z = 0: however it is turned."""
+        return True
+
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
+        return np.zeros(len(points_mm))
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        return points_mm[:, 1].copy(), np.broadcast_to([0.0, 1.0, 0.0], points_mm.shape).copy()
+
+
+def fillet_within(fillet_mm: float, width_mm: float, width_name: str) -> None:
+    """Refuse a fillet that is negative or takes more than half of a width. [mm]"""
+    not_negative("fillet_mm", fillet_mm, "mm")
+    if fillet_mm > width_mm / 2:
+        raise InputError(
+            f"fillet_mm must not exceed half of {width_name}, {width_mm / 2:g} mm: got {fillet_mm:g} mm."
+        )

@@ -1,0 +1,220 @@
+"""What a mesh must fulfil before anything is solved on it, each failing in a sentence that names the place.
+
+A mesh from `block_mesh` or `finger_mesh` fulfils all of it; this is for meshes made or changed by hand.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.mesh import CORNERS, LAYERS, IntArray, Mesh
+from fingerpad.geometry.mesh_quality import element_place, jacobian_at_gauss, rigid_motions
+
+PLANE_TOLERANCE = 1e-6
+"""How far a node of the plane of symmetry may lie from z = 0, over the size of the mesh."""
+
+JOINING_NODES = 3
+"""Nodes that two elements must share to hold each other: a face of a brick or a wedge, not an edge."""
+
+_RIGID_MOTIONS = 6
+
+
+def check_mesh(mesh: Mesh, n_materials: int = len(LAYERS)) -> None:
+    """Raise an error that names what is wrong with a mesh, if anything is.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The undeformed body.
+    n_materials : int
+        How many materials its layers may refer to.
+
+    Raises
+    ------
+    InputError
+        If nodes are not finite or belong to no element; an element refers to nodes that do not exist, repeats
+        a node other than as a wedge, is turned inside out or has no material; a set of nodes is missing or
+        out of range; nodes of the plane of symmetry are not those at z = 0; or a part of the body is free to
+        move as a whole.
+
+    Examples
+    --------
+    >>> from fingerpad.geometry.mesh import block_mesh
+    >>> check_mesh(block_mesh([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], layers=[0]))
+    """
+    _check_arrays(mesh)
+    _check_elements(mesh, n_materials)
+    _check_sets(mesh)
+    _check_jacobians(mesh)
+    _check_held(mesh)
+
+
+def _node_place(mesh: Mesh, node: int) -> str:
+    x, y, z = mesh.nodes_mm[node]
+    return f"node {node} (x = {x:.3g}, y = {y:.3g}, z = {z:.3g} mm)"
+
+
+def _check_arrays(mesh: Mesh) -> None:
+    """Shapes, and numbers that can be used to look anything up."""
+    nodes, elements = mesh.nodes_mm, mesh.elements
+    if nodes.ndim != 2 or nodes.shape[1] != 3 or not len(nodes):
+        raise InputError(f"nodes_mm needs one row of x, y and z per node: got shape {nodes.shape}.")
+    astray = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
+    if astray.size:
+        raise InputError(
+            f"nodes_mm must hold finite numbers: node {astray[0]} is at {nodes[astray[0]].tolist()}, "
+            f"one of {astray.size} such nodes."
+        )
+    if elements.ndim != 2 or elements.shape[1] != len(CORNERS) or not len(elements):
+        raise InputError(f"elements needs one row of 8 nodes per element: got shape {elements.shape}.")
+    if mesh.layer.shape != (len(elements),):
+        raise InputError(
+            f"layer needs one entry per element: got {mesh.layer.size} for {len(elements)} elements."
+        )
+
+
+def _check_elements(mesh: Mesh, n_materials: int) -> None:
+    """Nodes that exist, wedges that are wedges, layers that have a material, and no node left over."""
+    n_nodes = len(mesh.nodes_mm)
+    outside = np.flatnonzero(((mesh.elements < 0) | (mesh.elements >= n_nodes)).any(axis=1))
+    if outside.size:
+        raise InputError(
+            f"elements must refer to nodes 0 to {n_nodes - 1}: "
+            f"element {outside[0]} has {mesh.elements[outside[0]].tolist()}."
+        )
+    without = np.flatnonzero((mesh.layer < 0) | (mesh.layer >= n_materials))
+    if without.size:
+        raise InputError(
+            f"layer must be an index below {n_materials}, the number of materials: "
+            f"{element_place(mesh, without[0])} has {mesh.layer[without[0]]}."
+        )
+    repeated = np.flatnonzero((np.diff(np.sort(mesh.elements, axis=1), axis=1) == 0).any(axis=1))
+    wrong = repeated[~_is_wedge(mesh.elements[repeated])]
+    if wrong.size:
+        raise InputError(
+            "An element may repeat nodes only as a wedge, a brick with one side collapsed to an edge: "
+            f"{element_place(mesh, wrong[0])} has nodes {mesh.elements[wrong[0]].tolist()}."
+        )
+    used = np.zeros(n_nodes, dtype=bool)
+    used[mesh.elements] = True
+    if not used.all():
+        raise InputError(
+            f"Every node must belong to an element: {_node_place(mesh, int(np.argmin(used)))} does not, "
+            f"one of {np.count_nonzero(~used)} such nodes; leave them out."
+        )
+
+
+def _is_wedge(elements: IntArray) -> np.ndarray:
+    """Whether each element (n, 8) has six nodes, two parallel edges of one side being collapsed."""
+    edges = [(a, b) for a, b in combinations(range(8), 2) if np.abs(CORNERS[a] - CORNERS[b]).sum() == 2]
+    wedge = np.zeros(len(elements), dtype=bool)
+    for (a, b), (c, d) in combinations(edges, 2):
+        parallel = np.abs(np.cross(CORNERS[b] - CORNERS[a], CORNERS[d] - CORNERS[c])).sum() == 0
+        if parallel and min(np.abs(CORNERS[a] - CORNERS[other]).sum() for other in (c, d)) == 2:
+            wedge |= (elements[:, a] == elements[:, b]) & (elements[:, c] == elements[:, d])
+    n_different = 1 + (np.diff(np.sort(elements, axis=1), axis=1) != 0).sum(axis=1)
+    return wedge & (n_different == 6)
+
+
+def _check_sets(mesh: Mesh) -> None:
+    """Find every set of nodes and elements in range, and a skin, a support and a plane of symmetry."""
+    n_nodes, n_elements = len(mesh.nodes_mm), len(mesh.elements)
+    for name, last in (
+        ("skin_grid", n_nodes),
+        ("bone_nodes", n_nodes),
+        ("nail_nodes", n_nodes),
+        ("symmetry_nodes", n_nodes),
+        ("midline_nodes", n_nodes),
+        ("living_epidermis", n_elements),
+    ):
+        numbers = getattr(mesh, name).ravel()
+        wrong = numbers[(numbers < 0) | (numbers >= last)]
+        if wrong.size:
+            raise InputError(f"{name} must hold numbers from 0 to {last - 1}: got {wrong[0]}.")
+    if not mesh.skin_grid.size:
+        raise InputError(
+            "skin_grid must name the nodes of the skin, where the indenter touches: it is empty."
+        )
+    if not mesh.fixed_nodes.size:
+        raise InputError("bone_nodes and nail_nodes are empty: nothing holds the body; name nodes that do.")
+    if mesh.full != (not mesh.symmetry_nodes.size):
+        raise InputError(
+            f"symmetry_nodes must be given for half a body and only then: got full={mesh.full} "
+            f"with {mesh.symmetry_nodes.size} of them."
+        )
+    if not mesh.full:
+        _check_plane(mesh)
+
+
+def _check_plane(mesh: Mesh) -> None:
+    """Half a body lies at z >= 0, and its nodes at z = 0 are those of the plane of symmetry."""
+    tolerance_mm = PLANE_TOLERANCE * float(np.ptp(mesh.nodes_mm, axis=0).max())
+    z = mesh.nodes_mm[:, 2]
+    said = np.zeros(len(z), dtype=bool)
+    said[mesh.symmetry_nodes] = True
+    off = np.flatnonzero(said & (np.abs(z) > tolerance_mm))
+    if off.size:
+        raise InputError(f"symmetry_nodes must lie at z = 0: {_node_place(mesh, off[0])} does not.")
+    beyond = np.flatnonzero(z < -tolerance_mm)
+    if beyond.size:
+        raise InputError(f"Half a body must lie at z >= 0: {_node_place(mesh, beyond[0])} does not.")
+    missing = np.flatnonzero(~said & (np.abs(z) <= tolerance_mm))
+    if missing.size:
+        raise InputError(
+            f"symmetry_nodes must hold every node at z = 0: {_node_place(mesh, missing[0])} is missing."
+        )
+
+
+def _check_jacobians(mesh: Mesh) -> None:
+    """No element is turned inside out where the kernels evaluate it."""
+    smallest = jacobian_at_gauss(mesh).min(axis=1)
+    inverted = np.flatnonzero(~(smallest > 0.0))
+    if inverted.size:
+        worst = int(inverted[smallest[inverted].argmin()])
+        raise InputError(
+            "The Jacobian of an element must be above 0 at its Gauss points: that of "
+            f"{element_place(mesh, worst)} is {smallest[worst]:.3g} mm³, one of {inverted.size} such "
+            "elements; move its nodes or turn their order."
+        )
+
+
+def _check_held(mesh: Mesh) -> None:
+    """No part of the body floats: fixed nodes and the plane of symmetry rule out every rigid motion of it."""
+    n_elements, n_nodes = len(mesh.elements), len(mesh.nodes_mm)
+    rows = np.repeat(np.arange(n_elements), len(CORNERS))
+    incidence = coo_array(
+        (np.ones(rows.size, dtype=np.int32), (rows, mesh.elements.ravel())), shape=(n_elements, n_nodes)
+    ).tocsr()
+    incidence.sum_duplicates()
+    incidence.data[:] = 1
+    shared = (incidence @ incidence.T).tocoo()
+    joined = shared.data >= JOINING_NODES
+    neighbours = coo_array(
+        (np.ones(np.count_nonzero(joined), dtype=np.int8), (shared.row[joined], shared.col[joined])),
+        shape=(n_elements, n_elements),
+    )
+    n_parts, part_of = connected_components(neighbours, directed=False)
+    motions = rigid_motions(mesh.nodes_mm)
+    held = np.zeros((n_nodes, 3), dtype=bool)
+    held[mesh.symmetry_nodes, 2] = True
+    held[mesh.fixed_nodes] = True
+    for part in range(n_parts):
+        members = np.flatnonzero(part_of == part)
+        nodes = np.unique(mesh.elements[members])
+        rows_held = motions[nodes][held[nodes]]
+        if np.linalg.matrix_rank(rows_held.T @ rows_held) == _RIGID_MOTIONS:
+            continue
+        who = f"{members.size} element(s) with {element_place(mesh, int(members[0]))}"
+        if np.isin(nodes, mesh.fixed_nodes).any():
+            raise InputError(
+                f"A part of the body must be held in all directions: {who} can still move as a whole; "
+                "fix three or more nodes that do not lie on one line."
+            )
+        raise InputError(
+            f"Every part of the body must be joined face to face to bone or nail: {who} floats free."
+        )

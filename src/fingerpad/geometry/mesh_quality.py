@@ -1,0 +1,114 @@
+"""How good the bricks of a mesh are: Jacobians, volumes and shape; and how they move as a whole."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.geometry.mesh import CORNERS, LAYERS, IntArray, Mesh
+
+
+def _jacobians(mesh: Mesh, elements: IntArray, points: FloatArray) -> FloatArray:
+    """Jacobian matrices (n_elements, n_points, 3, 3), columns along the local axes, at local `points`."""
+    factors = 1.0 + points[:, None, :] * CORNERS
+    gradients = np.stack(
+        [CORNERS[:, axis] * np.delete(factors, axis, axis=2).prod(axis=2) / 8.0 for axis in range(3)],
+        axis=-1,
+    )
+    return np.einsum("mad,qac->mqdc", mesh.nodes_mm[elements], gradients, optimize=True)
+
+
+def jacobian_at_gauss(mesh: Mesh) -> FloatArray:
+    """Compute the Jacobian determinant at the 2 x 2 x 2 Gauss points, (n_elements, 8) [mm³].
+
+    An element's volume is the sum of its row.
+    """
+    return np.linalg.det(_jacobians(mesh, mesh.elements, CORNERS / np.sqrt(3.0)))
+
+
+def scaled_jacobian(mesh: Mesh) -> FloatArray:
+    """Smallest Jacobian of each element over the product of its edges' lengths, (n_elements,); 1 is a box.
+
+    Bricks are judged at their corners; wedges, whose collapsed side has none, at the Gauss points.
+    """
+    wedge = (np.diff(np.sort(mesh.elements, axis=1), axis=1) == 0).any(axis=1)
+    quality = np.empty(len(mesh.elements))
+    for chosen, points in ((~wedge, CORNERS), (wedge, CORNERS / np.sqrt(3.0))):
+        jacobian = _jacobians(mesh, mesh.elements[chosen], points)
+        scaled = np.linalg.det(jacobian) / np.linalg.norm(jacobian, axis=2).prod(axis=2)
+        quality[chosen] = scaled.min(axis=1, initial=1.0)
+    return quality
+
+
+def element_place(mesh: Mesh, element: int) -> str:
+    """Name an element with its layer and its middle.
+
+    Examples
+    --------
+    >>> from fingerpad.geometry.mesh import block_mesh
+    >>> element_place(block_mesh([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], layers=[2]), 0)
+    'element 0 (dermis, about x = 0.5, y = 0.5, z = 0.5 mm)'
+    """
+    layer = int(mesh.layer[element])
+    name = LAYERS[layer] if 0 <= layer < len(LAYERS) else f"layer {layer}"
+    x, y, z = mesh.nodes_mm[mesh.elements[element]].mean(axis=0)
+    return f"element {element} ({name}, about x = {x:.3g}, y = {y:.3g}, z = {z:.3g} mm)"
+
+
+def squeezed_most(mesh: Mesh, displacement_mm: FloatArray) -> tuple[int, float]:
+    """Find the element that is nearest to being turned inside out.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The undeformed body.
+    displacement_mm : array (n_nodes, 3)
+        Displacements. [mm]
+
+    Returns
+    -------
+    (int, float)
+        The element, and its smallest ratio of present to undeformed volume at a Gauss point; not above 0 if
+        it is inside out.
+
+    Examples
+    --------
+    >>> from fingerpad.geometry.mesh import block_mesh
+    >>> block = block_mesh([0.0, 1.0], [0.0, 1.0, 2.0], [0.0, 1.0], layers=[2, 3])
+    >>> element, ratio = squeezed_most(block, -0.1 * block.nodes_mm**2 * [0.0, 1.0, 0.0])
+    >>> element, round(ratio, 9)
+    (1, 0.7)
+    """
+    deformed = replace(mesh, nodes_mm=mesh.nodes_mm + displacement_mm)
+    ratio = (jacobian_at_gauss(deformed) / jacobian_at_gauss(mesh)).min(axis=1)
+    element = int(ratio.argmin())
+    return element, float(ratio[element])
+
+
+def rigid_motions(nodes_mm: FloatArray) -> FloatArray:
+    """Three translations and three rotations of the nodes about their middle.
+
+    Parameters
+    ----------
+    nodes_mm : array (n_nodes, 3)
+        Positions. [mm]
+
+    Returns
+    -------
+    array (n_nodes, 3, 6)
+        Displacement of every node in each motion; rotations turn by 1 over the size of the body, so that all
+        columns are of one size.
+
+    Examples
+    --------
+    >>> rigid_motions(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]))[:, 1, 3].tolist()  # along y, about z
+    [-0.5, 0.5]
+    """
+    centred = nodes_mm - nodes_mm.mean(axis=0)
+    x, y, z = (centred / (np.ptp(nodes_mm, axis=0).max() or 1.0)).T
+    zero, one = np.zeros_like(x), np.ones_like(x)
+    translations = [(one, zero, zero), (zero, one, zero), (zero, zero, one)]
+    rotations = [(-y, x, zero), (zero, -z, y), (z, zero, -x)]
+    return np.stack([np.stack(motion, axis=1) for motion in translations + rotations], axis=2)

@@ -1,0 +1,273 @@
+"""What recorded rates leave uncertain of an afferent's four identifiable numbers.
+
+Draws are told in coordinates in which the numbers depend least on each other: the potential at rest over the
+threshold, beta tau/(C v), and the logarithms of both gains and of tau. Walkers see the logarithm of what the
+potential at rest lacks instead, where it must lack something: then no coordinate has a border, and recordings
+leave straight ridges. An afferent that fires from an energy density U on fixes k_s tau U/(C v) to what lacks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import FloatArray, finite, positive
+from fingerpad.core.errors import InputError
+from fingerpad.data import neuron
+from fingerpad.inference.fitting.posterior import Chains, LogDensity, sample
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
+from fingerpad.inference.rate_likelihood import RateLikelihood, ResidualDraws
+from fingerpad.inference.rate_problem import RateModel, Reparametrised
+
+COORDINATE_NAMES = ("resting_share", "log_dynamic_gain", "log_static_gain", "log_time_constant")
+"""beta tau/(C v) [1], and the logarithms of k_d/(C v), k_s/(C v) and tau in the units of the four numbers."""
+
+START_SPREAD = (0.8, 0.8, 0.4, 0.8)
+"""How far the walkers start from the fit, in their coordinates: no less than the width of posteriors seen, so
+that ensembles which have not forgotten their start disagree."""
+
+SMALLEST_LACK = 0.01
+"""A fit at rest nearer to the threshold than this share of it, or beyond, is no start; walkers start here."""
+
+N_PREDICTED = 1000
+"""Draws that bands are made of."""
+
+_START = identifiable(
+    [
+        neuron.INTERCEPT_START.value,
+        neuron.DYNAMIC_GAIN_SCALE.value * neuron.DYNAMIC_GAIN_START_1.value,
+        neuron.STATIC_GAIN_SCALE.value * neuron.STATIC_GAIN_START_1.value,
+        neuron.TIME_CONSTANT.value,
+        neuron.CAPACITANCE.value,
+        neuron.THRESHOLD.value,
+    ]
+)
+
+
+def to_coordinates(four: ArrayLike) -> FloatArray:
+    """Turn the four identifiable numbers (..., 4) into the coordinates (..., 4).
+
+    Examples
+    --------
+    >>> to_coordinates([0.01, 4.0, 0.014, 68.0]).round(2).tolist()
+    [0.68, 1.39, -4.27, 4.22]
+    """
+    numbers = np.asarray(four, dtype=np.float64)
+    if numbers.shape[-1:] != (4,) or not (numbers[..., 1:] > 0.0).all():
+        raise InputError(
+            f"four must hold {', '.join(IDENTIFIABLE_NAMES)}, all but the first greater than 0: "
+            f"got {numbers.tolist()}."
+        )
+    tau = numbers[..., 3:]
+    return np.concatenate([numbers[..., :1] * tau, np.log(numbers[..., 1:])], axis=-1)
+
+
+def from_coordinates(points: ArrayLike) -> FloatArray:
+    """Turn the coordinates (..., 4) into the four identifiable numbers (..., 4).
+
+    Examples
+    --------
+    >>> from_coordinates(to_coordinates([0.01, 4.0, 0.014, 68.0])).round(6).tolist()
+    [0.01, 4.0, 0.014, 68.0]
+    """
+    coordinates = np.asarray(points, dtype=np.float64)
+    positive_three = np.exp(coordinates[..., 1:])
+    return np.concatenate([coordinates[..., :1] / positive_three[..., 2:], positive_three], axis=-1)
+
+
+def four_number_model(model: RateModel) -> Reparametrised:
+    """Let the four identifiable numbers drive a model of six parameters.
+
+    Parameters
+    ----------
+    model : RateModel
+        With the paper's six parameters, such as `fingerpad.inference.rate_problem.AfferentModel`.
+
+    Returns
+    -------
+    Reparametrised
+        The same model; C and v are the paper's, which changes no spike.
+    """
+    return Reparametrised(model, IDENTIFIABLE_NAMES, six_parameters)
+
+
+@dataclass(frozen=True)
+class AfferentPrior:
+    """What is believed of an afferent before it is recorded, weak enough for the recordings to decide.
+
+    The potential at rest is normal about 0; gains and time constant are log-normal about the start point of
+    fits, the paper's first one with its gains rescaled. See docs/decisions/priors.md.
+
+    Parameters
+    ----------
+    resting_share_sd : float
+        Standard deviation of the potential at rest over the threshold. [1]
+    dynamic_gain_per_kpa, static_gain_per_kpa_ms, time_constant_ms : float
+        Medians of k_d/(C v), k_s/(C v) and tau. [1/kPa, 1/(kPa ms), ms]
+    gain_factor, time_constant_factor : float
+        Two thirds of the prior lie within the median divided and multiplied by this factor. [1]
+    silent_at_rest : bool
+        Whether the potential at rest stays below the threshold, so that untouched skin elicits no spike.
+    """
+
+    resting_share_sd: float = 1.0
+    dynamic_gain_per_kpa: float = float(_START[1])
+    static_gain_per_kpa_ms: float = float(_START[2])
+    time_constant_ms: float = float(_START[3])
+    gain_factor: float = 10.0
+    time_constant_factor: float = 2.0
+    silent_at_rest: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("resting_share_sd", *IDENTIFIABLE_NAMES[1:]):
+            positive(name, getattr(self, name))
+        for name in ("gain_factor", "time_constant_factor"):
+            if finite(name, getattr(self, name)) <= 1.0:
+                raise InputError(f"{name} must be greater than 1: got {getattr(self, name)!r}.")
+
+    @property
+    def centre(self) -> FloatArray:
+        """Means in the coordinates (4,)."""
+        medians = (self.dynamic_gain_per_kpa, self.static_gain_per_kpa_ms, self.time_constant_ms)
+        return np.array([0.0, *np.log(medians)])
+
+    @property
+    def spread(self) -> FloatArray:
+        """Standard deviations in the coordinates (4,)."""
+        gain, time_constant = np.log(self.gain_factor), np.log(self.time_constant_factor)
+        return np.array([self.resting_share_sd, gain, gain, time_constant])
+
+    def log_density(self, coordinates: FloatArray) -> FloatArray:
+        """Log density of rows of coordinates, up to a constant; -inf where it is impossible."""
+        logarithm = -0.5 * (((coordinates - self.centre) / self.spread) ** 2).sum(axis=-1)
+        return np.where(self.silent_at_rest & (coordinates[..., 0] >= 1.0), -np.inf, logarithm)
+
+
+@dataclass(frozen=True)
+class AfferentPosterior:
+    """Draws of the four identifiable numbers, and what they predict.
+
+    Parameters
+    ----------
+    chains : Chains
+        Draws in the coordinates, with their convergence.
+    four : array (n_draws, 4)
+        The same draws as the four identifiable numbers.
+    rates : dict of str to ResidualDraws
+        By phase: predicted rates of some of the draws, new recordings, sigma and length.
+    """
+
+    chains: Chains
+    four: FloatArray
+    rates: dict[str, ResidualDraws]
+
+    def six(self, capacitance_mf: float, threshold_mv: float) -> FloatArray:
+        """Return the draws as six parameters (n_draws, 6) with this C [mF] and this v [mV]."""
+        return six_parameters(self.four, capacitance_mf, threshold_mv)
+
+
+def log_posterior(likelihood: RateLikelihood, prior: AfferentPrior) -> LogDensity:
+    """Log posterior density of rows of coordinates, up to a constant.
+
+    Parameters
+    ----------
+    likelihood : RateLikelihood
+        Of a model of the four numbers, from `four_number_model`.
+    prior : AfferentPrior
+        Weak beliefs.
+
+    Returns
+    -------
+    callable
+        From points (n_points, 4) to log densities (n_points,).
+    """
+    if likelihood.model.names != IDENTIFIABLE_NAMES:
+        raise InputError(
+            f"likelihood needs a model of {', '.join(IDENTIFIABLE_NAMES)}, as four_number_model makes it: "
+            f"got one of {', '.join(likelihood.model.names)}."
+        )
+
+    def log_density(points: FloatArray) -> FloatArray:
+        heights = prior.log_density(points)
+        possible = np.isfinite(heights)
+        heights[possible] += likelihood.log_likelihood(from_coordinates(points[possible]))
+        return heights
+
+    return log_density
+
+
+def afferent_posterior(
+    likelihood: RateLikelihood,
+    start: ArrayLike,
+    *,
+    seed: int,
+    prior: AfferentPrior | None = None,
+    **settings: Any,
+) -> AfferentPosterior:
+    """Draw the four identifiable numbers from their posterior.
+
+    Parameters
+    ----------
+    likelihood : RateLikelihood
+        Of a model of the four numbers, from `four_number_model`.
+    start : array_like (4,)
+        Four numbers near which the walkers start: a fit.
+    seed : int
+        Seed of the random numbers; the same one gives the same bits on any number of threads.
+    prior : AfferentPrior, optional
+        Weak beliefs by default.
+    **settings
+        Those of `fingerpad.inference.fitting.posterior.sample`.
+
+    Returns
+    -------
+    AfferentPosterior
+
+    Raises
+    ------
+    InputError
+        If the model has other parameters, or the start is no set of four numbers.
+    ConvergenceError
+        If the draws have not converged.
+    """
+    believed = prior or AfferentPrior()
+    density, centre = log_posterior(likelihood, believed), to_coordinates(start)
+    if believed.silent_at_rest:
+        centre[0] = min(centre[0], 1.0 - SMALLEST_LACK)
+        chains = _told(
+            sample(
+                _of_walkers(density), _walked(centre), START_SPREAD, COORDINATE_NAMES, seed=seed, **settings
+            )
+        )
+    else:
+        chains = sample(density, centre, START_SPREAD, COORDINATE_NAMES, seed=seed, **settings)
+    random = np.random.Generator(np.random.Philox([seed, 1]))
+    some = from_coordinates(chains.spread_out(N_PREDICTED))
+    return AfferentPosterior(chains, from_coordinates(chains.flat), likelihood.residual_draws(some, random))
+
+
+def _walked(coordinates: FloatArray) -> FloatArray:
+    """Replace the potential at rest u by ln(1 - u)."""
+    return np.concatenate([np.log(1.0 - coordinates[..., :1]), coordinates[..., 1:]], axis=-1)
+
+
+def _coordinates(walked: FloatArray) -> FloatArray:
+    """Replace ln(1 - u) by u: the inverse of `_walked`."""
+    return np.concatenate([1.0 - np.exp(walked[..., :1]), walked[..., 1:]], axis=-1)
+
+
+def _of_walkers(log_density: LogDensity) -> LogDensity:
+    """Turn a log density in u into one in ln(1 - u), of which du takes the share 1 - u."""
+    return lambda walked: log_density(_coordinates(walked)) + walked[:, 0]
+
+
+def _told(chains: Chains) -> Chains:
+    """Turn draws of what walkers see into coordinates; how ranks agree is the same in both."""
+    return replace(
+        chains,
+        draws=_coordinates(chains.draws),
+        log_densities=chains.log_densities - chains.draws[..., 0],
+    )

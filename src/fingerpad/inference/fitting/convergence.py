@@ -1,0 +1,173 @@
+"""Whether a sampler has converged: split R-hat, autocorrelation and effective number of draws.
+
+The walkers of one ensemble learn from each other and are no independent chains. Ensembles are: R-hat compares
+halves of ensembles, and the autocorrelation is that of an ensemble's mean over the steps, which counts what
+its walkers have in common.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import ndtri
+from scipy.stats import rankdata
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import InputError
+
+TAILS = (0.025, 0.975)
+"""Quantiles at which the effective size of the tails is judged: the ends of a 95 % interval."""
+
+
+def split_r_hat(draws: FloatArray) -> float:
+    """Return how much wider all draws spread than halves of single ensembles do; 1 once all agree.
+
+    Parameters
+    ----------
+    draws : array (n_ensembles, n_steps, n_walkers)
+        One quantity along the chains.
+
+    Returns
+    -------
+    float
+        The larger of the R-hat of ranks, which sees places that differ, and of distances from the median,
+        which sees widths that differ. [1]
+
+    Notes
+    -----
+    R-hat = sqrt(((n - 1)/n W + B)/W) with W the mean variance within halves of n draws, and B the variance
+    of their means, after ranks became normal scores (Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021).
+
+    Examples
+    --------
+    >>> still = np.random.default_rng(1).normal(size=(4, 50, 20))
+    >>> bool(split_r_hat(still) < 1.01), bool(split_r_hat(still + np.arange(4.0)[:, None, None]) > 1.3)
+    (True, True)
+    """
+    values = _checked(draws)
+    distances = np.abs(values - np.median(values))
+    return max(_r_hat(_normal_scores(values)), _r_hat(_normal_scores(distances)))
+
+
+def effective_size(draws: FloatArray) -> float:
+    """Return how many independent draws would tell the mean as well.
+
+    Parameters
+    ----------
+    draws : array (n_ensembles, n_steps, n_walkers)
+        One quantity along the chains.
+
+    Returns
+    -------
+    float
+        Variance of the draws over the variance of their mean, at most the number of draws. [1]
+
+    Notes
+    -----
+    The mean over all draws is a mean of the ensembles' means over the steps. The variance of a mean of such
+    series is var (1 + 2 sum rho_t)/(n_ensembles n_steps), the sum of autocorrelations cut where pairs of
+    them are no longer positive and made to fall (Geyer 1992).
+
+    Examples
+    --------
+    >>> independent = np.random.default_rng(1).normal(size=(4, 100, 20))
+    >>> bool(effective_size(independent) > 6000), round(effective_size(np.repeat(independent, 8, axis=1)))
+    (True, ...)
+    """
+    values = _checked(draws)
+    variance = float(values.var())
+    if variance == 0.0:
+        return float(values.size)
+    series = values.mean(axis=2)
+    n_ensembles, n_steps = series.shape
+    correlations, spread = _autocorrelations(series)
+    pairs = correlations[: n_steps // 2 * 2].reshape(-1, 2).sum(axis=1)
+    positive = int(np.argmax(pairs <= 0.0)) if (pairs <= 0.0).any() else pairs.size
+    # An antithetic chain may do better than independent draws, but no estimate of that is to be trusted.
+    time = max(2.0 * float(np.minimum.accumulate(pairs[:positive]).sum()) - 1.0, 1.0 / values.shape[2])
+    variance_of_mean = spread * time / (n_ensembles * n_steps)
+    return float(min(variance / variance_of_mean, values.size))
+
+
+def bulk_effective_size(draws: FloatArray) -> float:
+    """Return how many independent draws would tell the middle as well: the effective size of their ranks.
+
+    Parameters
+    ----------
+    draws : array (n_ensembles, n_steps, n_walkers)
+        One quantity along the chains.
+
+    Returns
+    -------
+    float
+        The same for every increasing function of the quantity: a long tail does not count for more. [1]
+
+    Notes
+    -----
+    Ranks became normal scores (Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021).
+
+    Examples
+    --------
+    >>> draws = np.random.default_rng(1).normal(size=(4, 100, 20))
+    >>> bulk_effective_size(np.exp(5.0 * draws)) == bulk_effective_size(draws)
+    True
+    """
+    return effective_size(_normal_scores(_checked(draws)))
+
+
+def tail_effective_size(draws: FloatArray) -> float:
+    """Return the smaller effective size of being beyond either end of the central 95 %.
+
+    Parameters
+    ----------
+    draws : array (n_ensembles, n_steps, n_walkers)
+        One quantity along the chains.
+
+    Returns
+    -------
+    float
+        How many independent draws would tell the ends of the interval as well. [1]
+    """
+    values = _checked(draws)
+    return min(effective_size((values <= end).astype(np.float64)) for end in np.quantile(values, TAILS))
+
+
+def _checked(draws: FloatArray) -> FloatArray:
+    values = np.asarray(draws, dtype=np.float64)
+    if values.ndim != 3 or values.shape[0] < 2 or values.shape[1] < 4:
+        raise InputError(
+            "draws must be of at least 2 ensembles and 4 steps, (n_ensembles, n_steps, n_walkers): "
+            f"got shape {values.shape}."
+        )
+    return values
+
+
+def _normal_scores(values: FloatArray) -> FloatArray:
+    ranks = rankdata(values, axis=None).reshape(values.shape)
+    return ndtri((ranks - 0.375) / (values.size + 0.25))
+
+
+def _r_hat(values: FloatArray) -> float:
+    half = values.shape[1] // 2
+    chains = np.concatenate([values[:, :half], values[:, -half:]]).reshape(2 * values.shape[0], -1)
+    n = chains.shape[1]
+    within = float(chains.var(axis=1, ddof=1).mean())
+    if within == 0.0:
+        return 1.0 if float(np.ptp(chains)) == 0.0 else float("inf")
+    between = float(chains.mean(axis=1).var(ddof=1))
+    return float(np.sqrt(((n - 1) / n * within + between) / within))
+
+
+def _autocorrelations(series: FloatArray) -> tuple[FloatArray, float]:
+    """Autocorrelations of several series of one law, (n_steps,), and the variance they refer to.
+
+    What the series' means differ by counts as correlation that lasts.
+    """
+    n_series, n_steps = series.shape
+    centred = series - series.mean(axis=1, keepdims=True)
+    spectrum = np.abs(np.fft.rfft(centred, 2 * n_steps, axis=1)) ** 2
+    covariances = np.fft.irfft(spectrum, axis=1)[:, :n_steps].mean(axis=0) / n_steps
+    within = covariances[0] * n_steps / (n_steps - 1)
+    spread = float(covariances[0] + series.mean(axis=1).var(ddof=1)) if n_series > 1 else float(within)
+    correlations = 1.0 - (within - covariances) / spread
+    correlations[0] = 1.0
+    return correlations, spread

@@ -1,0 +1,111 @@
+"""Evolution strategy with covariance matrix adaptation (CMA-ES): needs scores only, and minds no jumps."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import float_array, positive, whole
+from fingerpad.core.errors import InputError
+from fingerpad.inference.fitting.methods import Fit, Step
+from fingerpad.inference.fitting.problem import IntArray, Problem
+
+
+@dataclass(frozen=True)
+class CovarianceAdaptation:
+    """CMA-ES around one start; the package `cma` does the work.
+
+    Parameters
+    ----------
+    start : array_like (n_parameters,)
+        Middle of the first generation.
+    scales : array_like (n_parameters,)
+        A change of each parameter that matters as much as those of the others.
+    lower_bounds, upper_bounds : array_like (n_parameters,)
+        Limits; -inf and inf for none.
+    first_spread : float
+        Standard deviation of the first generation, in units of `scales`.
+    most_evaluations : int
+        The search ends with the generation that reaches so many, or when nothing more is gained.
+    seed : int
+        Of all random numbers: the same seed gives the same bits.
+
+    Raises
+    ------
+    InputError
+        If shapes disagree, or a scale or the spread is not positive.
+
+    Notes
+    -----
+    Hansen & Ostermeier 2001.
+
+    Examples
+    --------
+    >>> class Hill:
+    ...     names, n_observations = ("x", "y"), 1
+    ...     def residuals(self, parameters, chosen):
+    ...         return parameters - [3.0, -1.0]
+    ...     def score(self, parameters, chosen):
+    ...         return 1.0 - float((self.residuals(parameters, chosen) ** 2).sum())
+    >>> CovarianceAdaptation([0.0, 0.0], [1.0, 1.0]).fit(Hill(), np.arange(1)).parameters.round(3).tolist()
+    [3.0, -1.0]
+    """
+
+    start: ArrayLike
+    scales: ArrayLike
+    lower_bounds: ArrayLike = -np.inf
+    upper_bounds: ArrayLike = np.inf
+    first_spread: float = 0.5
+    most_evaluations: int = 2000
+    seed: int = 0
+    name: str = "CMA-ES"
+
+    def __post_init__(self) -> None:
+        start, scales = float_array("start", self.start, 1), float_array("scales", self.scales, 1)
+        if scales.shape != start.shape or (scales <= 0.0).any():
+            raise InputError(
+                f"scales needs one number above 0 per parameter: got {scales.tolist()} for {start.size}."
+            )
+        positive("first_spread", self.first_spread)
+        whole("most_evaluations", self.most_evaluations, at_least=1)
+        whole("seed", self.seed, at_least=0)
+        for name, value in (("start", start), ("scales", scales)):
+            object.__setattr__(self, name, value)
+        for name in ("lower_bounds", "upper_bounds"):
+            object.__setattr__(self, name, np.broadcast_to(getattr(self, name), start.shape))
+
+    def fit(self, problem: Problem, chosen: IntArray) -> Fit:
+        """Search until nothing is gained; the best of all places visited is the result."""
+        from cma import CMAEvolutionStrategy  # takes a second to load
+
+        clock, scales = time.perf_counter(), np.asarray(self.scales)
+        generator = np.random.default_rng(self.seed)
+        search = CMAEvolutionStrategy(
+            np.asarray(self.start) / scales,
+            self.first_spread,
+            {
+                "bounds": [
+                    list(np.asarray(side) / scales) for side in (self.lower_bounds, self.upper_bounds)
+                ],
+                "maxfevals": self.most_evaluations,
+                # Its own random numbers would come from NumPy's global state.
+                "seed": np.nan,
+                "randn": lambda *shape: generator.standard_normal(shape),
+                "verbose": -9,
+            },
+        )
+        best = Step(np.asarray(self.start), problem.score(np.asarray(self.start), chosen))
+        steps = [best]
+        while not search.stop():
+            places = search.ask()
+            scores = [problem.score(place * scales, chosen) for place in places]
+            search.tell(places, [-score for score in scores])
+            top = int(np.argmax(scores))
+            if scores[top] > best.score:
+                best = Step(places[top] * scales, float(scores[top]))
+                steps.append(best)
+        seconds = time.perf_counter() - clock
+        return Fit(best.parameters, best.score, search.countevals + 1, seconds, tuple(steps))

@@ -1,0 +1,199 @@
+"""Cross validation: fit on five sixths of the observations, judge on the rest (paper, section 2.2.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import float_array, whole
+from fingerpad.core.errors import InputError
+from fingerpad.data import protocol
+from fingerpad.inference.fitting.methods import Fit, Method
+from fingerpad.inference.fitting.problem import IntArray, Problem
+
+
+@dataclass(frozen=True)
+class FoldFit:
+    """Result of one fold.
+
+    Parameters
+    ----------
+    fold : int
+        Number of the fold, from 0.
+    fit : Fit
+        To the training set.
+    score_test : float
+        Score of its parameters on the observations left out.
+    training, testing : int array (n_training,), (n_testing,)
+        Observations used for fitting, and those left out.
+    """
+
+    fold: int
+    fit: Fit
+    score_test: float
+    training: IntArray
+    testing: IntArray
+
+    @property
+    def score_train(self) -> float:
+        """Score on the training set."""
+        return self.fit.score
+
+
+@dataclass(frozen=True)
+class CrossValidation:
+    """Results of all folds.
+
+    Parameters
+    ----------
+    folds : tuple of FoldFit
+        In the order of their numbers.
+    """
+
+    folds: tuple[FoldFit, ...]
+
+    @property
+    def score_train(self) -> float:
+        """Mean training score of the folds."""
+        return float(np.mean([fold.score_train for fold in self.folds]))
+
+    @property
+    def score_test(self) -> float:
+        """Mean testing score of the folds, the estimate of performance out of sample."""
+        return float(np.mean([fold.score_test for fold in self.folds]))
+
+
+def interleaved_folds(n_observations: int, n_folds: int = int(protocol.FOLDS.value)) -> IntArray:
+    """Fold of each observation, dealt out in turn: index modulo the number of folds.
+
+    Parameters
+    ----------
+    n_observations, n_folds : int
+        The first must not be smaller than the second.
+
+    Returns
+    -------
+    int array (n_observations,)
+
+    Examples
+    --------
+    >>> interleaved_folds(8, 3).tolist()
+    [0, 1, 2, 0, 1, 2, 0, 1]
+    """
+    whole("n_folds", n_folds, at_least=2)
+    whole("n_observations", n_observations, at_least=n_folds)
+    return np.arange(n_observations, dtype=np.int64) % n_folds
+
+
+def folds_of(testing_sets: Sequence[Sequence[int]], n_observations: int) -> IntArray:
+    """Fold of each observation from lists of those that each fold leaves out, as in the paper's Table 3.
+
+    Parameters
+    ----------
+    testing_sets : sequence of sequence of int
+        Observations of each fold, counted from 0.
+    n_observations : int
+        How many there are.
+
+    Returns
+    -------
+    int array (n_observations,)
+
+    Raises
+    ------
+    InputError
+        If an observation is in two folds or in none, or does not exist.
+
+    Examples
+    --------
+    >>> folds_of([[0, 3], [1], [2, 4]], 5).tolist()
+    [0, 1, 2, 0, 2]
+    """
+    memberships = np.full(whole("n_observations", n_observations, at_least=2), -1, dtype=np.int64)
+    for fold, observations in enumerate(testing_sets):
+        for observation in observations:
+            row = whole(f"an observation of fold {fold}", observation, at_least=0)
+            if row >= n_observations:
+                raise InputError(
+                    f"Folds must hold observations 0 ... {n_observations - 1}: fold {fold} holds {row}."
+                )
+            if memberships[row] >= 0:
+                raise InputError(
+                    "Folds must not overlap: "
+                    f"observation {row} is in fold {memberships[row]} and in fold {fold}."
+                )
+            memberships[row] = fold
+    missed = np.flatnonzero(memberships < 0)
+    if missed.size:
+        raise InputError(f"Folds must hold every observation: observation {missed[0]} is in none.")
+    return memberships
+
+
+def cross_validate(problem: Problem, method: Method, memberships: ArrayLike) -> CrossValidation:
+    """Fit every fold without its own observations, and judge the result on them.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is fitted.
+    method : Method
+        How.
+    memberships : int array (n_observations,)
+        Fold of each observation, 0 ... n_folds - 1, none empty; `interleaved_folds` deals them out.
+
+    Returns
+    -------
+    CrossValidation
+
+    Raises
+    ------
+    InputError
+        If an observation has no fold, or a fold is empty.
+    ConvergenceError
+        If a fit does not end.
+
+    Notes
+    -----
+    Gerling et al. 2014, section 2.2.2.
+
+    Examples
+    --------
+    >>> from fingerpad.inference.fitting import ResponseSurface
+    >>> class Line:
+    ...     names, n_observations = ("slope",), 4
+    ...     def residuals(self, slope, chosen):
+    ...         return ((np.array([1.0, 2.0, 3.0, 4.0]) - slope * [1, 2, 3, 4]) / 5.0)[chosen]
+    ...     def score(self, slope, chosen):
+    ...         return 1.0 - float((self.residuals(slope, chosen) ** 2).sum())
+    >>> method = ResponseSurface(starts=[[0.5], [2.0]], increments=[0.01])
+    >>> result = cross_validate(Line(), method, interleaved_folds(4, 2))
+    >>> [round(float(fold.fit.parameters[0]), 1) for fold in result.folds]
+    [1.0, 1.0]
+    """
+    folds = _checked_memberships(memberships, problem.n_observations)
+
+    def fold_fit(fold: int) -> FoldFit:
+        training, testing = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
+        fit = method.fit(problem, training)
+        return FoldFit(fold, fit, float(problem.score(fit.parameters, testing)), training, testing)
+
+    return CrossValidation(tuple(fold_fit(fold) for fold in range(int(folds.max()) + 1)))
+
+
+def _checked_memberships(memberships: ArrayLike, n_observations: int) -> IntArray:
+    given = float_array("memberships", memberships, 1)
+    if given.size != n_observations:
+        raise InputError(
+            f"memberships needs one fold per observation: got {given.size} for {n_observations}."
+        )
+    folds = given.astype(np.int64)
+    present = np.unique(folds)
+    if (folds != given).any() or present.size < 2 or not np.array_equal(present, np.arange(present.size)):
+        raise InputError(
+            "memberships must number at least two folds from 0 on without a gap: "
+            f"got {np.unique(given).tolist()}."
+        )
+    return folds

@@ -1,0 +1,89 @@
+"""Goodness of fit between observed and predicted firing rates (paper, Eqs. 12-14)."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import float_array, not_negative
+from fingerpad.core.errors import InputError
+from fingerpad.data import protocol
+
+
+def fractional_sum_of_squares(observed: ArrayLike, predicted: ArrayLike) -> float:
+    """Share of the observed sum of squares that the prediction leaves no residual for (Eqs. 13, 14).
+
+    FSS = 1 - sum (observed - predicted)^2 / sum observed^2; 1 is perfect, silence gives 0, and there is no
+    lower limit. It differs from R2, which measures against the mean and not against zero.
+
+    Parameters
+    ----------
+    observed, predicted : array (n_shifts,)
+        Rates at the same shifts; the sums run over all of them. [spikes/s]
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    InputError
+        If the two differ in length or nothing was observed.
+
+    Examples
+    --------
+    >>> fractional_sum_of_squares([3.0, 4.0], [3.0, 4.0])
+    1.0
+    >>> fractional_sum_of_squares([3.0, 4.0], [0.0, 4.0])
+    0.64
+    """
+    observed_rate = float_array("observed", observed, 1)
+    predicted_rate = float_array("predicted", predicted, 1)
+    if observed_rate.shape != predicted_rate.shape:
+        raise InputError(
+            f"observed and predicted must match: got {observed_rate.size} and {predicted_rate.size} values."
+        )
+    observed_squares = float(observed_rate @ observed_rate)
+    if observed_squares == 0.0:
+        raise InputError("observed must hold at least one value other than 0: FSS divides by its squares.")
+    residual = observed_rate - predicted_rate
+    return 1.0 - float(residual @ residual) / observed_squares
+
+
+def weighted_fractional_sum_of_squares(
+    observed_dynamic: ArrayLike,
+    predicted_dynamic: ArrayLike,
+    observed_static: ArrayLike,
+    predicted_static: ArrayLike,
+    dynamic_weight: float = protocol.DYNAMIC_WEIGHT.value,
+    static_weight: float = protocol.STATIC_WEIGHT.value,
+) -> float:
+    """Both phases in one number, FSS = w_d FSS_d + w_s FSS_s (Eq. 12).
+
+    Parameters
+    ----------
+    observed_dynamic, predicted_dynamic : array (n_shifts,)
+        Rates during the ramp. [spikes/s]
+    observed_static, predicted_static : array (n_shifts,)
+        Rates during the hold. [spikes/s]
+    dynamic_weight, static_weight : float
+        w_d and w_s. [1]
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    InputError
+        If a pair differs in length, nothing was observed, or a weight is negative.
+
+    Examples
+    --------
+    >>> weighted_fractional_sum_of_squares([200.0], [0.0], [60.0], [60.0])
+    0.75
+    """
+    dynamic_share = not_negative("dynamic_weight", dynamic_weight)
+    static_share = not_negative("static_weight", static_weight)
+    dynamic = fractional_sum_of_squares(observed_dynamic, predicted_dynamic)
+    static = fractional_sum_of_squares(observed_static, predicted_static)
+    return dynamic_share * dynamic + static_share * static

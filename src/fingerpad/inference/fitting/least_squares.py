@@ -1,0 +1,167 @@
+"""Least squares from several starts, for residuals that jump where a spike enters or leaves a window.
+
+A difference quotient over a tiny step sees either no jump or nothing but one. The steps are therefore as
+large as the changes that matter and shrink from round to round; or the slopes come from elsewhere, as from a
+formula that knows no single spikes. Slopes only say where to go: every place is judged by its own score.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import least_squares
+
+from fingerpad.core.checks import FloatArray, float_array, positive, whole
+from fingerpad.core.errors import InputError
+from fingerpad.inference.fitting.methods import Fit, Step, best_of
+from fingerpad.inference.fitting.problem import IntArray, Problem
+
+Jacobian = Callable[[FloatArray, IntArray], FloatArray]
+
+
+@dataclass(frozen=True)
+class LeastSquares:
+    """Trust-region least squares from the most promising of several starts.
+
+    Parameters
+    ----------
+    starts : array_like (n_starts, n_parameters)
+        Where fits may begin; all are scored.
+    scales : array_like (n_parameters,)
+        A change of each parameter that matters as much as those of the others; steps are counted in it.
+    lower_bounds, upper_bounds : array_like (n_parameters,)
+        Limits; -inf and inf for none.
+    n_refined : int
+        From how many of the starts, the best ones first, a fit is made.
+    difference_steps : tuple of float
+        Half the distance over which slopes are taken, round by round, in units of `scales`.
+    jacobian : callable, optional
+        `jacobian(parameters, chosen)`: slopes of the residuals, instead of differences.
+    most_iterations : int
+        Of each round.
+
+    Raises
+    ------
+    InputError
+        If shapes disagree, a scale or step is not positive, or a start lies outside of the bounds.
+
+    Notes
+    -----
+    The method of `scipy.optimize.least_squares`, "trf" (Branch, Coleman & Li 1999), and the best of all
+    places that it visited. Nothing is random.
+
+    Examples
+    --------
+    >>> class Line:
+    ...     names, n_observations = ("slope", "height"), 3
+    ...     def residuals(self, parameters, chosen):
+    ...         predicted = parameters @ [[0, 1, 2], [1, 1, 1]]
+    ...         return (np.array([1.0, 3.0, 5.0]) - predicted)[chosen] / np.sqrt(35.0)
+    ...     def score(self, parameters, chosen):
+    ...         residuals = self.residuals(parameters, chosen)
+    ...         return 1.0 - residuals @ residuals
+    >>> LeastSquares([[1.0, 0.0]], [1.0, 1.0]).fit(Line(), np.arange(3)).parameters.round(6).tolist()
+    [2.0, 1.0]
+    """
+
+    starts: ArrayLike
+    scales: ArrayLike
+    lower_bounds: ArrayLike = -np.inf
+    upper_bounds: ArrayLike = np.inf
+    n_refined: int = 4
+    difference_steps: tuple[float, ...] = (0.1, 0.03, 0.01)
+    jacobian: Jacobian | None = None
+    most_iterations: int = 50
+    name: str = "least squares"
+
+    def __post_init__(self) -> None:
+        starts = float_array("starts", self.starts, 2)
+        scales = float_array("scales", self.scales, 1)
+        if scales.shape != starts.shape[1:] or (scales <= 0.0).any():
+            raise InputError(
+                f"scales needs one number above 0 per parameter: got {scales.tolist()} for {starts.shape[1]}."
+            )
+        for step in self.difference_steps:
+            positive("difference_steps", step)
+        whole("n_refined", self.n_refined, at_least=1)
+        whole("most_iterations", self.most_iterations, at_least=1)
+        bounds = np.array(
+            [np.broadcast_to(side, scales.shape) for side in (self.lower_bounds, self.upper_bounds)]
+        )
+        outside = np.flatnonzero(((starts <= bounds[0]) | (starts >= bounds[1])).any(axis=1))
+        if outside.size:
+            row = int(outside[0])
+            raise InputError(f"starts must lie between the bounds: row {row} is {starts[row].tolist()}.")
+        for name, value in (("starts", starts), ("scales", scales)):
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "lower_bounds", bounds[0])
+        object.__setattr__(self, "upper_bounds", bounds[1])
+
+    def fit(self, problem: Problem, chosen: IntArray) -> Fit:
+        """Score all starts, fit from the best of them, and keep the best fit."""
+        clock, starts = time.perf_counter(), np.asarray(self.starts)
+        scores = np.array([problem.score(start, chosen) for start in starts])
+        scored = Fit(starts[0], -np.inf, len(starts), time.perf_counter() - clock, ())
+        order = np.argsort(-scores, kind="stable")[: self.n_refined]
+        return best_of((*(self._refined(problem, chosen, starts[row]) for row in order), scored))
+
+    def _refined(self, problem: Problem, chosen: IntArray, start: FloatArray) -> Fit:
+        """Fit from one start, in units of the scales."""
+        clock, scales = time.perf_counter(), np.asarray(self.scales)
+        visited = _Visited(problem, chosen, scales)
+        visited.residuals(start / scales)
+        steps = [visited.best]
+        for difference in self.difference_steps if self.jacobian is None else self.difference_steps[:1]:
+            least_squares(
+                visited.residuals,
+                visited.best.parameters / scales,
+                self._slopes(visited, difference),
+                bounds=(np.asarray(self.lower_bounds) / scales, np.asarray(self.upper_bounds) / scales),
+                max_nfev=self.most_iterations,
+            )
+            steps.append(visited.best)
+        seconds = time.perf_counter() - clock
+        return Fit(steps[-1].parameters, steps[-1].score, visited.n_evaluations, seconds, tuple(steps))
+
+    def _slopes(self, visited: _Visited, difference: float) -> Callable[[FloatArray], FloatArray]:
+        """Slopes of the residuals at a place, given and wanted in units of the scales."""
+        scales = np.asarray(self.scales)
+        if self.jacobian is not None:
+            jacobian = self.jacobian
+            return lambda place: jacobian(place * scales, visited.chosen) * scales
+        low, high = np.asarray(self.lower_bounds) / scales, np.asarray(self.upper_bounds) / scales
+
+        def central(place: FloatArray) -> FloatArray:
+            before = np.maximum(place - difference, low)
+            after = np.minimum(place + difference, high)
+            columns = []
+            for number in range(place.size):
+                ends = [place.copy(), place.copy()]
+                ends[0][number], ends[1][number] = before[number], after[number]
+                rise = visited.residuals(ends[1]) - visited.residuals(ends[0])
+                columns.append(rise / (after[number] - before[number]))
+            return np.column_stack(columns)
+
+        return central
+
+
+class _Visited:
+    """Residuals of a problem in scaled parameters, with a count and the best place so far."""
+
+    def __init__(self, problem: Problem, chosen: IntArray, scales: FloatArray):
+        self.problem, self.chosen, self.scales = problem, chosen, scales
+        self.n_evaluations = 0
+        self.best = Step(np.full(scales.size, np.nan), -np.inf)
+
+    def residuals(self, place: FloatArray) -> FloatArray:
+        parameters = place * self.scales
+        residuals = self.problem.residuals(parameters, self.chosen)
+        self.n_evaluations += 1
+        score = 1.0 - float(residuals @ residuals)
+        if score > self.best.score:
+            self.best = Step(parameters, score)
+        return residuals

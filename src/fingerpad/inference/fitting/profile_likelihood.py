@@ -1,0 +1,287 @@
+"""Profile likelihood: how well the data can still be explained when one parameter is held elsewhere.
+
+One parameter is moved away from the best fit in steps, and all others are fitted anew at each. Where twice
+the loss of log likelihood passes the quantile of chi-square with one degree of freedom, the confidence
+interval ends. A side on which that never happens is open: the data do not bound the parameter there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import minimize
+from scipy.stats import chi2
+
+from fingerpad.core.blocks import in_blocks
+from fingerpad.core.checks import FloatArray, finite, float_array, whole
+from fingerpad.core.errors import ConvergenceError, InputError
+
+LogLikelihood = Callable[[FloatArray], FloatArray]
+"""Called with points (n_points, n_parameters); returns their log likelihoods, -inf where impossible."""
+
+STEP = 0.5
+"""Step of the parameter that is held, over its scale. [1]"""
+
+CLOSE = 0.02
+"""Fits of the others end when they differ by this much: in log likelihood, and over the scales. [1]"""
+
+NEAREST = 20
+"""Starts nearest to where a parameter is held, the best of which is climbed from."""
+
+MOST_EVALUATIONS = 2000
+RESTARTS = 5
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Profile likelihood of one parameter.
+
+    Parameters
+    ----------
+    name : str
+        The parameter.
+    values : array (n_values,)
+        Where it was held, increasing.
+    losses : array (n_values,)
+        Largest log likelihood anywhere less the largest one there. [1]
+    points : array (n_values, n_parameters)
+        The best parameters there.
+    interval : (float, float)
+        Ends of the confidence interval; infinite where the data set no end.
+    level : float
+        Its level of confidence. [0-1]
+    """
+
+    name: str
+    values: FloatArray
+    losses: FloatArray
+    points: FloatArray
+    interval: tuple[float, float]
+    level: float
+
+
+@dataclass(frozen=True)
+class Profiles:
+    """Profile likelihoods of all parameters.
+
+    Parameters
+    ----------
+    best : array (n_parameters,)
+        The most likely parameters that were met.
+    log_likelihood : float
+        Theirs.
+    profiles : tuple of Profile
+        One per parameter.
+    n_evaluations : int
+        Evaluations of the likelihood.
+    """
+
+    best: FloatArray
+    log_likelihood: float
+    profiles: tuple[Profile, ...]
+    n_evaluations: int
+
+
+def profile_likelihoods(
+    log_likelihood: LogLikelihood,
+    starts: ArrayLike,
+    scales: ArrayLike,
+    names: Sequence[str],
+    *,
+    level: float = 0.95,
+    most_steps: int = 12,
+) -> Profiles:
+    """Profile the likelihood of every parameter.
+
+    Each profile is swept outwards from the best fit. A fit starts from its neighbour's and, where several
+    starts are given, also from the best of those nearby: a likelihood with many lumps needs that.
+
+    Parameters
+    ----------
+    log_likelihood : callable
+        Of rows of parameters.
+    starts : array (n_parameters,) or (n_starts, n_parameters)
+        Near the best fit, which is looked for first from the most likely of them; draws from a posterior do.
+    scales : array (n_parameters,)
+        About the standard deviation of each parameter.
+    names : sequence of str
+        Names of the parameters, two at least.
+    level : float, optional
+        Level of confidence. [0-1]
+    most_steps : int, optional
+        Steps of half a scale to either side, at most; a sweep ends earlier once two values in a row are
+        beyond the interval.
+
+    Returns
+    -------
+    Profiles
+
+    Raises
+    ------
+    InputError
+        If sizes disagree or all starts are impossible.
+    ConvergenceError
+        If a fit does not end.
+
+    Examples
+    --------
+    A normal likelihood has intervals of 1.96 standard deviations:
+
+    >>> def normal(points):
+    ...     a, b = points.T
+    ...     return -0.5 * (a**2 + (b - a) ** 2)
+    >>> found = profile_likelihoods(normal, [0.3, 0.3], [1.0, 1.4], ("a", "b"))
+    >>> [[round(end, 1) for end in profile.interval] for profile in found.profiles]
+    [[-2.0, 2.0], [-2.8, 2.8]]
+    """
+    labels = tuple(names)
+    origins, units = float_array("starts", np.atleast_2d(starts), 2), float_array("scales", scales, 1)
+    if not origins.shape[1] == units.size == len(labels) or len(labels) < 2 or (units <= 0.0).any():
+        raise InputError(
+            "starts, scales and names must have one entry for each of at least two parameters, scales "
+            f"greater than 0: got {origins.shape[1]}, {units.tolist()} and {len(labels)}."
+        )
+    if not 0.0 < finite("level", level) < 1.0:
+        raise InputError(f"level must lie between 0 and 1: got {level!r}.")
+    whole("most_steps", most_steps, at_least=2)
+    search = _Search(log_likelihood, units, origins)
+    best, highest = search.best_of(origins)
+    if not np.isfinite(highest):
+        raise InputError(f"log_likelihood must be finite at a start: it is not at {best.tolist()}.")
+    for _ in range(RESTARTS):
+        point = search.climb(best)
+        gain, best = search.height(point) - search.height(best), point
+        if gain <= CLOSE:
+            break
+    allowed = 0.5 * float(chi2.ppf(level, 1))
+
+    def sweep(indices: slice) -> tuple[_Search, list[tuple[FloatArray, float]]]:
+        # A search of its own, so that threads share nothing.
+        own = _Search(log_likelihood, units, origins)
+        return own, own.sweep(best, indices.start, allowed, most_steps)
+
+    sweeps = in_blocks(sweep, len(labels), 1)
+    met = [fit for _, fits in sweeps for fit in fits]
+    most_likely, highest = max(met, key=lambda fit: fit[1])
+    profiles = tuple(
+        _profile(labels[index], index, fits, highest, level, allowed)
+        for index, (_, fits) in enumerate(sweeps)
+    )
+    return Profiles(most_likely, highest, profiles, search.count + sum(own.count for own, _ in sweeps))
+
+
+class _Search:
+    """Looks for the most likely parameters, some of them held."""
+
+    def __init__(self, log_likelihood: LogLikelihood, scales: FloatArray, starts: FloatArray):
+        self.log_likelihood = log_likelihood
+        self.scales = scales
+        self.starts = starts
+        self.count = 0
+
+    def heights(self, points: FloatArray) -> FloatArray:
+        """Log likelihoods of points."""
+        self.count += len(points)
+        values = np.asarray(self.log_likelihood(points), dtype=np.float64)
+        if np.isnan(values).any():
+            wrong = points[np.isnan(values)][0].tolist()
+            raise InputError(f"log_likelihood must be a number or -inf: it is NaN at {wrong}.")
+        return values
+
+    def height(self, point: FloatArray) -> float:
+        """Log likelihood of one point."""
+        return float(self.heights(point[None])[0])
+
+    def best_of(self, points: FloatArray) -> tuple[FloatArray, float]:
+        """Most likely of some points, and its log likelihood."""
+        heights = self.heights(points)
+        return points[int(heights.argmax())], float(heights.max())
+
+    def climb(self, start: FloatArray, held: int | None = None) -> FloatArray:
+        """Most likely point near the start, by Nelder and Mead's method."""
+        free = np.array([index for index in range(start.size) if index != held])
+
+        def moved(offsets: FloatArray) -> FloatArray:
+            point = start.copy()
+            point[free] += self.scales[free] * offsets
+            return point
+
+        found = minimize(
+            # It compares: a large number stands for what is impossible.
+            lambda offsets: min(-self.height(moved(offsets)), 1e300),
+            np.zeros(free.size),
+            method="Nelder-Mead",
+            options={
+                "initial_simplex": np.vstack([np.zeros(free.size), STEP * np.eye(free.size)]),
+                "xatol": CLOSE,
+                "fatol": CLOSE,
+                "maxfev": MOST_EVALUATIONS,
+            },
+        )
+        if not found.success:
+            raise ConvergenceError(
+                f"A fit of the profile has not ended after {MOST_EVALUATIONS} evaluations, near "
+                f"{moved(found.x).tolist()}: choose smaller scales.",
+                (f"log likelihood {-found.fun:.4f}",),
+            )
+        return moved(found.x)
+
+    def sweep(
+        self, best: FloatArray, index: int, allowed: float, most_steps: int
+    ) -> list[tuple[FloatArray, float]]:
+        """Fit the others with one parameter held at steps to both sides; returns points and heights."""
+        top = self.height(best)
+        fits = [(best, top)]
+        for side in (-1.0, 1.0):
+            line = [(best, top)]
+            while len(line) <= most_steps and not all(top - height > allowed for _, height in line[-2:]):
+                value = best[index] + side * STEP * len(line) * self.scales[index]
+                line.append(self._fit(line[-1][0], index, value))
+            fits += line[1:]
+        return fits
+
+    def _fit(self, neighbour: FloatArray, index: int, value: float) -> tuple[FloatArray, float]:
+        """Most likely point with one parameter held, from the neighbour and from the best start nearby."""
+        nearest = np.argsort(np.abs(self.starts[:, index] - value), kind="stable")[:NEAREST]
+        pools = [neighbour[None], self.starts[nearest]] if len(self.starts) > 1 else [neighbour[None]]
+        climbed = []
+        for pool in pools:
+            held = pool.copy()
+            held[:, index] = value
+            climbed.append(self.climb(self.best_of(held)[0], held=index))
+        return self.best_of(np.array(climbed))
+
+
+def _profile(
+    name: str,
+    index: int,
+    fits: list[tuple[FloatArray, float]],
+    highest: float,
+    level: float,
+    allowed: float,
+) -> Profile:
+    points = np.array([point for point, _ in fits])
+    order = np.argsort(points[:, index])
+    values = points[order, index]
+    losses = highest - np.array([height for _, height in fits])[order]
+    return Profile(name, values, losses, points[order], _interval(values, losses, allowed), level)
+
+
+def _interval(values: FloatArray, losses: FloatArray, allowed: float) -> tuple[float, float]:
+    """Outermost crossings of the allowed loss, between values by straight lines."""
+    inside = np.flatnonzero(losses <= allowed)
+    if not inside.size:  # a better point lies on another profile, away from all values of this one
+        return float("-inf"), float("inf")
+
+    def crossing(within: int, beyond: int) -> float:
+        share = (allowed - losses[within]) / (losses[beyond] - losses[within])
+        return float(values[within] + share * (values[beyond] - values[within]))
+
+    first, last = int(inside[0]), int(inside[-1])
+    return (
+        crossing(first, first - 1) if first > 0 else float("-inf"),
+        crossing(last, last + 1) if last < values.size - 1 else float("inf"),
+    )

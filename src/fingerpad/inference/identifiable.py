@@ -1,0 +1,113 @@
+"""What firing can tell of an afferent: four numbers out of its six.
+
+The membrane fires when the potential reaches the threshold, u = v. Divided by v, Eqs. 1 and 5 read
+
+    d(u/v)/dt = -(u/v)/tau + beta/(C v) + k_d/(C v) U' + k_s/(C v) U,
+
+and neither C nor v appears alone. beta, k_d, k_s, C and v are therefore known only up to a common scale: C or
+v may be multiplied by any number, and the three gains with it, without moving a spike. The three gains per
+C v, and tau, are what recordings determine (docs/decisions/four-numbers-not-six.md).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import FloatArray, positive
+from fingerpad.core.errors import InputError
+from fingerpad.data import neuron
+from fingerpad.neuron.afferent import PARAMETER_NAMES
+
+IDENTIFIABLE_NAMES = (
+    "intercept_per_ms",
+    "dynamic_gain_per_kpa",
+    "static_gain_per_kpa_ms",
+    "time_constant_ms",
+)
+"""The four numbers in the paper's order: beta/(C v), k_d/(C v), k_s/(C v), tau."""
+
+IDENTIFIABLE_UNITS = ("1/ms", "1/kPa", "1/(kPa ms)", "ms")
+"""Units of the four numbers."""
+
+
+def identifiable(parameters: ArrayLike) -> FloatArray:
+    """Return the four numbers that spikes determine.
+
+    Parameters
+    ----------
+    parameters : array_like (..., 6)
+        beta [mA], k_d [mA ms/kPa], k_s [mA/kPa], tau [ms], C [mF], v [mV]: the order of
+        `fingerpad.neuron.afferent.PARAMETER_NAMES`.
+
+    Returns
+    -------
+    array (..., 4)
+        beta/(C v) [1/ms], k_d/(C v) [1/kPa], k_s/(C v) [1/(kPa ms)], tau [ms].
+
+    Raises
+    ------
+    InputError
+        If there are not six finite numbers, or C or v is not positive.
+
+    Examples
+    --------
+    >>> identifiable([5e-7, 2e-4, 7e-7, 68.0, 1e-6, 50.0]).round(6).tolist()
+    [0.01, 4.0, 0.014, 68.0]
+    """
+    six = _rows("parameters", parameters, PARAMETER_NAMES)
+    scale = six[..., 4:5] * six[..., 5:6]
+    if (six[..., 4:] <= 0.0).any():
+        raise InputError(
+            "capacitance_mf and threshold_mv of parameters must be greater than 0: they are not."
+        )
+    return np.concatenate([six[..., :3] / scale, six[..., 3:4]], axis=-1)
+
+
+def six_parameters(
+    four: ArrayLike,
+    capacitance_mf: float = neuron.CAPACITANCE.value,
+    threshold_mv: float = neuron.THRESHOLD.value,
+) -> FloatArray:
+    """Return one of the many sets of six that fire as the four numbers say: the one with this C and this v.
+
+    Parameters
+    ----------
+    four : array_like (..., 4)
+        In the order of `IDENTIFIABLE_NAMES`.
+    capacitance_mf, threshold_mv : float, optional
+        C [mF] and v [mV], chosen freely; the paper's start by default.
+
+    Returns
+    -------
+    array (..., 6)
+        In the order of `fingerpad.neuron.afferent.PARAMETER_NAMES`.
+
+    Raises
+    ------
+    InputError
+        If there are not four finite numbers, or C or v is not positive.
+
+    Examples
+    --------
+    >>> [f"{value:.3g}" for value in six_parameters([0.01, 4.0, 0.014, 68.0])]
+    ['5e-07', '0.0002', '7e-07', '68', '1e-06', '50']
+    """
+    numbers = _rows("four", four, IDENTIFIABLE_NAMES)
+    capacitance = positive("capacitance_mf", capacitance_mf, "mF")
+    threshold = positive("threshold_mv", threshold_mv, "mV")
+    kept = np.broadcast_to([capacitance, threshold], (*numbers.shape[:-1], 2))
+    return np.concatenate([numbers[..., :3] * (capacitance * threshold), numbers[..., 3:], kept], axis=-1)
+
+
+def _rows(name: str, values: ArrayLike, names: tuple[str, ...]) -> FloatArray:
+    """Check that the last axis holds the named numbers."""
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must hold numbers: got {type(values).__name__}.") from error
+    if array.ndim == 0 or array.shape[-1] != len(names):
+        raise InputError(f"{name} must hold {', '.join(names)} along its last axis: got shape {array.shape}.")
+    if not np.isfinite(array).all():
+        raise InputError(f"{name} must hold finite numbers only: {(~np.isfinite(array)).sum()} are not.")
+    return array

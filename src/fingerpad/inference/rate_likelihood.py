@@ -1,0 +1,253 @@
+"""How likely observed rates are, given what a model predicts: its misfit is unknown in size and in reach.
+
+In either phase an observed rate is the predicted one plus a normal residual of unknown standard deviation
+sigma. A model that is wrong is wrong alike at neighbouring places: residuals at places d apart correlate by
+exp(-d/l), with an unknown length l; l = 0 are independent residuals. Neither sigma nor l is sampled. With
+
+    q_l = r' R_l^-1 r,    R_l = exp(-|x_i - x_j|/l),    sigma^2 ~ scaled inverse chi-square(nu, s^2),
+
+and all lengths of a grid equally likely beforehand, both integrals have closed forms:
+
+    p(y | theta)  ~  sum_l |R_l|^(-1/2) (nu s^2 + q_l)^(-(n + nu)/2).
+
+See docs/decisions/likelihood-of-rates.md for the evidence that residuals are alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.special import logsumexp
+
+from fingerpad.core.checks import FloatArray, float_array, positive
+from fingerpad.core.errors import InputError
+from fingerpad.inference.many_rates import rates_of_each
+from fingerpad.inference.rate_problem import RateModel
+from fingerpad.inference.recordings import RateRecordings
+
+INDEPENDENT = 0.0
+"""Length at which residuals are independent. [mm]"""
+
+LENGTHS_MM = (INDEPENDENT, 0.2, 0.4, 0.6, 0.9, 1.3, 2.0, 3.0)
+"""Lengths over which residuals may be alike, from a step of the bar to a receptive field. [mm]"""
+
+DEVIATION_HZ = 10.0
+"""Standard deviation s that the prior expects. [spikes/s]"""
+
+PRIOR_OBSERVATIONS = 1.0
+"""Number nu of observations that the prior's word is worth."""
+
+
+@dataclass(frozen=True)
+class RateLikelihood:
+    """Observed rates of one afferent, and the model whose parameters they are to tell.
+
+    Parameters
+    ----------
+    model : RateModel
+        Predicts the rates under all stimuli.
+    recordings : RateRecordings
+        Observed rates, one row per stimulus.
+    positions_mm : array (n_stimuli,), optional
+        Where along a line each stimulus was, if residuals of neighbours may be alike; without, residuals are
+        independent. [mm]
+    lengths_mm : tuple of float, optional
+        Lengths of correlation that are tried; 0 is independence. [mm]
+    deviation_hz : float, optional
+        What the prior expects of sigma. [spikes/s]
+
+    Raises
+    ------
+    InputError
+        If numbers of stimuli differ, or two stimuli stand in one place.
+
+    Examples
+    --------
+    >>> from fingerpad.neuron.afferent import Afferent
+    >>> from fingerpad.inference.rate_problem import AfferentModel
+    >>> from fingerpad.core.signals import SedTraces
+    >>> from fingerpad.neuron.transduction import drive
+    >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0, 0.0], [1.0, 2.0], [1.0, 2.0]], kinks_ms=[50.0])
+    >>> observed = RateRecordings(("flat", "edge"), [120.0, 210.0], [35.0, 60.0])
+    >>> likelihood = RateLikelihood(AfferentModel(drive(sed)), observed)
+    >>> good, poor = likelihood.log_likelihood(Afferent().parameters * np.array([[1.0], [2.0]]))
+    >>> bool(good > poor)
+    True
+    """
+
+    model: RateModel
+    recordings: RateRecordings
+    positions_mm: FloatArray | None = None
+    lengths_mm: tuple[float, ...] = LENGTHS_MM
+    deviation_hz: float = DEVIATION_HZ
+    _whitening: FloatArray = field(init=False, repr=False, compare=False)
+    _log_weights: FloatArray = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        n = self.model.n_stimuli
+        if len(self.recordings.stimuli) != n:
+            raise InputError(
+                f"recordings needs one stimulus per column of the model's drive: "
+                f"got {len(self.recordings.stimuli)} for {n}."
+            )
+        positive("deviation_hz", self.deviation_hz, "spikes/s")
+        lengths = float_array("lengths_mm", self.lengths_mm, 1)
+        if not lengths.size or (lengths < 0.0).any():
+            raise InputError(f"lengths_mm must hold lengths of at least 0: got {self.lengths_mm}.")
+        if self.positions_mm is None:
+            lengths, distances = np.zeros(1), np.zeros((n, n))
+        else:
+            places = float_array("positions_mm", self.positions_mm, 1)
+            if places.size != n or np.unique(places).size != n:
+                raise InputError(
+                    f"positions_mm needs a place of its own for each of {n} stimuli: "
+                    f"got {places.size} values, {np.unique(places).size} of them different."
+                )
+            distances = np.abs(places[:, None] - places)
+        whitening = np.array([_whitening(distances, length) for length in lengths])
+        # log |R|^(-1/2), and equal shares of the prior.
+        log_weights = np.log(np.diagonal(whitening, axis1=1, axis2=2)).sum(axis=1) - np.log(lengths.size)
+        object.__setattr__(self, "lengths_mm", tuple(lengths.tolist()))
+        object.__setattr__(self, "_whitening", whitening)
+        object.__setattr__(self, "_log_weights", log_weights)
+
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """Which of "dynamic" and "static" were recorded."""
+        return self.recordings.phases
+
+    def log_likelihood(self, points: FloatArray) -> FloatArray:
+        """Log likelihood of parameters, sigma and length integrated out, up to a constant.
+
+        The constant depends on neither model nor lengths: differences between either are evidence.
+
+        Parameters
+        ----------
+        points : array (n_points, n_parameters)
+            Parameters of the model.
+
+        Returns
+        -------
+        array (n_points,)
+        """
+        return self.log_likelihood_of_rates(*rates_of_each(self.model, points))
+
+    def log_likelihood_of_rates(self, dynamic_hz: FloatArray, static_hz: FloatArray) -> FloatArray:
+        """Log likelihood as above, where the rates that points predict are known already.
+
+        Parameters
+        ----------
+        dynamic_hz, static_hz : array (n_points, n_stimuli)
+            Predicted rates; those of a phase that was not recorded have no part. [spikes/s]
+
+        Returns
+        -------
+        array (n_points,)
+        """
+        return sum(
+            (
+                logsumexp(self._log_shares(squares), axis=1)
+                for _, _, squares in self._phases(dynamic_hz, static_hz)
+            ),
+            start=np.zeros(len(dynamic_hz)),
+        )
+
+    def residual_draws(self, points: FloatArray, random: np.random.Generator) -> dict[str, ResidualDraws]:
+        """Draw sigma and length of every phase, given each row of parameters.
+
+        Parameters
+        ----------
+        points : array (n_points, n_parameters)
+            Draws from the posterior.
+        random : Generator
+            Source of the random numbers.
+
+        Returns
+        -------
+        dict of str to ResidualDraws
+            By phase.
+        """
+        return self.residual_draws_of_rates(*rates_of_each(self.model, points), random)
+
+    def residual_draws_of_rates(
+        self, dynamic_hz: FloatArray, static_hz: FloatArray, random: np.random.Generator
+    ) -> dict[str, ResidualDraws]:
+        """Draw as above, where the rates that points predict are known already.
+
+        Parameters
+        ----------
+        dynamic_hz, static_hz : array (n_points, n_stimuli)
+            Predicted rates. [spikes/s]
+        random : Generator
+            Source of the random numbers.
+
+        Returns
+        -------
+        dict of str to ResidualDraws
+            By phase.
+        """
+        return {
+            phase: self._residuals_of(predicted, squares, random)
+            for phase, predicted, squares in self._phases(dynamic_hz, static_hz)
+        }
+
+    def _residuals_of(
+        self, predicted: FloatArray, squares: FloatArray, random: np.random.Generator
+    ) -> ResidualDraws:
+        n_points, n = predicted.shape
+        shares = np.cumsum(np.exp(_normalised(self._log_shares(squares))), axis=1)
+        which = (random.uniform(size=(n_points, 1)) > shares[:, :-1]).sum(axis=1)
+        total = PRIOR_OBSERVATIONS * self.deviation_hz**2 + squares[np.arange(n_points), which]
+        deviation = np.sqrt(total / random.chisquare(PRIOR_OBSERVATIONS + n, size=n_points))
+        # A new recording departs from the prediction as far as this one, elsewhere.
+        new = np.maximum(predicted + deviation[:, None] * random.normal(size=predicted.shape), 0.0)
+        return ResidualDraws(predicted, new, deviation, np.array(self.lengths_mm)[which])
+
+    def _phases(
+        self, dynamic_hz: FloatArray, static_hz: FloatArray
+    ) -> Iterator[tuple[str, FloatArray, FloatArray]]:
+        """Name, predicted rates (n_points, n_stimuli) and q (n_points, n_lengths) of each recorded phase."""
+        predicted = {"dynamic": dynamic_hz, "static": static_hz}
+        for phase in self.phases:
+            residuals = getattr(self.recordings, f"{phase}_rate_hz") - predicted[phase]
+            white = residuals @ np.swapaxes(self._whitening, 1, 2)  # (n_lengths, n_points, n_stimuli)
+            yield phase, predicted[phase], (white**2).sum(axis=2).T
+
+    def _log_shares(self, squares: FloatArray) -> FloatArray:
+        """Logarithm of each length's part of the likelihood, (n_points, n_lengths)."""
+        exponent = 0.5 * (PRIOR_OBSERVATIONS + self.model.n_stimuli)
+        return self._log_weights - exponent * np.log(PRIOR_OBSERVATIONS * self.deviation_hz**2 + squares)
+
+
+@dataclass(frozen=True)
+class ResidualDraws:
+    """Rates of one phase, predicted and as a new recording would have them.
+
+    Parameters
+    ----------
+    predicted_hz, new_hz : array (n_points, n_stimuli)
+        Predicted, and with a residual of its own; not below 0. [spikes/s]
+    deviation_hz : array (n_points,)
+        Standard deviation sigma. [spikes/s]
+    length_mm : array (n_points,)
+        Length over which residuals are alike; 0 if they are independent. [mm]
+    """
+
+    predicted_hz: FloatArray
+    new_hz: FloatArray
+    deviation_hz: FloatArray
+    length_mm: FloatArray
+
+
+def _whitening(distances_mm: FloatArray, length_mm: float) -> FloatArray:
+    """Lower triangle W with W R W' = 1."""
+    if length_mm == INDEPENDENT:
+        return np.eye(len(distances_mm))
+    factor = np.linalg.cholesky(np.exp(-distances_mm / length_mm))
+    return np.asarray(np.linalg.inv(factor), dtype=np.float64)
+
+
+def _normalised(logarithms: FloatArray) -> FloatArray:
+    return np.asarray(logarithms - logsumexp(logarithms, axis=1, keepdims=True), dtype=np.float64)

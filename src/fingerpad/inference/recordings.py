@@ -1,0 +1,185 @@
+"""What was recorded from one afferent: rates per stimulus, or spike trains per presentation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import FloatArray, float_array, instance
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SpikeTrains
+from fingerpad.data import protocol
+from fingerpad.neuron.spikes import firing_rate_hz
+
+PHASES = ("dynamic", "static")
+"""The ramp and the hold."""
+
+
+@dataclass(frozen=True)
+class RateRecordings:
+    """Firing rates of one afferent, one row per stimulus.
+
+    Parameters
+    ----------
+    stimuli : tuple of str
+        Names of the stimuli, each once.
+    dynamic_rate_hz, static_rate_hz : array (n_stimuli,) or None
+        Rates in the ramp and in the hold; None for a phase that was not recorded. [spikes/s]
+    source : str
+        Where they come from.
+
+    Raises
+    ------
+    InputError
+        If a stimulus stands twice, a rate is negative or not finite, sizes disagree or no phase was recorded.
+
+    Examples
+    --------
+    >>> recordings = RateRecordings(("flat", "edge"), [54.0, 212.0], [9.0, 61.0])
+    >>> recordings.chosen([1]).dynamic_rate_hz.tolist()
+    [212.0]
+    """
+
+    stimuli: tuple[str, ...]
+    dynamic_rate_hz: FloatArray | None
+    static_rate_hz: FloatArray | None
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stimuli", tuple(self.stimuli))
+        twice = sorted({name for name in self.stimuli if self.stimuli.count(name) > 1})
+        if twice:
+            raise InputError(f"stimuli must be named once each: {twice[0]!r} stands twice, take its mean.")
+        if not self.phases:
+            raise InputError("RateRecordings needs dynamic_rate_hz, static_rate_hz or both: got neither.")
+        for phase in self.phases:
+            name = f"{phase}_rate_hz"
+            rates = float_array(name, getattr(self, name), 1)
+            if rates.size != len(self.stimuli):
+                raise InputError(
+                    f"{name} needs one rate per stimulus: got {rates.size} for {len(self.stimuli)}."
+                )
+            if (rates < 0.0).any():
+                raise InputError(f"{name} must not be negative: the smallest is {rates.min():g} spikes/s.")
+            object.__setattr__(self, name, rates)
+
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """Which of "dynamic" and "static" were recorded."""
+        return tuple(phase for phase in PHASES if getattr(self, f"{phase}_rate_hz") is not None)
+
+    @property
+    def n_rates(self) -> int:
+        """How many rates there are, both phases together."""
+        return len(self.phases) * len(self.stimuli)
+
+    def chosen(self, rows: ArrayLike) -> RateRecordings:
+        """Keep some of the stimuli, by their indices."""
+        indices = np.asarray(rows, dtype=np.int64)
+        rates = {f"{phase}_rate_hz": getattr(self, f"{phase}_rate_hz") for phase in PHASES}
+        return RateRecordings(
+            tuple(self.stimuli[index] for index in indices),
+            **{name: None if rate is None else rate[indices] for name, rate in rates.items()},
+            source=self.source,
+        )
+
+
+@dataclass(frozen=True)
+class SpikeRecordings:
+    """Spike trains of one afferent, one per presentation of a stimulus.
+
+    Parameters
+    ----------
+    stimuli : tuple of str
+        Stimulus of each presentation; one that was presented several times stands several times.
+    trains : SpikeTrains
+        One train per presentation, times from the onset of the indentation. [ms]
+    duration_ms : array (n_presentations,) or float
+        For how long spikes were recorded from the onset on, each time or always. [ms]
+    source : str
+        Where they come from.
+
+    Raises
+    ------
+    InputError
+        If sizes disagree, or a spike lies outside of its recording.
+
+    Examples
+    --------
+    >>> trains = SpikeTrains.from_lists([[10.0, 40.0, 45.0], [12.0, 38.0, 42.0], [100.0]])
+    >>> recordings = SpikeRecordings(("edge", "edge", "flat"), trains, 1000.0)
+    >>> rates = recordings.rates()
+    >>> rates.stimuli, rates.dynamic_rate_hz.round(1).tolist()
+    (('edge', 'flat'), [61.9, 0.0])
+    """
+
+    stimuli: tuple[str, ...]
+    trains: SpikeTrains
+    duration_ms: FloatArray
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stimuli", tuple(self.stimuli))
+        instance("trains", self.trains, SpikeTrains)
+        if len(self.trains) != len(self.stimuli):
+            raise InputError(
+                f"trains needs one train per presentation: got {len(self.trains)} for {len(self.stimuli)}."
+            )
+        duration = float_array("duration_ms", np.atleast_1d(self.duration_ms), 1)
+        if duration.size not in (1, len(self.stimuli)) or (duration <= 0.0).any():
+            raise InputError(
+                f"duration_ms must be above 0, one for all or for each of {len(self.stimuli)} presentations: "
+                f"got {self.duration_ms!r}."
+            )
+        duration = float_array("duration_ms", np.broadcast_to(duration, len(self.stimuli)), 1)
+        object.__setattr__(self, "duration_ms", duration)
+        for presentation, (name, end) in enumerate(zip(self.stimuli, duration, strict=True)):
+            train = self.trains[presentation]
+            if train.size and (train[0] < 0.0 or train[-1] > end):
+                outside = train[0] if train[0] < 0.0 else train[-1]
+                raise InputError(
+                    f"spikes must lie between 0 and duration_ms, {end:g} ms: {name!r} has one at "
+                    f"{outside:g} ms."
+                )
+
+    def rates(
+        self,
+        windows_ms: tuple[Sequence[float], Sequence[float]] = (
+            protocol.DYNAMIC_WINDOW.value,
+            protocol.STATIC_WINDOW.value,
+        ),
+    ) -> RateRecordings:
+        """Rates of each stimulus in the ramp and in the hold, Eqs. 6-10, mean of its presentations.
+
+        Parameters
+        ----------
+        windows_ms : ((float, float), (float, float)), optional
+            Start and end of the dynamic and of the static window. [ms]
+
+        Returns
+        -------
+        RateRecordings
+            Stimuli in the order of their first presentation.
+
+        Raises
+        ------
+        InputError
+            If a window does not end within a recording.
+        """
+        end = max(window[-1] for window in windows_ms)
+        if self.duration_ms.size and end > self.duration_ms.min():
+            raise InputError(
+                f"windows_ms must end within the recordings of {self.duration_ms.min():g} ms: "
+                f"one ends at {end:g} ms."
+            )
+        names = tuple(dict.fromkeys(self.stimuli))
+        owner = np.array([names.index(name) for name in self.stimuli], dtype=np.int64)
+        n_presentations = np.bincount(owner, minlength=len(names))
+        dynamic, static = (
+            np.bincount(owner, firing_rate_hz(self.trains, tuple(window)), len(names)) / n_presentations
+            for window in windows_ms
+        )
+        return RateRecordings(names, dynamic, static, self.source)

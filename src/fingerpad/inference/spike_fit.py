@@ -1,0 +1,217 @@
+"""Fit an afferent with a soft threshold to spike trains by maximum likelihood.
+
+Newton's method with the expected curvature (Fisher scoring), damped as Levenberg and Marquardt do, in the
+numbers (A, B, C, G, ln tau) of `fingerpad.inference.spike_parameters`: at a given tau log L is concave in
+the other four, and a start far away is no harm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import ndtri
+
+from fingerpad.core.checks import FloatArray, finite, whole
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.inference.spike_likelihood import (
+    SpikeLikelihood,
+)
+from fingerpad.inference.spike_parameters import (
+    N_PARAMETERS,
+    canonical,
+    canonical_jacobian,
+    checked_spike_parameters,
+    from_canonical,
+)
+
+POSITIVE = np.array([False, False, False, True, True])
+"""Parameters that cannot be negative: tau and the width."""
+
+NARROWEST = 1.0e-3
+"""Width below which a threshold counts as hard, and log L as unbounded."""
+
+SMALLEST_GAIN = 1.0e-6
+"""A fit ends when one more step promises to raise log L by less."""
+
+_FIRST_DAMPING, _MOST_DAMPING = 1.0e-3, 1.0e12
+_LONGEST_STEP_OF_LOG_TAU = 1.0
+
+
+@dataclass(frozen=True)
+class SpikeFit:
+    """Parameters that make the spikes most likely, and how well the spikes determine them.
+
+    Parameters
+    ----------
+    parameters : array (5,)
+        In the order of `fingerpad.inference.spike_parameters.SPIKE_PARAMETER_NAMES`.
+    covariance : array (5, 5)
+        Inverse of the information.
+    log_likelihood : float
+        At the parameters.
+    n_spikes : int
+        In all trains.
+    history : tuple of float
+        log L at the start and after each step.
+    """
+
+    parameters: FloatArray
+    covariance: FloatArray
+    log_likelihood: float
+    n_spikes: int
+    history: tuple[float, ...]
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Square roots of the variances (5,), in the units of the parameters."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlation of the estimates (5, 5)."""
+        return self.covariance / np.outer(self.standard_errors, self.standard_errors)
+
+    def interval(self, level: float = 0.95) -> FloatArray:
+        """Confidence interval of each parameter: symmetric for the gains, by a factor for tau and the width.
+
+        Parameters
+        ----------
+        level : float, optional
+            How often such intervals hold the truth. [0-1]
+
+        Returns
+        -------
+        array (5, 2)
+            Lower and upper end.
+
+        Raises
+        ------
+        InputError
+            If the level does not lie between 0 and 1.
+        """
+        if not 0.0 < finite("level", level) < 1.0:
+            raise InputError(f"level must lie between 0 and 1: got {level!r}.")
+        reach = ndtri(0.5 + 0.5 * level) * self.standard_errors
+        relative = reach / np.abs(self.parameters)
+        return np.stack(
+            [
+                np.where(POSITIVE, self.parameters * np.exp(sign * relative), self.parameters + sign * reach)
+                for sign in (-1.0, 1.0)
+            ],
+            axis=1,
+        )
+
+
+def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 100) -> SpikeFit:
+    """Find the parameters under which recorded spikes are most likely.
+
+    Parameters
+    ----------
+    recorded : SpikeLikelihood
+        The spikes and what drove them.
+    start : array_like (5,)
+        Where to begin, in the order of `SPIKE_PARAMETER_NAMES`; a wide threshold (0.5) is a safe one.
+    most_steps : int, optional
+        Give up after so many.
+
+    Returns
+    -------
+    SpikeFit
+
+    Raises
+    ------
+    InputError
+        If there are fewer spikes than parameters, or the start makes no sense.
+    ConvergenceError
+        If the fit does not end, or ends nowhere: spikes as regular as a clock have no width, and stimuli that
+        are all alike cannot tell the gains apart.
+
+    Examples
+    --------
+    See `fingerpad.experiments.gerling2014.spike_fit`, which recovers an afferent from its own spikes.
+    """
+    whole("most_steps", most_steps, 1)
+    if recorded.n_spikes < N_PARAMETERS:
+        raise InputError(
+            f"a fit of {N_PARAMETERS} parameters needs at least as many spikes: got {recorded.n_spikes}."
+        )
+    here = canonical(checked_spike_parameters(start))
+    value = recorded.canonical_derivatives(here)[0]
+    if not np.isfinite(value):
+        raise InputError(f"start must make the spikes possible: log L is {value}; take a wider threshold.")
+    history = [value]
+    # Far from the maximum a step would throw tau away: first the four numbers in which log L is concave.
+    for free in (slice(0, 4), slice(0, N_PARAMETERS)):
+        here, information = _climb(recorded, here, free, history, most_steps)
+    return _finished(recorded, here, information, history)
+
+
+def _climb(
+    recorded: SpikeLikelihood, start: FloatArray, free: slice, history: list[float], most_steps: int
+) -> tuple[FloatArray, FloatArray]:
+    """Raise log L in the free numbers until one more step promises nothing; write down each step."""
+    here = start
+    value, gradient, information = recorded.canonical_derivatives(here)
+    damping = _FIRST_DAMPING
+    for _ in range(most_steps):
+        slopes, curvature = gradient[free], information[free, free]
+        if _promised_gain(slopes, curvature, history) <= SMALLEST_GAIN:
+            return here, information
+        while True:
+            there = here.copy()
+            step = np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), slopes)
+            step *= min(1.0, _LONGEST_STEP_OF_LOG_TAU / max(np.abs(step[4:]).max(initial=0.0), 1e-300))
+            there[free] += step
+            if there[3] > 0.0:
+                trial = recorded.canonical_derivatives(there)
+                if np.isfinite(trial[0]) and trial[0] > value:
+                    break
+            damping *= 10.0
+            if damping > _MOST_DAMPING:
+                raise ConvergenceError("fit_spikes found no way up: try another start.", _lines(history))
+        here, (value, gradient, information) = there, trial
+        damping = max(0.1 * damping, 1e-12)
+        history.append(value)
+        if here[3] > 1.0 / NARROWEST:
+            raise ConvergenceError(
+                f"fit_spikes made the threshold narrower than {NARROWEST:g}: the spikes are too regular to "
+                "tell how soft it is; fit rates instead.",
+                _lines(history),
+            )
+    raise ConvergenceError(f"fit_spikes did not end in {most_steps} steps: allow more.", _lines(history))
+
+
+def _promised_gain(gradient: FloatArray, information: FloatArray, history: list[float]) -> float:
+    """Return what a full step would add to log L if it were a parabola, g' J^-1 g / 2."""
+    scale = np.sqrt(np.diag(information))
+    # Scaled, the information has ones on its diagonal, and its condition says how well it can be inverted.
+    known = bool((scale > 0.0).all()) and np.isfinite(information).all()
+    scaled = information / np.outer(scale, scale) if known else information
+    if not known or np.linalg.cond(scaled) > 1.0 / np.finfo(np.float64).eps:
+        raise ConvergenceError(
+            "fit_spikes met spikes that do not tell all parameters apart: record more, or more different, "
+            "stimuli.",
+            _lines(history),
+        )
+    slopes = gradient / scale
+    return 0.5 * float(slopes @ np.linalg.solve(scaled, slopes))
+
+
+def _finished(
+    recorded: SpikeLikelihood, numbers: FloatArray, information: FloatArray, history: list[float]
+) -> SpikeFit:
+    parameters = from_canonical(numbers)
+    to_natural = np.linalg.inv(canonical_jacobian(parameters))
+    return SpikeFit(
+        parameters=parameters,
+        covariance=to_natural @ np.linalg.inv(information) @ to_natural.T,
+        log_likelihood=history[-1],
+        n_spikes=recorded.n_spikes,
+        history=tuple(history),
+    )
+
+
+def _lines(history: list[float]) -> tuple[str, ...]:
+    return tuple(f"step {number}: log L = {value:.6g}" for number, value in enumerate(history))

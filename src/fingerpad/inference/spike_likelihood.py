@@ -1,0 +1,292 @@
+"""How likely spike trains are under an afferent with a soft threshold (`fingerpad.neuron.escape_rate`).
+
+With u the potential over the threshold and w the width of the threshold, both pure numbers,
+
+    log L = sum over spikes of ln h(u) - integral of h over the time not at rest,
+    ln h  = (u - 1)/w - ln tau_e.
+
+Given the spikes, u is a sum of three responses, to a constant 1, to U' and to U, weighted with the gains:
+
+    u = a X1 + b X2 + c X3,    (a, b, c) = (beta, k_d, k_s)/(C v).
+
+In the numbers A = a/w, B = b/w, C = c/w and G = 1/w, ln h is linear and log L concave at any given tau.
+Its derivatives come from the same sweep over the data: with g the gradient of ln h,
+
+    gradient    = sum over spikes of g - integral of h g,
+    information = integral of h g g',
+
+exact but for Gauss's formula. The trains are cut once into stretches, between knots of the drive and spikes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import kstest
+
+from fingerpad.core.blocks import in_blocks
+from fingerpad.core.checks import FloatArray, float_array, instance, positive
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SpikeTrains
+from fingerpad.data import neuron
+from fingerpad.inference.spike_parameters import (
+    N_PARAMETERS,
+    canonical,
+    canonical_jacobian,
+    checked_spike_parameters,
+)
+from fingerpad.inference.spike_sweeps import cut, operational_times, sweep
+from fingerpad.neuron.escape_rate import ESCAPE_TIME_MS
+from fingerpad.neuron.transduction import Drive
+
+TRAINS_PER_BLOCK = 8
+"""Trains that one thread goes through at a time; sums are taken block by block, on any number of threads."""
+
+
+@dataclass(frozen=True)
+class SpikeLikelihood:
+    """Spike trains of one afferent under known drives, and how likely parameters make them.
+
+    Parameters
+    ----------
+    drive : Drive
+        Strain energy density U and its rate U' at each stimulus, one column per stimulus.
+    trains : SpikeTrains
+        One train per presentation. [ms]
+    sites : int array (n_trains,), optional
+        Column of the drive that each train answers. Default: the first train the first, and so on.
+    duration_ms : float or array (n_trains,), optional
+        When each recording ends. Default: with the drive. [ms]
+    refractory_ms : float, optional
+        Rest after each spike, which is known. [ms]
+    escape_ms : float, optional
+        tau_e, a convention. [ms]
+
+    Raises
+    ------
+    InputError
+        If shapes disagree, a spike lies outside of its recording, or two lie closer than the rest allows.
+
+    Examples
+    --------
+    A drive of nothing, an intercept that holds the potential at its threshold: 1 spike per tau_e.
+
+    >>> nothing = Drive([0.0, 1e4], [[0.0], [0.0]], [[0.0], [0.0]])
+    >>> recorded = SpikeLikelihood(nothing, SpikeTrains.from_lists([[9000.0]]))
+    >>> round(recorded.log_likelihood([10.0, 0.0, 0.0, 0.1, 1.0]), 1)
+    -9998.8
+    """
+
+    drive: Drive
+    trains: SpikeTrains
+    sites: np.ndarray | None = None
+    duration_ms: float | FloatArray | None = None
+    refractory_ms: float = neuron.REFRACTORY.value
+    escape_ms: float = ESCAPE_TIME_MS
+    _stretches: tuple[FloatArray, np.ndarray, np.ndarray] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        instance("drive", self.drive, Drive)
+        instance("trains", self.trains, SpikeTrains)
+        positive("refractory_ms", self.refractory_ms, "ms")
+        positive("escape_ms", self.escape_ms, "ms")
+        n_trains, times = len(self.trains), self.drive.times_ms
+        sites = np.arange(n_trains) if self.sites is None else np.array(self.sites, dtype=np.int64)
+        if sites.shape != (n_trains,) or (
+            n_trains and not 0 <= sites.min() <= sites.max() < self.drive.n_sites
+        ):
+            raise InputError(
+                f"sites must name one of {self.drive.n_sites} columns of the drive for each of {n_trains} "
+                f"trains, from 0: got {sites}."
+            )
+        given = times[-1] if self.duration_ms is None else self.duration_ms
+        ends = np.broadcast_to(float_array("duration_ms", np.atleast_1d(given), 1), n_trains)
+        if n_trains and (ends.min() <= times[0] or ends.max() > times[-1]):
+            raise InputError(
+                f"duration_ms must lie within the drive, {times[0]:g} ... {times[-1]:g} ms: got {given}."
+            )
+        _check_spikes(self.trains, times[0], ends, self.refractory_ms)
+        stretches = cut(
+            times,
+            self.drive.rate_kpa_per_ms,
+            self.drive.sed_kpa,
+            sites,
+            ends,
+            self.trains.times_ms,
+            self.trains.offsets,
+            float(self.refractory_ms),
+        )
+        for name, value in (("sites", sites), ("duration_ms", ends), ("_stretches", stretches)):
+            object.__setattr__(self, name, value)
+
+    @property
+    def n_spikes(self) -> int:
+        """Number of spikes in all trains."""
+        return self.trains.times_ms.size
+
+    @property
+    def observed_ms(self) -> float:
+        """Length of all recordings together. [ms]"""
+        return float(np.sum(np.asarray(self.duration_ms) - self.drive.times_ms[0]))
+
+    def log_likelihood(self, parameters: ArrayLike) -> float:
+        """Logarithm of the likelihood.
+
+        Parameters
+        ----------
+        parameters : array_like (5,)
+            beta/(C v) [1/ms], k_d/(C v) [1/kPa], k_s/(C v) [1/(kPa ms)], tau [ms] and the width of the
+            threshold over the threshold [1].
+
+        Returns
+        -------
+        float
+
+        Raises
+        ------
+        InputError
+            If there are not five finite numbers, or tau or the width is not positive.
+        """
+        return self.derivatives(parameters)[0]
+
+    def derivatives(self, parameters: ArrayLike) -> tuple[float, FloatArray, FloatArray]:
+        """Logarithm of the likelihood, its gradient, and the information in the data.
+
+        Parameters
+        ----------
+        parameters : array_like (5,)
+            As in `log_likelihood`.
+
+        Returns
+        -------
+        value : float
+        gradient : array (5,)
+            With respect to the parameters, per unit of each.
+        information : array (5, 5)
+            Fisher's, given when the spikes came; its inverse estimates the covariance of a fit.
+
+        Raises
+        ------
+        InputError
+            As in `log_likelihood`.
+        """
+        natural = checked_spike_parameters(parameters)
+        value, gradient, information = self.canonical_derivatives(canonical(natural))
+        jacobian = canonical_jacobian(natural)
+        return value, jacobian.T @ gradient, jacobian.T @ information @ jacobian
+
+    def canonical_derivatives(self, numbers: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Return the same in the numbers (A, B, C, G, ln tau), in which a fit is best done; unchecked."""
+
+        def block(trains: slice) -> tuple[float, FloatArray, FloatArray]:
+            gradient, information = np.zeros(N_PARAMETERS), np.zeros((N_PARAMETERS, N_PARAMETERS))
+            value = sweep(*self._part(trains), numbers, float(self.escape_ms), gradient, information)
+            return value, gradient, information
+
+        blocks = in_blocks(block, len(self.trains), TRAINS_PER_BLOCK)
+        value = math.fsum(part[0] for part in blocks) - self.n_spikes * math.log(self.escape_ms)
+        gradient = np.sum([part[1] for part in blocks], axis=0)
+        half = np.sum([part[2] for part in blocks], axis=0)
+        return value, gradient, half + np.triu(half, 1).T
+
+    def operational_times(self, parameters: ArrayLike) -> FloatArray:
+        """Integral of the hazard up to each spike, all trains laid end to end.
+
+        Under the true parameters these are the events of a Poisson process of rate 1: their differences are
+        independent and exponential with mean 1, and no recording's end disturbs that.
+
+        Parameters
+        ----------
+        parameters : array_like (5,)
+            As in `log_likelihood`.
+
+        Returns
+        -------
+        array (n_spikes,)
+
+        Raises
+        ------
+        InputError
+            As in `log_likelihood`.
+        """
+        numbers = canonical(checked_spike_parameters(parameters))
+        return operational_times(*self._part(slice(0, len(self.trains))), numbers, float(self.escape_ms))
+
+    def _part(self, trains: slice) -> tuple[FloatArray, np.ndarray]:
+        """Stretches of some trains."""
+        values, flags, offsets = self._stretches
+        stretches = slice(offsets[trains.start], offsets[trains.stop])
+        return values[stretches], flags[stretches]
+
+
+@dataclass(frozen=True)
+class TimeRescaling:
+    """Whether a model can have made the spikes, by the time-rescaling theorem (Brown et al. 2002).
+
+    Parameters
+    ----------
+    quantiles : array (n_spikes,)
+        1 - exp(-rescaled interval) of each interval, in order of size: uniform under the model.
+    statistic : float
+        Largest distance of their distribution from the uniform one (Kolmogorov-Smirnov).
+    p_value : float
+        Chance of a larger one, if the parameters are true; with fitted parameters it errs to the high side.
+    """
+
+    quantiles: FloatArray
+    statistic: float
+    p_value: float
+
+
+def time_rescaling(recorded: SpikeLikelihood, parameters: ArrayLike) -> TimeRescaling:
+    """Test a model on spike trains.
+
+    Parameters
+    ----------
+    recorded : SpikeLikelihood
+        The trains.
+    parameters : array_like (5,)
+        As in `SpikeLikelihood.log_likelihood`.
+
+    Returns
+    -------
+    TimeRescaling
+
+    Raises
+    ------
+    InputError
+        If there is no spike, or the parameters are none.
+
+    Examples
+    --------
+    >>> nothing = Drive([0.0, 9.0], [[0.0], [0.0]], [[0.0], [0.0]])
+    >>> recorded = SpikeLikelihood(nothing, SpikeTrains.from_lists([[1.0, 3.0, 5.5]]), refractory_ms=1e-9)
+    >>> time_rescaling(recorded, [100.0, 0.0, 0.0, 0.01, 1.0]).quantiles.round(2).tolist()
+    [0.63, 0.86, 0.92]
+    """
+    if recorded.n_spikes == 0:
+        raise InputError("time_rescaling needs at least one spike: got none.")
+    intervals = np.diff(recorded.operational_times(parameters), prepend=0.0)
+    quantiles = np.sort(-np.expm1(-intervals))
+    test = kstest(quantiles, "uniform")
+    return TimeRescaling(quantiles, float(test.statistic), float(test.pvalue))
+
+
+def _check_spikes(trains: SpikeTrains, start_ms: float, ends_ms: FloatArray, refractory_ms: float) -> None:
+    for number, end in enumerate(ends_ms):
+        train = trains[number]
+        if train.size and not start_ms < train[0] <= train[-1] <= end:
+            outside = train[0] if train[0] <= start_ms else train[-1]
+            raise InputError(
+                f"spikes must lie after {start_ms:g} and until {end:g} ms, where the recording ends: train "
+                f"{number} has one at {outside:g} ms."
+            )
+        close = np.flatnonzero(np.diff(train) <= refractory_ms)
+        if close.size:
+            raise InputError(
+                f"spikes must lie further apart than refractory_ms, {refractory_ms:g} ms: train {number} has "
+                f"two at {train[close[0]]:g} and {train[close[0] + 1]:g} ms; give a shorter refractory_ms."
+            )

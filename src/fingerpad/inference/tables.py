@@ -1,0 +1,145 @@
+"""Tables that users bring: rows with their place in the file, so that an error can name it."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fingerpad.core.checks import finite
+from fingerpad.core.errors import InputError
+
+Check = Callable[[str, Any, str], float]
+
+
+@dataclass(frozen=True)
+class Line:
+    """One row of a table and where it stands.
+
+    Parameters
+    ----------
+    place : str
+        File and line as a person would look for them.
+    entries : mapping of str to Any
+        Texts, or values of a file that has types, by column; an absent or empty entry was not given.
+
+    Examples
+    --------
+    >>> line = Line("rates.csv, line 2", {"static_rate_hz": "61"})
+    >>> line.number("static_rate_hz", "spikes/s"), line.has("fold")
+    (61.0, False)
+    """
+
+    place: str
+    entries: Mapping[str, Any]
+
+    def has(self, column: str) -> bool:
+        """Whether this row gives a value for `column`."""
+        value = self.entries.get(column)
+        return value is not None and not (isinstance(value, str) and not value.strip())
+
+    def text(self, column: str) -> str:
+        """Entry of `column` as text without spaces around it, else raise `InputError`."""
+        if not self.has(column):
+            raise InputError(f"{self.place}: {column} must be given, its entry is empty.")
+        return str(self.entries[column]).strip()
+
+    def number(self, column: str, unit: str = "", check: Check = finite) -> float:
+        """Entry of `column` as a number that passes `check`, else raise `InputError`."""
+        self.text(column)
+        with self.placed():
+            return check(column, self.entries[column], unit)
+
+    def refuse_others(self, known: Collection[str], kind: str) -> None:
+        """Raise `InputError` if the row gives something that a `kind` does not have."""
+        for column in self.entries:
+            if self.has(column) and column not in known:
+                raise InputError(
+                    f"{self.place}: a {kind} has no {column}, only {', '.join(known)}: leave it empty."
+                )
+
+    @contextmanager
+    def placed(self) -> Iterator[None]:
+        """Put the place in front of an `InputError` from within."""
+        try:
+            yield
+        except InputError as error:
+            raise InputError(f"{self.place}: {error}") from error
+
+
+def read_text(path: Path) -> str:
+    """Text of a file in UTF-8, else raise `InputError`."""
+    try:
+        return Path(path).read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(f"{path} must be a file that can be read: {error.strerror}.") from error
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path} must be text in UTF-8: byte {error.start + 1} is not; save it as UTF-8."
+        ) from error
+
+
+def read_csv(path: Path, known: Sequence[str]) -> list[Line]:
+    r"""Rows of a CSV file: comments begin with #, then a header, then one row per line.
+
+    Parameters
+    ----------
+    path : Path
+        A file in UTF-8, its entries separated by commas.
+    known : sequence of str
+        Columns that it may have, in any order.
+
+    Returns
+    -------
+    list of Line
+        At least one.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is empty, has a column that is unknown or stands twice, or a row with
+        too few or too many entries.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "rates.csv"
+    ...     _ = path.write_text("# mine\nstimulus,static_rate_hz\nedge,61\n", encoding="utf-8")
+    ...     read_csv(path, ("stimulus", "static_rate_hz"))[0].number("static_rate_hz")
+    61.0
+    """
+    reader = csv.reader(_without_comments(read_text(path)), strict=True)
+    try:
+        rows = [(reader.line_num, row) for row in reader if any(entry.strip() for entry in row)]
+    except csv.Error as error:
+        raise InputError(f"{path}, line {reader.line_num}: cannot be read as CSV: {error}.") from error
+    if len(rows) < 2:
+        raise InputError(f"{path} must hold a header and at least one row: it has {len(rows)} of them.")
+    (header_line, header), *body = rows
+    columns = [column.strip() for column in header]
+    for column in columns:
+        if column not in known:
+            raise InputError(
+                f"{path}, line {header_line}: column {column!r} is unknown, only {', '.join(known)} can be."
+            )
+        if columns.count(column) > 1:
+            raise InputError(f"{path}, line {header_line}: column {column} stands twice, keep one.")
+    lines = []
+    for number, row in body:
+        if len(row) != len(columns):
+            raise InputError(
+                f"{path}, line {number}: must have {len(columns)} entries, one per column: got {len(row)}."
+            )
+        lines.append(Line(f"{path}, line {number}", dict(zip(columns, row, strict=True))))
+    return lines
+
+
+def _without_comments(text: str) -> Iterator[str]:
+    """Lines of a text; comments leave empty ones, so that the numbers of the others stay."""
+    for line in io.StringIO(text, newline=""):
+        yield "\n" if line.lstrip().startswith("#") else line

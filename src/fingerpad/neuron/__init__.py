@@ -1,0 +1,1 @@
+"""Transduction, membrane, noise, spikes, afferents, populations and their response maps."""

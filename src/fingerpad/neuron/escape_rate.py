@@ -1,0 +1,356 @@
+"""Membrane current -> spike times of a leaky integrate-and-fire neuron whose threshold is soft.
+
+The potential V follows Eq. 5 as ever and returns to 0 after a spike. It does not have to reach the
+threshold v: at any time the neuron fires with the hazard (escape rate)
+
+    h(V) = 1/tau_e exp((V - v)/delta),
+
+which is small below the threshold and grows without bound above it (Gerstner & Kistler 2002, section
+5.3). With u = V/v and the width delta/v it needs no unit of potential. As the width shrinks the threshold
+hardens into that of `fingerpad.neuron.lif`.
+
+Between two knots of the current u is known in closed form (`fingerpad.neuron.exact_spikes`), and the
+integral of h
+is done by Gauss's formula on short panels. Spikes follow from it by rescaling time:
+measured in the integral of h, the intervals between spikes are exponential with mean 1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from fingerpad.core.blocks import in_blocks
+from fingerpad.core.checks import FloatArray, float_array, positive
+from fingerpad.core.errors import InputError
+from fingerpad.core.philox import four_uniforms
+from fingerpad.core.random_streams import Presentations, Purpose, checked_sites
+from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.neuron.lif import LeakyIntegrateAndFire
+
+ESCAPE_TIME_MS = 1.0
+"""Mean time to a spike while the potential is held at the threshold, tau_e: a convention. [ms]"""
+
+TRAINS_PER_BLOCK = 32
+"""Trains that one thread makes at a time."""
+
+_ESCAPE = int(Purpose.ESCAPE)
+_NODES = tuple(0.5 + 0.5 * np.polynomial.legendre.leggauss(5)[0])
+_WEIGHTS = tuple(0.5 * np.polynomial.legendre.leggauss(5)[1])
+_LONGEST_PANEL = 0.5
+"""Time over tau that one panel spans, at most: over longer ones the potential bends."""
+
+_HIGHEST_STEP = 1.0
+"""Change of the logarithm of the hazard over one panel, at most: Gauss's formula then errs by 1e-9."""
+
+_NEGLIGIBLE = -60.0
+"""A hazard of exp(-60)/tau_e never fires: panels below it are passed over."""
+
+_MOST_PANELS = 1.0e6
+_ROUND_OFF = 1.0e-14
+_MOST_REFINEMENTS = 100
+
+
+@dataclass(frozen=True)
+class EscapeRate:
+    """A leaky integrate-and-fire neuron with a soft threshold.
+
+    Parameters
+    ----------
+    membrane : LeakyIntegrateAndFire
+        Its numbers; the threshold is where the hazard is 1/tau_e.
+    width : float
+        Softness of the threshold over the threshold itself, delta/v. [1]
+    escape_ms : float, optional
+        tau_e. Another value moves the threshold and changes no answer: docs/decisions/escape-rate.md. [ms]
+
+    Raises
+    ------
+    InputError
+        If a number is not positive.
+
+    Examples
+    --------
+    >>> neuron = LeakyIntegrateAndFire(68.0, 1e-6, 50.0, 1.0)
+    >>> steady = CurrentTraces([0.0, 100.0], [[2e-6], [2e-6]])
+    >>> EscapeRate(neuron, width=0.1).spikes(steady, seed=1)[0].round(1).tolist()
+    [28.7, 56.3, 83.4]
+    >>> EscapeRate(neuron, width=1e-4).spikes(steady, seed=1)[0].round(1).tolist()
+    [31.2, 63.4, 95.6]
+    """
+
+    membrane: LeakyIntegrateAndFire
+    width: float
+    escape_ms: float = ESCAPE_TIME_MS
+
+    def __post_init__(self) -> None:
+        positive("width", self.width)
+        positive("escape_ms", self.escape_ms, "ms")
+
+    def hazard_per_ms(self, potential_mv: ArrayLike) -> FloatArray:
+        """Chance to fire per time at a potential, h(V).
+
+        Parameters
+        ----------
+        potential_mv : array_like
+            V. [mV]
+
+        Returns
+        -------
+        array
+            Of the same shape. [1/ms]
+        """
+        relative = np.asarray(potential_mv, np.float64) / self.membrane.threshold_mv
+        return np.exp((relative - 1.0) / self.width) / self.escape_ms
+
+    def spikes(
+        self, current: CurrentTraces, seed: int, presentations: Presentations | None = None
+    ) -> SpikeTrains:
+        """Spike times by time rescaling: the integral of h from spike to spike is exponential with mean 1.
+
+        Parameters
+        ----------
+        current : CurrentTraces
+            One column per site. [mA]
+        seed : int
+            Of the run; the same seed gives the same spikes on any number of threads.
+        presentations : Presentations, optional
+            Site, trial and receptor of each train. Default: each site is a receptor, touched once.
+
+        Returns
+        -------
+        SpikeTrains
+            One per presentation.
+
+        Raises
+        ------
+        InputError
+            If a presentation names a site that is not there.
+        """
+        everyone = presentations or Presentations.of_population(current.n_sites)
+        checked_sites(everyone.sites, current.n_sites)
+        drives = self._relative_drive(current)
+        numbers = (
+            float(self.membrane.time_constant_ms),
+            float(self.membrane.refractory_ms),
+            float(self.width),
+            float(self.escape_ms),
+        )
+
+        def trains(some: slice) -> SpikeTrains:
+            part = everyone.part(some)
+            keys = part.sites, part.trials, part.receptors
+            return SpikeTrains(*_escape_trains(current.times_ms, drives, *keys, seed, *numbers))
+
+        return SpikeTrains.joined(in_blocks(trains, len(everyone), TRAINS_PER_BLOCK))
+
+    def intensity_per_ms(
+        self, current: CurrentTraces, spikes: SpikeTrains, sites: ArrayLike, times_ms: ArrayLike
+    ) -> FloatArray:
+        """Hazard at some times, given the spikes that came before; 0 during the refractory period.
+
+        Parameters
+        ----------
+        current : CurrentTraces
+            One column per site. [mA]
+        spikes : SpikeTrains
+            One train per presentation.
+        sites : int array_like (n_trains,)
+            Column of `current` that each train answers.
+        times_ms : array_like (n_times,)
+            Increasing, within the times of the current. [ms]
+
+        Returns
+        -------
+        array (n_times, n_trains)
+            At the time of a spike, the hazard just before it. [1/ms]
+
+        Raises
+        ------
+        InputError
+            If shapes disagree or a time lies outside.
+        """
+        chosen = checked_sites(np.asarray(sites, np.int64), current.n_sites)
+        wanted = float_array("times_ms", times_ms, 1)
+        first, last = current.times_ms[0], current.times_ms[-1]
+        if chosen.size != len(spikes):
+            raise InputError(f"sites needs one entry per train: got {chosen.size} for {len(spikes)}.")
+        if wanted.size and (np.any(np.diff(wanted) < 0) or wanted[0] < first or wanted[-1] > last):
+            raise InputError(f"times_ms must increase within {first:g} ... {last:g} ms: got {wanted[:4]} ...")
+        potentials = _potentials_at(
+            current.times_ms,
+            self._relative_drive(current),
+            chosen,
+            spikes.times_ms,
+            spikes.offsets,
+            wanted,
+            float(self.membrane.time_constant_ms),
+            float(self.membrane.refractory_ms),
+        )
+        # At rest the potential is -inf, whose hazard is 0.
+        return np.exp((potentials - 1.0) / self.width) / self.escape_ms
+
+    def _relative_drive(self, current: CurrentTraces) -> FloatArray:
+        """I/(C v), a row for each site. [1/ms]"""
+        scale = self.membrane.capacitance_mf * self.membrane.threshold_mv
+        return np.ascontiguousarray(current.current_ma.T) / scale
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def relative_potential(x: float, start: float, steady: float, drift: float) -> float:
+    """Potential over threshold x = s/tau after u = `start` and w = `steady`; w grows by `drift` x."""
+    gone = -math.expm1(-x)
+    return start + (steady - start) * gone + drift * (x - gone)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def panels(length: float, start: float, steady: float, drift: float, width: float) -> int:
+    """Into how many panels to cut a stretch, for Gauss's formula with five nodes to err by 1e-9 or less.
+
+    The slope of u is monotone, so that it is steepest at one of the ends.
+    """
+    rise = steady - start
+    steepest = max(abs(rise), abs(drift + (rise - drift) * math.exp(-length)))
+    per_length = max(steepest / (width * _HIGHEST_STEP), 1.0 / _LONGEST_PANEL)
+    return max(1, math.ceil(min(per_length * length, _MOST_PANELS)))
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _integral(begin: float, end: float, start: float, steady: float, drift: float, width: float) -> float:
+    """Integral of exp((u - 1)/width) over one panel, in x."""
+    total = 0.0
+    for node, weight in zip(_NODES, _WEIGHTS):  # noqa: B905 (Numba knows no strict)
+        u = relative_potential(begin + node * (end - begin), start, steady, drift)
+        total += weight * math.exp((u - 1.0) / width)
+    return (end - begin) * total
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _where_reached(
+    wanted: float, begin: float, end: float, start: float, steady: float, drift: float, width: float
+) -> float:
+    """Time until which the integral from `begin` is `wanted`, before `end`. Newton's method, bracketed."""
+    low, high = begin, end
+    guess = begin + (end - begin) * wanted / _integral(begin, end, start, steady, drift, width)
+    for _ in range(_MOST_REFINEMENTS):
+        if not low < guess < high:
+            guess = 0.5 * (low + high)
+        missing = wanted - _integral(begin, guess, start, steady, drift, width)
+        if missing > 0.0:
+            low = guess
+        else:
+            high = guess
+        step = missing / math.exp((relative_potential(guess, start, steady, drift) - 1.0) / width)
+        guess += step
+        if abs(step) <= _ROUND_OFF * end or high - low <= _ROUND_OFF * end:
+            break
+    return min(max(guess, low), high)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _escape_trains(
+    times: FloatArray,
+    drives: FloatArray,
+    sites: np.ndarray,
+    trials: np.ndarray,
+    receptors: np.ndarray,
+    seed: int,
+    tau: float,
+    refractory: float,
+    width: float,
+    escape: float,
+) -> tuple[FloatArray, np.ndarray]:
+    """Spike times of all trains, one after the other, and where each one's begin."""
+    found = np.empty(64 * (sites.size + 1))
+    offsets = np.zeros(sites.size + 1, dtype=np.int64)
+    count = 0
+    for train in range(sites.size):
+        drive = drives[sites[train]]
+        n_spikes = 0
+        draws = four_uniforms(seed, trials[train], receptors[train], _ESCAPE, 1)
+        wanted = -math.log1p(-draws[0]) * escape / tau  # in units of the integral over x
+        u, ready = 0.0, times[0]
+        for knot in range(times.size - 1):
+            first, last = times[knot], times[knot + 1]
+            begin = max(first, ready)
+            while begin < last:
+                drift = tau * (drive[knot + 1] - drive[knot]) / ((last - first) / tau)
+                steady = tau * drive[knot] + drift * ((begin - first) / tau)
+                length = (last - begin) / tau
+                n_panels = panels(length, u, steady, drift, width)
+                x = -1.0
+                for panel in range(n_panels):
+                    left, right = length * panel / n_panels, length * (panel + 1) / n_panels
+                    highest = max(
+                        relative_potential(left, u, steady, drift),
+                        relative_potential(right, u, steady, drift),
+                    )
+                    if highest - 1.0 < (_NEGLIGIBLE - _HIGHEST_STEP) * width:
+                        continue
+                    part = _integral(left, right, u, steady, drift, width)
+                    if part >= wanted:
+                        x = _where_reached(wanted, left, right, u, steady, drift, width)
+                        break
+                    wanted -= part
+                if x < 0.0:
+                    u = relative_potential(length, u, steady, drift)
+                    break
+                if count == found.size:
+                    found = np.concatenate((found, np.empty(found.size)))
+                found[count] = min(begin + tau * x, last)
+                ready = found[count] + refractory
+                begin = ready
+                count += 1
+                n_spikes += 1
+                if n_spikes % 4 == 0:
+                    block = n_spikes // 4 + 1
+                    draws = four_uniforms(seed, trials[train], receptors[train], _ESCAPE, block)
+                wanted = -math.log1p(-draws[n_spikes % 4]) * escape / tau
+                u = 0.0
+        offsets[train + 1] = count
+    return found[:count], offsets
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _potentials_at(
+    times: FloatArray,
+    drives: FloatArray,
+    sites: np.ndarray,
+    spikes: FloatArray,
+    offsets: np.ndarray,
+    wanted: FloatArray,
+    tau: float,
+    refractory: float,
+) -> FloatArray:
+    """Potential over threshold at the wanted times (n_times, n_trains); -inf at rest."""
+    found = np.full((wanted.size, sites.size), -np.inf)
+    for train in range(sites.size):
+        drive = drives[sites[train]]
+        spike, place = offsets[train], 0
+        u, ready, time = 0.0, times[0], times[0]
+        knot = 0
+        while place < wanted.size:
+            while knot < times.size - 2 and times[knot + 1] <= time:
+                knot += 1
+            first, last = times[knot], times[knot + 1]
+            target = min(last, wanted[place])
+            fires = spike < offsets[train + 1] and spikes[spike] <= target
+            if fires:
+                target = min(target, spikes[spike])
+            begin = max(time, ready)
+            if begin < target:
+                drift = tau * (drive[knot + 1] - drive[knot]) / ((last - first) / tau)
+                steady = tau * drive[knot] + drift * ((begin - first) / tau)
+                u = relative_potential((target - begin) / tau, u, steady, drift)
+            if wanted[place] == target:
+                found[place, train] = u if target >= ready else -np.inf
+                place += 1
+            elif fires:
+                spike += 1
+                u, ready = 0.0, target + refractory
+            time = target
+    return found

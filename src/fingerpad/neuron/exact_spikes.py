@@ -1,0 +1,302 @@
+"""When many membranes cross their threshold, exactly: the kernels behind `fingerpad.neuron.lif`.
+
+Eq. 5 says that the potential u follows w = R I, the potential that the present current would hold: in the
+time x = s/tau, with R = tau/C, du/dx = w - u. Between two knots the current is a straight line, w = w0 + c x,
+and the potential has the closed form
+
+    u(x) = u0 + (w0 - u0) g + c (x - g),    g = 1 - e^-x,
+
+whose slope is monotone: u has at most one extremum between two knots. A crossing of the threshold can
+therefore be bracketed with certainty, and is then refined to round-off.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from fingerpad.core.checks import FloatArray
+
+_MOST_REFINEMENTS = 200
+_ROUND_OFF = 4.0 * float(np.finfo(np.float64).eps)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _potential(x: float, gone: float, start: float, steady: float, drift: float) -> float:
+    """Solve Eq. 5 in closed form: u at x, from u = `start` and w = `steady` at 0; `gone` is g."""
+    return start + (steady - start) * gone + drift * (x - gone)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _first_guess(missing: float, rise: float, drift: float) -> float:
+    """Time in which the potential gains what is `missing`, roughly, from r = `rise` and c = `drift`.
+
+    Halley's formula gives a first time, h = 2 missing r/q. Were the current steady, its mean until h, then
+    x = -ln(1 - s) with s = missing/(r + c h/2), here by its Padé approximant s (6 - 3 s)/(6 - 6 s + s^2).
+    Put together it is one fraction: divisions are as dear as all else.
+    """
+    q = 2.0 * rise * rise + (drift - rise) * missing
+    a = missing * q
+    b = rise * (q + drift * missing)  # s = a/b
+    return 3.0 * a * (2.0 * b - a) / (6.0 * b * (b - a) + a * a)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _next_guess(guess: float, missing: float, rise: float, drift: float, high: float) -> tuple[float, bool]:
+    """Better guess of the crossing, and whether it is exact to the round-off of times up to `high`.
+
+    Each guess is the origin of the same law: from there the potential gains
+
+        r y + b (y^2/2 - y^3/6 + y^4/24 - ...)    in the time y,    r = w - u,    b = c - r.
+
+    Halley's formula finds the y that gains what is `missing`, and one step of Newton on the series up to y^5
+    improves it. What the series leaves out and the error of Newton's step are known.
+    """
+    bend = drift - rise
+    y = 2.0 * missing * rise / (2.0 * rise * rise + bend * missing)
+    gained = y * (rise + bend * y * (1 / 2 - y * (1 / 6 - y * (1 / 24 - y * (1 / 120)))))
+    rise_there = rise + bend * y * (1 - y * (1 / 2 - y * (1 / 6 - y * (1 / 24))))
+    correction = (missing - gained) / rise_there
+    y2 = y * y
+    error = abs(bend) * (y2 * y2 * y2 * (1 / 720) + 0.5 * correction * correction)
+    return guess + (y + correction), error <= _ROUND_OFF * high * abs(rise_there)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _refine(
+    high: float, reached: float, start: float, steady: float, drift: float, threshold: float
+) -> float:
+    """Time of the only crossing within (0, high], where the potential has `reached` the threshold.
+
+    The guesses of `_next_guess`, or bisection where they leave the bracket.
+    """
+    low = 0.0
+    guess = high * min(1.0, (threshold - start) / (reached - start))
+    for _ in range(_MOST_REFINEMENTS):
+        potential = _potential(guess, -math.expm1(-guess), start, steady, drift)
+        if potential < threshold:
+            low = guess
+        else:
+            high = guess
+        rise = steady + drift * guess - potential
+        following, exact = _next_guess(guess, threshold - potential, rise, drift, high)
+        if not low < following < high:
+            following, exact = 0.5 * (low + high), False
+        if exact or abs(following - guess) <= _ROUND_OFF * high:
+            return following
+        guess = following
+    return guess
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def first_crossing(
+    length: float, start: float, steady: float, later: float, threshold: float
+) -> tuple[bool, float, float]:
+    """Let one potential run between two knots, for kernels that treat neurons one by one.
+
+    Parameters
+    ----------
+    length : float
+        Time between the knots over tau, above 0. [1]
+    start : float
+        Potential at the first knot, below the threshold. [mV]
+    steady, later : float
+        w at the two knots. [mV]
+    threshold : float
+        Potential to reach. [mV]
+
+    Returns
+    -------
+    crosses : bool
+        Whether the potential reaches the threshold by the second knot.
+    x : float
+        When it first does; the length if it does not. [1]
+    reached : float
+        Potential at the second knot if the threshold were not there. [mV]
+    """
+    drift = (later - steady) / length
+    at_knot = reached = _potential(length, -math.expm1(-length), start, steady, drift)
+    high = length
+    if reached < threshold and steady >= threshold > later:
+        # As in `_bracket`: the potential peaks between the knots.
+        high = min(high, math.log1p(-(steady - start) / drift))
+        reached = _potential(high, -math.expm1(-high), start, steady, drift)
+    if reached < threshold:
+        return False, length, at_knot
+    return True, _refine(high, reached, start, steady, drift, threshold), at_knot
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def exact_trains(
+    times: FloatArray,
+    currents: FloatArray,
+    tau: float,
+    capacitance: float,
+    threshold: float,
+    refractory: float,
+) -> tuple[FloatArray, np.ndarray]:
+    """Spike times of all neurons, one after the other, and where each one's begin.
+
+    Parameters
+    ----------
+    times : array (n_knots,)
+        Knots, in order; one that stands twice is a jump. [ms]
+    currents : array (n_knots, n_neurons)
+        Current at the knots, a straight line between them. [mA]
+    tau, capacitance, threshold, refractory : float
+        The membrane's numbers, in the units of `fingerpad.neuron.lif.LeakyIntegrateAndFire`.
+
+    Returns
+    -------
+    array (n_spikes,)
+        Spike times, neuron by neuron. [ms]
+    array (n_neurons + 1,)
+        Where each neuron's begin.
+
+    Notes
+    -----
+    All neurons pass an interval before any passes the next: they share its exponential, rows of `currents`
+    lie in memory as they are read, and no neuron's arithmetic waits for another's. For
+    the same reason those that fire do so in rounds of one spike each, stage by stage in short loops.
+    """
+    n_neurons = currents.shape[1]
+    resistance = tau / capacitance
+    potentials = np.zeros(n_neurons)
+    ready = np.full(n_neurons, times[0])
+    busy = np.empty(n_neurons, dtype=np.int64)
+    searches = np.empty((6, n_neurons))
+    crossings = np.empty(n_neurons)
+    found = np.empty(64 * (n_neurons + 1))
+    finder = np.empty(found.size, dtype=np.int64)
+    count = 0
+    steady = resistance * currents[0]
+    for knot in range(times.size - 1):
+        start, end = times[knot], times[knot + 1]
+        now, steady = steady, resistance * currents[knot + 1]
+        if start == end:
+            continue
+        n_busy = _pass(start, (end - start) / tau, now, steady, threshold, potentials, ready, busy)
+        while n_busy > 0:
+            n_busy = _bracket(
+                start, end, tau, now, steady, threshold, potentials, ready, busy[:n_busy], searches
+            )
+            _cross(searches[:, :n_busy], threshold, crossings)
+            if count + n_busy > found.size:
+                found = np.concatenate((found, np.empty(found.size)))
+                finder = np.concatenate((finder, np.empty(finder.size, dtype=np.int64)))
+            for n in range(n_busy):
+                found[count], finder[count] = searches[0, n] + tau * crossings[n], busy[n]
+                potentials[busy[n]] = 0.0
+                ready[busy[n]] = found[count] + refractory
+                count += 1
+    return _by_neuron(found[:count], finder[:count], n_neurons)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _pass(
+    start: float,
+    length: float,
+    now: FloatArray,
+    later: FloatArray,
+    threshold: float,
+    potentials: FloatArray,
+    ready: FloatArray,
+    busy: np.ndarray,
+) -> int:
+    """Take all neurons that neither rest nor may fire to the next knot; list the others, return their number.
+
+    A potential equals w where it peaks. Between knots that both lie below the threshold it reaches the
+    threshold only if w falls past it: there is nothing else to rule out.
+    """
+    gone = -math.expm1(-length)
+    # The closed form sorted by u, w now and w later.
+    of_later = 1.0 - gone / length
+    of_now = gone - of_later
+    n_busy = 0
+    for neuron in range(potentials.size):
+        w0, w1 = now[neuron], later[neuron]
+        reached = (1.0 - gone) * potentials[neuron] + (of_now * w0 + of_later * w1)
+        if ready[neuron] > start or reached >= threshold or w0 >= threshold > w1:
+            busy[n_busy] = neuron
+            n_busy += 1
+        else:
+            potentials[neuron] = reached
+    return n_busy
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _bracket(
+    start: float,
+    end: float,
+    tau: float,
+    now: FloatArray,
+    later: FloatArray,
+    threshold: float,
+    potentials: FloatArray,
+    ready: FloatArray,
+    busy: np.ndarray,
+    searches: FloatArray,
+) -> int:
+    """Keep those of the `busy` that fire before the next knot, and return their number.
+
+    Each of them gets a column of `searches`: where it begins [ms] and until when at most it crosses, the
+    potential at both, steady potential and drift. The others go to the next knot.
+    """
+    n_firing = 0
+    for neuron in busy:
+        begin = max(start, ready[neuron])
+        if begin >= end:
+            continue
+        drift = (later[neuron] - now[neuron]) / ((end - start) / tau)
+        steady = now[neuron] + drift * ((begin - start) / tau)
+        high = (end - begin) / tau
+        potential = potentials[neuron]
+        at_knot = reached = _potential(high, -math.expm1(-high), potential, steady, drift)
+        if reached < threshold and steady >= threshold > later[neuron]:
+            # du/dx = c + (r - c) e^-x with r = w0 - u0 > 0 and c < 0: the potential peaks where that is 0.
+            high = min(high, math.log1p(-(steady - potential) / drift))
+            reached = _potential(high, -math.expm1(-high), potential, steady, drift)
+        if reached < threshold:
+            potentials[neuron] = at_knot
+            continue
+        busy[n_firing] = neuron
+        searches[0, n_firing], searches[1, n_firing] = begin, high
+        searches[2, n_firing], searches[3, n_firing] = potential, reached
+        searches[4, n_firing], searches[5, n_firing] = steady, drift
+        n_firing += 1
+    return n_firing
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _cross(searches: FloatArray, threshold: float, crossings: FloatArray) -> None:
+    """Find the crossing of every search: nearly always, one guess and one improvement are exact."""
+    _, highs, starts, reached, steady, drift = searches
+    guesses, gone = np.empty((2, highs.size))
+    for n in range(highs.size):
+        guess = _first_guess(threshold - starts[n], steady[n] - starts[n], drift[n])
+        guesses[n] = guess if 0.0 < guess < highs[n] else highs[n]
+    for n in range(highs.size):
+        gone[n] = -math.expm1(-guesses[n])
+    for n in range(highs.size):
+        potential = _potential(guesses[n], gone[n], starts[n], steady[n], drift[n])
+        rise = steady[n] + drift[n] * guesses[n] - potential
+        crossings[n], exact = _next_guess(guesses[n], threshold - potential, rise, drift[n], highs[n])
+        if not (exact and 0.0 < crossings[n] <= highs[n]):
+            crossings[n] = _refine(highs[n], reached[n], starts[n], steady[n], drift[n], threshold)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _by_neuron(found: FloatArray, finder: np.ndarray, n_neurons: int) -> tuple[FloatArray, np.ndarray]:
+    """Sort spikes by the neuron that fired them, each neuron's in the order they were found."""
+    offsets = np.zeros(n_neurons + 1, dtype=np.int64)
+    for neuron in finder:
+        offsets[neuron + 1] += 1
+    offsets = np.cumsum(offsets)
+    place = offsets[:-1].copy()
+    trains = np.empty(found.size)
+    for spike in range(found.size):
+        trains[place[finder[spike]]] = found[spike]
+        place[finder[spike]] += 1
+    return trains, offsets

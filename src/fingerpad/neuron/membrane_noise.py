@@ -1,0 +1,226 @@
+"""What may be noisy about a membrane and its input: the current, the threshold, the gain of the end organ.
+
+Each kind says how much and how its numbers are drawn; `fingerpad.neuron.noisy_lif` lets a membrane fire with
+them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray, not_negative, one_of, positive
+from fingerpad.core.errors import InputError
+from fingerpad.core.random_streams import Presentations, Purpose, normals_of
+
+STEP_MS = 0.1
+"""Default step of the noise of the current. [ms]"""
+
+
+@dataclass(frozen=True)
+class WhiteCurrentNoise:
+    """Noise of the current without memory.
+
+    Over a time T the charge that it brings is normal with variance D² T. It is constant within each step,
+    so large that the free potential at the ends of steps has exactly the law that white noise gives it;
+    what is left out are excursions within a step.
+
+    Parameters
+    ----------
+    intensity_ma_sqrt_ms : float
+        Square root of its spectral density, D. [mA √ms]
+    step_ms : float, optional
+        Step in time. [ms]
+
+    Raises
+    ------
+    InputError
+        If the intensity is negative or the step is not positive.
+    """
+
+    intensity_ma_sqrt_ms: float
+    step_ms: float = STEP_MS
+
+    def __post_init__(self) -> None:
+        not_negative("intensity_ma_sqrt_ms", self.intensity_ma_sqrt_ms, "mA √ms")
+        positive("step_ms", self.step_ms, "ms")
+
+    def level_ma(self, time_constant_ms: float) -> float:
+        """Return the standard deviation of the current of one step. [mA]
+
+        With e = exp(-h/tau) a step of constant current s z adds R (1 - e) s z to the potential, and white
+        noise adds a normal number of variance D²/C² (1 - e²) tau/2. Both agree if
+
+            s² = D²/(2 tau) (1 + e)/(1 - e).
+
+        Parameters
+        ----------
+        time_constant_ms : float
+            Of the membrane, tau. [ms]
+
+        Returns
+        -------
+        float
+            s; for short steps D/sqrt(h). [mA]
+
+        Examples
+        --------
+        >>> round(WhiteCurrentNoise(2.0, step_ms=0.01).level_ma(100.0), 6)
+        20.0
+        """
+        ratio = 1.0 / math.tanh(0.5 * self.step_ms / time_constant_ms)  # (1 + e)/(1 - e)
+        return self.intensity_ma_sqrt_ms * math.sqrt(0.5 * ratio / time_constant_ms)
+
+
+@dataclass(frozen=True)
+class CorrelatedCurrentNoise:
+    """Noise of the current with a memory: an Ornstein-Uhlenbeck process in its steady state.
+
+    Its values at the ends of steps have exactly the law of the process, and a straight line joins them.
+
+    Parameters
+    ----------
+    standard_deviation_ma : float
+        At any one time. [mA]
+    correlation_ms : float
+        Time in which its correlation falls to 1/e. [ms]
+    step_ms : float, optional
+        Step in time, no longer than the correlation. [ms]
+
+    Raises
+    ------
+    InputError
+        If a number is out of range.
+    """
+
+    standard_deviation_ma: float
+    correlation_ms: float
+    step_ms: float = STEP_MS
+
+    def __post_init__(self) -> None:
+        not_negative("standard_deviation_ma", self.standard_deviation_ma, "mA")
+        positive("correlation_ms", self.correlation_ms, "ms")
+        positive("step_ms", self.step_ms, "ms")
+        if self.step_ms > self.correlation_ms:
+            raise InputError(
+                f"step_ms must not exceed correlation_ms, {self.correlation_ms}: got {self.step_ms}; take a "
+                "shorter step, or WhiteCurrentNoise."
+            )
+
+    @property
+    def memory(self) -> float:
+        """Correlation from one step to the next."""
+        return math.exp(-self.step_ms / self.correlation_ms)
+
+
+@dataclass(frozen=True)
+class ThresholdNoise:
+    """A new threshold for each interval between spikes: log-normal, so that none is negative.
+
+    Parameters
+    ----------
+    relative_standard_deviation : float
+        Over the mean, which is the threshold of the membrane. [1]
+    """
+
+    relative_standard_deviation: float
+
+    def __post_init__(self) -> None:
+        not_negative("relative_standard_deviation", self.relative_standard_deviation)
+
+
+@dataclass(frozen=True)
+class GainNoise:
+    """How strongly an end organ answers differs: a log-normal factor on the current that touch causes.
+
+    Parameters
+    ----------
+    relative_standard_deviation : float
+        Of the factor, whose mean is 1. [1]
+    new_for : {"presentation", "receptor"}, optional
+        Whether each presentation has a factor of its own, or each receptor one for all its presentations.
+    """
+
+    relative_standard_deviation: float
+    new_for: str = "presentation"
+
+    def __post_init__(self) -> None:
+        not_negative("relative_standard_deviation", self.relative_standard_deviation)
+        one_of("new_for", self.new_for, ("presentation", "receptor"))
+
+    def factors(self, seed: int, presentations: Presentations) -> FloatArray:
+        """Factor of each train.
+
+        Parameters
+        ----------
+        seed : int
+            Of the run.
+        presentations : Presentations
+            Whose random numbers to draw.
+
+        Returns
+        -------
+        array (n_trains,)
+
+        Examples
+        --------
+        >>> twice = Presentations([0, 0], trials=[0, 1], receptors=[4, 4])
+        >>> GainNoise(0.2, new_for="receptor").factors(1, twice).round(3).tolist()
+        [1.286, 1.286]
+        """
+        whose = presentations
+        if self.new_for == "receptor":
+            receptors, which = np.unique(presentations.receptors, return_inverse=True)
+            whose = Presentations(receptors, np.zeros_like(receptors), receptors)
+        draws = normals_of(seed, whose, Purpose.GAIN, 1)[:, 0]
+        spread = log_spread(self.relative_standard_deviation)
+        factors = np.exp(spread * draws - 0.5 * spread**2)
+        return factors if self.new_for == "presentation" else factors[which]
+
+
+def log_spread(relative_standard_deviation: float) -> float:
+    """Return the standard deviation s of the logarithm of a log-normal number: s² = ln(1 + sigma²).
+
+    exp(s z - s²/2) with a standard normal z then has mean 1 and standard deviation sigma.
+
+    Parameters
+    ----------
+    relative_standard_deviation : float
+        sigma. [1]
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> round(log_spread(0.1), 4)
+    0.0998
+    """
+    return math.sqrt(math.log1p(relative_standard_deviation**2))
+
+
+@dataclass(frozen=True)
+class MembraneNoise:
+    """All that is noisy about a membrane and its input; what is None is not.
+
+    Parameters
+    ----------
+    current : WhiteCurrentNoise or CorrelatedCurrentNoise, optional
+        Noise of the current.
+    threshold : ThresholdNoise, optional
+        Noise of the threshold.
+    gain : GainNoise, optional
+        Noise of the gain.
+
+    Examples
+    --------
+    >>> MembraneNoise(threshold=ThresholdNoise(0.2)).gain is None
+    True
+    """
+
+    current: WhiteCurrentNoise | CorrelatedCurrentNoise | None = None
+    threshold: ThresholdNoise | None = None
+    gain: GainNoise | None = None

@@ -1,0 +1,208 @@
+"""Membrane current -> spike times of a noisy leaky integrate-and-fire neuron.
+
+Three sources of noise, alone or together, each named by what it disturbs:
+
+- the current through the membrane, white or with a memory (Ornstein-Uhlenbeck process),
+- the threshold, anew for each interval between spikes,
+- the gain of the end organ, anew for each presentation or for each receptor.
+
+Noise of the current is drawn at steps of time whose law is exact, and is a straight line within a step. The
+current as a whole is then piecewise linear, and spikes are found to round-off as without noise
+(`fingerpad.neuron.exact_spikes`). The membrane itself is that of `fingerpad.neuron.lif`, to which all of
+this returns as
+noise vanishes. All random numbers have keys: docs/decisions/random-numbers.md.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from fingerpad.core.blocks import in_blocks
+from fingerpad.core.checks import FloatArray, finite, instance
+from fingerpad.core.philox import four_normals
+from fingerpad.core.random_streams import Presentations, Purpose, checked_sites
+from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.neuron.exact_spikes import first_crossing
+from fingerpad.neuron.lif import LeakyIntegrateAndFire
+from fingerpad.neuron.membrane_noise import (
+    CorrelatedCurrentNoise,
+    MembraneNoise,
+    WhiteCurrentNoise,
+    log_spread,
+)
+
+TRAINS_PER_BLOCK = 32
+"""Trains that one thread makes at a time: each takes about a millisecond."""
+
+_CURRENT, _THRESHOLD = int(Purpose.CURRENT), int(Purpose.THRESHOLD)
+
+
+def noisy_spikes(
+    membrane: LeakyIntegrateAndFire,
+    current: CurrentTraces,
+    noise: MembraneNoise,
+    seed: int,
+    presentations: Presentations | None = None,
+    intercept_ma: float = 0.0,
+) -> SpikeTrains:
+    """Spike times of a noisy membrane.
+
+    Parameters
+    ----------
+    membrane : LeakyIntegrateAndFire
+        What it is without noise.
+    current : CurrentTraces
+        Current without noise, one column per site. [mA]
+    noise : MembraneNoise
+        What is noisy.
+    seed : int
+        Of the run; the same seed gives the same spikes on any number of threads.
+    presentations : Presentations, optional
+        Site, trial and receptor of each train. Default: each site is a receptor, touched once.
+    intercept_ma : float, optional
+        The part of the current that flows without touch, beta; noise of the gain leaves it alone. [mA]
+
+    Returns
+    -------
+    SpikeTrains
+        One per presentation.
+
+    Raises
+    ------
+    InputError
+        If a presentation names a site that is not there.
+
+    Examples
+    --------
+    >>> from fingerpad.neuron.membrane_noise import ThresholdNoise
+    >>> neuron = LeakyIntegrateAndFire(68.0, 1e-6, 50.0, 1.0)
+    >>> steady = CurrentTraces([0.0, 100.0], [[2e-6], [2e-6]])
+    >>> noise = MembraneNoise(threshold=ThresholdNoise(0.1))
+    >>> noisy_spikes(neuron, steady, noise, seed=1)[0].round(1).tolist()
+    [29.0, 63.7, 96.7]
+    """
+    instance("noise", noise, MembraneNoise)
+    everyone = presentations or Presentations.of_population(current.n_sites)
+    checked_sites(everyone.sites, current.n_sites)
+    resting = finite("intercept_ma", intercept_ma, "mA")
+    gains = noise.gain.factors(seed, everyone) if noise.gain else np.ones(len(everyone))
+    # A train runs through its own row: neighbours in time must be neighbours in memory.
+    rows = np.ascontiguousarray(current.current_ma.T)
+    numbers = (
+        float(membrane.time_constant_ms),
+        float(membrane.capacitance_mf),
+        float(membrane.threshold_mv),
+        float(membrane.refractory_ms),
+    )
+    disturbed = _current_numbers(noise.current, membrane.time_constant_ms)
+    spread = log_spread(noise.threshold.relative_standard_deviation) if noise.threshold else 0.0
+
+    def trains(some: slice) -> SpikeTrains:
+        part = everyone.part(some)
+        keys = part.sites, part.trials, part.receptors
+        return SpikeTrains(
+            *_noisy_trains(
+                current.times_ms, rows, *keys, gains[some], resting, seed, *numbers, *disturbed, spread
+            )
+        )
+
+    return SpikeTrains.joined(in_blocks(trains, len(everyone), TRAINS_PER_BLOCK))
+
+
+def _current_numbers(
+    noise: WhiteCurrentNoise | CorrelatedCurrentNoise | None, time_constant_ms: float
+) -> tuple[float, float, float]:
+    """Step (0: no noise), standard deviation of a level, and correlation of one with the next."""
+    if noise is None:
+        return 0.0, 0.0, 0.0
+    if isinstance(noise, WhiteCurrentNoise):
+        return float(noise.step_ms), noise.level_ma(time_constant_ms), 0.0
+    return float(noise.step_ms), float(noise.standard_deviation_ma), noise.memory
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _noisy_trains(
+    times: FloatArray,
+    currents: FloatArray,
+    sites: np.ndarray,
+    trials: np.ndarray,
+    receptors: np.ndarray,
+    gains: FloatArray,
+    resting: float,
+    seed: int,
+    tau: float,
+    capacitance: float,
+    threshold: float,
+    refractory: float,
+    step: float,
+    deviation: float,
+    memory: float,
+    spread: float,
+) -> tuple[FloatArray, np.ndarray]:
+    """Spike times of all trains, one after the other, and where each one's begin.
+
+    A stretch reaches from one event to the next: a knot of the current, the end of a step of its noise, or
+    a spike. `memory` > 0 joins the levels of noise by straight lines; without memory each lasts for a step.
+    """
+    resistance = tau / capacitance
+    fresh = math.sqrt(1.0 - memory * memory)  # share of a new level that the one before does not explain
+    found = np.empty(64 * (sites.size + 1))
+    offsets = np.zeros(sites.size + 1, dtype=np.int64)
+    count = 0
+    for train in range(sites.size):
+        current = resting + gains[train] * (currents[sites[train]] - resting)
+        trial, receptor = trials[train], receptors[train]
+        knot, n_steps, n_intervals = 0, 0, 0
+        time = ready = step_start = times[0]
+        step_end = times[0] + step if step > 0.0 else math.inf
+        four = four_normals(seed, trial, receptor, _CURRENT, 1)
+        level = following = deviation * four[0]
+        if memory > 0.0:
+            following = memory * level + fresh * deviation * four[1]
+        limits = four_normals(seed, trial, receptor, _THRESHOLD, 1)
+        limit = threshold * math.exp(spread * limits[0] - 0.5 * spread * spread)
+        potential = 0.0
+        while True:
+            while knot < times.size - 1 and times[knot + 1] <= time:
+                knot += 1
+            if knot == times.size - 1:
+                break
+            end = min(times[knot + 1], step_end)
+            begin = max(time, ready)
+            crosses = False
+            if begin < end:
+                slope = (current[knot + 1] - current[knot]) / (times[knot + 1] - times[knot])
+                noise_slope = (following - level) / step if step > 0.0 else 0.0
+                at_begin = current[knot] + slope * (begin - times[knot])
+                at_begin += level + noise_slope * (begin - step_start)
+                at_end = at_begin + (slope + noise_slope) * (end - begin)
+                length = (end - begin) / tau
+                crosses, x, potential = first_crossing(
+                    length, potential, resistance * at_begin, resistance * at_end, limit
+                )
+                if crosses:
+                    if count == found.size:
+                        found = np.concatenate((found, np.empty(found.size)))
+                    time = found[count] = min(begin + tau * x, end)
+                    ready = time + refractory
+                    count += 1
+                    potential = 0.0
+                    n_intervals += 1
+                    if n_intervals % 4 == 0:
+                        limits = four_normals(seed, trial, receptor, _THRESHOLD, n_intervals // 4 + 1)
+                    limit = threshold * math.exp(spread * limits[n_intervals % 4] - 0.5 * spread * spread)
+            if not crosses:
+                time = end
+            if time == step_end:
+                n_steps += 1
+                step_start, step_end = step_end, times[0] + (n_steps + 1) * step
+                newest = n_steps + 1 if memory > 0.0 else n_steps
+                if newest % 4 == 0:
+                    four = four_normals(seed, trial, receptor, _CURRENT, newest // 4 + 1)
+                new = memory * following + fresh * deviation * four[newest % 4]
+                level, following = (following, new) if memory > 0.0 else (new, new)
+        offsets[train + 1] = count
+    return found[:count], offsets

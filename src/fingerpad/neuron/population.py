@@ -1,0 +1,247 @@
+"""Many afferents side by side: where they end in the skin, and what they answer to one touch."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, positive, whole
+from fingerpad.core.errors import InputError
+from fingerpad.core.layouts import Layout, Place, around_zero
+from fingerpad.core.random_streams import Purpose, normals
+from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Skin
+from fingerpad.data import fingertip, protocol, psychophysics
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.spikes import firing_rate_hz, first_spike_latency_ms
+
+MM_PER_CM = 10.0
+CENTRE_MM = (fingertip.CONTACT_POINT.value[0], 0.0)
+"""Middle of the default layout: the laboratory's contact point, on the midline. [mm]"""
+
+
+def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
+    """Draw how much more or less sensitive each afferent is than the mean: factors of both gains.
+
+    They are log-normal with mean 1: exp(spread n - spread^2/2), n from Normal(0, 1).
+
+    Parameters
+    ----------
+    count : int
+        Number of afferents.
+    spread : float
+        Standard deviation of the logarithm; 0 makes all alike. What is known of it:
+        `parameters.psychophysics.SENSITIVITY_SPREAD`.
+    seed : int
+        Of the random numbers; each afferent has its own, by its number.
+
+    Returns
+    -------
+    array (count,)
+        Factors, above 0. [1]
+
+    Raises
+    ------
+    InputError
+        If the count is below 1, or spread or seed is negative.
+
+    Examples
+    --------
+    >>> sensitivities(3, spread=0.0, seed=7).tolist()
+    [1.0, 1.0, 1.0]
+    >>> bool((sensitivities(5, 0.4, seed=7)[:3] == sensitivities(3, 0.4, seed=7)).all())
+    True
+    """
+    sigma = not_negative("spread", spread)
+    drawn = normals(seed, 1, whole("count", count, 1), Purpose.SENSITIVITY, 1)[0, :, 0]
+    return np.exp(sigma * drawn - 0.5 * sigma**2)
+
+
+@dataclass(frozen=True)
+class Population:
+    """Afferents at different places of the skin, equal but for their sensitivity.
+
+    Parameters
+    ----------
+    positions_mm : array (n_receptors, 2) or (n_receptors, 3)
+        x (distal positive) and z (lateral) of each end organ on the volar side, or x, y and z of the skin
+        above it on any side. [mm]
+    pitch_mm : float
+        Distance between neighbours of the layout. [mm]
+    afferent : Afferent, optional
+        What every one of them is.
+    sensitivity : array (n_receptors,), optional
+        Factor of each afferent's gains k_d and k_s, as from `sensitivities`; default: 1. [1]
+    places_mm : array (n_receptors, 2), optional
+        Places in the plane of the layout, in which neighbours are sought; default: x and z. [mm]
+
+    Raises
+    ------
+    InputError
+        If the positions are not pairs or triples of finite numbers, the pitch is not positive, or there is
+        not one sensitivity above 0 and one place per receptor.
+    """
+
+    positions_mm: FloatArray
+    pitch_mm: float
+    afferent: Afferent = field(default_factory=Afferent)
+    sensitivity: FloatArray | None = None
+    places_mm: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        positions = float_array("positions_mm", self.positions_mm, 2)
+        if positions.shape[1] not in (2, 3) or len(positions) == 0:
+            raise InputError(
+                f"positions_mm must have rows of x and z, or of x, y and z: got shape {positions.shape}."
+            )
+        positive("pitch_mm", self.pitch_mm, "mm")
+        if self.sensitivity is not None:
+            factors = float_array("sensitivity", self.sensitivity, 1)
+            if factors.size != len(positions) or (factors <= 0.0).any():
+                raise InputError(
+                    f"sensitivity needs one factor above 0 per receptor, {len(positions)}: got {factors.size}"
+                    f", the smallest {factors.min(initial=math.inf):g}."
+                )
+            object.__setattr__(self, "sensitivity", factors)
+        places = float_array(
+            "places_mm", positions[:, [0, -1]] if self.places_mm is None else self.places_mm, 2
+        )
+        if places.shape != (len(positions), 2):
+            raise InputError(f"places_mm needs a pair per receptor, {len(positions)}: got {places.shape}.")
+        object.__setattr__(self, "positions_mm", positions)
+        object.__setattr__(self, "places_mm", places)
+
+    def __len__(self) -> int:
+        return len(self.positions_mm)
+
+    @classmethod
+    def of_layout(
+        cls,
+        layout: Layout,
+        place: Place | None = None,
+        afferent: Afferent | None = None,
+        sensitivity: ArrayLike | None = None,
+    ) -> Population:
+        """Let an afferent end at each place of a layout.
+
+        Parameters
+        ----------
+        layout : Layout
+            From `fingerpad.core.layouts`.
+        place : callable, optional
+            Points of the skin (n, 3) at places of the layout's plane (n, 2), such as `UnrolledSkin.points`;
+            by default that plane is x and z, the skin seen from its volar side.
+        afferent : Afferent, optional
+            Default: `Afferent()`.
+        sensitivity : array_like (n_receptors,), optional
+            As in `Population`.
+
+        Returns
+        -------
+        Population
+
+        Examples
+        --------
+        >>> from fingerpad.core.layouts import hexagonal
+        >>> from fingerpad.core.regions import Ellipse
+        >>> disc = Ellipse(3.0, 3.0, centre_mm=(17.37, 0.0))
+        >>> len(Population.of_layout(hexagonal(disc, density_per_cm2=100.0)))
+        31
+        """
+        positions = layout.places_mm if place is None else place(layout.places_mm)
+        factors = None if sensitivity is None else float_array("sensitivity", sensitivity, 1)
+        return cls(positions, layout.pitch_mm, afferent or Afferent(), factors, layout.places_mm)
+
+    @classmethod
+    def grid(
+        cls,
+        density_per_cm2: float = psychophysics.RECEPTOR_DENSITY.value,
+        rows: int = 3,
+        columns: int = 6,
+        centre_mm: tuple[float, float] = CENTRE_MM,
+        afferent: Afferent | None = None,
+    ) -> Population:
+        """Lay a square lattice around a point, symmetric about it.
+
+        The paper's 18 receptors, of which 9 are drawn for reasons of symmetry, are 3 along the finger by
+        6 across.
+
+        Parameters
+        ----------
+        density_per_cm2 : float, optional
+            Receptors per area; the pitch is one over its square root. [1/cm2]
+        rows, columns : int, optional
+            Receptors along x and along z.
+        centre_mm : (float, float), optional
+            x and z of the middle of the lattice. [mm]
+        afferent : Afferent, optional
+            Default: `Afferent()`.
+
+        Returns
+        -------
+        Population
+            Ordered by x, then by z.
+
+        Raises
+        ------
+        InputError
+            If the density is not positive or there is not at least one row and one column.
+
+        Examples
+        --------
+        >>> population = Population.grid(100.0, rows=1, columns=2, centre_mm=(17.0, 0.0))
+        >>> population.pitch_mm, population.positions_mm.tolist()
+        (1.0, [[17.0, -0.5], [17.0, 0.5]])
+        """
+        pitch_mm = MM_PER_CM / math.sqrt(positive("density_per_cm2", density_per_cm2, "1/cm2"))
+        centre_x, centre_z = (finite("centre_mm", value, "mm") for value in centre_mm)
+        x = centre_x + pitch_mm * around_zero(whole("rows", rows, 1))
+        z = centre_z + pitch_mm * around_zero(whole("columns", columns, 1))
+        positions = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
+        return cls(positions, pitch_mm, afferent or Afferent())
+
+    def respond(
+        self,
+        skin: Skin,
+        dynamic_window_ms: tuple[float, ...] = protocol.DYNAMIC_WINDOW.value,
+        static_window_ms: tuple[float, ...] = protocol.STATIC_WINDOW.value,
+    ) -> ResponseMap:
+        """Sample the skin at every receptor and let each afferent answer.
+
+        Parameters
+        ----------
+        skin : Skin
+            Anything with `sed(sites)`, such as a solved indentation.
+        dynamic_window_ms, static_window_ms : (float, float), optional
+            Windows of the two firing rates. [ms]
+
+        Returns
+        -------
+        ResponseMap
+            Spikes, rates and first-spike latencies, receptor by receptor.
+
+        Raises
+        ------
+        InputError
+            If the skin does not answer with one trace per receptor.
+        """
+        dynamic_quantity = self.afferent.dynamic_quantity
+        # Skins that know nothing but their energy need not know the extension either.
+        further = () if dynamic_quantity == STORED_ENERGY else (dynamic_quantity,)
+        sed = skin.sed(self.positions_mm, *further)
+        if sed.n_sites != len(self.positions_mm):
+            raise InputError(
+                f"skin.sed must give one trace per receptor: got {sed.n_sites} for {len(self.positions_mm)}."
+            )
+        # Both terms of the current are proportional to energy density: so scaled, they are with their gains.
+        spikes = self.afferent.spikes(sed if self.sensitivity is None else sed.scaled(self.sensitivity))
+        return ResponseMap(
+            positions_mm=self.positions_mm,
+            pitch_mm=self.pitch_mm,
+            spikes=spikes,
+            dynamic_rate_hz=firing_rate_hz(spikes, dynamic_window_ms),
+            static_rate_hz=firing_rate_hz(spikes, static_window_ms),
+            first_spike_latency_ms=first_spike_latency_ms(spikes),
+        )

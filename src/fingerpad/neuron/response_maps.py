@@ -1,0 +1,418 @@
+"""Who of a population fires first, and how many spikes it sends at a time.
+
+First spikes recruit afferents one by one; their order is a code that needs no rates (Johansson & Birznieks
+2004). The population rate is the histogram of all spikes over time, of everybody or ring by ring about the
+contact. Everything here is counted, nothing is fitted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import ndtr
+from scipy.stats import rankdata
+
+from fingerpad.core.checks import FloatArray, float_array, increasing, not_negative, positive
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SpikeTrains
+from fingerpad.core.units import MS_PER_S
+
+NO_GROUP = -1
+"""Group of an afferent that belongs to none."""
+
+_LEAST_SMOOTHING = 1e-6
+_PAIRS_AT_A_TIME = 4_000_000
+
+
+def recruitment_rank(latency_ms: ArrayLike) -> FloatArray:
+    """Place of every afferent in the order of first spikes.
+
+    Parameters
+    ----------
+    latency_ms : array_like (n_afferents,)
+        First-spike latencies; NaN for an afferent that stays silent. [ms]
+
+    Returns
+    -------
+    array (n_afferents,)
+        1 for the first; equal latencies share the mean of their places; NaN for the silent. [1]
+
+    Raises
+    ------
+    InputError
+        If the latencies are not one row of numbers.
+
+    Examples
+    --------
+    >>> recruitment_rank([12.0, np.nan, 7.0, 12.0]).tolist()
+    [2.5, nan, 1.0, 2.5]
+    """
+    latency = _latencies("latency_ms", latency_ms)
+    fires = ~np.isnan(latency)
+    rank = np.full(latency.size, np.nan)
+    rank[fires] = rankdata(latency[fires])
+    return rank
+
+
+def recruited(latency_ms: ArrayLike, times_ms: ArrayLike) -> np.ndarray:
+    """Count the afferents that have fired their first spike by each time.
+
+    Parameters
+    ----------
+    latency_ms : array_like (n_afferents,)
+        First-spike latencies; NaN for an afferent that stays silent. [ms]
+    times_ms : array_like (...)
+        When to count. [ms]
+
+    Returns
+    -------
+    int array (...)
+        Afferents with a latency of at most that time.
+
+    Raises
+    ------
+    InputError
+        If the latencies are not one row of numbers.
+
+    Examples
+    --------
+    >>> recruited([12.0, np.nan, 7.0, 30.0], [0.0, 7.0, 20.0, 1000.0]).tolist()
+    [0, 1, 2, 3]
+    """
+    latency = _latencies("latency_ms", latency_ms)
+    in_order = np.sort(latency[~np.isnan(latency)])
+    return np.searchsorted(in_order, np.asarray(times_ms, dtype=np.float64), side="right")
+
+
+def evoked_latency_ms(latency_ms: ArrayLike, resting_latency_ms: float) -> FloatArray:
+    """Keep the first spikes that a touch brings about, of afferents that also fire at rest.
+
+    A spike counts as evoked if the touch brings it to half of the time that it takes by itself, or less: the
+    afferent then fires twice as fast as at rest.
+
+    Parameters
+    ----------
+    latency_ms : array_like (n_afferents,)
+        First-spike latencies; NaN for an afferent that stays silent. [ms]
+    resting_latency_ms : float
+        When the afferent would first fire without any touch; infinity, or NaN, if never. [ms]
+
+    Returns
+    -------
+    array (n_afferents,)
+        Latencies; NaN where no spike is evoked. [ms]
+
+    Raises
+    ------
+    InputError
+        If the latencies are not one row of numbers, or the one at rest is negative.
+
+    Examples
+    --------
+    >>> evoked_latency_ms([12.0, 249.0, np.nan], 250.0).tolist(), evoked_latency_ms([249.0], np.inf).tolist()
+    ([12.0, nan, nan], [249.0])
+    """
+    latency = _latencies("latency_ms", latency_ms)
+    if resting_latency_ms < 0.0:
+        raise InputError(f"resting_latency_ms must not be negative [ms]: got {resting_latency_ms!r}.")
+    latest_ms = np.inf if np.isnan(resting_latency_ms) else 0.5 * resting_latency_ms
+    return np.where(latency <= latest_ms, latency, np.nan)
+
+
+@dataclass(frozen=True)
+class OrderChange:
+    """How the order of first spikes differs between two touches.
+
+    Parameters
+    ----------
+    both, either : int
+        Afferents that fire in both touches, and in one or both.
+    rank_correlation : float
+        Spearman's coefficient of the two orders, over those that fire in both: 1 for the same order, -1 for
+        the reverse. NaN if there are no two of them or all of them tie in one touch. [1]
+    swapped : float
+        Share of their pairs whose order is reversed; a pair that ties in a touch is not. NaN without a
+        pair. [0-1]
+    """
+
+    both: int
+    either: int
+    rank_correlation: float
+    swapped: float
+
+
+def order_change(latency_ms: ArrayLike, other_latency_ms: ArrayLike) -> OrderChange:
+    """Compare the recruitment by two touches: is it a different order, or the same at other times?
+
+    With the ranks r and s of those that fire in both touches:
+
+        rank correlation = sum (r_i - mean r) (s_i - mean s) / sqrt(sum (r_i - mean r)^2 sum (s_i - mean s)^2)
+        swapped = share of pairs i < j with (r_i - r_j) (s_i - s_j) < 0
+
+    Parameters
+    ----------
+    latency_ms, other_latency_ms : array_like (n_afferents,)
+        First-spike latencies of the same afferents; NaN for one that stays silent. [ms]
+
+    Returns
+    -------
+    OrderChange
+
+    Raises
+    ------
+    InputError
+        If they are not two rows of one length.
+
+    Examples
+    --------
+    The first two of four swap their places, which is one pair of six:
+
+    >>> change = order_change([5.0, 6.0, 7.0, 8.0, np.nan], [6.0, 5.0, 7.0, 8.0, 9.0])
+    >>> change.both, change.either, round(change.rank_correlation, 3), round(change.swapped, 3)
+    (4, 5, 0.8, 0.167)
+    """
+    first, second = _latencies("latency_ms", latency_ms), _latencies("other_latency_ms", other_latency_ms)
+    if first.size != second.size:
+        raise InputError(f"order_change needs the same afferents twice: got {first.size} and {second.size}.")
+    fires, fires_too = ~np.isnan(first), ~np.isnan(second)
+    both = fires & fires_too
+    r, s = rankdata(first[both]), rankdata(second[both])
+    return OrderChange(
+        both=int(both.sum()),
+        either=int((fires | fires_too).sum()),
+        rank_correlation=_correlation(r, s),
+        swapped=_swapped(r, s),
+    )
+
+
+def _latencies(name: str, values: ArrayLike) -> FloatArray:
+    latency = np.asarray(values, dtype=np.float64)
+    if latency.ndim != 1 or np.isinf(latency).any():
+        raise InputError(
+            f"{name} must be one row of times, NaN for the silent: got shape {latency.shape}"
+            f"{' with infinite times' if latency.ndim == 1 else ''}."
+        )
+    return latency
+
+
+def _correlation(r: FloatArray, s: FloatArray) -> float:
+    if r.size < 2:
+        return float("nan")
+    r, s = r - r.mean(), s - s.mean()
+    scale = np.sqrt(np.square(r).sum() * np.square(s).sum())
+    return float((r * s).sum() / scale) if scale > 0.0 else float("nan")
+
+
+def _swapped(r: FloatArray, s: FloatArray) -> float:
+    n = r.size
+    if n < 2:
+        return float("nan")
+    # Row by row in blocks: 10,000 afferents have 50 million pairs, too many to hold at once.
+    rows = max(1, _PAIRS_AT_A_TIME // n)
+    reversed_twice = sum(
+        np.count_nonzero((r[start : start + rows, None] - r) * (s[start : start + rows, None] - s) < 0.0)
+        for start in range(0, n, rows)
+    )
+    return float(reversed_twice / (n * (n - 1)))
+
+
+@dataclass(frozen=True)
+class PopulationRate:
+    """Spikes of groups of afferents over time.
+
+    Parameters
+    ----------
+    edges_ms : array (n_bins + 1,)
+        Borders of the bins, increasing. [ms]
+    spikes : array (n_groups, n_bins)
+        Spikes of each group in each bin; whole numbers unless smoothed.
+    active : int array (n_groups, n_bins)
+        Afferents of each group with at least one spike in the bin.
+    n_afferents : int array (n_groups,)
+        Size of each group, the silent included.
+    """
+
+    edges_ms: FloatArray
+    spikes: FloatArray
+    active: np.ndarray
+    n_afferents: np.ndarray
+
+    @property
+    def times_ms(self) -> FloatArray:
+        """Middles of the bins, (n_bins,). [ms]"""
+        return 0.5 * (self.edges_ms[1:] + self.edges_ms[:-1])
+
+    @property
+    def rate_hz(self) -> FloatArray:
+        """Rate per afferent, (n_groups, n_bins); NaN for a group of nobody. [spikes/s]"""
+        return MS_PER_S * self._per_afferent(self.spikes) / np.diff(self.edges_ms)
+
+    @property
+    def active_fraction(self) -> FloatArray:
+        """Share of the afferents that fire in each bin, (n_groups, n_bins); NaN for nobody. [0-1]"""
+        return self._per_afferent(self.active)
+
+    def rate_per_area(self, density_per_cm2: float) -> FloatArray:
+        """Rate of a patch of skin, the rate per afferent times their density.
+
+        Parameters
+        ----------
+        density_per_cm2 : float
+            Afferents per area of skin: of this layout, or of any that samples the same response. [1/cm2]
+
+        Returns
+        -------
+        array (n_groups, n_bins)
+            [spikes/s per cm2]
+
+        Raises
+        ------
+        InputError
+            If the density is not positive.
+        """
+        return self.rate_hz * positive("density_per_cm2", density_per_cm2, "1/cm2")
+
+    def _per_afferent(self, counts: np.ndarray) -> FloatArray:
+        sizes = np.where(self.n_afferents > 0, self.n_afferents, np.nan)
+        return counts / sizes[:, np.newaxis]
+
+
+def population_rate(
+    spikes: SpikeTrains, edges_ms: ArrayLike, groups: ArrayLike | None = None, smoothing_ms: float = 0.0
+) -> PopulationRate:
+    """Count the spikes of a population bin by bin: its peristimulus histogram.
+
+    A bin excludes its start and includes its end, as the windows of `firing_rate_hz` do. Smoothing spreads
+    the n_j spikes of bin j, evenly over the bin, by a normal density phi, of which every bin gets its share:
+
+        n_i <- sum_j K_ij n_j,    K_ij ~ integral over t in bin i, s in bin j of phi(t - s),    sum_i K_ij = 1
+
+    The shares of each spike add up to 1, so that smoothing neither makes nor loses spikes, at the ends of the
+    histogram neither. Who is active is never smoothed.
+
+    Parameters
+    ----------
+    spikes : SpikeTrains
+        One train per afferent.
+    edges_ms : array_like (n_bins + 1,)
+        Borders of the bins, increasing. [ms]
+    groups : int array_like (n_afferents,), optional
+        Number of the group that each afferent belongs to, from 0, or `NO_GROUP`; such as those of `rings`.
+        Default: all in one.
+    smoothing_ms : float, optional
+        Standard deviation of phi; 0 does not smooth. [ms]
+
+    Returns
+    -------
+    PopulationRate
+
+    Raises
+    ------
+    InputError
+        If there is no bin, the edges do not increase, there is not one group per afferent, or the smoothing
+        is negative.
+
+    Examples
+    --------
+    >>> trains = SpikeTrains.from_lists([[2.0, 4.0, 12.0], [10.0], []])
+    >>> found = population_rate(trains, [0.0, 10.0, 20.0])
+    >>> found.spikes.tolist(), found.rate_hz.tolist(), found.active_fraction.round(2).tolist()
+    ([[3.0, 1.0]], [[100.0, 33.33...]], [[0.67, 0.33]])
+    """
+    edges = increasing("edges_ms", float_array("edges_ms", edges_ms, 1))
+    if edges.size < 2:
+        raise InputError(f"edges_ms must hold the two borders of at least one bin: got {edges.size} numbers.")
+    not_negative("smoothing_ms", smoothing_ms, "ms")
+    group = _groups(groups, len(spikes))
+    n_groups, n_bins = int(group.max(initial=0)) + 1, edges.size - 1
+
+    owner = np.repeat(np.arange(len(spikes)), np.diff(spikes.offsets))
+    place = np.searchsorted(edges, spikes.times_ms, side="left") - 1
+    counted = (place >= 0) & (place < n_bins) & (group[owner] != NO_GROUP)
+    owner, place = owner[counted], place[counted]
+
+    # Trains are in order, and so are the places within each: an afferent's spikes of one bin are neighbours.
+    again = np.zeros(owner.size, dtype=bool)
+    again[1:] = (owner[1:] == owner[:-1]) & (place[1:] == place[:-1])
+    cell = group[owner] * n_bins + place
+    count = np.bincount(cell, minlength=n_groups * n_bins).reshape(n_groups, n_bins).astype(np.float64)
+    active = np.bincount(cell[~again], minlength=n_groups * n_bins).reshape(n_groups, n_bins)
+    if smoothing_ms > 0.0:
+        count = count @ _kernel(edges, smoothing_ms).T
+    return PopulationRate(
+        edges_ms=edges,
+        spikes=count,
+        active=active,
+        n_afferents=np.bincount(group[group != NO_GROUP], minlength=n_groups),
+    )
+
+
+def _groups(groups: ArrayLike | None, n_afferents: int) -> np.ndarray:
+    if groups is None:
+        return np.zeros(n_afferents, dtype=np.int64)
+    group = np.asarray(groups)
+    if group.shape != (n_afferents,) or not np.issubdtype(group.dtype, np.integer):
+        raise InputError(
+            f"groups must be one whole number per afferent, {n_afferents} in all: "
+            f"got {group.dtype} of shape {group.shape}."
+        )
+    if (group < NO_GROUP).any():
+        raise InputError(f"groups must count from 0, {NO_GROUP} for none: got {group.min()}.")
+    return group.astype(np.int64)
+
+
+def _kernel(edges: FloatArray, smoothing_ms: float) -> FloatArray:
+    """K_ij: what bin i gets of bin j, (n_bins, n_bins).
+
+    The double integral of phi is G(x) = x Phi(x) + phi(x), with signs, at the four pairs of borders.
+    """
+    # Far below the bins' width a density moves nothing, and its square overflows.
+    scale_ms = max(smoothing_ms, _LEAST_SMOOTHING * np.diff(edges).min())
+    x = (edges[:, np.newaxis] - edges) / scale_ms
+    integral = x * ndtr(x) + np.exp(-0.5 * x**2) / np.sqrt(2.0 * np.pi)
+    shares = np.maximum(-np.diff(np.diff(integral, axis=0), axis=1), 0.0)
+    return shares / shares.sum(axis=0)
+
+
+def rings(positions_mm: ArrayLike, centre_mm: ArrayLike, radii_mm: ArrayLike) -> np.ndarray:
+    """Sort receptors into rings about a point, such as the middle of the contact.
+
+    Parameters
+    ----------
+    positions_mm : array_like (n_receptors, 2 or 3)
+        Places of the receptors. [mm]
+    centre_mm : array_like (2 or 3,)
+        The point, in the same coordinates. [mm]
+    radii_mm : array_like (n_rings + 1,)
+        Inner radius of the first ring, then the outer radius of each, increasing. [mm]
+
+    Returns
+    -------
+    int array (n_receptors,)
+        Ring of each receptor from 0, its inner radius included and its outer not; `NO_GROUP` beyond the
+        last and inside the first.
+
+    Raises
+    ------
+    InputError
+        If the centre has not the coordinates of the positions, a radius is negative, or they do not increase.
+
+    Examples
+    --------
+    >>> rings([[17.0, 0.0], [18.0, 0.0], [17.0, 2.5]], [17.0, 0.0], [0.0, 1.0, 2.0]).tolist()
+    [0, 1, -1]
+    """
+    positions, centre = float_array("positions_mm", positions_mm, 2), float_array("centre_mm", centre_mm, 1)
+    if positions.shape[1] != centre.size:
+        raise InputError(
+            f"centre_mm must have the coordinates of the positions: got {centre.size} "
+            f"for {positions.shape[1]}."
+        )
+    radii = increasing("radii_mm", float_array("radii_mm", radii_mm, 1))
+    if radii.size < 2 or radii[0] < 0.0:
+        raise InputError(f"radii_mm must be at least two distances, none negative: got {radii_mm!r}.")
+    away = np.linalg.norm(positions - centre, axis=1)
+    ring = np.searchsorted(radii, away, side="right") - 1
+    return np.where(ring < radii.size - 1, ring, NO_GROUP)

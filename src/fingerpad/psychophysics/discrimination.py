@@ -1,0 +1,363 @@
+"""Noise, decision, hit rate: how often one sphere is told from another (paper, section 2.2.3, Figure 3).
+
+Letters in brackets are the steps of Figure 3. Readings where the paper is silent:
+
+- Noise multiplies every response by Normal(1, sigma_1), anew for each receptor and presentation.
+- The observer decides at the point a fraction beta of the way from the standard's mean to the
+  comparison's; a hit is an answer beyond it, on the comparison's side.
+- Which side that is, is the observer's lasting knowledge: the sign of the difference of the means over
+  all repetitions. Measures that fall with curvature (latencies) are read like those that rise, and equal
+  spheres are told apart in half of the trials, not more.
+
+Every random number has a key: seed, trial, receptor and purpose. Trials are numbered within a session, so
+that sessions of one seed are experiments with nothing in common but what was touched.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, one_of, whole
+from fingerpad.core.errors import InputError
+from fingerpad.core.random_streams import IntArray, Purpose, normals, uniforms
+from fingerpad.core.signals import HitRates
+from fingerpad.data import protocol, psychophysics
+from fingerpad.psychophysics.encoding import NORMS, check_neighbours, distance
+from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, noisy_responses, session_trials
+from fingerpad.psychophysics.signal_detection import decision_point, hit_probability, moments, side
+
+END_OF_STIMULUS_MS = protocol.RAMP.value + protocol.HOLD.value
+"""A usual stand-in for the latency of a receptor that stays silent. [ms]"""
+
+WAVERING = ("point", "fraction")
+"""What a varied criterion multiplies: the decision point, or the fraction beta that places it."""
+
+_REPETITIONS = int(psychophysics.REPETITIONS.value)
+_REPETITIONS_VARIED = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """How often everything is repeated, and where the observer decides.
+
+    Parameters
+    ----------
+    presentations : int
+        Noisy presentations of each sphere: gradient sums behind one mean and standard deviation (d), or
+        sets of responses from which pairs are picked (c*).
+    distributions : int
+        Pairs of mean and standard deviation per sphere, Gradient Sum only (f).
+    pairs : int
+        Distances per sphere behind one hit rate, Euclidean Distance only (f*).
+    hit_rates : int
+        Hit rates per comparison, of which mean and standard deviation are reported (i, h*).
+    criterion : float
+        Decision point beta, as a fraction of the way from the standard's mean to the comparison's.
+    criterion_sigma : float
+        Spread of the decision point: for each hit rate it is multiplied by Normal(1, criterion_sigma).
+        Above 0 this is the paper's derivative of Gradient Sum: one mean and standard deviation per
+        sphere, from `presentations_varied` sums; steps (f) and (g) fall away.
+    presentations_varied : int
+        Presentations of each sphere when the criterion varies.
+    criterion_moves : {"point", "fraction"}
+        What the varied criterion multiplies: the decision point itself, or beta.
+
+    Raises
+    ------
+    InputError
+        If a count is below 2, the criterion not finite, its spread negative, or what it moves unknown.
+
+    Examples
+    --------
+    >>> Experiment().hit_rates, Experiment(criterion_sigma=0.02).sums_per_sphere
+    (100, (1, 5000))
+    """
+
+    presentations: int = _REPETITIONS
+    distributions: int = _REPETITIONS
+    pairs: int = _REPETITIONS
+    hit_rates: int = _REPETITIONS
+    criterion: float = psychophysics.DECISION_CRITERION.value
+    criterion_sigma: float = 0.0
+    presentations_varied: int = _REPETITIONS_VARIED
+    criterion_moves: str = WAVERING[0]
+
+    def __post_init__(self) -> None:
+        for name in ("presentations", "distributions", "pairs", "hit_rates", "presentations_varied"):
+            whole(name, getattr(self, name), 2)
+        finite("criterion", self.criterion)
+        not_negative("criterion_sigma", self.criterion_sigma)
+        one_of("criterion_moves", self.criterion_moves, WAVERING)
+
+    @property
+    def sums_per_sphere(self) -> tuple[int, int]:
+        """Distributions per sphere, and gradient sums behind each of them."""
+        if self.criterion_sigma > 0.0:
+            return 1, self.presentations_varied
+        return self.distributions, self.presentations
+
+
+def discriminate_gradient_sum(
+    responses: ArrayLike,
+    neighbours: np.ndarray,
+    noise_sigma: float,
+    seed: int,
+    experiment: Experiment | None = None,
+    silent_value: float | None = None,
+    session: int = 0,
+) -> HitRates:
+    """Tell spheres apart by their Gradient Sum, steps (a) to (k).
+
+    Parameters
+    ----------
+    responses : array_like (n_spheres, n_receptors)
+        One measure (a rate, a latency) of every receptor; the standard in the first row. [any unit]
+    neighbours : int array (n_pairs, 2)
+        From `fingerpad.psychophysics.encoding.neighbour_pairs`.
+    noise_sigma : float
+        Standard deviation sigma_1 of the multiplicative noise.
+    seed : int
+        Of the whole run; same seed and session, same answer.
+    experiment : Experiment, optional
+        Repetitions and criterion; default: the paper's.
+    silent_value : float, optional
+        What a response of NaN, the latency of a silent receptor, stands for, before noise:
+        `END_OF_STIMULUS_MS` is usual. Without it NaN is refused.
+    session : int, optional
+        Which session of this seed: another one draws other numbers.
+
+    Returns
+    -------
+    HitRates
+        One mean and standard deviation per comparison, mu_3 and sigma_3.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two spheres, no receptor answers, neighbours are not receptors, the noise,
+        the seed or the session is negative, or a response is not finite and no `silent_value` is given.
+
+    Examples
+    --------
+    Two receptors whose difference is 10 for the standard, 10 and 14 for the comparisons:
+
+    >>> responses = [[50.0, 60.0], [50.0, 60.0], [50.0, 64.0]]
+    >>> discriminate_gradient_sum(responses, [[0, 1]], 0.02, seed=1).hit_rate.round(1).tolist()
+    [0.5, 0.9]
+    """
+    plan = experiment or Experiment()
+    values = checked_responses(responses, silent_value)
+    pairs = check_neighbours(neighbours, values.shape[1])
+    sigma = not_negative("noise_sigma", noise_sigma)
+    distributions, presentations = plan.sums_per_sphere
+    trials = session_trials(session, len(values), distributions)
+    sums = noisy_gradient_sums(values, pairs, sigma, whole("seed", seed, 0), trials, presentations)  # (a)-(f)
+    return hit_rates_of_sums(sums, seed, plan, session)
+
+
+def hit_rates_of_sums(
+    sums: FloatArray, seed: int, experiment: Experiment | None = None, session: int = 0
+) -> HitRates:
+    """Decide between spheres whose Gradient Sums are known, steps (e) and (g) to (k).
+
+    Parameters
+    ----------
+    sums : array (n_spheres, n_distributions, n_presentations)
+        From `fingerpad.psychophysics.noisy_responses.noisy_gradient_sums`, the standard first. [any unit]
+    seed : int
+        Of the whole run.
+    experiment : Experiment, optional
+        Hit rates and criterion; how many sums there are is seen from them.
+    session : int, optional
+        That of the sums.
+
+    Returns
+    -------
+    HitRates
+        One mean and standard deviation per comparison, mu_3 and sigma_3.
+
+    Examples
+    --------
+    >>> sums = np.array([[[9.0, 10.0, 11.0]] * 2, [[11.0, 12.0, 13.0]] * 2])
+    >>> hit_rates_of_sums(sums, seed=1).hit_rate.round(2).tolist()
+    [0.84]
+    """
+    plan = experiment or Experiment()
+    means, spreads = moments(sums)  # (e): (n_spheres, n_distributions)
+    varied = plan.criterion_sigma > 0.0
+    hit_rates = (_varied_criterion if varied else _picked_pairs)(means.T, spreads.T, seed, plan, session)
+    return _mean_and_spread(hit_rates, seed, session)  # (k)
+
+
+def discriminate_euclidean(
+    responses: ArrayLike,
+    noise_sigma: float,
+    seed: int,
+    experiment: Experiment | None = None,
+    silent_value: float | None = None,
+    norm: str = "city-block",
+    session: int = 0,
+) -> HitRates:
+    """Tell spheres apart by their Euclidean Distance from the standard, steps (a) and (b*) to (h*).
+
+    For every hit rate all is repeated: noisy sets (a)-(d*), random pairs of them (e*)-(g*) and the
+    decision (h*). Were the sets drawn only once, chance in them would shift the mean hit rate however
+    often it is repeated, whereas the paper finds it stable with 100 hit rates. The standard's own
+    distances are between two different sets of it.
+
+    Parameters
+    ----------
+    responses : array_like (n_spheres, n_receptors)
+        One measure (a rate, a latency) of every receptor; the standard in the first row. [any unit]
+    noise_sigma : float
+        Standard deviation sigma_1 of the multiplicative noise.
+    seed : int
+        Of the whole run; same seed and session, same answer.
+    experiment : Experiment, optional
+        Repetitions and criterion; default: the paper's. Its criterion does not vary here.
+    silent_value : float, optional
+        What a response of NaN stands for; without it NaN is refused.
+    norm : {"city-block", "euclidean"}, optional
+        Sum of absolute differences, as printed, or root of the sum of squares, as named.
+    session : int, optional
+        Which session of this seed: another one draws other numbers.
+
+    Returns
+    -------
+    HitRates
+        One mean and standard deviation per comparison, mu_3 and sigma_3.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two spheres, no receptor answers, the noise, the seed or the session is
+        negative, the norm unknown, the criterion is to vary, or a response is not finite and no
+        `silent_value` is given.
+
+    Examples
+    --------
+    >>> responses = [[50.0, 60.0], [51.0, 62.0], [60.0, 80.0]]
+    >>> discriminate_euclidean(responses, 0.02, seed=1).hit_rate.round(1).tolist()
+    [0.6, 1.0]
+    """
+    plan = experiment or Experiment()
+    if plan.criterion_sigma > 0.0:
+        raise InputError(
+            "criterion_sigma must be 0 for Euclidean Distance: its decision point does not vary."
+        )
+    one_of("norm", norm, NORMS)
+    values = checked_responses(responses, silent_value)
+    sigma = not_negative("noise_sigma", noise_sigma)
+    trials = session_trials(session, plan.hit_rates, len(values))
+    sums = np.array([_distances(values, sigma, seed, repetition, plan, norm) for repetition in trials])
+    # (a)-(g*): (hit_rates, n_spheres, pairs)
+    means = sums.mean(axis=2)
+    points = decision_point(means[:, :1], means[:, 1:], plan.criterion)
+    beyond = side(means) * (sums[:, 1:] - points[:, :, np.newaxis]).transpose(0, 2, 1)
+    return _mean_and_spread(np.heaviside(beyond, 0.5).mean(axis=1), seed, session)  # (h*)
+
+
+def checked_responses(responses: ArrayLike, silent_value: float | None = None) -> FloatArray:
+    """Return responses as a table if spheres can be told apart by them, else raise `InputError`.
+
+    Parameters
+    ----------
+    responses : array_like (n_spheres, n_receptors)
+        One measure of every receptor; the standard in the first row. [any unit]
+    silent_value : float, optional
+        What a response of NaN stands for; without it NaN is refused.
+
+    Returns
+    -------
+    array (n_spheres, n_receptors)
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two spheres or no receptor, a response is no finite number, or no receptor
+        answers any sphere.
+
+    Examples
+    --------
+    >>> checked_responses([[20.0, np.nan], [30.0, 40.0]], silent_value=50.0).tolist()
+    [[20.0, 50.0], [30.0, 40.0]]
+    """
+    try:
+        table = np.array(responses, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"responses must be numbers: got {type(responses).__name__}.") from error
+    silent = np.isnan(table)
+    if table.size and (silent | (table == 0.0)).all():
+        raise InputError(
+            "responses must come from a population that answers: it stays silent under every sphere, and "
+            "there is no hit rate from zeros; press deeper or take more sensitive afferents."
+        )
+    if silent.any():
+        if silent_value is None:
+            raise InputError(
+                f"responses must be finite: {np.count_nonzero(silent)} are NaN, as of silent receptors; "
+                "give silent_value to say what those stand for."
+            )
+        table[silent] = finite("silent_value", silent_value)
+    table = float_array("responses", table, 2)
+    if table.shape[0] < 2 or table.shape[1] == 0:
+        raise InputError(
+            f"responses needs the standard, at least one comparison and a receptor: got {table.shape}."
+        )
+    return table
+
+
+def _picked_pairs(
+    means: FloatArray, spreads: FloatArray, seed: int, plan: Experiment, session: int
+) -> FloatArray:
+    """Return hit rates (hit_rates, n_comparisons) of randomly picked distributions (g)-(j)."""
+    n_distributions, n_spheres = means.shape
+    comparison = np.arange(1, n_spheres)
+    trials = session_trials(session, n_spheres - 1)
+    picks = _picks(seed, trials, (plan.hit_rates, 2), n_distributions).transpose(2, 1, 0)
+    standard_mean = means[picks[0], 0]
+    comparison_mean = means[picks[1], comparison]
+    point = decision_point(standard_mean, comparison_mean, plan.criterion)
+    return hit_probability(point, comparison_mean, spreads[picks[1], comparison], side(means))
+
+
+def _varied_criterion(
+    means: FloatArray, spreads: FloatArray, seed: int, plan: Experiment, session: int
+) -> FloatArray:
+    """Return hit rates (hit_rates, n_comparisons) of one distribution per sphere, criterion wavering."""
+    trials = session_trials(session, means.shape[1] - 1)
+    draws = normals(seed, trials, 1, Purpose.CRITERION, plan.hit_rates)[:, 0].T
+    wavering = 1.0 + plan.criterion_sigma * draws
+    standard, comparison = means[0, 0], means[0, 1:]
+    if plan.criterion_moves == "point":
+        point = decision_point(standard, comparison, plan.criterion) * wavering
+    else:
+        point = decision_point(standard, comparison, plan.criterion * wavering)
+    return hit_probability(point, comparison, spreads[0, 1:], side(means[:1]))
+
+
+def _distances(
+    values: FloatArray, sigma: float, seed: int, trials: IntArray, plan: Experiment, norm: str
+) -> FloatArray:
+    """Return distances (n_spheres, pairs) of random sets from random sets of the standard (a)-(g*)."""
+    sets = noisy_responses(values, sigma, seed, trials, plan.presentations)
+    n_spheres, n_sets, _ = sets.shape
+    of_standard, of_sphere = _picks(seed, trials, (plan.pairs, 2), n_sets).transpose(2, 0, 1)
+    # A set at distance 0 from itself would tell nothing about noise: the standard meets its other sets.
+    other = _picks(seed, trials[:1], (plan.pairs, 2), n_sets - 1)[0, :, 1]
+    of_sphere[0] = other + (other >= of_standard[0])
+    return distance(sets[0, of_standard], sets[np.arange(n_spheres)[:, np.newaxis], of_sphere], norm)
+
+
+def _picks(seed: int, trials: IntArray, shape: tuple[int, int], choices: int) -> IntArray:
+    """Pick among 0 ... choices - 1, `shape` times in each trial; (n_trials, *shape)."""
+    numbers = uniforms(seed, trials, 1, Purpose.PICK, shape[0] * shape[1])
+    return (numbers * choices).astype(np.int64).reshape(-1, *shape)
+
+
+def _mean_and_spread(hit_rates: FloatArray, seed: int, session: int) -> HitRates:
+    """Return mean mu_3 and standard deviation sigma_3 over the repetitions (k)."""
+    return HitRates(hit_rates.mean(axis=0), hit_rates.std(axis=0, ddof=1), seed, session)

@@ -1,0 +1,204 @@
+"""How much noise the observer has: the hit rates that a noise predicts, and the noise that fits people."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import minimize_scalar
+from scipy.special import ndtr
+
+from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, positive
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.data import psychophysics
+from fingerpad.psychophysics.discrimination import checked_responses
+from fingerpad.psychophysics.encoding import check_neighbours
+from fingerpad.psychophysics.noisy_responses import shared_noise_gradient_sums
+from fingerpad.psychophysics.signal_detection import decision_point, hit_probability, moments, side
+
+_NOISE_SCAN = 33
+
+
+@dataclass(frozen=True)
+class NoiseFit:
+    """Noise that brings predicted hit rates closest to observed ones.
+
+    Parameters
+    ----------
+    noise_sigma : float
+        Standard deviation sigma_1 of the multiplicative noise.
+    hit_rates : array (n_targets,)
+        Predicted hit rates at that noise. [0-1]
+    root_mean_square_error : float
+        Of the predicted against the observed hit rates.
+    """
+
+    noise_sigma: float
+    hit_rates: FloatArray
+    root_mean_square_error: float
+
+
+def expected_hit_rates(
+    responses: ArrayLike,
+    neighbours: np.ndarray,
+    noise_sigma: float,
+    standard_normals: ArrayLike,
+    criterion: float = psychophysics.DECISION_CRITERION.value,
+    silent_value: float | None = None,
+) -> FloatArray:
+    """Predict the mean hit rates of `discriminate_gradient_sum` without repeating the experiment.
+
+    The same standard normal draws serve every sphere and every noise, so the result is a smooth function
+    of `noise_sigma`, made for `fit_noise_sigma`.
+
+    Parameters
+    ----------
+    responses, neighbours, noise_sigma, silent_value
+        As in `discriminate_gradient_sum`.
+    standard_normals : array_like (n_draws, n_receptors)
+        Draws from Normal(0, 1), several thousand; from `fingerpad.core.random_streams.normals`, they have
+        keys.
+    criterion : float, optional
+        Decision point beta.
+
+    Returns
+    -------
+    array (n_comparisons,)
+        Expected hit rates. [0-1]
+
+    Raises
+    ------
+    InputError
+        As `discriminate_gradient_sum`, or if the draws are not one column per receptor.
+
+    Examples
+    --------
+    >>> draws = np.random.default_rng(1).standard_normal((5000, 2))
+    >>> expected_hit_rates([[50.0, 60.0], [50.0, 64.0]], [[0, 1]], 0.02, draws).round(2).tolist()
+    [0.89]
+    """
+    values = checked_responses(responses, silent_value)
+    draws = float_array("standard_normals", standard_normals, 2)
+    if draws.shape[1] != values.shape[1] or len(draws) < 2:
+        raise InputError(
+            f"standard_normals needs two rows or more and {values.shape[1]} columns, one per receptor: "
+            f"got shape {draws.shape}."
+        )
+    pairs = check_neighbours(neighbours, values.shape[1])
+    sums = shared_noise_gradient_sums(values, pairs, not_negative("noise_sigma", noise_sigma), draws)
+    means, spreads = moments(sums)
+    point = decision_point(means[0], means[1:], finite("criterion", criterion))
+    return hit_probability(point, means[1:], spreads[1:], side(means[np.newaxis]))
+
+
+def expected_euclidean_hit_rates(
+    responses: ArrayLike,
+    noise_sigma: float,
+    criterion: float = psychophysics.DECISION_CRITERION.value,
+    silent_value: float | None = None,
+) -> FloatArray:
+    """Predict the mean hit rates of `discriminate_euclidean`, city-block, in closed form.
+
+    Of one receptor the difference of two noisy responses a and b is normal, and its size has
+
+        m = s sqrt(2/pi) exp(-d^2 / 2 s^2) + d (1 - 2 Phi(-d/s)),    v = d^2 + s^2 - m^2,
+        d = b - a,    s = sigma_1 sqrt(a^2 + b^2)
+
+    as mean and variance (the folded normal distribution). Receptors are independent, so both add up, and
+    the sum over a population is close to normal.
+
+    Parameters
+    ----------
+    responses, noise_sigma, silent_value
+        As in `fingerpad.psychophysics.discrimination.discriminate_euclidean`.
+    criterion : float, optional
+        Decision point beta.
+
+    Returns
+    -------
+    array (n_comparisons,)
+        Expected hit rates, within two points with 18 receptors. [0-1]
+
+    Examples
+    --------
+    >>> expected_euclidean_hit_rates([[50.0, 60.0], [51.0, 62.0], [60.0, 80.0]], 0.02).round(1).tolist()
+    [0.6, 1.0]
+    """
+    values = checked_responses(responses, silent_value)
+    sigma = positive("noise_sigma", noise_sigma)
+    d = values - values[0]
+    s = np.maximum(sigma * np.hypot(values, values[0]), np.finfo(float).tiny)  # both silent: no difference
+    m = s * np.sqrt(2.0 / np.pi) * np.exp(-0.5 * np.square(d / s)) + d * (1.0 - 2.0 * ndtr(-d / s))
+    means, spreads = m.sum(axis=1), np.sqrt((np.square(d) + np.square(s) - np.square(m)).sum(axis=1))
+    point = decision_point(means[0], means[1:], finite("criterion", criterion))
+    return hit_probability(point, means[1:], spreads[1:], side(means[np.newaxis]))
+
+
+def fit_noise_sigma(
+    hit_rates_of_sigma: Callable[[float], ArrayLike],
+    target_hit_rates: ArrayLike = psychophysics.GOODWIN_HIT_RATES.value,
+    bounds: tuple[float, float] = (1e-3, 1.0),
+) -> NoiseFit:
+    """Choose the noise so that predicted hit rates come closest to observed ones, in least squares.
+
+    The bounds are scanned on a logarithmic grid and the best cell is refined, so that the flat stretches
+    at very small and very large noise do no harm. No random number is drawn here.
+
+    Parameters
+    ----------
+    hit_rates_of_sigma : callable
+        Hit rates (n_targets,) at a given noise sigma_1; smooth, such as `expected_hit_rates`.
+    target_hit_rates : array_like (n_targets,), optional
+        Observed hit rates; default: Goodwin's for 296 and 365 /m. [0-1]
+    bounds : (float, float), optional
+        Smallest and largest noise to consider.
+
+    Returns
+    -------
+    NoiseFit
+
+    Raises
+    ------
+    InputError
+        If the bounds are not positive and in order, or predictions and targets differ in number.
+    ConvergenceError
+        If the best noise lies on a bound: the targets then cannot be met by noise.
+
+    Examples
+    --------
+    >>> from scipy.special import ndtr
+    >>> def predict(sigma):
+    ...     return ndtr([0.01 / sigma, 0.09 / sigma])
+    >>> fit = fit_noise_sigma(predict, predict(0.055))
+    >>> round(fit.noise_sigma, 4)
+    0.055
+    """
+    targets = float_array("target_hit_rates", target_hit_rates, 1)
+    smallest, largest = (positive("bounds", bound) for bound in bounds)
+    if smallest >= largest:
+        raise InputError(f"bounds must be a smaller and a larger noise: got {bounds!r}.")
+
+    def predict(sigma: float) -> FloatArray:
+        rates = float_array("hit rates of hit_rates_of_sigma", hit_rates_of_sigma(sigma), 1)
+        if rates.shape != targets.shape:
+            raise InputError(f"hit_rates_of_sigma must give {targets.size} hit rates: got {rates.size}.")
+        return rates
+
+    def misfit(log_sigma: float) -> float:
+        return float(np.square(predict(float(np.exp(log_sigma))) - targets).sum())
+
+    grid = np.linspace(np.log(smallest), np.log(largest), _NOISE_SCAN)
+    best = int(np.argmin([misfit(log_sigma) for log_sigma in grid]))
+    if best in (0, _NOISE_SCAN - 1):
+        raise ConvergenceError(
+            f"No noise within {smallest:g} ... {largest:g} meets the hit rates {targets.tolist()}: "
+            f"the best lies on the bound {np.exp(grid[best]):g}; widen the bounds or look at the responses."
+        )
+    refined = minimize_scalar(
+        misfit, bounds=(grid[best - 1], grid[best + 1]), method="bounded", options={"xatol": 1e-9}
+    )
+    sigma = float(np.exp(refined.x))
+    rates = predict(sigma)
+    return NoiseFit(sigma, rates, float(np.sqrt(np.mean(np.square(rates - targets)))))

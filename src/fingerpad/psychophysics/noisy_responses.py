@@ -1,0 +1,231 @@
+"""Noise on finished responses, by key, and the Gradient Sums of noisy populations (Figure 3, (a) to (d)).
+
+    r' = r n,    n ~ Normal(1, sigma_1)                 (a)
+    S  = sum over receptors and their neighbours of |r'_i - r'_j|    (b), (c)
+
+Each n has the key (seed, trial, receptor, RESPONSE) and a place in that stream: the number of the
+presentation. Sums are made in compiled blocks that store neither all noise nor all noisy responses; threads
+share the trials, and since no number depends on another the sums are the same on any number of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fingerpad.core.blocks import in_blocks
+from fingerpad.core.checks import FloatArray, whole
+from fingerpad.core.errors import InputError
+from fingerpad.core.philox import four_normals
+from fingerpad.core.random_streams import LARGEST_SEED, IntArray, Purpose, normals
+
+SESSION = 2**32
+"""Trials of one session. Sessions of one seed have no random number in common."""
+
+LARGEST_SESSION = LARGEST_SEED // SESSION - 1
+
+_RESPONSE = int(Purpose.RESPONSE)
+_TRIALS_AT_ONCE = 64
+_PRESENTATIONS_AT_ONCE = 128
+"""A multiple of 4, the numbers of a block of the random generator; with 18 receptors they fit into 18 KB."""
+
+
+def session_trials(session: int, *shape: int) -> IntArray:
+    """Give the trials of a session their numbers.
+
+    Parameters
+    ----------
+    session : int
+        Which session of the same seed, from 0.
+    *shape : int
+        How many stimuli, and how often each of them.
+
+    Returns
+    -------
+    int array of that shape
+        Numbers that no other session has.
+
+    Raises
+    ------
+    InputError
+        If the session is negative, too large or not whole.
+
+    Examples
+    --------
+    >>> session_trials(0, 2, 3).tolist()
+    [[0, 1, 2], [3, 4, 5]]
+    >>> int(session_trials(1, 2, 3)[0, 0]) == SESSION
+    True
+    """
+    if whole("session", session, 0) > LARGEST_SESSION:
+        raise InputError(f"session must not exceed {LARGEST_SESSION}: got {session}.")
+    return session * SESSION + np.arange(int(np.prod(shape)), dtype=np.int64).reshape(shape)
+
+
+def noisy_responses(
+    responses: FloatArray, noise_sigma: float, seed: int, trials: IntArray, presentations: int
+) -> FloatArray:
+    """Draw noisy presentations of every stimulus, step (a).
+
+    Parameters
+    ----------
+    responses : array (n_stimuli, n_receptors)
+        One measure of every receptor. [any unit]
+    noise_sigma : float
+        Standard deviation sigma_1 of the multiplicative noise.
+    seed : int
+        Of the whole run.
+    trials : int array (n_stimuli,)
+        One trial per stimulus, from `session_trials`.
+    presentations : int
+        How often each stimulus is presented.
+
+    Returns
+    -------
+    array (n_stimuli, presentations, n_receptors)
+        Noisy responses. [unit of `responses`]
+
+    Examples
+    --------
+    >>> noisy = noisy_responses(np.array([[10.0, 20.0]]), 0.1, 7, session_trials(0, 1), 1000)
+    >>> noisy.shape, noisy.mean(axis=1).round().tolist(), noisy.std(axis=1).round().tolist()
+    ((1, 1000, 2), [[10.0, 20.0]], [[1.0, 2.0]])
+    """
+    draws = normals(seed, trials, responses.shape[1], Purpose.RESPONSE, presentations)
+    return responses[:, np.newaxis] * (1.0 + noise_sigma * draws.transpose(0, 2, 1))
+
+
+def noisy_gradient_sums(
+    responses: FloatArray,
+    neighbours: np.ndarray,
+    noise_sigma: float | FloatArray,
+    seed: int,
+    trials: IntArray,
+    presentations: int,
+) -> FloatArray:
+    """Sum the gradients of noisy presentations of every stimulus, steps (a) to (d).
+
+    What `fingerpad.psychophysics.encoding.gradient_sum` makes of `noisy_responses`, without keeping either.
+    Several
+    measures of the same presentations, or several strengths of the noise, meet the same random numbers,
+    which are drawn once.
+
+    Parameters
+    ----------
+    responses : array (..., n_stimuli, n_receptors)
+        One measure of every receptor, or several of them. [any unit]
+    neighbours : int array (n_pairs, 2)
+        From `fingerpad.psychophysics.encoding.neighbour_pairs`.
+    noise_sigma : float or array (...)
+        Standard deviation sigma_1 of the multiplicative noise, one for all measures or one for each.
+    seed : int
+        Of the whole run.
+    trials : int array (n_stimuli, n_repeats)
+        Trials of every stimulus, from `session_trials`.
+    presentations : int
+        Presentations of a trial.
+
+    Returns
+    -------
+    array (..., n_stimuli, n_repeats, presentations)
+        Gradient Sums. [unit of `responses`]
+
+    Examples
+    --------
+    >>> two_receptors, trials = np.array([[10.0, 20.0]]), session_trials(0, 1, 2)
+    >>> noisy_gradient_sums(two_receptors, np.array([[0, 1]]), 0.0, 7, trials, 3).tolist()
+    [[[20.0, 20.0, 20.0], [20.0, 20.0, 20.0]]]
+    """
+    values = np.asarray(responses, dtype=np.float64)
+    measures = np.ascontiguousarray(values.reshape(-1, *values.shape[-2:]))
+    sigmas = np.ascontiguousarray(np.broadcast_to(noise_sigma, values.shape[:-2]).ravel(), dtype=np.float64)
+    pairs = np.ascontiguousarray(neighbours, dtype=np.int64)
+    numbers = np.ascontiguousarray(trials, dtype=np.int64).ravel()
+    stimuli = np.repeat(np.arange(trials.shape[0]), trials.shape[1])
+    sums = np.zeros((len(measures), numbers.size, whole("presentations", presentations, 1)))
+
+    def fill(some: slice) -> None:
+        _fill_sums(measures, stimuli[some], pairs, sigmas, seed, numbers[some], sums[:, some])
+
+    in_blocks(fill, numbers.size, _TRIALS_AT_ONCE)
+    return sums.reshape(*values.shape[:-2], *trials.shape, presentations)
+
+
+def shared_noise_gradient_sums(
+    responses: FloatArray, neighbours: np.ndarray, noise_sigma: float, standard_normals: FloatArray
+) -> FloatArray:
+    """Sum the gradients of every stimulus under the same noise.
+
+    Parameters
+    ----------
+    responses, neighbours, noise_sigma
+        As in `noisy_gradient_sums`.
+    standard_normals : array (n_draws, n_receptors)
+        Draws from Normal(0, 1) that serve every stimulus.
+
+    Returns
+    -------
+    array (n_stimuli, n_draws)
+        Gradient Sums. [unit of `responses`]
+
+    Examples
+    --------
+    >>> draws = np.array([[0.0, 0.0], [1.0, 1.0]])
+    >>> shared_noise_gradient_sums(np.array([[10.0, 20.0]]), np.array([[0, 1]]), 0.5, draws).tolist()
+    [[20.0, 30.0]]
+    """
+    values = np.ascontiguousarray(responses, dtype=np.float64)
+    pairs = np.ascontiguousarray(neighbours, dtype=np.int64)
+    sums = np.zeros((len(values), len(standard_normals)))
+    _fill_shared(values, pairs, noise_sigma, np.ascontiguousarray(standard_normals.T), sums)
+    return sums
+
+
+@njit(cache=True, nogil=True)
+def _fill_sums(measures, stimuli, pairs, sigmas, seed, trials, sums):  # type: ignore[no-untyped-def]
+    """Add up the sums (n_measures, n_trials, presentations) of some trials, a few presentations at a time."""
+    n_receptors, count = measures.shape[2], sums.shape[2]
+    draws = np.zeros((n_receptors, _PRESENTATIONS_AT_ONCE))
+    noisy = np.empty_like(draws)
+    for trial in range(trials.size):
+        for first in range(0, count, _PRESENTATIONS_AT_ONCE):
+            last = min(first + _PRESENTATIONS_AT_ONCE, count)
+            for receptor in range(n_receptors):
+                for start in range(first, last, 4):
+                    four = four_normals(seed, trials[trial], receptor, _RESPONSE, start // 4 + 1)
+                    for k in range(4):  # up to three too many at the end, which nobody reads
+                        draws[receptor, start - first + k] = four[k]
+            for measure in range(measures.shape[0]):
+                _multiply(measures[measure, stimuli[trial]], sigmas[measure], draws, noisy)
+                _add_gradients(noisy, pairs, sums[measure, trial, first:last])
+
+
+@njit(cache=True, nogil=True)
+def _fill_shared(values, pairs, sigma, standard_normals, sums):  # type: ignore[no-untyped-def]
+    """Add up the sums (n_stimuli, n_draws) of responses under given noise (n_receptors, n_draws)."""
+    n_receptors, count = standard_normals.shape
+    draws = np.zeros((n_receptors, _PRESENTATIONS_AT_ONCE))
+    noisy = np.empty_like(draws)
+    for first in range(0, count, _PRESENTATIONS_AT_ONCE):
+        last = min(first + _PRESENTATIONS_AT_ONCE, count)
+        draws[:, : last - first] = standard_normals[:, first:last]
+        for stimulus in range(values.shape[0]):
+            _multiply(values[stimulus], sigma, draws, noisy)
+            _add_gradients(noisy, pairs, sums[stimulus, first:last])
+
+
+@njit(cache=True, nogil=True)
+def _multiply(responses, sigma, draws, noisy):  # type: ignore[no-untyped-def]
+    """Write noisy responses (n_receptors, n_draws) (a)."""
+    for receptor in range(responses.size):
+        for k in range(draws.shape[1]):
+            noisy[receptor, k] = responses[receptor] * (1.0 + sigma * draws[receptor, k])
+
+
+@njit(cache=True, nogil=True)
+def _add_gradients(noisy, pairs, sums):  # type: ignore[no-untyped-def]
+    """Add to every sum the absolute differences of all neighbours, both ways round (b, c)."""
+    for pair in range(pairs.shape[0]):
+        one, other = noisy[pairs[pair, 0]], noisy[pairs[pair, 1]]
+        for k in range(sums.size):
+            sums[k] += 2.0 * abs(one[k] - other[k])

@@ -1,0 +1,107 @@
+"""What all figures share: colours that survive greyscale, sizes, and how a figure becomes bytes."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.files import write_atomically
+
+RESOLUTION_DPI = 150
+
+# Three hues that people with any colour vision tell apart, of three different greys.
+BLACK = "#1a1a1a"
+BLUE = "#0a5c99"
+ORANGE = "#d9650a"
+GREEN = "#3fae8a"
+GREY = "#8a8a8a"
+PALE = "#e9e9e6"
+
+# Untyped, since Matplotlib lists every setting by name in the type that it asks for.
+STYLE: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10.0,
+    "axes.titlesize": 11.0,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#dcdcd8",
+    "grid.linewidth": 0.6,
+    "legend.fontsize": 9.0,
+    "legend.frameon": False,
+    "lines.linewidth": 1.8,
+    "xtick.labelsize": 9.0,
+    "ytick.labelsize": 9.0,
+    "hatch.linewidth": 0.6,
+    "savefig.dpi": RESOLUTION_DPI,
+}
+
+
+def numbers(values: Any) -> FloatArray:
+    """Return nested lists of numbers as an array; None becomes NaN.
+
+    Examples
+    --------
+    >>> numbers([1, None])
+    array([ 1., nan])
+    """
+    return np.array(values, dtype=np.float64)
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """Return an empty figure that arranges its own margins and knows no window system. [in]"""
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def png(draw: Callable[[Any], Figure], section: Any) -> bytes:
+    """Return what `draw` makes of a section of the results, as PNG; settings elsewhere stay as they are."""
+    buffer = io.BytesIO()
+    with matplotlib.rc_context(STYLE):
+        draw(section).savefig(buffer, format="png", metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def write_png(draw: Callable[[Any], Figure], section: Any, path: Path) -> Path:
+    """Write what `draw` makes of a section of the results, or of results of your own, as PNG.
+
+    Parameters
+    ----------
+    draw : callable
+        One of the report's, such as `responses.draw`.
+    section : Any
+        What it draws.
+    path : Path
+        The file; folders are made as needed, and it is there whole or not at all.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be written.
+    """
+    write_atomically(Path(path), png(draw, section))
+    return Path(path)
+
+
+def say_nothing_to_draw(axes: Axes, text: str) -> None:
+    """Write in an empty panel why it is empty."""
+    axes.set_axis_off()
+    axes.text(0.5, 0.5, text, ha="center", va="center", color=GREY, transform=axes.transAxes)

@@ -1,0 +1,1 @@
+"""One touch, from its description to strain energy density over time; stored responses."""

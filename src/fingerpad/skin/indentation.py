@@ -1,0 +1,356 @@
+"""One touch: put an indenter on the finger, press, and hand over what the skin did."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from fingerpad.core.checks import FloatArray, finite, instance, one_of
+from fingerpad.core.compilation import announce_compilation
+from fingerpad.core.errors import InputError
+from fingerpad.core.threads import compiled_threads
+from fingerpad.core.units import cosine_and_sine
+from fingerpad.data import fingertip as published
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import RESOLUTIONS, Grading
+from fingerpad.geometry.indenter_grading import FEWEST_ACROSS_GROOVE, grading_about, sizes_across
+from fingerpad.geometry.indenters import Indenter
+from fingerpad.geometry.mesh import Mesh, finger_mesh
+from fingerpad.geometry.motion import Motion, RampAndHold, Stimulus
+from fingerpad.mechanics import assembly
+from fingerpad.mechanics.contact import Placement, check_friction, place
+from fingerpad.mechanics.fields import QUANTITIES, von_mises
+from fingerpad.mechanics.materials import Tissues
+from fingerpad.mechanics.press import Deformation, PressSettings, press
+from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.skin.sampling import SkinResponse
+
+CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
+STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
+"""Steps in ramp and hold of each resolution."""
+
+SLOWEST_KERNEL = assembly._add_chunk
+"""Of all that a press compiles, most of a minute is spent on this."""
+
+LARGEST_TILT_DEG = 45.0
+_CLEARANCE_TO_BONE = 0.8
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Everything that determines one indentation: its value is the key under which the result is stored.
+
+    Parameters
+    ----------
+    finger : Fingertip
+        The finger.
+    indenter : Indenter
+        The rigid body.
+    stimulus : RampAndHold or ForceRampAndHold
+        Its motion, by depth or by force.
+    tissues : Tissues
+        Laws of the four layers.
+    grading : Grading
+        Where the mesh is fine.
+    settings : PressSettings
+        Steps and tolerances.
+    at_mm : (float, float)
+        x and z of the skin point that the indenter's axis goes through. [mm]
+    tilt_deg : float
+        Rotation of the indenter about z. At 0 it presses along y, perpendicular to the finger's long axis;
+        a positive tilt turns the direction of pressing towards the proximal end. [degrees]
+    friction : float
+        Coulomb's coefficient between skin and indenter.
+    spin_deg : float
+        Rotation of the indenter about its direction of pressing, after the tilt. At 0 a bar lies across the
+        finger, at 90 along it; a positive spin turns the indenter's x axis from distal towards +z. [degrees]
+
+    Raises
+    ------
+    InputError
+        If the axis misses the finger, the depth reaches the bone, an axis beside the midline or a spin that
+        breaks the symmetry meets half a finger, the elements are too long for a groove, or tilt, spin or
+        friction is asked of a wire.
+    """
+
+    finger: Fingertip
+    indenter: Indenter
+    stimulus: Stimulus
+    tissues: Tissues
+    grading: Grading
+    settings: PressSettings = field(default_factory=PressSettings)
+    at_mm: tuple[float, float] = CONTACT_POINT_MM
+    tilt_deg: float = 0.0
+    friction: float = 0.0
+    spin_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, kind in (
+            ("finger", Fingertip),
+            ("indenter", Indenter),
+            ("stimulus", Motion),
+            ("tissues", Tissues),
+            ("grading", Grading),
+            ("settings", PressSettings),
+        ):
+            instance(name, getattr(self, name), kind)
+        x, z = _check_position(self.at_mm)
+        object.__setattr__(self, "at_mm", (x, z))
+        if abs(finite("tilt_deg", self.tilt_deg, "degrees")) > LARGEST_TILT_DEG:
+            raise InputError(f"tilt_deg must lie within {LARGEST_TILT_DEG:g} degrees: got {self.tilt_deg:g}.")
+        if z != 0.0 and not self.grading.full:
+            raise InputError(f"at_mm beside the midline (z = {z:g} mm) needs a grading with full=True.")
+        spin = finite("spin_deg", self.spin_deg, "degrees")
+        body = type(self.indenter).__name__
+        for name, angle in (("tilt_deg", self.tilt_deg), ("spin_deg", spin)):
+            if self.indenter.grips and angle != 0.0:
+                raise InputError(f"{name} must be 0 for {body}: got {angle:g} degrees.")
+        if not self.grading.full and not self.indenter.mirrors(spin):
+            raise InputError(
+                f"spin_deg = {spin:g} degrees leaves {body} without symmetry across the midline, so half a "
+                "finger is not enough: give a grading with full=True."
+            )
+        self._check_grooves()
+        check_friction(self.friction, self.indenter)
+        if isinstance(self.stimulus, RampAndHold) and self.stimulus.depth_mm > self.deepest_mm:
+            raise InputError(
+                f"depth_mm must stay below {self.deepest_mm:.2f} mm at x = {x:g}, z = {z:g} mm, "
+                f"where the bone comes: got {self.stimulus.depth_mm:g} mm."
+            )
+
+    def _check_grooves(self) -> None:
+        """No node presses on a ridge, or fits into a groove, that lies between two of them."""
+        size_mm, narrowest_mm = max(sizes_across(self.grading, self.spin_deg)), self.indenter.narrowest_mm
+        if size_mm > narrowest_mm / FEWEST_ACROSS_GROOVE:
+            raise InputError(
+                f"grading must have elements of at most {narrowest_mm / FEWEST_ACROSS_GROOVE:g} mm across "
+                f"grooves and ridges of {narrowest_mm:g} mm: got {size_mm:g} mm; leave grading out or take "
+                "grading_about(...)."
+            )
+
+    def solve(self, threads: int | None = None) -> SkinResponse:
+        """Press and return the answer of the skin.
+
+        Parameters
+        ----------
+        threads : int, optional
+            Threads to use, all by default; the answer has the same bits on any number of them.
+
+        Raises
+        ------
+        InputError
+            If a force pushes the indenter deeper than `deepest_mm`, or there are not so many threads.
+        ConvergenceError
+            If a step cannot be solved; nothing partial is returned.
+        """
+        mesh = self.mesh
+        done = self._press(mesh.living_epidermis.ravel(), threads)
+        return SkinResponse(
+            mesh=mesh,
+            times_ms=done.times_ms,
+            kinks_ms=(self.stimulus.ramp_ms,),
+            force_mn=done.force_mn,
+            depth_mm=done.depth_mm,
+            skin_displacement_mm=done.displacement_mm[:, mesh.skin_nodes],
+            displacement_mm=done.displacement_mm[-1],
+            sed_kpa=done.sed_kpa,
+            axis_x_mm=self.at_mm[0],
+            direction=self.placement.axis,
+            sheet={name: done.fields.quantity(name) for name in QUANTITIES if name != "stored"},
+            von_mises_kpa=von_mises(done.stress_kpa),
+            force_imbalance=done.force_imbalance,
+            energy_imbalance=done.energy.relative_imbalance,
+            penetration_mm=done.penetration_mm,
+            newton_steps=done.newton_steps,
+            factorisations=done.factorisations,
+            linear_solver=done.linear_solver,
+        )
+
+    def deform(self, threads: int | None = None) -> Deformation:
+        """Press and return everything that is known of every element and node over time.
+
+        For looking at one touch (`fingerpad.export`); `solve` keeps what the later stages need.
+
+        Parameters
+        ----------
+        threads : int, optional
+            As in `solve`.
+
+        Returns
+        -------
+        Deformation
+            Of the nodes and elements of `mesh`.
+
+        Raises
+        ------
+        ConvergenceError
+            If a step cannot be solved; nothing partial is returned.
+        """
+        return self._press(np.arange(len(self.mesh.elements)), threads)
+
+    def _press(self, watched: np.ndarray, threads: int | None) -> Deformation:
+        announce_compilation(SLOWEST_KERNEL)
+        # Libraries get one thread, since their sums depend on the number of threads; our loops' do not.
+        with compiled_threads(threads), threadpool_limits(limits=1):
+            return press(
+                self.mesh,
+                self.tissues.layers,
+                self.indenter,
+                self.placement,
+                self.stimulus,
+                self.settings,
+                self.deepest_mm,
+                watched,
+                self.friction,
+            )
+
+    @property
+    def placement(self) -> Placement:
+        """Where the indenter stands at first touch."""
+        skin = self.mesh.nodes_mm[self.mesh.skin_nodes]
+        at = self.finger.skin_point(*self.at_mm)
+        return place(self.indenter, skin, at, _rotation(self.tilt_deg, self.spin_deg))
+
+    @property
+    def deepest_mm(self) -> float:
+        """Depth that an indentation must not exceed: most of the way to the bone. [mm]"""
+        return _CLEARANCE_TO_BONE * float(self.finger.depth_available_mm(*self.at_mm))
+
+    @property
+    def mesh(self) -> Mesh:
+        """The undeformed finger of this touch."""
+        return _mesh(self.finger, self.grading)
+
+
+def _rotation(tilt_deg: float, spin_deg: float) -> FloatArray:
+    """Axes of an indenter tilted about z and then turned about its own y, as columns."""
+    cosine, sine = np.cos(np.deg2rad(tilt_deg)), np.sin(np.deg2rad(tilt_deg))
+    tilt = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    along, towards = cosine_and_sine(spin_deg)
+    return tilt @ np.array([[along, 0.0, -towards], [0.0, 1.0, 0.0], [towards, 0.0, along]])
+
+
+@lru_cache(maxsize=4)
+def _mesh(finger: Fingertip, grading: Grading) -> Mesh:
+    return finger_mesh(finger, grading)
+
+
+def touch_of(
+    finger: Fingertip,
+    indenter: Indenter,
+    stimulus: Stimulus | None = None,
+    materials: str | Tissues = "trial3",
+    resolution: str = "quick",
+    at_mm: Sequence[float] = CONTACT_POINT_MM,
+    grading: Grading | None = None,
+    tilt_deg: float = 0.0,
+    settings: PressSettings | None = None,
+    friction: float = 0.0,
+    spin_deg: float = 0.0,
+) -> Touch:
+    """Describe a touch without solving it; arguments as in `indent`.
+
+    Parameters
+    ----------
+    grading : Grading, optional
+        Mesh to use instead of the one that `resolution` grades about the indenter.
+    tilt_deg : float
+        Rotation of the indenter about z, see `Touch`. [degrees]
+    friction : float
+        Coulomb's coefficient between skin and indenter; the paper mentions none.
+    spin_deg : float
+        Rotation of the indenter about its direction of pressing, see `Touch`. Without a `grading` both halves
+        of the finger are meshed if the turned indenter is not its own mirror image. [degrees]
+
+    Returns
+    -------
+    Touch
+        A value that can be solved, stored and compared.
+    """
+    one_of("resolution", resolution, RESOLUTIONS)
+    x, z = _check_position(at_mm)
+    # The mesh is graded about this point, so finger, indenter and point are checked before it is.
+    instance("finger", finger, Fingertip).skin_point(x, z)
+    instance("indenter", indenter, Indenter)
+    return Touch(
+        finger=finger,
+        indenter=indenter,
+        stimulus=stimulus or RampAndHold(),
+        tissues=materials if isinstance(materials, Tissues) else named_tissues(materials),
+        grading=grading or grading_about(indenter, resolution, x, z, finite("spin_deg", spin_deg, "degrees")),
+        settings=settings or settings_of(resolution),
+        at_mm=(x, z),
+        tilt_deg=tilt_deg,
+        friction=friction,
+        spin_deg=spin_deg,
+    )
+
+
+def indent(
+    finger: Fingertip,
+    indenter: Indenter,
+    stimulus: Stimulus | None = None,
+    materials: str | Tissues = "trial3",
+    resolution: str = "quick",
+    at_mm: Sequence[float] = CONTACT_POINT_MM,
+    settings: PressSettings | None = None,
+) -> SkinResponse:
+    """Press an indenter into a finger.
+
+    Parameters
+    ----------
+    finger : Fingertip
+        The finger.
+    indenter : Indenter
+        `Line`, `Cylinder`, `Bar`, `Sphere`, `FlatPunch`, `Plate`, `Edge`, `Gap` or `Grating`.
+    stimulus : RampAndHold or ForceRampAndHold, optional
+        The motion, by depth or by force; the paper's by default.
+    materials : str or Tissues
+        "trial1", "trial2", "trial3" (paper, section 2.2.1), "trial2_wu", "trial3_wu", "trial3_stiffening",
+        "maeno1998", "wu2007", "gerling2014_fit", or tissues of your own.
+    resolution : {"quick", "standard", "paper"}
+        How fine the mesh and the steps are.
+    at_mm : (float, float)
+        x and z of the indenter's axis on the finger; half of the finger is solved on the midline. [mm]
+    settings : PressSettings, optional
+        Steps and tolerances instead of those of `resolution`; `PressSettings(sed_tolerance=0.01)` chooses
+        steps that keep the error of SED in time below 1 % of its largest value.
+
+    Returns
+    -------
+    SkinResponse
+        Force, depth, surface profile and strain energy density over time.
+
+    Raises
+    ------
+    InputError
+        If an argument cannot be used: unknown name, depth beyond the finger, indenter beside it.
+    ConvergenceError
+        If the mechanics cannot be solved.
+
+    Examples
+    --------
+    >>> import fingerpad as fp
+    >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287), fp.RampAndHold(depth_mm=0.3))
+    >>> print(f"{skin.surface_profile().deflection_mm.max():.1f} mm deep, {skin.force_mn[-1]:.0f} mN")
+    0.3 mm deep, 32 mN
+    """
+    return touch_of(finger, indenter, stimulus, materials, resolution, at_mm, settings=settings).solve()
+
+
+def settings_of(resolution: str) -> PressSettings:
+    """Return steps and tolerances of a named resolution."""
+    ramp_steps, hold_steps = STEPS[resolution]
+    return PressSettings(ramp_steps, hold_steps)
+
+
+def _check_position(at_mm: Sequence[float]) -> tuple[float, float]:
+    try:
+        x, z = at_mm
+    except (TypeError, ValueError) as error:
+        raise InputError(f"at_mm must be a pair, x and z in mm: got {at_mm!r}.") from error
+    return finite("x of at_mm", x, "mm"), finite("z of at_mm", z, "mm")

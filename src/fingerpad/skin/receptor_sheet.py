@@ -1,0 +1,327 @@
+"""Where end organs lie: from points of the skin to the living epidermis below, on any side of the finger.
+
+The sheet of living epidermis is one element thick and as regular as the mesh: rows along the finger, columns
+around it. Let (u, v) count them, whole numbers at the elements' middles. One cubic,
+`fingerpad.skin.grid_cubic`,
+carries all that is known there: the elements' values f, the points S of the skin above their middles, and the
+points B of the epidermal-dermal border below. A site is where S(u, v) meets it. The end organ lies where the
+normal n of the skin meets the border,
+
+    S(u, v) - t n = B(u', v'),
+
+and reads f(u', v'). As one cubic serves all, values that are linear in space are read exactly.
+
+Beyond the rim of the sheet rows and columns go on as the body does: mirrored where it is halved, on around
+where it is closed, through the pole at the tip, else straight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.mesh import Mesh
+from fingerpad.skin.grid_cubic import values_and_slopes_at, values_at
+
+_PADDING = 2  # rows and columns beyond the rim: what the cubic needs half an element past the last middle
+_MOST_STEPS = 60
+_LONGEST_STEP = 2.0  # elements
+_EXACT_MM = 1e-9
+_BEYOND_RIM = 0.9  # elements past the last middle that are tried; the mesh's bounds decide
+_OFF_THE_SKIN = 0.25
+"""How far beside the skin of the mesh a site may lie, over the size of its elements, which cut corners."""
+
+_MIRROR = np.array([1.0, 1.0, -1.0])
+"""What the plane of symmetry, z = 0, does to a point."""
+
+Equations = Callable[[FloatArray, np.ndarray], tuple[FloatArray, FloatArray]]
+"""From (u, v) of some sites (n, 2) and their numbers to what is to vanish (n, 2) and its Jacobian."""
+
+
+@dataclass(frozen=True)
+class ReceptorSheet:
+    """The elements just above the epidermal-dermal border, and the way from the skin to them.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The undeformed body.
+
+    Raises
+    ------
+    InputError
+        If it has no living epidermis, or only one element along or around.
+    """
+
+    mesh: Mesh
+
+    def __post_init__(self) -> None:
+        shape = self.mesh.living_epidermis.shape
+        if 0 in shape:
+            raise InputError("This mesh has no living epidermis: SED is sampled only in a layered finger.")
+        if 1 in shape:
+            raise InputError(f"Sampling needs two elements along and around, or more: got {shape}.")
+
+    def below(self, sites_mm: FloatArray) -> FloatArray:
+        """Find end organs below points of the skin, on any side of the finger.
+
+        Parameters
+        ----------
+        sites_mm : array (n_sites, 3)
+            x, y and z. [mm]
+
+        Returns
+        -------
+        array (n_sites, 2)
+            u and v, for `read`.
+
+        Raises
+        ------
+        InputError
+            If a site is not on the skin.
+        """
+        target = self._in_mesh(sites_mm)
+        start = self._middles[cKDTree(self._skin(self._middles)[0]).query(target)[1]]
+        uv, missed = self._solve(lambda uv, which: _tangential(self._skin(uv), target[which]), start)
+        point, *slopes = self._skin(uv)
+        away = np.linalg.norm(point - target, axis=1)
+        missed |= away > _OFF_THE_SKIN * np.linalg.norm(slopes, axis=2).max(axis=0)
+        missed |= self._past_the_rim(target)
+        if missed.any():
+            first = np.argmax(missed)
+            x, y, z = sites_mm[first]
+            raise InputError(
+                f"sites must lie on the skin of the mesh: (x, y, z) = ({x:g}, {y:g}, {z:g}) mm is "
+                f"{away[first]:.2g} mm beside it."
+            )
+        return self._below(uv)
+
+    def read(self, uv: FloatArray, values: FloatArray) -> FloatArray:
+        """Interpolate values of the sheet's elements.
+
+        Parameters
+        ----------
+        uv : array (n_sites, 2)
+            From `below`.
+        values : array (n_times, n_sheet)
+            Of the elements `mesh.living_epidermis`, flattened.
+
+        Returns
+        -------
+        array (n_times, n_sites)
+        """
+        known = np.asarray(values, dtype=np.float64).T.reshape(*self.mesh.living_epidermis.shape, -1)
+        # At the pole, where all columns meet, they agree on their mean.
+        return values_at(self._padded(known, 1.0, known[-1].mean(axis=0)), uv, _PADDING).T
+
+    def _below(self, uv: FloatArray) -> FloatArray:
+        """Where the normal of the skin at (u, v) meets the border, S - t n = B(u', v')."""
+        normal, skin = self._outward(uv), self._skin(uv)[0]
+        t = ((skin - self._border(uv)[0]) * normal).sum(axis=1, keepdims=True)
+        target = skin - t * normal
+        return self._solve(lambda uv, which: _tangential(self._border(uv), target[which]), uv)[0]
+
+    def _solve(self, equations: Equations, start: FloatArray) -> tuple[FloatArray, np.ndarray]:
+        """Solve for (u, v) of every site by Newton's method, and tell whom it missed."""
+        uv = start.copy()
+        open_sites = np.arange(len(uv))
+        for _ in range(_MOST_STEPS):
+            excess, jacobian = equations(uv[open_sites], open_sites)
+            unsolved = ~(np.abs(excess).max(axis=1) < _EXACT_MM)
+            open_sites, excess, jacobian = open_sites[unsolved], excess[unsolved], jacobian[unsolved]
+            if not open_sites.size:
+                break
+            (a, b), (c, d) = np.moveaxis(jacobian, 0, -1)
+            determinant = np.where(a * d == b * c, np.inf, a * d - b * c)
+            e, f = excess.T
+            step = np.stack([b * f - d * e, c * e - a * f], axis=1) / determinant[:, None]
+            step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+            uv[open_sites] = self._kept(uv[open_sites] + step)
+        missed = np.zeros(len(uv), dtype=bool)
+        missed[open_sites] = True
+        return uv, missed
+
+    def _kept(self, uv: FloatArray) -> FloatArray:
+        """(u, v) on the sheet: back to its rim, on around, or through the pole to the other side."""
+        (first_u, last_u), (first_v, last_v) = self._limits
+        u, v = uv.T
+        if self._ends_in_pole:
+            beyond, n_around = u > last_u, self.mesh.living_epidermis.shape[1]
+            opposite = v + 0.5 * n_around if self._closed else n_around - 1.0 - v
+            u, v = np.where(beyond, 2.0 * last_u - u, u), np.where(beyond, opposite, v)
+        v = v % last_v if self._closed else np.clip(v, first_v, last_v)
+        return np.stack([np.clip(u, first_u, last_u), v], axis=1)
+
+    @cached_property
+    def _limits(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Smallest and largest u and v: half an element past the last middle at a mirror or pole, else one.
+
+        Where elements grow towards a rim, it lies a little more than half a step beyond the last middle.
+        """
+        n_along, n_around = self.mesh.living_epidermis.shape
+        if self._closed:
+            around = 0.0, float(n_around)
+        else:
+            first, last = (0.5 if mirrored else _BEYOND_RIM for mirrored in self._mirrors)
+            around = -first, n_around - 1.0 + last
+        return (-_BEYOND_RIM, n_along - 1.0 + (0.5 if self._ends_in_pole else _BEYOND_RIM)), around
+
+    def _past_the_rim(self, sites_mm: FloatArray) -> np.ndarray:
+        """Whether sites lie beyond the cut, or beside a body that is open to its sides, bool (n,)."""
+        skin = self.mesh.nodes_mm[self.mesh.skin_nodes]
+        beyond = skin[:, 0].min() - sites_mm[:, 0]
+        if not self._ends_in_pole:
+            beyond = np.maximum(beyond, sites_mm[:, 0] - skin[:, 0].max())
+        if not (self._closed or all(self._mirrors)):
+            z = sites_mm[:, 2]
+            beyond = np.maximum(beyond, np.maximum(skin[:, 2].min() - z, z - skin[:, 2].max()))
+        return beyond > _EXACT_MM
+
+    def _in_mesh(self, sites_mm: FloatArray) -> FloatArray:
+        """Sites, mirrored into the half that the mesh holds."""
+        inside = sites_mm.copy()
+        if not self.mesh.full:
+            inside[:, -1] = np.abs(inside[:, -1])
+        return inside
+
+    @cached_property
+    def _closed(self) -> bool:
+        """Whether the columns go all around."""
+        grid = self.mesh.skin_grid
+        return bool((grid[:, 0] == grid[:, -1]).all())
+
+    @cached_property
+    def _ends_in_pole(self) -> bool:
+        """Whether all columns end in one node."""
+        return bool((self.mesh.skin_grid[-1] == self.mesh.skin_grid[-1, 0]).all())
+
+    @cached_property
+    def _mirrors(self) -> tuple[bool, bool]:
+        """Whether the body is halved along the first and along the last column."""
+        first, last = (
+            bool(np.isin(self.mesh.skin_grid[:, column], self.mesh.symmetry_nodes).all())
+            for column in (0, -1)
+        )
+        return first, last
+
+    @cached_property
+    def _middles(self) -> FloatArray:
+        """(u, v) of all elements, (n_sheet, 2)."""
+        return np.argwhere(np.full(self.mesh.living_epidermis.shape, True)).astype(np.float64)
+
+    @cached_property
+    def _skin_control(self) -> FloatArray:
+        return self._padded_points(0)
+
+    @cached_property
+    def _border_control(self) -> FloatArray:
+        return self._padded_points(self._through_border)
+
+    @cached_property
+    def _through_border(self) -> int:
+        """Level of the grid that is the epidermal-dermal border, where the sheet's elements begin."""
+        lower = self.mesh.elements[self.mesh.living_epidermis[0, 0], 0]
+        return int(np.flatnonzero(self.mesh.grid[0, 0] == lower)[0])
+
+    def _padded_points(self, through: int) -> FloatArray:
+        """Middles of the faces of one level of the grid, lifted onto the surface of its nodes, padded.
+
+        The middle of a face's corners lies below that surface by what its chords cut off. Cubics through four
+        nodes tell how much, along and around the finger.
+        """
+        nodes = self.mesh.nodes_mm[self.mesh.grid[:, :, through]]
+        middles = 0.25 * (nodes[:-1, :-1] + nodes[1:, :-1] + nodes[1:, 1:] + nodes[:-1, 1:])
+        bulge = np.zeros_like(middles)
+        wide = self._wider(nodes)
+        bulge += 0.5 * _bulge(wide, 1)[:-1] + 0.5 * _bulge(wide, 1)[1:]
+        tall = np.concatenate([2 * nodes[:1] - nodes[1:2], nodes, 2 * nodes[-1:] - nodes[-2:-1]])
+        bulge += 0.5 * _bulge(tall, 0)[:, :-1] + 0.5 * _bulge(tall, 0)[:, 1:]
+        normal = np.cross(nodes[1:, 1:] - nodes[:-1, :-1], nodes[:-1, 1:] - nodes[1:, :-1])
+        normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+        # Along the skin the middle of an element stays where it is.
+        middles += (bulge * normal).sum(axis=2, keepdims=True) * normal
+        return self._padded(middles, _MIRROR, nodes[-1, 0])
+
+    def _wider(self, nodes: FloatArray) -> FloatArray:
+        """Nodes with one more column at either end."""
+        if self._closed:
+            return np.concatenate([nodes[:, -2:-1], nodes, nodes[:, 1:2]], axis=1)
+        ends = [
+            _MIRROR * inner if mirrored else 2.0 * end - inner
+            for (end, inner), mirrored in zip(
+                ((nodes[:, :1], nodes[:, 1:2]), (nodes[:, -1:], nodes[:, -2:-1])), self._mirrors, strict=True
+            )
+        ]
+        return np.concatenate([ends[0], nodes, ends[1]], axis=1)
+
+    def _skin(self, uv: FloatArray) -> FloatArray:
+        """Points S of the skin and their derivatives by u and by v, (3, n, 3)."""
+        return values_and_slopes_at(self._skin_control, uv, _PADDING)
+
+    def _border(self, uv: FloatArray) -> FloatArray:
+        """Points B of the border and their derivatives by u and by v, (3, n, 3)."""
+        return values_and_slopes_at(self._border_control, uv, _PADDING)
+
+    def _outward(self, uv: FloatArray) -> FloatArray:
+        """Outward unit normal of the skin, (n, 3)."""
+        point, by_u, by_v = self._skin(uv)
+        normal = np.cross(by_u, by_v)
+        inside_out = ((point - self._border(uv)[0]) * normal).sum(axis=1, keepdims=True) < 0.0
+        return np.where(inside_out, -1.0, 1.0) * normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+    def _padded(self, known: FloatArray, mirror: float | FloatArray, pole: FloatArray) -> FloatArray:
+        """Two more rows and columns at either end of (n_along, n_around, k), as the body goes on.
+
+        Parameters
+        ----------
+        known : array (n_along, n_around, k)
+            At the elements' middles.
+        mirror : float or array (k,)
+            Sign that each component takes across the plane of symmetry.
+        pole : array (k,)
+            What all columns meet at, if the rows end in a pole.
+        """
+        if self._closed:
+            around = np.concatenate([known[:, -2:], known, known[:, :2]], axis=1)
+        else:
+            first, last = self._mirrors
+            ends = [
+                mirror * end if mirrored else _straight_on(end)
+                for end, mirrored in ((known[:, :2], first), (known[:, :-3:-1], last))
+            ]
+            around = np.concatenate([ends[0][:, ::-1], known, ends[1]], axis=1)
+        start = np.moveaxis(_straight_on(np.moveaxis(around[:2], 0, 1)), 1, 0)
+        tip = around[:-3:-1]
+        end = (
+            2.0 * pole - tip
+            if self._ends_in_pole
+            else np.moveaxis(_straight_on(np.moveaxis(tip, 0, 1)), 1, 0)
+        )
+        return np.concatenate([start[::-1], around, end])
+
+
+def _bulge(nodes: FloatArray, axis: int) -> FloatArray:
+    """How far a cubic through four nodes in a row passes beside the middle of the inner two."""
+    first, second, third, fourth = (np.moveaxis(nodes, axis, 0)[k : k - 3 or None] for k in range(4))
+    return np.moveaxis((second + third - first - fourth) / 16.0, 0, axis)
+
+
+def _straight_on(end: FloatArray) -> FloatArray:
+    """Next two of a row, given its last two, the very last first: (n, 2, k) -> (n, 2, k)."""
+    step = end[:, 0] - end[:, 1]
+    return np.stack([end[:, 0] + step, end[:, 0] + 2.0 * step], axis=1)
+
+
+def _tangential(surface: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Distance from a target along both tangents of a surface, and its Jacobian without their turning."""
+    point, *slopes = surface
+    slope = np.stack(slopes, axis=1)
+    tangent = slope / np.linalg.norm(slope, axis=2, keepdims=True)
+    excess = (tangent * (point - target)[:, None]).sum(axis=2)
+    return excess, np.einsum("nik,njk->nij", tangent, slope)

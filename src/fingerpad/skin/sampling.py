@@ -1,0 +1,244 @@
+"""The only place where skin becomes signal: surface profile, and strain energy density at receptor depth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CloughTocher2DInterpolator
+from scipy.spatial import Delaunay
+from threadpoolctl import threadpool_limits
+
+from fingerpad.core.checks import FloatArray, float_array, one_of
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import STORED_ENERGY, SedTraces
+from fingerpad.geometry.mesh import Mesh
+from fingerpad.skin.receptor_sheet import ReceptorSheet
+
+
+@dataclass(frozen=True)
+class SurfaceProfile:
+    """Deflection of the skin along the midline of the finger.
+
+    Parameters
+    ----------
+    distance_mm : array (n_nodes,)
+        Position of the undeformed skin relative to the indenter's axis, distal positive. [mm]
+    deflection_mm : array (n_nodes,)
+        Displacement along the direction of pressing, towards the bone positive. [mm]
+    """
+
+    distance_mm: FloatArray
+    deflection_mm: FloatArray
+
+    def at(self, distance_mm: ArrayLike) -> FloatArray:
+        """Deflection at other distances, linear between nodes. [mm]"""
+        return np.interp(np.asarray(distance_mm, dtype=float), self.distance_mm, self.deflection_mm)
+
+
+@dataclass(frozen=True)
+class SkinResponse:
+    """What one touch did to the skin; the end of the mechanical half of the chain.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The undeformed body.
+    times_ms : array (n_times,)
+        From 0, the unloaded state. [ms]
+    kinks_ms : tuple of float
+        Times at which the motion changes its speed abruptly: the end of the ramp. [ms]
+    force_mn : array (n_times,)
+        Force of the indenter along its axis, on the whole finger. [mN]
+    depth_mm : array (n_times,)
+        How far the indenter has advanced since first touch. [mm]
+    skin_displacement_mm : array (n_times, n_skin_nodes, 3)
+        Displacement of `mesh.skin_nodes`. [mm]
+    displacement_mm : array (n_nodes, 3)
+        Displacement of all nodes at the last time. [mm]
+    sed_kpa : array (n_times, n_elements)
+        Stored strain energy density, element mean. [kPa]
+    axis_x_mm : float
+        Where the indenter's axis meets the midline. [mm]
+    direction : array (3,)
+        Unit direction of pressing.
+    sheet : dict of str to array (n_times, n_sheet)
+        What else may drive an afferent, by the names of `mechanics.fields.QUANTITIES` except "stored", in the
+        elements `mesh.living_epidermis` (flattened).
+    von_mises_kpa : array (n_elements,)
+        Equivalent stress after von Mises at the last time. [kPa]
+    force_imbalance : float
+        Largest difference at any time between the indenter's force and the reaction of bone and nail, over
+        that force.
+    energy_imbalance : float
+        Largest difference at any time between the indenter's work and what was stored, dissipated and held
+        by the contact, over that work.
+    penetration_mm : float
+        Deepest penetration of the indenter by any node at any time. [mm]
+    newton_steps, factorisations : int
+        Work that the solution took.
+    linear_solver : str
+        Which linear solver was chosen, and why.
+    """
+
+    mesh: Mesh
+    times_ms: FloatArray
+    kinks_ms: tuple[float, ...]
+    force_mn: FloatArray
+    depth_mm: FloatArray
+    skin_displacement_mm: FloatArray
+    displacement_mm: FloatArray
+    sed_kpa: FloatArray
+    axis_x_mm: float
+    direction: FloatArray
+    sheet: Mapping[str, FloatArray]
+    von_mises_kpa: FloatArray
+    force_imbalance: float
+    energy_imbalance: float
+    penetration_mm: float
+    newton_steps: int
+    factorisations: int
+    linear_solver: str
+
+    def surface_profile(self, time_index: int = -1) -> SurfaceProfile:
+        """Deflection along the midline of the volar skin (paper, section 2.2.1).
+
+        Parameters
+        ----------
+        time_index : int
+            Which of `times_ms`; the last by default.
+
+        Returns
+        -------
+        SurfaceProfile
+            One entry per node of the midline, from proximal to distal.
+        """
+        row = np.searchsorted(self.mesh.skin_nodes, self.mesh.midline_nodes)
+        distance = self.mesh.nodes_mm[self.mesh.midline_nodes, 0] - self.axis_x_mm
+        return SurfaceProfile(distance, self.skin_displacement_mm[time_index, row] @ self.direction)
+
+    def sed(self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY) -> SedTraces:
+        """Strain energy density in the living epidermis below points of the undeformed skin.
+
+        End organs lie on the epidermal-dermal border and move with the tissue. A pair gives an organ's own x
+        and z, a triple the point of the skin from which it lies 0.471 mm deep along the normal. The means of
+        the elements just above the border (0.371 to 0.471 mm deep) are interpolated along it by a cubic of
+        class C1, and never across it, where SED jumps.
+
+        Parameters
+        ----------
+        sites : array (n_sites, 2) or (n_sites, 3)
+            x and z of end organs on the volar side, or x, y and z of the skin above them on any side. [mm]
+        dynamic_quantity : str, optional
+            What the dynamic response follows, by the names of `sample`. Default: SED, as in the paper.
+
+        Returns
+        -------
+        SedTraces
+            One column per site, with the end of the ramp as kink. [kPa]
+
+        Raises
+        ------
+        InputError
+            If `sites` is not an array of pairs or triples, a site is not on the skin, or the quantity is
+            unknown.
+        """
+        stored, *dynamic = self._read(dict.fromkeys((STORED_ENERGY, dynamic_quantity)), sites)
+        return SedTraces(
+            self.times_ms,
+            stored,
+            np.array(self.kinks_ms),
+            dynamic[0] if dynamic else None,
+            dynamic_quantity,
+        )
+
+    def sample(self, quantity: str, sites: ArrayLike) -> FloatArray:
+        """Anything that may drive an afferent, in the living epidermis below points of the undeformed skin.
+
+        Read as `sed` reads the stored energy density, which is one of them.
+
+        Parameters
+        ----------
+        quantity : str
+            "stored", "instantaneous" or "work" (energy densities by their three definitions), "von_mises",
+            "compressive_stress" [all kPa] or "compressive_strain" (logarithmic).
+        sites : array (n_sites, 2) or (n_sites, 3)
+            x and z of end organs on the volar side, or x, y and z of the skin above them on any side. [mm]
+
+        Returns
+        -------
+        array (n_times, n_sites)
+            Never negative.
+
+        Raises
+        ------
+        InputError
+            If the quantity is unknown, `sites` is not an array of pairs or triples, or a site is not on the
+            skin.
+        """
+        return self._read([quantity], sites)[0]
+
+    def _read(self, quantities: Iterable[str], sites: ArrayLike) -> list[FloatArray]:
+        """Several quantities at the same sites, (n_times, n_sites) each."""
+        known = [self._of_sheet(quantity) for quantity in quantities]
+        points = float_array("sites", sites, 2)
+        if points.shape[1] == 2:
+            read = [self._read_volar(values, points) for values in known]
+        elif points.shape[1] == 3:
+            organs = self._receptors.below(points)
+            read = [self._receptors.read(organs, values) for values in known]
+        else:
+            raise InputError(f"sites needs columns x and z, or x, y and z, in mm: got shape {points.shape}.")
+        # A cubic may dip below zero beside a steep front; none of the quantities can.
+        return [np.maximum(values, 0.0) for values in read]
+
+    def _read_volar(self, known: FloatArray, organs: FloatArray) -> FloatArray:
+        """Values of the sheet at end organs by their x and z."""
+        triangulation, rows = self._volar_sheet
+        outside = np.flatnonzero(triangulation.find_simplex(organs) < 0)
+        if outside.size:
+            x, z = organs[outside[0]]
+            raise InputError(
+                f"sites must lie on the volar skin of the mesh: (x, z) = ({x:g}, {z:g}) mm does not."
+            )
+        interpolate = CloughTocher2DInterpolator(triangulation, known[:, rows].T.astype(np.float64))
+        if self.mesh.symmetry_nodes.size:
+            # Diagonals of the triangles are not mirrored: without this, a site and its mirror image differ.
+            organs = np.column_stack([organs[:, 0], np.abs(organs[:, 1])])
+        return interpolate(organs).T
+
+    def _of_sheet(self, quantity: str) -> FloatArray:
+        """One quantity in the elements `mesh.living_epidermis`, (n_times, n_sheet)."""
+        one_of("quantity", quantity, (STORED_ENERGY, *self.sheet))
+        if quantity == STORED_ENERGY:
+            return self.sed_kpa[:, self.mesh.living_epidermis.ravel()]
+        return self.sheet[quantity]
+
+    @cached_property
+    def _volar_sheet(self) -> tuple[Delaunay, np.ndarray]:
+        """Triangulated (x, z) of the volar sheet of living epidermis, and its rows; both halves."""
+        mesh = self.mesh
+        elements = mesh.living_epidermis.ravel()
+        if not elements.size:
+            raise InputError("This mesh has no living epidermis: SED is sampled only in a layered finger.")
+        corners = mesh.nodes_mm[mesh.elements[elements]]
+        centre = corners.mean(axis=1)
+        # The upper face (last four nodes) looks towards the skin: volar where its normal has y < 0.
+        normal = np.cross(corners[:, 6] - corners[:, 4], corners[:, 7] - corners[:, 5])
+        volar = normal[:, 1] < 0.0
+        plane, rows = centre[volar][:, [0, 2]], np.flatnonzero(volar)
+        if mesh.symmetry_nodes.size:
+            plane, rows = np.vstack([plane, plane * [1.0, -1.0]]), np.tile(rows, 2)
+        triangulation = Delaunay(plane)
+        # Its first search solves one 2x2 system per triangle, for each of which OpenBLAS would wake its
+        # threads: on busy processors 8 ms a triangle, half a minute in all.
+        with threadpool_limits(limits=1):
+            triangulation.find_simplex(plane[:1])
+        return triangulation, rows
+
+    @cached_property
+    def _receptors(self) -> ReceptorSheet:
+        return ReceptorSheet(self.mesh)

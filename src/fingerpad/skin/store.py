@@ -1,0 +1,323 @@
+"""Finished touches on disk: found again by everything that determines them, and computed where missing.
+
+The key of a touch is a hash of its whole value (finger, indenter, motion, tissues, mesh, tolerances) and of
+the source code of the mechanical half. One file per touch, written atomically, so a run that is killed at any
+moment goes on from the last finished touch and ends with the same bits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import Field, fields, is_dataclass
+from functools import lru_cache
+from importlib.resources import files
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fingerpad.core.checks import whole
+from fingerpad.core.compilation import LOGGER, announce_compilation
+from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.files import write_atomically
+from fingerpad.core.threads import available_threads
+from fingerpad.mechanics.fields import QUANTITIES
+from fingerpad.skin.indentation import SLOWEST_KERNEL, Touch
+from fingerpad.skin.sampling import SkinResponse
+
+MECHANICAL_SOURCES = (
+    "core/units.py",
+    "core/threads.py",
+    "geometry",
+    "skin/indentation.py",
+    "mechanics",
+)
+"""Source files and folders on which the stored numbers depend."""
+
+_ARRAYS = (
+    "times_ms",
+    "force_mn",
+    "depth_mm",
+    "skin_displacement_mm",
+    "displacement_mm",
+    "sed_kpa",
+    "von_mises_kpa",
+    "direction",
+)
+_SHEET = tuple(name for name in QUANTITIES if name != "stored")
+_SINGLE_PRECISION = ("skin_displacement_mm", "displacement_mm", "sed_kpa", "von_mises_kpa", *_SHEET)
+_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+_LOOK_FOR_PARENT_S = 0.1
+
+
+@lru_cache(maxsize=1)
+def code_hash() -> str:
+    """Hash of the source code on which stored results depend, 16 hexadecimal digits."""
+    digest = hashlib.sha256()
+    package = files("fingerpad")
+    for name in MECHANICAL_SOURCES:
+        entry = package / name
+        sources = [entry] if entry.is_file() else sorted(entry.iterdir(), key=lambda source: source.name)
+        for source in sources:
+            if source.name.endswith(".py"):
+                digest.update(source.name.encode() + b"\0" + source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def touch_key(touch: Touch) -> str:
+    """Key under which a touch is stored, 32 hexadecimal digits.
+
+    Examples
+    --------
+    >>> import fingerpad as fp
+    >>> touch = fp.touch_of(fp.Fingertip(), fp.Line())
+    >>> len(touch_key(touch)), touch_key(touch) == touch_key(fp.touch_of(fp.Fingertip(), fp.Bar()))
+    (32, False)
+    """
+    text = json.dumps([code_hash(), _plain(touch)], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def _plain(value: Any, is_float: bool = False) -> Any:
+    """Nested lists and exact numbers: the same for equal values, others for others."""
+    if is_dataclass(value):
+        return [
+            type(value).__name__,
+            {field.name: _plain(getattr(value, field.name), _holds_floats(field)) for field in fields(value)},
+        ]
+    if isinstance(value, tuple | list):
+        return [_plain(item, is_float) for item in value]
+    if isinstance(value, float | np.floating) or (is_float and isinstance(value, int | np.integer)):
+        return (float(value) + 0.0).hex()  # 0.0 added: -0.0 equals 0.0 but is written with its sign
+    if isinstance(value, str | int | bool) or value is None:
+        return value
+    raise InputError(
+        f"A touch can only be stored if its parts are frozen values: got {type(value).__name__}."
+    )
+
+
+def _holds_floats(field: Field[Any]) -> bool:
+    """Whether a whole number in this field means a float: 287 and 287.0 are the same sphere."""
+    return "float" in str(field.type)
+
+
+class Store:
+    """Folder of finished touches.
+
+    Parameters
+    ----------
+    folder : Path
+        Made when first needed.
+    """
+
+    def __init__(self, folder: Path):
+        self.folder = Path(folder)
+
+    def path(self, touch: Touch) -> Path:
+        """File of a touch, whether it exists or not."""
+        return self.folder / f"{touch_key(touch)}.npz"
+
+    def holds(self, touch: Touch) -> bool:
+        """Whether a touch is finished."""
+        return self.path(touch).exists()
+
+    def save(self, touch: Touch, response: SkinResponse) -> None:
+        """Write a finished touch; nothing half-written is ever left behind.
+
+        Raises
+        ------
+        StoreError
+            If the folder cannot be written.
+        """
+        write_atomically(self.path(touch), _packed(response))
+
+    def load(self, touch: Touch) -> SkinResponse:
+        """Read a finished touch.
+
+        Raises
+        ------
+        StoreError
+            If its file is missing or damaged, or its arrays have not the shapes of this touch.
+        """
+        path = self.path(touch)
+        try:
+            # Opened here, since np.load leaves the file open where the archive is damaged.
+            with open(path, "rb") as opened, np.load(opened, allow_pickle=False) as file:
+                content = {name: file[name].astype(np.float64) for name in (*_ARRAYS, *_SHEET, "solution")}
+                linear_solver = str(file["linear_solver"])
+        except Exception as error:  # bytes that are not ours may fail in any way
+            said = " ".join(str(error).split()).rstrip(".")
+            raise StoreError(
+                f"The stored result {path} cannot be read ({said}): delete it and run again."
+            ) from error
+        for name, shape in _shapes(touch, content["times_ms"].size).items():
+            if content[name].shape != shape or not np.isfinite(content[name]).all():
+                raise StoreError(f"The stored result {path} is damaged in {name}: delete it and run again.")
+        of_force, of_energy, penetration, newton_steps, factorisations = content.pop("solution")
+        return SkinResponse(
+            mesh=touch.mesh,
+            kinks_ms=(touch.stimulus.ramp_ms,),
+            axis_x_mm=touch.at_mm[0],
+            sheet={name: content.pop(name) for name in _SHEET},
+            force_imbalance=float(of_force),
+            energy_imbalance=float(of_energy),
+            penetration_mm=float(penetration),
+            newton_steps=int(newton_steps),
+            factorisations=int(factorisations),
+            linear_solver=linear_solver,
+            **content,
+        )
+
+
+def _shapes(touch: Touch, n_times: int) -> dict[str, tuple[int, ...]]:
+    """Shapes of the arrays that a stored file of this touch holds."""
+    mesh = touch.mesh
+    return {
+        "times_ms": (n_times,),
+        "force_mn": (n_times,),
+        "depth_mm": (n_times,),
+        "sed_kpa": (n_times, len(mesh.elements)),
+        "skin_displacement_mm": (n_times, mesh.skin_nodes.size, 3),
+        "displacement_mm": mesh.nodes_mm.shape,
+        "von_mises_kpa": (len(mesh.elements),),
+        "direction": (3,),
+        **dict.fromkeys(_SHEET, (n_times, mesh.living_epidermis.size)),
+        "solution": (5,),
+    }
+
+
+def _packed(response: SkinResponse) -> bytes:
+    """Content of a stored file."""
+    content: dict[str, Any] = {name: getattr(response, name) for name in _ARRAYS} | dict(response.sheet)
+    for name in _SINGLE_PRECISION:
+        content[name] = content[name].astype(np.float32)
+    solution = [
+        response.force_imbalance,
+        response.energy_imbalance,
+        response.penetration_mm,
+        response.newton_steps,
+        response.factorisations,
+    ]
+    buffer = io.BytesIO()
+    content["linear_solver"] = np.array(response.linear_solver)
+    np.savez(buffer, **content, solution=np.array(solution, dtype=np.float64))
+    return buffer.getvalue()
+
+
+def _compute(touch: Touch, path: Path, threads: int | None = None) -> float:
+    """Solve one touch and store it at `path`; return the seconds it took.
+
+    The path is given, not found again: a worker would hash the sources as they are by then.
+    """
+    started = time.perf_counter()
+    write_atomically(path, _packed(touch.solve(threads)))
+    return time.perf_counter() - started
+
+
+def solve_missing(
+    touches: Sequence[Touch], store: Store, jobs: int, on_finished: Callable[[float], None] | None = None
+) -> int:
+    """Compute the touches that the store does not hold.
+
+    Parameters
+    ----------
+    touches : sequence of Touch
+        What is wanted; equal ones are computed once.
+    store : Store
+        Where finished ones are.
+    jobs : int
+        Processes to use; the results do not depend on it.
+    on_finished : callable, optional
+        Called with the seconds that each finished touch took.
+
+    Returns
+    -------
+    int
+        How many were computed.
+
+    Raises
+    ------
+    ConvergenceError
+        If one cannot be solved; those finished before stay in the store.
+    """
+    whole("jobs", jobs, at_least=1)
+    missing = {store.path(touch): touch for touch in touches if not store.holds(touch)}
+    in_processes = jobs > 1 and len(missing) > 1
+    for seconds in _in_processes(missing, jobs) if in_processes else _in_turn(missing):
+        if on_finished:
+            on_finished(seconds)
+    return len(missing)
+
+
+def _in_turn(touches: Mapping[Path, Touch]) -> Iterator[float]:
+    for path, touch in touches.items():
+        yield _compute(touch, path)
+
+
+def _in_processes(touches: Mapping[Path, Touch], jobs: int) -> Iterator[float]:
+    announce_compilation(SLOWEST_KERNEL)
+    processes = min(jobs, len(touches))
+    threads = max(1, available_threads() // processes)
+    with (
+        _environment(_ONE_THREAD),
+        ProcessPoolExecutor(processes, get_context("spawn"), _begin, (os.getpid(),)) as pool,
+    ):
+        waiting: set[Future[float]] = {
+            pool.submit(_compute, touch, path, threads) for path, touch in touches.items()
+        }
+        try:
+            while waiting:
+                done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                for future in done:
+                    yield future.result()
+        except BrokenProcessPool as error:
+            raise StoreError(
+                "A worker process was ended from outside (out of memory?): run again, perhaps with fewer "
+                "jobs; finished indentations are kept."
+            ) from error
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def _environment(variables: dict[str, str]) -> Iterator[None]:
+    """Environment that new processes start with: one thread each for the libraries."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _begin(parent: int) -> None:
+    """Set up a worker, which has nothing to say: its parent has told already what is compiled."""
+    LOGGER.disabled = True
+    _end_with_parent(parent)
+
+
+def _end_with_parent(parent: int) -> None:
+    """Let a worker end when its parent was killed: nothing else would tell it."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_LOOK_FOR_PARENT_S)
+        os._exit(1)
+
+    if sys.platform != "win32":
+        threading.Thread(target=watch, daemon=True).start()

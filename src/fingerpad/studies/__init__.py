@@ -1,5 +1,0 @@
-"""One file per claim of the paper, what is pressed and what is read from it; `reproduction` runs all."""
-
-from fingerpad.studies.reproduction import Reproduction, reproduce
-
-__all__ = ["Reproduction", "reproduce"]

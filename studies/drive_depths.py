@@ -1,0 +1,129 @@
+"""How deep the end organ lies: the paper's model, its energy density read in every layer of elements.
+
+Of all quantities only the stored energy density is kept in the whole finger; the others are kept where the
+paper puts the end organs, in the living epidermis. The paper's model is fitted alike in each layer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import STORED_ENERGY
+from fingerpad.experiments.conditions import RECEPTOR_X_MM
+from fingerpad.experiments.gerling2014 import single_unit
+from fingerpad.experiments.gerling2014.drive_fits import (
+    judge,
+    quick_method,
+    relative_model,
+    row,
+    scaled_starts,
+)
+from fingerpad.geometry.mesh import LAYERS, Mesh
+from fingerpad.inference.fitting import Method
+from fingerpad.inference.rate_problem import AfferentModel, RateProblem
+from fingerpad.inference.recordings import RateRecordings
+from fingerpad.neuron.transduction import drive
+from fingerpad.skin.sampling import SkinResponse
+
+
+def borders_mm(mesh: Mesh) -> FloatArray:
+    """Depths of the borders between layers of elements below the receptor, from 0, the skin. [mm]"""
+    midline = mesh.midline_nodes
+    above = midline[np.argmin(np.abs(mesh.nodes_mm[midline, 0] - RECEPTOR_X_MM))]
+    ((along, around), *_) = np.argwhere(mesh.skin_grid == above)
+    column = mesh.nodes_mm[mesh.grid[along, around]]
+    return np.linalg.norm(column - column[0], axis=1)
+
+
+def read_in(skin: SkinResponse, layer: int) -> SkinResponse:
+    """Return the same touch with end organs in another layer of elements, counted from the skin, from 0.
+
+    Parameters
+    ----------
+    skin : SkinResponse
+        One touch.
+    layer : int
+        Which.
+
+    Returns
+    -------
+    SkinResponse
+        It knows the stored energy density alone.
+
+    Raises
+    ------
+    InputError
+        If there is no such layer.
+    """
+    mesh = skin.mesh
+    through = mesh.shape[2]
+    if not 0 <= layer < through:
+        raise InputError(f"layer must be one of the {through} of this mesh, from 0: got {layer}.")
+    # Elements of one place on the skin are numbered in a row, from the skin downwards.
+    elements = mesh.living_epidermis - mesh.living_epidermis % through + layer
+    return replace(skin, mesh=replace(mesh, living_epidermis=elements), sheet={})
+
+
+def result(
+    responses: Sequence[SkinResponse],
+    recordings: RateRecordings,
+    generator: np.random.Generator,
+    method: Method | None = None,
+) -> dict[str, Any]:
+    """Fit the paper's model with its energy density read at every depth.
+
+    Parameters
+    ----------
+    responses : sequence of SkinResponse
+        One per shift of the bar, on one mesh.
+    recordings : RateRecordings
+        Observed rates.
+    generator : numpy.random.Generator
+        Draws the bootstrap.
+    method : Method, optional
+        For the relative numbers; `quick_method` by default.
+
+    Returns
+    -------
+    dict
+        `method` and `layers`: per layer of elements its tissue, `from_mm` and `to_mm`, the largest energy
+        density that the receptor meets, and what `drive_fits.row` says; gains are those over the living
+        epidermis, `own_layer`.
+    """
+    method = method or quick_method()
+    mesh = responses[0].mesh
+    borders, own = borders_mm(mesh), int(mesh.living_epidermis.flat[0]) % mesh.shape[2]
+    drives = [
+        drive(single_unit.receptor_traces([read_in(skin, layer) for skin in responses], STORED_ENERGY))
+        for layer in range(mesh.shape[2])
+    ]
+    reference = drives[own]
+    judged = [
+        judge(
+            RateProblem(
+                relative_model(AfferentModel(driven), scaled_starts(driven, reference)[0]), recordings
+            ),
+            method,
+        )
+        for driven in drives
+    ]
+    return {
+        "method": method.name,
+        "own_layer": own,
+        "layers": [
+            {
+                "tissue": LAYERS[mesh.layer[layer]],
+                "from_mm": borders[layer],
+                "to_mm": borders[layer + 1],
+                "largest_sed_kpa": driven.sed_kpa.max(),
+                **row(one, judged[own], recordings, generator),
+            }
+            for layer, (driven, one) in enumerate(zip(drives, judged, strict=True))
+        ],
+    }

@@ -1,0 +1,403 @@
+"""One set of tissues for all three levels: deflection, firing and discrimination of each candidate.
+
+Every candidate is pressed by the cylinder, by bars and by spheres. An afferent is then fitted twice: to the
+firing rates alone, and to firing rates and hit rates at once. The first asks what a material gives to
+somebody who follows the paper's order, the second whether that material could reconcile the levels at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import differential_evolution
+
+from fingerpad.core.checks import FloatArray, not_negative, whole
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.data import neuron, protocol, psychophysics
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.experiments.gerling2014 import single_unit, sphere_discrimination
+from fingerpad.experiments.gerling2014.skin_deflection import deflection_r2
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenters import Bar, Cylinder
+from fingerpad.mechanics.materials import Tissues
+from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.neuron.population import Population
+from fingerpad.neuron.transduction import Drive, drive
+from fingerpad.psychophysics.encoding import neighbour_pairs
+from fingerpad.psychophysics.noise_fit import expected_hit_rates, fit_noise_sigma
+from fingerpad.skin.sampling import SkinResponse
+from fingerpad.skin.store import Store, solve_missing
+
+SHOWN_DISTANCES_MM = (1.0, 2.0, 3.0, 4.0, 5.0)
+"""Where the deflection is told, mean of both sides. [mm]"""
+
+NOISE_SIGMA = psychophysics.NOISE_SIGMA.value
+GOODWIN = np.array(psychophysics.GOODWIN_HIT_RATES.value)
+SPHERES = (psychophysics.SPHERE_CURVATURES.value[0], *psychophysics.GOODWIN_CURVATURES.value)
+
+NOISE_DRAWS = 400
+"""Common random presentations behind expected hit rates, many thousand times in a search."""
+
+CHANCE = 0.5
+"""Hit rate of an observer who learns nothing. [0-1]"""
+
+SITE_MARGIN_MM = 0.3
+"""Fine zone of the one bar beyond its outermost shifted site. [mm]"""
+
+# Shares of the rheobase C v / tau, in which every set of tissues has the same range however stiff it is; the
+# last is the time constant, as logarithms to base 10 but for the intercept.
+BOUNDS = ((-3.0, 0.99), (-0.5, 1.7), (-1.0, 2.0), (0.7, 2.7))
+"""Ranges of intercept, static drive, dynamic drive (all over the rheobase) and time constant [ms]."""
+
+
+@dataclass(frozen=True)
+class MaterialSet:
+    """Tissues that are tried.
+
+    Parameters
+    ----------
+    name : str
+        Short, unique within a study.
+    tissues : Tissues
+        Laws of the four layers.
+    basis : str
+        Where the numbers come from, and their status.
+    """
+
+    name: str
+    tissues: Tissues
+    basis: str
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much of each level is looked at, and how hard an afferent is searched for.
+
+    Parameters
+    ----------
+    shifted_bars : bool
+        Press the bar at all 36 shifts; or press it once and read the energy density at 36 shifted sites,
+        which costs a thirtieth and neglects that the pad is curved along the finger.
+    generations, population : int
+        Of the search for the afferent (differential evolution, four numbers).
+    percept_weight : float
+        Weight of the error in hit rates against FSS in the joint fit.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range.
+    """
+
+    shifted_bars: bool = False
+    generations: int = 60
+    population: int = 12
+    percept_weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        whole("generations", self.generations, 1)
+        whole("population", self.population, 2)
+        not_negative("percept_weight", self.percept_weight)
+
+
+def touches(
+    candidate: MaterialSet, conditions: Conditions, shifted_bars: bool = False
+) -> dict[tuple[str, float], Touch]:
+    """Everything that one candidate is pressed with.
+
+    Returns
+    -------
+    dict
+        `("cylinder", diameter)`, `("bar", shift)` and `("sphere", curvature)`, the keys in mm, mm and 1/m.
+    """
+    pressed = {("cylinder", Cylinder().diameter_mm): _cylinder_touch(candidate, conditions)}
+    conditions = replace(conditions, materials=candidate.tissues)
+    if shifted_bars:
+        bars = zip(protocol.BAR_SHIFTS.value, single_unit.touches(conditions), strict=True)
+        pressed |= {("bar", shift): touch for shift, touch in bars}
+    else:
+        pressed["bar", 0.0] = conditions.touch(
+            Bar(), RECEPTOR_X_MM, _wide_bar_grading(conditions), tilt_deg=conditions.skin_tilt_deg
+        )
+    spheres = sphere_discrimination.touches(conditions)
+    position = sphere_discrimination.POSITIONS_MM[0]
+    return pressed | {("sphere", curvature): spheres[position, curvature] for curvature in SPHERES}
+
+
+def _cylinder_touch(candidate: MaterialSet, conditions: Conditions) -> Touch:
+    cylinder = Cylinder()
+    grading = conditions.deflection_grading(cylinder)
+    return conditions.touch(cylinder, RECEPTOR_X_MM, grading, candidate.tissues)
+
+
+def _described(candidate: MaterialSet) -> dict[str, Any]:
+    """Name, basis and initial shear moduli [kPa]."""
+    layers = ("living_epidermis", "dermis", "subcutis")
+    names = ("epidermis", "dermis", "subcutis")
+    moduli = (getattr(candidate.tissues, layer).shear_modulus_kpa for layer in layers)
+    shear = dict(zip(names, moduli, strict=True))
+    return {"name": candidate.name, "basis": candidate.basis, "shear_kpa": shear}
+
+
+def _wide_bar_grading(conditions: Conditions) -> Grading:
+    """Mesh of the single-unit study, fine over all shifted sites and not only about the receptor."""
+    farthest = max(abs(shift) for shift in protocol.BAR_SHIFTS.value)
+    return replace(conditions.bar_grading(), half_length_mm=farthest + SITE_MARGIN_MM)
+
+
+def bar_sed(responses: Mapping[tuple[str, float], SkinResponse], tilt_deg: float) -> SedTraces:
+    """Strain energy density at the receptor, one column per shift.
+
+    From one bar, the sites move instead of it: a bar shifted by s towards the proximal end has the receptor
+    s distal of its axis, along the skin's tangent.
+    """
+    bars = {shift: skin for (kind, shift), skin in responses.items() if kind == "bar"}
+    if len(bars) > 1:
+        return single_unit.receptor_sed([bars[shift] for shift in protocol.BAR_SHIFTS.value])
+    along = float(np.cos(np.deg2rad(tilt_deg)))
+    return bars[0.0].sed([[RECEPTOR_X_MM + shift * along, 0.0] for shift in protocol.BAR_SHIFTS.value])
+
+
+class Levels:
+    """What one candidate's presses say to an afferent: the drive under bars and under spheres.
+
+    Parameters
+    ----------
+    sed : SedTraces
+        At the receptor, one column per bar shift.
+    spheres : sequence of SedTraces
+        At the population's receptors, one per sphere of `SPHERES`.
+    seed : int
+        Of the presentations behind expected hit rates, and of the search.
+    """
+
+    def __init__(self, sed: SedTraces, spheres: Sequence[SedTraces], seed: int):
+        population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
+        self.problem = single_unit.rate_problem(sed)
+        self.spheres: list[Drive] = [drive(traces) for traces in spheres]
+        self.neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
+        draws = (NOISE_DRAWS, len(population.positions_mm))
+        self.draws = np.random.default_rng([seed, 0]).standard_normal(draws)
+        self.seed = seed
+        self.everything = np.arange(sed.n_sites)
+        self.sed_peak_kpa = float(sed.sed_kpa[-1].max())
+        self.rate_peak_kpa_per_ms = float(drive(sed).rate_kpa_per_ms.max())
+
+    def parameters(self, searched: FloatArray) -> FloatArray:
+        """Six numbers of an afferent from the four that are searched, see `BOUNDS`."""
+        capacitance, threshold = neuron.CAPACITANCE.value, neuron.THRESHOLD.value
+        intercept, log_static, log_dynamic, log_time = searched
+        time_constant = 10.0**log_time
+        rheobase = capacitance * threshold / time_constant
+        return np.array(
+            [
+                intercept * rheobase,
+                10.0**log_dynamic * rheobase / self.rate_peak_kpa_per_ms,
+                10.0**log_static * rheobase / self.sed_peak_kpa,
+                time_constant,
+                capacitance,
+                threshold,
+            ]
+        )
+
+    def fss(self, parameters: FloatArray) -> float:
+        """Weighted FSS over all shifts."""
+        return self.problem.score(parameters, self.everything)
+
+    def hit_rates(self, parameters: FloatArray, noise_sigma: float) -> FloatArray:
+        """Predict the hit rates at 296 and 365 /m of the static Gradient Sum."""
+        afferent = Afferent.from_parameters(parameters)
+        static = np.array([afferent.rates(traces)[1] for traces in self.spheres])
+        if not static.any():  # the search also tries afferents that stay silent; those can only guess
+            return np.full(len(SPHERES) - 1, CHANCE)
+        return expected_hit_rates(static, self.neighbours, noise_sigma, self.draws)
+
+    def percept_error(self, parameters: FloatArray) -> float:
+        """Root mean square distance to Goodwin's hit rates at the paper's noise."""
+        return float(np.sqrt(np.mean((self.hit_rates(parameters, NOISE_SIGMA) - GOODWIN) ** 2)))
+
+    def search(self, effort: Effort, percept_weight: float) -> FloatArray:
+        """Afferent that is best for FSS, less the weighted error in hit rates."""
+
+        def loss(searched: FloatArray) -> float:
+            parameters = self.parameters(searched)
+            missed = percept_weight * self.percept_error(parameters) if percept_weight else 0.0
+            return missed - self.fss(parameters)
+
+        found = differential_evolution(
+            loss,
+            BOUNDS,
+            seed=self.seed,
+            popsize=effort.population,
+            maxiter=effort.generations,
+            tol=1e-4,
+            polish=False,
+        )
+        return self.parameters(found.x)
+
+    def judged(self, parameters: FloatArray) -> dict[str, Any]:
+        """FSS, hit rates and the noise that would be needed, of one afferent."""
+        by_phase = self.problem.score_by_phase(parameters, self.everything)
+        try:
+            noise = fit_noise_sigma(lambda sigma: self.hit_rates(parameters, sigma))
+            sigma, error = noise.noise_sigma, noise.root_mean_square_error
+        except ConvergenceError:  # a response that does not tell the spheres apart: no noise brings it there
+            sigma, error = float("nan"), float("nan")
+        return {
+            "fss": self.fss(parameters),
+            "fss_dynamic": by_phase["dynamic"],
+            "fss_static": by_phase["static"],
+            "noise_sigma": sigma,
+            "noise_fit_error": error,
+            "hit_rate": self.hit_rates(parameters, NOISE_SIGMA),
+            "percept_error": self.percept_error(parameters),
+            "parameters": dict(zip(PARAMETER_NAMES, parameters, strict=True)),
+        }
+
+
+def evaluate(
+    candidate: MaterialSet,
+    responses: Mapping[tuple[str, float], SkinResponse],
+    conditions: Conditions,
+    effort: Effort,
+) -> dict[str, Any]:
+    """Judge one candidate on the three levels.
+
+    Returns
+    -------
+    dict
+        `deflection`, `firing` (afferent fitted to rates alone) and `joint` (to rates and hit rates), beside
+        the candidate's name, basis and initial shear moduli.
+    """
+    cylinder = next(skin for (kind, _), skin in responses.items() if kind == "cylinder")
+    sites = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0)).positions_mm
+    levels = Levels(
+        bar_sed(responses, conditions.skin_tilt_deg),
+        [responses["sphere", curvature].sed(sites) for curvature in SPHERES],
+        conditions.seed,
+    )
+    return _described(candidate) | {
+        "deflection": deflection(cylinder),
+        "sed_peak_kpa": levels.sed_peak_kpa,
+        "firing": levels.judged(levels.search(effort, 0.0)),
+        "joint": levels.judged(levels.search(effort, effort.percept_weight)),
+    }
+
+
+def deflection(cylinder: SkinResponse) -> dict[str, Any]:
+    """R² under the cylinder, deflection on a few distances (mean of both sides) and force."""
+    profile = cylinder.surface_profile()
+    distance = np.array(SHOWN_DISTANCES_MM)
+    return {
+        "r2": deflection_r2(profile),
+        "r2_mirrored": deflection_r2(profile, proximal_positive=False),
+        "distance_mm": distance,
+        "deflection_mm": (profile.at(distance) + profile.at(-distance)) / 2.0,
+        "force_mn": cylinder.force_mn[-1],
+    }
+
+
+def compare(
+    candidates: Sequence[MaterialSet],
+    conditions: Conditions,
+    store: Store,
+    jobs: int = 1,
+    effort: Effort | None = None,
+    on_finished: Callable[[str], None] | None = None,
+) -> list[dict[str, Any]]:
+    """Judge candidates one after the other; a stopped run goes on from the last finished press.
+
+    Parameters
+    ----------
+    candidates : sequence of MaterialSet
+        What is tried; names must differ.
+    conditions : Conditions
+        Finger, resolution and seed; its materials are not used.
+    store : Store
+        Finished presses.
+    jobs : int
+        Processes to press with; the numbers do not depend on it.
+    effort : Effort, optional
+        How much of each level is looked at.
+    on_finished : callable, optional
+        Called with the name of each finished candidate.
+
+    Returns
+    -------
+    list of dict
+        One per candidate, see `evaluate`. A candidate whose mechanics cannot be solved has its name, its
+        basis and the reason as `unsolved`, and no number.
+
+    Raises
+    ------
+    InputError
+        If two candidates have one name.
+    StoreError
+        If a stored press is damaged.
+    """
+    names = [candidate.name for candidate in candidates]
+    if len(set(names)) != len(names):
+        raise InputError(f"candidates must have different names: got {', '.join(names)}.")
+    effort = effort or Effort()
+    rows = []
+    for candidate in candidates:
+        wanted = touches(candidate, conditions, effort.shifted_bars)
+        try:
+            solve_missing(list(wanted.values()), store, jobs)
+            responses = {key: store.load(touch) for key, touch in wanted.items()}
+            rows.append(evaluate(candidate, responses, conditions, effort))
+        except ConvergenceError as error:
+            rows.append({"name": candidate.name, "basis": candidate.basis, "unsolved": str(error)})
+        if on_finished:
+            on_finished(candidate.name)
+    return rows
+
+
+def deflections(
+    candidates: Sequence[MaterialSet], conditions: Conditions, store: Store, jobs: int = 1
+) -> list[dict[str, Any]]:
+    """Judge candidates by the cylinder alone; arguments as in `compare`.
+
+    Returns
+    -------
+    list of dict
+        `name`, `basis`, `shear_kpa` and `deflection` of each.
+
+    Raises
+    ------
+    ConvergenceError
+        If a press cannot be solved.
+    StoreError
+        If a stored press is damaged.
+    """
+    pressed = {candidate.name: _cylinder_touch(candidate, conditions) for candidate in candidates}
+    solve_missing(list(pressed.values()), store, jobs)
+    return [_described(one) | {"deflection": deflection(store.load(pressed[one.name]))} for one in candidates]
+
+
+def pareto_front(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Names of the candidates that no other beats on all three levels.
+
+    Levels are R² under the cylinder, FSS of the joint fit and its error in hit rates. A candidate is beaten
+    by another that is at least as good on each and better on one.
+
+    Examples
+    --------
+    >>> def row(name, r2, fss, error):
+    ...     return {"name": name, "deflection": {"r2": r2}, "joint": {"fss": fss, "percept_error": error}}
+    >>> pareto_front([row("a", 0.9, 0.8, 0.1), row("b", 0.8, 0.9, 0.1), row("c", 0.8, 0.8, 0.1)])
+    ['a', 'b']
+    """
+    solved = [row for row in rows if "unsolved" not in row]
+    merits = np.array(
+        [[row["deflection"]["r2"], row["joint"]["fss"], -row["joint"]["percept_error"]] for row in solved]
+    )
+    return [
+        row["name"]
+        for row, merit in zip(solved, merits, strict=True)
+        if not ((merits >= merit).all(axis=1) & (merits > merit).any(axis=1)).any()
+    ]

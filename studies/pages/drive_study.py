@@ -1,0 +1,289 @@
+"""The page of `fingerpad drives`: quantities, explanations of the dynamic rates, and depths."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from fingerpad.core.files import write_atomically
+from fingerpad.report import drive_quantities
+from fingerpad.report.drive_quantities import gain
+from fingerpad.report.formatting import ABSENT, fixed
+from fingerpad.report.markdown import table as markdown_table
+from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, numbers, png
+from fingerpad.report.tables import Row, Table
+
+FIGURES = {
+    "quantities": "drive_quantities.png",
+    "explanations": "drive_explanations.png",
+    "depths": "drive_depths.png",
+}
+_OUT_OF_SAMPLE = tuple(f"fss_out_of_sample{phase}" for phase in ("", "_dynamic", "_static"))
+_EXPLANATION_COLUMNS = (
+    "explanation",
+    "free numbers",
+    "those added",
+    "FSS in sample",
+    "out of sample",
+    "dynamic",
+    "static",
+    "gain, 95 %",
+    "ΔAIC",
+    "ΔBIC",
+)
+_DEPTH_COLUMNS = (
+    "tissue",
+    "from [mm]",
+    "to [mm]",
+    "largest SED [kPa]",
+    "FSS in sample",
+    "out of sample",
+    "dynamic",
+    "static",
+    "gain, 95 %",
+)
+
+
+def draw_explanations(section: Mapping[str, Any]) -> Figure:
+    """Draw what each explanation predicts, and what it gains over the paper's model.
+
+    Parameters
+    ----------
+    section : dict
+        What `studies.drive_study.study_drives` returns.
+
+    Returns
+    -------
+    Figure
+    """
+    rows = section["explanations"]
+    height = np.arange(len(rows))
+    figure = new_figure(10.0, 1.4 + 0.32 * len(rows))
+    scores, gains = figure.subplots(1, 2, sharey=True, width_ratios=(1.0, 1.0))
+    for phase, (label, marker, colour) in {
+        "": ("both, weighted", "o", BLACK),
+        "_dynamic": ("dynamic rates", "s", ORANGE),
+    }.items():
+        values = numbers([row[f"fss_out_of_sample{phase}"] for row in rows])
+        scores.plot(values, height, marker, color=colour, label=label, linestyle="none")
+    scores.set_yticks(height, [f"{row['name']} ({row['free_numbers']})" for row in rows])
+    scores.invert_yaxis()
+    scores.set_xlabel("FSS out of sample [1]")
+    scores.set_title("(a) what is predicted")
+    ends = numbers([row["gain_interval"] for row in rows])
+    total = numbers([row["fss_out_of_sample"] for row in rows])
+    gains.axvline(0.0, color=GREY, linewidth=1.0)
+    gains.hlines(height, *ends.T, color=BLUE, linewidth=2.0)
+    gains.plot(total - total[0], height, "o", color=BLACK)
+    gains.locator_params(axis="x", nbins=5)
+    gains.set_xlabel("gain in FSS out of sample over the first row [1]")
+    gains.set_title("(b) what is gained, 95 % by bootstrap")
+    figure.legend(*scores.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return figure
+
+
+def caption_explanations(section: Mapping[str, Any]) -> str:
+    """Say what is compared, and how many explanations are as good as the best one."""
+    rows = section["explanations"]
+    known = [row for row in rows if row["aic_difference"] is not None]
+    best = min(known, key=lambda row: row["aic_difference"], default=None)
+    near = [row for row in known if best and row["aic_difference"] - best["aic_difference"] <= NEAR_AIC]
+    said = (
+        f" Least AIC has: {best['name']}; {len(near) - 1} more lie within {NEAR_AIC:g} of it, which no such "
+        "recording tells apart."
+        if best
+        else ""
+    )
+    return (
+        "Explanations of what the dynamic rates lack, each with the numbers that it leaves free (in "
+        "brackets). (a) Mean FSS of the folds on positions that were not fitted to. (b) What that gains over "
+        f"the paper's model, with an interval from a bootstrap over blocks of three positions.{said}"
+    )
+
+
+NEAR_AIC = 4.0
+"""Differences of AIC below which the worse of two models still has some support (Burnham & Anderson 2004)."""
+
+
+def draw_depths(section: Mapping[str, Any]) -> Figure:
+    """Draw how well the paper's model predicts when its energy density is read at other depths.
+
+    Parameters
+    ----------
+    section : dict
+        As in `draw_explanations`.
+
+    Returns
+    -------
+    Figure
+    """
+    found = section["depths"]
+    layers = found["layers"]
+    own = layers[found["own_layer"]]
+    figure = new_figure(7.5, 4.2)
+    axes = figure.subplots()
+    axes.axvspan(own["from_mm"], own["to_mm"], color=PALE, zorder=0)
+    depth = numbers([(layer["from_mm"] + layer["to_mm"]) / 2.0 for layer in layers])
+    for phase, (label, style, colour) in {
+        "": ("both, weighted", "o-", BLACK),
+        "_dynamic": ("dynamic rates", "s--", ORANGE),
+        "_static": ("static rates", "^:", BLUE),
+    }.items():
+        axes.plot(
+            depth,
+            numbers([layer[f"fss_out_of_sample{phase}"] for layer in layers]),
+            style,
+            color=colour,
+            label=label,
+        )
+    for above, below in pairwise(layers):
+        if above["tissue"] != below["tissue"]:
+            axes.axvline(above["to_mm"], color=GREY, linewidth=0.8, linestyle=":")
+    axes.set_xscale("log")
+    axes.set_xticks([0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0], ["0.05", "0.1", "0.2", "0.5", "1", "2", "5"])
+    axes.minorticks_off()
+    axes.set_xlabel("depth below the skin [mm]")
+    axes.set_ylabel("FSS out of sample [1]")
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
+
+
+def caption_depths(section: Mapping[str, Any]) -> str:
+    """Say at which depth the paper's model predicts best."""
+    layers = section["depths"]["layers"]
+    own = layers[section["depths"]["own_layer"]]
+    best = max(layers, key=lambda layer: layer["fss_out_of_sample"] or 0.0)
+    return (
+        "The paper's model with its energy density read in each layer of elements below the receptor; the "
+        "shaded one is the living epidermis, where the paper puts the end organs, dotted lines part tissues. "
+        f"There FSS out of sample is {fixed(own['fss_out_of_sample'], 3)}; it is largest, "
+        f"{fixed(best['fss_out_of_sample'], 3)}, between {fixed(best['from_mm'], 2)} and "
+        f"{fixed(best['to_mm'], 2)} mm, in the {best['tissue']}."
+    )
+
+
+def tables(section: Mapping[str, Any]) -> list[Table]:
+    """Return the tables of quantities, explanations and depths, as far as the results have them."""
+    made = drive_quantities.table(section)
+    if section.get("explanations"):
+        rows = [_explanation_row(row) for row in section["explanations"]]
+        note = "ΔAIC, ΔBIC: against the first row, smaller is better. Gain: as above."
+        made.append(Table("What explains the dynamic rates", _EXPLANATION_COLUMNS, rows, note))
+    if section.get("depths"):
+        rows = [_depth_row(layer) for layer in section["depths"]["layers"]]
+        note = (
+            "Stored energy density in both terms, four free numbers, least squares. Outside the living "
+            "epidermis no other quantity is kept. Gain: over the living epidermis."
+        )
+        made.append(Table("By depth", _DEPTH_COLUMNS, rows, note))
+    return made
+
+
+def _explanation_row(row: Mapping[str, Any]) -> Row:
+    added = ", ".join(f"{_spelled(name)} {fixed(value, 2)}" for name, value in row["added"].items())
+    return Row(
+        (
+            row["name"],
+            str(row["free_numbers"]),
+            added or ABSENT,
+            fixed(row["fss_in_sample"], 3),
+            *(fixed(row[key], 3) for key in _OUT_OF_SAMPLE),
+            gain(row["gain_interval"]),
+            fixed(row["aic_difference"], 1),
+            fixed(row["bic_difference"], 1),
+        )
+    )
+
+
+def _depth_row(layer: Mapping[str, Any]) -> Row:
+    return Row(
+        (
+            layer["tissue"],
+            fixed(layer["from_mm"], 2),
+            fixed(layer["to_mm"], 2),
+            fixed(layer["largest_sed_kpa"], 2),
+            fixed(layer["fss_in_sample"], 3),
+            *(fixed(layer[key], 3) for key in _OUT_OF_SAMPLE),
+            gain(layer["gain_interval"]),
+        )
+    )
+
+
+def _spelled(name: str) -> str:
+    """Return a number's name with its unit behind it."""
+    for ending, unit in (("_mm", " [mm]"), ("_ms", " [ms]")):
+        if name.endswith(ending):
+            return name.removesuffix(ending).replace("_", " ") + unit
+    return name.replace("_", " ")
+
+
+def page(results: Mapping[str, Any], command: str = "fingerpad drives") -> str:
+    """Write the page: every quantity by both methods, every explanation, every depth.
+
+    Parameters
+    ----------
+    results : dict
+        What `studies.drive_study.study_drives` returns.
+    command : str, optional
+        The command that made them, to be told to the reader.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
+    manifest = results["manifest"]
+    parts = [
+        "# Which quantity drives the afferent",
+        f"Written by `{command}` on {manifest['date']}: {manifest['resolution']} resolution, seed "
+        f"{manifest['seed']}, mechanical code {manifest['code_hash']}. What is concluded from it stands in "
+        "[what the dynamic term follows](decisions/what-the-dynamic-term-follows.md) and "
+        "[one afferent, fitted](single-unit.md).",
+        f"![Rates by quantity](images/{FIGURES['quantities']})",
+        drive_quantities.caption(results),
+        f"![What explains the dynamic rates](images/{FIGURES['explanations']})",
+        caption_explanations(results),
+        f"![By depth](images/{FIGURES['depths']})",
+        caption_depths(results),
+    ]
+    for one in tables(results):
+        parts += [f"## {one.title}", markdown_table(one.columns, [row.cells for row in one.rows]), one.note]
+    return "\n\n".join(parts) + "\n"
+
+
+def write_drive_page(results: Mapping[str, Any], folder: Path, command: str = "fingerpad drives") -> Path:
+    """Write `drive-quantities.md` and its figures.
+
+    Parameters
+    ----------
+    results : dict
+        What `studies.drive_study.study_drives` returns.
+    folder : Path
+        Made if needed.
+    command : str, optional
+        The command that made them.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    StoreError
+        If the folder cannot be written.
+    """
+    images, section = Path(folder) / "images", dict(results)
+    for name, draw in DRAWN.items():
+        write_atomically(images / FIGURES[name], png(draw, section))
+    path = Path(folder) / "drive-quantities.md"
+    write_atomically(path, page(results, command).encode())
+    return path
+
+
+DRAWN = {"quantities": drive_quantities.draw, "explanations": draw_explanations, "depths": draw_depths}

@@ -1,0 +1,288 @@
+"""Material sets on three levels: one figure, and one page in Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fingerpad.core.files import write_atomically
+from fingerpad.data import paper, psychophysics
+from fingerpad.report.formatting import fixed
+from fingerpad.report.markdown import table
+from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, png
+
+FIGURE = "material_sets.png"
+_SIGMA = psychophysics.NOISE_SIGMA.value
+_FSS = paper.FSS_OUT_OF_SAMPLE.value
+ONE_BAR = (
+    "The bar was pressed once and read at shifted sites: pressed at all 36 shifts (`--shifted-bars`), two "
+    "sets changed their FSS by -0.01 and +0.05, so that a set so close to the mark may lie on its other side."
+)
+_LETTERS = {"deflection": "d", "firing": "f", "discrimination": "p"}
+_REGIONS = {"near_mm": "within 0.5 mm", "far_mm": "0.5 to 5 mm"}
+
+
+def draw(section: dict[str, Any]) -> Figure:
+    """Draw FSS and noise against R², every set under its number in the table.
+
+    Parameters
+    ----------
+    section : dict
+        What `studies.material_study.study_materials` returns.
+
+    Returns
+    -------
+    Figure
+    """
+    figure = new_figure(10.0, 4.6)
+    left, middle, right = figure.subplots(1, 3)
+    rows, front = _numbered(section), set(section["pareto"])
+
+    def r2(row: Mapping[str, Any]) -> float:
+        return row["deflection"]["r2"]
+
+    def fss(row: Mapping[str, Any]) -> float:
+        return row["firing"]["fss"]
+
+    def sigma(row: Mapping[str, Any]) -> float:
+        return row["firing"]["noise_sigma"]
+
+    _cloud(left, rows, front, r2, fss)
+    _cloud(middle, rows, front, r2, sigma)
+    _cloud(right, rows, front, fss, sigma)
+    for axes in (left, middle):
+        axes.axvspan(section["targets"]["r2"], 1.0, color=PALE, zorder=0)
+        axes.set_xlim(right=1.0)
+        axes.set_xlabel("deflection: $R^2$ under the cylinder")
+    left.axhline(_FSS, color=GREY, linewidth=1.0)
+    left.set_ylabel("firing: FSS in sample")
+    right.axvline(_FSS, color=GREY, linewidth=1.0)
+    right.set_xlabel("firing: FSS in sample")
+    for axes in (middle, right):
+        axes.axhline(_SIGMA, color=GREY, linewidth=1.0)
+        axes.set_ylabel(r"discrimination: noise $\sigma_1$ that is needed")
+    for axes, title in ((left, "(a) deflection, firing"), (middle, "(b) deflection, discrimination")):
+        axes.set_title(title)
+    right.set_title("(c) firing, discrimination")
+    return figure
+
+
+def page(results: Mapping[str, Any], command: str = "fingerpad materials") -> str:
+    """Write the page: what was tried, what each level says, and the order of the trials.
+
+    Parameters
+    ----------
+    results : dict
+        What `studies.material_study.study_materials` returns.
+    command : str, optional
+        The command that made them, to be told to the reader.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
+    manifest, targets = results["manifest"], results["targets"]
+    bars = (
+        "36 presses of the bar"
+        if manifest["shifted_bars"]
+        else "one press of the bar, read at 36 shifted sites"
+    )
+    parts = [
+        "# Material sets on three levels",
+        f"Written by `{command}` on {manifest['date']}: {manifest['resolution']} resolution, {bars}, seed "
+        f"{manifest['seed']}, mechanical code {manifest['code_hash']}. What is concluded from it stands in "
+        "[what stands in for the three trials](decisions/lost-hyperelastic-coefficients.md), "
+        "[the order of the trials](decisions/order-of-the-trials.md) and "
+        "[one set for three levels](decisions/one-set-for-three-levels.md).",
+        _met(results),
+        *([] if manifest["shifted_bars"] else [ONE_BAR]),
+        f"![R², FSS and noise of every set](images/{FIGURE})",
+        "Orange: no other set is at least as good on all three levels and better on one. Shaded: R² of "
+        f"{targets['r2']:g} or more. Lines: the paper's {_FSS:g} and {_SIGMA:g}. Numbers are those of the "
+        "table.",
+        "## What was tried",
+        table(
+            ("", "set", "epidermis", "dermis", "subcutis", "basis and status"),
+            [_moduli(number, row) for number, row in enumerate(results["sets"], start=1)],
+        ),
+        "Initial shear moduli in kPa. All layers relax by the same Prony series (recalled).",
+        "## What each level says",
+        table(
+            (
+                "",
+                "R²",
+                "deflection at 1, 2, 3, 4, 5 mm [mm]",
+                "force [mN]",
+                "FSS (dynamic, static)",
+                "noise needed",
+                "hit rates at 0.055",
+                "joint FSS",
+                "joint hit rates",
+                "meets",
+            ),
+            [_levels(number, row) for number, row in _numbered(results)],
+        ),
+        "R² and deflection (mean of both sides) are under the 3.17 mm cylinder, 1 mm deep; the force is that "
+        "at the end of the hold. FSS is in sample, over all 36 shifts, of the best free fit of four numbers. "
+        "\"Noise needed\" is the sigma_1 that brings that afferent's hit rates closest to Goodwin's 0.58 and "
+        f'0.95; hit rates are at the paper\'s {_SIGMA:g}. "Joint" is an afferent fitted to FSS less the root '
+        f"mean square error of the hit rates at {_SIGMA:g}. A level counts as met with R² of "
+        f"{targets['r2']:g} or more (d), a joint FSS of {_FSS:g} or more (f), both joint hit rates within "
+        f"{targets['hit_rate_error']:g} of Goodwin's (p).",
+        *_unsolved(results),
+        "## What deflection alone says",
+        table(
+            ("set", "epidermis", "dermis", "subcutis", "R²", "force [mN]"),
+            [
+                (
+                    row["name"],
+                    *(f"{value:.4g}" for value in row["shear_kpa"].values()),
+                    fixed(row["deflection"]["r2"], 3),
+                    fixed(row["deflection"]["force_mn"], 0),
+                )
+                for row in results["deflection_only"]
+            ],
+        ),
+        "Pressed by the cylinder only; initial shear moduli in kPa, all assumed but Wu's (recalled).",
+        "## Order of the trials",
+        _order(results["order"]),
+        "## Wu's tissues as polynomials",
+        table(
+            ("layer", "nu", "fitted up to", "C10, C01, C20, C11, C02 [kPa]", "rms error / largest stress"),
+            [
+                (
+                    row["layer"],
+                    f"{row['poisson']:.2f}",
+                    f"{row['compression']:.0%}",
+                    ", ".join(f"{value:.4f}" for value in row["coefficients_kpa"]),
+                    f"{row['misfit']:.2%}",
+                )
+                for row in results["polynomials"]
+            ],
+        ),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _numbered(results: Mapping[str, Any]) -> list[tuple[int, Mapping[str, Any]]]:
+    rows = enumerate(results["sets"], start=1)
+    return [(number, row) for number, row in rows if "unsolved" not in row]
+
+
+def _cloud(
+    axes: Axes,
+    rows: Sequence[tuple[int, Mapping[str, Any]]],
+    front: set[str],
+    across: Callable[[Mapping[str, Any]], float],
+    up: Callable[[Mapping[str, Any]], float | None],
+) -> None:
+    for number, row in rows:
+        x, y = across(row), up(row)
+        if y is None:
+            continue
+        colour = ORANGE if row["name"] in front else BLUE
+        axes.plot(x, y, "o", markersize=5.0, color=colour)
+        axes.annotate(
+            str(number), (x, y), xytext=(4, 3), textcoords="offset points", fontsize=8.0, color=BLACK
+        )
+
+
+def _met(results: Mapping[str, Any]) -> str:
+    all_three = [row["name"] for row in results["sets"] if all(row["meets"].values())]
+    if not all_three:
+        return "**No set meets all three levels.**"
+    return f"**Sets that meet all three levels: {', '.join(all_three)}.**"
+
+
+def _moduli(number: int, row: Mapping[str, Any]) -> tuple[str, ...]:
+    shear = row.get("shear_kpa")
+    values = (f"{value:.4g}" for value in shear.values()) if shear else ("-", "-", "-")
+    return (str(number), row["name"], *values, row["basis"])
+
+
+def _levels(number: int, row: Mapping[str, Any]) -> tuple[str, ...]:
+    deflection, firing, joint = row["deflection"], row["firing"], row["joint"]
+    met = [_LETTERS[level] for level, reached in row["meets"].items() if reached]
+    return (
+        str(number),
+        fixed(deflection["r2"], 3),
+        ", ".join(fixed(value, 2) for value in deflection["deflection_mm"]),
+        fixed(deflection["force_mn"], 0),
+        f"{fixed(firing['fss'], 3)} ({fixed(firing['fss_dynamic'], 2)}, {fixed(firing['fss_static'], 2)})",
+        fixed(firing["noise_sigma"], 3),
+        ", ".join(fixed(rate, 2) for rate in firing["hit_rate"]),
+        fixed(joint["fss"], 3),
+        ", ".join(fixed(rate, 2) for rate in joint["hit_rate"]),
+        " ".join(met) or "-",
+    )
+
+
+def _unsolved(results: Mapping[str, Any]) -> list[str]:
+    return [
+        f"Set {number} could not be solved: {row['unsolved']}"
+        for number, row in enumerate(results["sets"], start=1)
+        if "unsolved" in row
+    ]
+
+
+def _order(order: Mapping[str, Any]) -> str:
+    def cells(found: Mapping[str, Any]) -> tuple[str, ...]:
+        return (
+            *(fixed(found["same_depth"][region], 3) for region in _REGIONS),
+            *(fixed(found["same_force"][region], 3) for region in _REGIONS),
+            fixed(found["force_ratio"], 2),
+        )
+
+    observed = table(
+        ("inner layers and epidermis", *(f"{region} [mm]" for region in _REGIONS.values())),
+        [
+            (name, *(fixed(found[region], 3) for region in _REGIONS))
+            for name, found in order["observed"].items()
+        ],
+    )
+    columns = (
+        "inner layers of Trials 2 and 3",
+        *(f"{region}, same depth [mm]" for region in _REGIONS.values()),
+        *(f"{region}, same force [mm]" for region in _REGIONS.values()),
+        "force ratio at 1 mm",
+    )
+    stiff = table(columns, [(name, *cells(found)) for name, found in order["stiff_epidermis"].items()])
+    inner = table(columns, [(name, *cells(found)) for name, found in order["inner_layers"].items()])
+    return "\n\n".join(
+        (
+            "Mean deflection under the cylinder above the observed one, 1 mm deep:",
+            observed,
+            "Trial 2 above Trial 3: the stiff epidermis above the soft one, over the same inner layers.",
+            stiff,
+            "Trial 1 above Trial 3: Maeno's inner layers above others, under the same soft epidermis.",
+            inner,
+        )
+    )
+
+
+def write_material_page(results: Mapping[str, Any], folder: Path, command: str) -> Path:
+    """Write page and figure into a folder.
+
+    Parameters
+    ----------
+    results : dict
+        What `studies.material_study.study_materials` returns.
+    folder : Path
+        Gets `material-sets.md` and `images/material_sets.png`.
+    command : str
+        Told on the page.
+
+    Returns
+    -------
+    Path
+        The page.
+    """
+    write_atomically(folder / "images" / FIGURE, png(draw, dict(results)))
+    path = folder / "material-sets.md"
+    write_atomically(path, page(results, command).encode())
+    return path
