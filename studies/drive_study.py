@@ -15,7 +15,8 @@ from fingerpad.core.checks import FloatArray, whole
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.gerling2014 import drive_fits, drive_quantities, single_unit
 from fingerpad.experiments.gerling2014.drive_fits import RELATIVE_NAMES, Judged
-from fingerpad.experiments.gerling2014.reproduction import STORE_FOLDER, plain
+from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.skin.store import Store, code_hash, solve_missing

@@ -15,7 +15,8 @@ from fingerpad.core.checks import one_of, whole
 from fingerpad.data import paper
 from fingerpad.data import tissues as published
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.gerling2014.reproduction import STORE_FOLDER, plain
+from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.skin.store import Store, code_hash, solve_missing
 from studies import trial_order
 from studies.hyperfoam_fit import polynomial_of_hyperfoam

@@ -15,10 +15,12 @@ from typing import Any
 import numpy as np
 
 from fingerpad.core.checks import positive
+from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, sphere_discrimination
-from fingerpad.experiments.gerling2014.reproduction import STORE_FOLDER, NoProgress, Progress, plain
+from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.geometry.grading import Grading
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.neuron.population import Population

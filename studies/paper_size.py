@@ -15,10 +15,12 @@ from typing import Any
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.data import psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, skin_deflection, sphere_discrimination
-from fingerpad.experiments.gerling2014.reproduction import STORE_FOLDER, NoProgress, Progress, plain
+from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import LAYERS, Mesh, finger_mesh
 from fingerpad.neuron.population import Population

@@ -22,7 +22,7 @@ from fingerpad.core.compilation import NOTICE
 from fingerpad.data import all_published
 from fingerpad.experiments.discrimination.task_files import read_question
 from fingerpad.experiments.discrimination.task_stimuli import touches
-from fingerpad.experiments.gerling2014.reproduction import STORE_FOLDER
+from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.report.page import CHAPTERS, METHODS
 from fingerpad.skin.store import Store
 

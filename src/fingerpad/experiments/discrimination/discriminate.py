@@ -11,11 +11,14 @@ from typing import Any
 
 from fingerpad.core.checks import whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.experiments.discrimination.judgements import Asked, result
 from fingerpad.experiments.discrimination.task import Question
 from fingerpad.experiments.discrimination.task_population import population_of
 from fingerpad.experiments.discrimination.task_stimuli import presented, touches
-from fingerpad.experiments.gerling2014.reproduction import STORE_FOLDER, NoProgress, Progress, plain, software
+from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.experiments.manifest import software
+from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.store import Store, solve_missing
 

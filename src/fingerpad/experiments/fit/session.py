@@ -15,15 +15,18 @@ import numpy as np
 
 from fingerpad.core.checks import one_of, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.fit.fit import check_enough, dealt_folds, fit_recordings
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
 from fingerpad.experiments.fit.offset import check_offset
-from fingerpad.experiments.gerling2014.reproduction import STORE_FOLDER, NoProgress, Progress, plain, software
+from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.experiments.gerling2014.single_unit_methods import OFFSETS_MM
+from fingerpad.experiments.manifest import software
 from fingerpad.experiments.recording_files import Recorded
+from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.experiments.stimuli import TactileStimulus
 from fingerpad.geometry.grading import Grading, covering
 from fingerpad.geometry.indenter_grading import grading_about

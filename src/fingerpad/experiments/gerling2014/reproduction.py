@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import math
-import platform
-import resource
-import sys
-import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 
-from fingerpad import __version__
 from fingerpad.core.checks import whole
+from fingerpad.core.progress import Progress
+from fingerpad.core.results import to_json
 from fingerpad.data import all_published, protocol
 from fingerpad.experiments.conditions import Conditions, Touch
 from fingerpad.experiments.gerling2014 import (
@@ -36,34 +31,10 @@ from fingerpad.experiments.gerling2014 import (
     spike_fit,
 )
 from fingerpad.experiments.gerling2014.comparison import comparison
-from fingerpad.geometry.mesh_quality import jacobian_at_gauss, scaled_jacobian
+from fingerpad.experiments.runner import Runner
 from fingerpad.neuron.afferent import Afferent
-from fingerpad.skin.sampling import SkinResponse
-from fingerpad.skin.store import Store, code_hash, solve_missing
 
-STORE_FOLDER = "indentations"
-PACKAGES = ("numpy", "scipy", "numba", "matplotlib", "pypardiso")
 STANDARD_SPHERE = (sphere_discrimination.POSITIONS_MM[0], sphere_discrimination.CURVATURES[0])
-BYTES_PER_KIB = 1024
-
-Key = TypeVar("Key")
-
-
-class Progress(Protocol):
-    """Tells somebody how far a reproduction is."""
-
-    def stage(self, name: str, total: int) -> AbstractContextManager[Callable[[], None]]:
-        """Open a stage of `total` parts; call the result once per finished part."""
-        ...
-
-
-class NoProgress:
-    """Tells nobody."""
-
-    @contextmanager
-    def stage(self, name: str, total: int) -> Iterator[Callable[[], None]]:
-        """Open a stage that is not shown."""
-        yield lambda: None
 
 
 @dataclass(frozen=True)
@@ -122,10 +93,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
     StoreError
         If a stored indentation is damaged or the folder cannot be written.
     """
-    progress = progress or NoProgress()
-    started, clock = datetime.now(UTC), time.perf_counter()
-    store, conditions = Store(run.folder / STORE_FOLDER), run.conditions
-    stages: list[dict[str, Any]] = []
+    runner, conditions = Runner(run.folder, run.jobs, progress), run.conditions
 
     spheres = sphere_discrimination.touches(conditions)
     wanted: dict[str, Mapping[Any, Touch]] = {
@@ -138,19 +106,11 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
     if run.goes_beyond:
         wanted["spheres, other meshes"] = mesh_noise.touches(conditions)
         wanted["spheres, other curvatures"] = curvature_thresholds.touches(conditions)
-    missing = {
-        name: sum(not store.holds(touch) for touch in touches.values()) for name, touches in wanted.items()
-    }
-    with _timed("indentations", sum(missing.values()), progress, stages) as advance:
-        everything = [touch for touches in wanted.values() for touch in touches.values()]
-        solve_missing(everything, store, run.jobs, lambda seconds: advance())
-    responses = {name: _loaded(name, touches, store, stages) for name, touches in wanted.items()}
-    for stage in stages[1:]:
-        stage["computed"] = missing[stage["name"]]
+    responses = runner.responses(wanted)
     deflection, bar_responses = responses["skin deflection"], responses["bar, 36 shifts"]
     sphere_responses, nail_response = responses["spheres"], responses["nail"]["nail"]
 
-    with _timed("fit and discrimination", 3, progress, stages) as advance:
+    with runner.stage("fit and discrimination", 3) as advance:
         bars = list(bar_responses.values())
         bar_sed = single_unit.receptor_sed(bars)
         problem = single_unit.rate_problem(bar_sed)
@@ -168,7 +128,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
         }
         advance()
     if run.goes_beyond:
-        with _timed("beyond the paper", 8, progress, stages) as advance:
+        with runner.stage("beyond the paper", 8) as advance:
             traces = drive_quantities.receptor_traces(bars, drive_quantities.SHOWN_QUANTITIES)
             results["single_unit"]["starts"] = single_unit_starts.result(problem, traces["von_mises"])
             advance()
@@ -208,94 +168,12 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
             advance()
     results["comparison"] = comparison(results)
     results["inputs"] = [asdict(number) for number in all_published()]
-    results["manifest"] = _manifest(conditions, spheres[STANDARD_SPHERE], deflection, bar_responses) | {
-        "started": started.isoformat(timespec="seconds"),
-        "wall_s": round(time.perf_counter() - clock, 2),
-        "peak_memory_mb": _peak_memory_mb(),
-        "stages": stages,
+    meshes = {"sphere": spheres[STANDARD_SPHERE].mesh, "bar": bar_responses[0].mesh} | {
+        name: deflection["trial3", name].mesh for name in skin_deflection.INDENTERS
     }
+    half_model = not spheres[STANDARD_SPHERE].grading.full
+    results["manifest"] = json.loads(to_json(runner.manifest(conditions, meshes, half_model)))
     return plain(results)
-
-
-def _loaded(
-    name: str, touches: Mapping[Key, Touch], store: Store, stages: list[dict[str, Any]]
-) -> dict[Key, SkinResponse]:
-    """Read the indentations of one study, all of which are there."""
-    with _timed(name, 0, NoProgress(), stages):
-        responses = {key: store.load(touch) for key, touch in touches.items()}
-    stages[-1] |= {
-        "indentations": len(touches),
-        # Whether forces and energies of every press add up, at their worst.
-        "largest_force_imbalance": max(skin.force_imbalance for skin in responses.values()),
-        "largest_energy_imbalance": max(skin.energy_imbalance for skin in responses.values()),
-        "linear_solvers": sorted({skin.linear_solver for skin in responses.values()}),
-    }
-    return responses
-
-
-@contextmanager
-def _timed(
-    name: str, total: int, progress: Progress, stages: list[dict[str, Any]]
-) -> Iterator[Callable[[], None]]:
-    started = time.perf_counter()
-    stages.append({"name": name, "wall_s": 0.0})
-    with progress.stage(name, total) as advance:
-        yield advance
-    stages[-1]["wall_s"] = round(time.perf_counter() - started, 2)
-
-
-def _manifest(
-    conditions: Conditions,
-    standard: Touch,
-    deflection: Mapping[Any, SkinResponse],
-    bars: Mapping[int, SkinResponse],
-) -> dict[str, Any]:
-    """Say what ran, so that the run can be repeated and its meshes judged."""
-    meshes = {"sphere": standard.mesh, "bar": bars[0].mesh}
-    meshes |= {name: deflection["trial3", name].mesh for name in skin_deflection.INDENTERS}
-    return software() | {
-        "seed": conditions.seed,
-        "resolution": conditions.resolution,
-        "materials": conditions.materials,
-        "nodes": len(standard.mesh.nodes_mm),
-        "elements": len(standard.mesh.elements),
-        "meshes": {
-            name: {
-                "nodes": len(mesh.nodes_mm),
-                "elements": len(mesh.elements),
-                "smallest_gauss_jacobian_mm3": float(jacobian_at_gauss(mesh).min()),
-                "smallest_scaled_jacobian": float(np.nanmin(scaled_jacobian(mesh))),
-            }
-            for name, mesh in meshes.items()
-        },
-        "half_model": not standard.grading.full,
-    }
-
-
-def software() -> dict[str, Any]:
-    """Say what program runs, on what."""
-    return {
-        "version": __version__,
-        "code_hash": code_hash(),
-        "python": platform.python_version(),
-        "platform": platform.platform(),
-        "packages": {name: version(name) for name in PACKAGES if _installed(name)},
-    }
-
-
-def _installed(package: str) -> bool:
-    try:
-        version(package)
-    except ModuleNotFoundError:  # importlib.metadata.PackageNotFoundError is one
-        return False
-    return True
-
-
-def _peak_memory_mb() -> float:
-    """Largest resident memory of this process or of one of its workers. [MB]"""
-    unit = 1 if sys.platform == "darwin" else BYTES_PER_KIB
-    peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    return round(peak * unit / 1e6, 1)
 
 
 def plain(value: Any) -> Any:

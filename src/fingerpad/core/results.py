@@ -1,0 +1,277 @@
+"""Results: frozen dataclasses that are checked on construction, written as JSON and described by a schema.
+
+A class of results is declared with `@result_class`. Its fields say what a file holds: names carry units,
+types carry shapes (`Vector`, `Matrix`, `Array`), and a misspelt or missing field is an error. `to_json` and
+`from_json` convert between an instance and JSON; NaN is null there. `schema_of` gives the JSON schema.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Protocol, TypeVar, dataclass_transform
+
+import fastjsonschema
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    GetPydanticSchema,
+    PlainSerializer,
+    TypeAdapter,
+    ValidationError,
+    WithJsonSchema,
+    model_validator,
+)
+from pydantic.dataclasses import dataclass
+from pydantic_core import ArgsKwargs, core_schema
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.files import write_atomically
+
+Kind = TypeVar("Kind")
+
+
+def _array(dtype: type, ndim: int | None, item: dict[str, Any]) -> GetPydanticSchema:
+    """Make the validation, JSON and schema of a read-only array; null stands for NaN."""
+
+    def validated(value: Any) -> NDArray[Any]:
+        array: NDArray[Any] = np.array(value, dtype=dtype)
+        if ndim is not None and array.ndim != ndim:
+            if array.size == 0 and array.ndim < ndim:
+                array = array.reshape((0,) * ndim)
+            else:
+                raise ValueError(f"must have {ndim} dimension(s): got shape {array.shape}")
+        array.setflags(write=False)
+        return array
+
+    def schema(source: Any, handler: Any) -> core_schema.CoreSchema:
+        return core_schema.no_info_plain_validator_function(
+            validated,
+            serialization=core_schema.plain_serializer_function_ser_schema(_listed),
+        )
+
+    json_schema = dict(item)
+    for _ in range(ndim or 0):
+        json_schema = {"type": "array", "items": json_schema}
+    if ndim is None:
+        json_schema = {"type": ["array", "number", "null"]}
+    return GetPydanticSchema(schema, lambda core, handler: json_schema)
+
+
+def _listed(array: NDArray[Any]) -> Any:
+    """Nested lists of an array, with None for what is not finite."""
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        values = array.astype(object)
+        values[~np.isfinite(array)] = None
+        return values.tolist()
+    return array.tolist()
+
+
+_NUMBER = {"type": ["number", "null"]}
+_WHOLE = {"type": "integer"}
+_TRUTH = {"type": "boolean"}
+
+Array = Annotated[FloatArray, _array(np.float64, None, _NUMBER)]
+"""Float array of any shape."""
+Vector = Annotated[FloatArray, _array(np.float64, 1, _NUMBER)]
+"""Float array (n,)."""
+Matrix = Annotated[FloatArray, _array(np.float64, 2, _NUMBER)]
+"""Float array (n, m)."""
+Stack = Annotated[FloatArray, _array(np.float64, 3, _NUMBER)]
+"""Float array (n, m, k)."""
+WholeVector = Annotated[NDArray[np.int64], _array(np.int64, 1, _WHOLE)]
+"""Integer array (n,)."""
+WholeMatrix = Annotated[NDArray[np.int64], _array(np.int64, 2, _WHOLE)]
+"""Integer array (n, m)."""
+TruthVector = Annotated[NDArray[np.bool_], _array(np.bool_, 1, _TRUTH)]
+"""Boolean array (n,)."""
+TruthMatrix = Annotated[NDArray[np.bool_], _array(np.bool_, 2, _TRUTH)]
+"""Boolean array (n, m)."""
+Number = Annotated[
+    float,
+    BeforeValidator(lambda value: np.nan if value is None else value),
+    PlainSerializer(lambda value: value if np.isfinite(value) else None),
+    WithJsonSchema(_NUMBER),
+]
+"""A float that may be NaN, which is null in a file."""
+
+
+class ResultFile(Protocol):
+    """Results that are a file of their own: both fields are literals with a default."""
+
+    @property
+    def format(self) -> str:
+        """Name of the format; the schema of that name lies in the package."""
+        ...
+
+    @property
+    def format_version(self) -> int:
+        """Raised when a reader of the version before would not understand the file."""
+        ...
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+def result_class(cls: type[Kind]) -> type[Kind]:
+    """Make a class a frozen dataclass with named fields that are checked on construction.
+
+    Parameters
+    ----------
+    cls : type
+        Annotated fields, as of a dataclass. NumPy scalars are taken for Python's numbers.
+
+    Returns
+    -------
+    type
+        The dataclass; an unknown, missing or unfit field raises `pydantic.ValidationError`.
+
+    Examples
+    --------
+    >>> @result_class
+    ... class Rates:
+    ...     rate_hz: Vector
+    ...     label: str = "hold"
+    >>> rates = Rates(rate_hz=[1.0, np.nan])
+    >>> to_json(rates, indent=None)
+    b'{"rate_hz":[1.0,null],"label":"hold"}'
+    >>> from_json(Rates, to_json(rates)).rate_hz
+    array([ 1., nan])
+    """
+    cls._plain_scalars = model_validator(mode="before")(_plain_scalars)  # type: ignore[attr-defined]
+    made: Any = dataclass(frozen=True, kw_only=True, config=ConfigDict(extra="forbid"))(cls)
+    return made
+
+
+def _plain_scalars(values: Any) -> Any:
+    """Python's numbers in the place of NumPy's scalars, in fields and in what they nest."""
+    if isinstance(values, ArgsKwargs):
+        return ArgsKwargs(values.args, _plain(values.kwargs or {}))
+    return _plain(values) if isinstance(values, Mapping) else values
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Mapping):
+        return {_plain(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(_plain(item) for item in value) if type(value) in (list, tuple) else value
+    return value
+
+
+def _adapter(cls: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(cls)
+
+
+def to_json(result: Any, indent: int | None = 1) -> bytes:
+    """JSON of a result, null for NaN.
+
+    Parameters
+    ----------
+    result : instance of a `result_class`
+        What is written.
+    indent : int, optional
+        Spaces per level; None writes one line.
+    """
+    return _adapter(type(result)).dump_json(result, indent=indent)
+
+
+def from_json(cls: type[Kind], content: bytes) -> Kind:
+    """Read a result from its JSON.
+
+    Parameters
+    ----------
+    cls : type
+        The `result_class`.
+    content : bytes
+        As from `to_json`.
+
+    Raises
+    ------
+    InputError
+        If the content is no JSON, or a field is missing, unknown or unfit; the first one is named.
+    """
+    try:
+        return _adapter(cls).validate_json(content)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(str(part) for part in first["loc"]) or "the file"
+        raise InputError(f"{place} is not as {cls.__name__} needs it: {first['msg']}.") from error
+
+
+def schema_of(cls: type) -> dict[str, Any]:
+    """JSON schema of a class of results, as a file holds it."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | _adapter(cls).json_schema(
+        mode="serialization"
+    )
+
+
+def write_results(path: Path, results: ResultFile, schema: dict[str, Any]) -> None:
+    """Write a file of results, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        Where the file shall be; folders are made as needed.
+    results : ResultFile
+        An instance of a `result_class` with format and version.
+    schema : dict
+        JSON schema that the file has to meet.
+
+    Raises
+    ------
+    StoreError
+        If the results do not meet the schema, or as `write_atomically`.
+    """
+    content = to_json(results)
+    try:
+        fastjsonschema.compile(schema)(json.loads(content))
+    except fastjsonschema.JsonSchemaValueException as error:
+        raise StoreError(
+            f"{path} was not written: the results do not meet their schema ({error.message}); "
+            "write the schemas anew with `python -m fingerpad.experiments.schemas`."
+        ) from error
+    write_atomically(path, content + b"\n")
+
+
+def read_results(path: Path, cls: type[Kind]) -> Kind:
+    """Read a file of results.
+
+    Parameters
+    ----------
+    path : Path
+        Written by `write_results`.
+    cls : type
+        The class of its results, a `ResultFile`.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read, has another format or version, or is damaged.
+    """
+    try:
+        content = Path(path).read_bytes()
+        values = json.loads(content)
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{path} cannot be read as JSON ({error}): run the command again.") from error
+    found = (values.get("format"), values.get("format_version")) if isinstance(values, dict) else (None, None)
+    wanted = file_format(cls)
+    if found != wanted:
+        raise StoreError(
+            f"{path} must have the format {wanted[0]}, version {wanted[1]}: got "
+            f"{'no format' if found[0] is None else f'{found[0]}, version {found[1]}'}; "
+            "run the command again to write it anew."
+        )
+    try:
+        return from_json(cls, content)
+    except InputError as error:
+        raise StoreError(f"{path} is damaged: {error} Run the command again.") from error
+
+
+def file_format(cls: Any) -> tuple[str, int]:
+    """Format and version that a class of result files declares."""
+    declared = cls.__dataclass_fields__
+    return declared["format"].default, declared["format_version"].default

@@ -1,0 +1,162 @@
+"""The manifest of a run: what ran, on what, from what and for how long."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import resource
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fingerpad import __version__
+from fingerpad.core.results import Number, result_class
+from fingerpad.geometry.mesh import Mesh
+from fingerpad.geometry.mesh_quality import jacobian_at_gauss, scaled_jacobian
+from fingerpad.skin.store import code_hash
+
+PACKAGES = ("numpy", "scipy", "numba", "matplotlib")
+"""Packages on which the numbers of a run depend."""
+
+_BYTES_PER_KIB = 1024
+
+
+@result_class
+class MeshSummary:
+    """Size and quality of one mesh.
+
+    Parameters
+    ----------
+    nodes, elements : int
+        How many.
+    smallest_gauss_jacobian_mm3 : float
+        Smallest determinant of the Jacobian at a Gauss point. [mm³]
+    smallest_scaled_jacobian : float
+        Smallest scaled Jacobian of an element, 1 for a cube.
+    """
+
+    nodes: int
+    elements: int
+    smallest_gauss_jacobian_mm3: Number
+    smallest_scaled_jacobian: Number
+
+
+@result_class
+class StageSummary:
+    """One stage of a run.
+
+    Parameters
+    ----------
+    name : str
+        What was done.
+    wall_s : float
+        Time on the clock. [s]
+    indentations, computed : int, optional
+        How many indentations the stage read, and how many of them this run solved.
+    largest_force_imbalance, largest_energy_imbalance : float, optional
+        Largest relative imbalance of the forces and of the energies of an indentation.
+    linear_solvers : tuple of str
+        Which solvers served the Newton steps.
+    """
+
+    name: str
+    wall_s: float
+    indentations: int | None = None
+    computed: int | None = None
+    largest_force_imbalance: float | None = None
+    largest_energy_imbalance: float | None = None
+    linear_solvers: tuple[str, ...] = ()
+
+
+@result_class
+class Manifest:
+    """What ran, so that a run can be repeated and its meshes judged.
+
+    Parameters
+    ----------
+    version, code_hash, python, platform : str
+        The program, the code behind stored indentations, and the machine's system.
+    packages : dict of str to str
+        Versions of the packages on which the numbers depend.
+    resolution : str
+        How fine meshes and steps are.
+    materials : str
+        Tissues: their name, or how they are written in Python.
+    seed : int
+        Seed of all random numbers.
+    started : str
+        Date and time, UTC.
+    wall_s, peak_memory_mb : float
+        Time on the clock and largest resident memory of a process. [s], [MB]
+    stages : tuple of StageSummary
+        In the order of the run.
+    meshes : dict of str to MeshSummary
+        By what is pressed.
+    half_model : bool, optional
+        Whether the finger is cut at its plane of symmetry.
+    command : str, optional
+        The command line.
+    inputs : dict of str to str
+        SHA-256 of the input files, by name.
+    """
+
+    version: str
+    code_hash: str
+    python: str
+    platform: str
+    packages: dict[str, str]
+    resolution: str
+    materials: str
+    seed: int
+    started: str
+    wall_s: float
+    peak_memory_mb: float
+    stages: tuple[StageSummary, ...]
+    meshes: dict[str, MeshSummary]
+    half_model: bool | None = None
+    command: str | None = None
+    inputs: dict[str, str]
+
+
+def software() -> dict[str, Any]:
+    """Fields of a `Manifest` that name the program and the system."""
+    return {
+        "version": __version__,
+        "code_hash": code_hash(),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "packages": {name: version(name) for name in PACKAGES if _installed(name)},
+    }
+
+
+def mesh_summary(mesh: Mesh) -> MeshSummary:
+    """Count and judge a mesh."""
+    return MeshSummary(
+        nodes=len(mesh.nodes_mm),
+        elements=len(mesh.elements),
+        smallest_gauss_jacobian_mm3=float(jacobian_at_gauss(mesh).min()),
+        smallest_scaled_jacobian=float(np.nanmin(scaled_jacobian(mesh))),
+    )
+
+
+def sha256(path: Path) -> str:
+    """SHA-256 of a file's content, 64 hexadecimal digits."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def peak_memory_mb() -> float:
+    """Largest resident memory of this process or of one of its workers. [MB]"""
+    unit = 1 if sys.platform == "darwin" else _BYTES_PER_KIB
+    peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return round(peak * unit / 1e6, 1)
+
+
+def _installed(package: str) -> bool:
+    try:
+        version(package)
+    except PackageNotFoundError:
+        return False
+    return True

@@ -1,0 +1,191 @@
+"""One run of an experiment: solve the indentations that are missing, load them, and record what was done."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, TypeVar
+
+from fingerpad.core.checks import whole
+from fingerpad.core.progress import NoProgress, Progress
+from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.manifest import Manifest, StageSummary, mesh_summary, peak_memory_mb, software
+from fingerpad.geometry.mesh import Mesh
+from fingerpad.skin.indentation import Touch
+from fingerpad.skin.sampling import SkinResponse
+from fingerpad.skin.store import Store, solve_missing
+
+STORE_FOLDER = "indentations"
+"""Folder of finished indentations within the folder of a run."""
+
+Key = TypeVar("Key")
+
+
+class Runner:
+    """What every experiment does around its own arithmetic.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the run; finished indentations are stored below it.
+    jobs : int
+        Processes to use; the numbers do not depend on it.
+    progress : Progress, optional
+        Shown each finished part.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     runner = Runner(Path(folder))
+    ...     with runner.stage("fit", 1) as advance:
+    ...         advance()
+    ...     manifest = runner.manifest(Conditions(resolution="quick"))
+    >>> [stage.name for stage in manifest.stages], manifest.resolution
+    (['fit'], 'quick')
+    """
+
+    def __init__(self, folder: Path, jobs: int = 1, progress: Progress | None = None):
+        self.folder = Path(folder)
+        self.jobs = whole("jobs", jobs, at_least=1)
+        self.progress = progress or NoProgress()
+        self.store = Store(self.folder / STORE_FOLDER)
+        self._stages: list[StageSummary] = []
+        self._started, self._clock = datetime.now(UTC), time.perf_counter()
+
+    @contextmanager
+    def stage(self, name: str, total: int) -> Iterator[Callable[[], None]]:
+        """Time one stage of `total` parts, and show how far it is."""
+        started = time.perf_counter()
+        with self.progress.stage(name, total) as advance:
+            yield advance
+        self._stages.append(StageSummary(name=name, wall_s=round(time.perf_counter() - started, 2)))
+
+    def solve(self, touches: Sequence[Touch], stage: str = "indentations") -> int:
+        """Solve and store the touches that are not stored yet.
+
+        Parameters
+        ----------
+        touches : sequence of Touch
+            In the order in which they are started: the longest first keeps all processes busy to the end.
+        stage : str, optional
+            Name under which this is timed and shown.
+
+        Returns
+        -------
+        int
+            How many were solved.
+
+        Raises
+        ------
+        ConvergenceError
+            If one cannot be solved; those finished before stay stored.
+        StoreError
+            If the folder cannot be written.
+        """
+        missing = sum(not self.store.holds(touch) for touch in touches)
+        with self.stage(stage, missing) as advance:
+            return solve_missing(touches, self.store, self.jobs, lambda seconds: advance())
+
+    def load(self, name: str, touches: Mapping[Key, Touch]) -> dict[Key, SkinResponse]:
+        """Read the indentations of one part of the experiment, all of which are stored.
+
+        Parameters
+        ----------
+        name : str
+            Of the part, for the manifest.
+        touches : mapping of key to Touch
+            What was pressed.
+
+        Returns
+        -------
+        dict of key to SkinResponse
+
+        Raises
+        ------
+        StoreError
+            If a stored indentation is missing or damaged.
+        """
+        with self.stage(name, 0):
+            responses = {key: self.store.load(touch) for key, touch in touches.items()}
+        skins = responses.values()
+        self._stages[-1] = replace(
+            self._stages[-1],
+            indentations=len(touches),
+            largest_force_imbalance=max((skin.force_imbalance for skin in skins), default=None),
+            largest_energy_imbalance=max((skin.energy_imbalance for skin in skins), default=None),
+            linear_solvers=tuple(sorted({skin.linear_solver for skin in skins})),
+        )
+        return responses
+
+    def responses(self, groups: Mapping[str, Mapping[Any, Touch]]) -> dict[str, dict[Any, SkinResponse]]:
+        """Solve what is missing of all groups, then read them group by group.
+
+        Parameters
+        ----------
+        groups : mapping of str to mapping of key to Touch
+            Touches of each part of the experiment, by its name.
+
+        Returns
+        -------
+        dict of str to dict of key to SkinResponse
+
+        Raises
+        ------
+        ConvergenceError, StoreError
+            As `solve` and `load`.
+        """
+        missing = {
+            name: sum(not self.store.holds(touch) for touch in touches.values())
+            for name, touches in groups.items()
+        }
+        self.solve([touch for touches in groups.values() for touch in touches.values()])
+        responses = {}
+        for name, touches in groups.items():
+            responses[name] = self.load(name, touches)
+            self._stages[-1] = replace(self._stages[-1], computed=missing[name])
+        return responses
+
+    def manifest(
+        self,
+        conditions: Conditions,
+        meshes: Mapping[str, Mesh] | None = None,
+        half_model: bool | None = None,
+        command: str | None = None,
+        inputs: Mapping[str, str] | None = None,
+    ) -> Manifest:
+        """Record what ran.
+
+        Parameters
+        ----------
+        conditions : Conditions
+            Tissues, accuracy and seed.
+        meshes : mapping of str to Mesh, optional
+            By what is pressed.
+        half_model : bool, optional
+            Whether the finger is cut at its plane of symmetry.
+        command : str, optional
+            The command line.
+        inputs : mapping of str to str, optional
+            SHA-256 of the input files, by name.
+        """
+        materials = conditions.materials
+        return Manifest(
+            **software(),
+            resolution=conditions.resolution,
+            materials=materials if isinstance(materials, str) else repr(materials),
+            seed=conditions.seed,
+            started=self._started.isoformat(timespec="seconds"),
+            wall_s=round(time.perf_counter() - self._clock, 2),
+            peak_memory_mb=peak_memory_mb(),
+            stages=tuple(self._stages),
+            meshes={name: mesh_summary(mesh) for name, mesh in (meshes or {}).items()},
+            half_model=half_model,
+            command=command,
+            inputs=dict(inputs or {}),
+        )

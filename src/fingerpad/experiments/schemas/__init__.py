@@ -1,0 +1,45 @@
+"""JSON schemas of the files of results, generated from their types; every file that is written meets its own.
+
+`python -m fingerpad.experiments.schemas` writes them anew after a change of a type.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from fingerpad.core.results import ResultFile, write_results
+
+
+@cache
+def schema(file_format: str) -> dict[str, Any]:
+    """JSON schema of a format, as it lies in the package.
+
+    Parameters
+    ----------
+    file_format : str
+        The field `format` of a file of results.
+    """
+    name = file_format.replace(" ", "-") + ".schema.json"
+    return json.loads((files(__name__) / name).read_text(encoding="utf-8"))
+
+
+def write(path: Path, results: ResultFile) -> None:
+    """Write a file of results that meets the schema of its format.
+
+    Parameters
+    ----------
+    path : Path
+        Where the file shall be; folders are made as needed.
+    results : ResultFile
+        What it holds.
+
+    Raises
+    ------
+    StoreError
+        If the results do not meet the schema or the file cannot be written.
+    """
+    write_results(path, results, schema(results.format))
