@@ -1,4 +1,4 @@
-"""The whole comparison of drives behind `fingerpad drives`: every quantity, explanation and depth."""
+"""The whole comparison of drives behind `python -m studies drives`: every quantity, explanation and depth."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def test_drives_writes_its_page_and_numbers_for_the_conditions_given(call, monke
     status, said, _ = call("drives", "--resolution", "quick", "--out", "found", "--jobs", "2", "--seed", "5")
     assert (status, asked) == (0, [("quick", 5, Path("found"), 2)])
     assert said == f"Page: {Path('found/page.md')}\nResults: {Path('found/drive_quantities.json')}\n"
-    assert (tmp_path / "found" / "page.md").read_text() == "fingerpad drives --resolution quick"
+    assert (tmp_path / "found" / "page.md").read_text() == "python -m studies drives --resolution quick"
     assert json.loads((tmp_path / "found" / "drive_quantities.json").read_text()) == {"candidates": []}
 
 

@@ -538,9 +538,9 @@ def explained(section):
 
 def test_the_page_tells_every_explanation_and_both_methods(section, tmp_path):
     results = explained(section)
-    path = drives_report.write_drive_page(results, tmp_path, "fingerpad drives --resolution quick")
+    path = drives_report.write_drive_page(results, tmp_path, "python -m studies drives --resolution quick")
     text = path.read_text(encoding="utf-8")
-    assert "`fingerpad drives --resolution quick` on 2026-01-01" in text
+    assert "`python -m studies drives --resolution quick` on 2026-01-01" in text
     assert "## By quantity, response surface" in text
     assert "| power law of the dynamic term | 5 | exponent 0.39 |" in text
     assert "| +0.010 … +0.200 | −50.9 | −48.6 |" in text

@@ -411,7 +411,7 @@ def test_a_second_run_presses_nothing_and_says_the_same(tiny, monkeypatch):
 
 
 def test_the_page_tells_every_set_and_its_numbers(tiny, tmp_path):
-    path = write_material_page(tiny.results, tmp_path, "fingerpad materials")
+    path = write_material_page(tiny.results, tmp_path, "python -m studies materials")
     text = path.read_text(encoding="utf-8")
     assert (tmp_path / "images" / FIGURE).read_bytes().startswith(b"\x89PNG")
     for number, found in enumerate(tiny.results["sets"], start=1):

@@ -123,14 +123,10 @@ def test_the_index_lists_every_decision_once() -> None:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_a_decision_is_complete_and_names_only_what_exists(page: str) -> None:
+def test_a_decision_is_complete_and_names_arguments_that_exist(page: str) -> None:
     text = (DECISIONS / page).read_text(encoding="utf-8")
     parts = re.findall(r"^\*\*(Question|Choice|Reason|To change it)\.\*\*", text, flags=re.MULTILINE)
     assert parts == ["Question", "Choice", "Reason", "To change it"]
-    for name in re.findall(r"`(fingerpad(?:\.\w+)+)`", text):
-        assert pkgutil.resolve_name(name) is not None
-    for link in re.findall(r"\]\(([\w-]+\.md)\)", text):
-        assert link in PAGES
     for names, owner in re.findall(
         r"((?:`\w+`(?:, | and )?)+) of `(fingerpad(?:\.\w+)+)`", " ".join(text.split())
     ):

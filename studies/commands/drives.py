@@ -1,4 +1,4 @@
-"""`fingerpad drives`: what may drive the afferent."""
+"""`python -m studies drives`: what may drive the afferent."""
 
 from __future__ import annotations
 
@@ -38,6 +38,6 @@ def drives_command(
         results = study_drives(study, lambda part: console.print(f"done: {part}"))
         numbers = out / "drive_quantities.json"
         write_json(numbers, results)
-        page = write_drive_page(results, out, f"fingerpad drives --resolution {resolution}")
+        page = write_drive_page(results, out, f"python -m studies drives --resolution {resolution}")
     typer.echo(f"Page: {page}")
     typer.echo(f"Results: {numbers}")

@@ -1,4 +1,4 @@
-"""`fingerpad materials`: sets of tissues side by side."""
+"""`python -m studies materials`: sets of tissues side by side."""
 
 from __future__ import annotations
 
@@ -47,7 +47,8 @@ def materials_command(
     make_writable(out)
     console = Console(stderr=True, quiet=not sys.stderr.isatty())
     chosen = "".join(f' --name "{one}"' for one in name or ())
-    command = f"fingerpad materials --resolution {resolution}{' --shifted-bars' * shifted_bars}{chosen}"
+    options = f"--resolution {resolution}{' --shifted-bars' * shifted_bars}{chosen}"
+    command = f"python -m studies materials {options}"
     with interruptible():
         results = study_materials(study, lambda part: console.print(f"done: {part}"))
         numbers = out / "material_sets.json"

@@ -1,4 +1,4 @@
-"""`fingerpad refine`: the error of the meshes."""
+"""`python -m studies refine`: the error of the meshes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of `fingerpad drives`: quantities, explanations of the dynamic rates, and depths."""
+"""The page of `python -m studies drives`: quantities, explanations of the dynamic rates, and depths."""
 
 from __future__ import annotations
 
@@ -222,7 +222,7 @@ def _spelled(name: str) -> str:
     return name.replace("_", " ")
 
 
-def page(results: Mapping[str, Any], command: str = "fingerpad drives") -> str:
+def page(results: Mapping[str, Any], command: str = "python -m studies drives") -> str:
     """Write the page: every quantity by both methods, every explanation, every depth.
 
     Parameters
@@ -256,7 +256,9 @@ def page(results: Mapping[str, Any], command: str = "fingerpad drives") -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def write_drive_page(results: Mapping[str, Any], folder: Path, command: str = "fingerpad drives") -> Path:
+def write_drive_page(
+    results: Mapping[str, Any], folder: Path, command: str = "python -m studies drives"
+) -> Path:
     """Write `drive-quantities.md` and its figures.
 
     Parameters

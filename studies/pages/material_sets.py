@@ -71,7 +71,7 @@ def draw(section: dict[str, Any]) -> Figure:
     return figure
 
 
-def page(results: Mapping[str, Any], command: str = "fingerpad materials") -> str:
+def page(results: Mapping[str, Any], command: str = "python -m studies materials") -> str:
     """Write the page: what was tried, what each level says, and the order of the trials.
 
     Parameters

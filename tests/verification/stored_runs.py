@@ -1,7 +1,7 @@
-"""Last sections of the page: meshes held against finer ones, from stored runs.
+"""Last sections of the page: the standard meshes compared with finer ones, from stored runs.
 
-The runs take an hour and more and are not repeated for the page: `fingerpad refine` presses everything, and
-its numbers and figures are kept beside the page with the hash of the code that made them.
+The runs take more than an hour and are not repeated for the page. `python -m studies refine` indents every
+mesh. Its numbers and figures are kept beside the page with the hash of the code that made them.
 """
 
 from __future__ import annotations
@@ -60,26 +60,28 @@ REFINEMENT = StoredRun(
     mesh_refinement,
     "## Mesh refinement",
     """\
-No closed form knows a fingertip, so the meshes of every resolution are compared with a finer one: strain
-energy density (SED) at the receptor under the shifted bar and at the population's receptors under spheres,
-and the firing rates, fit and hit rates that follow with the same afferent, noise and random numbers. Coarse,
-standard and fine differ by one factor in every direction. `fingerpad refine` presses all of it and writes
-these tables; these come from code {code_hash}. What follows for the choice of a mesh:
-[three sizes of mesh](decisions/mesh-sizes.md).
+There is no closed-form solution for a fingertip. The meshes of every resolution are therefore compared
+with a finer one. Compared are the strain energy density (SED) at the receptor under the shifted bar and at
+the receptors of the population under spheres, and the firing rates, goodness of fit and hit rates computed
+from it. Afferent, noise and random numbers are the same on every mesh. The coarse, standard and fine
+meshes differ by one factor in every direction. `python -m studies refine` computes these tables; the ones
+below come from code {code_hash}. Conclusions about the choice of a mesh are on [mesh
+resolutions](decisions/mesh-sizes.md).
 """,
     "SED at the receptor and its firing rates against the shift of the bar, on every mesh",
 )
 
 PAPER_SIZE = StoredRun(
     paper_size,
-    "## Against the paper's size of mesh",
+    "## Comparison with the paper's mesh size",
     """\
-The same touches on quick, standard and a mesh of the paper's size: the skin under line and cylinder in three
-trials, the bar at its edges, centre and beside it, four spheres at both positions. Meshes differ along the
-skin only; standard and the paper's size have the same elements through it, so what those leave open is shown
-by a mesh with twice as many through the deep layers. `fingerpad refine --against paper` presses all of it and
-writes these tables; these come from code {code_hash}. What the preset is, and what follows:
-[the paper's size of mesh](decisions/paper-size.md).
+The same indentations on the quick mesh, the standard mesh and a mesh of the paper's size: line and
+cylinder with the materials of three trials, the bar at its edges, at its centre and beside it, four
+spheres at both positions. The meshes differ along the skin only. The standard mesh and the mesh of the
+paper's size have the same elements through the depth; a mesh with twice as many elements through dermis
+and subcutis shows the remaining error. `python -m studies refine --against paper` computes these tables;
+the ones below come from code {code_hash}. The preset and the conclusions are on [the mesh of the paper's
+size](decisions/paper-size.md).
 """,
     "Deflection, SED under the bar and hit rates on every mesh, and by how much the deflections differ",
 )

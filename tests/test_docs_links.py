@@ -1,0 +1,87 @@
+"""The pages name only files, headings, objects and commands that exist."""
+
+import pkgutil
+import re
+from pathlib import Path
+
+import pytest
+import typer
+
+from benchmarks.__main__ import BENCHMARKS
+from fingerpad.cli import app
+from studies.__main__ import app as studies_app
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "benchmarks" / "README.md"])
+CURRENT = [page for page in PAGES if page.name != "CHANGELOG.md"]
+"""Pages about the code as it is; the change log also names what is gone."""
+
+
+def named(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def anchors(page: Path) -> set[str]:
+    """The fragments that GitHub gives to the headings of a page."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=named)
+def test_relative_links_lead_to_a_file_and_a_heading(page: Path) -> None:
+    lost = []
+    for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        file, _, fragment = link.partition("#")
+        target = page.parent / file if file else page
+        if "://" in link:
+            continue
+        if not target.exists() or (fragment and fragment not in anchors(target)):
+            lost.append(link)
+    assert lost == []
+
+
+@pytest.mark.parametrize("page", CURRENT, ids=named)
+def test_dotted_names_can_be_imported(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    lost = []
+    for name in sorted(set(re.findall(r"`((?:fingerpad|studies|benchmarks)(?:\.\w+)+)[`(]", text))):
+        try:
+            pkgutil.resolve_name(name)
+        except (ImportError, AttributeError):
+            lost.append(name)
+    assert lost == []
+
+
+def commands(program: typer.Typer) -> dict[str, set[str]]:
+    """The options of every command of a program."""
+    group = typer.main.get_command(program)
+    return {
+        name: {option for parameter in command.params for option in parameter.opts} | {"--help"}
+        for name, command in group.commands.items()  # type: ignore[attr-defined]
+    }
+
+
+PROGRAMS = {
+    "fingerpad": commands(app),
+    "python -m fingerpad": commands(app),
+    "python -m studies": commands(studies_app),
+    "python -m benchmarks": {name: set() for name in BENCHMARKS},
+}
+
+
+@pytest.mark.parametrize("page", CURRENT, ids=named)
+def test_commands_and_their_options_exist(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    shown = re.findall(r"`([^`\n]+)`", text)
+    for block in re.findall(r"^```(?:text|sh|bash|console)?\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
+        shown += block.splitlines()
+    lost = []
+    for line in shown:
+        for program, known in PROGRAMS.items():
+            called = re.match(rf"(?:\$ )?{program} (\w[\w-]*)(.*)", line)
+            if called is None:
+                continue
+            options = set(re.findall(r"(?<!\S)--[\w-]+", called[2].split("#")[0]))
+            if called[1] not in known or not options <= known[called[1]]:
+                lost.append(line)
+    assert lost == []
