@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from fingerpad.mechanics.tissues import named_tissues
     from fingerpad.neuron.afferent import Afferent
     from fingerpad.neuron.population import Population
+    from fingerpad.report.touch import save_figure
     from fingerpad.skin.indentation import Touch, indent, touch_of
     from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
 
@@ -90,6 +91,7 @@ __all__ = [
     "Touch",
     "indent",
     "named_tissues",
+    "save_figure",
     "touch_of",
 ]
 
@@ -114,6 +116,7 @@ _HOMES = {
     "mechanics.press": ("PressSettings",),
     "mechanics.tissues": ("named_tissues",),
     "neuron.population": ("Population",),
+    "report.touch": ("save_figure",),
     "skin.sampling": ("SkinResponse", "SurfaceProfile"),
     "core.signals": ("CurrentTraces", "HitRates", "ResponseMap", "SedTraces", "SpikeTrains"),
     "geometry.motion": ("ForceRampAndHold", "RampAndHold"),

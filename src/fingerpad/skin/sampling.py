@@ -17,6 +17,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import STORED_ENERGY, SedTraces
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.skin.receptor_sheet import ReceptorSheet
+from fingerpad.skin.section import Section, middle_section
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,10 @@ class SkinResponse:
         row = np.searchsorted(self.mesh.skin_nodes, self.mesh.midline_nodes)
         distance = self.mesh.nodes_mm[self.mesh.midline_nodes, 0] - self.axis_x_mm
         return SurfaceProfile(distance, self.skin_displacement_mm[time_index, row] @ self.direction)
+
+    def section(self) -> Section:
+        """Middle plane of the finger, z = 0, as it lies at the last time."""
+        return middle_section(self.mesh, self.displacement_mm)
 
     def sed(self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY) -> SedTraces:
         """Strain energy density in the living epidermis below points of the undeformed skin.

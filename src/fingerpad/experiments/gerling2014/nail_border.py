@@ -76,6 +76,7 @@ def result(skin: SkinResponse) -> dict[str, Any]:
     highest = int(outside.station[outside.ratios.argmax()])
     grid = (mesh.nodes_mm + skin.displacement_mm)[mesh.skin_grid]
     ratio = float(np.median(outside.ratios))
+    middle = skin.section()
     return {
         "x_mm": grid[..., 0],
         "y_mm": grid[..., 1],
@@ -99,7 +100,11 @@ def result(skin: SkinResponse) -> dict[str, Any]:
             f"{np.median(energy.ratios):.2g} times."
         ),
         "profile": _profile(skin, surface, deep, distance, outside.station),
-        "middle": _middle(mesh, skin),
+        "middle": {
+            "x_mm": middle.corners_mm[..., 0],
+            "y_mm": middle.corners_mm[..., 1],
+            "von_mises_kpa": skin.von_mises_kpa[middle.elements],
+        },
         "across": _across(mesh, skin, numbers[highest]),
     }
 
@@ -192,21 +197,6 @@ def _profile(
                 table[row] = np.quantile(here, (0.1, 0.5, 0.9))
         found[f"{name}_kpa"] = table
     return found
-
-
-def _middle(mesh: Mesh, skin: SkinResponse) -> dict[str, Any]:
-    """Deformed quadrilaterals of the elements' faces on the plane z = 0, and their stress."""
-    on_plane = np.abs(mesh.nodes_mm[:, 2]) < 1e-9
-    faces = np.array([[0, 1, 5, 4], [3, 2, 6, 7]])
-    moved = mesh.nodes_mm + skin.displacement_mm
-    corners, stress = [], []
-    for face in faces:
-        nodes = mesh.elements[:, face]
-        chosen = on_plane[nodes].all(axis=1) & (np.ptp(nodes, axis=1) > 0)
-        corners.append(moved[nodes[chosen]])
-        stress.append(skin.von_mises_kpa[chosen])
-    quads = np.concatenate(corners)
-    return {"x_mm": quads[..., 0], "y_mm": quads[..., 1], "von_mises_kpa": np.concatenate(stress)}
 
 
 def _across(mesh: Mesh, skin: SkinResponse, elements: np.ndarray) -> dict[str, Any]:

@@ -1,0 +1,276 @@
+"""One touch in one picture: strain energy density in the pressed finger, and the spikes of a population."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import LinearSegmentedColormap, LogNorm
+from matplotlib.figure import Figure
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.report.style import BLACK, BLUE, new_figure, numbers, say_nothing_to_draw, write_png
+
+SKIN = LinearSegmentedColormap.from_list(
+    "skin", ["#f7ece1", "#f3c9a5", "#e58a5e", "#b8405e", "#5c1a63", "#1d0b33"]
+)
+"""From pale skin to dark violet; the lightness falls all the way, so that the order survives greyscale."""
+
+DECADES = 2.5
+"""Energy densities that are further below the largest share the palest colour."""
+
+REACH_MM, ROOM_BELOW_MM, MARGIN_MM = 16.0, 2.0, 0.5
+"""Skin to either side of the indenter's axis, room below and beside the finger that is shown. [mm]"""
+
+BODY_MM = 40.0
+"""Farther than this from its face no body is drawn. [mm]"""
+
+BONE = "#9a9488"
+"""Colour of bone and nail."""
+
+
+class Section(Protocol):
+    """What a `skin.section.Section` knows."""
+
+    @property
+    def corners_mm(self) -> FloatArray:
+        """Corners of the faces, (n_faces, 4, 2). [mm]"""
+
+    @property
+    def elements(self) -> np.ndarray:
+        """The element of each face, (n_faces,)."""
+
+    @property
+    def skin_mm(self) -> FloatArray:
+        """Edges of the outline on free skin, (n_edges, 2, 2). [mm]"""
+
+    @property
+    def nail_mm(self) -> FloatArray:
+        """Edges under the nail, (n_edges, 2, 2). [mm]"""
+
+    @property
+    def bone_mm(self) -> FloatArray:
+        """Edges on the bone, (n_edges, 2, 2). [mm]"""
+
+
+class Mesh(Protocol):
+    """What a `geometry.mesh.Mesh` knows."""
+
+    @property
+    def nodes_mm(self) -> FloatArray:
+        """Undeformed nodes, (n_nodes, 3). [mm]"""
+
+    @property
+    def midline_nodes(self) -> np.ndarray:
+        """Nodes of the volar skin at z = 0, x increasing."""
+
+
+class Skin(Protocol):
+    """What a `SkinResponse` knows."""
+
+    @property
+    def mesh(self) -> Mesh:
+        """The undeformed finger."""
+
+    @property
+    def times_ms(self) -> FloatArray:
+        """Times, (n_times,). [ms]"""
+
+    @property
+    def depth_mm(self) -> FloatArray:
+        """Depth of the indenter, (n_times,). [mm]"""
+
+    @property
+    def sed_kpa(self) -> FloatArray:
+        """Strain energy density, (n_times, n_elements). [kPa]"""
+
+    @property
+    def axis_x_mm(self) -> float:
+        """Where the indenter's axis meets the midline. [mm]"""
+
+    @property
+    def direction(self) -> FloatArray:
+        """Unit direction of pressing, (3,)."""
+
+    def section(self) -> Section:
+        """Return the deformed middle plane."""
+
+
+class Spikes(Protocol):
+    """What `SpikeTrains` know."""
+
+    def __getitem__(self, afferent: int) -> FloatArray:
+        """Spike times of one afferent. [ms]"""
+
+
+class Response(Protocol):
+    """What a `ResponseMap` knows."""
+
+    @property
+    def positions_mm(self) -> FloatArray:
+        """Places of the receptors, (n, 2) or (n, 3). [mm]"""
+
+    @property
+    def spikes(self) -> Spikes:
+        """One train per receptor."""
+
+
+class Indenter(Protocol):
+    """A rigid body that knows its face."""
+
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """Y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
+
+
+def save_figure(path: str | Path, skin: Skin, response: Response, indenter: Indenter | None = None) -> Path:
+    """Draw a touch and save the picture: the pressed finger with its energy density, and the spikes.
+
+    Parameters
+    ----------
+    path : str or Path
+        The PNG file; folders are made as needed.
+    skin : SkinResponse
+        From `indent`.
+    response : ResponseMap
+        What a population answers to it.
+    indenter : Indenter, optional
+        The body that pressed, to be drawn as well; as it stands when it is not spun.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> import fingerpad as fp
+    >>> sphere = fp.Sphere(curvature_per_m=287)
+    >>> skin = fp.indent(fp.Fingertip(), sphere, fp.RampAndHold(depth_mm=0.5))
+    >>> response = fp.Population.grid(density_per_cm2=100).respond(skin)
+    >>> fp.save_figure(Path(mkdtemp()) / "touch.png", skin, response, sphere).name
+    'touch.png'
+    """
+    return write_png(lambda parts: draw(*parts), (skin, response, indenter), Path(path))
+
+
+def draw(skin: Skin, response: Response, indenter: Indenter | None = None) -> Figure:
+    """Draw a touch as `save_figure` saves it."""
+    figure = new_figure(9.5, 4.0)
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0), height_ratios=(1.0, 4.0))
+    draw_section(figure.add_subplot(grid[:, 0]), skin, indenter)
+    motion = figure.add_subplot(grid[0, 1])
+    draw_motion(motion, skin)
+    draw_spikes(figure.add_subplot(grid[1, 1], sharex=motion), skin, response)
+    return figure
+
+
+def draw_section(axes: Axes, skin: Skin, indenter: Indenter | None = None) -> None:
+    """Draw the middle plane of the pressed finger at the end of the touch, coloured by energy density.
+
+    Parameters
+    ----------
+    axes : Axes
+        An empty panel.
+    skin : SkinResponse
+        What is drawn.
+    indenter : Indenter, optional
+        The body that pressed.
+    """
+    section = skin.section()
+    sed = numbers(skin.sed_kpa[-1])[section.elements]
+    largest = float(sed.max())
+    faces = PolyCollection(
+        list(section.corners_mm),
+        array=sed,
+        cmap=SKIN,
+        norm=LogNorm(largest / 10.0**DECADES, largest, clip=True),
+        edgecolors="face",
+        linewidths=0.3,
+    )
+    axes.add_collection(faces)
+    for edges, colour, width in (
+        (section.skin_mm, BLACK, 1.0),
+        (section.bone_mm, BONE, 1.2),
+        (section.nail_mm, BONE, 4.0),
+    ):
+        axes.add_collection(LineCollection(list(edges), colors=colour, linewidths=width, capstyle="round"))
+    x = section.corners_mm[..., 0]
+    low, high = section.corners_mm[..., 1].min(), section.corners_mm[..., 1].max()
+    axes.set(
+        xlim=(max(x.min(), skin.axis_x_mm - REACH_MM), min(x.max(), skin.axis_x_mm + REACH_MM) + MARGIN_MM),
+        ylim=(low - ROOM_BELOW_MM, high + MARGIN_MM),
+        aspect="equal",
+        xlabel="along the finger, x [mm]",
+        ylabel="towards the back, y [mm]",
+    )
+    if indenter is not None:
+        _draw_indenter(axes, skin, section, indenter)
+    axes.grid(visible=False)
+    bar = axes.figure.colorbar(faces, ax=axes, shrink=0.75, aspect=18, pad=0.02, extend="min")
+    bar.set_label("strain energy density [kPa]")
+    bar.ax.yaxis.set_major_formatter("{x:g}")
+
+
+def _draw_indenter(axes: Axes, skin: Skin, section: Section, indenter: Indenter) -> None:
+    """Draw the body where its face meets the deformed skin."""
+    towards = numbers(skin.direction)[:2]
+    along = np.array([towards[1], -towards[0]])
+    middle = numbers(skin.mesh.nodes_mm)[skin.mesh.midline_nodes]
+    foot = np.array([skin.axis_x_mm, np.interp(skin.axis_x_mm, middle[:, 0], middle[:, 1])])
+
+    def face(beside: FloatArray) -> FloatArray:
+        return indenter.front(np.column_stack([beside, np.zeros((beside.size, 2))]))
+
+    surface = section.skin_mm.reshape(-1, 2) - foot
+    # The back of the finger lies behind the bone.
+    surface = surface[surface @ towards < -foot[1]]
+    gap = surface @ towards - face(surface @ along)
+    line = np.linspace(-BODY_MM, BODY_MM, 4001)
+    height = face(line)
+    line, height = line[np.isfinite(height)], height[np.isfinite(height)]
+    top = foot + np.outer(line, along) + np.outer(height + gap.min(), towards)
+    outline = np.concatenate([top, top[[-1, 0]] - BODY_MM * towards])
+    axes.fill(*outline.T, facecolor="#c9d1d8", edgecolor=BLACK, linewidth=1.0)
+
+
+def draw_motion(axes: Axes, skin: Skin) -> None:
+    """Draw the depth of the indenter over time."""
+    axes.plot(skin.times_ms, skin.depth_mm, color=BLUE)
+    axes.set(ylabel="depth\n[mm]", ylim=(0.0, 1.15 * float(skin.depth_mm.max())))
+    axes.tick_params(labelbottom=False)
+    axes.grid(visible=False)
+
+
+def draw_spikes(axes: Axes, skin: Skin, response: Response) -> None:
+    """Draw the spike trains of the afferents that fire, the nearest to the indenter's axis at the bottom."""
+    plane = numbers(response.positions_mm)[:, [0, -1]] - [skin.axis_x_mm, 0.0]
+    trains = [response.spikes[afferent] for afferent in np.argsort(np.hypot(*plane.T), kind="stable")]
+    firing = [train for train in trains if train.size]
+    if not firing:
+        say_nothing_to_draw(axes, "no afferent fires a spike")
+        return
+    axes.eventplot(
+        firing,
+        lineoffsets=list(range(1, len(firing) + 1)),
+        linelengths=0.75,
+        linewidths=1.0,
+        colors=BLACK,
+    )
+    axes.set(
+        xlabel="time [ms]",
+        ylabel=f"{len(firing)} of {len(trains)} afferents\nfire, nearest lowest",
+        xlim=(0.0, skin.times_ms[-1]),
+        ylim=(0.25, len(firing) + 0.75),
+        yticks=[],
+    )
+    axes.grid(visible=False)

@@ -1,0 +1,86 @@
+"""The deformed middle plane of the finger: the faces of its elements at z = 0, and their outlines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.mesh import IntArray, Mesh
+
+_FACES = ((0, 1, 5, 4), (3, 2, 6, 7))
+"""Corners of the two faces of an element that look across the finger."""
+
+_ON_PLANE_MM = 1e-9
+
+
+@dataclass(frozen=True)
+class Section:
+    """Faces of elements on the plane z = 0, as they lie after the deformation.
+
+    Parameters
+    ----------
+    corners_mm : array (n_faces, 4, 2)
+        x and y of the corners, in order around each face. [mm]
+    elements : int array (n_faces,)
+        The element of each face.
+    skin_mm, nail_mm, bone_mm : array (n_edges, 2, 2)
+        Both ends of each edge of the outline on free skin, under the nail and on the bone. [mm]
+    """
+
+    corners_mm: FloatArray
+    elements: IntArray
+    skin_mm: FloatArray
+    nail_mm: FloatArray
+    bone_mm: FloatArray
+
+
+def middle_section(mesh: Mesh, displacement_mm: FloatArray) -> Section:
+    """Cut a finger along its plane of symmetry.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Half a finger, or a whole one.
+    displacement_mm : array (n_nodes, 3)
+        Displacement of the nodes. [mm]
+
+    Returns
+    -------
+    Section
+        Of a whole finger the faces of both halves, which lie on each other.
+
+    Raises
+    ------
+    InputError
+        If no element has a face on the plane.
+
+    Examples
+    --------
+    >>> from fingerpad.geometry.mesh import block_mesh
+    >>> mesh = block_mesh([0.0, 1.0, 2.0], [0.0, 1.0], [0.0, 1.0], layers=[0], symmetric=True)
+    >>> middle_section(mesh, np.zeros_like(mesh.nodes_mm)).elements.tolist()
+    [0, 1]
+    """
+    on_plane = np.abs(mesh.nodes_mm[:, 2]) < _ON_PLANE_MM
+    moved = (mesh.nodes_mm + displacement_mm)[:, :2]
+    faces, elements = [], []
+    for corners in _FACES:
+        nodes = mesh.elements[:, corners]
+        # Elements at the pole are wedges: there a face may shrink to an edge.
+        chosen = np.flatnonzero(on_plane[nodes].all(axis=1) & (np.ptp(nodes, axis=1) > 0))
+        faces.append(nodes[chosen])
+        elements.append(chosen)
+    nodes = np.concatenate(faces)
+    if not len(nodes):
+        raise InputError("mesh must have elements with a face on the plane z = 0: it has none.")
+    edges = np.unique(np.sort(np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=-1).reshape(-1, 2)), axis=0)
+    on_nail, on_bone = (np.isin(edges, fixed).all(axis=1) for fixed in (mesh.nail_nodes, mesh.bone_nodes))
+    on_skin = np.isin(edges, mesh.skin_nodes).all(axis=1) & ~on_nail
+    return Section(
+        moved[nodes],
+        np.concatenate(elements),
+        *(moved[edges[chosen]] for chosen in (on_skin, on_nail, on_bone)),
+    )

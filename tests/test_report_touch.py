@@ -1,0 +1,119 @@
+"""The picture of one touch shows the pressed finger, the body that presses it, and the spikes."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from matplotlib.collections import EventCollection, PolyCollection
+from matplotlib.patches import Polygon
+from numpy.testing import assert_allclose, assert_array_equal
+
+import fingerpad as fp
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.report import touch as touch_figure
+from fingerpad.report.style import new_figure
+from fingerpad.skin.section import middle_section
+
+MOTION = fp.RampAndHold(depth_mm=0.4)
+FEW_STEPS = fp.PressSettings(ramp_steps=2, hold_steps=1)
+
+
+@pytest.fixture(scope="module")
+def touch():
+    return fp.touch_of(fp.Fingertip(), fp.Sphere(curvature_per_m=287), MOTION, settings=FEW_STEPS)
+
+
+@pytest.fixture(scope="module")
+def skin(touch):
+    return touch.solve()
+
+
+def area(quads):
+    """Area of polygons by the shoelace formula."""
+    x, y = quads[..., 0], quads[..., 1]
+    return 0.5 * np.abs((x * np.roll(y, -1, -1) - y * np.roll(x, -1, -1)).sum(-1))
+
+
+def test_the_section_of_a_block_is_one_of_its_sides():
+    mesh = block_mesh([0.0, 1.0, 3.0], [0.0, 2.0], [0.0, 1.0], layers=[0], symmetric=True)
+    section = middle_section(mesh, np.zeros_like(mesh.nodes_mm))
+    assert_allclose(area(section.corners_mm), [2.0, 4.0])
+    assert section.bone_mm[..., 1].tolist() == [[2.0, 2.0]] * 2
+    assert section.skin_mm[..., 1].tolist() == [[0.0, 0.0]] * 2
+    assert section.nail_mm.shape == (0, 2, 2)
+
+
+def test_a_body_without_its_middle_plane_has_no_section():
+    mesh = block_mesh([0.0, 1.0], [0.0, 1.0], [1.0, 2.0], layers=[0])
+    with pytest.raises(InputError, match="face on the plane z = 0"):
+        middle_section(mesh, np.zeros_like(mesh.nodes_mm))
+
+
+def test_skin_and_nail_go_once_around_the_section_and_lie_on_the_mesh(skin):
+    section, mesh = skin.section(), skin.mesh
+    outside = np.concatenate([section.skin_mm, section.nail_mm])
+    ends, count = np.unique(outside.reshape(-1, 2).round(9), axis=0, return_counts=True)
+    assert sorted(count) == [1, 1, *[2] * (len(ends) - 2)]
+    moved = (mesh.nodes_mm + skin.displacement_mm)[np.abs(mesh.nodes_mm[:, 2]) < 1e-9]
+    assert {tuple(end) for end in ends} <= {tuple(node) for node in moved[:, :2].round(9)}
+
+
+def test_faces_have_the_colour_of_the_energy_density_at_the_end(skin):
+    axes = new_figure(4.0, 3.0).subplots()
+    touch_figure.draw_section(axes, skin)
+    faces = next(drawn for drawn in axes.collections if isinstance(drawn, PolyCollection))
+    assert_array_equal(faces.get_array(), skin.sed_kpa[-1][skin.section().elements])
+    assert not axes.patches
+
+
+def test_the_colours_grow_darker_all_the_way():
+    red, green, blue, _ = touch_figure.SKIN(np.linspace(0.0, 1.0, 256)).T
+    assert (np.diff(0.2126 * red + 0.7152 * green + 0.0722 * blue) < 0.0).all()
+
+
+@pytest.mark.parametrize("tilt_deg", [0.0, 20.0])
+def test_the_body_is_drawn_where_it_was_pressed(touch, skin, tilt_deg):
+    if tilt_deg:
+        touch = fp.touch_of(touch.finger, touch.indenter, MOTION, tilt_deg=tilt_deg, settings=FEW_STEPS)
+        skin = touch.solve()
+    axes = new_figure(4.0, 3.0).subplots()
+    touch_figure.draw_section(axes, skin, touch.indenter)
+    (body,) = axes.patches
+    assert isinstance(body, Polygon)
+    placement = touch.placement
+    moved = placement.origin_mm + skin.depth_mm[-1] * placement.axis
+    points = np.column_stack([body.get_xy()[:-3], np.zeros(len(body.get_xy()) - 3)])
+    gap, _ = touch.indenter.gap((points - moved) @ placement.rotation)
+    # Between two nodes the skin spans the sphere as a chord.
+    assert_allclose(gap, 0.0, atol=0.03)
+
+
+def test_trains_stand_in_the_order_of_their_distance_and_silent_ones_are_counted(skin):
+    trains = {2.0: [3.0, 9.0], 0.5: [1.0], 9.0: [], 4.0: [7.0]}
+    response = SimpleNamespace(
+        positions_mm=np.array([[skin.axis_x_mm, -z] for z in trains]),
+        spikes=[np.array(train) for train in trains.values()],
+    )
+    axes = new_figure(4.0, 3.0).subplots()
+    touch_figure.draw_spikes(axes, skin, response)
+    rows = sorted(
+        (drawn.get_lineoffset(), list(drawn.get_positions()))
+        for drawn in axes.collections
+        if isinstance(drawn, EventCollection)
+    )
+    assert rows == [(1, [1.0]), (2, [3.0, 9.0]), (3, [7.0])]
+    assert axes.get_ylabel().startswith("3 of 4 afferents")
+
+
+def test_a_silent_population_is_said_to_be_silent(skin):
+    response = SimpleNamespace(positions_mm=np.zeros((1, 2)), spikes=[np.empty(0)])
+    axes = new_figure(4.0, 3.0).subplots()
+    touch_figure.draw_spikes(axes, skin, response)
+    assert [text.get_text() for text in axes.texts] == ["no afferent fires a spike"]
+
+
+def test_the_picture_is_saved_with_folders_on_the_way(skin, tmp_path):
+    response = fp.Population.grid(density_per_cm2=100).respond(skin)
+    saved = fp.save_figure(tmp_path / "new" / "touch.png", skin, response)
+    assert saved.read_bytes().startswith(b"\x89PNG")
