@@ -14,7 +14,10 @@ from benchmarks.results import Report, Table
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.gerling2014 import single_unit, single_unit_methods
-from fingerpad.inference.fitting import cross_validate, interleaved_folds
+from fingerpad.inference.afferent_methods import four_number_problem
+from fingerpad.inference.fitting import Method, cross_validate, interleaved_folds
+from fingerpad.inference.rate_problem import RateProblem
+from fingerpad.inference.start_points import response_surface, start_points
 from fingerpad.neuron.transduction import drive
 from fingerpad.skin.store import Store, solve_missing
 
@@ -60,11 +63,11 @@ def fit(traces: str) -> dict[str, Any]:
         sed = SedTraces(stored["times_ms"], stored["sed_kpa"], stored["kinks_ms"])
     driven = drive(sed)
     six = single_unit.rate_problem(sed)
-    four = single_unit_methods.four_numbers(driven, six.recordings)
+    four = four_number_problem(six.model, six.recordings)
     folds = interleaved_folds(six.n_observations)
-    cases = [(six, single_unit.response_surface())]
-    cases += [(four, method) for method in single_unit_methods.methods(four, driven)]  # type: ignore[misc]
-    start = single_unit.start_points()[0]
+    cases: list[tuple[RateProblem, Method]] = [(six, response_surface())]
+    cases += [(four, method) for method in single_unit_methods.methods(four, driven)]
+    start = start_points()[0]
     six.score(start, np.arange(six.n_observations))  # loads compiled kernels
     found: dict[str, Any] = {}
     for problem, method in cases:
@@ -85,7 +88,7 @@ def measure() -> Report:
         run_job("fitting", "press", 1, folder=str(Path(name) / "indentations"), traces=traces)
         runs = [run_job("fitting", "fit", 1, traces=traces).answer for _ in range(REPEATS)]
     seconds = {method: Spread.of([run[method]["seconds"] for run in runs]) for method in runs[0]}
-    paper = single_unit.response_surface().name
+    paper = response_surface().name
     return Report(
         name="fitting",
         title="Fits",

@@ -12,13 +12,14 @@ from scipy.stats import norm
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
-from fingerpad.experiments.gerling2014 import drive_fits, drive_quantities, single_unit
+from fingerpad.experiments.gerling2014 import drive_fits, drive_quantities
 from fingerpad.experiments.gerling2014.drive_quantities import ALONE, APART, EXTENDED, PAPER, SHOWN, Drivers
 from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.inference.fitting import Fit, interleaved_folds
 from fingerpad.inference.identifiable import identifiable, six_parameters
 from fingerpad.inference.rate_problem import AfferentModel, RateProblem
 from fingerpad.inference.recordings import RateRecordings
+from fingerpad.inference.start_points import start_points
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.report import drive_quantities as report
@@ -148,7 +149,7 @@ def test_the_receptor_is_read_under_every_shift():
 @pytest.mark.parametrize("drivers", [*ALONE, *APART])
 def test_every_drive_starts_with_the_same_largest_currents(drivers):
     driven, reference = (drive_quantities.drive_of(TRACES, each) for each in (drivers, PAPER))
-    starts, usual = drive_fits.scaled_starts(driven, reference), single_unit.start_points()
+    starts, usual = drive_fits.scaled_starts(driven, reference), start_points()
     for start, paper in zip(starts, usual, strict=True):
         assert_allclose(start[1] * driven.rate_kpa_per_ms.max(), paper[1] * reference.rate_kpa_per_ms.max())
         assert_allclose(start[2] * driven.sed_kpa.max(), paper[2] * reference.sed_kpa.max())
@@ -156,7 +157,7 @@ def test_every_drive_starts_with_the_same_largest_currents(drivers):
 
 
 def test_relative_numbers_are_those_that_spikes_determine():
-    start = single_unit.start_points()[1]
+    start = start_points()[1]
     four = identifiable(start)
     assert_allclose(
         identifiable(drive_fits.six_of_relative(np.zeros(4), start)), four * [0, 1, 1, 1], rtol=1e-12
@@ -438,9 +439,7 @@ def test_an_explained_model_begins_at_the_scaled_start():
     assert model.names[4:] == ("offset_mm",)
     assert model.n_stimuli == 24
     assert_array_equal(model.numbers(np.array([0.0, 0.0, 0.0, 0.0, 0.25])), [0.25])
-    at_start = Afferent.from_parameters(
-        drive_fits.six_of_relative(np.zeros(4), single_unit.start_points()[0])
-    )
+    at_start = Afferent.from_parameters(drive_fits.six_of_relative(np.zeros(4), start_points()[0]))
     assert_array_equal(model.rates(np.zeros(5)), at_start.rates(PATCH.drive(PATCH.at("stored"))))
 
 

@@ -26,16 +26,17 @@ from fingerpad.experiments.fit import session
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
 from fingerpad.experiments.fit.posterior import posterior
 from fingerpad.experiments.gerling2014 import single_unit
-from fingerpad.experiments.gerling2014.single_unit_methods import OFFSETS_MM
-from fingerpad.experiments.gerling2014.spike_fit import soft_spikes
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.stimuli import INDENTERS, ShiftedBar, TactileStimulus
 from fingerpad.geometry.edged_indenters import Gap
 from fingerpad.geometry.indenters import Bar, Line, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad.inference.afferent_methods import OFFSETS_MM
 from fingerpad.inference.any_motion import AnyMotion, AnyMotionInClosedForm
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
+from fingerpad.inference.soft_afferent import soft_spikes
+from fingerpad.inference.start_points import start_points
 from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.transduction import drive
@@ -141,7 +142,7 @@ def test_draws_begin_where_they_can_though_a_gain_ended_at_its_bound(monkeypatch
     monkeypatch.setattr(recording_posterior, "afferent_posterior", note)
     with pytest.raises(ConvergenceError, match="Enough"):
         posterior(AnyMotion.under(SED), RATES, [-0.1, 0.0, 0.03, 40.0], 1)
-    assert begun[0].tolist() == [-0.1, identifiable(single_unit.start_points()[0])[1], 0.03, 40.0]
+    assert begun[0].tolist() == [-0.1, identifiable(start_points()[0])[1], 0.03, 40.0]
 
 
 def test_a_posterior_is_part_of_the_fit_and_of_its_page(recovered, monkeypatch):

@@ -11,8 +11,12 @@ from fingerpad.data import neuron, paper, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.gerling2014 import single_unit, single_unit_methods, single_unit_starts
 from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.inference import afferent_methods
+from fingerpad.inference.afferent_methods import OFFSETS_MM, four_number_problem
 from fingerpad.inference.fitting import interleaved_folds
+from fingerpad.inference.rate_problem import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
+from fingerpad.inference.start_points import start_points
 from fingerpad.neuron.transduction import drive
 from fingerpad.report import single_unit_methods as report
 
@@ -48,7 +52,7 @@ def recorded(model, truth) -> RateRecordings:
 @pytest.fixture(scope="module")
 def recordings() -> RateRecordings:
     """What an afferent would answer whose dynamic term follows the other quantity."""
-    problem = single_unit_methods.four_numbers(drive(extended()), single_unit.bar_recordings())
+    problem = four_number_problem(AfferentModel(drive(extended())), single_unit.bar_recordings())
     return recorded(problem.model, FOUR * [1.0, 0.1, 1.0, 1.0])
 
 
@@ -101,7 +105,7 @@ def test_the_papers_session_leaves_its_fold_out_and_begins_where_it_says(starts,
     assert abs(second["fss_start"] - wanted) == min(abs(fss - wanted) for fss in reached) > 0.0
     assert ours["static_scale"] == neuron.STATIC_GAIN_SCALE.value
     assert ours["dynamic_scale"] == neuron.DYNAMIC_GAIN_SCALE.value
-    assert ours["fss_start"] == problem.score(single_unit.start_points()[1], training)
+    assert ours["fss_start"] == problem.score(start_points()[1], training)
     for row in starts["sessions"]:
         assert row["fss_train"] >= row["fss_start"]
 
@@ -112,10 +116,10 @@ def test_the_papers_session_leaves_its_fold_out_and_begins_where_it_says(starts,
 @pytest.fixture(scope="module")
 def found(recordings) -> dict:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(single_unit_methods, "MOST_EVALUATIONS", 60)
-        patch.setattr(single_unit_methods, "N_STARTS", 8)
-        patch.setattr(single_unit_methods, "N_REFINED", 1)
-        beside = {offset: traces(offset) for offset in single_unit_methods.OFFSETS_MM}
+        patch.setattr(afferent_methods, "MOST_EVALUATIONS", 60)
+        patch.setattr(afferent_methods, "N_STARTS", 8)
+        patch.setattr(afferent_methods, "N_REFINED", 1)
+        beside = {offset: traces(offset) for offset in OFFSETS_MM}
         problem = replace(single_unit.rate_problem(traces()), recordings=recordings)
         return single_unit_methods.result(beside, extended(), recordings, single_unit.fit(problem))
 
@@ -147,7 +151,7 @@ def test_the_model_that_made_the_rates_fits_them_and_the_papers_does_not(found):
 
 
 def test_residual_shares_are_the_squares_of_each_phase_and_place(recordings):
-    problem = single_unit_methods.four_numbers(drive(traces()), recordings)
+    problem = four_number_problem(AfferentModel(drive(traces())), recordings)
     shares = single_unit_methods.residual_shares(problem, FOUR)
     dynamic, static = problem.model.rates(FOUR)
     flat = np.abs(SHIFT_MM) < 1.2

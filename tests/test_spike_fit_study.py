@@ -11,6 +11,7 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.gerling2014 import interval_variability, spike_fit
 from fingerpad.experiments.gerling2014.interval_variability import SETTLED_MS, SOURCES, held_at_its_rate
 from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.inference.soft_afferent import soft_spikes
 from fingerpad.inference.spike_parameters import (
     SPIKE_PARAMETER_NAMES,
 )
@@ -116,7 +117,7 @@ def test_spikes_of_other_noise_are_told_from_those_of_a_soft_threshold(found):
 def test_the_raster_shows_the_first_presentation_of_each_position(found):
     raster = found["raster"]
     driven, true = drive(bar(), pieces=8), found["recovery"]["truth"]
-    once = spike_fit.soft_spikes(driven, true, Presentations.of_one_afferent(SHIFT_MM.size), SEED)
+    once = soft_spikes(driven, true, Presentations.of_one_afferent(SHIFT_MM.size), SEED)
     for number, train in enumerate(raster["spikes_ms"]):
         np.testing.assert_array_equal(train, once[number])
     counts = [len(train) for train in raster["spikes_ms"]]

@@ -27,6 +27,7 @@ from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, Cylinder, Line, Sphere
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.geometry.motion import RampAndHold
+from fingerpad.inference.start_points import increments, printed_starts, start_points
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.afferent import Afferent
@@ -260,7 +261,7 @@ def test_the_fit_finds_what_a_known_afferent_answered(synthetic_problem, synthet
     assert best.score > 0.98
     assert best.score == problem.score(best.parameters, np.arange(36))
     assert folds.score_test > 0.97
-    starts = [problem.score(start, np.arange(36)) for start in single_unit.start_points()]
+    starts = [problem.score(start, np.arange(36)) for start in start_points()]
     assert best.score > max(starts)
 
 
@@ -297,16 +298,16 @@ def test_single_unit_result_names_every_number(synthetic_problem, synthetic_fit)
 
 
 def test_both_start_points_are_the_papers_with_both_gains_rescaled_alike():
-    printed = single_unit.printed_starts()
+    printed = printed_starts()
     np.testing.assert_array_equal(printed[0], [0.0, 8e-9, 7e-7, 68.0, 1e-6, 50.0])
     np.testing.assert_array_equal(printed[1], [0.0, 8.2e-9, 3e-7, 68.0, 1e-6, 50.0])
-    first, second = single_unit.start_points()
+    first, second = start_points()
     np.testing.assert_array_equal([first[[0, 3, 4, 5]], second[[0, 3, 4, 5]]], printed[:, [0, 3, 4, 5]])
     assert second[1] / first[1] == pytest.approx(8.2 / 8.0, rel=1e-12)
     assert second[2] / first[2] == pytest.approx(3.0 / 7.0, rel=1e-12)
     assert first[1] / printed[0, 1] == pytest.approx(neuron.DYNAMIC_GAIN_SCALE.value, rel=1e-12)
     assert first[2] / printed[0, 2] == pytest.approx(neuron.STATIC_GAIN_SCALE.value, rel=1e-12)
-    steps = single_unit.increments(single_unit.start_points())
+    steps = increments(start_points())
     np.testing.assert_allclose(steps[:, 1:], 0.01 * np.array([first, second])[:, 1:], rtol=1e-12)
     np.testing.assert_allclose(
         steps[:, 0], 0.01 * 1e-6 * 50.0 / 68.0, rtol=1e-12

@@ -25,6 +25,9 @@ PARAMETER_NAMES = (
 )
 """The six fitted numbers in the paper's order: beta, k_d, k_s, tau, C, v."""
 
+PARAMETER_UNITS = ("mA", "mA ms/kPa", "mA/kPa", "ms", "mF", "mV")
+"""Units of the six fitted numbers."""
+
 
 @dataclass(frozen=True)
 class Afferent:

@@ -7,6 +7,7 @@ populations are read at once.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,14 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 from fingerpad.core.checks import FloatArray, float_array, one_of, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import PATTERNS
+from fingerpad.core.signals import ResponseMap
+
+RESPONSE_MEASURES: dict[str, Callable[[ResponseMap], FloatArray]] = {
+    "static": lambda response: response.static_rate_hz,
+    "dynamic": lambda response: response.dynamic_rate_hz,
+    "latency": lambda response: response.first_spike_latency_ms,
+}
+"""Measures of a response on which spheres are discriminated, by name. [spikes/s or ms]"""
 
 NORMS = ("city-block", "euclidean")
 _BETWEEN_FIRST_AND_SECOND_NEIGHBOUR = {4: 1.5, 6: 0.5 * (1.0 + math.sqrt(3.0)), 8: 1.5}

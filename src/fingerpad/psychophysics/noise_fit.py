@@ -18,6 +18,9 @@ from fingerpad.psychophysics.encoding import check_neighbours
 from fingerpad.psychophysics.noisy_responses import shared_noise_gradient_sums
 from fingerpad.psychophysics.signal_detection import decision_point, hit_probability, moments, side
 
+NOISE_DRAWS = 4000
+"""Common random presentations behind the fit of the noise, which they leave uncertain by one percent."""
+
 _NOISE_SCAN = 33
 
 

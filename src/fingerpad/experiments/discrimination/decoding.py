@@ -12,15 +12,14 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import IntArray, Purpose, normals
 from fingerpad.core.signals import HitRates, ResponseMap
 from fingerpad.experiments.discrimination.task import CurveSettings
-from fingerpad.experiments.gerling2014.sphere_discrimination import NOISE_DRAWS, RESPONSES
 from fingerpad.psychophysics import bootstrap, fit_psychometric, posterior
 from fingerpad.psychophysics.discrimination import (
     Experiment,
     discriminate_euclidean,
     discriminate_gradient_sum,
 )
-from fingerpad.psychophysics.encoding import answering_neighbours, distance
-from fingerpad.psychophysics.noise_fit import NoiseFit, expected_hit_rates, fit_noise_sigma
+from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, answering_neighbours, distance
+from fingerpad.psychophysics.noise_fit import NOISE_DRAWS, NoiseFit, expected_hit_rates, fit_noise_sigma
 from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, noisy_responses, session_trials
 
 SESSION = 1
@@ -50,7 +49,7 @@ def responses(answers: Sequence[ResponseMap], measure: str, patience_ms: float |
     array (n_stimuli, n_receptors)
         NaN where a receptor has no latency. [spikes/s or ms]
     """
-    table = np.array([RESPONSES[measure](answer) for answer in answers])
+    table = np.array([RESPONSE_MEASURES[measure](answer) for answer in answers])
     return table if measure != "latency" or patience_ms is None else np.fmin(table, patience_ms)
 
 

@@ -16,7 +16,6 @@ from fingerpad.experiments.fit.methods import METHODS, Prepared
 from fingerpad.experiments.fit.offset import Beside, check_beside, fit_offset
 from fingerpad.experiments.fit.posterior import four_numbers, posterior, profiled
 from fingerpad.experiments.fit.rate_uncertainty import sensitivity
-from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.inference.any_motion import WINDOWS_MS, AnyMotion, Windows
 from fingerpad.inference.fitting import (
@@ -34,7 +33,7 @@ from fingerpad.inference.identifiable import (
 )
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
-from fingerpad.neuron.afferent import PARAMETER_NAMES
+from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
 
 
 def fit_recordings(
@@ -194,7 +193,7 @@ def _parameters(prepared: Prepared, best: Fit, validation: CrossValidation) -> d
     covariance = prepared.covariance(best, validation)
     errors = [None] * 4 if covariance is None else np.sqrt(np.diag(covariance)).tolist()
     return _named(prepared.six(best.parameters)) | {
-        "units": dict(zip(PARAMETER_NAMES, single_unit.UNITS, strict=True)),
+        "units": dict(zip(PARAMETER_NAMES, PARAMETER_UNITS, strict=True)),
         "identifiable_units": dict(zip(IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, strict=True)),
         "identifiable_standard_error": dict(zip(IDENTIFIABLE_NAMES, errors, strict=True)),
         "identifiable_covariance": covariance,

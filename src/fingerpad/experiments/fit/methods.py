@@ -4,34 +4,32 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
-from fingerpad.core.random_streams import Presentations
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.data import neuron
-from fingerpad.experiments.gerling2014 import single_unit, spike_fit
-from fingerpad.experiments.gerling2014.single_unit_methods import (
-    FIRST_SPREAD,
-    MOST_EVALUATIONS,
+from fingerpad.inference.afferent_methods import (
     Bounds,
+    along_slopes,
     bounds_of,
     by_differences,
+    four_number_problem,
+    search_from,
 )
-from fingerpad.inference.any_motion import AnyMotion, AnyMotionInClosedForm, Windows
+from fingerpad.inference.any_motion import AnyMotion, AnyMotionInClosedForm
 from fingerpad.inference.fitting import CrossValidation, Fit, Method
 from fingerpad.inference.fitting.covariance import jackknife_covariance
-from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
-from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.fitting.methods import Continued
 from fingerpad.inference.fitting.problem import IntArray, Problem
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
-from fingerpad.inference.rate_problem import RateProblem, Reparametrised
+from fingerpad.inference.identifiable import identifiable, six_parameters
+from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
+from fingerpad.inference.soft_afferent import SoftAfferent
 from fingerpad.inference.spike_fit import fit_spikes
 from fingerpad.inference.spike_likelihood import (
     SpikeLikelihood,
@@ -40,15 +38,10 @@ from fingerpad.inference.spike_likelihood import (
 from fingerpad.inference.spike_parameters import (
     SPIKE_PARAMETER_NAMES,
 )
-from fingerpad.neuron.afferent import Afferent
-from fingerpad.neuron.escape_rate import EscapeRate
-from fingerpad.neuron.spikes import firing_rate_hz
+from fingerpad.inference.start_points import response_surface, spike_start
 from fingerpad.neuron.transduction import Drive
 
 MethodOf = Callable[[RateProblem, Bounds], Method]
-
-PREDICTED_PRESENTATIONS = 20
-"""Presentations whose mean is the rate that an afferent with a soft threshold is said to have."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +109,7 @@ def _response_surface(
     """Prepare the paper's method in its six parameters."""
     return Prepared(
         RateProblem(model, rates),
-        single_unit.response_surface(),
+        response_surface(),
         lambda six: six,
         _scatter_of(lambda six: six),
     )
@@ -129,27 +122,12 @@ def _scatter_of(six: Callable[[FloatArray], FloatArray]) -> Callable[[Fit, Cross
     )
 
 
-def four_number_problem(model: AnyMotion, rates: RateRecordings) -> RateProblem:
-    """Rates to be predicted from the four numbers that firing can tell."""
-    return RateProblem(Reparametrised(model, IDENTIFIABLE_NAMES, six_parameters), rates)
-
-
-def bounds_under(model: AnyMotion) -> Bounds:
-    """Bounds of the four numbers under all stimuli, the same for all methods."""
-    # They only ask how strong a drive becomes, whatever the motion.
-    sed, rate = (
-        np.array([[max(float(getattr(group, name).max()) for group in model.drives)]] * 2)
-        for name in ("sed_kpa", "rate_kpa_per_ms")
-    )
-    return bounds_of(Drive(np.array([0.0, 1.0]), sed, rate))
-
-
 def _four_numbers(model: AnyMotion, rates: RateRecordings, method_of: MethodOf) -> Prepared:
     """Prepare a method for the four numbers that firing can tell."""
     problem = four_number_problem(model, rates)
     return Prepared(
         problem,
-        method_of(problem, bounds_under(model)),
+        method_of(problem, bounds_of(*model.drives)),
         six_parameters,
         _scatter_of(six_parameters),
     )
@@ -166,13 +144,9 @@ def _closed_form(
     model: AnyMotion, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
 ) -> Prepared:
     """Prepare least squares along the slopes of the rate in closed form."""
-    return _four_numbers(model, rates, lambda problem, bounds: along_slopes(model, problem, bounds))
-
-
-def along_slopes(model: AnyMotion, problem: RateProblem, bounds: Bounds) -> LeastSquares:
-    """Least squares in the four numbers, along the slopes of the rate in closed form."""
-    slopes = problem.jacobian_of(AnyMotionInClosedForm(model))
-    return replace(by_differences(bounds), jacobian=slopes, name="slopes in closed form")
+    return _four_numbers(
+        model, rates, lambda problem, bounds: along_slopes(AnyMotionInClosedForm(model), problem, bounds)
+    )
 
 
 def _evolution(
@@ -182,66 +156,12 @@ def _evolution(
 
     def method_of(problem: RateProblem, bounds: Bounds) -> Method:
         return Continued(
-            along_slopes(model, problem, bounds),
+            along_slopes(AnyMotionInClosedForm(model), problem, bounds),
             lambda begun: search_from(begun, bounds, seed),
             name="CMA-ES",
         )
 
     return _four_numbers(model, rates, method_of)
-
-
-def search_from(begun: FloatArray, bounds: Bounds, seed: int) -> CovarianceAdaptation:
-    """CMA-ES that begins where a quicker method ended."""
-    return CovarianceAdaptation(
-        begun,
-        bounds.scales,
-        bounds.low,
-        bounds.high,
-        first_spread=FIRST_SPREAD,
-        most_evaluations=MOST_EVALUATIONS,
-        seed=seed,
-    )
-
-
-@dataclass(frozen=True)
-class SoftAfferent:
-    """Mean rates of an afferent with a soft threshold; a `RateModel` in the five numbers that spikes tell.
-
-    Parameters
-    ----------
-    drive : Drive
-        One column per stimulus.
-    windows_ms : ((float, float), (float, float))
-        Windows of the dynamic and of the static rate. [ms]
-    seed : int
-        Of the simulated presentations, the same for all parameters.
-    """
-
-    drive: Drive
-    windows_ms: Windows
-    seed: int
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The four identifiable numbers and the width of the threshold."""
-        return SPIKE_PARAMETER_NAMES
-
-    @property
-    def n_stimuli(self) -> int:
-        """Number of columns of the drive."""
-        return self.drive.n_sites
-
-    def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Dynamic and static rates, means of simulated presentations. [spikes/s]"""
-        afferent = Afferent.from_parameters(six_parameters(parameters[:4]))
-        soft = EscapeRate(afferent.membrane, float(parameters[4]))
-        presentations = Presentations.of_one_afferent(self.n_stimuli, PREDICTED_PRESENTATIONS)
-        trains = soft.spikes(afferent.transduction.current(self.drive), self.seed, presentations)
-        dynamic, static = (
-            np.bincount(presentations.sites, firing_rate_hz(trains, window)) / PREDICTED_PRESENTATIONS
-            for window in self.windows_ms
-        )
-        return dynamic, static
 
 
 @dataclass(frozen=True)
@@ -272,7 +192,7 @@ class MaximumLikelihood:
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Climb to the likeliest parameters; the problem only scores them."""
         clock = time.perf_counter()
-        found = fit_spikes(self.of(chosen), spike_fit.start())
+        found = fit_spikes(self.of(chosen), spike_start())
         seconds = time.perf_counter() - clock
         score = problem.score(found.parameters, chosen)
         return Fit(found.parameters, score, len(found.history), seconds, ())

@@ -15,19 +15,22 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.fit.methods import (
     METHODS,
+)
+from fingerpad.inference.afferent_methods import (
+    Bounds,
     along_slopes,
-    bounds_under,
+    bounds_of,
+    by_differences,
+    five_number_problem,
     four_number_problem,
     search_from,
 )
-from fingerpad.experiments.gerling2014.single_unit_methods import Bounds, by_differences, five_numbers
-from fingerpad.inference.any_motion import AnyMotion, AnyMotionBeside, Windows
+from fingerpad.inference.any_motion import AnyMotion, AnyMotionBeside, AnyMotionInClosedForm, Windows
 from fingerpad.inference.fitting import Continued, Method, cross_validate
 from fingerpad.inference.fitting.covariance import jackknife_covariance
 from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.fitting.problem import IntArray
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
-from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 
 Beside = Mapping[float, SedTraces | Sequence[SedTraces]]
@@ -103,7 +106,7 @@ def fit_offset(
     beside_mm = check_beside(beside)
     places = [AnyMotion.under(beside[offset], windows_ms) for offset in beside_mm]
     roving = AnyMotionBeside(beside_mm, places)
-    problem, everything = RateProblem(five_numbers(roving), rates), np.arange(roving.n_stimuli)
+    problem, everything = five_number_problem(roving, rates), np.arange(roving.n_stimuli)
     searching = OFFSET_METHODS[one_of("method", method, tuple(OFFSET_METHODS))](roving, rates, seed)
     best = searching.fit(problem, everything)
     crossed = cross_validate(problem, searching, memberships)
@@ -148,7 +151,7 @@ def _evolution(roving: AnyMotionBeside, rates: RateRecordings, seed: int) -> Met
     bounds, centre = _bounds(roving), roving.at(0.0)
 
     def quick(of_four: Bounds) -> Method:
-        return along_slopes(centre, four_number_problem(centre, rates), of_four)
+        return along_slopes(AnyMotionInClosedForm(centre), four_number_problem(centre, rates), of_four)
 
     return _continued(roving, rates, quick, lambda begun: search_from(np.append(begun, 0.0), bounds, seed))
 
@@ -161,12 +164,12 @@ def _continued(
 ) -> Continued:
     """Fit a receptor in its place, then let it move."""
     centre = roving.at(0.0)
-    return Continued(first(bounds_under(centre)), second, four_number_problem(centre, rates))
+    return Continued(first(bounds_of(*centre.drives)), second, four_number_problem(centre, rates))
 
 
 def _bounds(roving: AnyMotionBeside) -> Bounds:
     low_mm, *_, high_mm = roving.offsets_mm.tolist()
-    return bounds_under(roving.at(0.0)).and_offset(low_mm, high_mm)
+    return bounds_of(*roving.at(0.0).drives).and_offset(low_mm, high_mm)
 
 
 OFFSET_METHODS: dict[str, Callable[[AnyMotionBeside, RateRecordings, int], Method]] = {

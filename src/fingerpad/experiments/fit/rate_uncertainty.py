@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from scipy.stats import norm, qmc
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.inference.afferent_posterior import from_coordinates, to_coordinates
 from fingerpad.inference.fitting.profile_likelihood import Profile, profile_likelihoods
 from fingerpad.inference.fitting.sensitivity import sobol_indices
@@ -18,6 +17,7 @@ from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.many_rates import scores_of_each
 from fingerpad.inference.rate_likelihood import RateLikelihood
 from fingerpad.inference.rate_problem import RateProblem
+from fingerpad.inference.start_points import start_points
 
 LEVEL = 0.95
 """Probability within every interval and band."""
@@ -62,7 +62,7 @@ def possible(four: ArrayLike) -> FloatArray:
     [0.018, 4.0, 0.042, 50.0]
     """
     fitted = np.array(four, dtype=np.float64)
-    usual = identifiable(single_unit.start_points()[0])
+    usual = identifiable(start_points()[0])
     fitted[1:] = np.where(fitted[1:] > 0.0, fitted[1:], usual[1:])
     fitted[0] = min(fitted[0], MOST_RESTING_SHARE / fitted[3])
     return fitted
@@ -169,7 +169,7 @@ def sensitivity(problem: RateProblem, four: ArrayLike, seed: int) -> dict[str, A
     dict
         Ranges, `first` and `total` indices with their half widths, and FSS over the ranges.
     """
-    fitted, sizes = np.asarray(four, dtype=np.float64), identifiable(single_unit.start_points()[0])
+    fitted, sizes = np.asarray(four, dtype=np.float64), identifiable(start_points()[0])
     sizes[0] = 1.0 / sizes[3]  # beta tau/(C v) = 1 just fires
     reach = SENSITIVITY_SHARE * np.where(fitted == 0.0, sizes, np.abs(fitted))
     found = sobol_indices(

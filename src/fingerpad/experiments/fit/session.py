@@ -23,7 +23,6 @@ from fingerpad.experiments.fit.fit import check_enough, dealt_folds, fit_recordi
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
 from fingerpad.experiments.fit.offset import check_offset
 from fingerpad.experiments.gerling2014.reproduction import plain
-from fingerpad.experiments.gerling2014.single_unit_methods import OFFSETS_MM
 from fingerpad.experiments.manifest import software
 from fingerpad.experiments.recording_files import Recorded
 from fingerpad.experiments.runner import STORE_FOLDER
@@ -31,6 +30,7 @@ from fingerpad.experiments.stimuli import TactileStimulus
 from fingerpad.geometry.grading import Grading, covering
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Bar, FlatPunch, Line, Sphere
+from fingerpad.inference.afferent_methods import OFFSETS_MM
 from fingerpad.inference.any_motion import WINDOWS_MS, Windows
 from fingerpad.inference.fitting.problem import IntArray
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES

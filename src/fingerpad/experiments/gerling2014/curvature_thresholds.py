@@ -24,7 +24,6 @@ from fingerpad.data import psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014.claim_row import MATERIALS, ClaimRow, claim_row
 from fingerpad.experiments.gerling2014.code_efficiency import efficiencies
-from fingerpad.experiments.gerling2014.sphere_discrimination import NOISE_DRAWS, RESPONSES
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics import (
@@ -34,8 +33,8 @@ from fingerpad.psychophysics import (
     posterior,
     yes_no,
 )
-from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
-from fingerpad.psychophysics.noise_fit import expected_hit_rates, fit_noise_sigma
+from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, gradient_sum, neighbour_pairs
+from fingerpad.psychophysics.noise_fit import NOISE_DRAWS, expected_hit_rates, fit_noise_sigma
 from fingerpad.skin.sampling import SkinResponse
 
 STANDARDS_PER_M = (144.0, 200.0, 287.0, 400.0)
@@ -96,7 +95,9 @@ def result(
     population = _population("paper", afferent)
     neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
     answers = [population.respond(responses[curvature]) for curvature in curvatures.tolist()]
-    tables = {name: np.array([read(answer) for answer in answers]) for name, read in RESPONSES.items()}
+    tables = {
+        name: np.array([read(answer) for answer in answers]) for name, read in RESPONSE_MEASURES.items()
+    }
     return {
         "seed": seed,
         "proportion": PROPORTION,

@@ -14,11 +14,9 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, whole
 from fingerpad.data import protocol
-from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.inference.fitting import (
     Fit,
     Method,
-    ResponseSurface,
     best_of,
     cross_validate,
     interleaved_folds,
@@ -29,6 +27,7 @@ from fingerpad.inference.fitting.problem import IntArray, Problem
 from fingerpad.inference.identifiable import identifiable, six_parameters
 from fingerpad.inference.rate_problem import RateModel, RateProblem, Reparametrised
 from fingerpad.inference.recordings import PHASES, RateRecordings
+from fingerpad.inference.start_points import start_points
 from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.neuron.transduction import Drive
 
@@ -67,18 +66,12 @@ def scaled_starts(driven: Drive, reference: Drive) -> FloatArray:
     >>> (scaled / usual).round(6).tolist()
     [0.1, 0.1]
     """
-    starts = single_unit.start_points()
+    starts = start_points()
     starts[:, PARAMETER_NAMES.index("dynamic_gain")] *= (
         reference.rate_kpa_per_ms.max() / driven.rate_kpa_per_ms.max()
     )
     starts[:, PARAMETER_NAMES.index("static_gain")] *= reference.sed_kpa.max() / driven.sed_kpa.max()
     return starts
-
-
-def response_surface(starts: FloatArray) -> ResponseSurface:
-    """Return the paper's method from these start points, with its bounds and increments."""
-    bounds = np.array([-np.inf, 0.0, 0.0, *(single_unit.LOWEST_SHARE * starts[0, 3:])])
-    return ResponseSurface(starts, single_unit.increments(starts), bounds)
 
 
 RELATIVE_NAMES = ("intercept_share", "log_dynamic_gain", "log_static_gain", "log_time_constant")
@@ -106,7 +99,7 @@ def six_of_relative(relative: FloatArray, start: FloatArray) -> FloatArray:
 
     Examples
     --------
-    >>> start = single_unit.start_points()[0]
+    >>> start = start_points()[0]
     >>> six = six_of_relative(np.array([0.0, 0.0, np.log(2.0), 0.0]), start)
     >>> (six[1:] / start[1:]).round(6).tolist()
     [1.0, 2.0, 1.0, 1.0, 1.0]

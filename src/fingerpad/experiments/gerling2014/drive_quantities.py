@@ -23,7 +23,6 @@ from fingerpad.experiments.gerling2014.drive_fits import (
     judge,
     quick_method,
     relative_model,
-    response_surface,
     row,
     scaled_starts,
     six_of_relative,
@@ -32,6 +31,7 @@ from fingerpad.inference.fitting import Method
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_problem import AfferentModel, RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings
+from fingerpad.inference.start_points import response_surface
 from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.skin.sampling import SkinResponse
 

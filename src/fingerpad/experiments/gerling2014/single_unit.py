@@ -10,34 +10,26 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.signals import STORED_ENERGY, SedTraces
-from fingerpad.data import bar_firing_rates, neuron, protocol
+from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.geometry.indenters import Bar
 from fingerpad.inference.fitting import (
     CrossValidation,
     Fit,
     FoldFit,
-    ResponseSurface,
-    coding_increments,
     cross_validate,
     interleaved_folds,
 )
 from fingerpad.inference.rate_problem import AfferentModel, RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings
-from fingerpad.neuron.afferent import PARAMETER_NAMES
+from fingerpad.inference.start_points import response_surface, start_points
+from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
 from fingerpad.neuron.spikes import modulation_difference, modulation_index
 from fingerpad.neuron.transduction import drive
 from fingerpad.skin.sampling import SkinResponse
 
-INCREMENT = 0.01
-"""Coding increment over the start value; the paper's are "typically two orders of magnitude smaller"."""
-
-UNITS = ("mA", "mA ms/kPa", "mA/kPa", "ms", "mF", "mV")
 RECEPTOR = ((RECEPTOR_X_MM, 0.0),)
 """Where the end organ lies: x and z on the skin. [mm]"""
-
-LOWEST_SHARE = 0.05
-"""Time constant, capacitance and threshold stay above this share of their start, to stay physical."""
 
 
 def touches(conditions: Conditions) -> list[Touch]:
@@ -103,37 +95,6 @@ def following(static: SedTraces, dynamic: SedTraces, quantity: str) -> SedTraces
     return replace(static, dynamic_kpa=dynamic.sed_kpa, dynamic_quantity=quantity)
 
 
-def printed_starts() -> FloatArray:
-    """Both start points of the paper as they are printed, (2, 6), read with energy density in kPa."""
-    shared = (neuron.TIME_CONSTANT.value, neuron.CAPACITANCE.value, neuron.THRESHOLD.value)
-    return np.array(
-        [
-            [neuron.INTERCEPT_START.value, dynamic.value, static.value, *shared]
-            for dynamic, static in (
-                (neuron.DYNAMIC_GAIN_START_1, neuron.STATIC_GAIN_START_1),
-                (neuron.DYNAMIC_GAIN_START_2, neuron.STATIC_GAIN_START_2),
-            )
-        ]
-    )
-
-
-def start_points() -> FloatArray:
-    """Both start points of the paper, (2, 6), the printed gains rescaled.
-
-    See docs/decisions/dynamic-gain-rescaled.md for why one factor on k_d and one on k_s, the same in both.
-    """
-    scales = [1.0, neuron.DYNAMIC_GAIN_SCALE.value, neuron.STATIC_GAIN_SCALE.value, 1.0, 1.0, 1.0]
-    return printed_starts() * scales
-
-
-def increments(starts: FloatArray) -> FloatArray:
-    """Coding increments of both start points (2, 6); that of the intercept is a share of the rheobase."""
-    time_constant, capacitance, threshold = starts[0, 3:]
-    rheobase = capacitance * threshold / time_constant
-    where_zero = np.full(6, INCREMENT * rheobase)
-    return np.array([coding_increments(start, INCREMENT, where_zero) for start in starts])
-
-
 def rate_problem(sed: SedTraces) -> RateProblem:
     """Observed rates at all shifts, and the paper's model of the afferent that answers `sed`."""
     return RateProblem(AfferentModel(drive(sed)), bar_recordings())
@@ -144,19 +105,6 @@ def bar_recordings() -> RateRecordings:
     observed = bar_firing_rates()
     names = tuple(f"{shift:g}" for shift in observed.shift_mm)
     return RateRecordings(names, observed.dynamic_rate_hz, observed.static_rate_hz, observed.source)
-
-
-def response_surface(starts: FloatArray | None = None) -> ResponseSurface:
-    """Return the paper's method; what is of the membrane stays physical.
-
-    Parameters
-    ----------
-    starts : array (n_starts, 6), optional
-        Start points; default: the paper's two, rescaled.
-    """
-    starts = start_points() if starts is None else starts
-    bounds = np.array([-np.inf, 0.0, 0.0, *(LOWEST_SHARE * starts[0, 3:])])
-    return ResponseSurface(starts, increments(starts), bounds)
 
 
 def fit(problem: RateProblem, memberships: ArrayLike | None = None) -> tuple[Fit, CrossValidation]:
@@ -188,7 +136,7 @@ def result(problem: RateProblem, best: Fit, folds: CrossValidation) -> dict[str,
         "fss_out_of_sample": folds.score_test,
         "fss_training_mean": folds.score_train,
         "parameters": _named(best.parameters),
-        "units": dict(zip(PARAMETER_NAMES, UNITS, strict=True)),
+        "units": dict(zip(PARAMETER_NAMES, PARAMETER_UNITS, strict=True)),
         "shift_mm": shift_mm,
         **{f"{phase}_rate_hz": predicted[phase] for phase in PHASES},
         **{f"observed_{phase}_rate_hz": observed[phase] for phase in PHASES},

@@ -7,17 +7,24 @@ own fits its six. Then the model itself is let loose piece by piece, to see whic
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.optimize import isotonic_regression
-from scipy.stats import qmc
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
+from fingerpad.inference.afferent_methods import (
+    OFFSETS_MM,
+    along_slopes,
+    bounds_of,
+    by_differences,
+    five_number_problem,
+    four_number_problem,
+    search_from,
+)
 from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.fitting import (
     Continued,
@@ -30,31 +37,11 @@ from fingerpad.inference.fitting import (
 )
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.least_squares import LeastSquares
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
-from fingerpad.inference.rate_problem import AfferentModel, RateModel, RateProblem, Reparametrised
-from fingerpad.inference.receptor_offset import OFFSET_NAME, receptor_offset
+from fingerpad.inference.rate_problem import AfferentModel, RateProblem
+from fingerpad.inference.receptor_offset import receptor_offset
 from fingerpad.inference.recordings import PHASES, RateRecordings
 from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.skin.sampling import SkinResponse
-
-OFFSETS_MM = (-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
-"""Places beside the receptor at which the drive is known. The bar moves in steps of 0.2 mm. [mm]"""
-
-LOWEST = (-0.05, 0.0, 0.0, 3.0)
-HIGHEST = (0.05, 0.6, 0.2, 300.0)
-SCALES = (0.01, 0.05, 0.02, 20.0)
-"""Bounds and scales of a fit: the intercept [1/ms], what the dynamic and the static term reach under the
-strongest stimulus [1/ms], and tau [ms]. A drive of 0.2/ms fires at up to 200 spikes/s, three times the
-largest static rate."""
-
-OFFSET_SCALE_MM = 0.1
-"""A change of the receptor's place that matters. [mm]"""
-
-N_STARTS, N_REFINED = 32, 2
-"""Starts that are scored, and those from which least squares goes on."""
-
-FIRST_SPREAD, MOST_EVALUATIONS = 0.5, 600
-"""Of CMA-ES: the first generation's standard deviation in units of the scales, and its effort."""
 
 
 def traces_beside(responses: Sequence[SkinResponse]) -> dict[float, SedTraces]:
@@ -71,117 +58,45 @@ def traces_beside(responses: Sequence[SkinResponse]) -> dict[float, SedTraces]:
     }
 
 
-def four_numbers(driven: Drive, recordings: RateRecordings) -> RateProblem:
-    """Rates to be predicted from the four numbers that firing can tell."""
-    return RateProblem(Reparametrised(AfferentModel(driven), IDENTIFIABLE_NAMES, six_parameters), recordings)
-
-
-def with_offset(traces: Mapping[float, SedTraces], recordings: RateRecordings) -> RateProblem:
-    """Build the problem of the four numbers and the place of the receptor."""
-    return RateProblem(five_numbers(receptor_offset(tuple(traces), tuple(traces.values()))), recordings)
-
-
-def five_numbers(model: RateModel) -> Reparametrised:
-    """Let the four numbers that firing can tell and the receptor's offset drive a model of all seven.
-
-    Parameters
-    ----------
-    model : RateModel
-        With the paper's six parameters and the offset behind them.
-
-    Returns
-    -------
-    Reparametrised
-    """
-    return Reparametrised(
-        model,
-        (*IDENTIFIABLE_NAMES, OFFSET_NAME),
-        lambda numbers: np.append(six_parameters(numbers[:4]), numbers[4]),
-    )
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """Between which numbers a fit searches, and how far a step is.
-
-    Parameters
-    ----------
-    low, high, scales : array (n_parameters,)
-        Bounds, and a change that matters.
-    """
-
-    low: FloatArray
-    high: FloatArray
-    scales: FloatArray
-
-    def and_offset(self, low_mm: float = OFFSETS_MM[0], high_mm: float = OFFSETS_MM[-1]) -> Bounds:
-        """Return the bounds of the same parameters and the place of the receptor. [mm]"""
-        offset = (low_mm, high_mm, OFFSET_SCALE_MM)
-        sides = (self.low, self.high, self.scales)
-        return Bounds(*(np.append(side, entry) for side, entry in zip(sides, offset, strict=True)))
-
-    def spread(self, number: int) -> FloatArray:
-        """Spread points evenly between the bounds, (number, n_parameters), the same ones each time."""
-        shares = qmc.Halton(self.low.size, scramble=False).random(number + 1)[1:]  # the first is a corner
-        return self.low + shares * (self.high - self.low)
-
-
-def bounds_of(driven: Drive) -> Bounds:
-    """Bounds of the four numbers for a drive: those of `LOWEST`, `HIGHEST` and `SCALES`."""
-    strongest = np.array([1.0, driven.rate_kpa_per_ms.max(), driven.sed_kpa.max(), 1.0])
-    return Bounds(*(np.array(terms) / strongest for terms in (LOWEST, HIGHEST, SCALES)))
-
-
-def by_differences(bounds: Bounds) -> LeastSquares:
-    """Least squares from starts all over the range."""
-    starts = bounds.spread(N_STARTS)
-    return LeastSquares(starts, bounds.scales, bounds.low, bounds.high, n_refined=N_REFINED)
-
-
-def by_formula(problem: RateProblem, driven: Drive) -> LeastSquares:
-    """Least squares along the slopes of the rate in closed form.
+def methods(problem: RateProblem, driven: Drive) -> tuple[Method, ...]:
+    """Return the methods beside the paper's, all with the same bounds.
 
     Parameters
     ----------
     problem : RateProblem
-        From `four_numbers`.
+        From `fingerpad.inference.afferent_methods.four_number_problem`.
     driven : Drive
         Its drive.
     """
-    slopes = problem.jacobian_of(ClosedFormModel(driven))
-    return replace(by_differences(bounds_of(driven)), jacobian=slopes, name="slopes in closed form")
+    bounds = bounds_of(driven)
+    return by_differences(bounds), by_formula(problem, driven), evolution(problem, driven)
+
+
+def by_formula(problem: RateProblem, driven: Drive) -> LeastSquares:
+    """Least squares along the slopes of the rate in closed form; parameters as of `methods`."""
+    return along_slopes(ClosedFormModel(driven), problem, bounds_of(driven))
 
 
 def evolution(problem: RateProblem, driven: Drive, offset: bool = False) -> Continued:
-    """CMA-ES from where the slopes in closed form lead.
+    """CMA-ES from where the slopes in closed form lead; parameters as of `methods`.
 
     Parameters
     ----------
     problem : RateProblem
-        From `four_numbers`, of a receptor in its place.
+        Of the four numbers, with the receptor in its place.
     driven : Drive
         Its drive.
     offset : bool
         Whether the place of the receptor is a fifth number, which begins at 0.
     """
-    bounds = bounds_of(driven).and_offset() if offset else bounds_of(driven)
+    bounds = bounds_of(driven)
 
     def search(begun: FloatArray) -> CovarianceAdaptation:
-        return CovarianceAdaptation(
-            np.append(begun, 0.0) if offset else begun,
-            bounds.scales,
-            bounds.low,
-            bounds.high,
-            first_spread=FIRST_SPREAD,
-            most_evaluations=MOST_EVALUATIONS,
+        return (
+            search_from(np.append(begun, 0.0), bounds.and_offset()) if offset else search_from(begun, bounds)
         )
 
     return Continued(by_formula(problem, driven), search, problem, name="CMA-ES")
-
-
-def methods(problem: RateProblem, driven: Drive) -> tuple[Method, ...]:
-    """Return the methods beside the paper's, all with the same bounds."""
-    return by_differences(bounds_of(driven)), by_formula(problem, driven), evolution(problem, driven)
 
 
 def result(
@@ -209,10 +124,11 @@ def result(
         `methods`, `models` and `ceilings`: FSS in and out of sample, and what belongs to it.
     """
     driven, otherwise = drive(traces[0.0]), drive(extended)
-    problem = four_numbers(driven, recordings)
+    problem = four_number_problem(AfferentModel(driven), recordings)
     fits = {method.name: _fitted(problem, method) for method in methods(problem, driven)}
     searched = evolution(problem, driven).name
-    offset, other = with_offset(traces, recordings), four_numbers(otherwise, recordings)
+    offset = five_number_problem(receptor_offset(tuple(traces), tuple(traces.values())), recordings)
+    other = four_number_problem(AfferentModel(otherwise), recordings)
     models = {
         "the paper's model": (problem, fits[searched]),
         "receptor beside its place": (offset, _fitted(offset, evolution(problem, driven, offset=True))),

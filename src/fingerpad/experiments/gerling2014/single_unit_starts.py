@@ -11,9 +11,9 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.signals import SedTraces
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data import neuron, paper
-from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.inference.fitting import interleaved_folds
 from fingerpad.inference.rate_problem import AfferentModel, RateProblem
+from fingerpad.inference.start_points import printed_starts, response_surface
 from fingerpad.neuron.transduction import drive
 
 PER_KPA = {"MPa": 1.0e-3, "kPa": 1.0, "Pa": 1.0e3}
@@ -67,7 +67,7 @@ def scaled_start(start: int, static_scale: float, dynamic_scale: float) -> Float
     static_scale, dynamic_scale : float
         Factors on the printed k_s and k_d. [1]
     """
-    printed = single_unit.printed_starts()[start - 1]
+    printed = printed_starts()[start - 1]
     return printed * [1.0, dynamic_scale, static_scale, 1.0, 1.0, 1.0]
 
 
@@ -117,7 +117,7 @@ def _session(problem: RateProblem, name: str, scales: FloatArray) -> dict[str, A
     """Fold 3 from start 2, both gains scaled."""
     training = _training(problem)
     testing = np.setdiff1d(np.arange(problem.n_observations), training)
-    method = single_unit.response_surface(np.array([scaled_start(SESSION_START, *scales)]))
+    method = response_surface(np.array([scaled_start(SESSION_START, *scales)]))
     fit = method.fit(problem, training)
     dynamic, static = problem.model.rates(fit.parameters)
     return {

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.signals import ResponseMap
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014 import goodwin
@@ -18,19 +16,17 @@ from fingerpad.experiments.gerling2014.percept_sessions import SESSIONS, Measure
 from fingerpad.experiments.gerling2014.percept_statistics import statistics
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
-from fingerpad.psychophysics.encoding import answering_neighbours, gradient_sum, neighbour_pairs
+from fingerpad.psychophysics.encoding import (
+    RESPONSE_MEASURES,
+    answering_neighbours,
+    gradient_sum,
+    neighbour_pairs,
+)
+from fingerpad.psychophysics.noise_fit import NOISE_DRAWS
 from fingerpad.skin.sampling import SkinResponse
 
 CURVATURES = psychophysics.SPHERE_CURVATURES.value
 POSITIONS_MM = protocol.SPHERE_POSITIONS.value
-NOISE_DRAWS = 4000
-"""Common random presentations behind the fit of the noise, which they leave uncertain by one percent."""
-
-RESPONSES: dict[str, Callable[[ResponseMap], FloatArray]] = {
-    "static": lambda response: response.static_rate_hz,
-    "dynamic": lambda response: response.dynamic_rate_hz,
-    "latency": lambda response: response.first_spike_latency_ms,
-}
 
 
 def touches(conditions: Conditions) -> dict[tuple[float, float], Touch]:
@@ -79,7 +75,7 @@ def result(
             np.array([read(answers[position, curvature]) for curvature in CURVATURES])
             for position in POSITIONS_MM
         ]
-        for name, read in RESPONSES.items()
+        for name, read in RESPONSE_MEASURES.items()
     }
     measures = {
         name: _measured(name, both, neighbours)
@@ -107,7 +103,7 @@ def result(
         "variants": {
             name: rates for name, rates in drawn.items() if name not in measures and name != "euclidean"
         },
-        "silent": [name for name in RESPONSES if name not in measures],
+        "silent": [name for name in RESPONSE_MEASURES if name not in measures],
         "statistics": statistics(observers, CURVATURES, tuple(measures)),
         "reasons": reasons(
             measures,

@@ -18,9 +18,10 @@ from fingerpad.core.random_streams import Presentations
 from fingerpad.core.signals import SedTraces, SpikeTrains
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data import protocol
-from fingerpad.experiments.gerling2014 import interval_variability, single_unit
+from fingerpad.experiments.gerling2014 import interval_variability
 from fingerpad.experiments.gerling2014.interval_variability import CORRELATION_MS, SOFT_THRESHOLD, STEP_MS
-from fingerpad.inference.identifiable import identifiable, six_parameters
+from fingerpad.inference.identifiable import identifiable
+from fingerpad.inference.soft_afferent import soft_membrane, soft_spikes
 from fingerpad.inference.spike_fit import SpikeFit, fit_spikes
 from fingerpad.inference.spike_likelihood import (
     SpikeLikelihood,
@@ -30,8 +31,8 @@ from fingerpad.inference.spike_parameters import (
     SPIKE_PARAMETER_NAMES,
     SPIKE_PARAMETER_UNITS,
 )
+from fingerpad.inference.start_points import spike_start
 from fingerpad.neuron.afferent import Afferent
-from fingerpad.neuron.escape_rate import EscapeRate
 from fingerpad.neuron.membrane_noise import (
     CorrelatedCurrentNoise,
     MembraneNoise,
@@ -44,7 +45,6 @@ from fingerpad.neuron.transduction import Drive, drive
 WIDTH = 0.2
 """Width of the true threshold over the threshold."""
 
-START_WIDTH = 0.5
 N_REPEATS = 5
 LEVEL = 0.95
 PIECES = 8
@@ -56,17 +56,6 @@ OTHER_AMOUNT = 0.3
 N_QUANTILES = 100
 SHOWN_MS = (0.0, 250.0)
 SHOWN_STEP_MS = 0.5
-
-
-def start() -> FloatArray:
-    """Return where every fit begins: the paper's first start point, its gains rescaled, and soft.
-
-    Returns
-    -------
-    array (5,)
-        In the order of `fingerpad.inference.spike_parameters.SPIKE_PARAMETER_NAMES`.
-    """
-    return np.array([*identifiable(single_unit.start_points()[0]), START_WIDTH])
 
 
 def truth(driven: Drive, afferent: Afferent, seed: int) -> FloatArray:
@@ -138,40 +127,10 @@ def result(sed: SedTraces, afferent: Afferent, shift_mm: FloatArray, seed: int) 
     return found
 
 
-def soft_spikes(
-    driven: Drive, parameters: FloatArray, presentations: Presentations, seed: int
-) -> SpikeTrains:
-    """Let an afferent with a soft threshold fire.
-
-    Parameters
-    ----------
-    driven : Drive
-        One column per stimulus.
-    parameters : array (5,)
-        In the order of `fingerpad.inference.spike_parameters.SPIKE_PARAMETER_NAMES`.
-    presentations : Presentations
-        Which stimulus each train answers.
-    seed : int
-        Of the run.
-
-    Returns
-    -------
-    SpikeTrains
-    """
-    soft, current = _soft_afferent(driven, parameters)
-    return soft.spikes(current, seed, presentations)
-
-
-def _soft_afferent(driven: Drive, parameters: FloatArray) -> tuple[EscapeRate, Any]:
-    """Soft membrane and current of five numbers."""
-    afferent = Afferent.from_parameters(six_parameters(parameters[:4]))
-    return EscapeRate(afferent.membrane, parameters[4]), afferent.transduction.current(driven)
-
-
 def _fit_if_possible(recorded: SpikeLikelihood) -> SpikeFit | None:
     """Fit, or None for spikes that are too few or too regular: that is a finding, not a failure."""
     try:
-        return fit_spikes(recorded, start())
+        return fit_spikes(recorded, spike_start())
     except (ConvergenceError, InputError):
         return None
 
@@ -183,7 +142,7 @@ def _recovery(recorded: SpikeLikelihood, fit: SpikeFit, true: FloatArray) -> dic
     return {
         "n_spikes": fit.n_spikes,
         "level": LEVEL,
-        "start": start(),
+        "start": spike_start(),
         "truth": true,
         "estimate": fit.parameters,
         "standard_error": fit.standard_errors,
@@ -216,7 +175,7 @@ def _raster(
     train = SpikeTrains.from_lists([first[busiest]])
     intensity_hz = {}
     for name, parameters in (("truth", true), ("fitted", fit.parameters)):
-        soft, current = _soft_afferent(recorded.drive, parameters)
+        soft, current = soft_membrane(recorded.drive, parameters)
         intensity_hz[name] = MS_PER_S * soft.intensity_per_ms(current, train, [busiest], times)[:, 0]
     return {
         "shift_mm": shift_mm,

@@ -1,0 +1,164 @@
+"""Methods that fit one afferent to firing rates: their bounds, scales, starts and vectors of parameters.
+
+All but the paper's own method (`fingerpad.inference.start_points.response_surface`) search the four
+identifiable numbers, of which a fifth may be the receptor's offset along the finger, and share their bounds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import qmc
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.inference.afferent_posterior import four_number_model
+from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
+from fingerpad.inference.fitting.least_squares import LeastSquares
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
+from fingerpad.inference.rate_problem import RateModel, RateProblem, Reparametrised, SmoothRateModel
+from fingerpad.inference.receptor_offset import OFFSET_NAME
+from fingerpad.inference.recordings import RateRecordings
+from fingerpad.neuron.transduction import Drive
+
+OFFSETS_MM = (-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
+"""Offsets from the receptor at which the drive is sampled. The paper's bar moves in steps of 0.2 mm. [mm]"""
+
+LOWEST = (-0.05, 0.0, 0.0, 3.0)
+HIGHEST = (0.05, 0.6, 0.2, 300.0)
+SCALES = (0.01, 0.05, 0.02, 20.0)
+"""Bounds and scales of a fit: the intercept [1/ms], what the dynamic and the static term reach under the
+strongest stimulus [1/ms], and tau [ms]. A drive of 0.2/ms fires at up to 200 spikes/s, three times the
+largest static rate."""
+
+OFFSET_SCALE_MM = 0.1
+"""A change of the receptor's place that matters. [mm]"""
+
+N_STARTS, N_REFINED = 32, 2
+"""Starts that are scored, and those from which least squares goes on."""
+
+FIRST_SPREAD, MOST_EVALUATIONS = 0.5, 600
+"""Of CMA-ES: the first generation's standard deviation in units of the scales, and its effort."""
+
+
+def four_number_problem(model: RateModel, recordings: RateRecordings) -> RateProblem:
+    """Problem of predicting recorded rates from the four identifiable numbers.
+
+    Parameters
+    ----------
+    model : RateModel
+        With the paper's six parameters.
+    recordings : RateRecordings
+        What was observed.
+    """
+    return RateProblem(four_number_model(model), recordings)
+
+
+def five_number_problem(model: RateModel, recordings: RateRecordings) -> RateProblem:
+    """Problem of predicting recorded rates from the four identifiable numbers and the receptor's offset.
+
+    Parameters
+    ----------
+    model : RateModel
+        With the paper's six parameters and the offset behind them.
+    recordings : RateRecordings
+        What was observed.
+    """
+
+    def seven(numbers: FloatArray) -> FloatArray:
+        return np.append(six_parameters(numbers[:4]), numbers[4])
+
+    return RateProblem(Reparametrised(model, (*IDENTIFIABLE_NAMES, OFFSET_NAME), seven), recordings)
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Between which numbers a fit searches, and how far a step is.
+
+    Parameters
+    ----------
+    low, high, scales : array (n_parameters,)
+        Bounds, and a change that matters.
+    """
+
+    low: FloatArray
+    high: FloatArray
+    scales: FloatArray
+
+    def and_offset(self, low_mm: float = OFFSETS_MM[0], high_mm: float = OFFSETS_MM[-1]) -> Bounds:
+        """Return the bounds of the same parameters and the place of the receptor. [mm]"""
+        offset = (low_mm, high_mm, OFFSET_SCALE_MM)
+        sides = (self.low, self.high, self.scales)
+        return Bounds(*(np.append(side, entry) for side, entry in zip(sides, offset, strict=True)))
+
+    def spread(self, number: int) -> FloatArray:
+        """Spread points evenly between the bounds, (number, n_parameters), the same ones each time."""
+        shares = qmc.Halton(self.low.size, scramble=False).random(number + 1)[1:]  # the first is a corner
+        return self.low + shares * (self.high - self.low)
+
+
+def bounds_of(*drives: Drive) -> Bounds:
+    """Bounds of the four identifiable numbers: those of `LOWEST`, `HIGHEST` and `SCALES`.
+
+    Parameters
+    ----------
+    *drives : Drive
+        Under all stimuli; the strongest one sets the unit of both gains.
+
+    Examples
+    --------
+    >>> driven = Drive([0.0, 1.0], [[0.0], [2.0]], [[4.0], [4.0]])
+    >>> bounds_of(driven).high.tolist()
+    [0.05, 0.15, 0.1, 300.0]
+    """
+    rate, sed = (
+        max(float(getattr(driven, name).max()) for driven in drives)
+        for name in ("rate_kpa_per_ms", "sed_kpa")
+    )
+    strongest = np.array([1.0, rate, sed, 1.0])
+    return Bounds(*(np.array(terms) / strongest for terms in (LOWEST, HIGHEST, SCALES)))
+
+
+def by_differences(bounds: Bounds) -> LeastSquares:
+    """Least squares from starts all over the range."""
+    starts = bounds.spread(N_STARTS)
+    return LeastSquares(starts, bounds.scales, bounds.low, bounds.high, n_refined=N_REFINED)
+
+
+def along_slopes(smooth: SmoothRateModel, problem: RateProblem, bounds: Bounds) -> LeastSquares:
+    """Least squares in the four identifiable numbers, along the slopes of the rate in closed form.
+
+    Parameters
+    ----------
+    smooth : SmoothRateModel
+        The model of the problem in the closed form of constant drive.
+    problem : RateProblem
+        From `four_number_problem`.
+    bounds : Bounds
+        Of the four numbers.
+    """
+    slopes = problem.jacobian_of(smooth)
+    return replace(by_differences(bounds), jacobian=slopes, name="slopes in closed form")
+
+
+def search_from(begun: FloatArray, bounds: Bounds, seed: int = 0) -> CovarianceAdaptation:
+    """CMA-ES that begins where a quicker method ended.
+
+    Parameters
+    ----------
+    begun : array (n_parameters,)
+        Middle of the first generation.
+    bounds : Bounds
+        Of the same parameters.
+    seed : int, optional
+        Of the random numbers.
+    """
+    return CovarianceAdaptation(
+        begun,
+        bounds.scales,
+        bounds.low,
+        bounds.high,
+        first_spread=FIRST_SPREAD,
+        most_evaluations=MOST_EVALUATIONS,
+        seed=seed,
+    )

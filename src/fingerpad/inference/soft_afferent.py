@@ -1,0 +1,98 @@
+"""An afferent with a soft threshold, described by the five numbers that spikes determine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.random_streams import Presentations
+from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.inference.any_motion import Windows
+from fingerpad.inference.identifiable import six_parameters
+from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_NAMES
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.escape_rate import EscapeRate
+from fingerpad.neuron.spikes import firing_rate_hz
+from fingerpad.neuron.transduction import Drive
+
+PREDICTED_PRESENTATIONS = 20
+"""Presentations whose mean is the predicted rate of an afferent with a soft threshold."""
+
+
+def soft_membrane(driven: Drive, parameters: FloatArray) -> tuple[EscapeRate, CurrentTraces]:
+    """Return the membrane and the current of an afferent with a soft threshold.
+
+    Parameters
+    ----------
+    driven : Drive
+        One column per stimulus.
+    parameters : array (5,)
+        In the order of `fingerpad.inference.spike_parameters.SPIKE_PARAMETER_NAMES`.
+    """
+    afferent = Afferent.from_parameters(six_parameters(parameters[:4]))
+    return EscapeRate(afferent.membrane, float(parameters[4])), afferent.transduction.current(driven)
+
+
+def soft_spikes(
+    driven: Drive, parameters: FloatArray, presentations: Presentations, seed: int
+) -> SpikeTrains:
+    """Simulate the spikes of an afferent with a soft threshold.
+
+    Parameters
+    ----------
+    driven : Drive
+        One column per stimulus.
+    parameters : array (5,)
+        In the order of `fingerpad.inference.spike_parameters.SPIKE_PARAMETER_NAMES`.
+    presentations : Presentations
+        Which stimulus each train answers.
+    seed : int
+        Of the random numbers.
+
+    Returns
+    -------
+    SpikeTrains
+    """
+    membrane, current = soft_membrane(driven, parameters)
+    return membrane.spikes(current, seed, presentations)
+
+
+@dataclass(frozen=True)
+class SoftAfferent:
+    """Mean rates of an afferent with a soft threshold; a `RateModel` in the five numbers of its spikes.
+
+    Parameters
+    ----------
+    drive : Drive
+        One column per stimulus.
+    windows_ms : ((float, float), (float, float))
+        Windows of the dynamic and of the static rate. [ms]
+    seed : int
+        Of the simulated presentations, the same for all parameters.
+    """
+
+    drive: Drive
+    windows_ms: Windows
+    seed: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The four identifiable numbers and the width of the threshold."""
+        return SPIKE_PARAMETER_NAMES
+
+    @property
+    def n_stimuli(self) -> int:
+        """Number of columns of the drive."""
+        return self.drive.n_sites
+
+    def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Dynamic and static rates, means of simulated presentations. [spikes/s]"""
+        presentations = Presentations.of_one_afferent(self.n_stimuli, PREDICTED_PRESENTATIONS)
+        trains = soft_spikes(self.drive, parameters, presentations, self.seed)
+        dynamic, static = (
+            np.bincount(presentations.sites, firing_rate_hz(trains, window)) / PREDICTED_PRESENTATIONS
+            for window in self.windows_ms
+        )
+        return dynamic, static

@@ -1,0 +1,85 @@
+"""The paper's start points, and its method of fitting from them (paper, 2.2.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.data import neuron
+from fingerpad.inference.fitting import ResponseSurface, coding_increments
+from fingerpad.inference.identifiable import identifiable
+
+INCREMENT = 0.01
+"""Coding increment over the start value; the paper's are "typically two orders of magnitude smaller"."""
+
+LOWEST_SHARE = 0.05
+"""Time constant, capacitance and threshold stay above this share of their start, to stay physical."""
+
+START_WIDTH = 0.5
+"""Width of the threshold over the threshold where every fit to spikes starts. [1]"""
+
+
+def printed_starts() -> FloatArray:
+    """Both start points of the paper as they are printed, (2, 6), with energy density in kPa.
+
+    Returns
+    -------
+    array (2, 6)
+        In the order of `fingerpad.neuron.afferent.PARAMETER_NAMES`.
+
+    Examples
+    --------
+    >>> printed_starts()[:, 1].tolist()
+    [8e-09, 8.2e-09]
+    """
+    shared = (neuron.TIME_CONSTANT.value, neuron.CAPACITANCE.value, neuron.THRESHOLD.value)
+    return np.array(
+        [
+            [neuron.INTERCEPT_START.value, dynamic.value, static.value, *shared]
+            for dynamic, static in (
+                (neuron.DYNAMIC_GAIN_START_1, neuron.STATIC_GAIN_START_1),
+                (neuron.DYNAMIC_GAIN_START_2, neuron.STATIC_GAIN_START_2),
+            )
+        ]
+    )
+
+
+def start_points() -> FloatArray:
+    """Both start points of the paper, (2, 6), the printed gains rescaled.
+
+    See docs/decisions/dynamic-gain-rescaled.md for why one factor on k_d and one on k_s, the same in both.
+    """
+    scales = [1.0, neuron.DYNAMIC_GAIN_SCALE.value, neuron.STATIC_GAIN_SCALE.value, 1.0, 1.0, 1.0]
+    return printed_starts() * scales
+
+
+def spike_start() -> FloatArray:
+    """Return where every fit to spikes starts: the paper's first start point with a soft threshold.
+
+    Returns
+    -------
+    array (5,)
+        In the order of `fingerpad.inference.spike_parameters.SPIKE_PARAMETER_NAMES`.
+    """
+    return np.array([*identifiable(start_points()[0]), START_WIDTH])
+
+
+def increments(starts: FloatArray) -> FloatArray:
+    """Coding increments of both start points (2, 6); that of the intercept is a share of the rheobase."""
+    time_constant, capacitance, threshold = starts[0, 3:]
+    rheobase = capacitance * threshold / time_constant
+    where_zero = np.full(6, INCREMENT * rheobase)
+    return np.array([coding_increments(start, INCREMENT, where_zero) for start in starts])
+
+
+def response_surface(starts: FloatArray | None = None) -> ResponseSurface:
+    """Return the paper's method. Gains stay positive, and the membrane stays physical.
+
+    Parameters
+    ----------
+    starts : array (n_starts, 6), optional
+        Start points; default: the paper's two, rescaled.
+    """
+    starts = start_points() if starts is None else starts
+    bounds = np.array([-np.inf, 0.0, 0.0, *(LOWEST_SHARE * starts[0, 3:])])
+    return ResponseSurface(starts, increments(starts), bounds)
