@@ -242,7 +242,7 @@ def page(results: Mapping[str, Any], command: str = "python -m studies drives") 
         "# Which quantity drives the afferent",
         f"Written by `{command}` on {manifest['date']}: {manifest['resolution']} resolution, seed "
         f"{manifest['seed']}, mechanical code {manifest['code_hash']}. What is concluded from it stands in "
-        "[what the dynamic term follows](decisions/what-the-dynamic-term-follows.md) and "
+        "[what the dynamic term follows](decisions/dynamic-term-quantity.md) and "
         "[one afferent, fitted](single-unit.md).",
         f"![Rates by quantity](images/{FIGURES['quantities']})",
         drive_quantities.caption(results),

@@ -66,7 +66,7 @@ the receptors of the population under spheres, and the firing rates, goodness of
 from it. Afferent, noise and random numbers are the same on every mesh. The coarse, standard and fine
 meshes differ by one factor in every direction. `python -m studies refine` computes these tables; the ones
 below come from code {code_hash}. Conclusions about the choice of a mesh are on [mesh
-resolutions](decisions/mesh-sizes.md).
+resolutions](decisions/mesh-resolutions.md).
 """,
     "SED at the receptor and its firing rates against the shift of the bar, on every mesh",
 )

@@ -6,7 +6,7 @@ The membrane fires when the potential reaches the threshold, u = v. Divided by v
 
 and neither C nor v appears alone. beta, k_d, k_s, C and v are therefore known only up to a common scale: C or
 v may be multiplied by any number, and the three gains with it, without moving a spike. The three gains per
-C v, and tau, are what recordings determine (docs/decisions/four-numbers-not-six.md).
+C v, and tau, are what recordings determine (docs/decisions/four-identifiable-parameters.md).
 """
 
 from __future__ import annotations

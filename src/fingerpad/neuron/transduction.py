@@ -9,7 +9,7 @@ What does not depend on the gains, SED and its rate on fine knots, is a `Drive`.
 many gains: each costs a linear combination.
 
 In the paper both terms follow SED. As an extension, traces may bring another quantity for the dynamic term:
-I = beta + k_d |Q'| + k_s U (docs/decisions/what-the-dynamic-term-follows.md).
+I = beta + k_d |Q'| + k_s U (docs/decisions/dynamic-term-quantity.md).
 """
 
 from __future__ import annotations

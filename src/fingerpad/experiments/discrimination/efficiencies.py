@@ -24,7 +24,7 @@ LEAST_KNOWN = 10.0
 
 SMALLEST_SPREAD = 1.0
 """Noise beside that which multiplies: without it, an afferent that fires nothing would tell a stimulus with
-certainty from one that makes it fire (docs/decisions/ideal-observer-of-questions.md). [spikes/s or ms]"""
+certainty from one that makes it fire (docs/decisions/ideal-observer-of-tasks.md). [spikes/s or ms]"""
 
 
 def presentations(table: FloatArray, noise_sigma: float, seed: int) -> list[Presentation]:
