@@ -53,8 +53,9 @@ def seconds_of_parts(manifest: Mapping[str, Any], whole_s: float) -> dict[str, f
     {'fit': 2.0, 'reading what is stored': 1.0, 'the rest of the study': 1.0,
      'imports, figures and report': 5.0}
     """
-    work = {stage["name"]: stage["wall_s"] for stage in manifest["stages"] if "indentations" not in stage}
-    reading_s = sum(stage["wall_s"] for stage in manifest["stages"] if "indentations" in stage)
+    stages = manifest["stages"]
+    work = {stage["name"]: stage["wall_s"] for stage in stages if stage.get("indentations") is None}
+    reading_s = sum(stage["wall_s"] for stage in stages if stage.get("indentations") is not None)
     return {
         **work,
         "reading what is stored": reading_s,

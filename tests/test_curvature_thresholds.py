@@ -148,8 +148,8 @@ def test_a_threshold_out_of_reach_is_said_and_costs_only_its_own_row(found):
     assert [entry["standard_per_m"] for entry in reached] == [144.0, 200.0]
     assert [entry["standard_per_m"] for entry in missed] == [287.0, 400.0]
     rows = study.weber_rows(loud)
-    assert rows[0]["met"] is False
-    assert "No sphere" in rows[0]["note"]
+    assert rows[0].met is False
+    assert "No sphere" in rows[0].note
     assert png(page.draw, loud)[:4] == b"\x89PNG"
     assert "No sphere" in page.tables(loud)[0].note
 
@@ -182,7 +182,7 @@ def test_weber_rows_are_judged_in_whole_per_cent(found):
         section["populations"][0]["standards"] = [
             {"standard_per_m": 287.0, "weber_fraction": fraction} for fraction in fractions
         ]
-        assert study.weber_rows(section)[0]["met"] is met
+        assert study.weber_rows(section)[0].met is met
 
 
 def test_page_shows_and_names_what_was_found(found):

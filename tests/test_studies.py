@@ -426,8 +426,8 @@ def test_a_measure_that_stays_silent_is_left_out_and_named():
         == set(found["statistics"]["shift"]) - {"euclidean"}
     )
     told = percept_claims.percept_rows(plain(found))
-    assert any("latency" in row["quantity"] for row in told)
-    assert not any("dynamic Gradient Sum" in row["quantity"] for row in told)
+    assert any("latency" in row.quantity for row in told)
+    assert not any("dynamic Gradient Sum" in row.quantity for row in told)
 
 
 def test_positions_draw_their_noise_apart():
@@ -795,18 +795,17 @@ def good_results():
 
 
 def rows(results):
-    return {row["quantity"]: row for row in plain(comparison.comparison(results))}
+    return {row.quantity: row for row in comparison.comparison(results)}
 
 
 def test_a_good_run_meets_every_criterion():
-    found = plain(comparison.comparison(good_results()))
+    found = comparison.comparison(good_results())
     # The paper shows the border of the nail without a number to judge by.
-    assert [row["quantity"].split()[-2:] for row in found if row["met"] is not True] == [["(Figure", "9)"]]
-    assert len({row["quantity"] for row in found}) == len(found) > 20
+    assert [row.quantity.split()[-2:] for row in found if row.met is not True] == [["(Figure", "9)"]]
+    assert len({row.quantity for row in found}) == len(found) > 20
     for row in found:
-        assert set(row) == {"quantity", "paper", "ours", "difference", "status", "met", "note"}
-        assert row["paper"]
-        assert row["ours"]
+        assert row.paper
+        assert row.ours
 
 
 def worse(*path):
@@ -897,10 +896,10 @@ def test_a_number_made_worse_is_marked_as_a_miss_and_no_other(change, missed):
     results = good_results()
     change(results)
     found = rows(results)
-    assert {name for name, row in found.items() if row["met"] is False} == missed
-    judged = [row for row in found.values() if row["met"] is not None]
+    assert {name for name, row in found.items() if row.met is False} == missed
+    judged = [row for row in found.values() if row.met is not None]
     assert len(judged) == len(found) - 1
-    assert sum(row["met"] is True for row in judged) == len(judged) - len(missed)
+    assert sum(row.met is True for row in judged) == len(judged) - len(missed)
 
 
 @pytest.mark.parametrize(("difference", "met"), [(0.099, True), (0.101, False)])
@@ -914,15 +913,15 @@ def test_other_meshes_make_a_row_only_where_they_were_pressed(difference, met):
         "limit": 0.1,
     }
     added = {name: row for name, row in rows(results).items() if name not in before}
-    assert [row["met"] for row in added.values()] == [met]
-    assert "70.0, 76.5" in next(iter(added.values()))["note"]
+    assert [row.met for row in added.values()] == [met]
+    assert "70.0, 76.5" in next(iter(added.values())).note
 
 
 def test_deflection_far_from_the_indenter_does_not_decide_between_trials():
     results = good_results()
     line = results["skin_deflection"]["trial1"]["line"]
     line["deflection_mm"] = np.where(np.abs(line["distance_mm"]) > 5.0, -100.0, line["deflection_mm"])
-    assert rows(results)["Trial 1, deflection under the line, against Trial 3"]["met"] is True
+    assert rows(results)["Trial 1, deflection under the line, against Trial 3"].met is True
 
 
 @pytest.mark.parametrize(
@@ -941,7 +940,7 @@ def test_deflection_far_from_the_indenter_does_not_decide_between_trials():
 )
 def test_both_numbers_and_their_difference_are_written(quantity, published, ours, difference):
     row = rows(good_results())[quantity]
-    assert (row["paper"], row["ours"], row["difference"]) == (published, ours, difference)
+    assert (row.paper, row.ours, row.difference) == (published, ours, difference)
 
 
 # What is written

@@ -334,7 +334,7 @@ def write_page(
     return path
 
 
-_KNOWN = {"comparison", *(chapter.section for chapter in CHAPTERS)}
+_KNOWN = {"format", "format_version", "comparison", *(chapter.section for chapter in CHAPTERS)}
 
 
 def _drawn(chapter: Chapter, section: Any) -> dict[str, Any]:

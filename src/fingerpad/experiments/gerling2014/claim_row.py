@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from fingerpad.core.results import result_class
 from fingerpad.data.published import Published
 
 CLOSE = 0.2
@@ -11,7 +10,37 @@ CLOSE = 0.2
 
 MATERIALS = "materials assumed (Tables 1 and 2 are lost), geometry read"
 
-ClaimRow = dict[str, Any]
+
+@result_class
+class ClaimRow:
+    """A claim of the paper beside this run.
+
+    Parameters
+    ----------
+    quantity : str
+        What is compared.
+    paper, ours, difference : str
+        As they are printed.
+    status : str
+        How far the inputs can be trusted.
+    met : bool or None
+        Whether the claim is met; None where the paper gives no criterion.
+    note : str
+        How it was judged.
+
+    Examples
+    --------
+    >>> ClaimRow(quantity="hit rate", paper="0.58", ours="0.60", met=True).met
+    True
+    """
+
+    quantity: str
+    paper: str
+    ours: str
+    difference: str = ""
+    status: str = ""
+    met: bool | None = None
+    note: str = ""
 
 
 def claim_row(
@@ -23,22 +52,16 @@ def claim_row(
     met: bool | None = None,
     note: str = "",
 ) -> ClaimRow:
-    """Return a row: what, the paper's, ours, their difference, what it rests on, the verdict and a note.
-
-    Examples
-    --------
-    >>> claim_row("hit rate", "0.58", "0.60", met=True)["met"]
-    True
-    """
-    return {
-        "quantity": quantity,
-        "paper": published,
-        "ours": ours,
-        "difference": difference,
-        "status": status,
-        "met": met,
-        "note": note,
-    }
+    """Return a row from its parts in order."""
+    return ClaimRow(
+        quantity=quantity,
+        paper=published,
+        ours=ours,
+        difference=difference,
+        status=status,
+        met=met,
+        note=note,
+    )
 
 
 def measured_row(

@@ -7,7 +7,7 @@ from typing import Any
 
 from fingerpad.data import paper
 from fingerpad.data.published import Published
-from fingerpad.experiments.gerling2014.claim_row import MATERIALS, claim_row, measured_row
+from fingerpad.experiments.gerling2014.claim_row import MATERIALS, ClaimRow, claim_row, measured_row
 from fingerpad.experiments.gerling2014.curvature_thresholds import weber_rows
 from fingerpad.experiments.gerling2014.percept_claims import mesh_noise_rows, percept_rows
 
@@ -15,7 +15,7 @@ LEAST_R2 = 0.93
 """R² that Trial 3 must reach under the cylinder: the laboratory's own later fit."""
 
 
-def comparison(results: Mapping[str, Any]) -> list[dict[str, Any]]:
+def comparison(results: Mapping[str, Any]) -> list[ClaimRow]:
     """Rows of the table "paper | ours | difference | status of the inputs".
 
     Parameters
@@ -25,9 +25,7 @@ def comparison(results: Mapping[str, Any]) -> list[dict[str, Any]]:
 
     Returns
     -------
-    list of dict
-        `quantity`, `paper`, `ours`, `difference`, `status`, `met` (None where the paper gives no criterion)
-        and `note`.
+    list of ClaimRow
     """
     return [
         *_deflection(results["skin_deflection"]),
@@ -39,7 +37,7 @@ def comparison(results: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _deflection(found: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _deflection(found: Mapping[str, Any]) -> list[ClaimRow]:
     later: Published = paper.LATER_DEFLECTION_R2
     trial_3 = found["trial3"]["cylinder"]
     r2 = trial_3["r2"]
@@ -84,7 +82,7 @@ def _mean_excess(trial: Mapping[str, Any], reference: Mapping[str, Any]) -> floa
     return float(sum(pairs) / len(pairs))
 
 
-def _single_unit(found: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _single_unit(found: Mapping[str, Any]) -> list[ClaimRow]:
     status = MATERIALS + "; recordings read"
     rows = [
         measured_row(
@@ -124,7 +122,7 @@ def _single_unit(found: Mapping[str, Any]) -> list[dict[str, Any]]:
     return rows
 
 
-def _nail(found: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _nail(found: Mapping[str, Any]) -> list[ClaimRow]:
     low, high = found["ratio_range"]
     return [
         claim_row(

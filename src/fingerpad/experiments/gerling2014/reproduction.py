@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from fingerpad.core.checks import whole
 from fingerpad.core.progress import Progress
-from fingerpad.core.results import to_json
+from fingerpad.core.results import result_class
 from fingerpad.data import all_published, protocol
 from fingerpad.experiments.conditions import Conditions, Touch
 from fingerpad.experiments.gerling2014 import (
@@ -30,7 +29,9 @@ from fingerpad.experiments.gerling2014 import (
     sphere_discrimination,
     spike_fit,
 )
+from fingerpad.experiments.gerling2014.claim_row import ClaimRow
 from fingerpad.experiments.gerling2014.comparison import comparison
+from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.neuron.afferent import Afferent
 
@@ -70,7 +71,74 @@ class Reproduction:
         return self.conditions.resolution != "quick" if self.extended is None else self.extended
 
 
-def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, Any]:
+@result_class
+class PublishedNumber:
+    """A published number on which the results rest, as `fingerpad.data.all_published` lists it.
+
+    Parameters
+    ----------
+    name : str
+        What it is.
+    value : float or tuple of float
+        In `unit`.
+    unit : str
+        "1" for pure numbers.
+    source : str
+        Where it was published.
+    status : {"paper", "read", "recalled", "assumed"}
+        How far it can be trusted; see `fingerpad.data.STATUSES`.
+    """
+
+    name: str
+    value: float | tuple[float, ...]
+    unit: str
+    source: str
+    status: str
+
+
+@result_class
+class ReproductionResult:
+    """Result of a reproduction, the content of `results.json`.
+
+    Parameters
+    ----------
+    format, format_version : str, int
+        Of the file.
+    skin_deflection : dict
+        Level 1, see `skin_deflection`.
+    single_unit : dict
+        Level 2, see `single_unit`.
+    discrimination, population, nail : dict
+        Level 3, see `sphere_discrimination`, `response_maps` and `nail_border`.
+    mesh_noise, drive_quantities, spike_fit, single_unit_uncertainty, curvature_thresholds, population_timing
+        What goes beyond the paper, None where it was not asked for.
+    comparison : tuple of ClaimRow
+        The paper's numbers beside ours.
+    inputs : tuple of PublishedNumber
+        Published numbers on which all of it rests.
+    manifest : Manifest
+        What ran.
+    """
+
+    format: Literal["fingerpad reproduction"] = "fingerpad reproduction"
+    format_version: Literal[1] = 1
+    skin_deflection: dict[str, Any]
+    single_unit: dict[str, Any]
+    discrimination: dict[str, Any]
+    population: dict[str, Any]
+    nail: dict[str, Any]
+    mesh_noise: dict[str, Any] | None = None
+    drive_quantities: dict[str, Any] | None = None
+    spike_fit: dict[str, Any] | None = None
+    single_unit_uncertainty: dict[str, Any] | None = None
+    curvature_thresholds: dict[str, Any] | None = None
+    population_timing: dict[str, Any] | None = None
+    comparison: tuple[ClaimRow, ...]
+    inputs: tuple[PublishedNumber, ...]
+    manifest: Manifest
+
+
+def reproduce(run: Reproduction, progress: Progress | None = None) -> ReproductionResult:
     """Run the three validations and compare them with the paper.
 
     Parameters
@@ -82,9 +150,8 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
 
     Returns
     -------
-    dict
-        Numbers, strings and lists only, as written to results.json. All but the times, dates and memory of
-        `manifest` depend on nothing but the conditions.
+    ReproductionResult
+        All but the times, dates and memory of `manifest` depend on the conditions only.
 
     Raises
     ------
@@ -166,14 +233,15 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> dict[str, 
             advance()
             results["population_timing"] = response_maps.timing(sphere_responses, afferent, conditions.finger)
             advance()
-    results["comparison"] = comparison(results)
-    results["inputs"] = [asdict(number) for number in all_published()]
     meshes = {"sphere": spheres[STANDARD_SPHERE].mesh, "bar": bar_responses[0].mesh} | {
         name: deflection["trial3", name].mesh for name in skin_deflection.INDENTERS
     }
-    half_model = not spheres[STANDARD_SPHERE].grading.full
-    results["manifest"] = json.loads(to_json(runner.manifest(conditions, meshes, half_model)))
-    return plain(results)
+    return ReproductionResult(
+        **plain(results),
+        comparison=tuple(comparison(results)),
+        inputs=tuple(PublishedNumber(**asdict(number)) for number in all_published()),
+        manifest=runner.manifest(conditions, meshes, half_model=not spheres[STANDARD_SPHERE].grading.full),
+    )
 
 
 def plain(value: Any) -> Any:

@@ -23,8 +23,18 @@ def schema(file_format: str) -> dict[str, Any]:
     file_format : str
         The field `format` of a file of results.
     """
-    name = file_format.replace(" ", "-") + ".schema.json"
-    return json.loads((files(__name__) / name).read_text(encoding="utf-8"))
+    return json.loads((files(__name__) / file_name(file_format)).read_text(encoding="utf-8"))
+
+
+def file_name(file_format: str) -> str:
+    """Name of the file that holds the schema of a format.
+
+    Examples
+    --------
+    >>> file_name("fingerpad reproduction")
+    'fingerpad-reproduction.schema.json'
+    """
+    return file_format.replace(" ", "-") + ".schema.json"
 
 
 def write(path: Path, results: ResultFile) -> None:

@@ -1,0 +1,21 @@
+"""Schemas of the files of results: those in the package are the ones that the types give."""
+
+import json
+
+import pytest
+
+from fingerpad.core.results import file_format
+from fingerpad.experiments.schemas import file_name, schema
+from fingerpad.experiments.schemas.__main__ import RESULT_FILES, main
+
+
+@pytest.mark.parametrize("results", RESULT_FILES)
+def test_the_schema_in_the_package_is_the_one_that_the_types_give(results, tmp_path):
+    main(tmp_path)
+    name = file_format(results)[0]
+    assert json.loads((tmp_path / file_name(name)).read_text(encoding="utf-8")) == schema(name)
+
+
+def test_every_file_of_results_has_its_own_format(tmp_path):
+    main(tmp_path)
+    assert len(list(tmp_path.iterdir())) == len(RESULT_FILES)
