@@ -20,7 +20,7 @@ import pytest
 from fingerpad import __version__
 from fingerpad.core.compilation import NOTICE
 from fingerpad.data import all_published
-from fingerpad.experiments.discrimination.task_files import read_question
+from fingerpad.experiments.discrimination.task_files import read_task
 from fingerpad.experiments.discrimination.task_stimuli import touches
 from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.report.page import CHAPTERS, METHODS
@@ -495,9 +495,7 @@ def test_the_papers_question_asked_as_ones_own_has_the_papers_hit_rates(first, a
 def test_a_question_killed_at_any_moment_goes_on_and_ends_with_the_same_bits(first, asked, tmp_path):
     folder = prepared(first, tmp_path)
     store = folder / STORE_FOLDER
-    spheres = [
-        Store(store).path(touch) for touch in touches(read_question(folder / "question.yaml")).values()
-    ]
+    spheres = [Store(store).path(touch) for touch in touches(read_task(folder / "question.yaml")).values()]
     for path in spheres[:3]:
         path.unlink()
     run = discriminate(folder, "--jobs", "2", start_new_session=True)

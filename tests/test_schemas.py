@@ -2,6 +2,7 @@
 
 import json
 
+import fastjsonschema
 import pytest
 
 from fingerpad.core.results import file_format
@@ -19,3 +20,11 @@ def test_the_schema_in_the_package_is_the_one_that_the_types_give(results, tmp_p
 def test_every_file_of_results_has_its_own_format(tmp_path):
     main(tmp_path)
     assert len(list(tmp_path.iterdir())) == len(RESULT_FILES)
+
+
+@pytest.mark.parametrize("results", RESULT_FILES)
+def test_a_schema_refuses_a_file_without_its_parts(results):
+    name, version = file_format(results)
+    check = fastjsonschema.compile(schema(name))
+    with pytest.raises(fastjsonschema.JsonSchemaValueException, match="must contain"):
+        check({"format": name, "format_version": version})

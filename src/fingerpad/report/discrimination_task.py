@@ -1,25 +1,30 @@
-"""A question of one's own, answered on one page: what was found, thresholds, hit rates and efficiencies."""
+"""The page of a discrimination task: thresholds, hit rates, efficiencies and their figures."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import json
+import math
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
+from fingerpad.core.results import to_json
+from fingerpad.experiments.discrimination.analysis import TaskResult
+from fingerpad.experiments.discrimination.decoding import SideCurve
+from fingerpad.experiments.discrimination.run import DiscriminationFile
 from fingerpad.report import tables
 from fingerpad.report.discrimination_task_figures import (
     CODES,
-    caption_curves,
-    caption_responses,
-    caption_statistics,
-    draw_curves,
-    draw_responses,
-    draw_statistics,
-    main_reading,
+    caption_task_curves,
+    caption_task_responses,
+    caption_task_statistics,
+    draw_task_curves,
+    draw_task_responses,
+    draw_task_statistics,
+    main_decoding,
     titled,
     why_silent,
 )
-from fingerpad.report.formatting import ABSENT, fixed, joined, number, plain, whole_percent
+from fingerpad.report.formatting import ABSENT, fixed, joined, number, whole_percent
 from fingerpad.report.page import Chapter, Drawing, write_page
 from fingerpad.report.tables import Row, Table
 
@@ -27,34 +32,38 @@ PAGE = "discriminate.html"
 SEVERAL = {"static": "static rates", "dynamic": "dynamic rates", "latency": "first-spike latencies"}
 
 
-def answer_tables(section: Mapping[str, Any]) -> list[Table]:
-    """Return thresholds, hit rates, statistics and the population."""
-    every = (_thresholds(section), _hit_rates(section), _efficiencies(section), _population(section))
+def task_tables(found: TaskResult) -> list[Table]:
+    """Tables of thresholds, hit rates, efficiencies and the population."""
+    every = (_thresholds(found), _hit_rates(found), _efficiencies(found), _population(found))
     return [table for table in every if table.rows]
 
 
 CHAPTERS = (
     Chapter(
         "discrimination",
-        "The answer",
+        "Results",
         (
-            Drawing(1, "curves", "How often stimuli are told apart", draw_curves, caption_curves),
-            Drawing(2, "statistics", "What the observer compares", draw_statistics, caption_statistics),
-            Drawing(3, "responses", "What the population answers", draw_responses, caption_responses),
+            Drawing(1, "curves", "Hit rates and psychometric curves", draw_task_curves, caption_task_curves),
+            Drawing(
+                2, "statistics", "Statistics of the codes", draw_task_statistics, caption_task_statistics
+            ),
+            Drawing(
+                3, "responses", "Responses of the population", draw_task_responses, caption_task_responses
+            ),
         ),
-        answer_tables,
+        task_tables,
     ),
-    Chapter("manifest", "How this was made", (), tables.manifest),
+    Chapter("manifest", "Provenance", (), tables.manifest),
 )
 
 
-def write_discrimination_page(results: Mapping[str, Any], folder: Path) -> Path:
-    """Write the page of a question, `discriminate.html`, and its figures.
+def write_task_page(results: DiscriminationFile, folder: Path) -> Path:
+    """Write the page of a task, `discriminate.html`, and its figures.
 
     Parameters
     ----------
-    results : mapping
-        What `studies.discriminate.run` returns.
+    results : DiscriminationFile
+        From `discriminate`.
     folder : Path
         Where; made if needed.
 
@@ -64,147 +73,123 @@ def write_discrimination_page(results: Mapping[str, Any], folder: Path) -> Path:
         The page.
     """
     return write_page(
-        results,
+        {"discrimination": results.discrimination, "manifest": json.loads(to_json(results.manifest))},
         CHAPTERS,
         Path(folder) / PAGE,
-        heading=results["discrimination"]["question"],
+        heading=results.discrimination.question,
         subtitle="A finite-element fingertip, a population of slowly adapting afferents and an observer, "
         "after Gerling et al. 2014.",
-        paragraphs=summary(results["discrimination"]),
+        paragraphs=task_summary(results.discrimination),
     )
 
 
-def summary(section: Mapping[str, Any]) -> list[str]:
-    """Return what was found, in a few sentences.
-
-    Examples
-    --------
-    >>> summary({
-    ...     "stimulus": ["287", "365"], "level": [287.0, 365.0], "axis": "curvature [1/m]",
-    ...     "noise": {"sigma": 0.137, "fitted_to": None},
-    ...     "readings": [{"code": "gradient_sum", "measure": "static", "hit_rate": [0.93], "curves": []}],
-    ... })
-    ['Gradient Sum of static rates tells 365 from 287 in 93 % of trials (curvature [1/m]), with noise
-    σ₁ = 0.137.']
-    """
-    main, noise = main_reading(section), section["noise"]
-    standard, *others = section["stimulus"]
-    rates = [(name, whole_percent(rate)) for name, rate in zip(others, main["hit_rate"], strict=True)]
-    fitted = (
-        f", fitted to {joined([str(name) for name in noise['fitted_to']['stimulus']])}"
-        if noise["fitted_to"]
-        else ""
-    )
-    (nearest, rate), *farther = rates
-    told = joined([f"{nearest} from {standard} in {rate}", *(f"{name} in {rate}" for name, rate in farther)])
-    of = "" if section["level"] is None else f" ({section['axis']})"
-    found = [
-        f"{CODES[main['code']]} of {SEVERAL[main['measure']]} tells {told} of trials{of}, with noise "
-        f"σ₁ = {number(noise['sigma'])}{fitted}."
+def task_summary(found: TaskResult) -> list[str]:
+    """Summarise a task in a few sentences: hit rates of the main decoding, and its thresholds."""
+    main, noise = main_decoding(found), found.noise
+    assert main.hit_rate is not None
+    standard, *others = found.stimulus
+    rates = [
+        f"{name} from {standard} in {whole_percent(rate)}"
+        for name, rate in zip(others, main.hit_rate, strict=True)
     ]
-    return found + [_threshold_sentence(section, side) for side in main["curves"]]
+    fitted = f", fitted to {joined(list(noise.fitted_to.stimulus))}" if noise.fitted_to else ""
+    of = "" if found.level is None else f" ({found.axis})"
+    sentence = (
+        f"{CODES[main.code]} of {SEVERAL[main.measure]} discriminates {joined(rates)} of trials{of}, "
+        f"with noise σ₁ = {number(noise.sigma)}{fitted}."
+    )
+    return [sentence, *(_threshold_sentence(found, side) for side in main.curves)]
 
 
-def _threshold_sentence(section: Mapping[str, Any], side: Mapping[str, Any]) -> str:
-    if "why_not" in side:
-        return f"There is no threshold {side['side']} the standard: {side['why_not']}"
-    threshold = side["threshold"]
-    share = threshold["over_standard"]
+def _threshold_sentence(found: TaskResult, side: SideCurve) -> str:
+    if side.fit is None:
+        return f"There is no threshold {side.side} the standard: {side.why_not}"
+    threshold = side.fit.threshold
+    share = f", {whole_percent(threshold.over_standard)} of it" if threshold.over_standard else ""
     return (
-        f"{whole_percent(threshold['proportion'])} are reached {number(threshold['difference'])} "
-        f"{side['side']} the standard, at {number(threshold['level'])} ({section['axis']})"
-        + (f", {whole_percent(share)} of it" if share else "")
-        + f"; 95 % credible {_interval(threshold['posterior_interval'])} with "
-        f"{number(side['trials'])} trials per comparison."
+        f"{whole_percent(threshold.proportion)} are reached {number(threshold.difference)} {side.side} the "
+        f"standard, at {number(threshold.level)} ({found.axis}){share}; 95 % credible interval "
+        f"{_interval(threshold.posterior_interval)} with {number(side.fit.trials)} trials per comparison."
     )
 
 
-def _with_error(value: float | None, error: float | None) -> str:
-    return ABSENT if value is None else f"{fixed(value, 3)} ± {fixed(error, 3)}"
+def _with_error(value: float, error: float) -> str:
+    return ABSENT if math.isnan(value) else f"{fixed(value, 3)} ± {fixed(error, 3)}"
 
 
-def _interval(ends: Sequence[float | None]) -> str:
+def _interval(ends: Sequence[float]) -> str:
     return " … ".join(number(end) for end in ends)
 
 
-def _thresholds(section: Mapping[str, Any]) -> Table:
-    rows = []
-    for reading in section["readings"]:
-        for side in reading.get("curves") or []:
-            if "why_not" in side:
-                cells = [titled(reading), side["side"], side["why_not"], "", "", "", "", ""]
-            else:
-                threshold = side["threshold"]
-                cells = [
-                    titled(reading),
-                    side["side"],
-                    number(threshold["level"]),
-                    number(threshold["difference"]),
-                    _interval(threshold["posterior_interval"]),
-                    _interval(threshold["bootstrap_interval"]),
-                    ABSENT
-                    if threshold["over_standard"] is None
-                    else whole_percent(threshold["over_standard"]),
-                    number(side["slope"]),
-                ]
-            rows.append(Row(cells))
+def _thresholds(found: TaskResult) -> Table:
+    rows = [
+        Row((titled(decoding), side.side, *_threshold_cells(side)))
+        for decoding in found.decodings
+        for side in decoding.curves
+    ]
     columns = (
-        "reading", "side", f"threshold, {section['axis']}", "difference", "95 % credible",
+        "decoding", "side", f"threshold, {found.axis}", "difference", "95 % credible",
         "95 %, bootstrap", "of the standard", "slope",
     )  # fmt: skip
     note = (
-        "Difference: from the standard to the threshold, with intervals of an experiment of as many trials "
-        "per comparison as the question says. Slope: of the hit rate there, per unit."
+        "Difference: from the standard to the threshold. Intervals: of an experiment with the trials per "
+        "comparison of the task. Slope: of the hit rate at the threshold, per unit."
     )
     return Table("Thresholds", columns, rows, note)
 
 
-def _hit_rates(section: Mapping[str, Any]) -> Table:
+def _threshold_cells(side: SideCurve) -> tuple[str, ...]:
+    if side.fit is None:
+        return (side.why_not or "", "", "", "", "", "")
+    threshold = side.fit.threshold
+    share = threshold.over_standard
+    return (
+        number(threshold.level),
+        number(threshold.difference),
+        _interval(threshold.posterior_interval),
+        _interval(threshold.bootstrap_interval),
+        ABSENT if share is None else whole_percent(share),
+        number(side.fit.slope),
+    )
+
+
+def _hit_rates(found: TaskResult) -> Table:
     rows = [
-        Row(
-            (
-                titled(reading),
-                *(
-                    _with_error(mean, spread)
-                    for mean, spread in zip(reading["hit_rate"], reading["hit_rate_sd"], strict=True)
-                ),
-            )
-        )
-        for reading in section["readings"]
-        if reading["hit_rate"] is not None
+        Row((titled(decoding), *map(_with_error, decoding.hit_rate, decoding.hit_rate_sd)))
+        for decoding in found.decodings
+        if decoding.hit_rate is not None and decoding.hit_rate_sd is not None
     ]
     silent = [
-        f"{titled(reading)}: none, the population is {why_silent(reading)}"
-        for reading in section["readings"]
-        if reading["hit_rate"] is None
+        f"{titled(decoding)}: none, the population is {why_silent(decoding)}"
+        for decoding in found.decodings
+        if decoding.hit_rate is None
     ]
-    columns = ("reading", *section["stimulus"][1:])
+    columns = ("decoding", *found.stimulus[1:])
     return Table("Hit rates, mean ± standard deviation", columns, rows, "; ".join(silent))
 
 
-def _efficiencies(section: Mapping[str, Any]) -> Table:
+def _efficiencies(found: TaskResult) -> Table:
     rows = [
-        Row(
-            (
-                titled(reading),
-                *(
-                    _with_error(share, error)
-                    for share, error in zip(reading["efficiency"], reading["efficiency_error"], strict=True)
-                ),
-            )
-        )
-        for reading in section["readings"]
-        if reading.get("efficiency")
+        Row((titled(decoding), *map(_with_error, decoding.efficiency, decoding.efficiency_error)))
+        for decoding in found.decodings
+        if decoding.efficiency is not None and decoding.efficiency_error is not None
     ]
     note = (
-        "The share of its trials that the ideal observer would need to judge as well as the code; a dash "
-        "where the ideal observer nearly guesses or never fails."
+        "The share of its trials that the ideal observer needs to perform as the code does; a dash where d' "
+        "of the ideal observer is not known well enough or infinite."
     )
-    return Table("Efficiency ± standard error", ("reading", *section["stimulus"][1:]), rows, note)
+    return Table("Efficiency ± standard error", ("decoding", *found.stimulus[1:]), rows, note)
 
 
-def _population(section: Mapping[str, Any]) -> Table:
-    facts = {key: value for key, value in section["population"].items() if key not in ("positions_mm",)}
-    return Table(
-        "The population", ("", ""), [Row((tables.spelled(key), plain(value))) for key, value in facts.items()]
-    )
+def _population(found: TaskResult) -> Table:
+    population = found.population
+    facts = {
+        "layout": population.layout,
+        "receptors": number(population.n_receptors),
+        "pitch [mm]": number(population.pitch_mm),
+        "density [1/cm²]": number(population.density_per_cm2),
+        "sensitivity": ABSENT
+        if population.sensitivity is None
+        else f"{number(population.sensitivity.min())} … {number(population.sensitivity.max())}",
+    }
+    return Table("The population", ("", ""), [Row(fact) for fact in facts.items()])

@@ -1,8 +1,8 @@
-"""Figures of a question of one's own: psychometric curves, what codes make of stimuli, responses."""
+"""Figures of a discrimination task: psychometric curves, statistics of the codes, responses."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.experiments.discrimination.analysis import Decoding, TaskResult
 from fingerpad.report.formatting import number, whole_percent
 from fingerpad.report.style import (
     BLACK,
@@ -20,7 +21,6 @@ from fingerpad.report.style import (
     ORANGE,
     PALE,
     new_figure,
-    numbers,
     say_nothing_to_draw,
 )
 
@@ -45,34 +45,34 @@ _STYLES = (
 )
 
 
-def draw_responses(section: dict[str, Any]) -> Figure:
-    """Draw what the population answers to the standard and to comparisons, seen from the volar side.
+def draw_task_responses(found: TaskResult) -> Figure:
+    """Draw the responses to the standard and to comparisons, seen from the volar side.
 
     Parameters
     ----------
-    section : dict
-        `results["discrimination"]` of `studies.discriminate.run`.
+    found : TaskResult
+        What the task found.
 
     Returns
     -------
     Figure
     """
-    measure = main_reading(section)["measure"]
+    measure = main_decoding(found).measure
     what, unit = MEASURES[measure]
-    answers, places = numbers(section["responses"][measure]), numbers(section["population"]["positions_mm"])
-    shown = _shown(len(answers))
+    responses, places = found.responses[measure], found.population.positions_mm
+    shown = _shown(len(responses))
     low, high = places[:, [-1, 0]].min(axis=0) - MARGIN_MM, places[:, [-1, 0]].max(axis=0) + MARGIN_MM
     across, along = high - low
     height = float(np.clip(8.0 / len(shown) * along / across, 0.5, 4.0))
     figure = new_figure(10.0, 2.0 * height + 1.4)
     grid = figure.subplots(2, len(shown), sharex=True, sharey=True, squeeze=False)
-    largest = float(np.nanmax(np.abs(answers[shown] - answers[0])))
+    largest = float(np.nanmax(np.abs(responses[shown] - responses[0])))
     for column, row in enumerate(shown):
-        name = section["stimulus"][row]
-        picture = _answers(grid[0, column], places, answers[row], answers)
+        name = found.stimulus[row]
+        picture = _responses(grid[0, column], places, responses[row], responses)
         grid[0, column].set_title(f"{name}, standard" if row == 0 else name)
         if row:
-            _differences(grid[1, column], places, answers[row] - answers[0], largest)
+            _differences(grid[1, column], places, responses[row] - responses[0], largest)
     grid[1, 0].set_axis_off()
     grid[1, 0].text(
         0.5,
@@ -95,12 +95,12 @@ def draw_responses(section: dict[str, Any]) -> Figure:
     return figure
 
 
-def _answers(axes: Axes, places: FloatArray, answers: FloatArray, of_all: FloatArray) -> PathCollection:
-    """Draw every afferent where it ends, as light as it answers."""
+def _responses(axes: Axes, places: FloatArray, responses: FloatArray, of_all: FloatArray) -> PathCollection:
+    """Draw every afferent where it ends, coloured by its response."""
     return axes.scatter(
         places[:, -1],
         places[:, 0],
-        c=answers,
+        c=responses,
         s=_marker_size(len(places)),
         cmap="viridis",
         vmin=np.nanmin(of_all),
@@ -118,65 +118,64 @@ def _differences(axes: Axes, places: FloatArray, difference: FloatArray, largest
         axes.scatter(places[there, -1], places[there, 0], s=size[there], marker=marker, color=colour)
 
 
-def draw_statistics(section: dict[str, Any]) -> Figure:
-    """Draw what each code makes of every stimulus: mean and spread over noisy presentations.
+def draw_task_statistics(found: TaskResult) -> Figure:
+    """Draw the statistic of each code for every stimulus: mean and spread over noisy presentations.
 
     Parameters
     ----------
-    section : dict
-        As in `draw_responses`.
+    found : TaskResult
+        What the task found.
 
     Returns
     -------
     Figure
     """
-    readings = [reading for reading in section["readings"] if reading["code"] != "ideal"]
-    codes, measures = (
-        list(dict.fromkeys(reading[key] for reading in readings)) for key in ("code", "measure")
-    )
+    decodings = [decoding for decoding in found.decodings if decoding.code != "ideal"]
+    codes = list(dict.fromkeys(decoding.code for decoding in decodings))
+    measures = list(dict.fromkeys(decoding.measure for decoding in decodings))
     figure = new_figure(min(10.0, 4.0 * len(codes) + 1.5), 3.0 * len(measures) + 0.3)
     grid = figure.subplots(len(measures), len(codes), squeeze=False)
-    for axes, reading in zip(grid.flat, readings, strict=True):
-        axes.set_title(titled(reading))
-        if reading["hit_rate"] is None:
-            say_nothing_to_draw(axes, why_silent(reading))
+    for axes, decoding in zip(grid.flat, decodings, strict=True):
+        axes.set_title(titled(decoding))
+        if decoding.statistic is None:
+            say_nothing_to_draw(axes, why_silent(decoding))
             continue
-        where, _ = _places(section)
-        mean, spread = (numbers(reading["statistic"][key]) for key in ("mean", "sd"))
+        where, _ = _places(found)
+        mean, spread = decoding.statistic.mean, decoding.statistic.sd
         axes.axhspan(mean[0] - spread[0], mean[0] + spread[0], color=GREY, alpha=0.25, linewidth=0.0)
         axes.errorbar(where, mean, spread, fmt="o", color=BLUE, markersize=4.5, capsize=3.0, elinewidth=1.2)
         axes.plot(where[0], mean[0], "D", color=BLACK, markersize=6.5, zorder=4)
-        axes.set_ylabel(f"{CODES[reading['code']]} [{MEASURES[reading['measure']][1]}]")
-        _name_axis(axes, section)
+        axes.set_ylabel(f"{CODES[decoding.code]} [{MEASURES[decoding.measure][1]}]")
+        _name_axis(axes, found)
     return figure
 
 
-def draw_curves(section: dict[str, Any]) -> Figure:
-    """Draw hit rates, psychometric curves with their bands, and what people do.
+def draw_task_curves(found: TaskResult) -> Figure:
+    """Draw hit rates, psychometric curves with their bands, and hit rates of people.
 
     Parameters
     ----------
-    section : dict
-        As in `draw_responses`.
+    found : TaskResult
+        What the task found.
 
     Returns
     -------
     Figure
     """
-    measures = list(dict.fromkeys(reading["measure"] for reading in section["readings"]))
+    measures = list(dict.fromkeys(decoding.measure for decoding in found.decodings))
     figure = new_figure(min(10.0, 3.6 * len(measures) + 2.0), 4.6)
     grid = figure.subplots(1, len(measures), sharey=True, squeeze=False)
     for axes, measure in zip(grid[0], measures, strict=True):
-        of_measure = [reading for reading in section["readings"] if reading["measure"] == measure]
+        of_measure = [decoding for decoding in found.decodings if decoding.measure == measure]
         axes.set_title(MEASURES[measure][0])
         axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)))
-        if all(reading["hit_rate"] is None for reading in of_measure):
+        if all(decoding.hit_rate is None for decoding in of_measure):
             say_nothing_to_draw(axes, why_silent(of_measure[0]))
             continue
-        for reading, style in zip(of_measure, _STYLES, strict=False):
-            _curve(axes, section, reading, style)
-        _people(axes, section)
-        _name_axis(axes, section)
+        for decoding, style in zip(of_measure, _STYLES, strict=False):
+            _curve(axes, found, decoding, style)
+        _people(axes, found)
+        _name_axis(axes, found)
         axes.set_ylim(0.4, 1.03)
     grid[0, 0].set_ylabel("hit rate [fraction]")
     handles: dict[str, Any] = {}
@@ -187,114 +186,111 @@ def draw_curves(section: dict[str, Any]) -> Figure:
     return figure
 
 
-def _curve(axes: Axes, section: Mapping[str, Any], reading: Mapping[str, Any], style: Any) -> None:
-    if reading["hit_rate"] is None:
+def _curve(axes: Axes, found: TaskResult, decoding: Decoding, style: Any) -> None:
+    if decoding.hit_rate is None or decoding.hit_rate_sd is None:
         return
     colour, marker, line = style
-    where, _ = _places(section)
+    where, _ = _places(found)
     axes.errorbar(
         where[1:],
-        numbers(reading["hit_rate"]),
-        np.nan_to_num(numbers(reading["hit_rate_sd"])),
+        decoding.hit_rate,
+        np.nan_to_num(decoding.hit_rate_sd),
         fmt=marker,
         color=colour,
         markersize=5.0,
         capsize=3.0,
         elinewidth=1.0,
-        label=CODES[reading["code"]],
+        label=CODES[decoding.code],
     )
-    for side in reading["curves"]:
-        if "why_not" in side:
+    for side in decoding.curves:
+        if side.fit is None:
             continue
-        curve, threshold = side["curve"], side["threshold"]
-        level = numbers(curve["level"])
-        axes.fill_between(
-            level, numbers(curve["low"]), numbers(curve["high"]), color=colour, alpha=0.15, linewidth=0.0
-        )
-        axes.plot(level, numbers(curve["proportion"]), color=colour, linestyle=line, linewidth=1.5)
+        curve, threshold = side.fit.curve, side.fit.threshold
+        axes.fill_between(curve.level, curve.low, curve.high, color=colour, alpha=0.15, linewidth=0.0)
+        axes.plot(curve.level, curve.proportion, color=colour, linestyle=line, linewidth=1.5)
         axes.plot(
-            [threshold["level"]] * 2,
-            [0.4, threshold["proportion"]],
+            [threshold.level] * 2,
+            [0.4, threshold.proportion],
             color=colour,
             linewidth=0.9,
             linestyle=":",
         )
 
 
-def _people(axes: Axes, section: Mapping[str, Any]) -> None:
-    observed = section["observed"]
-    points = [point for point in observed["points"] if point["level"] is not None] if observed else []
+def _people(axes: Axes, found: TaskResult) -> None:
+    observed = found.observed
+    if observed is None:
+        return
+    points = [(point.level, point) for point in observed.points if point.level is not None]
     if not points:
         return
-    level, rate = (numbers([point[key] for point in points]) for key in ("level", "hit_rate"))
-    for point in points:
-        if point["interval"]:
-            axes.plot([point["level"]] * 2, point["interval"], color=BLACK, linewidth=1.4, zorder=5)
+    for level, point in points:
+        if point.interval:
+            axes.plot([level] * 2, point.interval, color=BLACK, linewidth=1.4, zorder=5)
     axes.plot(
-        level,
-        rate,
+        [level for level, _ in points],
+        [point.hit_rate for _, point in points],
         "D",
         color=BLACK,
         markerfacecolor="none",
         markersize=8.0,
         markeredgewidth=1.5,
         zorder=5,
-        label=f"people ({observed['source']})",
+        label=f"people ({observed.source})",
     )
 
 
-def caption_responses(section: Mapping[str, Any]) -> str:
-    """Say what the response maps show."""
-    main, n_stimuli = main_reading(section), len(section["stimulus"])
+def caption_task_responses(found: TaskResult) -> str:
+    """Caption of the response maps."""
+    main, n_stimuli = main_decoding(found), len(found.stimulus)
     left_out = n_stimuli - len(_shown(n_stimuli))
     return (
-        f"{MEASURES[main['measure']][0].capitalize()} of {section['population']['n_receptors']} afferents "
-        "without noise, the distal end above; below, what a stimulus adds to the standard or takes from it, "
+        f"{MEASURES[main.measure][0].capitalize()} of {found.population.n_receptors} afferents "
+        "without noise, the distal end above; below, the difference from the standard, "
         "by the area of triangles."
         + (f" {left_out} of the comparisons are left out here." if left_out else "")
     )
 
 
-def caption_statistics(section: Mapping[str, Any]) -> str:
-    """Say what the statistics show."""
+def caption_task_statistics(found: TaskResult) -> str:
+    """Caption of the statistics."""
     return (
-        "What the code makes of each stimulus: mean and standard deviation over noisy presentations, noise "
-        f"σ₁ = {number(section['noise']['sigma'])}. Diamond and grey band: the standard, "
+        "Statistic of the code for each stimulus: mean and standard deviation over noisy presentations, "
+        f"noise σ₁ = {number(found.noise.sigma)}. Diamond and grey band: the standard, "
         "whose distance is that between presentations of its own."
     )
 
 
-def caption_curves(section: Mapping[str, Any]) -> str:
-    """Say what the curves show."""
-    curves = [side for reading in section["readings"] for side in reading.get("curves") or []]
-    fitted = [side for side in curves if "why_not" not in side]
+def caption_task_curves(found: TaskResult) -> str:
+    """Caption of the curves."""
+    fitted = [side.fit for decoding in found.decodings for side in decoding.curves if side.fit]
     said = (
-        "How often each comparison is told from the standard; bars are one standard deviation over the "
+        "Hit rate of each comparison against the standard; bars are one standard deviation over the "
         "repetitions of the paper's protocol."
     )
     if fitted:
         first = fitted[0]
         said += (
-            f" Lines: psychometric functions ({first['sigmoid']}) of the difference from the standard, with "
-            f"95 % credible bands for an experiment of {number(first['trials'])} trials per comparison. "
-            f"Dotted: the threshold at {whole_percent(first['threshold']['proportion'])}."
+            f" Lines: psychometric functions ({first.sigmoid}) of the difference from the standard, with "
+            f"95 % credible bands for an experiment of {number(first.trials)} trials per comparison. "
+            f"Dotted: the threshold at {whole_percent(first.threshold.proportion)}."
         )
     return said
 
 
-def main_reading(section: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the first reading that has hit rates."""
-    return next(reading for reading in section["readings"] if reading["hit_rate"] is not None)
+def main_decoding(found: TaskResult) -> Decoding:
+    """Return the first decoding that has hit rates."""
+    return next(decoding for decoding in found.decodings if decoding.hit_rate is not None)
 
 
-def titled(reading: Mapping[str, Any]) -> str:
-    """Name a reading by its code and measure."""
-    return f"{CODES[reading['code']]}, {MEASURES[reading['measure']][0]}"
+def titled(decoding: Decoding) -> str:
+    """Name a decoding by its code and measure."""
+    return f"{CODES[decoding.code]}, {MEASURES[decoding.measure][0]}"
 
 
-def why_silent(reading: Mapping[str, Any]) -> str:
-    """Say under which stimuli there is nothing to read."""
-    return f"silent under {', '.join(reading['silent'][:3])}"
+def why_silent(decoding: Decoding) -> str:
+    """Name the stimuli under which the population is silent."""
+    return f"silent under {', '.join(decoding.silent[:3])}"
 
 
 def _shown(n_stimuli: int) -> list[int]:
@@ -309,17 +305,17 @@ def _marker_size(count: int) -> float:
     return float(np.clip(2500.0 / count, 4.0, 140.0))
 
 
-def _places(section: Mapping[str, Any]) -> tuple[FloatArray, Sequence[str] | None]:
+def _places(found: TaskResult) -> tuple[FloatArray, Sequence[str] | None]:
     """Where each stimulus stands along an axis, and its name if that place has no meaning."""
-    if section["level"] is None:
-        return np.arange(len(section["stimulus"]), dtype=np.float64), section["stimulus"]
-    return numbers(section["level"]), None
+    if found.level is None:
+        return np.arange(len(found.stimulus), dtype=np.float64), found.stimulus
+    return found.level, None
 
 
-def _name_axis(axes: Axes, section: Mapping[str, Any]) -> None:
-    where, names = _places(section)
+def _name_axis(axes: Axes, found: TaskResult) -> None:
+    where, names = _places(found)
     if names is None:
-        axes.set_xlabel(section["axis"])
+        axes.set_xlabel(found.axis)
     else:
         axes.set_xticks(where, names, rotation=30, ha="right")
         axes.set_xlabel("stimulus")

@@ -42,8 +42,8 @@ class Drawing:
     number: int
     name: str
     title: str
-    draw: Callable[[dict[str, Any]], Figure]
-    caption: Callable[[dict[str, Any]], str]
+    draw: Callable[[Any], Figure]
+    caption: Callable[[Any], str]
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,15 @@
-"""A population read by a code and a measure: hit rates, what is behind them, and a psychometric curve."""
+"""Decoding of a population by a code and a measure: hit rates, their statistic, and psychometric curves."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import IntArray, Purpose, normals
+from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import HitRates, ResponseMap
 from fingerpad.experiments.discrimination.task import CurveSettings
 from fingerpad.psychophysics import bootstrap, fit_psychometric, posterior
@@ -32,42 +32,140 @@ CURVE_POINTS = 61
 CREDIBLE = 0.95
 
 
-def responses(answers: Sequence[ResponseMap], measure: str, patience_ms: float | None = None) -> FloatArray:
+@result_class
+class TaskStatistic:
+    """Mean and standard deviation of a code's statistic over noisy presentations, (n_stimuli,)."""
+
+    mean: Vector
+    sd: Vector
+
+
+@result_class
+class CurveThreshold:
+    """Threshold of a psychometric curve.
+
+    Parameters
+    ----------
+    proportion : float
+        Hit rate at the threshold. [0-1]
+    difference, level : float
+        From the standard, and on the axis. [unit of what varies]
+    over_standard : float, optional
+        Difference over the standard (Weber fraction); absent where the standard is 0.
+    bootstrap_interval, posterior_interval : (float, float)
+        Confidence and credible interval of the difference. [unit of what varies]
+    """
+
+    proportion: float
+    difference: Number
+    level: Number
+    over_standard: float | None
+    bootstrap_interval: tuple[Number, Number]
+    posterior_interval: tuple[Number, Number]
+
+
+@result_class
+class CurvePoints:
+    """A fitted curve at points (n_points,), with its credible band."""
+
+    difference: Vector
+    level: Vector
+    proportion: Vector
+    low: Vector
+    high: Vector
+
+
+@result_class
+class CurveFit:
+    """A fitted psychometric curve.
+
+    Parameters
+    ----------
+    sigmoid : str
+        Its shape.
+    trials : int
+        Judgements per comparison behind the intervals.
+    threshold : CurveThreshold
+        At the proportion that the task asks for.
+    slope : float
+        Of the hit rate at the threshold. [1/unit of what varies]
+    lapse : float
+        What is missing to 1 far above the threshold. [0-1]
+    at_bounds : tuple of str
+        Parameters that ended at a bound.
+    curve : CurvePoints
+        For figures.
+    """
+
+    sigmoid: str
+    trials: int
+    threshold: CurveThreshold
+    slope: Number
+    lapse: float
+    at_bounds: tuple[str, ...]
+    curve: CurvePoints
+
+
+@result_class
+class SideCurve:
+    """Hit rates on one side of the standard, with their curve or the reason why there is none.
+
+    Parameters
+    ----------
+    side : {"above", "below"}
+        Of the standard.
+    difference, hit_rate : array (n_comparisons,)
+        Distance from the standard and hit rate. [unit of what varies], [0-1]
+    fit : CurveFit, optional
+        The curve.
+    why_not : str, optional
+        Why there is no curve.
+    """
+
+    side: str
+    difference: Vector
+    hit_rate: Vector
+    fit: CurveFit | None = None
+    why_not: str | None = None
+
+
+def response_table(maps: Sequence[ResponseMap], measure: str, latest_ms: float | None = None) -> FloatArray:
     """Return one measure of every receptor under every stimulus.
 
     Parameters
     ----------
-    answers : sequence of ResponseMap
+    maps : sequence of ResponseMap
         Of the population, stimulus by stimulus.
     measure : {"static", "dynamic", "latency"}
         Rates in the hold or the ramp, or first-spike latency.
-    patience_ms : float, optional
-        How long the observer waits for first spikes: a later one, or none, counts as that. [ms]
+    latest_ms : float, optional
+        Latest first spike that counts: a later one, or none, counts as this time. [ms]
 
     Returns
     -------
     array (n_stimuli, n_receptors)
         NaN where a receptor has no latency. [spikes/s or ms]
     """
-    table = np.array([RESPONSE_MEASURES[measure](answer) for answer in answers])
-    return table if measure != "latency" or patience_ms is None else np.fmin(table, patience_ms)
+    table = np.array([RESPONSE_MEASURES[measure](answer) for answer in maps])
+    return table if measure != "latency" or latest_ms is None else np.fmin(table, latest_ms)
 
 
-def silent_stimuli(table: FloatArray, measure: str, patience_ms: float | None = None) -> IntArray:
-    """Find the stimuli under which nobody answers, as far as a measure tells.
+def silent_stimuli(table: FloatArray, measure: str, latest_ms: float | None = None) -> IntArray:
+    """Find the stimuli under which no afferent responds by a measure.
 
     Parameters
     ----------
-    table, measure, patience_ms
-        Of and as in `responses`.
+    table, measure, latest_ms
+        Of and as in `response_table`.
 
     Returns
     -------
     int array (n_silent,)
-        Rows of the table. For latencies, if nobody fires under every stimulus, those under which fewest do.
+        Rows of the table. For latencies, if no afferent fires under every stimulus, those under which
+        fewest do.
     """
-    if measure != "latency" or patience_ms is not None:
-        return np.flatnonzero((table == (patience_ms if measure == "latency" else 0.0)).all(axis=1))
+    if measure != "latency" or latest_ms is not None:
+        return np.flatnonzero((table == (latest_ms if measure == "latency" else 0.0)).all(axis=1))
     missing = np.isnan(table)
     if not missing.any(axis=0).all():
         return np.empty(0, dtype=np.int64)
@@ -75,14 +173,14 @@ def silent_stimuli(table: FloatArray, measure: str, patience_ms: float | None = 
 
 
 def taking_part(table: FloatArray, neighbours: np.ndarray) -> tuple[FloatArray, np.ndarray]:
-    """Let receptors that are silent under one stimulus take no part under any, as in the reproduction.
+    """Leave out receptors that are silent under one stimulus, as in the reproduction.
 
     See docs/decisions/silent-receptors.md.
 
     Parameters
     ----------
     table : array (n_stimuli, n_receptors)
-        From `responses`, NaN for silence.
+        From `response_table`, NaN for silence.
     neighbours : int array (n_pairs, 2)
         Who is whose neighbour.
 
@@ -110,7 +208,7 @@ def hit_rates(
     code : {"gradient_sum", "euclidean"}
         How the population is read.
     table : array (n_stimuli, n_receptors)
-        From `responses`, the standard first.
+        From `response_table`, the standard first.
     neighbours : int array (n_pairs, 2)
         Who is whose neighbour, for Gradient Sum.
     noise_sigma : float
@@ -171,10 +269,10 @@ def fitted_noise(
     return fit_noise_sigma(by_distance if code == "euclidean" else by_gradient, observed)
 
 
-def statistic(
+def task_statistic(
     code: str, table: FloatArray, neighbours: np.ndarray, noise_sigma: float, seed: int
-) -> dict[str, FloatArray]:
-    """Say what a code makes of every stimulus: its Gradient Sum, or its distance from the standard.
+) -> TaskStatistic:
+    """Compute the statistic of a code for every stimulus: Gradient Sum, or distance from the standard.
 
     Parameters
     ----------
@@ -183,30 +281,29 @@ def statistic(
 
     Returns
     -------
-    dict of str to array (n_stimuli,)
-        `mean` and `sd`. [unit of the table]
+    TaskStatistic
     """
     n_stimuli = len(table)
     if code == "euclidean":
         sets = noisy_responses(
             table, noise_sigma, seed, session_trials(SESSION, n_stimuli), 2 * SHOWN_PRESENTATIONS
         )
-        # The standard meets other presentations of itself.
+        # The standard is compared with other presentations of itself.
         values = distance(sets[:1, :SHOWN_PRESENTATIONS], sets[:, SHOWN_PRESENTATIONS:])
     else:
         trials = session_trials(SESSION, n_stimuli, 1)
         sums = noisy_gradient_sums(table, neighbours, noise_sigma, seed, trials, SHOWN_PRESENTATIONS)
         values = sums[:, 0]
-    return {"mean": values.mean(axis=1), "sd": values.std(axis=1, ddof=1)}
+    return TaskStatistic(mean=values.mean(axis=1), sd=values.std(axis=1, ddof=1))
 
 
-def curves(
+def side_curves(
     levels: Sequence[float], rates: FloatArray, trials: int, settings: CurveSettings, seed: int
-) -> list[dict[str, Any]]:
+) -> tuple[SideCurve, ...]:
     """Psychometric curves through hit rates, on either side of the standard.
 
-    A curve runs over the distance from the standard, at which nobody does better than chance. The intervals
-    are those of an experiment with so many trials per comparison that finds these hit rates.
+    A curve runs over the distance from the standard, where the hit rate is chance. The intervals are those of
+    an experiment with so many trials per comparison that finds these hit rates.
 
     Parameters
     ----------
@@ -223,14 +320,14 @@ def curves(
 
     Returns
     -------
-    list of dict
-        One per side that has a comparison: `side`, `difference`, `hit_rate`, and either the curve or, where
-        there is none, `why_not`.
+    tuple of SideCurve
+        One per side that has a comparison.
 
     Examples
     --------
-    >>> found = curves([10.0, 11.0, 12.0, 14.0], np.array([0.6, 0.75, 0.95]), 200, CurveSettings(), seed=1)
-    >>> found[0]["side"], round(found[0]["threshold"]["difference"], 1)
+    >>> rates = np.array([0.6, 0.75, 0.95])
+    >>> above = side_curves([10.0, 11.0, 12.0, 14.0], rates, 200, CurveSettings(), seed=1)[0]
+    >>> above.side, round(above.fit.threshold.difference, 1)
     ('above', 2.0)
     """
     standard, others = levels[0], np.asarray(levels[1:], dtype=np.float64)
@@ -238,17 +335,22 @@ def curves(
     for side, sign in (("above", 1.0), ("below", -1.0)):
         difference = sign * (others - standard)
         order = [int(row) for row in np.argsort(difference) if difference[row] > 0.0]
-        if order:
-            told = {"side": side, "difference": difference[order], "hit_rate": rates[order]}
-            try:
-                told |= _curve(standard, sign, difference[order], rates[order], trials, settings, seed)
-            except (ConvergenceError, InputError) as error:
-                told["why_not"] = str(error).splitlines()[0]
-            found.append(told)
-    return found
+        if not order:
+            continue
+        fit, why_not = None, None
+        try:
+            fit = _curve_fit(standard, sign, difference[order], rates[order], trials, settings, seed)
+        except (ConvergenceError, InputError) as error:
+            why_not = str(error).splitlines()[0]
+        found.append(
+            SideCurve(
+                side=side, difference=difference[order], hit_rate=rates[order], fit=fit, why_not=why_not
+            )
+        )
+    return tuple(found)
 
 
-def _curve(
+def _curve_fit(
     standard: float,
     sign: float,
     difference: FloatArray,
@@ -256,8 +358,8 @@ def _curve(
     trials: int,
     settings: CurveSettings,
     seed: int,
-) -> dict[str, Any]:
-    """One curve with its threshold, intervals and band."""
+) -> CurveFit:
+    """Fit one curve; estimate its threshold, intervals and band."""
     if difference.size < 2:
         raise InputError("A curve needs two comparisons on a side of the standard or more: got 1.")
     counts = np.round(rates * trials)
@@ -267,30 +369,24 @@ def _curve(
     )
     wanted = settings.proportion
     threshold = fit.threshold(wanted)
-    clouds = {"bootstrap": bootstrap(fit, seed), "posterior": posterior(fit)}
+    of_bootstrap, of_posterior = bootstrap(fit, seed), posterior(fit)
     at = np.linspace(0.0, 1.05 * difference[-1], CURVE_POINTS + 1)[1:]
-    low, high = clouds["posterior"].band(at, CREDIBLE)
-    return {
-        "sigmoid": settings.sigmoid,
-        "trials": trials,
-        "threshold": {
-            "proportion": wanted,
-            "difference": threshold,
-            "level": standard + sign * threshold,
-            "over_standard": threshold / abs(standard) if standard else None,
-            **{
-                f"{kind}_interval": cloud.threshold_interval(wanted, CREDIBLE)
-                for kind, cloud in clouds.items()
-            },
-        },
-        "slope": fit.slope(wanted),
-        "lapse": fit.function.lapse,
-        "at_bounds": fit.at_bounds,
-        "curve": {
-            "difference": at,
-            "level": standard + sign * at,
-            "proportion": fit.predict(at),
-            "low": low,
-            "high": high,
-        },
-    }
+    low, high = of_posterior.band(at, CREDIBLE)
+    return CurveFit(
+        sigmoid=settings.sigmoid,
+        trials=trials,
+        threshold=CurveThreshold(
+            proportion=wanted,
+            difference=threshold,
+            level=standard + sign * threshold,
+            over_standard=threshold / abs(standard) if standard else None,
+            bootstrap_interval=of_bootstrap.threshold_interval(wanted, CREDIBLE),
+            posterior_interval=of_posterior.threshold_interval(wanted, CREDIBLE),
+        ),
+        slope=fit.slope(wanted),
+        lapse=fit.function.lapse,
+        at_bounds=fit.at_bounds,
+        curve=CurvePoints(
+            difference=at, level=standard + sign * at, proportion=fit.predict(at), low=low, high=high
+        ),
+    )

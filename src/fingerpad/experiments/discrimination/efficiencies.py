@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.results import Vector, result_class
 from fingerpad.psychophysics import Presentation, efficiency, multiplied_responses, present
 from fingerpad.psychophysics.encoding import distance, gradient_sum
 from fingerpad.psychophysics.ideal_observer import Statistic
@@ -25,6 +25,41 @@ LEAST_KNOWN = 10.0
 SMALLEST_SPREAD = 1.0
 """Noise beside that which multiplies: without it, an afferent that fires nothing would tell a stimulus with
 certainty from one that makes it fire (docs/decisions/ideal-observer-of-tasks.md). [spikes/s or ms]"""
+
+
+@result_class
+class IdealObserver:
+    """The ideal observer of a population.
+
+    Parameters
+    ----------
+    hit_rate, hit_rate_sd : array (n_comparisons,)
+        Hit rate and its Monte-Carlo error. [0-1]
+    d_prime : array (n_comparisons,)
+        Infinite where no trial is failed.
+    """
+
+    hit_rate: Vector
+    hit_rate_sd: Vector
+    d_prime: Vector
+
+
+@result_class
+class CodeEfficiency:
+    """Efficiency of a code against the ideal observer.
+
+    Parameters
+    ----------
+    d_prime : array (n_comparisons,)
+        Of the code.
+    efficiency, efficiency_error : array (n_comparisons,)
+        Squared ratio of d' and its standard error; NaN where d' of the ideal observer is not known well
+        enough or infinite.
+    """
+
+    d_prime: Vector
+    efficiency: Vector
+    efficiency_error: Vector
 
 
 def presentations(table: FloatArray, noise_sigma: float, seed: int) -> list[Presentation]:
@@ -48,8 +83,8 @@ def presentations(table: FloatArray, noise_sigma: float, seed: int) -> list[Pres
     return [present(models[0], model, seed, TRIALS, SESSION) for model in models[1:]]
 
 
-def ideal_observer(shown: list[Presentation]) -> dict[str, Any]:
-    """Return how often, and with which d', the ideal observer tells each comparison from the standard.
+def ideal_observer(shown: list[Presentation]) -> IdealObserver:
+    """Compute how well the ideal observer discriminates each comparison from the standard.
 
     Parameters
     ----------
@@ -58,15 +93,14 @@ def ideal_observer(shown: list[Presentation]) -> dict[str, Any]:
 
     Returns
     -------
-    dict of str to array (n_comparisons,)
-        `hit_rate`, `hit_rate_sd` (its Monte-Carlo error) and `d_prime`, infinite where no trial is failed.
+    IdealObserver
     """
     rates = np.array([presentation.ideal_hit_rate() for presentation in shown])
-    return {
-        "hit_rate": rates,
-        "hit_rate_sd": np.sqrt(rates * (1.0 - rates) / TRIALS),
-        "d_prime": np.array([presentation.ideal().d_prime for presentation in shown]),
-    }
+    return IdealObserver(
+        hit_rate=rates,
+        hit_rate_sd=np.sqrt(rates * (1.0 - rates) / TRIALS),
+        d_prime=np.array([presentation.ideal().d_prime for presentation in shown]),
+    )
 
 
 def efficiencies(
@@ -76,7 +110,7 @@ def efficiencies(
     neighbours: np.ndarray,
     noise_sigma: float,
     seed: int,
-) -> dict[str, Any]:
+) -> CodeEfficiency:
     """Compare a code with the ideal observer, comparison by comparison.
 
     Parameters
@@ -92,9 +126,7 @@ def efficiencies(
 
     Returns
     -------
-    dict of str to list (n_comparisons,)
-        `d_prime` of the code, `efficiency` and `efficiency_error`; None where the ideal observer nearly
-        guesses or never fails. Empty where nothing is shown.
+    CodeEfficiency
 
     Examples
     --------
@@ -103,21 +135,17 @@ def efficiencies(
     >>> table = np.array([[50.0, 50.0], [50.0, 53.0]])
     >>> shown = presentations(table, 0.1, seed=1)
     >>> found = efficiencies("gradient_sum", shown, table, np.array([[0, 1]]), 0.1, seed=1)
-    >>> found["efficiency"][0] < 0.6
+    >>> bool(found.efficiency[0] < 0.6)
     True
     """
-    found: dict[str, Any] = {"d_prime": [], "efficiency": [], "efficiency_error": []}
-    if not shown:
-        return found
     statistic = _statistic(code, table, neighbours, noise_sigma, seed)
+    rows = []
     for presentation in shown:
         of_code, of_ideal = presentation.of(statistic), presentation.ideal()
         known = LEAST_KNOWN * of_ideal.d_prime_error <= of_ideal.d_prime < math.inf
-        share, error = efficiency(of_code, of_ideal) if known else (None, None)
-        found["d_prime"].append(of_code.d_prime)
-        found["efficiency"].append(share)
-        found["efficiency_error"].append(error)
-    return found
+        rows.append((of_code.d_prime, *(efficiency(of_code, of_ideal) if known else (math.nan, math.nan))))
+    d_prime, share, error = np.array(rows).T
+    return CodeEfficiency(d_prime=d_prime, efficiency=share, efficiency_error=error)
 
 
 def _statistic(

@@ -1,6 +1,6 @@
-"""A question of one's own: which stimuli, met by which afferents, read by which code, shall be told apart.
+"""A discrimination task: which stimuli, which afferents, which codes and which noise.
 
-Each class is a part of the file that `studies.question_file` reads. docs/discriminate.md explains every key.
+Each class is a part of the file that `task_files` reads. docs/discriminate.md explains every key.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ CODES = ("gradient_sum", "euclidean", IDEAL)
 MEASURES = ("static", "dynamic", "latency")
 FREE = "free"
 DEFAULT = "default"
-"""What `afferent` says for our fit to the recordings under the shifted bar."""
+"""Value of `afferent` for the fit to the recordings under the shifted bar."""
 
 FITTED = "fitted"
-"""What `noise` says where it shall be found from observed hit rates."""
+"""Value of `noise` where it is fitted to observed hit rates."""
 
 GRID = "grid"
 NAIL_ROWS = "nail rows"
@@ -52,7 +52,7 @@ PAD = "pad"
 SHAPES = ("rectangle", "ellipse", "polygon", PAD)
 
 LISTED, VARIED, NAMED, SPELLED = "listed", "varied", "named", "spelled"
-"""Forms that a part of a question may have; pydantic puts them into the places of errors."""
+"""Forms that a part of a task may have; pydantic puts them into the places of errors."""
 
 UNITS = SIZES | MOTION | {"spin_deg": "degrees", "tilt_deg": "degrees", "friction": ""}
 """What can be varied from stimulus to stimulus, and in which unit."""
@@ -153,7 +153,7 @@ class RegionSettings(Part):
     Parameters
     ----------
     shape : {"rectangle", "ellipse", "polygon", "pad"}
-        What it looks like.
+        Kind of shape.
     length_mm, width_mm : float
         Extent of a rectangle or an ellipse along the finger and across. [mm]
     corners_mm : list of (float, float)
@@ -167,7 +167,7 @@ class RegionSettings(Part):
 
 
 class PopulationSettings(Part):
-    """The afferents that meet every stimulus.
+    """The afferents.
 
     Parameters
     ----------
@@ -228,15 +228,15 @@ class AfferentSettings(Part):
 
 
 class WindowSettings(Part):
-    """When spikes count.
+    """Windows in which spikes count.
 
     Parameters
     ----------
     dynamic, static : (float, float)
         Start and end of the windows of the two rates. [ms]
     latency : float
-        How long the observer waits for first spikes; a later one, or none, counts as that. Without it,
-        receptors that are silent under one stimulus take no part. [ms]
+        Latest first spike that counts; a later one, or none, counts as this time. Without it, receptors that
+        are silent under one stimulus are left out. [ms]
     """
 
     dynamic: Pair = protocol.DYNAMIC_WINDOW.value
@@ -245,7 +245,7 @@ class WindowSettings(Part):
 
 
 class ExperimentSettings(Part):
-    """How often the model's observer decides, and where.
+    """Repetitions, decision criterion and seed.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ class CurveSettings(Part):
 
 
 class ObservedPoint(Part):
-    """How often people told one stimulus from the standard.
+    """How often people discriminated one stimulus from the standard.
 
     Parameters
     ----------
@@ -318,7 +318,7 @@ class ObservedPoint(Part):
 
 
 class ObservedSettings(Part):
-    """What is known of people.
+    """Observations in people.
 
     Parameters
     ----------
@@ -332,8 +332,8 @@ class ObservedSettings(Part):
     source: Text = "people"
 
 
-class Question(Part):
-    """Everything that a file of a question says.
+class DiscriminationTask(Part):
+    """All that a file of a task holds.
 
     Parameters
     ----------
@@ -346,7 +346,7 @@ class Question(Part):
     common : StimulusSettings
         What all stimuli share, unless they say otherwise.
     stimuli : VariedStimuli or list of StimulusSettings
-        What is to be told apart.
+        Which are discriminated.
     standard : float or str
         Level or name of the stimulus that all others are compared with.
     population : PopulationSettings
@@ -355,14 +355,14 @@ class Question(Part):
         "default", a file of results (`fit.json` of `fingerpad fit`, `results.json` of
         `fingerpad reproduce`), or numbers.
     code : str or list of str
-        How the population is read, by the names of `CODES`; the first is the main one.
+        How the population is decoded, by the names of `CODES`; the first is the main one.
     measure : str or list of str
-        What is read of each afferent, by the names of `MEASURES`; the first is the main one.
+        What is measured of each afferent, by the names of `MEASURES`; the first is the main one.
     windows_ms : WindowSettings
         When spikes count.
     noise : float or "fitted"
-        Standard deviation of the multiplicative noise, or that which brings the main code and measure
-        closest to the observed hit rates.
+        Standard deviation of the multiplicative noise, or "fitted": that which brings the main code and
+        measure closest to the observed hit rates.
     experiment : ExperimentSettings
         Repetitions, criterion and seed.
     curve : CurveSettings

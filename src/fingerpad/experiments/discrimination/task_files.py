@@ -1,4 +1,4 @@
-"""Questions on file: read, with every error one sentence that says where; and those that come ready-made."""
+"""Files of discrimination tasks: reading, errors that name the place in the file, and example tasks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,15 @@ from pydantic import BaseModel, ValidationError
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.plain_yaml import read_yaml
-from fingerpad.experiments.discrimination.task import DEFAULT, LISTED, NAMED, SPELLED, VARIED, Question
+from fingerpad.experiments.discrimination.task import (
+    DEFAULT,
+    LISTED,
+    NAMED,
+    SPELLED,
+    VARIED,
+    DiscriminationTask,
+)
+from fingerpad.experiments.manifest import sha256
 from fingerpad.inference.tables import read_text
 
 SUFFIX = ".yaml"
@@ -21,8 +29,8 @@ _FORMS = (LISTED, VARIED, NAMED, SPELLED)
 _LONGEST_VALUE = 60
 
 
-def ready_made() -> dict[str, str]:
-    """Questions that come with the package.
+def example_tasks() -> dict[str, str]:
+    """Tasks that come with the package.
 
     Returns
     -------
@@ -31,7 +39,7 @@ def ready_made() -> dict[str, str]:
 
     Examples
     --------
-    >>> print(ready_made()["sphere_curvature"].splitlines()[0])
+    >>> print(example_tasks()["sphere_curvature"].splitlines()[0])
     question: Which spheres can be told from one of 287 /m?
     """
     folder = files("fingerpad.experiments.discrimination") / "tasks"
@@ -43,85 +51,84 @@ def ready_made() -> dict[str, str]:
 
 
 def title(text: str) -> str:
-    """Return the question of a ready-made file in words.
+    """Return the question of an example task in words.
 
     Examples
     --------
-    >>> title(ready_made()["sphere_curvature"])
+    >>> title(example_tasks()["sphere_curvature"])
     'Which spheres can be told from one of 287 /m?'
     """
-    return parsed(read_yaml(text, "question")).question
+    return parse_task(read_yaml(text, "task")).question
 
 
-def provenance(source: str | Path, question: Question) -> list[dict[str, str]]:
-    """Files that an answer rests on, and their hashes, by which they are known again.
+def input_hashes(source: str | Path, task: DiscriminationTask) -> dict[str, str]:
+    """SHA-256 of the files on which a task rests.
 
     Parameters
     ----------
     source : str or Path
-        As of `read_question`.
-    question : Question
+        As of `read_task`.
+    task : DiscriminationTask
         What was read there; it may name a file of fitted parameters.
 
     Returns
     -------
-    list of dict
-        `file` and `sha256`.
+    dict of str to str
+        By name of the file.
     """
     path = Path(source)
-    content = path.read_bytes() if path.exists() else ready_made()[str(source)].encode()
-    found = [{"file": str(source), "sha256": hashlib.sha256(content).hexdigest()}]
-    if isinstance(question.afferent, str) and question.afferent != DEFAULT:
-        named = path.parent / question.afferent
-        found.append({"file": str(named), "sha256": hashlib.sha256(named.read_bytes()).hexdigest()})
-    return found
+    content = path.read_bytes() if path.exists() else example_tasks()[str(source)].encode()
+    hashes = {str(source): hashlib.sha256(content).hexdigest()}
+    if isinstance(task.afferent, str) and task.afferent != DEFAULT:
+        named = path.parent / task.afferent
+        hashes[str(named)] = sha256(named)
+    return hashes
 
 
-def read_question(source: str | Path, **skin: Any) -> Question:
-    """Read a question from a file, or one that comes with the package.
+def read_task(source: str | Path, **skin: Any) -> DiscriminationTask:
+    """Read a task from a file, or one that comes with the package.
 
     Parameters
     ----------
     source : str or Path
-        A YAML file, or a name of `ready_made`.
+        A YAML file, or a name of `example_tasks`.
     **skin
         Settings of the skin that replace those of the file, such as `resolution`; None leaves them.
 
     Returns
     -------
-    Question
+    DiscriminationTask
 
     Raises
     ------
     InputError
-        If there is no such file or name, it is no YAML, or a key is unknown, missing or has a value that
-        cannot be; with the place in the file.
+        If there is no such file or name, it is no YAML, or a key is unknown, missing or has an unfit
+        value; with the place in the file.
 
     Examples
     --------
-    >>> read_question("sphere_curvature", resolution="quick").skin.resolution
+    >>> read_task("sphere_curvature", resolution="quick").skin.resolution
     'quick'
     """
     name, path = str(source), Path(source)
-    known = ready_made()
+    known = example_tasks()
     if name in known and not path.exists():
         text = known[name]
     elif path.suffix or path.exists():
         text = read_text(path)
     else:
         raise InputError(
-            f"{name} must be a YAML file or one of the ready-made questions, {', '.join(known)}: it is "
-            "neither."
+            f"{name} must be a YAML file or one of the example tasks, {', '.join(known)}: it is neither."
         )
     content = read_yaml(text, name)
     replaced = {key: value for key, value in skin.items() if value is not None}
     if replaced and isinstance(content, dict) and isinstance(content.get("skin", {}), dict):
         content["skin"] = content.get("skin", {}) | replaced
-    return parsed(content, name)
+    return parse_task(content, name)
 
 
-def parsed(content: Any, source: str = "question") -> Question:
-    """Build a question from plain values.
+def parse_task(content: Any, source: str = "task") -> DiscriminationTask:
+    """Build a task from plain values.
 
     Parameters
     ----------
@@ -132,35 +139,35 @@ def parsed(content: Any, source: str = "question") -> Question:
 
     Returns
     -------
-    Question
+    DiscriminationTask
 
     Raises
     ------
     InputError
-        For the first thing that is wrong, with its place.
+        For the first error, with its place.
 
     Examples
     --------
     >>> spheres = {"vary": "curvature_per_m", "values": [287, 340]}
-    >>> parsed({"question": "Which?", "stimuli": spheres, "standard": 287, "noise": 0.1}).code
+    >>> parse_task({"question": "Which?", "stimuli": spheres, "standard": 287, "noise": 0.1}).code
     ('gradient_sum',)
-    >>> parsed({"question": "Which?", "stimuli": spheres, "standard": 287, "noise": -0.1})
+    >>> parse_task({"question": "Which?", "stimuli": spheres, "standard": 287, "noise": -0.1})
     Traceback (most recent call last):
-    fingerpad.core.errors.InputError: question, noise must be a number not below 0, or fitted: got -0.1.
+    fingerpad.core.errors.InputError: task, noise must be a number not below 0, or fitted: got -0.1.
     """
     try:
-        return Question.model_validate(content)
+        return DiscriminationTask.model_validate(content)
     except ValidationError as error:
-        raise InputError(f"{source}, {sentence(error)}") from error
+        raise InputError(f"{source}, {error_sentence(error)}") from error
 
 
-def sentence(error: ValidationError) -> str:
-    """Say the first thing that pydantic found wrong: where, what was expected, what came.
+def error_sentence(error: ValidationError) -> str:
+    """Describe the first error that pydantic found: where, what was expected, what came.
 
     Parameters
     ----------
     error : pydantic.ValidationError
-        Of a part of a question.
+        Of a part of a task.
 
     Returns
     -------
@@ -188,9 +195,9 @@ _EXPECTED = {
 
 
 def _spelled(path: Sequence[int | str]) -> str:
-    """Place in a file as a person would write it: stimuli[2].width_mm, entries counted from 1."""
+    """Spell a place in a file, such as stimuli[2].width_mm, entries counted from 1."""
     text = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in path)
-    return text.lstrip(".") or "a question"
+    return text.lstrip(".") or "a task"
 
 
 def _shown(value: Any) -> str:
@@ -199,8 +206,8 @@ def _shown(value: Any) -> str:
 
 
 def _keys_at(path: Sequence[int | str]) -> list[str]:
-    """Keys that the part of a question at `path` may have."""
-    parts: list[type[BaseModel]] = [Question]
+    """Keys that the part of a task at `path` may have."""
+    parts: list[type[BaseModel]] = [DiscriminationTask]
     for key in path:
         if isinstance(key, str):
             parts = [found for part in parts for found in _parts_in(part.model_fields[key].annotation)]
@@ -208,7 +215,7 @@ def _keys_at(path: Sequence[int | str]) -> list[str]:
 
 
 def _parts_in(annotation: Any) -> list[type[BaseModel]]:
-    """Parts of a question that an annotation names."""
+    """Parts of a task that an annotation names."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [found for inner in getattr(annotation, "__args__", ()) for found in _parts_in(inner)]

@@ -1,4 +1,4 @@
-"""The afferents of a question: what each of them is, and where they end in the skin."""
+"""The afferents of a discrimination task, and where they end in the skin."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from fingerpad.experiments.discrimination.task import (
     NAIL_ROWS,
     PAD,
     AfferentSettings,
+    DiscriminationTask,
     PopulationSettings,
-    Question,
     RegionSettings,
 )
 from fingerpad.inference.tables import read_text
@@ -45,13 +45,13 @@ _OF_SHAPE = {
 }
 
 
-def afferent_of(question: Question, beside: Path = Path()) -> Afferent:
-    """Make the afferent of a question.
+def task_afferent(task: DiscriminationTask, beside: Path = Path()) -> Afferent:
+    """Make the afferent of a task.
 
     Parameters
     ----------
-    question : Question
-        From `read_question`.
+    task : DiscriminationTask
+        From `read_task`.
     beside : Path, optional
         Folder from which a file of results is named.
 
@@ -64,7 +64,7 @@ def afferent_of(question: Question, beside: Path = Path()) -> Afferent:
     InputError
         If the file cannot be read or holds no fitted parameters.
     """
-    chosen = question.afferent
+    chosen = task.afferent
     if isinstance(chosen, AfferentSettings):
         return Afferent(**chosen.given)
     return Afferent() if chosen == DEFAULT else _fitted(Path(beside) / chosen)
@@ -91,15 +91,15 @@ def _fitted(path: Path) -> Afferent:
     return Afferent.from_parameters(six, dynamic_quantity=quantity)
 
 
-def population_of(question: Question, beside: Path = Path()) -> Population:
-    """Lay out the afferents of a question.
+def task_population(task: DiscriminationTask, beside: Path = Path()) -> Population:
+    """Lay out the afferents of a task.
 
     Parameters
     ----------
-    question : Question
-        From `read_question`.
+    task : DiscriminationTask
+        From `read_task`.
     beside : Path, optional
-        As in `afferent_of`.
+        As in `task_afferent`.
 
     Returns
     -------
@@ -108,10 +108,10 @@ def population_of(question: Question, beside: Path = Path()) -> Population:
     Raises
     ------
     InputError
-        As `afferent_of`, or if something is given that the layout has no use for, the region is missing or
+        As `task_afferent`, or if a key is given that the layout does not have, the region is missing or
         has no area, or no receptor falls into it.
     """
-    settings, afferent = question.population, afferent_of(question, beside)
+    settings, afferent = task.population, task_afferent(task, beside)
     for key, layouts in _OF_LAYOUT.items():
         if key in settings.given and settings.layout not in layouts:
             raise InputError(

@@ -1,4 +1,4 @@
-"""The stimuli of a question: what each of them is, and the touches that press them."""
+"""The stimuli of a discrimination task, and the touches that indent with them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from pydantic import ValidationError
 from fingerpad.core.errors import InputError
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.discrimination.task import Question, StimulusSettings, VariedStimuli
-from fingerpad.experiments.discrimination.task_files import sentence
+from fingerpad.experiments.discrimination.task import DiscriminationTask, StimulusSettings, VariedStimuli
+from fingerpad.experiments.discrimination.task_files import error_sentence
 from fingerpad.experiments.stimuli import INDENTERS
 from fingerpad.geometry.grading import Grading, covering
 from fingerpad.geometry.indenter_grading import grading_about
@@ -40,8 +40,8 @@ _HANDLING = (
 
 
 @dataclass(frozen=True)
-class Presented:
-    """One stimulus of a question.
+class TaskStimulus:
+    """One stimulus of a task.
 
     Parameters
     ----------
@@ -73,17 +73,17 @@ class Presented:
     friction: float
 
 
-def presented(question: Question) -> tuple[Presented, ...]:
-    """List the stimuli of a question, the standard first.
+def task_stimuli(task: DiscriminationTask) -> tuple[TaskStimulus, ...]:
+    """List the stimuli of a task, the standard first.
 
     Parameters
     ----------
-    question : Question
-        From `read_question`.
+    task : DiscriminationTask
+        From `read_task`.
 
     Returns
     -------
-    tuple of Presented
+    tuple of TaskStimulus
         The standard, then the comparisons in the order of the file.
 
     Raises
@@ -94,14 +94,14 @@ def presented(question: Question) -> tuple[Presented, ...]:
 
     Examples
     --------
-    >>> from fingerpad.experiments.discrimination.task_files import read_question
-    >>> spheres = presented(read_question("sphere_curvature"))
+    >>> from fingerpad.experiments.discrimination.task_files import read_task
+    >>> spheres = task_stimuli(read_task("sphere_curvature"))
     >>> [stimulus.name for stimulus in spheres[:3]], spheres[1].indenter
     (['287', '296', '305'], Sphere(curvature_per_m=296.0))
     """
-    found = _varied(question) if isinstance(question.stimuli, VariedStimuli) else _listed(question)
+    found = _varied(task) if isinstance(task.stimuli, VariedStimuli) else _listed(task)
     if len(found) < 2:
-        raise InputError(f"stimuli must be two or more, or there is nothing to tell apart: got {len(found)}.")
+        raise InputError(f"stimuli must be two or more to be discriminated: got {len(found)}.")
     for number, stimulus in enumerate(found):
         if stimulus.name in [other.name for other in found[:number]]:
             raise InputError(f"stimuli must differ: {stimulus.name!r} stands twice, keep one.")
@@ -111,11 +111,11 @@ def presented(question: Question) -> tuple[Presented, ...]:
             f"level must be given for all stimuli or for none: {found[with_level.index(False)].name!r} "
             "has none."
         )
-    row = which(found, question.standard, "standard")
+    row = stimulus_index(found, task.standard, "standard")
     return (found[row], *found[:row], *found[row + 1 :])
 
 
-def which(stimuli: Sequence[Presented], place: float | str, key: str) -> int:
+def stimulus_index(stimuli: Sequence[TaskStimulus], place: float | str, key: str) -> int:
     """Index of the stimulus that a level or a name means, else raise `InputError` that names the key."""
     for row, stimulus in enumerate(stimuli):
         if place == stimulus.name or (stimulus.level is not None and place == stimulus.level):
@@ -124,38 +124,38 @@ def which(stimuli: Sequence[Presented], place: float | str, key: str) -> int:
     raise InputError(f"{key} must be one of the stimuli, {names}: got {place!r}.")
 
 
-def _varied(question: Question) -> list[Presented]:
-    assert isinstance(question.stimuli, VariedStimuli)
-    vary, found = question.stimuli.vary, []
-    if vary in question.common.given:
+def _varied(task: DiscriminationTask) -> list[TaskStimulus]:
+    assert isinstance(task.stimuli, VariedStimuli)
+    vary, found = task.stimuli.vary, []
+    if vary in task.common.given:
         raise InputError(f"common.{vary} must not be given where stimuli.vary it: leave it out there.")
-    for number, value in enumerate(question.stimuli.values, start=1):
+    for number, value in enumerate(task.stimuli.values, start=1):
         place = f"stimuli.values[{number}]"
         try:
             own = StimulusSettings.model_validate({vary: value})
         except ValidationError as error:
-            raise InputError(f"{place}: {sentence(error)}") from error
-        found.append(_presented(place, question.common, own, f"{value:g}", value))
+            raise InputError(f"{place}: {error_sentence(error)}") from error
+        found.append(_presented(place, task.common, own, f"{value:g}", value))
     return found
 
 
-def _listed(question: Question) -> list[Presented]:
-    assert not isinstance(question.stimuli, VariedStimuli)
+def _listed(task: DiscriminationTask) -> list[TaskStimulus]:
+    assert not isinstance(task.stimuli, VariedStimuli)
     for key in ("name", "level"):
-        if key in question.common.given:
+        if key in task.common.given:
             raise InputError(f"common.{key} must not be given: each stimulus has its own.")
     found = []
-    for number, own in enumerate(question.stimuli, start=1):
+    for number, own in enumerate(task.stimuli, start=1):
         place = f"stimuli[{number}]"
         if own.name is None:
             raise InputError(f"{place}.name must be given: it is missing.")
-        found.append(_presented(place, question.common, own, own.name, own.level))
+        found.append(_presented(place, task.common, own, own.name, own.level))
     return found
 
 
 def _presented(
     place: str, common: StimulusSettings, own: StimulusSettings, name: str, level: float | None
-) -> Presented:
+) -> TaskStimulus:
     """Build one stimulus from what all share and what it says itself."""
     given = _merged(place, common, own)
     kind = given.get("indenter")
@@ -172,7 +172,7 @@ def _presented(
             )
     motion = ForceRampAndHold if "force_mn" in given else RampAndHold
     try:
-        return Presented(
+        return TaskStimulus(
             name=name,
             level=level,
             indenter=INDENTERS[kind](**_chosen(given, sizes)),
@@ -199,13 +199,13 @@ def _chosen(given: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:
     return {key: value for key, value in given.items() if key in keys}
 
 
-def touches(question: Question) -> dict[str, Touch]:
+def task_touches(task: DiscriminationTask) -> dict[str, Touch]:
     """One touch per stimulus, all on one mesh; those of the paper's spheres are those of a reproduction.
 
     Parameters
     ----------
-    question : Question
-        From `read_question`.
+    task : DiscriminationTask
+        From `read_task`.
 
     Returns
     -------
@@ -215,11 +215,11 @@ def touches(question: Question) -> dict[str, Touch]:
     Raises
     ------
     InputError
-        As `presented`, or if one cannot be pressed, with its name.
+        As `task_stimuli`, or if one cannot be pressed, with its name.
     """
-    stimuli = presented(question)
-    conditions = Conditions(question.skin.resolution, question.experiment.seed, question.skin.materials)
-    grading = _grading(stimuli, conditions, question.skin.reach_mm)
+    stimuli = task_stimuli(task)
+    conditions = Conditions(task.skin.resolution, task.experiment.seed, task.skin.materials)
+    grading = _grading(stimuli, conditions, task.skin.reach_mm)
     found = {}
     for stimulus in stimuli:
         along, across = stimulus.offset_mm
@@ -241,8 +241,8 @@ def touches(question: Question) -> dict[str, Touch]:
     return found
 
 
-def _grading(stimuli: Sequence[Presented], conditions: Conditions, reach_mm: float | None) -> Grading:
-    """Mesh that is fine wherever one touches, the same for all: other meshes would be told apart."""
+def _grading(stimuli: Sequence[TaskStimulus], conditions: Conditions, reach_mm: float | None) -> Grading:
+    """Mesh that is fine at every contact, the same for all: meshes that differ would be discriminated."""
     zones = list(dict.fromkeys(_zone(stimulus, conditions) for stimulus in stimuli))
     grading = zones[0] if len(zones) == 1 else covering(zones)
     if reach_mm is None:
@@ -257,7 +257,7 @@ def _grading(stimuli: Sequence[Presented], conditions: Conditions, reach_mm: flo
         raise InputError(f"skin.reach_mm leaves no room for the finest elements: {error}") from error
 
 
-def _zone(stimulus: Presented, conditions: Conditions) -> Grading:
+def _zone(stimulus: TaskStimulus, conditions: Conditions) -> Grading:
     """Mesh that is fine where one stimulus touches."""
     along, across = stimulus.offset_mm
     if isinstance(stimulus.indenter, Sphere) and abs(along) <= _NEAR_MM and across == 0.0:

@@ -1,16 +1,25 @@
-"""What a key of a question may hold: kinds of values, each with the words for what it must be."""
+"""Types of the values of a task, each with the words of its error."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError, WrapValidator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    Strict,
+    ValidationError,
+    WrapValidator,
+    model_serializer,
+)
 from pydantic_core import PydanticCustomError
 
 
 def expected(words: str, allowed: Collection[Any] | None = None) -> WrapValidator:
-    """Let a part of a question say in a few words what it must be, whatever is wrong with it.
+    """Give a value one message for any error: what it must be.
 
     Parameters
     ----------
@@ -47,7 +56,7 @@ def expected(words: str, allowed: Collection[Any] | None = None) -> WrapValidato
 
 
 def one_of(allowed: Collection[str]) -> WrapValidator:
-    """Let a part of a question be one of several names.
+    """Restrict a value to one of several names.
 
     Examples
     --------
@@ -73,14 +82,19 @@ Place = Annotated[float | str, Field(union_mode="left_to_right"), expected("a nu
 
 
 def as_list(value: Any) -> Any:
-    """Let one stand for a list of one."""
+    """Return a list of one for a single name."""
     return [value] if isinstance(value, str) else value
 
 
 class Part(BaseModel):
-    """What all parts share: unknown keys are refused, nothing is converted, nothing changes."""
+    """Base of all parts: unknown keys are refused, nothing is converted, values are frozen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    @model_serializer(mode="wrap")
+    def _as_written(self, dump: SerializerFunctionWrapHandler):  # type: ignore[no-untyped-def]
+        """Leave defaults out of files: a default is not always a value that the file may give."""
+        return {name: value for name, value in dump(self).items() if name in self.model_fields_set}
 
     @property
     def given(self) -> dict[str, Any]:

@@ -6,10 +6,11 @@ from pathlib import Path
 
 from fingerpad.core.files import write_json
 from fingerpad.core.results import file_format, schema_of
+from fingerpad.experiments.discrimination.run import DiscriminationFile
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.schemas import file_name
 
-RESULT_FILES: tuple[type, ...] = (ReproductionResult,)
+RESULT_FILES: tuple[type, ...] = (ReproductionResult, DiscriminationFile)
 """Classes of results that are written to a file of their own."""
 
 

@@ -4,6 +4,7 @@ import hashlib
 import json
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,22 +15,23 @@ from scipy.stats import binom
 
 from fingerpad import cli
 from fingerpad.core.errors import InputError
+from fingerpad.core.results import to_json
 from fingerpad.core.signals import SedTraces
+from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
-from fingerpad.experiments.discrimination import discriminate as study
-from fingerpad.experiments.discrimination.decoding import SESSION, curves
+from fingerpad.experiments.discrimination import run as task_run
+from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse
+from fingerpad.experiments.discrimination.decoding import SESSION, side_curves
 from fingerpad.experiments.discrimination.efficiencies import (
     SMALLEST_SPREAD,
     efficiencies,
     ideal_observer,
     presentations,
 )
-from fingerpad.experiments.discrimination.judgements import Asked, result
 from fingerpad.experiments.discrimination.task import CurveSettings
-from fingerpad.experiments.discrimination.task_files import parsed, ready_made
-from fingerpad.experiments.discrimination.task_population import population_of
-from fingerpad.experiments.discrimination.task_stimuli import presented, touches
-from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.experiments.discrimination.task_files import example_tasks, parse_task
+from fingerpad.experiments.discrimination.task_population import task_population
+from fingerpad.experiments.discrimination.task_stimuli import task_stimuli, task_touches
 from fingerpad.psychophysics.discrimination import (
     Experiment,
     discriminate_euclidean,
@@ -75,8 +77,8 @@ class NearOnly(Bump):
 
 
 def asked(**parts):
-    question = parsed(QUESTION | parts)
-    return Asked(question, presented(question), population_of(question))
+    question = parse_task(QUESTION | parts)
+    return PreparedTask(question, task_stimuli(question), task_population(question))
 
 
 def bumps(question, **more):
@@ -86,11 +88,11 @@ def bumps(question, **more):
 @pytest.fixture(scope="module")
 def answered():
     question = asked()
-    return result(question, bumps(question))
+    return analyse(question, bumps(question))
 
 
-def reading(section, code, measure):
-    return next(one for one in section["readings"] if (one["code"], one["measure"]) == (code, measure))
+def decoding(section, code, measure):
+    return next(one for one in section.decodings if (one.code, one.measure) == (code, measure))
 
 
 # What a code makes of known skins
@@ -98,7 +100,7 @@ def reading(section, code, measure):
 
 def test_hit_rates_are_those_of_the_observers_with_the_questions_own_numbers(answered):
     question = asked()
-    static = np.array(answered["responses"]["static"])
+    static = np.array(answered.responses["static"])
     np.testing.assert_array_equal(
         static,
         [question.population.respond(skin).static_rate_hz for skin in bumps(question).values()],
@@ -108,35 +110,35 @@ def test_hit_rates_are_those_of_the_observers_with_the_questions_own_numbers(ans
     sums = discriminate_gradient_sum(static, neighbours, 0.1, 5, plan, session=SESSION)
     distances = discriminate_euclidean(static, 0.1, 5, plan, session=SESSION)
     for code, expected in (("gradient_sum", sums), ("euclidean", distances)):
-        found = reading(answered, code, "static")
-        np.testing.assert_array_equal(found["hit_rate"], expected.hit_rate)
-        np.testing.assert_array_equal(found["hit_rate_sd"], expected.hit_rate_sd)
+        found = decoding(answered, code, "static")
+        np.testing.assert_array_equal(found.hit_rate, expected.hit_rate)
+        np.testing.assert_array_equal(found.hit_rate_sd, expected.hit_rate_sd)
 
 
 def test_every_code_reads_every_measure_in_the_order_of_the_question(answered):
-    assert [(one["code"], one["measure"]) for one in answered["readings"]] == [
+    assert [(one.code, one.measure) for one in answered.decodings] == [
         (code, measure) for measure in QUESTION["measure"] for code in QUESTION["code"]
     ]
-    assert answered["stimulus"] == ["200", "220", "240", "280", "320"]
-    assert answered["axis"] == "curvature [1/m]"
-    for one in answered["readings"]:
-        assert len(one["hit_rate"]) == 4
-        assert len(one["statistic"]["mean"]) == 5
+    assert answered.stimulus == ("200", "220", "240", "280", "320")
+    assert answered.axis == "curvature [1/m]"
+    for one in answered.decodings:
+        assert len(one.hit_rate) == 4
+        assert len(one.statistic.mean) == 5
 
 
 def test_the_statistic_rises_with_what_is_told_apart_and_distances_begin_above_zero(answered):
-    sums = reading(answered, "gradient_sum", "static")["statistic"]
-    distances = reading(answered, "euclidean", "static")["statistic"]
+    sums = decoding(answered, "gradient_sum", "static").statistic
+    distances = decoding(answered, "euclidean", "static").statistic
     for statistic in (sums, distances):
-        assert (np.diff(statistic["mean"]) > 0.0).all()
-        assert (statistic["sd"] > 0.0).all()
-    assert distances["mean"][0] > 0.0
+        assert (np.diff(statistic.mean) > 0.0).all()
+        assert (statistic.sd > 0.0).all()
+    assert distances.mean[0] > 0.0
 
 
 def test_an_observer_who_waits_counts_later_spikes_as_the_end_of_his_patience():
     def latest_ms(patience_ms):
         question = asked(measure="latency", code="gradient_sum", windows_ms={"latency": patience_ms})
-        return np.max(result(question, bumps(question, peak_kpa=0.3))["responses"]["latency"])
+        return np.max(analyse(question, bumps(question, peak_kpa=0.3)).responses["latency"])
 
     assert latest_ms(40) == 40.0
     assert 50.0 < latest_ms(900) < 900.0
@@ -149,35 +151,35 @@ def test_who_is_silent_under_one_stimulus_has_no_latency_under_any():
     near = distance_mm < 2.0
     assert 0 < near.sum() < 16
     skins["240"] = NearOnly(240.0)
-    found = result(question, skins)
-    assert np.isnan(found["responses"]["latency"]).sum() == 16 - near.sum()
-    alone = result(asked(measure="latency", population={"rows": 2, "columns": 4}), bumps(question))
-    assert alone["readings"][0]["statistic"]["mean"].shape == (5,)
-    inner = reading(found, "gradient_sum", "latency")["statistic"]["mean"]
-    all_of_them = reading(result(question, bumps(question)), "gradient_sum", "latency")["statistic"]["mean"]
+    found = analyse(question, skins)
+    assert np.isnan(found.responses["latency"]).sum() == 16 - near.sum()
+    alone = analyse(asked(measure="latency", population={"rows": 2, "columns": 4}), bumps(question))
+    assert alone.decodings[0].statistic.mean.shape == (5,)
+    inner = decoding(found, "gradient_sum", "latency").statistic.mean
+    all_of_them = decoding(analyse(question, bumps(question)), "gradient_sum", "latency").statistic.mean
     assert (inner < all_of_them).all()  # the outer ones, which fire late, are left out
 
 
 def test_without_noise_every_difference_is_seen():
     question = asked(noise=0)
-    found = result(question, bumps(question))
-    assert all((np.array(one["hit_rate"]) == 1.0).all() for one in found["readings"])
-    assert all(one["efficiency"] == [] for one in found["readings"])
-    for one in found["readings"]:
-        assert all("why_not" in side for side in one["curves"])
+    found = analyse(question, bumps(question))
+    assert all((np.array(one.hit_rate) == 1.0).all() for one in found.decodings)
+    assert all(one.efficiency is None for one in found.decodings)
+    for one in found.decodings:
+        assert all(side.fit is None for side in one.curves)
 
 
 @pytest.mark.parametrize("code", ["gradient_sum", "euclidean"])
 def test_fitted_noise_meets_the_hit_rates_of_a_known_observer(code):
     known = asked(noise=0.13, code=code, measure="static", experiment={"seed": 5})
-    rates = result(known, bumps(known))["readings"][0]["hit_rate"]
+    rates = analyse(known, bumps(known)).decodings[0].hit_rate
     points = [{"at": 220, "hit_rate": float(rates[0])}, {"at": 320, "hit_rate": float(rates[3])}]
     points.append({"at": 999, "hit_rate": 0.9})  # not pressed: drawn, not fitted
     question = asked(noise="fitted", code=code, measure="static", observed={"points": points})
-    noise = result(question, bumps(question))["noise"]
-    assert noise["sigma"] == pytest.approx(0.13, rel=0.05)
-    assert noise["fitted_to"]["stimulus"] == ["220", "320"]
-    assert (noise["fitted_to"]["code"], noise["fitted_to"]["measure"]) == (code, "static")
+    noise = analyse(question, bumps(question)).noise
+    assert noise.sigma == pytest.approx(0.13, rel=0.05)
+    assert noise.fitted_to.stimulus == ("220", "320")
+    assert (noise.fitted_to.code, noise.fitted_to.measure) == (code, "static")
 
 
 def test_observed_points_have_a_binomial_interval_where_trials_are_known():
@@ -185,13 +187,13 @@ def test_observed_points_have_a_binomial_interval_where_trials_are_known():
     question = asked(
         observed={"points": points, "source": "two people"}, measure="static", code="gradient_sum"
     )
-    observed = result(question, bumps(question))["observed"]
-    assert [point["level"] for point in observed["points"]] == [220.0, 250.0]
-    low, high = observed["points"][0]["interval"]
+    observed = analyse(question, bumps(question)).observed
+    assert [point.level for point in observed.points] == [220.0, 250.0]
+    low, high = observed.points[0].interval
     # Clopper and Pearson: so few, or so many, hits of 50 have a chance of 2.5 % there.
     assert binom.sf(29, 50, low) == pytest.approx(0.025, rel=1e-9)
     assert binom.cdf(30, 50, high) == pytest.approx(0.025, rel=1e-9)
-    assert observed["points"][1]["interval"] is None
+    assert observed.points[1].interval is None
 
 
 # Curves
@@ -205,49 +207,49 @@ def test_a_curve_finds_a_known_threshold_on_either_side_of_the_standard():
     levels = [100.0, 104.0, 108.0, 112.0, 120.0, 97.0, 94.0, 88.0]
     difference = np.abs(np.array(levels[1:]) - 100.0)
     rates = weibull(difference, 8.0, 1.5)
-    above, below = curves(levels, rates, 2000, CurveSettings(), seed=1)
-    assert (above["side"], below["side"]) == ("above", "below")
-    np.testing.assert_array_equal(above["difference"], [4.0, 8.0, 12.0, 20.0])
-    np.testing.assert_array_equal(below["difference"], [3.0, 6.0, 12.0])
+    above, below = side_curves(levels, rates, 2000, CurveSettings(), seed=1)
+    assert (above.side, below.side) == ("above", "below")
+    np.testing.assert_array_equal(above.difference, [4.0, 8.0, 12.0, 20.0])
+    np.testing.assert_array_equal(below.difference, [3.0, 6.0, 12.0])
     for side, sign in ((above, 1.0), (below, -1.0)):
-        threshold = side["threshold"]
-        assert threshold["difference"] == pytest.approx(8.0, abs=0.15)
-        assert threshold["level"] == pytest.approx(100.0 + sign * 8.0, abs=0.15)
-        assert threshold["over_standard"] == pytest.approx(0.08, abs=0.0015)
+        threshold = side.fit.threshold
+        assert threshold.difference == pytest.approx(8.0, abs=0.15)
+        assert threshold.level == pytest.approx(100.0 + sign * 8.0, abs=0.15)
+        assert threshold.over_standard == pytest.approx(0.08, abs=0.0015)
         for kind in ("bootstrap", "posterior"):
-            low, high = threshold[f"{kind}_interval"]
-            assert low < threshold["difference"] < high
+            low, high = getattr(threshold, f"{kind}_interval")
+            assert low < threshold.difference < high
         np.testing.assert_allclose(
-            side["curve"]["proportion"], weibull(side["curve"]["difference"], 8.0, 1.5), atol=0.01
+            side.fit.curve.proportion, weibull(side.fit.curve.difference, 8.0, 1.5), atol=0.01
         )
-        assert (side["curve"]["low"] <= side["curve"]["proportion"]).all()
-        assert (side["curve"]["high"] >= side["curve"]["proportion"]).all()
+        assert (side.fit.curve.low <= side.fit.curve.proportion).all()
+        assert (side.fit.curve.high >= side.fit.curve.proportion).all()
 
 
 def test_more_trials_narrow_the_interval_as_their_root():
     levels, rates = [0.0, 4.0, 8.0, 12.0, 20.0], weibull([4.0, 8.0, 12.0, 20.0], 8.0, 1.5)
     few, many = (
-        curves(levels, rates, trials, CurveSettings(), seed=1)[0]["threshold"] for trials in (100, 1600)
+        side_curves(levels, rates, trials, CurveSettings(), seed=1)[0].fit.threshold for trials in (100, 1600)
     )
-    ratio = np.diff(few["posterior_interval"]) / np.diff(many["posterior_interval"])
+    ratio = np.diff(few.posterior_interval) / np.diff(many.posterior_interval)
     assert ratio[0] == pytest.approx(4.0, rel=0.25)
-    assert few["over_standard"] is None  # of nothing
+    assert few.over_standard is None  # of nothing
 
 
 def test_where_there_is_no_curve_it_says_why():
-    (one,) = curves([1.0, 2.0], np.array([0.8]), 100, CurveSettings(), seed=1)
-    assert one["why_not"] == "A curve needs two comparisons on a side of the standard or more: got 1."
-    (low,) = curves([0.0, 1.0, 2.0], np.array([0.5, 0.5]), 100, CurveSettings(), seed=1)
-    assert "threshold" in low["why_not"]
+    (one,) = side_curves([1.0, 2.0], np.array([0.8]), 100, CurveSettings(), seed=1)
+    assert one.why_not == "A curve needs two comparisons on a side of the standard or more: got 1."
+    (low,) = side_curves([0.0, 1.0, 2.0], np.array([0.5, 0.5]), 100, CurveSettings(), seed=1)
+    assert "threshold" in low.why_not
 
 
 def test_stimuli_without_levels_have_hit_rates_and_no_curve():
     listed = [{"name": "blunt", "curvature_per_m": 200}, {"name": "sharp", "curvature_per_m": 300}]
     question = asked(stimuli=listed, standard="blunt", measure="static")
-    found = result(question, bumps(question))
-    assert found["level"] is None
-    assert [one["curves"] for one in found["readings"]] == [[], []]
-    for draw in (figures.draw_curves, figures.draw_statistics, figures.draw_responses):
+    found = analyse(question, bumps(question))
+    assert found.level is None
+    assert [one.curves for one in found.decodings] == [(), ()]
+    for draw in (figures.draw_task_curves, figures.draw_task_statistics, figures.draw_task_responses):
         (*_, last) = draw(found).axes
         assert last.get_figure()
 
@@ -260,8 +262,8 @@ def test_curves_show_every_code_people_with_their_intervals_and_thresholds():
     question = asked(
         code=["gradient_sum", "ideal"], measure="static", observed={"points": points, "source": "two people"}
     )
-    found = plain(result(question, bumps(question)))
-    figure = figures.draw_curves(found)
+    found = analyse(question, bumps(question))
+    figure = figures.draw_task_curves(found)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert sorted(labels) == ["Gradient Sum", "ideal observer", "people (two people)"]
     (axes,) = figure.axes
@@ -269,19 +271,19 @@ def test_curves_show_every_code_people_with_their_intervals_and_thresholds():
     assert (220.0, 220.0) in drawn  # the interval of the first point
     assert (300.0, 300.0) not in drawn
     for code in ("gradient_sum", "ideal"):
-        level = round(reading(found, code, "static")["curves"][0]["threshold"]["level"], 6)
+        level = round(decoding(found, code, "static").curves[0].fit.threshold.level, 6)
         assert (level, level) in drawn
-    table = {row.cells[0]: row.cells for row in report.answer_tables(found)[0].rows}
-    threshold = reading(found, "gradient_sum", "static")["curves"][0]["threshold"]
-    assert table["Gradient Sum, static rate"][3] == f"{threshold['difference']:.3g}"
+    table = {row.cells[0]: row.cells for row in report.task_tables(found)[0].rows}
+    threshold = decoding(found, "gradient_sum", "static").curves[0].fit.threshold
+    assert table["Gradient Sum, static rate"][3] == f"{threshold.difference:.3g}"
 
 
 def test_maps_leave_out_who_has_no_latency():
     question = asked(measure="latency", code="gradient_sum")
     skins = bumps(question) | {"240": NearOnly(240.0)}
-    found = plain(result(question, skins))
-    known = [latency for row in found["responses"]["latency"] for latency in row if latency is not None]
-    colours = figures.draw_responses(found).axes[0].collections[0]
+    found = analyse(question, skins)
+    known = [latency for row in found.responses["latency"] for latency in row if not np.isnan(latency)]
+    colours = figures.draw_task_responses(found).axes[0].collections[0]
     assert colours.get_clim() == (min(known), max(known))
 
 
@@ -290,17 +292,17 @@ def test_maps_leave_out_who_has_no_latency():
 
 def test_no_code_beats_the_ideal_observer_and_what_it_makes_use_of_is_a_share():
     question = asked(noise=0.2, code=["gradient_sum", "euclidean", "ideal"], measure=["static", "latency"])
-    found = result(question, bumps(question))
+    found = analyse(question, bumps(question))
     for measure in ("static", "latency"):
-        codes = [reading(found, code, measure) for code in ("gradient_sum", "euclidean")]
-        ideal = reading(found, "ideal", measure)
-        assert (np.diff(ideal["hit_rate"]) > -0.02).all()
+        codes = [decoding(found, code, measure) for code in ("gradient_sum", "euclidean")]
+        ideal = decoding(found, "ideal", measure)
+        assert (np.diff(ideal.hit_rate) > -0.02).all()
         for code in codes:
-            assert (np.array(code["d_prime"]) < ideal["d_prime"]).all()
-            assert (np.array(code["hit_rate"]) < ideal["hit_rate"] + 0.02).all()
-            shares = np.square(np.divide(code["d_prime"], ideal["d_prime"]))
-            np.testing.assert_allclose(np.array(code["efficiency"], dtype=float), shares, rtol=1e-12)
-            assert all(0.0 < error < 0.1 for error in code["efficiency_error"])
+            assert (np.array(code.d_prime) < ideal.d_prime).all()
+            assert (np.array(code.hit_rate) < ideal.hit_rate + 0.02).all()
+            shares = np.square(np.divide(code.d_prime, ideal.d_prime))
+            np.testing.assert_allclose(np.array(code.efficiency, dtype=float), shares, rtol=1e-12)
+            assert all(0.0 < error < 0.1 for error in code.efficiency_error)
 
 
 def test_the_ideal_observer_of_one_afferent_is_known_in_closed_form():
@@ -309,15 +311,15 @@ def test_the_ideal_observer_of_one_afferent_is_known_in_closed_form():
     (shown,) = presentations(table, 0.05, seed=3)
     expected = 2.0 / np.hypot(0.05 * 51.0, SMALLEST_SPREAD)
     told = ideal_observer([shown])
-    assert told["d_prime"][0] == pytest.approx(expected, abs=4.0 * shown.ideal().d_prime_error)
-    assert told["hit_rate"][0] == pytest.approx(ndtr(expected / 2.0), abs=0.03)
+    assert told.d_prime[0] == pytest.approx(expected, abs=4.0 * shown.ideal().d_prime_error)
+    assert told.hit_rate[0] == pytest.approx(ndtr(expected / 2.0), abs=0.03)
 
 
 def test_where_the_ideal_observer_never_fails_there_is_no_efficiency():
     table = np.array([[50.0, 60.0], [150.0, 10.0]])
     shown = presentations(table, 0.01, seed=3)
     found = efficiencies("gradient_sum", shown, table, np.array([[0, 1]]), 0.01, seed=3)
-    assert (found["efficiency"], found["efficiency_error"]) == ([None], [None])
+    assert np.isnan([*found.efficiency, *found.efficiency_error]).all()
 
 
 # Silence
@@ -326,23 +328,23 @@ def test_where_the_ideal_observer_never_fails_there_is_no_efficiency():
 def test_a_population_that_stays_silent_has_no_hit_rate():
     question = asked()
     with pytest.raises(
-        InputError, match=r"stays silent: by static or dynamic or latency none of its 16 .* any stimulus"
+        InputError, match=r"is silent: by static or dynamic or latency none of its 16 .* any stimulus"
     ):
-        result(question, bumps(question, peak_kpa=0.01))
+        analyse(question, bumps(question, peak_kpa=0.01))
 
 
 def test_silence_under_one_stimulus_is_silence_of_that_measure_alone():
     # The bluntest bump is too low for two spikes in the ramp, but not in the hold.
     question = asked(code="gradient_sum", measure=["dynamic", "static"], standard=320)
     skins = bumps(question) | {"200": Bump(200.0, peak_kpa=0.2)}
-    found = result(question, skins)
-    dynamic, static = found["readings"]
-    assert (dynamic["silent"], dynamic["hit_rate"]) == (["200"], None)
-    assert static["silent"] == []
-    assert len(static["hit_rate"]) == 4
-    assert "silent under 200" in report.answer_tables(found)[1].note
-    assert figures.draw_curves(found)
-    assert report.summary(found)[0].startswith("Gradient Sum of static rates tells")
+    found = analyse(question, skins)
+    dynamic, static = found.decodings
+    assert (dynamic.silent, dynamic.hit_rate) == (("200",), None)
+    assert static.silent == ()
+    assert len(static.hit_rate) == 4
+    assert "silent under 200" in report.task_tables(found)[1].note
+    assert figures.draw_task_curves(found)
+    assert report.task_summary(found)[0].startswith("Gradient Sum of static rates discriminates")
 
 
 def test_noise_is_not_fitted_to_silence():
@@ -353,7 +355,7 @@ def test_noise_is_not_fitted_to_silence():
     with pytest.raises(
         InputError, match=r"noise cannot be fitted: by the measure dynamic .* the stimulus 220"
     ):
-        result(question, skins)
+        analyse(question, skins)
 
 
 # The command
@@ -363,14 +365,16 @@ def test_noise_is_not_fitted_to_silence():
 def call(monkeypatch, capsys, tmp_path):
     """Run the command in an empty folder; presses take no time."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(study, "solve_missing", lambda touches, *_: len(touches))
+    monkeypatch.setattr(runner, "solve_missing", lambda touches, *_: len(touches))
 
     def pressed(self, touch):
         skin = Bump(touch.indenter.curvature_per_m)
         skin.mesh = touch.mesh
+        skin.force_imbalance = skin.energy_imbalance = 0.0
+        skin.linear_solver = "none"
         return skin
 
-    monkeypatch.setattr(study.Store, "load", pressed)
+    monkeypatch.setattr(runner.Store, "load", pressed)
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["fingerpad", "discriminate", *map(str, arguments)])
@@ -397,7 +401,7 @@ def test_an_answer_is_a_page_figures_and_numbers_with_their_origin(call, tmp_pat
     results = json.loads((tmp_path / "discriminate" / "discriminate.json").read_text())
     section, manifest = results["discrimination"], results["manifest"]
     lines = said.splitlines()
-    assert lines[0].startswith("Gradient Sum of static rates tells 220 from 200 in ")
+    assert lines[0].startswith("Gradient Sum of static rates discriminates 220 from 200 in ")
     assert lines[-2:] == ["Report: discriminate/discriminate.html", "Results: discriminate/discriminate.json"]
     assert written(tmp_path / "discriminate") == {
         "discriminate.html",
@@ -405,46 +409,46 @@ def test_an_answer_is_a_page_figures_and_numbers_with_their_origin(call, tmp_pat
         *(f"figures/{name}.png" for name in ("curves", "responses", "statistics")),
     }
     assert manifest["command"] == "fingerpad discriminate mine.yaml --jobs 1"
-    assert manifest["inputs"] == [{"file": "mine.yaml", "sha256": hashlib.sha256(MINE.encode()).hexdigest()}]
+    assert manifest["inputs"] == {"mine.yaml": hashlib.sha256(MINE.encode()).hexdigest()}
     assert (manifest["seed"], manifest["resolution"], manifest["materials"]) == (5, "quick", "trial3")
-    assert manifest["question"]["stimuli"]["values"] == [200.0, 220.0, 240.0, 280.0, 320.0]
-    again = parsed(manifest["question"])  # what was asked can be asked again
-    assert again == parsed(json.loads(MINE))
-    assert touches(again) == touches(parsed(json.loads(MINE)))
+    assert results["task"]["stimuli"]["values"] == [200.0, 220.0, 240.0, 280.0, 320.0]
+    again = parse_task(results["task"])  # what was asked can be asked again
+    assert again == parse_task(json.loads(MINE))
+    assert task_touches(again) == task_touches(parse_task(json.loads(MINE)))
     page = (tmp_path / "discriminate" / "discriminate.html").read_text()
     assert "<h1>Which bumps?</h1>" in page
     assert page.count("data:image/png;base64,") == 3
-    threshold = section["readings"][0]["curves"][0]["threshold"]
+    threshold = section["decodings"][0]["curves"][0]["fit"]["threshold"]
     assert f"<td>{threshold['difference']:.3g}</td>" in page
 
 
 def test_the_same_seed_gives_the_same_numbers_and_another_others():
     def answer(seed):
         question = asked(measure="static", experiment={"seed": seed, "distributions": 20})
-        return plain(result(question, bumps(question)))
+        return analyse(question, bumps(question))
 
     first, again, other = answer(5), answer(5), answer(6)
-    assert first == again
-    assert first["responses"] == other["responses"]
-    for ours, theirs in zip(first["readings"], other["readings"], strict=True):
-        assert ours["hit_rate"] != theirs["hit_rate"]
+    assert to_json(first) == to_json(again)
+    np.testing.assert_array_equal(first.responses["static"], other.responses["static"])
+    for ours, theirs in zip(first.decodings, other.decodings, strict=True):
+        assert (ours.hit_rate != theirs.hit_rate).any()
         assert (
-            ours["curves"][0]["threshold"]["bootstrap_interval"]
-            != theirs["curves"][0]["threshold"]["bootstrap_interval"]
+            ours.curves[0].fit.threshold.bootstrap_interval
+            != theirs.curves[0].fit.threshold.bootstrap_interval
         )
 
 
-def test_a_ready_made_question_is_asked_by_name_or_made_ones_own(call, tmp_path, answered, monkeypatch):
+def test_an_example_task_runs_by_name_or_as_a_file_of_ones_own(call, tmp_path, answered, monkeypatch):
     monkeypatch.setattr(
-        study,
-        "result",
-        lambda asked, skins: answered | {"question": asked.question.question, "skins": list(skins)},
+        task_run,
+        "analyse",
+        lambda prepared, skins: replace(answered, question=prepared.task.question, axis=", ".join(skins)),
     )
     status, said, _ = call("--list")
     assert status == 0
-    assert [line.split(":")[0] for line in said.splitlines()] == list(ready_made())
+    assert [line.split(":")[0] for line in said.splitlines()] == list(example_tasks())
     status, said, _ = call("--example", "sphere_curvature")
-    assert (status, said) == (0, ready_made()["sphere_curvature"])
+    assert (status, said) == (0, example_tasks()["sphere_curvature"])
     assert list(tmp_path.iterdir()) == []
     assert call("sphere_curvature", "--resolution", "quick", "--out", "named")[0] == 0
     (tmp_path / "mine.yaml").write_text(said)
@@ -453,20 +457,20 @@ def test_a_ready_made_question_is_asked_by_name_or_made_ones_own(call, tmp_path,
         json.loads((tmp_path / folder / "discriminate.json").read_text()) for folder in ("named", "own")
     )
     assert named["discrimination"] == own["discrimination"]
-    assert named["discrimination"]["skins"] == ["287", "296", "305", "316", "328", "340", "365"]
-    assert named["manifest"]["inputs"][0]["sha256"] == own["manifest"]["inputs"][0]["sha256"]
+    assert named["discrimination"]["axis"] == "287, 296, 305, 316, 328, 340, 365"
+    assert [*named["manifest"]["inputs"].values()] == [*own["manifest"]["inputs"].values()]
     assert named["manifest"]["resolution"] == "quick"
 
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ([], "discriminate needs a question, a YAML file or one of"),
+        ([], "discriminate needs a task, a YAML file or one of"),
         (["none.yaml"], "none.yaml must be a file that can be read"),
-        (["bumps"], "bumps must be a YAML file or one of the ready-made questions"),
+        (["bumps"], "bumps must be a YAML file or one of the example tasks"),
         (["bad.yaml"], "bad.yaml, standard must be one of the stimuli"),
         (["broken.yaml"], "broken.yaml cannot be read as YAML"),
-        (["empty.yaml"], "empty.yaml, a question must be a mapping"),
+        (["empty.yaml"], "empty.yaml, a task must be a mapping"),
         (["mine.yaml", "--jobs", "0"], "jobs must be a whole number of at least 1"),
         (["mine.yaml", "--resolution", "high"], "skin.resolution must be one of quick"),
         (["--example", "bumps"], "--example must be one of"),
@@ -499,7 +503,7 @@ def test_a_silent_population_writes_no_answer(call, tmp_path, monkeypatch):
     )
     status, _, errors = call("mine.yaml")
     assert status == 2
-    assert "stays silent" in errors
+    assert "is silent" in errors
     assert written(tmp_path / "discriminate") == set()
 
 

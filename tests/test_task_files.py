@@ -11,11 +11,11 @@ import pytest
 from fingerpad.core.errors import InputError
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.discrimination.judgements import Asked
-from fingerpad.experiments.discrimination.task import Question, StimulusSettings
-from fingerpad.experiments.discrimination.task_files import parsed, read_question, ready_made
-from fingerpad.experiments.discrimination.task_population import afferent_of, population_of
-from fingerpad.experiments.discrimination.task_stimuli import presented, touches
+from fingerpad.experiments.discrimination.analysis import PreparedTask
+from fingerpad.experiments.discrimination.task import DiscriminationTask, StimulusSettings
+from fingerpad.experiments.discrimination.task_files import example_tasks, parse_task, read_task
+from fingerpad.experiments.discrimination.task_population import task_afferent, task_population
+from fingerpad.experiments.discrimination.task_stimuli import task_stimuli, task_touches
 from fingerpad.experiments.gerling2014.sphere_discrimination import touches as sphere_touches
 from fingerpad.experiments.stimuli import INDENTERS
 from fingerpad.geometry.indenters import Bar, Sphere
@@ -52,16 +52,16 @@ def changed(content, **parts):
 
 
 def asked(content):
-    question = parsed(content)
-    touches(question)
-    return Asked(question, presented(question), population_of(question))
+    question = parse_task(content)
+    task_touches(question)
+    return PreparedTask(question, task_stimuli(question), task_population(question))
 
 
 # What a file means
 
 
 def test_what_varies_makes_one_stimulus_per_value_and_the_standard_comes_first():
-    stimuli = presented(parsed(changed(SPHERES, standard=296)))
+    stimuli = task_stimuli(parse_task(changed(SPHERES, standard=296)))
     assert [stimulus.name for stimulus in stimuli] == ["296", "287", "365"]
     assert [stimulus.level for stimulus in stimuli] == [296.0, 287.0, 365.0]
     assert [stimulus.indenter for stimulus in stimuli] == [Sphere(296.0), Sphere(287.0), Sphere(365.0)]
@@ -69,7 +69,7 @@ def test_what_varies_makes_one_stimulus_per_value_and_the_standard_comes_first()
 
 
 def test_listed_stimuli_say_what_they_do_not_share():
-    wide, narrow, deep = presented(parsed(BARS))
+    wide, narrow, deep = task_stimuli(parse_task(BARS))
     assert (wide.name, wide.level, wide.indenter) == ("wide", None, Bar(4.0, 0.2))
     assert (wide.motion, wide.offset_mm) == (ForceRampAndHold(150.0), (0.5, 0.0))
     assert (narrow.indenter, narrow.offset_mm, narrow.tilt_deg) == (Bar(2.0, 0.2), (0.0, 0.0), None)
@@ -79,12 +79,12 @@ def test_listed_stimuli_say_what_they_do_not_share():
 
 def test_a_force_or_a_duration_may_vary_as_well_as_a_size():
     forces = changed(SPHERES, stimuli={"vary": "force_mn", "values": [50, 80]}, standard=50)
-    assert [stimulus.motion for stimulus in presented(parsed(forces))] == [
+    assert [stimulus.motion for stimulus in task_stimuli(parse_task(forces))] == [
         ForceRampAndHold(50.0),
         ForceRampAndHold(80.0),
     ]
     ramps = changed(SPHERES, stimuli={"vary": "ramp_ms", "values": [50, 25]}, standard=50)
-    assert [stimulus.motion.ramp_ms for stimulus in presented(parsed(ramps))] == [50.0, 25.0]
+    assert [stimulus.motion.ramp_ms for stimulus in task_stimuli(parse_task(ramps))] == [50.0, 25.0]
 
 
 def test_every_size_of_every_indenter_can_be_given():
@@ -93,7 +93,7 @@ def test_every_size_of_every_indenter_can_be_given():
 
 
 def test_the_papers_spheres_are_the_very_touches_of_a_reproduction():
-    ours = touches(read_question("sphere_curvature", resolution="quick"))
+    ours = task_touches(read_task("sphere_curvature", resolution="quick"))
     theirs = {
         f"{curvature:g}": touch
         for (at, curvature), touch in sphere_touches(Conditions("quick")).items()
@@ -103,7 +103,7 @@ def test_the_papers_spheres_are_the_very_touches_of_a_reproduction():
 
 
 def test_all_stimuli_meet_one_mesh_that_is_fine_below_each_of_them():
-    pressed = touches(parsed(changed(BARS, skin={"resolution": "quick"})))
+    pressed = task_touches(parse_task(changed(BARS, skin={"resolution": "quick"})))
     gradings = {touch.grading for touch in pressed.values()}
     assert len(gradings) == 1
     grading = gradings.pop()
@@ -120,11 +120,13 @@ def test_beside_the_midline_both_halves_are_pressed():
     beside = changed(
         SPHERES, common={"indenter": "sphere", "offset_mm": [0.0, 1.0]}, skin={"resolution": "quick"}
     )
-    assert all(touch.grading.full and touch.at_mm[1] == 1.0 for touch in touches(parsed(beside)).values())
+    assert all(
+        touch.grading.full and touch.at_mm[1] == 1.0 for touch in task_touches(parse_task(beside)).values()
+    )
 
 
 def test_a_population_without_further_words_is_the_papers():
-    population, paper = population_of(parsed(SPHERES)), Population.grid()
+    population, paper = task_population(parse_task(SPHERES)), Population.grid()
     np.testing.assert_array_equal(population.positions_mm, paper.positions_mm)
     assert population.afferent == Afferent()
 
@@ -139,30 +141,32 @@ def test_any_layout_fills_its_region_at_its_density(layout):
         "offset_mm": [1.0, 0.0],
         "seed": 3,
     }
-    population = population_of(parsed(changed(SPHERES, population=settings)))
+    population = task_population(parse_task(changed(SPHERES, population=settings)))
     assert abs(len(population) - 0.48 * 150) <= 8
     x, z = population.positions_mm[:, 0], population.positions_mm[:, -1]
     assert abs(x.mean() - RECEPTOR_X_MM - 1.0) < 1.0
     assert np.ptp(x) <= 8.5
     assert np.ptp(z) <= 6.1
-    again = population_of(parsed(changed(SPHERES, population=settings)))
+    again = task_population(parse_task(changed(SPHERES, population=settings)))
     np.testing.assert_array_equal(again.positions_mm, population.positions_mm)
 
 
 def test_afferents_fill_the_pad_at_the_density_of_its_skin_or_line_the_nail():
     pad = {"layout": "poisson-disc", "density_per_cm2": 70, "region": {"shape": "pad"}}
-    population = population_of(parsed(changed(SPHERES, population=pad)))
+    population = task_population(parse_task(changed(SPHERES, population=pad)))
     assert len(population) == round(0.7 * UnrolledSkin().pad().area_mm2)
-    rows = population_of(parsed(changed(SPHERES, population={"layout": "nail rows", "rows": 2})))
+    rows = task_population(parse_task(changed(SPHERES, population={"layout": "nail rows", "rows": 2})))
     np.testing.assert_array_equal(
         rows.positions_mm, NailEdge().points(NailEdge().rows(2, density_per_cm2=100.0).places_mm)
     )
-    assert len(Asked(parsed(SPHERES), presented(parsed(SPHERES)), rows).neighbours) > 2 * len(rows)
+    assert len(
+        PreparedTask(parse_task(SPHERES), task_stimuli(parse_task(SPHERES)), rows).neighbours
+    ) > 2 * len(rows)
 
 
 def test_seed_and_spread_make_another_finger():
     def sensitivity(**settings):
-        return population_of(parsed(changed(SPHERES, population=settings))).sensitivity
+        return task_population(parse_task(changed(SPHERES, population=settings))).sensitivity
 
     assert sensitivity() is None
     first, other = sensitivity(sensitivity_spread=0.4), sensitivity(sensitivity_spread=0.4, seed=1)
@@ -171,9 +175,9 @@ def test_seed_and_spread_make_another_finger():
 
 
 def test_an_afferent_is_ours_or_ones_own_numbers_or_of_a_file_of_results(tmp_path):
-    assert afferent_of(parsed(SPHERES)) == Afferent()
-    own = parsed(changed(SPHERES, afferent={"static_gain": 1.1e-6, "dynamic_quantity": "von_mises"}))
-    assert afferent_of(own) == Afferent(static_gain=1.1e-6, dynamic_quantity="von_mises")
+    assert task_afferent(parse_task(SPHERES)) == Afferent()
+    own = parse_task(changed(SPHERES, afferent={"static_gain": 1.1e-6, "dynamic_quantity": "von_mises"}))
+    assert task_afferent(own) == Afferent(static_gain=1.1e-6, dynamic_quantity="von_mises")
     six = dict(zip(PARAMETER_NAMES, [2e-7, 1e-4, 9e-7, 60.0, 1e-6, 50.0], strict=True))
     expected = Afferent.from_parameters(list(six.values()))
     for name, results in (
@@ -181,25 +185,25 @@ def test_an_afferent_is_ours_or_ones_own_numbers_or_of_a_file_of_results(tmp_pat
         ("results.json", {"single_unit": {"parameters": six}, "manifest": {}}),
     ):
         (tmp_path / name).write_text(json.dumps(results))
-        assert afferent_of(parsed(changed(SPHERES, afferent=name)), tmp_path) == expected
+        assert task_afferent(parse_task(changed(SPHERES, afferent=name)), tmp_path) == expected
 
 
 def test_the_resolution_can_be_replaced_and_nothing_else_changes(tmp_path):
     path = tmp_path / "mine.yaml"
-    path.write_text(ready_made()["sphere_curvature"], encoding="utf-8")
-    quick, own = read_question(path, resolution="quick"), read_question(path)
+    path.write_text(example_tasks()["sphere_curvature"], encoding="utf-8")
+    quick, own = read_task(path, resolution="quick"), read_task(path)
     assert (quick.skin.resolution, own.skin.resolution) == ("quick", "standard")
     assert quick.model_copy(update={"skin": own.skin}) == own
 
 
-@pytest.mark.parametrize("name", ready_made())
+@pytest.mark.parametrize("name", example_tasks())
 def test_ready_made_questions_can_be_asked(name):
-    question = read_question(name, resolution="quick")
-    found = Asked(question, presented(question), population_of(question))
+    question = read_task(name, resolution="quick")
+    found = PreparedTask(question, task_stimuli(question), task_population(question))
     assert found.stimuli[0].level == question.standard or found.stimuli[0].name == question.standard
     assert all(
-        touch.grading == touches(question)[found.stimuli[0].name].grading
-        for touch in touches(question).values()
+        touch.grading == task_touches(question)[found.stimuli[0].name].grading
+        for touch in task_touches(question).values()
     )
 
 
@@ -256,7 +260,7 @@ noise: fitted
 nois: 0.1
     nois is unknown: did you mean noise?
 colour: red
-    colour is unknown: a question has question, axis,
+    colour is unknown: a task has question, axis,
 stimuli: null
     stimuli must be given
 stimuli: []
@@ -411,8 +415,8 @@ def test_what_cannot_be_is_refused_in_one_sentence_that_says_where(parts, said):
     [
         ("question: a\nquestion: b\n", "mine.yaml, line 1: question stands twice, keep one."),
         ("question: [a\n", "mine.yaml cannot be read as YAML"),
-        ("- 1\n- 2\n", "mine.yaml, a question must be a mapping of keys to values: got [1, 2]."),
-        ("", "mine.yaml, a question must be a mapping of keys to values: got None."),
+        ("- 1\n- 2\n", "mine.yaml, a task must be a mapping of keys to values: got [1, 2]."),
+        ("", "mine.yaml, a task must be a mapping of keys to values: got None."),
         ("question: &a [*a]\n", "mine.yaml, question must be a text"),
         ("[" * 600, "mine.yaml cannot be read as YAML"),
         ("{[1]: 2}", "mine.yaml cannot be read as YAML"),
@@ -422,24 +426,24 @@ def test_a_file_that_is_no_question_is_refused_with_its_name(tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     Path("mine.yaml").write_text(text)
     with pytest.raises(InputError, match="^" + re.escape(said)):
-        read_question("mine.yaml")
+        read_task("mine.yaml")
 
 
 def test_neither_a_file_nor_a_ready_made_question_lists_those():
     with pytest.raises(
         InputError, match=r"must be a YAML file or one of .*sphere_curvature.*: it is neither"
     ):
-        read_question("sphere_curvatur")
+        read_task("sphere_curvatur")
     with pytest.raises(InputError, match=r"gone\.yaml must be a file that can be read"):
-        read_question("gone.yaml")
+        read_task("gone.yaml")
 
 
 @pytest.mark.parametrize("content", ["[1]", "{}", '{"fit": {"parameters": {"tau": 3}}}', "no json"])
 def test_a_file_without_fitted_parameters_is_refused(tmp_path, content):
     (tmp_path / "fit.json").write_text(content)
-    question = parsed(changed(SPHERES, afferent="fit.json"))
+    question = parse_task(changed(SPHERES, afferent="fit.json"))
     with pytest.raises(InputError, match=r"^afferent.*fit\.json"):
-        afferent_of(question, tmp_path)
+        task_afferent(question, tmp_path)
 
 
 def test_null_is_as_good_as_nothing():
@@ -471,4 +475,4 @@ def test_the_guide_names_every_key():
                 )
 
     guide = (ROOT / "docs" / "discriminate.md").read_text(encoding="utf-8")
-    assert [key for key in dict.fromkeys(keys(Question)) if f"`{key}`" not in guide] == []
+    assert [key for key in dict.fromkeys(keys(DiscriminationTask)) if f"`{key}`" not in guide] == []

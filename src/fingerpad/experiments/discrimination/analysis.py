@@ -1,0 +1,501 @@
+"""The analysis of a discrimination task: responses to every stimulus, decoded by every code and measure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import InputError
+from fingerpad.core.random_streams import IntArray
+from fingerpad.core.results import Matrix, Vector, result_class
+from fingerpad.core.signals import ResponseMap, Skin
+from fingerpad.experiments.discrimination.decoding import (
+    SideCurve,
+    TaskStatistic,
+    fitted_noise,
+    hit_rates,
+    response_table,
+    side_curves,
+    silent_stimuli,
+    taking_part,
+    task_statistic,
+)
+from fingerpad.experiments.discrimination.efficiencies import efficiencies, ideal_observer, presentations
+from fingerpad.experiments.discrimination.task import (
+    FITTED,
+    GRID,
+    IDEAL,
+    NAIL_ROWS,
+    UNITS,
+    DiscriminationTask,
+    ObservedPoint,
+    VariedStimuli,
+)
+from fingerpad.experiments.discrimination.task_stimuli import TaskStimulus, stimulus_index
+from fingerpad.experiments.gerling2014.goodwin import binomial_interval
+from fingerpad.neuron.population import Population
+from fingerpad.psychophysics import Presentation
+from fingerpad.psychophysics.discrimination import Experiment
+from fingerpad.psychophysics.encoding import neighbours_of
+
+Encoded = tuple[FloatArray, np.ndarray]
+"""A measure of all receptors under every stimulus, and the pairs of neighbours that take part."""
+
+
+@result_class
+class TaskPopulation:
+    """The population of a task.
+
+    Parameters
+    ----------
+    layout : str
+        How the afferents are laid out.
+    n_receptors : int
+        How many there are.
+    pitch_mm : float
+        Distance between neighbours. [mm]
+    density_per_cm2 : float
+        Afferents per area of skin. [1/cm2]
+    positions_mm : array (n_receptors, 2 or 3)
+        x and z, or x, y and z. [mm]
+    sensitivity : array (n_receptors,), optional
+        Factor on the gains of each afferent.
+    """
+
+    layout: str
+    n_receptors: int
+    pitch_mm: float
+    density_per_cm2: float
+    positions_mm: Matrix
+    sensitivity: Vector | None
+
+
+@result_class
+class FittedNoise:
+    """What the noise was fitted to.
+
+    Parameters
+    ----------
+    code, measure : str
+        The decoding that was brought closest to the observed hit rates.
+    stimulus : tuple of str
+        The comparisons that were observed.
+    observed, hit_rate : array (n_observed,)
+        Hit rates of people and of the model. [0-1]
+    """
+
+    code: str
+    measure: str
+    stimulus: tuple[str, ...]
+    observed: Vector
+    hit_rate: Vector
+
+
+@result_class
+class TaskNoise:
+    """The noise of a task.
+
+    Parameters
+    ----------
+    sigma : float
+        Standard deviation of the multiplicative noise.
+    fitted_to : FittedNoise, optional
+        Absent where the noise was given.
+    root_mean_square_error : float, optional
+        Of the fitted hit rates.
+    """
+
+    sigma: float
+    fitted_to: FittedNoise | None = None
+    root_mean_square_error: float | None = None
+
+
+@result_class
+class Decoding:
+    """One measure of the population, decoded by one code.
+
+    Parameters
+    ----------
+    code, measure : str
+        By the names of `CODES` and `MEASURES`.
+    silent : tuple of str
+        Stimuli under which no afferent responds; there is no hit rate then.
+    hit_rate, hit_rate_sd : array (n_comparisons,), optional
+        Mean and standard deviation over repetitions. [0-1]
+    statistic : TaskStatistic, optional
+        What the code computes for each stimulus; absent for the ideal observer.
+    d_prime : array (n_comparisons,), optional
+        Discriminability; NaN where it is infinite.
+    efficiency, efficiency_error : array (n_comparisons,), optional
+        Against the ideal observer; NaN where it cannot be estimated.
+    curves : tuple of SideCurve
+        Psychometric curves above and below the standard.
+    """
+
+    code: str
+    measure: str
+    silent: tuple[str, ...] = ()
+    hit_rate: Vector | None = None
+    hit_rate_sd: Vector | None = None
+    statistic: TaskStatistic | None = None
+    d_prime: Vector | None = None
+    efficiency: Vector | None = None
+    efficiency_error: Vector | None = None
+    curves: tuple[SideCurve, ...] = ()
+
+
+@result_class
+class TaskObservation:
+    """A hit rate of people.
+
+    Parameters
+    ----------
+    at : float or str
+        Level or name of the stimulus, as the task gives it.
+    level : float, optional
+        On the axis of the psychometric curve.
+    hit_rate : float
+        Fraction of trials. [0-1]
+    trials : int, optional
+        How many there were.
+    interval : (float, float), optional
+        Binomial interval, where the trials are known. [0-1]
+    """
+
+    at: float | str
+    level: float | None
+    hit_rate: float
+    trials: int | None
+    interval: tuple[float, float] | None
+
+
+@result_class
+class TaskObservations:
+    """What was observed in people, and by whom."""
+
+    source: str
+    points: tuple[TaskObservation, ...]
+
+
+@result_class
+class TaskResult:
+    """Result of a discrimination task.
+
+    Parameters
+    ----------
+    question : str
+        The task in words.
+    axis : str
+        What the levels are.
+    stimulus : tuple of str
+        Names, the standard first.
+    level : array (n_stimuli,), optional
+        Where the stimuli stand on the axis of the psychometric curve.
+    population : TaskPopulation
+        The afferents.
+    noise : TaskNoise
+        Given or fitted.
+    responses : dict of str to array (n_stimuli, n_receptors)
+        By measure. [spikes/s or ms]
+    decodings : tuple of Decoding
+        One per measure and code.
+    observed : TaskObservations, optional
+        Hit rates of people.
+    """
+
+    question: str
+    axis: str
+    stimulus: tuple[str, ...]
+    level: Vector | None
+    population: TaskPopulation
+    noise: TaskNoise
+    responses: dict[str, Matrix]
+    decodings: tuple[Decoding, ...]
+    observed: TaskObservations | None
+
+
+@dataclass(frozen=True)
+class PreparedTask:
+    """A task with its stimuli and its population.
+
+    Parameters
+    ----------
+    task : DiscriminationTask
+        As it was read.
+    stimuli : tuple of TaskStimulus
+        From `task_stimuli`, the standard first.
+    population : Population
+        From `task_population`.
+
+    Raises
+    ------
+    InputError
+        If the windows do not end with the stimuli, an observed point means none of them, or noise shall be
+        fitted to no point.
+    """
+
+    task: DiscriminationTask
+    stimuli: tuple[TaskStimulus, ...]
+    population: Population
+
+    def __post_init__(self) -> None:
+        task = self.task
+        for key in ("dynamic", "static"):
+            self._check_window(key, *getattr(task.windows_ms, key))
+        for number, point in enumerate(task.observed.points if task.observed else (), start=1):
+            if isinstance(point.at, str) or self.stimuli[0].level is None:
+                stimulus_index(self.stimuli, point.at, f"observed.points[{number}].at")
+        if task.noise == FITTED and not self.observed_comparisons:
+            raise InputError(
+                "noise can only be fitted to observed hit rates of the comparisons, "
+                f"{', '.join(stimulus.name for stimulus in self.stimuli[1:])}: observed.points has none."
+            )
+        if IDEAL in task.code and task.noise == 0.0:
+            raise InputError("noise must be greater than 0 where code has ideal: got 0.")
+        if task.noise == FITTED and task.code[0] == IDEAL:
+            raise InputError("code must not begin with ideal where noise is fitted: put another first.")
+        if task.experiment.criterion_sigma > 0.0 and "euclidean" in task.code:
+            raise InputError(
+                "experiment.criterion_sigma must be 0 where code has euclidean, whose decision point "
+                f"does not vary: got {task.experiment.criterion_sigma:g}."
+            )
+
+    def _check_window(self, key: str, start: float, end: float) -> None:
+        if not 0.0 <= start < end:
+            raise InputError(
+                f"windows_ms.{key} must be a start from 0 on and a later end: got {start:g}, {end:g}."
+            )
+        for stimulus in self.stimuli:
+            if stimulus.motion.end_ms < end:
+                raise InputError(
+                    f"windows_ms.{key} must end with the stimuli, not at {end:g} ms: {stimulus.name!r} ends "
+                    f"at {stimulus.motion.end_ms:g} ms."
+                )
+
+    @cached_property
+    def observed_comparisons(self) -> dict[int, float]:
+        """Observed hit rates of comparisons that are pressed, by their row among the stimuli."""
+        points = self.task.observed.points if self.task.observed else ()
+        return {
+            row: point.hit_rate
+            for point in points
+            for row, stimulus in enumerate(self.stimuli[1:], start=1)
+            if point.at in (stimulus.name, stimulus.level)
+        }
+
+    @cached_property
+    def neighbours(self) -> IntArray:
+        """Who is whose neighbour, (n_pairs, 2)."""
+        layout = self.task.population.layout
+        pattern = "rectangular" if layout in (GRID, NAIL_ROWS) else layout
+        return neighbours_of(np.asarray(self.population.places_mm), self.population.pitch_mm, pattern)
+
+    @property
+    def plan(self) -> Experiment:
+        """Repetitions and criterion."""
+        settings = dict(self.task.experiment)
+        return Experiment(**{name: settings[name] for name in settings if name not in ("seed", "trials")})
+
+    @property
+    def axis(self) -> str:
+        """Say what the levels are."""
+        if self.task.axis or not isinstance(self.task.stimuli, VariedStimuli):
+            return self.task.axis or "level"
+        name, unit = self.task.stimuli.vary, UNITS[self.task.stimuli.vary]
+        words = name.split("_per_")[0] if "_per_" in name else name.rsplit("_", 1)[0] if unit else name
+        return f"{words} [{unit}]" if unit else words
+
+    def responses(self, skins: Mapping[str, Skin]) -> list[ResponseMap]:
+        """Responses of the population to every stimulus."""
+        windows = self.task.windows_ms
+        return [
+            self.population.respond(skins[stimulus.name], windows.dynamic, windows.static)
+            for stimulus in self.stimuli
+        ]
+
+
+def analyse(prepared: PreparedTask, skins: Mapping[str, Skin]) -> TaskResult:
+    """Compute the responses to indented stimuli, and decode them by every code and measure.
+
+    Parameters
+    ----------
+    prepared : PreparedTask
+        The task.
+    skins : mapping of str to Skin
+        Response of the skin to each stimulus, by its name.
+
+    Returns
+    -------
+    TaskResult
+
+    Raises
+    ------
+    InputError
+        If the population is silent under a stimulus by every measure.
+    ConvergenceError
+        If no noise gives the observed hit rates.
+    """
+    task, stimuli, latest_ms = prepared.task, prepared.stimuli, prepared.task.windows_ms.latency
+    maps = prepared.responses(skins)
+    tables = {measure: response_table(maps, measure, latest_ms) for measure in task.measure}
+    silent = {measure: silent_stimuli(table, measure, latest_ms) for measure, table in tables.items()}
+    if all(rows.size for rows in silent.values()):
+        raise InputError(
+            f"The population is silent: by {' or '.join(silent)} none of its {len(prepared.population)} "
+            f"afferents responds to {_named(stimuli, next(iter(silent.values())))}, so that there is no hit "
+            "rate; indent deeper, or place the population below the stimuli."
+        )
+    encoded = {measure: taking_part(table, prepared.neighbours) for measure, table in tables.items()}
+    noise = _noise(prepared, encoded, silent)
+    return TaskResult(
+        question=task.question,
+        axis=prepared.axis,
+        stimulus=tuple(stimulus.name for stimulus in stimuli),
+        level=None if stimuli[0].level is None else np.array([stimulus.level for stimulus in stimuli]),
+        population=_population(prepared),
+        noise=noise,
+        responses=tables,
+        decodings=tuple(
+            decoding
+            for measure in task.measure
+            for decoding in _decodings(prepared, measure, encoded[measure], silent[measure], noise.sigma)
+        ),
+        observed=_observed(prepared),
+    )
+
+
+def _named(stimuli: Sequence[TaskStimulus], rows: Sequence[int] | IntArray) -> str:
+    """Name stimuli within a sentence."""
+    if len(rows) == len(stimuli):
+        return "any stimulus"
+    return f"the stimulus {', '.join(stimuli[row].name for row in rows)}"
+
+
+def _population(prepared: PreparedTask) -> TaskPopulation:
+    settings, population = prepared.task.population, prepared.population
+    return TaskPopulation(
+        layout=settings.layout,
+        n_receptors=len(population),
+        pitch_mm=population.pitch_mm,
+        density_per_cm2=settings.density_per_cm2,
+        positions_mm=population.positions_mm,
+        sensitivity=population.sensitivity,
+    )
+
+
+def _noise(
+    prepared: PreparedTask, encoded: Mapping[str, Encoded], silent: Mapping[str, IntArray]
+) -> TaskNoise:
+    """Find the noise: as it is given, or as the first code and measure need it for the observed hit rates."""
+    task, points = prepared.task, prepared.observed_comparisons
+    if not isinstance(task.noise, str):
+        return TaskNoise(sigma=task.noise)
+    code, measure = task.code[0], task.measure[0]
+    if silent[measure].size:
+        raise InputError(
+            f"noise cannot be fitted: by the measure {measure} the population is silent under "
+            f"{_named(prepared.stimuli, silent[measure])}; give a number, or another measure first."
+        )
+    fit = fitted_noise(
+        code,
+        *encoded[measure],
+        [row - 1 for row in points],
+        list(points.values()),
+        task.experiment.seed,
+        prepared.plan,
+    )
+    return TaskNoise(
+        sigma=fit.noise_sigma,
+        fitted_to=FittedNoise(
+            code=code,
+            measure=measure,
+            stimulus=tuple(prepared.stimuli[row].name for row in points),
+            observed=np.array(list(points.values())),
+            hit_rate=np.asarray(fit.hit_rates),
+        ),
+        root_mean_square_error=fit.root_mean_square_error,
+    )
+
+
+def _decodings(
+    prepared: PreparedTask, measure: str, encoded: Encoded, silent: IntArray, sigma: float
+) -> list[Decoding]:
+    """Decode one measure by every code; there is no hit rate without responses."""
+    codes, seed = prepared.task.code, prepared.task.experiment.seed
+    if silent.size:
+        names = tuple(prepared.stimuli[row].name for row in silent)
+        return [Decoding(code=code, measure=measure, silent=names) for code in codes]
+    shown = presentations(encoded[0], sigma, seed) if sigma > 0.0 else []
+    return [_decoding(prepared, code, measure, encoded, sigma, shown) for code in codes]
+
+
+def _decoding(
+    prepared: PreparedTask,
+    code: str,
+    measure: str,
+    encoded: Encoded,
+    sigma: float,
+    shown: list[Presentation],
+) -> Decoding:
+    """Hit rates of one code, their statistic, efficiency and psychometric curves."""
+    settings, (table, neighbours) = prepared.task.experiment, encoded
+    if code == IDEAL:
+        ideal = ideal_observer(shown)
+        decoding = Decoding(
+            code=code,
+            measure=measure,
+            hit_rate=ideal.hit_rate,
+            hit_rate_sd=ideal.hit_rate_sd,
+            d_prime=ideal.d_prime,
+        )
+    else:
+        rates = hit_rates(code, table, neighbours, sigma, settings.seed, prepared.plan)
+        decoding = Decoding(
+            code=code,
+            measure=measure,
+            hit_rate=rates.hit_rate,
+            hit_rate_sd=rates.hit_rate_sd,
+            statistic=task_statistic(code, table, neighbours, sigma, settings.seed),
+        )
+        if shown:
+            of_code = efficiencies(code, shown, table, neighbours, sigma, settings.seed)
+            decoding = replace(
+                decoding,
+                d_prime=of_code.d_prime,
+                efficiency=of_code.efficiency,
+                efficiency_error=of_code.efficiency_error,
+            )
+    levels = [stimulus.level for stimulus in prepared.stimuli if stimulus.level is not None]
+    if not levels or decoding.hit_rate is None:
+        return decoding
+    found = side_curves(levels, decoding.hit_rate, settings.trials, prepared.task.curve, settings.seed)
+    return replace(decoding, curves=found)
+
+
+def _observed(prepared: PreparedTask) -> TaskObservations | None:
+    """Observed points with their levels, and binomial intervals where the trials are known."""
+    observed = prepared.task.observed
+    if observed is None:
+        return None
+    return TaskObservations(
+        source=observed.source,
+        points=tuple(_observation(prepared.stimuli, point) for point in observed.points),
+    )
+
+
+def _observation(stimuli: Sequence[TaskStimulus], point: ObservedPoint) -> TaskObservation:
+    at, interval = point.at, None
+    if point.trials:
+        low, high = binomial_interval(point.hit_rate, point.trials)
+        interval = (float(low), float(high))
+    return TaskObservation(
+        at=at,
+        level=stimuli[stimulus_index(stimuli, at, "at")].level if isinstance(at, str) else at,
+        hit_rate=point.hit_rate,
+        trials=point.trials,
+        interval=interval,
+    )
