@@ -229,13 +229,13 @@ def _rate_powered(patch: Patch, numbers: FloatArray) -> Drive:
 EXPLANATIONS: tuple[Explanation, ...] = (
     Explanation("the paper's model", (), lambda patch, _: patch.energy),
     Explanation(
-        "window of 20 ms cuts no interval",
+        "rate by formula, without intervals",
         (),
         lambda patch, _: patch.energy,
         by_formula=True,
     ),
     Explanation(
-        "receptor elsewhere", (_OFFSET,), lambda patch, n: patch.drive(patch.at(STORED_ENERGY, n[0]))
+        "offset of the receptor", (_OFFSET,), lambda patch, n: patch.drive(patch.at(STORED_ENERGY, n[0]))
     ),
     Explanation(
         "mean of a cluster along the finger",
@@ -253,7 +253,7 @@ EXPLANATIONS: tuple[Explanation, ...] = (
         lambda patch, n: patch.following(patch.mean(STORED_ENERGY, n[0])),
     ),
     Explanation(
-        "hardest driven of a cluster",
+        "maximum over a cluster",
         (_REACH,),
         lambda patch, n: patch.drive(patch.largest(STORED_ENERGY, n[0])),
     ),
@@ -285,7 +285,7 @@ EXPLANATIONS: tuple[Explanation, ...] = (
         lambda patch, n: patch.following(patch.mean(STRESS, n[0])),
     ),
     Explanation(
-        "compressive stress, receptor elsewhere",
+        "compressive stress, offset of the receptor",
         (_OFFSET,),
         lambda patch, n: patch.drive(patch.at(STORED_ENERGY, n[0]), patch.at(STRESS, n[0])),
     ),

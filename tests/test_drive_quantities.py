@@ -434,7 +434,7 @@ def test_rates_by_formula_are_those_of_a_steady_current():
 
 
 def test_an_explained_model_begins_at_the_scaled_start():
-    (explanation,) = (explanation for explanation in EXPLANATIONS if explanation.name == "receptor elsewhere")
+    (explanation,) = (one for one in EXPLANATIONS if one.name == "offset of the receptor")
     model = ExplainedModel.from_start(explanation, PATCH)
     assert model.names[4:] == ("offset_mm",)
     assert model.n_stimuli == 24
@@ -444,7 +444,7 @@ def test_an_explained_model_begins_at_the_scaled_start():
 
 
 def test_the_last_drive_is_kept_and_no_other_taken_for_it():
-    (explanation,) = (explanation for explanation in EXPLANATIONS if explanation.name == "receptor elsewhere")
+    (explanation,) = (one for one in EXPLANATIONS if one.name == "offset of the receptor")
     asked = []
 
     def driven(patch, numbers):
@@ -466,7 +466,7 @@ def test_explanations_are_judged_alike_and_told_by_what_they_add(monkeypatch):
 
     monkeypatch.setattr(drive_fits, "thorough_method", short)
     by_name = {explanation.name: explanation for explanation in EXPLANATIONS}
-    names = ("the paper's model", "receptor elsewhere", "dynamic term follows compressive stress")
+    names = ("the paper's model", "offset of the receptor", "dynamic term follows compressive stress")
     chosen = tuple(by_name[name] for name in names)
     told = []
     rows = drive_study.explained(PATCH, RECORDINGS, 0, np.random.default_rng(0), told.append, chosen)
