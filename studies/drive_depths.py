@@ -26,7 +26,8 @@ from fingerpad.experiments.gerling2014.drive_fits import (
 )
 from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.inference.fitting import Method
-from fingerpad.inference.rate_problem import AfferentModel, RateProblem
+from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.transduction import drive
 from fingerpad.skin.sampling import SkinResponse
@@ -107,7 +108,8 @@ def result(
     judged = [
         judge(
             RateProblem(
-                relative_model(AfferentModel(driven), scaled_starts(driven, reference)[0]), recordings
+                relative_model(AfferentModel.of_drive(driven), scaled_starts(driven, reference)[0]),
+                recordings,
             ),
             method,
         )

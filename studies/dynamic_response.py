@@ -22,7 +22,7 @@ from fingerpad.experiments.gerling2014.drive_fits import RELATIVE_NAMES, scaled_
 from fingerpad.experiments.gerling2014.drive_quantities import EXTENDED
 from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.identifiable import identifiable
-from fingerpad.inference.quick_rates import rates_under
+from fingerpad.inference.rate_model import AfferentModel, Rates, evaluate_rows
 from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.skin.sampling import SkinResponse
 
@@ -338,13 +338,17 @@ class ExplainedModel:
             ]
         )
 
-    def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def evaluate(self, parameters: FloatArray) -> Rates:
         """Dynamic and static rates. [spikes/s]"""
-        driven = self._drive(self.numbers(parameters))
+        driven = AfferentModel.of_drive(self._drive(self.numbers(parameters)))
         six = six_of_relative(parameters[: len(RELATIVE_NAMES)], self.start)
         if self.explanation.by_formula:
-            return ClosedFormModel(driven, bend=0.0).rates(identifiable(six))
-        return rates_under(driven)(six)
+            return ClosedFormModel(driven, bend=0.0).evaluate(identifiable(six))
+        return driven.evaluate(six)
+
+    def evaluate_batch(self, points: FloatArray) -> Rates:
+        """Rates (n_points, n_stimuli) for rows of parameters, bit-equal to `evaluate`. [spikes/s]"""
+        return evaluate_rows(self, points)
 
     def _drive(self, numbers: FloatArray) -> Drive:
         """Drive for the added numbers; the last one is kept, since slopes mostly leave these as they are."""

@@ -13,9 +13,8 @@ from fingerpad.experiments.gerling2014.drive_fits import quick_method
 from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.geometry.mesh import LAYERS, block_mesh
 from fingerpad.inference.identifiable import six_parameters
-from fingerpad.inference.rate_problem import AfferentModel
+from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
-from fingerpad.neuron.transduction import drive
 from fingerpad.report.style import png
 from fingerpad.skin.sampling import SkinResponse
 from studies import drive_depths
@@ -75,7 +74,7 @@ SKINS = [skin(shift) for shift in SHIFT_MM]
 
 def recordings():
     sed = SedTraces(TIMES_MS, np.outer(COURSE, felt_kpa(TRUE_LAYER, SHIFT_MM)), [50.0])
-    rates = AfferentModel(drive(sed)).rates(six_parameters(FOUR_TRUE))
+    rates = AfferentModel.of_traces(sed).evaluate(six_parameters(FOUR_TRUE))
     return RateRecordings(tuple(f"{shift:g}" for shift in SHIFT_MM), *rates)
 
 

@@ -17,7 +17,8 @@ from fingerpad.experiments.gerling2014.drive_quantities import ALONE, APART, EXT
 from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.inference.fitting import Fit, interleaved_folds
 from fingerpad.inference.identifiable import identifiable, six_parameters
-from fingerpad.inference.rate_problem import AfferentModel, RateProblem
+from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import start_points
 from fingerpad.neuron.afferent import Afferent
@@ -67,8 +68,9 @@ FOUR_TRUE = np.array([0.03, 0.3, 0.04, 30.0])
 
 
 def true_recordings():
-    model = AfferentModel(drive_quantities.drive_of(TRACES, EXTENDED))
-    return RateRecordings(tuple(f"{shift:g}" for shift in SHIFT_MM), *model.rates(six_parameters(FOUR_TRUE)))
+    model = AfferentModel.of_drive(drive_quantities.drive_of(TRACES, EXTENDED))
+    rates = model.evaluate(six_parameters(FOUR_TRUE))
+    return RateRecordings(tuple(f"{shift:g}" for shift in SHIFT_MM), *rates)
 
 
 RECORDINGS = true_recordings()
@@ -77,7 +79,7 @@ RECORDINGS = true_recordings()
 def problem(drivers, traces=TRACES):
     driven = drive_quantities.drive_of(traces, drivers)
     start = drive_fits.scaled_starts(driven, drive_quantities.drive_of(TRACES, PAPER))[0]
-    return RateProblem(drive_fits.relative_model(AfferentModel(driven), start), RECORDINGS), start
+    return RateProblem(drive_fits.relative_model(AfferentModel.of_drive(driven), start), RECORDINGS), start
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +102,7 @@ def test_the_paper_comes_first_and_every_quantity_once():
 
 def test_a_fitted_model_follows_what_its_drive_follows():
     traces = SedTraces(TIMES_MS, TRACES["stored"].sed_kpa, [50.0], TRACES["von_mises"].sed_kpa, "von_mises")
-    rates = AfferentModel(drive(traces)).rates(Afferent().parameters)
+    rates = AfferentModel.of_traces(traces).evaluate(Afferent().parameters)
     assert_array_equal(rates, Afferent(dynamic_quantity="von_mises").rates(traces))
 
 
@@ -209,10 +211,11 @@ def test_what_is_left_out_is_predicted_by_the_fold_that_did_not_know_it():
         testing = np.flatnonzero(folds == fold)
         assert not set(testing) & set(method.shown[1 + fold])
         relative = np.array([0.5, 0.1 * (2 + fold), 0.0, -0.5])
-        assert_array_equal(judged.left_out_hz[:, testing], np.array(asked.model.rates(relative))[:, testing])
+        expected = np.array(asked.model.evaluate(relative))[:, testing]
+        assert_array_equal(judged.left_out_hz[:, testing], expected)
         assert judged.folds[fold]["total"] == asked.score(relative, testing)
     assert judged.out_of_sample["dynamic"] == pytest.approx(np.mean([one["dynamic"] for one in judged.folds]))
-    assert_array_equal(judged.predicted_hz, asked.model.rates(np.array([0.5, 0.1, 0.0, -0.5])))
+    assert_array_equal(judged.predicted_hz, asked.model.evaluate(np.array([0.5, 0.1, 0.0, -0.5])))
 
 
 def test_the_best_of_several_methods_is_kept_with_the_effort_of_all():
@@ -421,7 +424,7 @@ def test_rates_by_formula_are_those_of_a_steady_current():
     (explanation,) = (explanation for explanation in EXPLANATIONS if explanation.by_formula)
     model = ExplainedModel.from_start(explanation, PATCH)
     relative = np.array([0.4, 0.3, 0.2, -0.5])
-    _, static_hz = model.rates(relative)
+    _, static_hz = model.evaluate(relative)
     b, dynamic_gain, static_gain, tau = identifiable(drive_fits.six_of_relative(relative, model.start))
     driven = PATCH.drive(PATCH.at("stored"))
     energy, rate = (
@@ -440,7 +443,7 @@ def test_an_explained_model_begins_at_the_scaled_start():
     assert model.n_stimuli == 24
     assert_array_equal(model.numbers(np.array([0.0, 0.0, 0.0, 0.0, 0.25])), [0.25])
     at_start = Afferent.from_parameters(drive_fits.six_of_relative(np.zeros(4), start_points()[0]))
-    assert_array_equal(model.rates(np.zeros(5)), at_start.rates(PATCH.drive(PATCH.at("stored"))))
+    assert_array_equal(model.evaluate(np.zeros(5)), at_start.rates(PATCH.drive(PATCH.at("stored"))))
 
 
 def test_the_last_drive_is_kept_and_no_other_taken_for_it():
@@ -454,10 +457,10 @@ def test_the_last_drive_is_kept_and_no_other_taken_for_it():
     model = ExplainedModel.from_start(replace(explanation, driven=driven), PATCH)
     asked.clear()
     places = ([0.1, 0.0, 0.0, 0.0, 0.25], [0.3, 0.2, 0.0, 0.0, 0.25], [0.3, 0.2, 0.0, 0.0, -0.25])
-    found = [model.rates(np.array(place)) for place in places]
+    found = [model.evaluate(np.array(place)) for place in places]
     assert asked == [[0.25], [-0.25]]
     for place, rates in zip(places, found, strict=True):
-        assert_array_equal(rates, ExplainedModel.from_start(explanation, PATCH).rates(np.array(place)))
+        assert_array_equal(rates, ExplainedModel.from_start(explanation, PATCH).evaluate(np.array(place)))
 
 
 def test_explanations_are_judged_alike_and_told_by_what_they_add(monkeypatch):

@@ -18,15 +18,13 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.inference.afferent_posterior import (
     AfferentPrior,
     afferent_posterior,
-    four_number_model,
     from_coordinates,
     log_posterior,
     to_coordinates,
 )
 from fingerpad.inference.fitting.posterior import credible_band
-from fingerpad.inference.many_rates import rates_of_each
 from fingerpad.inference.rate_likelihood import LENGTHS_MM, RateLikelihood
-from fingerpad.inference.rate_problem import AfferentModel
+from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.transduction import drive
 
@@ -39,7 +37,7 @@ COURSE = np.where(TIMES <= 50.0, (TIMES / 50.0) ** 2, 0.75 + 0.25 * np.exp(-(TIM
 def under(peaks: np.ndarray):
     """The model under stimuli of these peaks of energy density [kPa]."""
     return four_number_model(
-        AfferentModel(drive(SedTraces(TIMES, COURSE[:, None] * peaks, [50.0]), pieces=3))
+        AfferentModel.of_drive(drive(SedTraces(TIMES, COURSE[:, None] * peaks, [50.0]), pieces=3))
     )
 
 
@@ -73,7 +71,7 @@ EFFORT = {
 def simulated(four: np.ndarray, random: np.random.Generator) -> RateRecordings:
     rates = [
         np.maximum(rate + DEVIATIONS_HZ[phase] * random.normal(size=SHIFTS.size), 0.0)
-        for phase, rate in zip(DEVIATIONS_HZ, MODEL.rates(four), strict=True)
+        for phase, rate in zip(DEVIATIONS_HZ, MODEL.evaluate(four), strict=True)
     ]
     return RateRecordings(tuple(f"{shift:g}" for shift in SHIFTS), *rates)
 
@@ -83,7 +81,7 @@ def places():
     """Coordinates that cover the prior twice as wide, their rates, and the log density of the cover."""
     wide = CENTRE + COVER * SPREAD * np.random.default_rng(1).normal(size=(N_PLACES, 4))
     wide = wide[wide[:, 0] < 1.0]
-    rates = rates_of_each(MODEL, from_coordinates(wide))
+    rates = MODEL.evaluate_batch(from_coordinates(wide))
     return wide, rates, norm.logpdf(wide, CENTRE, COVER * SPREAD).sum(axis=1)
 
 

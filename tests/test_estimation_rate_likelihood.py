@@ -7,6 +7,7 @@ from scipy.special import gammaln, logsumexp
 
 from fingerpad.core.errors import InputError
 from fingerpad.inference.rate_likelihood import RateLikelihood
+from fingerpad.inference.rate_model import evaluate_rows
 from fingerpad.inference.recordings import RateRecordings
 
 PLACES = np.array([-1.0, -0.4, 0.0, 0.6, 1.5])
@@ -23,10 +24,13 @@ class Scaled:
     names = ("height",)
     n_stimuli = 5
 
-    def rates(self, parameters):
+    def evaluate(self, parameters):
         return parameters[0] * np.array([100.0, 130.0, 110.0, 70.0, 0.0]), parameters[0] * np.array(
             [8.0, 25.0, 22.0, 6.0, 1.0]
         )
+
+    def evaluate_batch(self, points):
+        return evaluate_rows(self, points)
 
 
 def recordings(*phases: str) -> RateRecordings:
@@ -59,7 +63,7 @@ def test_differences_of_log_likelihood_are_those_of_the_integral(phases: tuple[s
     heights = np.array([[0.5], [0.95], [1.3]])
     expected = []
     for height in heights:
-        predicted = dict(zip(("dynamic", "static"), Scaled().rates(height), strict=True))
+        predicted = dict(zip(("dynamic", "static"), Scaled().evaluate(height), strict=True))
         expected.append(
             sum(
                 logsumexp([integrated(OBSERVED[phase] - predicted[phase], length, 7.0) for length in lengths])
@@ -73,7 +77,7 @@ def test_differences_of_log_likelihood_are_those_of_the_integral(phases: tuple[s
     independent = [
         sum(
             integrated(OBSERVED[phase] - predicted, 0.0, 7.0)
-            for phase, predicted in zip(("dynamic", "static"), Scaled().rates(height), strict=True)
+            for phase, predicted in zip(("dynamic", "static"), Scaled().evaluate(height), strict=True)
             if phase in phases
         )
         for height in heights
@@ -87,7 +91,7 @@ def test_residual_draws_have_the_conditional_law() -> None:
     likelihood = RateLikelihood(Scaled(), recordings("dynamic", "static"), deviation_hz=7.0)
     points = np.full((20000, 1), 0.95)
     draws = likelihood.residual_draws(points, np.random.default_rng(1))
-    for phase, predicted in zip(("dynamic", "static"), Scaled().rates(points[0]), strict=True):
+    for phase, predicted in zip(("dynamic", "static"), Scaled().evaluate(points[0]), strict=True):
         squares = ((OBSERVED[phase] - predicted) ** 2).sum()
         assert draws[phase].length_mm.max() == 0.0
         np.testing.assert_array_equal(draws[phase].predicted_hz[0], predicted)
@@ -102,7 +106,7 @@ def test_lengths_are_drawn_by_their_shares_of_the_likelihood() -> None:
     lengths = (0.0, 0.8)
     likelihood = RateLikelihood(Scaled(), recordings("dynamic"), PLACES, lengths, deviation_hz=7.0)
     draws = likelihood.residual_draws(np.full((20000, 1), 1.3), np.random.default_rng(2))["dynamic"]
-    residuals = OBSERVED["dynamic"] - Scaled().rates(np.array([1.3]))[0]
+    residuals = OBSERVED["dynamic"] - Scaled().evaluate(np.array([1.3]))[0]
     logarithms = np.array([integrated(residuals, length, 7.0) for length in lengths])
     share = np.exp(logarithms[1] - logsumexp(logarithms))
     assert 0.1 < share < 0.9

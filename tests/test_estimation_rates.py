@@ -11,8 +11,9 @@ from fingerpad.inference.closed_form import ClosedFormModel, constant_drive_rate
 from fingerpad.inference.fitting import weighted_fractional_sum_of_squares
 from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
-from fingerpad.inference.rate_problem import AfferentModel, RateProblem, Reparametrised
-from fingerpad.inference.receptor_offset import ReceptorOffset, receptor_offset
+from fingerpad.inference.rate_model import AfferentModel, Reparametrised, four_number_model
+from fingerpad.inference.rate_problem import RateProblem
+from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
@@ -35,13 +36,13 @@ def traces(offset_mm: float = 0.0) -> SedTraces:
 
 def problem(model, truth) -> RateProblem:
     """What an afferent with these parameters would have been recorded to answer."""
-    dynamic, static = model.rates(truth)
+    dynamic, static = model.evaluate(truth)
     return RateProblem(model, RateRecordings(tuple(f"{shift:g}" for shift in SHIFT_MM), dynamic, static))
 
 
 @pytest.fixture(scope="module")
 def four_numbers() -> RateProblem:
-    model = Reparametrised(AfferentModel(drive(traces())), IDENTIFIABLE_NAMES, six_parameters)
+    model = four_number_model(AfferentModel.of_traces(traces()))
     return problem(model, FOUR)
 
 
@@ -53,7 +54,7 @@ def test_residuals_make_the_score_and_the_score_is_the_papers(four_numbers):
     other = FOUR * [1.0, 1.2, 0.8, 1.1]
     residuals = four_numbers.residuals(other, chosen)
     assert residuals.shape == (10,)
-    observed, (dynamic, static) = four_numbers.recordings, four_numbers.model.rates(other)
+    observed, (dynamic, static) = four_numbers.recordings, four_numbers.model.evaluate(other)
     papers = weighted_fractional_sum_of_squares(
         observed.dynamic_rate_hz[chosen], dynamic[chosen], observed.static_rate_hz[chosen], static[chosen]
     )
@@ -74,8 +75,8 @@ def test_a_phase_that_was_not_recorded_has_no_part_in_the_score(four_numbers):
 
 def test_six_parameters_and_their_four_numbers_predict_the_same(four_numbers):
     six = six_parameters(FOUR, capacitance_mf=3e-7, threshold_mv=20.0)
-    rates = AfferentModel(drive(traces())).rates(six)
-    np.testing.assert_allclose(rates, four_numbers.model.rates(identifiable(six)), rtol=1e-9)
+    rates = AfferentModel.of_traces(traces()).evaluate(six)
+    np.testing.assert_allclose(rates, four_numbers.model.evaluate(identifiable(six)), rtol=1e-9)
 
 
 def test_recordings_of_other_stimuli_are_refused(four_numbers):
@@ -126,7 +127,7 @@ def test_the_bend_lets_a_rate_set_in_gently_and_vanishes_with_its_width():
 
 
 def test_slopes_of_the_model_are_those_of_its_residuals(four_numbers):
-    smooth = replace(four_numbers, model=ClosedFormModel(drive(traces())))
+    smooth = replace(four_numbers, model=ClosedFormModel(AfferentModel.of_traces(traces())))
     slopes = smooth.jacobian_of(smooth.model)(FOUR, EVERYTHING)
     steps = np.diag(1e-6 * FOUR)
     differences = [
@@ -138,7 +139,7 @@ def test_slopes_of_the_model_are_those_of_its_residuals(four_numbers):
 
 
 def test_static_rates_of_the_formula_are_near_those_of_spikes(four_numbers):
-    dynamic, static = ClosedFormModel(drive(traces()), bend=0.0).rates(FOUR)
+    dynamic, static = ClosedFormModel(AfferentModel.of_traces(traces()), bend=0.0).evaluate(FOUR)
     # Spikes do not fill the window to its borders; the formula does.
     np.testing.assert_allclose(static, four_numbers.recordings.static_rate_hz, atol=0.3)
     assert (static > 0.0).sum() == 11
@@ -148,7 +149,9 @@ def test_static_rates_of_the_formula_are_near_those_of_spikes(four_numbers):
 @pytest.mark.parametrize("by_formula", [False, True])
 def test_the_truth_is_recovered_from_simulated_rates(four_numbers, by_formula):
     starts = FOUR * np.array([[0.3, 0.5, 1.6, 1.7], [1.5, 2.0, 0.5, 0.5]])
-    jacobian = four_numbers.jacobian_of(ClosedFormModel(drive(traces()))) if by_formula else None
+    jacobian = (
+        four_numbers.jacobian_of(ClosedFormModel(AfferentModel.of_traces(traces()))) if by_formula else None
+    )
     method = LeastSquares(starts, 0.3 * FOUR, 0.0 * FOUR, 10.0 * FOUR, jacobian=jacobian)
     fit = method.fit(four_numbers, EVERYTHING)
     assert fit.score > 0.995
@@ -161,20 +164,20 @@ OFFSETS_MM = (-0.4, -0.2, 0.0, 0.2, 0.4)
 
 
 def offset_model() -> ReceptorOffset:
-    return receptor_offset(OFFSETS_MM, [traces(offset) for offset in OFFSETS_MM])
+    return ReceptorOffset.of_traces({offset: traces(offset) for offset in OFFSETS_MM})
 
 
 def test_at_a_sampled_place_the_receptor_feels_what_was_sampled():
     model = offset_model()
     six = Afferent().parameters
     for offset in OFFSETS_MM:
-        rates = model.rates(np.append(six, offset))
-        np.testing.assert_array_equal(rates, AfferentModel(drive(traces(offset))).rates(six))
+        rates = model.evaluate(np.append(six, offset))
+        np.testing.assert_array_equal(rates, AfferentModel.of_traces(traces(offset)).evaluate(six))
 
 
 def test_between_two_places_the_drive_is_interpolated():
     model = offset_model()
-    middle = model.drive_at(0.1)
+    middle = model.at(0.1).drives[0]
     for name in ("sed_kpa", "rate_kpa_per_ms"):
         ends = [getattr(drive(traces(offset)), name) for offset in (0.0, 0.2)]
         np.testing.assert_allclose(getattr(middle, name), np.mean(ends, axis=0), rtol=1e-12, atol=1e-15)
@@ -195,16 +198,16 @@ def test_a_hidden_offset_is_recovered():
     method = LeastSquares([start], scales, [*(0.0 * FOUR), -0.4], [*(10.0 * FOUR), 0.4])
     fit = method.fit(free, EVERYTHING)
     assert fit.parameters[-1] == pytest.approx(0.13, abs=0.02)
-    blind = replace(hidden, model=AfferentModel(drive(traces())))
+    blind = replace(hidden, model=AfferentModel.of_traces(traces()))
     assert fit.score > 0.99 > blind.score(six, EVERYTHING) + 0.02
 
 
 def test_places_that_were_not_sampled_are_refused():
     with pytest.raises(InputError, match=r"offset_mm must lie within -0\.4 \.\.\. 0\.4 mm.*got 0\.5"):
-        offset_model().drive_at(0.5)
-    with pytest.raises(InputError, match="got 1 places and 1 drives"):
-        receptor_offset([0.0], [traces()])
-    with pytest.raises(InputError, match="got 2 places and 2 drives of 2 kinds"):
-        receptor_offset([0.0, 0.1], [traces(), SedTraces([0.0, 1000.0], [[0.0], [1.0]])])
+        offset_model().at(0.5)
+    with pytest.raises(InputError, match="got 1 offsets and 1 models"):
+        ReceptorOffset.of_traces({0.0: traces()})
+    with pytest.raises(InputError, match="got 2 offsets and 2 models of 2 kinds"):
+        ReceptorOffset.of_traces({0.0: traces(), 0.1: SedTraces([0.0, 1000.0], [[0.0], [1.0]])})
     with pytest.raises(InputError, match="offsets_mm must increase strictly"):
-        receptor_offset([0.1, 0.0], [traces(), traces()])
+        ReceptorOffset.of_traces({0.1: traces(), 0.0: traces()})

@@ -7,18 +7,17 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.inference.fitting.identifiability import identifiability, jacobian
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
-from fingerpad.inference.rate_problem import AfferentModel
+from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
-from fingerpad.neuron.transduction import drive
 
 PEAKS = np.array([0.3, 0.8, 1.4, 1.9, 2.5])
 TIMES = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 100.0, 200.0, 500.0, 1000.0])
 COURSE = np.where(TIMES <= 50.0, (TIMES / 50.0) ** 2, 0.75 + 0.25 * np.exp(-(TIMES - 50.0) / 150.0))
-MODEL = AfferentModel(drive(SedTraces(TIMES, COURSE[:, None] * PEAKS, [50.0])))
+MODEL = AfferentModel.of_traces(SedTraces(TIMES, COURSE[:, None] * PEAKS, [50.0]))
 
 
 def rates(six: np.ndarray) -> np.ndarray:
-    return np.concatenate(MODEL.rates(six))
+    return np.concatenate(MODEL.evaluate(six))
 
 
 def test_rates_tell_four_of_six_parameters_and_two_scalings_are_silent() -> None:

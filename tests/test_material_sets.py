@@ -199,7 +199,7 @@ TRUTH = np.array([2e-7, 1.2e-4, 1.4e-6, 50.0, 1e-6, 50.0])
 
 def test_the_search_finds_an_afferent_that_answers_like_the_one_that_made_the_rates():
     levels = synthetic_levels()
-    dynamic, static = levels.problem.model.rates(TRUTH)
+    dynamic, static = levels.problem.model.evaluate(TRUTH)
     recordings = replace(levels.problem.recordings, dynamic_rate_hz=dynamic, static_rate_hz=static)
     levels.problem = replace(levels.problem, recordings=recordings)
     assert static.max() > 20.0

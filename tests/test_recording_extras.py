@@ -9,13 +9,13 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.fit import rate_uncertainty
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.experiments.fit.offset import check_offset, fit_offset
-from fingerpad.experiments.fit.posterior import four_numbers, profiled
+from fingerpad.experiments.fit.posterior import profiled
 from fingerpad.experiments.gerling2014.reproduction import plain
-from fingerpad.inference.any_motion import AnyMotion, AnyMotionBeside
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.many_rates import scores_of_each
 from fingerpad.inference.rate_likelihood import RateLikelihood
+from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
+from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.report import recording_extras as report
 from fingerpad.report.rate_uncertainty import ALLOWED_LOSS
@@ -39,12 +39,12 @@ def felt(offset_mm, times_ms=TIMES_MS):
 
 
 BESIDE = {offset: felt(offset) for offset in PLACES_MM}
-MODEL = AnyMotion.under(BESIDE[0.0])
+MODEL = AfferentModel.of_traces(BESIDE[0.0])
 # In between, the model is linear: the truth is made the same way, so that it can be found.
-TRUTH = AnyMotionBeside(np.array(PLACES_MM), [AnyMotion.under(traces) for traces in BESIDE.values()])
+TRUTH = ReceptorOffset.of_traces(BESIDE)
 NAMES = tuple(f"{shift:g}" for shift in SHIFTS_MM)
-ASIDE = RateRecordings(NAMES, *TRUTH.rates(np.append(KNOWN, TRUE_OFFSET_MM)))
-IN_PLACE = RateRecordings(NAMES, *MODEL.rates(KNOWN))
+ASIDE = RateRecordings(NAMES, *TRUTH.evaluate(np.append(KNOWN, TRUE_OFFSET_MM)))
+IN_PLACE = RateRecordings(NAMES, *MODEL.evaluate(KNOWN))
 
 
 @pytest.fixture(scope="module")
@@ -59,9 +59,13 @@ def fitted():
 
 def test_between_two_places_the_drive_is_linear_and_at_a_place_it_is_that_of_the_place():
     for offset in PLACES_MM:
-        assert_allclose(TRUTH.at(offset).rates(KNOWN), AnyMotion.under(felt(offset)).rates(KNOWN), rtol=1e-12)
+        assert_allclose(
+            TRUTH.at(offset).evaluate(KNOWN),
+            AfferentModel.of_traces(felt(offset)).evaluate(KNOWN),
+            rtol=1e-12,
+        )
     (between,) = TRUTH.at(0.06).drives
-    ends = [AnyMotion.under(felt(offset)).drives[0].sed_kpa for offset in (0.0, 0.3)]
+    ends = [AfferentModel.of_traces(felt(offset)).drives[0].sed_kpa for offset in (0.0, 0.3)]
     assert_allclose(between.sed_kpa, 0.8 * ends[0] + 0.2 * ends[1], rtol=1e-12)
     assert TRUTH.names[-1] == "offset_mm"
     with pytest.raises(InputError, match=r"offset_mm must lie within -0.3 ... 0.3 mm"):
@@ -70,11 +74,11 @@ def test_between_two_places_the_drive_is_linear_and_at_a_place_it_is_that_of_the
 
 def test_stimuli_that_move_in_their_own_time_are_felt_beside_as_well():
     slow_ms = np.append(TIMES_MS[:-1], 1500.0)
-    mixed = [AnyMotion.under([felt(place), felt(place, slow_ms)]) for place in (-0.2, 0.2)]
-    dynamic, _ = AnyMotionBeside(np.array([-0.2, 0.2]), mixed).rates(np.append(KNOWN, 0.2))
-    assert_array_equal(dynamic[:9], AnyMotion.under(felt(0.2)).rates(KNOWN)[0])
-    with pytest.raises(InputError, match="the same stimuli at every place: got 2 kinds"):
-        AnyMotionBeside(np.array([-0.2, 0.2]), [mixed[0], MODEL])
+    mixed = [AfferentModel.of_traces([felt(place), felt(place, slow_ms)]) for place in (-0.2, 0.2)]
+    dynamic, _ = ReceptorOffset(np.array([-0.2, 0.2]), mixed).evaluate(np.append(KNOWN, 0.2))
+    assert_array_equal(dynamic[:9], AfferentModel.of_traces(felt(0.2)).evaluate(KNOWN)[0])
+    with pytest.raises(InputError, match="2 offsets and 2 models of 2 kinds"):
+        ReceptorOffset(np.array([-0.2, 0.2]), [mixed[0], MODEL])
 
 
 @pytest.mark.parametrize("method", ["least_squares", "cma_es"])
@@ -131,7 +135,7 @@ def test_an_offset_needs_its_method_and_several_places():
 
 def test_profiles_hold_the_known_afferent_and_rise_to_both_sides():
     noise = np.random.default_rng(2).normal(0.0, 1.0, (2, 9))
-    noisy = RateRecordings(NAMES, *np.maximum(MODEL.rates(KNOWN) + noise, 0.0))
+    noisy = RateRecordings(NAMES, *np.maximum(MODEL.evaluate(KNOWN) + noise, 0.0))
     found = profiled(MODEL, noisy, identifiable(KNOWN))
     assert [profile["name"] for profile in found] == list(IDENTIFIABLE_NAMES)
     for profile, known in zip(found, identifiable(KNOWN), strict=True):
@@ -148,7 +152,7 @@ def test_profiles_hold_the_known_afferent_and_rise_to_both_sides():
 
 
 def test_likely_points_are_likely_and_find_a_better_place_than_a_poor_fit():
-    likelihood = RateLikelihood(four_numbers(MODEL), IN_PLACE)
+    likelihood = RateLikelihood(four_number_model(MODEL), IN_PLACE)
     poor = identifiable(KNOWN) * [1.0, 1.3, 0.9, 1.4]
     points = rate_uncertainty.likely_points(likelihood, poor)
     heights = likelihood.log_likelihood(points)
@@ -172,9 +176,9 @@ def test_a_search_begins_where_no_afferent_fires_untouched():
 def test_scores_of_rows_are_those_of_the_problem_for_one_phase_as_well():
     points = identifiable(KNOWN) * np.array([[1.0], [1.1], [0.8]])
     for recordings in (IN_PLACE, RateRecordings(NAMES, None, IN_PLACE.static_rate_hz)):
-        problem = RateProblem(four_numbers(MODEL), recordings)
+        problem = RateProblem(four_number_model(MODEL), recordings)
         expected = [problem.score(point, np.arange(9)) for point in points]
-        assert_allclose(scores_of_each(problem, points), expected, rtol=1e-12)
+        assert_allclose(problem.score_batch(points), expected, rtol=1e-12)
         assert expected[0] > expected[1]
 
 
@@ -182,7 +186,7 @@ def test_ranges_are_shares_of_the_fit_and_a_gain_of_nothing_has_one_too(fitted):
     found = fitted["sensitivity"]
     four = np.array(list(fitted["identifiable"].values()))
     assert_allclose(found["lower"], np.minimum(0.75 * four, 1.25 * four), rtol=1e-12)
-    problem = RateProblem(four_numbers(MODEL), IN_PLACE)
+    problem = RateProblem(four_number_model(MODEL), IN_PLACE)
     nothing = rate_uncertainty.sensitivity(problem, [0.0, 0.0, 0.018, 60.0], 1)
     assert_allclose(nothing["lower"][:2], [-0.25 / 68.0, 0.0], rtol=1e-12)
     assert (nothing["upper"] > nothing["lower"]).all()

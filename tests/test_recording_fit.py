@@ -32,8 +32,9 @@ from fingerpad.geometry.edged_indenters import Gap
 from fingerpad.geometry.indenters import Bar, Line, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.inference.afferent_methods import OFFSETS_MM
-from fingerpad.inference.any_motion import AnyMotion, AnyMotionInClosedForm
+from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
+from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 from fingerpad.inference.soft_afferent import soft_spikes
 from fingerpad.inference.start_points import start_points
@@ -92,12 +93,12 @@ def test_every_method_recovers_them(method, fss):
 
 def test_stimuli_that_move_in_their_own_time_have_slopes_in_closed_form_in_their_order():
     slow_ms = np.concatenate([TIMES_MS[:-1], [1000.0, 1500.0]])
-    mixed = AnyMotionInClosedForm(
-        AnyMotion.under([traces([1.0, 2.0]), traces([1.5], slow_ms), traces([2.5])])
+    mixed = ClosedFormModel(
+        AfferentModel.of_traces([traces([1.0, 2.0]), traces([1.5], slow_ms), traces([2.5])])
     )
-    alone = AnyMotionInClosedForm(AnyMotion.under(traces([1.0, 2.0, 2.5])))
+    alone = ClosedFormModel(AfferentModel.of_traces(traces([1.0, 2.0, 2.5])))
     four = identifiable(KNOWN)
-    for told in ("rates", "slopes"):
+    for told in ("evaluate", "slopes"):
         for ours, theirs in zip(getattr(mixed, told)(four), getattr(alone, told)(four), strict=True):
             np.testing.assert_allclose(ours[[0, 1, 3]], theirs, rtol=1e-12)
 
@@ -119,7 +120,7 @@ def test_one_phase_is_enough_for_a_fit_and_the_other_is_said_to_be_missing():
 def test_noisy_rates_leave_a_posterior_that_holds_the_known_afferent():
     noise = np.random.default_rng(4).normal(0.0, 1.0, (2, 8))
     noisy = RateRecordings(NAMES, *np.maximum(AFFERENT.rates(SED) + noise, 0.0))
-    model, known = AnyMotion.under(SED), identifiable(KNOWN)
+    model, known = AfferentModel.of_traces(SED), identifiable(KNOWN)
     few = {"n_ensembles": 2, "n_walkers": 32, "largest_r_hat": 1.1, "smallest_effective_size": 50.0}
     drawn = posterior(model, noisy, known, 1, **few)
     for value, (low, high) in zip(known, drawn["interval"].values(), strict=True):
@@ -141,7 +142,7 @@ def test_draws_begin_where_they_can_though_a_gain_ended_at_its_bound(monkeypatch
 
     monkeypatch.setattr(recording_posterior, "afferent_posterior", note)
     with pytest.raises(ConvergenceError, match="Enough"):
-        posterior(AnyMotion.under(SED), RATES, [-0.1, 0.0, 0.03, 40.0], 1)
+        posterior(AfferentModel.of_traces(SED), RATES, [-0.1, 0.0, 0.03, 40.0], 1)
     assert begun[0].tolist() == [-0.1, identifiable(start_points()[0])[1], 0.03, 40.0]
 
 
@@ -226,9 +227,9 @@ def test_six_folds_are_dealt_out_by_default_and_one_per_stimulus_where_there_are
 def test_stimuli_that_move_in_their_own_time_are_answered_each_in_theirs():
     slow_ms = np.concatenate([TIMES_MS[:-1], [1000.0, 1500.0]])
     short, longer = traces([1.0, 2.0]), traces([1.5], slow_ms)
-    model = AnyMotion.under([short, longer, traces([2.5])], ((20.0, 50.0), (500.0, 900.0)))
+    model = AfferentModel.of_traces([short, longer, traces([2.5])], ((20.0, 50.0), (500.0, 900.0)))
     assert (model.n_stimuli, [drive.n_sites for drive in model.drives]) == (4, [3, 1])
-    dynamic, static = model.rates(np.array(KNOWN))
+    dynamic, static = model.evaluate(np.array(KNOWN))
     alone = [AFFERENT.rates(one, (20.0, 50.0), (500.0, 900.0)) for one in (short, longer, traces([2.5]))]
     np.testing.assert_array_equal(dynamic, np.concatenate([rates[0] for rates in alone]))
     np.testing.assert_array_equal(static, np.concatenate([rates[1] for rates in alone]))
@@ -236,12 +237,12 @@ def test_stimuli_that_move_in_their_own_time_are_answered_each_in_theirs():
 
 def test_another_quantity_for_the_dynamic_term_reaches_the_afferent():
     more = {"dynamic_kpa": 2.0 * SED.sed_kpa, "dynamic_quantity": "work"}
-    doubled = AnyMotion.under([traces(HEIGHT_KPA, **more)])
+    doubled = AfferentModel.of_traces([traces(HEIGHT_KPA, **more)])
     halved = [KNOWN[0], KNOWN[1] / 2.0, *KNOWN[2:]]
-    for rates, expected in zip(doubled.rates(np.array(halved)), AFFERENT.rates(SED), strict=True):
+    for rates, expected in zip(doubled.evaluate(np.array(halved)), AFFERENT.rates(SED), strict=True):
         np.testing.assert_allclose(rates, expected, rtol=1e-9)
     with pytest.raises(InputError, match="one dynamic_quantity: got stored, work"):
-        AnyMotion.under([SED, traces([1.0], dynamic_kpa=SED.sed_kpa[:, :1], dynamic_quantity="work")])
+        AfferentModel.of_traces([SED, traces([1.0], dynamic_kpa=SED.sed_kpa[:, :1], dynamic_quantity="work")])
 
 
 # What it refuses
@@ -280,7 +281,7 @@ def test_spikes_that_have_no_likelihood_are_refused(recordings, n_motions, said)
 
 def test_a_stimulus_that_ends_before_a_window_is_refused():
     with pytest.raises(InputError, match="one ends at 950 ms, stimulus 9 at 700 ms"):
-        AnyMotion.under([SED, traces([1.0], TIMES_MS[:-1])])
+        AfferentModel.of_traces([SED, traces([1.0], TIMES_MS[:-1])])
 
 
 # What is pressed
@@ -647,7 +648,7 @@ def test_a_fit_from_nothing_recovers_a_known_afferent(call, monkeypatch, tmp_pat
         session.touches(stimuli, Conditions("quick")),
     )
     sed = [store.load(touch).sed([[RECEPTOR_X_MM, 0.0]]) for touch in pressed.values()]
-    rates = zip(listed, *AnyMotion.under(sed).rates(strong), strict=True)
+    rates = zip(listed, *AfferentModel.of_traces(sed).evaluate(strong), strict=True)
     (tmp_path / "mine.csv").write_text(
         ROWS.splitlines()[0] + "".join(f"\n{name},{dynamic},{static}" for name, dynamic, static in rates)
     )

@@ -14,10 +14,9 @@ from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.inference import afferent_methods
 from fingerpad.inference.afferent_methods import OFFSETS_MM, four_number_problem
 from fingerpad.inference.fitting import interleaved_folds
-from fingerpad.inference.rate_problem import AfferentModel
+from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import start_points
-from fingerpad.neuron.transduction import drive
 from fingerpad.report import single_unit_methods as report
 
 SHIFT_MM = np.array(protocol.BAR_SHIFTS.value)
@@ -45,14 +44,14 @@ def extended() -> SedTraces:
 
 
 def recorded(model, truth) -> RateRecordings:
-    dynamic, static = model.rates(truth)
+    dynamic, static = model.evaluate(truth)
     return RateRecordings(tuple(f"{shift:g}" for shift in SHIFT_MM), dynamic, static)
 
 
 @pytest.fixture(scope="module")
 def recordings() -> RateRecordings:
     """What an afferent would answer whose dynamic term follows the other quantity."""
-    problem = four_number_problem(AfferentModel(drive(extended())), single_unit.bar_recordings())
+    problem = four_number_problem(AfferentModel.of_traces(extended()), single_unit.bar_recordings())
     return recorded(problem.model, FOUR * [1.0, 0.1, 1.0, 1.0])
 
 
@@ -74,7 +73,7 @@ def test_each_unit_multiplies_the_printed_gains(starts, recordings):
             six = np.array([0.0, factor * dynamic, factor * static, 68.0, 1e-6, 50.0])
             row = rows["strain energy density", unit][f"start_{number}"]
             assert row["fss"] == pytest.approx(problem.score(six, EVERYTHING), rel=1e-9)
-            rates = problem.model.rates(six)
+            rates = problem.model.evaluate(six)
             assert row["largest_dynamic_hz"] == pytest.approx(rates[0].max(), rel=1e-9)
             assert row["largest_static_hz"] == pytest.approx(rates[1].max(), rel=1e-9)
     assert rows["strain energy density", "MPa"]["start_1"]["fss"] == 0.0
@@ -151,9 +150,9 @@ def test_the_model_that_made_the_rates_fits_them_and_the_papers_does_not(found):
 
 
 def test_residual_shares_are_the_squares_of_each_phase_and_place(recordings):
-    problem = four_number_problem(AfferentModel(drive(traces())), recordings)
+    problem = four_number_problem(AfferentModel.of_traces(traces()), recordings)
     shares = single_unit_methods.residual_shares(problem, FOUR)
-    dynamic, static = problem.model.rates(FOUR)
+    dynamic, static = problem.model.evaluate(FOUR)
     flat = np.abs(SHIFT_MM) < 1.2
     lost = 1.0 - problem.score(FOUR, EVERYTHING)
     for phase, weight, seen, predicted in (

@@ -9,10 +9,9 @@ from fingerpad.experiments.fit import rate_uncertainty
 from fingerpad.experiments.gerling2014 import single_unit, single_unit_uncertainty
 from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.rate_problem import AfferentModel
+from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import Afferent
-from fingerpad.neuron.transduction import drive
 from fingerpad.report import single_unit_uncertainty as report
 from fingerpad.report.style import png
 
@@ -30,7 +29,7 @@ def section() -> dict:
     random = np.random.default_rng(8)
     rates = [
         np.maximum(rate + deviation * random.normal(size=SHIFTS.size), 0.0)
-        for rate, deviation in zip(AfferentModel(drive(SED)).rates(TRUTH), (12.0, 2.0), strict=True)
+        for rate, deviation in zip(AfferentModel.of_traces(SED).evaluate(TRUTH), (12.0, 2.0), strict=True)
     ]
     recordings = RateRecordings(single_unit.bar_recordings().stimuli, *rates)
     with pytest.MonkeyPatch.context() as patch:

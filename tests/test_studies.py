@@ -235,7 +235,7 @@ def synthetic_problem():
     """What a known afferent would have been recorded to answer."""
     problem = single_unit.rate_problem(bar_traces(bar_firing_rates().shift_mm))
     truth = np.array([3e-7, 2.6e-4, 1.1e-6, 60.0, 1.0e-6, 50.0])
-    dynamic, static = problem.model.rates(truth)
+    dynamic, static = problem.model.evaluate(truth)
     recordings = replace(problem.recordings, dynamic_rate_hz=dynamic, static_rate_hz=static)
     return replace(problem, recordings=recordings), truth
 
@@ -270,7 +270,7 @@ def test_single_unit_result_names_every_number(synthetic_problem, synthetic_fit)
     best, folds = synthetic_fit
     found = single_unit.result(problem, best, folds)
     shift_mm = bar_firing_rates().shift_mm
-    dynamic, static = problem.model.rates(best.parameters)
+    dynamic, static = problem.model.evaluate(best.parameters)
     np.testing.assert_array_equal(found["dynamic_rate_hz"], dynamic)
     np.testing.assert_array_equal(found["static_rate_hz"], static)
     assert list(found["parameters"].values()) == best.parameters.tolist()

@@ -12,11 +12,11 @@ import numpy as np
 from scipy.stats import qmc
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.inference.afferent_posterior import four_number_model
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
-from fingerpad.inference.rate_problem import RateModel, RateProblem, Reparametrised, SmoothRateModel
+from fingerpad.inference.rate_model import RateModel, Reparametrised, SmoothRateModel, four_number_model
+from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.receptor_offset import OFFSET_NAME
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.transduction import Drive

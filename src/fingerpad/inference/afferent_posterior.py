@@ -20,7 +20,6 @@ from fingerpad.data import neuron
 from fingerpad.inference.fitting.posterior import Chains, LogDensity, sample
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
 from fingerpad.inference.rate_likelihood import RateLikelihood, ResidualDraws
-from fingerpad.inference.rate_problem import RateModel, Reparametrised
 
 COORDINATE_NAMES = ("resting_share", "log_dynamic_gain", "log_static_gain", "log_time_constant")
 """beta tau/(C v) [1], and the logarithms of k_d/(C v), k_s/(C v) and tau in the units of the four numbers."""
@@ -76,22 +75,6 @@ def from_coordinates(points: ArrayLike) -> FloatArray:
     coordinates = np.asarray(points, dtype=np.float64)
     positive_three = np.exp(coordinates[..., 1:])
     return np.concatenate([coordinates[..., :1] / positive_three[..., 2:], positive_three], axis=-1)
-
-
-def four_number_model(model: RateModel) -> Reparametrised:
-    """Let the four identifiable numbers drive a model of six parameters.
-
-    Parameters
-    ----------
-    model : RateModel
-        With the paper's six parameters, such as `fingerpad.inference.rate_problem.AfferentModel`.
-
-    Returns
-    -------
-    Reparametrised
-        The same model; C and v are the paper's, which changes no spike.
-    """
-    return Reparametrised(model, IDENTIFIABLE_NAMES, six_parameters)
 
 
 @dataclass(frozen=True)

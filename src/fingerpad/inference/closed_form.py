@@ -20,8 +20,9 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, not_negative, positive
 from fingerpad.core.units import MS_PER_S
-from fingerpad.data import neuron, protocol
+from fingerpad.data import neuron
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
+from fingerpad.inference.rate_model import AfferentModel, Rates, evaluate_rows
 from fingerpad.neuron.transduction import Drive
 
 BEND = 0.05
@@ -95,71 +96,71 @@ def _bent(excess: FloatArray, bend: float) -> tuple[FloatArray, FloatArray]:
 
 @dataclass(frozen=True)
 class ClosedFormModel:
-    """Rates by formula: in each window the mean of the rates that its drive would give if it were constant.
+    """Closed-form rates: the mean over each window of the rate under a constant drive; a `SmoothRateModel`.
 
-    It knows neither the potential's way from rest nor single spikes. As a model it is rough for the ramp; as
-    a source of slopes it is cheap and smooth.
+    The model neglects the charging from rest and single spikes. It is inaccurate in the ramp, but smooth, and
+    its derivatives are cheap.
 
     Parameters
     ----------
-    drive : Drive
-        Strain energy density and its rate of change, one column per stimulus.
-    refractory_ms : float
-        Rest after each spike. [ms]
+    stimuli : AfferentModel
+        Drives, windows and refractory period.
     bend : float
         Width over which the rate sets in. [1]
-    windows_ms : pair of (float, float)
-        The dynamic and the static window. [ms]
 
     Examples
     --------
     >>> from fingerpad.core.signals import SedTraces
-    >>> from fingerpad.neuron.transduction import drive
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-    >>> model = ClosedFormModel(drive(sed))
-    >>> dynamic_hz, static_hz = model.rates(np.array([0.01, 4.0, 0.014, 68.0]))
+    >>> model = ClosedFormModel(AfferentModel.of_traces(sed))
+    >>> dynamic_hz, static_hz = model.evaluate(np.array([0.01, 4.0, 0.014, 68.0]))
     >>> dynamic_hz.round().tolist(), static_hz.round().tolist()
     ([156.0], [29.0])
     >>> [slopes.shape for slopes in model.slopes(np.array([0.01, 4.0, 0.014, 68.0]))]
     [(1, 4), (1, 4)]
     """
 
-    drive: Drive
-    refractory_ms: float = neuron.REFRACTORY.value
+    stimuli: AfferentModel
     bend: float = BEND
-    windows_ms: tuple[tuple[float, ...], tuple[float, ...]] = (
-        protocol.DYNAMIC_WINDOW.value,
-        protocol.STATIC_WINDOW.value,
-    )
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The four numbers that firing can tell."""
+        """The four identifiable parameters."""
         return IDENTIFIABLE_NAMES
 
     @property
     def n_stimuli(self) -> int:
-        """Number of columns of the drive."""
-        return self.drive.n_sites
+        """Number of stimuli."""
+        return self.stimuli.n_stimuli
 
-    def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Dynamic and static rates. [spikes/s]"""
-        (dynamic, _), (static, _) = (self._window(parameters, window) for window in self.windows_ms)
+    def evaluate(self, parameters: FloatArray) -> Rates:
+        """Rates (n_stimuli,) for the four parameters. [spikes/s]"""
+        dynamic, static = (self._window(parameters, window)[0] for window in self.stimuli.windows_ms)
         return dynamic, static
 
-    def slopes(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Slopes of both rates along the four numbers, (n_stimuli, 4) each."""
-        (_, dynamic), (_, static) = (self._window(parameters, window) for window in self.windows_ms)
+    def evaluate_batch(self, points: FloatArray) -> Rates:
+        """Rates (n_points, n_stimuli) for rows of the four parameters, bit-equal to `evaluate`. [spikes/s]"""
+        return evaluate_rows(self, points)
+
+    def slopes(self, parameters: FloatArray) -> Rates:
+        """Return the derivatives of both rates along the four parameters, (n_stimuli, 4) each."""
+        dynamic, static = (self._window(parameters, window)[1] for window in self.stimuli.windows_ms)
         return dynamic, static
 
     def _window(self, parameters: FloatArray, window_ms: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
-        """Mean rate in a window and its slopes."""
+        """Mean rate (n_stimuli,) in a window, and its derivatives (n_stimuli, 4)."""
         intercept, dynamic_gain, static_gain, tau = parameters
-        speed, sed = _samples(self.drive, window_ms)
-        g = intercept + dynamic_gain * speed + static_gain * sed
-        rate, per_drive, per_tau = constant_drive_rate(g, float(tau), self.refractory_ms, self.bend)
-        slopes = (per_drive, per_drive * speed, per_drive * sed, per_tau)
-        return rate.mean(axis=0), np.column_stack([slope.mean(axis=0) for slope in slopes])
+        mean, slopes = np.empty(self.n_stimuli), np.empty((self.n_stimuli, 4))
+        for drive, columns in zip(self.stimuli.drives, self.stimuli.stimuli, strict=True):
+            speed, sed = _samples(drive, window_ms)
+            g = intercept + dynamic_gain * speed + static_gain * sed
+            rate, per_drive, per_tau = constant_drive_rate(
+                g, float(tau), self.stimuli.refractory_ms, self.bend
+            )
+            mean[columns] = rate.mean(axis=0)
+            for number, slope in enumerate((per_drive, per_drive * speed, per_drive * sed, per_tau)):
+                slopes[columns, number] = slope.mean(axis=0)
+        return mean, slopes
 
 
 def _samples(drive: Drive, window_ms: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:

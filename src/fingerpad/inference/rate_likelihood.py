@@ -23,8 +23,7 @@ from scipy.special import logsumexp
 
 from fingerpad.core.checks import FloatArray, float_array, positive
 from fingerpad.core.errors import InputError
-from fingerpad.inference.many_rates import rates_of_each
-from fingerpad.inference.rate_problem import RateModel
+from fingerpad.inference.rate_model import RateModel
 from fingerpad.inference.recordings import RateRecordings
 
 INDEPENDENT = 0.0
@@ -66,12 +65,11 @@ class RateLikelihood:
     Examples
     --------
     >>> from fingerpad.neuron.afferent import Afferent
-    >>> from fingerpad.inference.rate_problem import AfferentModel
+    >>> from fingerpad.inference.rate_model import AfferentModel
     >>> from fingerpad.core.signals import SedTraces
-    >>> from fingerpad.neuron.transduction import drive
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0, 0.0], [1.0, 2.0], [1.0, 2.0]], kinks_ms=[50.0])
     >>> observed = RateRecordings(("flat", "edge"), [120.0, 210.0], [35.0, 60.0])
-    >>> likelihood = RateLikelihood(AfferentModel(drive(sed)), observed)
+    >>> likelihood = RateLikelihood(AfferentModel.of_traces(sed), observed)
     >>> good, poor = likelihood.log_likelihood(Afferent().parameters * np.array([[1.0], [2.0]]))
     >>> bool(good > poor)
     True
@@ -132,7 +130,7 @@ class RateLikelihood:
         -------
         array (n_points,)
         """
-        return self.log_likelihood_of_rates(*rates_of_each(self.model, points))
+        return self.log_likelihood_of_rates(*self.model.evaluate_batch(points))
 
     def log_likelihood_of_rates(self, dynamic_hz: FloatArray, static_hz: FloatArray) -> FloatArray:
         """Log likelihood as above, where the rates that points predict are known already.
@@ -169,7 +167,7 @@ class RateLikelihood:
         dict of str to ResidualDraws
             By phase.
         """
-        return self.residual_draws_of_rates(*rates_of_each(self.model, points), random)
+        return self.residual_draws_of_rates(*self.model.evaluate_batch(points), random)
 
     def residual_draws_of_rates(
         self, dynamic_hz: FloatArray, static_hz: FloatArray, random: np.random.Generator

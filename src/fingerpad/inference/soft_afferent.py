@@ -9,8 +9,8 @@ import numpy as np
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.random_streams import Presentations
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
-from fingerpad.inference.any_motion import Windows
 from fingerpad.inference.identifiable import six_parameters
+from fingerpad.inference.rate_model import Rates, Windows, evaluate_rows
 from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_NAMES
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.escape_rate import EscapeRate
@@ -87,7 +87,7 @@ class SoftAfferent:
         """Number of columns of the drive."""
         return self.drive.n_sites
 
-    def rates(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def evaluate(self, parameters: FloatArray) -> Rates:
         """Dynamic and static rates, means of simulated presentations. [spikes/s]"""
         presentations = Presentations.of_one_afferent(self.n_stimuli, PREDICTED_PRESENTATIONS)
         trains = soft_spikes(self.drive, parameters, presentations, self.seed)
@@ -96,3 +96,7 @@ class SoftAfferent:
             for window in self.windows_ms
         )
         return dynamic, static
+
+    def evaluate_batch(self, points: FloatArray) -> Rates:
+        """Rates (n_points, n_stimuli) for rows of parameters, bit-equal to `evaluate`. [spikes/s]"""
+        return evaluate_rows(self, points)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, finite
@@ -42,20 +43,52 @@ def firing_rate_hz(spikes: SpikeTrains, window_ms: tuple[float, ...]) -> FloatAr
     >>> firing_rate_hz(trains, (30.0, 50.0)).round(3).tolist()
     [66.667, 0.0, 0.0]
     """
-    intervals_ms, owners, _ = _intervals(spikes, window_ms)
-    count = np.bincount(owners, minlength=len(spikes))
-    total_ms = np.bincount(owners, weights=intervals_ms, minlength=len(spikes))
-    return MS_PER_S * np.divide(count, total_ms, out=np.zeros(len(spikes)), where=count > 0)
+    return window_rates_hz(spikes.times_ms, spikes.offsets, *_bounds(window_ms))
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def window_rates_hz(times_ms: FloatArray, offsets: np.ndarray, start: float, end: float) -> FloatArray:
+    """Compute `firing_rate_hz` of unchecked arrays, for evaluations that are repeated often.
+
+    Parameters
+    ----------
+    times_ms : array (n_spikes,)
+        Spike times, train after train. [ms]
+    offsets : int array (n_trains + 1,)
+        Index of the first spike of each train.
+    start, end : float
+        The window. [ms]
+
+    Returns
+    -------
+    array (n_trains,)
+        [spikes/s]
+    """
+    rates = np.zeros(offsets.size - 1)
+    for train in range(rates.size):
+        count = 0
+        total = 0.0
+        for spike in range(offsets[train] + 1, offsets[train + 1]):
+            if start < times_ms[spike] <= end:
+                count += 1
+                total += times_ms[spike] - times_ms[spike - 1]
+        if count > 0:
+            rates[train] = MS_PER_S * (count / total)
+    return rates
+
+
+def _bounds(window_ms: tuple[float, ...]) -> tuple[float, float]:
+    bounds = [finite("window_ms", bound, "ms") for bound in window_ms]
+    if len(bounds) != 2 or bounds[1] <= bounds[0]:
+        raise InputError(f"window_ms must be a start and a later end: got {window_ms!r}.")
+    return bounds[0], bounds[1]
 
 
 def _intervals(
     spikes: SpikeTrains, window_ms: tuple[float, ...]
 ) -> tuple[FloatArray, np.ndarray, np.ndarray]:
-    """Intervals that close in a window, the train that owns each, and the place of its closing spike."""
-    bounds = [finite("window_ms", bound, "ms") for bound in window_ms]
-    if len(bounds) != 2 or bounds[1] <= bounds[0]:
-        raise InputError(f"window_ms must be a start and a later end: got {window_ms!r}.")
-    start, end = bounds
+    """Intervals that close in a window, the train of each, and the index of its closing spike."""
+    start, end = _bounds(window_ms)
     times, n_afferents = spikes.times_ms, len(spikes)
     opens_train = np.zeros(times.size, dtype=bool)
     opens_train[spikes.offsets[:-1][np.diff(spikes.offsets) > 0]] = True

@@ -12,12 +12,11 @@ from fingerpad.core.checks import FloatArray, one_of, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
-from fingerpad.experiments.fit.methods import METHODS, Prepared
+from fingerpad.experiments.fit.methods import METHODS, Prepared, four_number_problem
 from fingerpad.experiments.fit.offset import Beside, check_beside, fit_offset
-from fingerpad.experiments.fit.posterior import four_numbers, posterior, profiled
+from fingerpad.experiments.fit.posterior import posterior, profiled
 from fingerpad.experiments.fit.rate_uncertainty import sensitivity
 from fingerpad.experiments.gerling2014.reproduction import plain
-from fingerpad.inference.any_motion import WINDOWS_MS, AnyMotion, Windows
 from fingerpad.inference.fitting import (
     CrossValidation,
     Fit,
@@ -31,6 +30,7 @@ from fingerpad.inference.identifiable import (
     IDENTIFIABLE_UNITS,
     identifiable,
 )
+from fingerpad.inference.rate_model import WINDOWS_MS, AfferentModel, Windows
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
@@ -113,7 +113,7 @@ def fit_recordings(
         check_beside(beside)
     folds = dealt_folds(len(rates.stimuli)) if memberships is None else np.asarray(memberships)
     check_enough(rates, folds, len(IDENTIFIABLE_NAMES) + (beside is not None))
-    model = AnyMotion.under(sed, windows_ms)
+    model = AfferentModel.of_traces(sed, windows_ms)
     prepared = METHODS[one_of("method", method, tuple(METHODS))](model, recordings, rates, seed)
     best = prepared.method.fit(prepared.problem, np.arange(len(rates.stimuli)))
     validation = cross_validate(prepared.problem, prepared.method, folds)
@@ -133,7 +133,7 @@ def fit_recordings(
             "posterior": posterior(model, rates, four, seed, positions_mm) if with_posterior else None,
             "profiles": profiled(model, rates, four, positions_mm) if with_profiles else None,
             "sensitivity": (
-                sensitivity(RateProblem(four_numbers(model), rates), four, seed) if with_sensitivity else None
+                sensitivity(four_number_problem(model, rates), four, seed) if with_sensitivity else None
             ),
             "offset": None if beside is None else fit_offset(beside, rates, folds, method, windows_ms, seed),
         }
@@ -212,12 +212,12 @@ def _scores(
     problem: RateProblem, rates: RateRecordings, fitted: FloatArray, validation: CrossValidation
 ) -> dict[str, Any]:
     """FSS in and out of sample, and every rate as observed, predicted, and predicted without its fold."""
-    predicted = dict(zip(PHASES, problem.model.rates(fitted), strict=True))
+    predicted = dict(zip(PHASES, problem.model.evaluate(fitted), strict=True))
     left_out = {phase: np.empty(problem.n_observations) for phase in PHASES}
     memberships = np.empty(problem.n_observations, dtype=np.int64)
     for fold in validation.folds:
         memberships[fold.testing] = fold.fold
-        for phase, rate in zip(PHASES, problem.model.rates(fold.fit.parameters), strict=True):
+        for phase, rate in zip(PHASES, problem.model.evaluate(fold.fit.parameters), strict=True):
             left_out[phase][fold.testing] = rate[fold.testing]
     found: dict[str, Any] = {
         "fss_in_sample": problem.score(fitted, np.arange(problem.n_observations)),

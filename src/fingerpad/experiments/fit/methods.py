@@ -21,12 +21,13 @@ from fingerpad.inference.afferent_methods import (
     four_number_problem,
     search_from,
 )
-from fingerpad.inference.any_motion import AnyMotion, AnyMotionInClosedForm
+from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.fitting import CrossValidation, Fit, Method
 from fingerpad.inference.fitting.covariance import jackknife_covariance
 from fingerpad.inference.fitting.methods import Continued
 from fingerpad.inference.fitting.problem import IntArray, Problem
 from fingerpad.inference.identifiable import identifiable, six_parameters
+from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 from fingerpad.inference.soft_afferent import SoftAfferent
@@ -104,7 +105,7 @@ def check_spikes(recordings: RateRecordings | SpikeRecordings, n_motions: int) -
 
 
 def _response_surface(
-    model: AnyMotion, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
+    model: AfferentModel, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
 ) -> Prepared:
     """Prepare the paper's method in its six parameters."""
     return Prepared(
@@ -122,7 +123,7 @@ def _scatter_of(six: Callable[[FloatArray], FloatArray]) -> Callable[[Fit, Cross
     )
 
 
-def _four_numbers(model: AnyMotion, rates: RateRecordings, method_of: MethodOf) -> Prepared:
+def _four_numbers(model: AfferentModel, rates: RateRecordings, method_of: MethodOf) -> Prepared:
     """Prepare a method for the four numbers that firing can tell."""
     problem = four_number_problem(model, rates)
     return Prepared(
@@ -134,29 +135,29 @@ def _four_numbers(model: AnyMotion, rates: RateRecordings, method_of: MethodOf) 
 
 
 def _least_squares(
-    model: AnyMotion, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
+    model: AfferentModel, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
 ) -> Prepared:
     """Prepare least squares by differences, from starts all over the range."""
     return _four_numbers(model, rates, lambda problem, bounds: by_differences(bounds))
 
 
 def _closed_form(
-    model: AnyMotion, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
+    model: AfferentModel, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
 ) -> Prepared:
     """Prepare least squares along the slopes of the rate in closed form."""
     return _four_numbers(
-        model, rates, lambda problem, bounds: along_slopes(AnyMotionInClosedForm(model), problem, bounds)
+        model, rates, lambda problem, bounds: along_slopes(ClosedFormModel(model), problem, bounds)
     )
 
 
 def _evolution(
-    model: AnyMotion, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
+    model: AfferentModel, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
 ) -> Prepared:
     """Prepare CMA-ES from where the slopes in closed form lead."""
 
     def method_of(problem: RateProblem, bounds: Bounds) -> Method:
         return Continued(
-            along_slopes(AnyMotionInClosedForm(model), problem, bounds),
+            along_slopes(ClosedFormModel(model), problem, bounds),
             lambda begun: search_from(begun, bounds, seed),
             name="CMA-ES",
         )
@@ -199,7 +200,7 @@ class MaximumLikelihood:
 
 
 def _likelihood(
-    model: AnyMotion, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
+    model: AfferentModel, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
 ) -> Prepared:
     """Prepare maximum likelihood of spike trains under a soft threshold."""
     trains, (drive,) = check_spikes(recordings, len(model.drives)), model.drives
@@ -232,7 +233,9 @@ def _likelihood(
     )
 
 
-METHODS: dict[str, Callable[[AnyMotion, RateRecordings | SpikeRecordings, RateRecordings, int], Prepared]] = {
+METHODS: dict[
+    str, Callable[[AfferentModel, RateRecordings | SpikeRecordings, RateRecordings, int], Prepared]
+] = {
     "least_squares": _least_squares,
     "response_surface": _response_surface,
     "closed_form": _closed_form,

@@ -25,12 +25,14 @@ from fingerpad.inference.afferent_methods import (
     four_number_problem,
     search_from,
 )
-from fingerpad.inference.any_motion import AnyMotion, AnyMotionBeside, AnyMotionInClosedForm, Windows
+from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.fitting import Continued, Method, cross_validate
 from fingerpad.inference.fitting.covariance import jackknife_covariance
 from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.fitting.problem import IntArray
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
+from fingerpad.inference.rate_model import Windows
+from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import RateRecordings
 
 Beside = Mapping[float, SedTraces | Sequence[SedTraces]]
@@ -104,8 +106,7 @@ def fit_offset(
         If the places do not lie on both sides of 0, or disagree in their stimuli.
     """
     beside_mm = check_beside(beside)
-    places = [AnyMotion.under(beside[offset], windows_ms) for offset in beside_mm]
-    roving = AnyMotionBeside(beside_mm, places)
+    roving = ReceptorOffset.of_traces({offset: beside[offset] for offset in beside_mm}, windows_ms)
     problem, everything = five_number_problem(roving, rates), np.arange(roving.n_stimuli)
     searching = OFFSET_METHODS[one_of("method", method, tuple(OFFSET_METHODS))](roving, rates, seed)
     best = searching.fit(problem, everything)
@@ -113,7 +114,7 @@ def fit_offset(
     *four, offset_mm = best.parameters.tolist()
     folds_mm = [float(fold.fit.parameters[-1]) for fold in crossed.folds]
     error = jackknife_covariance(np.reshape(folds_mm, (-1, 1)))
-    held = [METHODS[method](place, rates, rates, seed) for place in places]
+    held = [METHODS[method](place, rates, rates, seed) for place in roving.models]
     return {
         "offset_mm": offset_mm,
         "standard_error_mm": None if error is None else float(np.sqrt(error[0, 0])),
@@ -134,7 +135,7 @@ def fit_offset(
     }
 
 
-def _least_squares(roving: AnyMotionBeside, rates: RateRecordings, seed: int) -> Method:
+def _least_squares(roving: ReceptorOffset, rates: RateRecordings, seed: int) -> Method:
     """Least squares from the best fit of a receptor in its place, which it can only gain on."""
     bounds = _bounds(roving)
     begin_mm = sorted({0.0, *roving.offsets_mm[1:-1].tolist()})
@@ -146,18 +147,18 @@ def _least_squares(roving: AnyMotionBeside, rates: RateRecordings, seed: int) ->
     return _continued(roving, rates, by_differences, beside)
 
 
-def _evolution(roving: AnyMotionBeside, rates: RateRecordings, seed: int) -> Method:
+def _evolution(roving: ReceptorOffset, rates: RateRecordings, seed: int) -> Method:
     """CMA-ES from where the slopes in closed form lead with the receptor in its place."""
     bounds, centre = _bounds(roving), roving.at(0.0)
 
     def quick(of_four: Bounds) -> Method:
-        return along_slopes(AnyMotionInClosedForm(centre), four_number_problem(centre, rates), of_four)
+        return along_slopes(ClosedFormModel(centre), four_number_problem(centre, rates), of_four)
 
     return _continued(roving, rates, quick, lambda begun: search_from(np.append(begun, 0.0), bounds, seed))
 
 
 def _continued(
-    roving: AnyMotionBeside,
+    roving: ReceptorOffset,
     rates: RateRecordings,
     first: Callable[[Bounds], Method],
     second: Callable[[FloatArray], Method],
@@ -167,12 +168,12 @@ def _continued(
     return Continued(first(bounds_of(*centre.drives)), second, four_number_problem(centre, rates))
 
 
-def _bounds(roving: AnyMotionBeside) -> Bounds:
+def _bounds(roving: ReceptorOffset) -> Bounds:
     low_mm, *_, high_mm = roving.offsets_mm.tolist()
     return bounds_of(*roving.at(0.0).drives).and_offset(low_mm, high_mm)
 
 
-OFFSET_METHODS: dict[str, Callable[[AnyMotionBeside, RateRecordings, int], Method]] = {
+OFFSET_METHODS: dict[str, Callable[[ReceptorOffset, RateRecordings, int], Method]] = {
     "least_squares": _least_squares,
     "cma_es": _evolution,
 }

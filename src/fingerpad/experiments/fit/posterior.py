@@ -9,17 +9,16 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.experiments.fit.rate_uncertainty import LEVEL, likely_points, possible, profiles
-from fingerpad.inference.afferent_posterior import afferent_posterior, four_number_model
-from fingerpad.inference.any_motion import WINDOWS_MS, AnyMotion
+from fingerpad.inference.afferent_posterior import afferent_posterior
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.rate_likelihood import RateLikelihood
-from fingerpad.inference.rate_problem import AfferentModel, Reparametrised
+from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.recordings import RateRecordings
 
 
 def posterior(
-    model: AnyMotion,
+    model: AfferentModel,
     rates: RateRecordings,
     four: ArrayLike,
     seed: int,
@@ -30,7 +29,7 @@ def posterior(
 
     Parameters
     ----------
-    model : AnyMotion
+    model : AfferentModel
         The afferent under all stimuli.
     rates : RateRecordings
         What was observed.
@@ -74,7 +73,7 @@ def posterior(
 
 
 def profiled(
-    model: AnyMotion, rates: RateRecordings, four: ArrayLike, positions_mm: ArrayLike | None = None
+    model: AfferentModel, rates: RateRecordings, four: ArrayLike, positions_mm: ArrayLike | None = None
 ) -> list[dict[str, Any]]:
     """Profile the likelihood of each of the four identifiable numbers.
 
@@ -92,16 +91,11 @@ def profiled(
     return profiles(likelihood, likely_points(likelihood, possible(four)))
 
 
-def four_numbers(model: AnyMotion) -> Reparametrised:
-    """Return the model in the four identifiable numbers, in the form that is quickest over many of them."""
-    if len(model.drives) > 1 or model.windows_ms != WINDOWS_MS:
-        return four_number_model(model)
-    return four_number_model(AfferentModel(model.drives[0], model.refractory_ms))
-
-
-def _likelihood(model: AnyMotion, rates: RateRecordings, positions_mm: ArrayLike | None) -> RateLikelihood:
+def _likelihood(
+    model: AfferentModel, rates: RateRecordings, positions_mm: ArrayLike | None
+) -> RateLikelihood:
     places = None if positions_mm is None else np.asarray(positions_mm, dtype=np.float64)
-    return RateLikelihood(four_numbers(model), rates, places)
+    return RateLikelihood(four_number_model(model), rates, places)
 
 
 def _band(draws_hz: FloatArray) -> dict[str, FloatArray]:

@@ -14,7 +14,6 @@ from fingerpad.inference.afferent_posterior import from_coordinates, to_coordina
 from fingerpad.inference.fitting.profile_likelihood import Profile, profile_likelihoods
 from fingerpad.inference.fitting.sensitivity import sobol_indices
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.many_rates import scores_of_each
 from fingerpad.inference.rate_likelihood import RateLikelihood
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.start_points import start_points
@@ -173,7 +172,7 @@ def sensitivity(problem: RateProblem, four: ArrayLike, seed: int) -> dict[str, A
     sizes[0] = 1.0 / sizes[3]  # beta tau/(C v) = 1 just fires
     reach = SENSITIVITY_SHARE * np.where(fitted == 0.0, sizes, np.abs(fitted))
     found = sobol_indices(
-        lambda points: scores_of_each(problem, points),
+        problem.score_batch,
         # A gain is never negative.
         np.maximum(fitted - reach, [-np.inf, 0.0, 0.0, 0.0]),
         fitted + reach,

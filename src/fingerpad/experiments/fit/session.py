@@ -31,9 +31,9 @@ from fingerpad.geometry.grading import Grading, covering
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Bar, FlatPunch, Line, Sphere
 from fingerpad.inference.afferent_methods import OFFSETS_MM
-from fingerpad.inference.any_motion import WINDOWS_MS, Windows
 from fingerpad.inference.fitting.problem import IntArray
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
+from fingerpad.inference.rate_model import WINDOWS_MS, Windows
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.skin.indentation import Touch, touch_of

@@ -25,7 +25,8 @@ from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptati
 from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.fitting.problem import IntArray, Problem
 from fingerpad.inference.identifiable import identifiable, six_parameters
-from fingerpad.inference.rate_problem import RateModel, RateProblem, Reparametrised
+from fingerpad.inference.rate_model import RateModel, Reparametrised
+from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings
 from fingerpad.inference.start_points import start_points
 from fingerpad.neuron.afferent import PARAMETER_NAMES
@@ -233,13 +234,13 @@ def judge(problem: RateProblem, method: Method, memberships: IntArray | None = N
     validation = cross_validate(problem, method, folds)
     left_out = np.empty((len(PHASES), everything.size))
     for fold in validation.folds:
-        predicted = np.array(problem.model.rates(fold.fit.parameters))
+        predicted = np.array(problem.model.evaluate(fold.fit.parameters))
         left_out[:, fold.testing] = predicted[:, fold.testing]
     return Judged(
         best,
         _scores(problem, best.parameters, everything),
         tuple(_scores(problem, fold.fit.parameters, fold.testing) for fold in validation.folds),
-        np.array(problem.model.rates(best.parameters)),
+        np.array(problem.model.evaluate(best.parameters)),
         left_out,
     )
 

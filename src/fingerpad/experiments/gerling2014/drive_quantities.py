@@ -29,7 +29,8 @@ from fingerpad.experiments.gerling2014.drive_fits import (
 )
 from fingerpad.inference.fitting import Method
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.rate_problem import AfferentModel, RateProblem
+from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings
 from fingerpad.inference.start_points import response_surface
 from fingerpad.neuron.transduction import Drive, drive
@@ -171,7 +172,7 @@ def result(
     rows: list[dict[str, Any]] = []
     for drivers in candidates:
         driven = drive_of(traces, drivers)
-        starts, model = scaled_starts(driven, reference), AfferentModel(driven)
+        starts, model = scaled_starts(driven, reference), AfferentModel.of_drive(driven)
         fits = {"fit": judge(RateProblem(relative_model(model, starts[0]), recordings), method)}
         if with_response_surface:
             fits["response_surface"] = judge(RateProblem(model, recordings), response_surface(starts))

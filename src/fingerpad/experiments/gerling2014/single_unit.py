@@ -20,12 +20,12 @@ from fingerpad.inference.fitting import (
     cross_validate,
     interleaved_folds,
 )
-from fingerpad.inference.rate_problem import AfferentModel, RateProblem
+from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings
 from fingerpad.inference.start_points import response_surface, start_points
 from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
 from fingerpad.neuron.spikes import modulation_difference, modulation_index
-from fingerpad.neuron.transduction import drive
 from fingerpad.skin.sampling import SkinResponse
 
 RECEPTOR = ((RECEPTOR_X_MM, 0.0),)
@@ -97,7 +97,7 @@ def following(static: SedTraces, dynamic: SedTraces, quantity: str) -> SedTraces
 
 def rate_problem(sed: SedTraces) -> RateProblem:
     """Observed rates at all shifts, and the paper's model of the afferent that answers `sed`."""
-    return RateProblem(AfferentModel(drive(sed)), bar_recordings())
+    return RateProblem(AfferentModel.of_traces(sed), bar_recordings())
 
 
 def bar_recordings() -> RateRecordings:
@@ -128,7 +128,7 @@ def result(problem: RateProblem, best: Fit, folds: CrossValidation) -> dict[str,
     """Rates, fits and modulation, ready for the report."""
     shift_mm = bar_firing_rates().shift_mm
     observed = {phase: getattr(problem.recordings, f"{phase}_rate_hz") for phase in PHASES}
-    predicted = dict(zip(PHASES, problem.model.rates(best.parameters), strict=True))
+    predicted = dict(zip(PHASES, problem.model.evaluate(best.parameters), strict=True))
     by_phase = problem.score_by_phase(best.parameters, np.arange(problem.n_observations))
     return {
         "fss_in_sample": best.score,

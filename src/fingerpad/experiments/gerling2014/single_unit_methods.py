@@ -37,8 +37,9 @@ from fingerpad.inference.fitting import (
 )
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.least_squares import LeastSquares
-from fingerpad.inference.rate_problem import AfferentModel, RateProblem
-from fingerpad.inference.receptor_offset import receptor_offset
+from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.rate_problem import RateProblem
+from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import PHASES, RateRecordings
 from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.skin.sampling import SkinResponse
@@ -74,7 +75,7 @@ def methods(problem: RateProblem, driven: Drive) -> tuple[Method, ...]:
 
 def by_formula(problem: RateProblem, driven: Drive) -> LeastSquares:
     """Least squares along the slopes of the rate in closed form; parameters as of `methods`."""
-    return along_slopes(ClosedFormModel(driven), problem, bounds_of(driven))
+    return along_slopes(ClosedFormModel(AfferentModel.of_drive(driven)), problem, bounds_of(driven))
 
 
 def evolution(problem: RateProblem, driven: Drive, offset: bool = False) -> Continued:
@@ -124,11 +125,11 @@ def result(
         `methods`, `models` and `ceilings`: FSS in and out of sample, and what belongs to it.
     """
     driven, otherwise = drive(traces[0.0]), drive(extended)
-    problem = four_number_problem(AfferentModel(driven), recordings)
+    problem = four_number_problem(AfferentModel.of_drive(driven), recordings)
     fits = {method.name: _fitted(problem, method) for method in methods(problem, driven)}
     searched = evolution(problem, driven).name
-    offset = five_number_problem(receptor_offset(tuple(traces), tuple(traces.values())), recordings)
-    other = four_number_problem(AfferentModel(otherwise), recordings)
+    offset = five_number_problem(ReceptorOffset.of_traces(traces), recordings)
+    other = four_number_problem(AfferentModel.of_drive(otherwise), recordings)
     models = {
         "the paper's model": (problem, fits[searched]),
         "receptor beside its place": (offset, _fitted(offset, evolution(problem, driven, offset=True))),

@@ -12,9 +12,9 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data import neuron, paper
 from fingerpad.inference.fitting import interleaved_folds
-from fingerpad.inference.rate_problem import AfferentModel, RateProblem
+from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.start_points import printed_starts, response_surface
-from fingerpad.neuron.transduction import drive
 
 PER_KPA = {"MPa": 1.0e-3, "kPa": 1.0, "Pa": 1.0e3}
 """Energy density in each unit for one in kPa."""
@@ -47,7 +47,7 @@ def result(problem: RateProblem, von_mises: SedTraces) -> dict[str, Any]:
         `units`: one row per reading of the unit; `scales`: FSS of the first start with its gains rescaled;
         `sessions`: one row per start of the paper's session.
     """
-    stress = replace(problem, model=AfferentModel(drive(von_mises)))
+    stress = replace(problem, model=AfferentModel.of_traces(von_mises))
     readings = [("strain energy density", problem, unit) for unit in PER_KPA]
     readings += [("von Mises stress", stress, unit) for unit in PER_KPA]
     return {
@@ -77,7 +77,7 @@ def _reading(quantity: str, problem: RateProblem, unit: str) -> dict[str, Any]:
     row: dict[str, Any] = {"quantity": quantity, "unit": unit}
     for start in (1, 2):
         parameters = scaled_start(start, PER_KPA[unit], PER_KPA[unit])
-        dynamic, static = problem.model.rates(parameters)
+        dynamic, static = problem.model.evaluate(parameters)
         row[f"start_{start}"] = {
             "fss": problem.score(parameters, everything),
             "largest_dynamic_hz": dynamic.max(),
@@ -119,7 +119,7 @@ def _session(problem: RateProblem, name: str, scales: FloatArray) -> dict[str, A
     testing = np.setdiff1d(np.arange(problem.n_observations), training)
     method = response_surface(np.array([scaled_start(SESSION_START, *scales)]))
     fit = method.fit(problem, training)
-    dynamic, static = problem.model.rates(fit.parameters)
+    dynamic, static = problem.model.evaluate(fit.parameters)
     return {
         "start": name,
         "static_scale": scales[0],

@@ -12,12 +12,13 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments.fit.rate_uncertainty import LEVEL, SEEDS_OF_PROFILES, profiles, sensitivity
 from fingerpad.experiments.gerling2014 import single_unit
-from fingerpad.inference.afferent_posterior import AfferentPosterior, afferent_posterior, four_number_model
+from fingerpad.inference.afferent_posterior import AfferentPosterior, afferent_posterior
 from fingerpad.inference.fitting.identifiability import identifiability
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, identifiable
 from fingerpad.inference.rate_likelihood import INDEPENDENT, RateLikelihood, ResidualDraws
-from fingerpad.inference.rate_problem import AfferentModel, RateProblem
+from fingerpad.inference.rate_model import AfferentModel, four_number_model
+from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.neuron.transduction import drive
 
@@ -59,7 +60,7 @@ def result(sed: SedTraces, fitted: ArrayLike, seed: int, *, quick: bool = False)
         If draws or profiles do not converge.
     """
     recordings, shift_mm = single_unit.bar_recordings(), bar_firing_rates().shift_mm
-    six_model = AfferentModel(drive(sed, pieces=PIECES))
+    six_model = AfferentModel.of_drive(drive(sed, pieces=PIECES))
     model = four_number_model(six_model)
     six = np.asarray(fitted, dtype=np.float64)
     four = identifiable(six)
@@ -92,7 +93,7 @@ def result(sed: SedTraces, fitted: ArrayLike, seed: int, *, quick: bool = False)
 
 def _identifiability(model: AfferentModel, six: FloatArray) -> dict[str, Any]:
     """Singular values of the rates' Jacobian in shares of the six parameters."""
-    found = identifiability(lambda values: np.concatenate(model.rates(values)), six, PARAMETER_NAMES)
+    found = identifiability(lambda values: np.concatenate(model.evaluate(values)), six, PARAMETER_NAMES)
     return {
         "rank": found.rank,
         "relative_singular_values": found.singular_values / found.singular_values[0],

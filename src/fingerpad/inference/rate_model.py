@@ -1,0 +1,347 @@
+"""Rate models: parameters of an afferent -> its dynamic and static rate under every stimulus.
+
+All rate models follow one contract, `RateModel`. `AfferentModel` is the paper's model with six parameters.
+`Reparametrised` is the same model in other parameters. `fingerpad.inference.closed_form` has an approximation
+with derivatives, `fingerpad.inference.receptor_offset` a model whose receptor position is a parameter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from fingerpad.core.blocks import in_blocks
+from fingerpad.core.checks import FloatArray, not_negative
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.data import neuron, protocol
+from fingerpad.inference.fitting.problem import IntArray
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
+from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.neuron.exact_spikes import exact_trains
+from fingerpad.neuron.spikes import window_rates_hz
+from fingerpad.neuron.transduction import Drive, drive
+
+Rates = tuple[FloatArray, FloatArray]
+"""Dynamic and static rates, one column per stimulus. [spikes/s]"""
+
+Evaluate = Callable[[FloatArray], Rates]
+"""From one set of parameters (n_parameters,) to rates (n_stimuli,)."""
+
+Windows = tuple[tuple[float, ...], tuple[float, ...]]
+
+WINDOWS_MS: Windows = (protocol.DYNAMIC_WINDOW.value, protocol.STATIC_WINDOW.value)
+"""The paper's windows of the dynamic and of the static rate. [ms]"""
+
+ROWS_PER_BLOCK = 4
+"""Rows of parameters that a thread evaluates at a time."""
+
+
+class RateModel(Protocol):
+    """Contract of a model that predicts the dynamic and the static rate under every stimulus."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters, in their order."""
+        ...
+
+    @property
+    def n_stimuli(self) -> int:
+        """Number of stimuli."""
+        ...
+
+    def evaluate(self, parameters: FloatArray) -> Rates:
+        """Rates (n_stimuli,) for one set of parameters (n_parameters,). [spikes/s]"""
+        ...
+
+    def evaluate_batch(self, points: FloatArray) -> Rates:
+        """Rates (n_points, n_stimuli) for rows of parameters, bit-equal to `evaluate`. [spikes/s]"""
+        ...
+
+
+class SmoothRateModel(RateModel, Protocol):
+    """A rate model with derivatives."""
+
+    def slopes(self, parameters: FloatArray) -> Rates:
+        """Return the derivatives of both rates along the parameters, (n_stimuli, n_parameters) each."""
+        ...
+
+
+def evaluate_rows(
+    model: RateModel, points: FloatArray, new_evaluator: Callable[[], Evaluate] | None = None
+) -> Rates:
+    """Evaluate a model row by row on all threads: what `evaluate_batch` of most models does.
+
+    Parameters
+    ----------
+    model : RateModel
+        The model.
+    points : array (n_points, n_parameters)
+        One set of parameters per row.
+    new_evaluator : callable, optional
+        Returns a function like `model.evaluate` that one thread may call again and again; default:
+        `model.evaluate` itself.
+
+    Returns
+    -------
+    dynamic_hz, static_hz : array (n_points, n_stimuli)
+        [spikes/s]
+
+    Raises
+    ------
+    InputError
+        If the rows do not have one entry per parameter, or a row is not a valid set of parameters.
+    """
+    rows = checked_rows(model, points)
+    rates = np.empty((2, len(rows), model.n_stimuli))
+
+    def work(block: slice) -> None:
+        evaluate = model.evaluate if new_evaluator is None else new_evaluator()
+        for row in range(block.start, block.stop):
+            rates[0, row], rates[1, row] = evaluate(rows[row])
+
+    in_blocks(work, len(rows), ROWS_PER_BLOCK)
+    return rates[0], rates[1]
+
+
+def checked_rows(model: RateModel, points: FloatArray) -> FloatArray:
+    """Return rows with one entry per parameter of the model, else raise `InputError`."""
+    rows = np.asarray(points, dtype=np.float64)
+    if rows.ndim != 2 or rows.shape[1] != len(model.names):
+        raise InputError(f"points must have {len(model.names)} columns: got shape {rows.shape}.")
+    return rows
+
+
+@dataclass(frozen=True)
+class AfferentModel:
+    """The paper's model of one afferent in its six parameters.
+
+    Parameters
+    ----------
+    drives : tuple of Drive
+        One per group of stimuli with the same times, so that a group is simulated at once.
+    stimuli : tuple of int array
+        Stimulus number of each column of each drive; every stimulus once.
+    windows_ms : ((float, float), (float, float))
+        Windows of the dynamic and of the static rate. [ms]
+    refractory_ms : float
+        Refractory period, which is not fitted. [ms]
+
+    Raises
+    ------
+    InputError
+        If a stimulus ends before a window does, or the refractory period is negative.
+
+    Examples
+    --------
+    >>> short = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    >>> longer = SedTraces([0.0, 50.0, 2000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    >>> model = AfferentModel.of_traces([short, longer, short])
+    >>> [drive.n_sites for drive in model.drives]
+    [2, 1]
+    >>> model.evaluate(Afferent().parameters)[1].round().tolist()
+    [63.0, 63.0, 63.0]
+    """
+
+    drives: tuple[Drive, ...]
+    stimuli: tuple[IntArray, ...]
+    windows_ms: Windows = WINDOWS_MS
+    refractory_ms: float = neuron.REFRACTORY.value
+
+    def __post_init__(self) -> None:
+        not_negative("refractory_ms", self.refractory_ms, "ms")
+        end = max(bound for window in self.windows_ms for bound in window)
+        for group, columns in zip(self.drives, self.stimuli, strict=True):
+            if group.times_ms[-1] < end:
+                raise InputError(
+                    f"windows_ms must end with the stimuli: one ends at {end:g} ms, stimulus "
+                    f"{columns[0] + 1} at {group.times_ms[-1]:g} ms."
+                )
+
+    @classmethod
+    def of_drive(
+        cls, driven: Drive, windows_ms: Windows = WINDOWS_MS, refractory_ms: float = neuron.REFRACTORY.value
+    ) -> AfferentModel:
+        """Make the model for stimuli that share their times.
+
+        Parameters
+        ----------
+        driven : Drive
+            One column per stimulus.
+        windows_ms, refractory_ms
+            As of the class.
+        """
+        return cls((driven,), (np.arange(driven.n_sites),), windows_ms, refractory_ms)
+
+    @classmethod
+    def of_traces(
+        cls,
+        sed: SedTraces | Sequence[SedTraces],
+        windows_ms: Windows = WINDOWS_MS,
+        refractory_ms: float = neuron.REFRACTORY.value,
+    ) -> AfferentModel:
+        """Make the model for strain energy density, stimuli grouped by their times.
+
+        Parameters
+        ----------
+        sed : SedTraces or sequence of SedTraces
+            Strain energy density, one column per stimulus; the columns of several traces are numbered
+            consecutively.
+        windows_ms, refractory_ms
+            As of the class.
+
+        Raises
+        ------
+        InputError
+            If a stimulus ends before a window does, or the traces differ in the quantity of the dynamic
+            term.
+        """
+        traces = [sed] if isinstance(sed, SedTraces) else list(sed)
+        quantities = sorted({trace.dynamic_quantity for trace in traces})
+        if len(quantities) != 1:
+            raise InputError(
+                f"sed must bring one dynamic_quantity: got {', '.join(quantities) or 'no traces'}."
+            )
+        groups: dict[tuple[bytes, bytes], list[tuple[int, SedTraces]]] = {}
+        first = 0
+        for trace in traces:
+            groups.setdefault((trace.times_ms.tobytes(), trace.kinks_ms.tobytes()), []).append((first, trace))
+            first += trace.n_sites
+        return cls(
+            tuple(drive(_side_by_side([trace for _, trace in group])) for group in groups.values()),
+            tuple(
+                np.concatenate([start + np.arange(trace.n_sites) for start, trace in group])
+                for group in groups.values()
+            ),
+            windows_ms,
+            refractory_ms,
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Full names of beta, k_d, k_s, tau, C, v."""
+        return PARAMETER_NAMES
+
+    @property
+    def n_stimuli(self) -> int:
+        """Number of stimuli."""
+        return sum(group.n_sites for group in self.drives)
+
+    def evaluate(self, parameters: FloatArray) -> Rates:
+        """Rates (n_stimuli,) for six parameters, bit-equal to `Afferent.rates`. [spikes/s]"""
+        return self._evaluator()(parameters)
+
+    def evaluate_batch(self, points: FloatArray) -> Rates:
+        """Rates (n_points, n_stimuli) for rows of six parameters, bit-equal to `evaluate`. [spikes/s]"""
+        return evaluate_rows(self, points, self._evaluator)
+
+    def _evaluator(self) -> Evaluate:
+        """Return a function like `evaluate` that reuses its arrays: only one thread may call it."""
+        groups = [_evaluator_of(group, self.refractory_ms, self.windows_ms) for group in self.drives]
+
+        def evaluate(parameters: FloatArray) -> Rates:
+            dynamic, static = np.empty((2, self.n_stimuli))
+            for group, columns in zip(groups, self.stimuli, strict=True):
+                dynamic[columns], static[columns] = group(parameters)
+            return dynamic, static
+
+        return evaluate
+
+
+@dataclass(frozen=True)
+class Reparametrised:
+    """A rate model in other parameters.
+
+    Parameters
+    ----------
+    model : RateModel
+        The model in its own parameters.
+    names : tuple of str
+        Names of the new parameters.
+    transform : callable
+        From the new parameters to those of `model`.
+
+    Examples
+    --------
+    A model that has only its static gain free:
+
+    >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    >>> model = Reparametrised(
+    ...     AfferentModel.of_traces(sed),
+    ...     ("static_gain",),
+    ...     lambda gain: np.array([0.0, 1e-4, gain[0], 70.0, 1e-6, 50.0]),
+    ... )
+    >>> model.evaluate_batch(np.array([[5e-7], [2e-6]]))[1].round().tolist()
+    [[11.0], [68.0]]
+    """
+
+    model: RateModel
+    names: tuple[str, ...]
+    transform: Callable[[FloatArray], FloatArray]
+
+    @property
+    def n_stimuli(self) -> int:
+        """Number of stimuli."""
+        return self.model.n_stimuli
+
+    def evaluate(self, parameters: FloatArray) -> Rates:
+        """Rates (n_stimuli,) for one set of the new parameters. [spikes/s]"""
+        return self.model.evaluate(self.transform(parameters))
+
+    def evaluate_batch(self, points: FloatArray) -> Rates:
+        """Rates (n_points, n_stimuli) for rows of the new parameters, bit-equal to `evaluate`. [spikes/s]"""
+        rows = np.empty((len(points), len(self.model.names)))
+        for number, row in enumerate(checked_rows(self, points)):
+            rows[number] = self.transform(row)
+        return self.model.evaluate_batch(rows)
+
+
+def four_number_model(model: RateModel) -> Reparametrised:
+    """Express a model of the paper's six parameters in the four identifiable ones.
+
+    Parameters
+    ----------
+    model : RateModel
+        A model of six parameters, such as `AfferentModel`.
+
+    Returns
+    -------
+    Reparametrised
+        The same model; C and v are the paper's, which changes no spike.
+    """
+    return Reparametrised(model, IDENTIFIABLE_NAMES, six_parameters)
+
+
+def _evaluator_of(driven: Drive, refractory_ms: float, windows_ms: Windows) -> Evaluate:
+    """Return the rates under one drive as a function of six parameters; its arrays are allocated once."""
+    current, static_part = np.empty_like(driven.sed_kpa), np.empty_like(driven.sed_kpa)
+
+    def evaluate(parameters: FloatArray) -> Rates:
+        six = np.asarray(parameters, dtype=np.float64)
+        if not (six.shape == (len(PARAMETER_NAMES),) and np.isfinite(six).all() and (six[3:] > 0.0).all()):
+            Afferent.from_parameters(six, refractory_ms)  # raises the error that names the parameter
+        intercept, dynamic_gain, static_gain, tau, capacitance, threshold = six.tolist()
+        # I = beta + k_d U' + k_s U, in the order of Transduction.current.
+        np.multiply(driven.rate_kpa_per_ms, dynamic_gain, out=current)
+        current.__iadd__(intercept)
+        current.__iadd__(np.multiply(driven.sed_kpa, static_gain, out=static_part))
+        times, offsets = exact_trains(
+            driven.times_ms, current, tau, capacitance, threshold, float(refractory_ms)
+        )
+        dynamic, static = (window_rates_hz(times, offsets, start, end) for start, end in windows_ms)
+        return dynamic, static
+
+    return evaluate
+
+
+def _side_by_side(traces: Sequence[SedTraces]) -> SedTraces:
+    """Join traces with the same times into one."""
+    dynamic = [trace.dynamic_kpa for trace in traces if trace.dynamic_kpa is not None]
+    return replace(
+        traces[0],
+        sed_kpa=np.hstack([trace.sed_kpa for trace in traces]),
+        dynamic_kpa=np.hstack(dynamic) if dynamic else None,
+    )

@@ -1,0 +1,94 @@
+"""A batch of evaluations of a rate model is bit-equal to single ones, and these to the afferent's rates."""
+
+import numpy as np
+import pytest
+
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.inference.closed_form import ClosedFormModel
+from fingerpad.inference.identifiable import identifiable
+from fingerpad.inference.rate_model import AfferentModel, evaluate_rows, four_number_model
+from fingerpad.inference.receptor_offset import ReceptorOffset
+from fingerpad.neuron.afferent import Afferent
+
+PEAKS = np.array([0.0, 0.3, 0.8, 1.4, 1.9, 2.5])
+TIMES = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 100.0, 200.0, 500.0, 1000.0])
+COURSE = np.where(TIMES <= 50.0, (TIMES / 50.0) ** 2, 0.75 + 0.25 * np.exp(-(TIMES - 50.0) / 150.0))
+SED = SedTraces(TIMES, COURSE[:, None] * PEAKS, [50.0])
+LONGER = SedTraces(np.append(TIMES, 1500.0), np.append(COURSE, COURSE[-1])[:, None] * PEAKS[2:4], [50.0])
+MODEL = AfferentModel.of_traces(SED)
+SIX = Afferent().parameters
+
+
+def scattered(parameters: np.ndarray, n_points: int = 37) -> np.ndarray:
+    random = np.random.default_rng(4)
+    return parameters * np.exp(random.normal(0.0, 0.4, size=(n_points, parameters.size)))
+
+
+@pytest.mark.parametrize(
+    ("model", "points"),
+    [
+        (MODEL, scattered(SIX)),
+        (AfferentModel.of_traces([SED, LONGER]), scattered(SIX)),
+        (four_number_model(MODEL), scattered(identifiable(SIX))),
+        (
+            ReceptorOffset.of_traces({-0.1: SED, 0.1: SED.scaled(np.full(6, 0.5))}),
+            np.column_stack([scattered(SIX), np.linspace(-0.1, 0.1, 37)]),
+        ),
+        (ClosedFormModel(MODEL, bend=0.0), scattered(identifiable(SIX))),
+    ],
+    ids=["six", "two motions", "four", "offset", "closed form"],
+)
+def test_rows_equal_single_runs_to_the_bit(model, points: np.ndarray) -> None:
+    dynamic, static = model.evaluate_batch(points)
+    expected = np.array([model.evaluate(point) for point in points])
+    assert dynamic.shape == (37, model.n_stimuli)
+    np.testing.assert_array_equal(dynamic, expected[:, 0])
+    np.testing.assert_array_equal(static, expected[:, 1])
+    assert (dynamic > 0.0).any(axis=1).sum() > 20
+    assert (dynamic == 0.0).any(axis=1).sum() > 5
+
+
+def test_no_rows_have_no_rates() -> None:
+    assert four_number_model(MODEL).evaluate_batch(np.empty((0, 4)))[0].shape == (0, 6)
+
+
+def test_single_runs_equal_the_afferent_to_the_bit() -> None:
+    windows = ((20.0, 50.0), (500.0, 900.0))
+    (driven,) = MODEL.drives
+    chosen = AfferentModel.of_drive(driven, windows, 2.0)
+    for point in scattered(SIX, 9):
+        np.testing.assert_array_equal(MODEL.evaluate(point), Afferent.from_parameters(point).rates(driven))
+        rested = Afferent.from_parameters(point, 2.0).rates(driven, *windows)
+        np.testing.assert_array_equal(chosen.evaluate(point), rested)
+
+
+def test_a_model_without_a_batch_of_its_own_is_evaluated_row_by_row() -> None:
+    class Plain:
+        names = ("a",)
+        n_stimuli = 2
+
+        def evaluate(self, parameters):
+            return parameters[0] * np.array([1.0, 2.0]), parameters[0] * np.array([3.0, 4.0])
+
+        def evaluate_batch(self, points):
+            return evaluate_rows(self, points)
+
+    dynamic, static = Plain().evaluate_batch(np.arange(9.0)[:, None])
+    np.testing.assert_array_equal(dynamic, np.outer(np.arange(9.0), [1.0, 2.0]))
+    np.testing.assert_array_equal(static, np.outer(np.arange(9.0), [3.0, 4.0]))
+
+
+def test_a_row_that_is_no_afferent_is_refused() -> None:
+    points = scattered(SIX, 3)
+    points[1, 3] = -1.0
+    with pytest.raises(InputError, match="time_constant_ms must be greater than 0"):
+        MODEL.evaluate_batch(points)
+    with pytest.raises(InputError, match="got 4 numbers"):
+        MODEL.evaluate(points[0, :4])
+    with pytest.raises(InputError, match="refractory_ms must not be negative"):
+        AfferentModel.of_traces(SED, refractory_ms=-1.0)
+    with pytest.raises(InputError, match=r"points must have 6 columns: got shape \(3, 4\)"):
+        MODEL.evaluate_batch(points[:, :4])
+    with pytest.raises(InputError, match=r"points must have 4 columns: got shape \(3, 6\)"):
+        four_number_model(MODEL).evaluate_batch(points)
