@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.core.blocks import BLOCK
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
+from fingerpad.core.threads import BLOCK
 from fingerpad.data import neuron
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.spikes import firing_rate_hz

@@ -9,11 +9,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad, solve_ivp
 from scipy.stats import kstest
 
-from fingerpad.core import blocks
+from fingerpad.core import threads
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Presentations, Purpose, uniforms
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
-from fingerpad.neuron.escape_rate import EscapeRate, _integral, panels, relative_potential
+from fingerpad.neuron.escape_rate import EscapeRate, _integral, panels
+from fingerpad.neuron.exact_spikes import potential_at
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 
 TAU, CAPACITANCE, THRESHOLD, REFRACTORY = 30.0, 1e-6, 50.0, 3.0
@@ -132,15 +133,15 @@ def test_gauss_on_panels_errs_by_a_billionth_at_most():
             for pieces in (n, 4 * n)
         )
         assert_allclose(coarse, fine, rtol=1e-9)
-        assert relative_potential(0.0, start, steady, drift) == start
+        assert potential_at(0.0, start, steady, drift) == start
 
 
 def test_the_same_seed_gives_the_same_spikes_on_any_number_of_threads(monkeypatch):
     presentations = Presentations.of_one_afferent(4, n_repeats=25)
     trains = {}
-    for threads in (1, 3):
-        monkeypatch.setattr(blocks, "available_threads", lambda threads=threads: threads)
-        trains[threads] = SOFT.spikes(touched(4), SEED, presentations)
+    for number in (1, 3):
+        monkeypatch.setattr(threads, "available_threads", lambda number=number: number)
+        trains[number] = SOFT.spikes(touched(4), SEED, presentations)
     assert_array_equal(trains[1].times_ms, trains[3].times_ms)
     alone = SOFT.spikes(touched(4), SEED, Presentations([2], [70], [0]))
     assert_array_equal(alone[0], trains[1][70])

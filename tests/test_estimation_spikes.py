@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad, solve_ivp
 from scipy.stats import binom
 
-from fingerpad.core import blocks
+from fingerpad.core import threads
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Presentations
 from fingerpad.core.signals import SedTraces, SpikeTrains
@@ -177,8 +177,8 @@ def test_canonical_numbers_and_back():
 
 def test_the_likelihood_has_the_same_bits_on_any_number_of_threads(monkeypatch):
     values = []
-    for threads in (1, 3):
-        monkeypatch.setattr(blocks, "available_threads", lambda threads=threads: threads)
+    for number in (1, 3):
+        monkeypatch.setattr(threads, "available_threads", lambda number=number: number)
         values.append(recorded().derivatives(TRUTH))
     for one, three in zip(*values, strict=True):
         assert_array_equal(one, three)

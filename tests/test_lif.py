@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from fingerpad.core import blocks
-from fingerpad.core.blocks import BLOCK
+from fingerpad.core import threads
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import CurrentTraces
+from fingerpad.core.threads import BLOCK
 from fingerpad.neuron.exact_spikes import _next_guess
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 
@@ -247,8 +247,8 @@ def test_every_column_is_a_neuron_of_its_own():
 def test_many_neurons_fire_as_each_does_alone_on_any_number_of_threads(monkeypatch):
     current = bumpy_current(2 * BLOCK + 3)
     answers = []
-    for threads in (1, 3):
-        monkeypatch.setattr(blocks, "available_threads", lambda threads=threads: threads)
+    for number in (1, 3):
+        monkeypatch.setattr(threads, "available_threads", lambda number=number: number)
         answers.append(NEURON.spikes(current))
     one, several = answers
     assert_array_equal(one.times_ms, several.times_ms)

@@ -1,21 +1,19 @@
 """The threaded sum over elements against a plain loop, and the same bits on any number of threads."""
 
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 
+from fingerpad.core.threads import FEWEST_IN_CHUNK, MANY_CHUNKS, available_threads, compiled_threads
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import block_mesh, finger_mesh
-from fingerpad.mechanics.assembly import Sparsity, assemble
-from fingerpad.mechanics.chunks import FEWEST_ELEMENTS, MANY_CHUNKS, coloured_chunks
+from fingerpad.mechanics.assembly import Sparsity, assemble, coloured_chunks
 from fingerpad.mechanics.element import element_system
 from fingerpad.mechanics.materials import Hyperfoam, Material, MaterialTable, Ogden, Polynomial
 
@@ -31,7 +29,7 @@ TABLE = MaterialTable.of(
 )
 S = np.array([0.9, 0.8, 0.95, 1.0])
 needs_two_threads = pytest.mark.skipif(
-    numba.config.NUMBA_NUM_THREADS < 2, reason="this machine has one core: nothing can run side by side"
+    available_threads() < 2, reason="this machine has one core: nothing can run side by side"
 )
 
 
@@ -102,22 +100,14 @@ def test_single_precision_blocks_hold_the_same_tangent():
     assert abs(single[2] - double[2]).max() <= 1e-6 * abs(double[2]).max()
 
 
-@contextmanager
-def threads(count):
-    before = numba.get_num_threads()
-    numba.set_num_threads(count)
-    yield
-    numba.set_num_threads(before)
-
-
 @needs_two_threads
 @MESHES
 def test_bits_do_not_depend_on_the_number_of_threads(name):
     where = state(name)
-    with threads(1):
+    with compiled_threads(1):
         alone = assembled(name, *where)
     for _ in range(3):
-        with threads(2):
+        with compiled_threads(2):
             together = assembled(name, *where)
         assert together[0] == alone[0]
         np.testing.assert_array_equal(together[1], alone[1])
@@ -150,7 +140,7 @@ def test_chunks_of_one_colour_share_no_node(name):
 
 
 @settings(max_examples=30, deadline=None)
-@given(st.integers(1, 5 * FEWEST_ELEMENTS), st.integers(8, 2000), st.integers(0, 100))
+@given(st.integers(1, 5 * FEWEST_IN_CHUNK), st.integers(8, 2000), st.integers(0, 100))
 def test_chunks_of_any_mesh_share_no_node(n_elements, n_nodes, seed):
     """Elements of nodes drawn at random: even a mesh whose numbers say nothing is added up rightly."""
     elements = np.random.default_rng(seed).integers(0, n_nodes, size=(n_elements, 8))

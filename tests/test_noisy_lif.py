@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 from scipy.special import erfcx
 
-from fingerpad.core import blocks
+from fingerpad.core import threads
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Presentations, Purpose, normals
 from fingerpad.core.signals import CurrentTraces
@@ -176,9 +176,9 @@ EVERYTHING = MembraneNoise(CorrelatedCurrentNoise(0.5e-6, 4.0), ThresholdNoise(0
 def test_the_same_seed_gives_the_same_spikes_on_any_number_of_threads(monkeypatch):
     presentations = Presentations.of_population(4, n_trials=25)
     trains = {}
-    for threads in (1, 3):
-        monkeypatch.setattr(blocks, "available_threads", lambda threads=threads: threads)
-        trains[threads] = noisy_spikes(NEURON, touched(), EVERYTHING, SEED, presentations)
+    for number in (1, 3):
+        monkeypatch.setattr(threads, "available_threads", lambda number=number: number)
+        trains[number] = noisy_spikes(NEURON, touched(), EVERYTHING, SEED, presentations)
     assert_array_equal(trains[1].times_ms, trains[3].times_ms)
     alone = noisy_spikes(NEURON, touched(), EVERYTHING, SEED, Presentations([2], [17], [2]))
     assert_array_equal(alone[0], trains[1][17 * 4 + 2])

@@ -10,7 +10,13 @@ import pytest
 
 import fingerpad as fp
 from fingerpad.core.errors import InputError
-from fingerpad.core.threads import available_threads, compiled_threads, current_threads, worker_threads
+from fingerpad.core.threads import (
+    available_threads,
+    compiled_threads,
+    current_threads,
+    in_blocks,
+    in_chunks,
+)
 
 needs_two_threads = pytest.mark.skipif(available_threads() < 2, reason="this machine has one core")
 
@@ -45,12 +51,12 @@ def test_work_is_shared_out_and_answers_come_in_order():
             meeting.wait()
         return last, threading.get_ident()
 
-    with compiled_threads(2), worker_threads() as each:
-        answers = each(work, [(0, 5), (1, 6), (2, 7), (3, 8)])
+    with compiled_threads(2):
+        answers = in_chunks(work, [(0, 5), (1, 6), (2, 7), (3, 8)])
     assert [last for last, _ in answers] == [5, 6, 7, 8]
     assert len({thread for _, thread in answers}) == 2
-    with compiled_threads(1), worker_threads() as each:
-        assert each(lambda *_: threading.get_ident(), [(0, 1), (1, 2)]) == 2 * [threading.get_ident()]
+    with compiled_threads(1):
+        assert in_chunks(lambda *_: threading.get_ident(), [(0, 1), (1, 2)]) == 2 * [threading.get_ident()]
 
 
 @needs_two_threads
@@ -76,10 +82,22 @@ def test_press_has_the_same_bits_on_any_number_of_threads():
 
 @needs_two_threads
 def test_a_failure_in_any_thread_is_raised():
-    with compiled_threads(2), worker_threads() as each:
+    with compiled_threads(2):
         with pytest.raises(ZeroDivisionError):
-            each(lambda first, last: 1 // (first - 3), [(n, n + 1) for n in range(6)])
-        assert each(lambda first, last: first, [(0, 1), (1, 2)]) == [0, 1]
+            in_chunks(lambda first, last: 1 // (first - 3), [(n, n + 1) for n in range(6)])
+        assert in_chunks(lambda first, last: first, [(0, 1), (1, 2)]) == [0, 1]
+
+
+@needs_two_threads
+def test_work_within_work_neither_waits_for_ever_nor_takes_other_threads():
+    """Helpers that call for help wait for no one: all helpers may be in the same place."""
+
+    def inner(first, last):
+        return current_threads(), sum(in_chunks(lambda a, b: b - a, [(0, 2), (2, 5)])), last - first
+
+    with compiled_threads(2):
+        answers = in_blocks(lambda some: in_chunks(inner, [(some.start, some.stop), (0, 1)]), 6, block=1)
+    assert answers == [[(2, 5, 1), (2, 5, 1)]] * 6
 
 
 @needs_two_threads
@@ -88,8 +106,8 @@ def test_python_threads_may_share_out_work_at_once():
 
     def several(name):
         for _ in range(200):
-            with compiled_threads(2), worker_threads() as each:
-                sums[name] = each(lambda first, last: last - first, [(0, 3), (3, 5), (5, 9)])
+            with compiled_threads(2):
+                sums[name] = in_chunks(lambda first, last: last - first, [(0, 3), (3, 5), (5, 9)])
 
     together = [threading.Thread(target=several, args=(name,)) for name in "ab"]
     for one in together:
@@ -101,11 +119,11 @@ def test_python_threads_may_share_out_work_at_once():
 
 FORKED = """
 import os
-from fingerpad.core.threads import compiled_threads, worker_threads
+from fingerpad.core.threads import compiled_threads, in_chunks
 
 def shared():
-    with compiled_threads(2), worker_threads() as each:
-        return each(lambda first, last: last - first, [(0, 3), (3, 5), (5, 9)])
+    with compiled_threads(2):
+        return in_chunks(lambda first, last: last - first, [(0, 3), (3, 5), (5, 9)])
 
 shared()
 child = os.fork()

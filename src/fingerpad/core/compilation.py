@@ -6,33 +6,12 @@ import logging
 from functools import cache
 from typing import Any
 
+from fingerpad.core.numba_internals import is_compiled
+
 NOTICE = "fingerpad compiles its kernels, once: about a minute."
 
 LOGGER = logging.getLogger("fingerpad")
 """Where the notice goes: to standard error, unless logging is set up otherwise."""
-
-
-def is_compiled(kernel: Any) -> bool:
-    """Whether a cached Numba kernel need not be compiled.
-
-    Parameters
-    ----------
-    kernel : Numba dispatcher
-        A function decorated with `njit(cache=True)`.
-
-    Returns
-    -------
-    bool
-        True if it was compiled in this process, or lies on disk as this Python and this Numba make it from
-        the source as it is now; also where nothing is compiled at all, as under NUMBA_DISABLE_JIT.
-    """
-    if getattr(kernel, "signatures", ()):
-        return True
-    try:
-        # Numba's own reading of its index, which comes out empty if another version or source made it.
-        return bool(kernel._cache._cache_file._load_index())
-    except AttributeError:
-        return True
 
 
 def announce_compilation(kernel: Any) -> None:

@@ -1,4 +1,9 @@
-"""How many threads share the work of compiled loops, and how it is shared: docs/decisions/threads.md."""
+"""Share work between threads, with the same bits on any number of them: docs/decisions/threads.md.
+
+Work is a function of consecutive numbers (elements, columns, receptors or trials), cut into chunks. Chunks do
+not depend on the number of threads, and results come back in the order of the chunks. Threads help only where
+the work releases the interpreter lock, as NumPy does and kernels compiled with `nogil=True` do.
+"""
 
 from __future__ import annotations
 
@@ -6,50 +11,63 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from contextvars import ContextVar
+from contextvars import ContextVar, copy_context
 from functools import cache
 from itertools import starmap
-from typing import Any
+from typing import TypeVar
 
 import numba
 
 from fingerpad.core.checks import whole
 from fingerpad.core.errors import InputError
 
+Result = TypeVar("Result")
+
+Chunk = tuple[int, int]
+"""Consecutive numbers, from the first up to but not including the last."""
+
+BLOCK = 1024
+"""Receptors of a block, by default: a thread is worth starting for so many, and they need little memory."""
+
+MANY_CHUNKS = 128
+"""Most chunks of `even_chunks`: enough for all threads of a computer."""
+FEWEST_IN_CHUNK = 128
+"""Fewest numbers in a chunk of `even_chunks`: handing over a smaller chunk takes as long as its work."""
+
 _THREADS: ContextVar[int | None] = ContextVar("threads", default=None)
 
 
 @cache
-def _helpers(threads: int) -> ThreadPoolExecutor:
-    """Threads that help the one that asks; they wait, without turning, until they are asked again."""
+def _pool(threads: int) -> ThreadPoolExecutor:
+    """Threads that work beside the calling thread. They block, without using the processor, until called."""
     return ThreadPoolExecutor(threads - 1, thread_name_prefix="fingerpad")
 
 
-if hasattr(os, "register_at_fork"):  # not on Windows, where nothing forks
-    # The threads of a parent stay behind: a child gets its own.
-    os.register_at_fork(after_in_child=_helpers.cache_clear)
+if hasattr(os, "register_at_fork"):  # not on Windows, which cannot fork
+    # A forked child has none of its parent's threads, so it makes its own.
+    os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 def available_threads() -> int:
-    """Threads that compiled loops may use in this process, one per core unless NUMBA_NUM_THREADS is set."""
+    """Threads that this process may use: one per core, or the value of NUMBA_NUM_THREADS."""
     return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 
 
 def current_threads() -> int:
-    """Threads that compiled loops use now."""
+    """Threads in use now: those of the innermost `compiled_threads`, or all available ones."""
     return _THREADS.get() or available_threads()
 
 
 @contextmanager
 def compiled_threads(threads: int | None = None) -> Iterator[int]:
-    """Let compiled loops use so many threads for a while; afterwards the number is what it was.
+    """Set the number of threads within a `with` block; afterwards it is what it was.
 
-    Every Python thread has a number of its own.
+    Every Python thread has a number of its own, which the threads that help it take over.
 
     Parameters
     ----------
     threads : int, optional
-        Number of threads; by default as many as before.
+        Number of threads; unchanged by default.
 
     Yields
     ------
@@ -59,7 +77,7 @@ def compiled_threads(threads: int | None = None) -> Iterator[int]:
     Raises
     ------
     InputError
-        If there are not so many.
+        If the number is not a positive integer or exceeds `available_threads`.
 
     Examples
     --------
@@ -77,44 +95,88 @@ def compiled_threads(threads: int | None = None) -> Iterator[int]:
         _THREADS.reset(before)
 
 
-Work = Callable[[int, int], Any]
-"""Compiled work on consecutive numbers, from the first up to but not including the last."""
-
-
-@contextmanager
-def worker_threads() -> Iterator[Callable[[Work, Sequence[tuple[int, int]]], list[Any]]]:
-    """Share work out to as many threads as compiled loops may use, the caller's among them.
-
-    The work must release Python's lock (nogil=True), and no two chunks of one call may write to the same
-    place. A thread that is done with a chunk takes the next one, so none waits for a slower one.
-
-    Yields
-    ------
-    callable
-        Called with the work and its chunks (first, last); returns the answers in the order of the chunks.
+def even_chunks(count: int) -> list[Chunk]:
+    """Cut `count` numbers into chunks of one size; only the last may be smaller.
 
     Examples
     --------
-    >>> with worker_threads() as each:
-    ...     each(lambda first, last: last - first, [(0, 4), (4, 9)])
+    >>> even_chunks(300)
+    [(0, 128), (128, 256), (256, 300)]
+    """
+    return _chunks(count, max(FEWEST_IN_CHUNK, -(-count // MANY_CHUNKS)))
+
+
+def _chunks(count: int, size: int) -> list[Chunk]:
+    return [(first, min(first + size, count)) for first in range(0, count, size)]
+
+
+def in_chunks(work: Callable[[int, int], Result], chunks: Sequence[Chunk]) -> list[Result]:
+    """Run a function on every chunk, on `current_threads` threads, the calling one included.
+
+    A thread that has finished a chunk takes the next one. Calls may be nested.
+
+    Parameters
+    ----------
+    work : callable
+        Called with the first and the last number of each chunk. No two chunks may write to the same place.
+    chunks : sequence of (int, int)
+        First number, and the number after the last, of each chunk.
+
+    Returns
+    -------
+    list
+        One result per chunk, in the order of the chunks.
+
+    Raises
+    ------
+    Exception
+        Whatever the work raises, in any thread.
+
+    Examples
+    --------
+    >>> in_chunks(lambda first, last: last - first, [(0, 4), (4, 9)])
     [4, 5]
     """
     threads = current_threads()
+    if threads == 1 or len(chunks) == 1:
+        return list(starmap(work, chunks))
+    results: dict[int, Result] = {}
+    numbers = iter(range(len(chunks)))
 
-    def each(work: Work, chunks: Sequence[tuple[int, int]]) -> list[Any]:
-        if threads == 1 or len(chunks) == 1:
-            return list(starmap(work, chunks))
-        answers: list[Any] = [None] * len(chunks)
-        numbers = iter(range(len(chunks)))
+    def take() -> None:
+        for n in numbers:
+            results[n] = work(*chunks[n])
 
-        def take() -> None:
-            for n in numbers:
-                answers[n] = work(*chunks[n])
+    helpers = [_pool(threads).submit(copy_context().run, take) for _ in range(min(threads, len(chunks)) - 1)]
+    take()
+    for helper in helpers:
+        # All chunks are taken by now. A call from within a helper must not wait for one that cannot start,
+        # because all threads of the pool may be waiting too.
+        if not helper.cancel():
+            helper.result()
+    return [results[n] for n in range(len(chunks))]
 
-        others = [_helpers(threads).submit(take) for _ in range(min(threads, len(chunks)) - 1)]
-        take()
-        for other in others:
-            other.result()
-        return answers
 
-    yield each
+def in_blocks(work: Callable[[slice], Result], count: int, block: int = BLOCK) -> list[Result]:
+    """Run a function on slices of `count` receptors, trials or rows, on threads as in `in_chunks`.
+
+    Parameters
+    ----------
+    work : callable
+        Called with the slice of each block; blocks must not depend on each other.
+    count : int
+        Number of receptors.
+    block : int, optional
+        Receptors of a block.
+
+    Returns
+    -------
+    list
+        One result per block, in the order of the receptors.
+
+    Examples
+    --------
+    >>> in_blocks(lambda receptors: (receptors.start, receptors.stop), 5, block=2)
+    [(0, 2), (2, 4), (4, 5)]
+    """
+    return in_chunks(lambda first, last: work(slice(first, last)), _chunks(count, block))

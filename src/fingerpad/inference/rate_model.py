@@ -13,10 +13,10 @@ from typing import Protocol
 
 import numpy as np
 
-from fingerpad.core.blocks import in_blocks
 from fingerpad.core.checks import FloatArray, not_negative
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
+from fingerpad.core.threads import in_blocks
 from fingerpad.data import neuron, protocol
 from fingerpad.inference.fitting.problem import IntArray
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters

@@ -27,10 +27,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import kstest
 
-from fingerpad.core.blocks import in_blocks
 from fingerpad.core.checks import FloatArray, float_array, instance, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SpikeTrains
+from fingerpad.core.threads import in_blocks
 from fingerpad.data import neuron
 from fingerpad.inference.spike_parameters import (
     N_PARAMETERS,

@@ -1,4 +1,10 @@
-"""All elements together: sparsity of 3x3 blocks, energy, residual and tangent."""
+"""Sums over all elements: sparsity in 3x3 blocks, energy, residual and tangent.
+
+Two elements that share a node add to the same numbers. So elements are added up in chunks of consecutive
+numbers, and the chunks are coloured: no two chunks of one colour share a node. Colours are done one after the
+other, the chunks of one colour at the same time on several threads. The order in which elements add to a node
+depends on chunks and colours, and these on the mesh alone.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +15,7 @@ from numba import njit
 from scipy import sparse
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.core.threads import worker_threads
-from fingerpad.mechanics.chunks import Chunk, coloured_chunks, even_chunks
+from fingerpad.core.threads import Chunk, even_chunks, in_chunks
 from fingerpad.mechanics.element import N_NODES, element_system
 
 
@@ -29,7 +34,7 @@ class Sparsity:
     diagonal : int array (n_nodes,)
         Block of each node with itself.
     colours : list of list of (int, int)
-        Chunks of elements that threads may add up at the same time, see `chunks`.
+        Chunks of elements that threads may add up at the same time, see `coloured_chunks`.
     """
 
     row_start: np.ndarray
@@ -66,6 +71,43 @@ class Sparsity:
         """Tangent as a block matrix that shares `blocks` (n_blocks, 3, 3)."""
         size = 3 * (len(self.row_start) - 1)
         return sparse.bsr_matrix((blocks, self.column, self.row_start), shape=(size, size), copy=False)
+
+
+def coloured_chunks(elements: np.ndarray, n_nodes: int) -> list[list[Chunk]]:
+    """Chunks of a mesh by colour, each in the first colour that is free.
+
+    Parameters
+    ----------
+    elements : int array (n_elements, 8)
+        Nodes of each element.
+    n_nodes : int
+        Number of nodes of the mesh.
+
+    Returns
+    -------
+    list of list of (int, int)
+        For each colour its chunks, of which no two share a node.
+
+    Examples
+    --------
+    A row of 400 elements takes every second chunk in the first colour:
+
+    >>> row = np.arange(400)[:, None] + np.array([0, 1, 1, 0, 0, 1, 1, 0])
+    >>> coloured_chunks(row, n_nodes=401)
+    [[(0, 128), (256, 384)], [(128, 256), (384, 400)]]
+    """
+    colours: list[list[Chunk]] = []
+    taken: list[np.ndarray] = []  # for each colour, whether one of its chunks has a node
+    for first, last in even_chunks(len(elements)):
+        nodes = elements[first:last]
+        free = (colour for colour, has in enumerate(taken) if not has[nodes].any())
+        colour = next(free, len(colours))
+        if colour == len(colours):
+            colours.append([])
+            taken.append(np.zeros(n_nodes, dtype=bool))
+        colours[colour].append((first, last))
+        taken[colour][nodes] = True
+    return colours
 
 
 @njit(cache=True)
@@ -132,10 +174,9 @@ def assemble(
         )  # fmt: skip
 
     force[:] = 0.0
-    with worker_threads() as each:
-        if with_tangent:
-            each(clear, even_chunks(len(blocks)))
-        return sum(potential for chunks in sparsity.colours for potential in each(add, chunks))
+    if with_tangent:
+        in_chunks(clear, even_chunks(len(blocks)))
+    return sum(potential for chunks in sparsity.colours for potential in in_chunks(add, chunks))
 
 
 @njit(cache=True, nogil=True)

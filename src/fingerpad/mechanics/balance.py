@@ -22,11 +22,10 @@ from numba import njit
 from scipy.interpolate import CubicSpline
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.core.threads import worker_threads
-from fingerpad.mechanics.chunks import even_chunks
+from fingerpad.core.numba_internals import small_array
+from fingerpad.core.threads import even_chunks, in_chunks
 from fingerpad.mechanics.element import N_NODES, N_POINTS, frame_scale, gradients_at_points
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
-from fingerpad.mechanics.small_arrays import small_array
 from fingerpad.mechanics.tensors import invert, push_forward
 from fingerpad.mechanics.viscoelastic import StressHistory
 
@@ -334,5 +333,4 @@ def dissipated_energy(
             before.instantaneous, before.relaxed, instantaneous, energies, first, last,
         )  # fmt: skip
 
-    with worker_threads() as each:
-        return sum(each(find, even_chunks(len(elements))))
+    return sum(in_chunks(find, even_chunks(len(elements))))

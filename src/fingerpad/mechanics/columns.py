@@ -30,7 +30,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.mechanics.small_arrays import small_single_array
+from fingerpad.core.numba_internals import small_single_array
 
 SingleArray = NDArray[np.float32]
 RoundedArray = NDArray[np.int16]

@@ -27,9 +27,9 @@ import numpy as np
 from numba import njit
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.numba_internals import small_array
 from fingerpad.mechanics.energy import CARRIED, SECOND, differentiate
 from fingerpad.mechanics.materials import COUPLED, N_COEFFICIENTS, POLYNOMIAL
-from fingerpad.mechanics.small_arrays import small_array
 from fingerpad.mechanics.tensors import (
     COLUMN,
     INDEX,

@@ -24,9 +24,8 @@ import numpy as np
 from numba import njit
 
 from fingerpad.core.checks import FloatArray, one_of
-from fingerpad.core.threads import worker_threads
+from fingerpad.core.threads import even_chunks, in_chunks
 from fingerpad.geometry.mesh import Mesh
-from fingerpad.mechanics.chunks import even_chunks
 from fingerpad.mechanics.element import N_NODES, N_POINTS, element_state, frame_scale, gradients_at_points
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
 from fingerpad.mechanics.tensors import COLUMN, INDEX, ROW, invert, push_forward
@@ -262,8 +261,7 @@ class Watched:
                 first, last,
             )  # fmt: skip
 
-        with worker_threads() as each:
-            each(find, even_chunks(n))
+        in_chunks(find, even_chunks(n))
         work += 0.5 * (before.pressure_kpa + pressure) * (dilatation - before.dilatation)
         weights, isochoric = energies[chosen, :, 0], energies[chosen, :, 1]
         instantaneous = (weights * isochoric).sum(axis=1) / weights.sum(axis=1) + volumetric_kpa[chosen]
@@ -304,8 +302,7 @@ def cauchy_stress(
             pressure, dilatation, gradient, stress, first, last,
         )  # fmt: skip
 
-    with worker_threads() as each:
-        each(find, even_chunks(n))
+    in_chunks(find, even_chunks(n))
     return stress
 
 

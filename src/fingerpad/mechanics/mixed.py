@@ -25,9 +25,8 @@ import numpy as np
 from numba import njit
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.core.threads import worker_threads
+from fingerpad.core.threads import even_chunks, in_chunks
 from fingerpad.mechanics.assembly import Sparsity
-from fingerpad.mechanics.chunks import even_chunks
 from fingerpad.mechanics.element import N_NODES, N_POINTS, gradients_at_points
 from fingerpad.mechanics.energy import CARRIED, differentiate
 from fingerpad.mechanics.materials import COUPLED, N_COEFFICIENTS, POLYNOMIAL
@@ -68,8 +67,7 @@ class Pressures:
         def find(first: int, last: int) -> None:
             _pressures(nodes, elements, displacement, layer, law, pressure, slope, first, last)
 
-        with worker_threads() as each:
-            each(find, even_chunks(len(elements)))
+        in_chunks(find, even_chunks(len(elements)))
         return cls(pressure, slope)
 
     def after(self, elements: np.ndarray, step_mm: FloatArray) -> FloatArray:
@@ -151,9 +149,8 @@ def exchange_pressure(
     def exchange(first: int, last: int) -> None:
         _exchange_chunk(nodes, elements, displacement, change, sparsity.position, blocks, first, last)
 
-    with worker_threads() as each:
-        for chunks in sparsity.colours:
-            each(exchange, chunks)
+    for chunks in sparsity.colours:
+        in_chunks(exchange, chunks)
 
 
 @njit(cache=True, nogil=True)

@@ -22,7 +22,7 @@ import numpy as np
 from numba import njit
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.core.threads import current_threads, worker_threads
+from fingerpad.core.threads import current_threads, in_chunks
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.columns import (
     ColumnGraph,
@@ -282,8 +282,7 @@ def _share(kernel: Callable[..., None], first: int, last: int, *arguments: Any) 
     # More pieces than threads: columns differ in work, and whoever is done takes the next piece.
     pieces = min(PIECES_PER_THREAD * parts, (last - first) // FEWEST_COLUMNS)
     ends = [first + (last - first) * n // pieces for n in range(pieces + 1)]
-    with worker_threads() as each:
-        each(lambda start, stop: kernel(start, stop, *arguments), list(pairwise(ends)))
+    in_chunks(lambda start, stop: kernel(start, stop, *arguments), list(pairwise(ends)))
 
 
 class _Level:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fingerpad.mechanics.small_arrays import small_array
+from fingerpad.core.numba_internals import small_array
 
 ROW = np.array([0, 1, 2, 0, 1, 0])
 COLUMN = np.array([0, 1, 2, 1, 2, 2])

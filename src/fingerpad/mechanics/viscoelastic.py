@@ -18,8 +18,7 @@ import numpy as np
 from numba import njit
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.core.threads import worker_threads
-from fingerpad.mechanics.chunks import even_chunks
+from fingerpad.core.threads import even_chunks, in_chunks
 from fingerpad.mechanics.element import N_POINTS, element_state, relaxing_norms
 from fingerpad.mechanics.materials import MaterialTable
 
@@ -77,8 +76,7 @@ class StressHistory:
         def carry(first: int, last: int) -> None:
             _carry(step.old, step.decay, layer, self.instantaneous, self.relaxed, total, first, last)
 
-        with worker_threads() as each:
-            each(carry, even_chunks(len(layer)))
+        in_chunks(carry, even_chunks(len(layer)))
         return total
 
     def advanced(self, step: StepCoefficients, layer: np.ndarray, instantaneous: FloatArray) -> StressHistory:
@@ -91,8 +89,7 @@ class StressHistory:
                 relaxed, first, last,
             )  # fmt: skip
 
-        with worker_threads() as each:
-            each(relax, even_chunks(len(layer)))
+        in_chunks(relax, even_chunks(len(layer)))
         return StressHistory(instantaneous, relaxed)
 
 
@@ -171,8 +168,7 @@ def instantaneous_state(
             nodes, elements, displacement, layer, table.law, instantaneous, energies, volumetric, first, last
         )
 
-    with worker_threads() as each:
-        each(find, even_chunks(n))
+    in_chunks(find, even_chunks(n))
     return instantaneous, energies, volumetric
 
 
@@ -208,6 +204,5 @@ def stored_energy_density(
             history.instantaneous, history.relaxed, energies, volumetric, stored, first, last,
         )  # fmt: skip
 
-    with worker_threads() as each:
-        each(find, even_chunks(len(elements)))
+    in_chunks(find, even_chunks(len(elements)))
     return stored

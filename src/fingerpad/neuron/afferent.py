@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from fingerpad.core.blocks import in_blocks
 from fingerpad.core.checks import FloatArray, float_array
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import STORED_ENERGY, SedTraces, SpikeTrains
+from fingerpad.core.threads import in_blocks
 from fingerpad.data import neuron, protocol
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.spikes import firing_rate_hz

@@ -24,12 +24,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from fingerpad.core.blocks import in_blocks
 from fingerpad.core.checks import FloatArray, float_array, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.philox import four_uniforms
 from fingerpad.core.random_streams import Presentations, Purpose, checked_sites
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.core.threads import in_blocks
+from fingerpad.neuron.exact_spikes import potential_at
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 
 ESCAPE_TIME_MS = 1.0
@@ -201,13 +202,6 @@ class EscapeRate:
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def relative_potential(x: float, start: float, steady: float, drift: float) -> float:
-    """Potential over threshold x = s/tau after u = `start` and w = `steady`; w grows by `drift` x."""
-    gone = -math.expm1(-x)
-    return start + (steady - start) * gone + drift * (x - gone)
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
 def panels(length: float, start: float, steady: float, drift: float, width: float) -> int:
     """Into how many panels to cut a stretch, for Gauss's formula with five nodes to err by 1e-9 or less.
 
@@ -224,7 +218,7 @@ def _integral(begin: float, end: float, start: float, steady: float, drift: floa
     """Integral of exp((u - 1)/width) over one panel, in x."""
     total = 0.0
     for node, weight in zip(_NODES, _WEIGHTS):  # noqa: B905 (Numba knows no strict)
-        u = relative_potential(begin + node * (end - begin), start, steady, drift)
+        u = potential_at(begin + node * (end - begin), start, steady, drift)
         total += weight * math.exp((u - 1.0) / width)
     return (end - begin) * total
 
@@ -244,7 +238,7 @@ def _where_reached(
             low = guess
         else:
             high = guess
-        step = missing / math.exp((relative_potential(guess, start, steady, drift) - 1.0) / width)
+        step = missing / math.exp((potential_at(guess, start, steady, drift) - 1.0) / width)
         guess += step
         if abs(step) <= _ROUND_OFF * end or high - low <= _ROUND_OFF * end:
             break
@@ -286,8 +280,8 @@ def _escape_trains(
                 for panel in range(n_panels):
                     left, right = length * panel / n_panels, length * (panel + 1) / n_panels
                     highest = max(
-                        relative_potential(left, u, steady, drift),
-                        relative_potential(right, u, steady, drift),
+                        potential_at(left, u, steady, drift),
+                        potential_at(right, u, steady, drift),
                     )
                     if highest - 1.0 < (_NEGLIGIBLE - _HIGHEST_STEP) * width:
                         continue
@@ -297,7 +291,7 @@ def _escape_trains(
                         break
                     wanted -= part
                 if x < 0.0:
-                    u = relative_potential(length, u, steady, drift)
+                    u = potential_at(length, u, steady, drift)
                     break
                 if count == found.size:
                     found = np.concatenate((found, np.empty(found.size)))
@@ -345,7 +339,7 @@ def _potentials_at(
             if begin < target:
                 drift = tau * (drive[knot + 1] - drive[knot]) / ((last - first) / tau)
                 steady = tau * drive[knot] + drift * ((begin - first) / tau)
-                u = relative_potential((target - begin) / tau, u, steady, drift)
+                u = potential_at((target - begin) / tau, u, steady, drift)
             if wanted[place] == target:
                 found[place, train] = u if target >= ready else -np.inf
                 place += 1

@@ -30,6 +30,12 @@ def _potential(x: float, gone: float, start: float, steady: float, drift: float)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
+def potential_at(x: float, start: float, steady: float, drift: float) -> float:
+    """Potential u at x = s/tau, from u = `start` and w = `steady` at 0; w grows by `drift` per unit of x."""
+    return _potential(x, -math.expm1(-x), start, steady, drift)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def _first_guess(missing: float, rise: float, drift: float) -> float:
     """Time in which the potential gains what is `missing`, roughly, from r = `rise` and c = `drift`.
 
@@ -75,7 +81,7 @@ def _refine(
     low = 0.0
     guess = high * min(1.0, (threshold - start) / (reached - start))
     for _ in range(_MOST_REFINEMENTS):
-        potential = _potential(guess, -math.expm1(-guess), start, steady, drift)
+        potential = potential_at(guess, start, steady, drift)
         if potential < threshold:
             low = guess
         else:
@@ -117,12 +123,12 @@ def first_crossing(
         Potential at the second knot if the threshold were not there. [mV]
     """
     drift = (later - steady) / length
-    at_knot = reached = _potential(length, -math.expm1(-length), start, steady, drift)
+    at_knot = reached = potential_at(length, start, steady, drift)
     high = length
     if reached < threshold and steady >= threshold > later:
         # As in `_bracket`: the potential peaks between the knots.
         high = min(high, math.log1p(-(steady - start) / drift))
-        reached = _potential(high, -math.expm1(-high), start, steady, drift)
+        reached = potential_at(high, start, steady, drift)
     if reached < threshold:
         return False, length, at_knot
     return True, _refine(high, reached, start, steady, drift, threshold), at_knot
@@ -253,11 +259,11 @@ def _bracket(
         steady = now[neuron] + drift * ((begin - start) / tau)
         high = (end - begin) / tau
         potential = potentials[neuron]
-        at_knot = reached = _potential(high, -math.expm1(-high), potential, steady, drift)
+        at_knot = reached = potential_at(high, potential, steady, drift)
         if reached < threshold and steady >= threshold > later[neuron]:
             # du/dx = c + (r - c) e^-x with r = w0 - u0 > 0 and c < 0: the potential peaks where that is 0.
             high = min(high, math.log1p(-(steady - potential) / drift))
-            reached = _potential(high, -math.expm1(-high), potential, steady, drift)
+            reached = potential_at(high, potential, steady, drift)
         if reached < threshold:
             potentials[neuron] = at_knot
             continue

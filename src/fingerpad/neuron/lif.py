@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from fingerpad.core.blocks import in_blocks
 from fingerpad.core.checks import FloatArray, positive
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.core.threads import in_blocks
 from fingerpad.neuron.exact_spikes import exact_trains
 
 

@@ -20,11 +20,11 @@ import math
 import numpy as np
 from numba import njit
 
-from fingerpad.core.blocks import in_blocks
 from fingerpad.core.checks import FloatArray, finite, instance
 from fingerpad.core.philox import four_normals
 from fingerpad.core.random_streams import Presentations, Purpose, checked_sites
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.core.threads import in_blocks
 from fingerpad.neuron.exact_spikes import first_crossing
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.membrane_noise import (

@@ -13,11 +13,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fingerpad.core.blocks import in_blocks
 from fingerpad.core.checks import FloatArray, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.philox import four_normals
 from fingerpad.core.random_streams import LARGEST_SEED, IntArray, Purpose, normals
+from fingerpad.core.threads import in_blocks
 
 SESSION = 2**32
 """Trials of one session. Sessions of one seed have no random number in common."""

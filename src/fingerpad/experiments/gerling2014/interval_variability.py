@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from fingerpad.core.blocks import in_blocks
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.random_streams import Presentations
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.core.threads import in_blocks
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data import neuron
 from fingerpad.neuron.afferent import Afferent

@@ -1,8 +1,12 @@
-"""Small arrays on the stack of a compiled function, for kernels that run once per element.
+"""What the package uses of Numba beyond its documented interface: the only file that does.
 
-`np.empty` asks the heap for memory, which costs as much as dozens of multiplications, and the compiler must
-assume that what it gets overlaps every other array: it reads numbers again after each write, and leaves loops
-over eight nodes one number at a time. Of an array on the stack it knows the size, and that nothing overlaps.
+Numba may change these parts in any release. `TRIED` names the versions with which the tests of this file have
+passed; a test fails with any other, so that a new version is looked at before it is allowed.
+
+Small arrays live on the stack of a compiled function, for kernels that run once per element. `np.empty`
+allocates on the heap, which costs as much as dozens of multiplications, and the compiler must assume that the
+memory overlaps every other array: it reads numbers again after each write and does not vectorise loops over
+eight nodes. The size of an array on the stack is known, and nothing overlaps it.
 """
 
 from __future__ import annotations
@@ -17,26 +21,52 @@ from numba.core.errors import TypingError
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
+TRIED = ("0.68",)
+"""Versions of Numba with which this file was tried."""
+
 ALIGNMENT = 64
 """Bytes of the widest vector registers, whose loads are fastest from such addresses."""
+
+
+def is_compiled(kernel: Any) -> bool:
+    """Whether a cached Numba kernel need not be compiled.
+
+    Parameters
+    ----------
+    kernel : Numba dispatcher
+        A function decorated with `njit(cache=True)`.
+
+    Returns
+    -------
+    bool
+        True if it was compiled in this process, or if the cache on disk has it for this version of Python and
+        Numba and for the present source; also where nothing is compiled at all, as under NUMBA_DISABLE_JIT.
+    """
+    if getattr(kernel, "signatures", ()):
+        return True
+    try:
+        # Numba's own reading of its index, which is empty if another version or another source wrote it.
+        return bool(kernel._cache._cache_file._load_index())
+    except AttributeError:
+        return True
 
 
 @intrinsic(prefer_literal=True)
 def small_array(typing_context: Any, shape: Any) -> Any:
     """Uninitialised array of float64 for use in compiled functions.
 
-    Its memory goes when the function that made it returns: pass it on to others, but never return or keep
-    it. An array made in a loop is one and the same each time.
+    Its memory is freed when the function that made it returns: pass it to other functions, but never return
+    or store it. An array made in a loop has the same memory in each round.
 
     Parameters
     ----------
     shape : tuple of int
-        Sizes, literal numbers or global constants: they must be known to the compiler.
+        Sizes, as literal numbers or global constants: the compiler must know them.
 
     Returns
     -------
     array
-        Float64 in C order, with whatever numbers were in its memory.
+        Float64 in C order; its numbers are undefined.
 
     Raises
     ------
@@ -99,7 +129,7 @@ def _on_the_stack(shape: Any, number_type: Any, number: Any) -> Any:
             shape=constants(sizes),
             strides=constants([number_bytes * prod(sizes[axis + 1 :]) for axis in range(len(sizes))]),
             itemsize=context.get_constant(types.intp, number_bytes),
-            meminfo=None,  # nobody counts references to it
+            meminfo=None,  # no reference counting
         )
         return array._getvalue()
 

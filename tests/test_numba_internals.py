@@ -1,13 +1,44 @@
-"""Arrays on the stack of compiled functions behave like any others."""
+"""The parts of Numba that are not documented behave as this package expects."""
 
+import re
+from pathlib import Path
+
+import numba
 import numpy as np
 import pytest
 from numba import njit
 from numba.core.errors import TypingError
 
-from fingerpad.mechanics.small_arrays import ALIGNMENT, small_array
+import fingerpad
+from fingerpad.core.numba_internals import ALIGNMENT, TRIED, is_compiled, small_array
 
 N_ROWS = 3
+
+PRIVATE = re.compile(r"llvmlite|numba\.(?:core|np|extending)\b|\b_cache_file\b")
+
+
+def test_this_version_of_numba_was_tried():
+    version = ".".join(numba.__version__.split(".")[:2])
+    assert version in TRIED, (
+        f"Numba {numba.__version__} is not one of the versions tried with core/numba_internals.py "
+        f"({', '.join(TRIED)}): run the tests of the mechanics with it and, if they pass, add it to TRIED."
+    )
+
+
+def test_undocumented_parts_are_used_in_one_file_only():
+    folder = Path(fingerpad.__file__).parent
+    users = [path.name for path in folder.rglob("*.py") if PRIVATE.search(path.read_text(encoding="utf-8"))]
+    assert users == ["numba_internals.py"]
+
+
+def test_a_kernel_in_memory_is_compiled_and_anything_else_need_not_be():
+    @njit
+    def twice(x):
+        return 2 * x
+
+    twice(1)
+    assert is_compiled(twice)
+    assert is_compiled(len)
 
 
 @njit
