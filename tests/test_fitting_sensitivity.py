@@ -1,4 +1,4 @@
-"""Sobol's indices of a function whose indices are known."""
+"""Sobol indices of a function whose indices are known."""
 
 import numpy as np
 import pytest
@@ -55,7 +55,7 @@ def test_the_seed_fixes_the_numbers_and_nothing_global_is_drawn() -> None:
         ({"n_base": 100}, "n_base must be a power of two: got 100"),
         ({"level": 0.0}, "level must lie between 0 and 1"),
         ({"objective": lambda points: np.ones(len(points))}, "it is constant"),
-        ({"objective": lambda points: np.ones(3)}, "got 3 for 256"),
+        ({"objective": lambda points: np.ones(3)}, "got 3 for 64"),
         (
             {"objective": lambda points: np.full(len(points), np.nan)},
             "objective must hold finite numbers only",
@@ -73,3 +73,11 @@ def test_what_has_no_indices_is_refused(changes: dict, words: str) -> None:
     }
     with pytest.raises(InputError, match=words):
         sobol_indices(**(given | changes))
+
+
+def test_a_parameter_without_effect_has_indices_of_0_with_certainty() -> None:
+    found = sobol_indices(lambda p: p[:, 0] ** 2, [0.0, 5.0], [1.0, 6.0], ("a", "b"), seed=3, n_base=64)
+    np.testing.assert_array_equal([found.first[1], found.total[1]], 0.0)
+    np.testing.assert_array_equal([found.first_half_width[1], found.total_half_width[1]], 0.0)
+    assert found.first[0] == pytest.approx(1.0, abs=0.05)
+    assert found.first_half_width[0] > 0.0
