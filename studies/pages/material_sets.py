@@ -19,15 +19,16 @@ FIGURE = "material_sets.png"
 _SIGMA = psychophysics.NOISE_SIGMA.value
 _FSS = paper.FSS_OUT_OF_SAMPLE.value
 ONE_BAR = (
-    "The bar was pressed once and read at shifted sites: pressed at all 36 shifts (`--shifted-bars`), two "
-    "sets changed their FSS by -0.01 and +0.05, so that a set so close to the mark may lie on its other side."
+    "The bar was indented once and sampled at shifted sites. With an indentation at each of the 36 shifts "
+    "(`--shifted-bars`) the FSS of two sets changed by -0.01 and +0.05. A set whose FSS is closer to the "
+    "criterion than that may lie on the other side of it."
 )
 _LETTERS = {"deflection": "d", "firing": "f", "discrimination": "p"}
 _REGIONS = {"near_mm": "within 0.5 mm", "far_mm": "0.5 to 5 mm"}
 
 
 def draw(section: dict[str, Any]) -> Figure:
-    """Draw FSS and noise against R², every set under its number in the table.
+    """Draw FSS and noise against R²; each set has its number in the table.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ def draw(section: dict[str, Any]) -> Figure:
     right.set_xlabel("firing: FSS in sample")
     for axes in (middle, right):
         axes.axhline(_SIGMA, color=GREY, linewidth=1.0)
-        axes.set_ylabel(r"discrimination: noise $\sigma_1$ that is needed")
+        axes.set_ylabel(r"discrimination: fitted noise $\sigma_1$")
     for axes, title in ((left, "(a) deflection, firing"), (middle, "(b) deflection, discrimination")):
         axes.set_title(title)
     right.set_title("(c) firing, discrimination")
@@ -72,14 +73,14 @@ def draw(section: dict[str, Any]) -> Figure:
 
 
 def page(results: Mapping[str, Any], command: str = "python -m studies materials") -> str:
-    """Write the page: what was tried, what each level says, and the order of the trials.
+    """Write the page: material sets, results of each level, and order of the trials.
 
     Parameters
     ----------
     results : dict
         What `studies.material_study.study_materials` returns.
     command : str, optional
-        The command that made them, to be told to the reader.
+        The command that computed them, for the page.
 
     Returns
     -------
@@ -88,30 +89,30 @@ def page(results: Mapping[str, Any], command: str = "python -m studies materials
     """
     manifest, targets = results["manifest"], results["targets"]
     bars = (
-        "36 presses of the bar"
+        "36 indentations of the bar"
         if manifest["shifted_bars"]
-        else "one press of the bar, read at 36 shifted sites"
+        else "one indentation of the bar, sampled at 36 shifted sites"
     )
     parts = [
         "# Material sets on three levels",
         f"Written by `{command}` on {manifest['date']}: {manifest['resolution']} resolution, {bars}, seed "
-        f"{manifest['seed']}, mechanical code {manifest['code_hash']}. What is concluded from it stands in "
-        "[what stands in for the three trials](decisions/lost-hyperelastic-coefficients.md), "
-        "[the order of the trials](decisions/order-of-the-trials.md) and "
-        "[one set for three levels](decisions/one-set-for-three-levels.md).",
+        f"{manifest['seed']}, mechanical code {manifest['code_hash']}. Conclusions are on "
+        "[substitutes for the lost hyperelastic coefficients](decisions/lost-hyperelastic-coefficients.md), "
+        "[order of the three trials in deflection](decisions/order-of-the-trials.md) and "
+        "[one material set for three levels](decisions/one-set-for-three-levels.md).",
         _met(results),
         *([] if manifest["shifted_bars"] else [ONE_BAR]),
         f"![R², FSS and noise of every set](images/{FIGURE})",
-        "Orange: no other set is at least as good on all three levels and better on one. Shaded: R² of "
-        f"{targets['r2']:g} or more. Lines: the paper's {_FSS:g} and {_SIGMA:g}. Numbers are those of the "
-        "table.",
-        "## What was tried",
+        "Orange: Pareto front; no other set is at least as good on all three levels and better on one. "
+        f"Shaded: R² of {targets['r2']:g} or more. Lines: the paper's {_FSS:g} and {_SIGMA:g}. Labels: "
+        "numbers of the sets in the table.",
+        "## Material sets",
         table(
             ("", "set", "epidermis", "dermis", "subcutis", "basis and status"),
             [_moduli(number, row) for number, row in enumerate(results["sets"], start=1)],
         ),
         "Initial shear moduli in kPa. All layers relax by the same Prony series (recalled).",
-        "## What each level says",
+        "## Results on three levels",
         table(
             (
                 "",
@@ -119,7 +120,7 @@ def page(results: Mapping[str, Any], command: str = "python -m studies materials
                 "deflection at 1, 2, 3, 4, 5 mm [mm]",
                 "force [mN]",
                 "FSS (dynamic, static)",
-                "noise needed",
+                "fitted noise",
                 "hit rates at 0.055",
                 "joint FSS",
                 "joint hit rates",
@@ -127,15 +128,16 @@ def page(results: Mapping[str, Any], command: str = "python -m studies materials
             ),
             [_levels(number, row) for number, row in _numbered(results)],
         ),
-        "R² and deflection (mean of both sides) are under the 3.17 mm cylinder, 1 mm deep; the force is that "
-        "at the end of the hold. FSS is in sample, over all 36 shifts, of the best free fit of four numbers. "
-        "\"Noise needed\" is the sigma_1 that brings that afferent's hit rates closest to Goodwin's 0.58 and "
-        f'0.95; hit rates are at the paper\'s {_SIGMA:g}. "Joint" is an afferent fitted to FSS less the root '
-        f"mean square error of the hit rates at {_SIGMA:g}. A level counts as met with R² of "
-        f"{targets['r2']:g} or more (d), a joint FSS of {_FSS:g} or more (f), both joint hit rates within "
-        f"{targets['hit_rate_error']:g} of Goodwin's (p).",
+        "R² and deflection (mean of both sides) are under the 3.17 mm cylinder at a depth of 1 mm; the force "
+        "is that at the end of the hold. FSS is in sample, over all 36 shifts, of the best free fit of four "
+        'parameters. "Fitted noise" is the sigma_1 for which the hit rates of that afferent are closest to '
+        f"Goodwin's 0.58 and 0.95; hit rates are at the paper's {_SIGMA:g}. "
+        '"Joint" is an afferent fitted to FSS minus the root mean square error of the hit rates at '
+        f"{_SIGMA:g}. "
+        f"Criteria of the levels: R² of {targets['r2']:g} or more (d), a joint FSS of {_FSS:g} or more (f), "
+        f"both joint hit rates within {targets['hit_rate_error']:g} of Goodwin's (p).",
         *_unsolved(results),
-        "## What deflection alone says",
+        "## Deflection of further sets",
         table(
             ("set", "epidermis", "dermis", "subcutis", "R²", "force [mN]"),
             [
@@ -148,7 +150,7 @@ def page(results: Mapping[str, Any], command: str = "python -m studies materials
                 for row in results["deflection_only"]
             ],
         ),
-        "Pressed by the cylinder only; initial shear moduli in kPa, all assumed but Wu's (recalled).",
+        "Cylinder only. Initial shear moduli in kPa, all assumed except Wu's (recalled).",
         "## Order of the trials",
         _order(results["order"]),
         "## Wu's tissues as polynomials",
@@ -255,11 +257,11 @@ def _order(order: Mapping[str, Any]) -> str:
     inner = table(columns, [(name, *cells(found)) for name, found in order["inner_layers"].items()])
     return "\n\n".join(
         (
-            "Mean deflection under the cylinder above the observed one, 1 mm deep:",
+            "Mean deflection under the cylinder minus the observed one, at a depth of 1 mm:",
             observed,
-            "Trial 2 above Trial 3: the stiff epidermis above the soft one, over the same inner layers.",
+            "Trial 2 minus Trial 3: stiff minus soft epidermis over the same inner layers.",
             stiff,
-            "Trial 1 above Trial 3: Maeno's inner layers above others, under the same soft epidermis.",
+            "Trial 1 minus Trial 3: Maeno's inner layers minus others, under the same soft epidermis.",
             inner,
         )
     )
@@ -275,7 +277,7 @@ def write_material_page(results: Mapping[str, Any], folder: Path, command: str) 
     folder : Path
         Gets `material-sets.md` and `images/material_sets.png`.
     command : str
-        Told on the page.
+        Command that computed them, for the page.
 
     Returns
     -------
