@@ -1,33 +1,37 @@
 """The report draws finished numbers: all of them, escaped, and whole or not at all."""
 
 import base64
+import json
 import re
 import struct
 import subprocess
 import sys
+from dataclasses import asdict
 
 import matplotlib
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
+from fingerpad.core.results import from_json, to_json
 from fingerpad.data import all_published
+from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
 from fingerpad.report import (
     discrimination,
     nail,
-    page,
     population,
     population_rate,
     recruitment,
+    reproduction,
     single_unit,
     single_unit_methods,
     skin_deflection,
-    summary,
     tables,
-    write_report,
 )
 from fingerpad.report import formatting as words
-from fingerpad.report.style import BLUE, GREEN, ORANGE, RESOLUTION_DPI
+from fingerpad.report.page import markdown, write_html, write_markdown
+from fingerpad.report.parts import Chapter, Drawing, Page, Paragraph, Row, Table
+from fingerpad.report.reproduction import reproduction_page, reproduction_summary, write_report
+from fingerpad.report.style import BLUE, GREEN, ORANGE, RESOLUTION_DPI, new_figure
 
 SHIFT_MM = np.linspace(-3.5, 3.5, 36)
 CURVATURE_PER_M = [287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0]
@@ -39,6 +43,10 @@ PARAMETERS = {
     "capacitance_mf": 1e-6,
     "threshold_mv": 50.0,
 }
+
+
+def typed(results: dict) -> ReproductionResult:
+    return from_json(ReproductionResult, json.dumps(results).encode())
 
 
 def synthetic_results() -> dict:
@@ -78,15 +86,22 @@ def synthetic_results() -> dict:
             "resolution": "standard",
             "wall_s": 4210.5,
             "peak_memory_mb": 3100.0,
-            "nodes": 232000,
-            "elements": 221000,
             "stages": [{"name": "spheres", "wall_s": 812.0, "indentations": 14}],
             "packages": {"numpy": "2.2.0", "scipy": "1.15.0"},
             "python": "3.11.2",
             "platform": "Linux",
             "started": "2025-01-01T00:00:00",
             "code_hash": "0123456789abcdef",
-            "worst_scaled_jacobian": 0.55,
+            "materials": "trial3",
+            "inputs": {},
+            "meshes": {
+                "sphere": {
+                    "nodes": 232000,
+                    "elements": 221000,
+                    "smallest_gauss_jacobian_mm3": 0.001,
+                    "smallest_scaled_jacobian": 0.55,
+                }
+            },
         },
     }
 
@@ -656,11 +671,14 @@ def _nail() -> dict:
     }
 
 
+DRAWINGS = reproduction_page(typed(synthetic_results())).drawings
+
+
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
-    results, settings = synthetic_results(), dict(matplotlib.rcParams)
+    results, settings = typed(synthetic_results()), dict(matplotlib.rcParams)
     path = write_report(results, tmp_path_factory.mktemp("report"))
-    assert results == synthetic_results(), "drawing changed the results"
+    assert to_json(results) == to_json(typed(synthetic_results())), "drawing changed the results"
     assert dict(matplotlib.rcParams) == settings, "drawing changed settings that others share"
     return path
 
@@ -672,7 +690,7 @@ def pixels_per_metre(png: bytes) -> int:
 
 def test_one_picture_per_figure_of_the_paper_at_its_resolution(report):
     pictures = sorted((report.parent / "figures").iterdir())
-    numbers = sorted(drawing.number for chapter in page.CHAPTERS for drawing in chapter.drawings)
+    numbers = sorted(drawing.number for drawing in DRAWINGS)
     assert sorted(int(picture.name.split("_")[1]) for picture in pictures) == numbers
     assert numbers[:6] == [4, 5, 6, 7, 8, 9]
     for picture in pictures:
@@ -682,46 +700,79 @@ def test_one_picture_per_figure_of_the_paper_at_its_resolution(report):
 def test_the_page_holds_the_pictures_themselves_and_asks_for_nothing_else(report):
     text = report.read_text(encoding="utf-8")
     inside = [base64.b64decode(code) for code in re.findall(r"data:image/png;base64,([^\"]+)", text)]
-    drawn = [chapter_drawing.name for chapter in page.CHAPTERS for chapter_drawing in chapter.drawings]
-    assert inside == [(report.parent / "figures" / f"{name}.png").read_bytes() for name in drawn]
+    names = [drawing.name for drawing in DRAWINGS]
+    assert inside == [(report.parent / "figures" / f"{name}.png").read_bytes() for name in names]
     without_pictures = re.sub(r"base64,[^\"]+", "", text)
     assert not re.search(r"<script|<link|@import|url\(|https?:", without_pictures)
     assert text.startswith("<!DOCTYPE html>")
-    assert len(re.findall(r'<img alt="Figure \d+: \w', text)) == len(inside)
+    assert len(re.findall(r'<img alt="Figure \d+\. \w', text)) == len(inside)
 
 
 def test_nothing_unfinished_is_left_beside_the_report(report):
     left = sorted(entry.name for entry in report.parent.rglob("*") if entry.is_file())
-    assert len(left) == 1 + sum(len(chapter.drawings) for chapter in page.CHAPTERS)
+    assert len(left) == 1 + len(DRAWINGS)
     assert all(name.endswith((".png", ".html")) for name in left)
 
 
 def test_equal_results_give_equal_bytes(tmp_path):
-    results = {key: synthetic_results()[key] for key in ("single_unit", "manifest")}
+    results = typed(synthetic_results())
     first, second = (write_report(results, tmp_path / name).read_bytes() for name in "ab")
     assert first == second
 
 
 def test_the_report_needs_no_window_system():
-    code = "import sys, fingerpad.report; print('matplotlib.pyplot' in sys.modules)"
+    code = "import sys, fingerpad.report.reproduction; print('matplotlib.pyplot' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 
 
-def test_a_figure_that_fails_leaves_the_old_report_as_it_was(tmp_path):
-    results = {"single_unit": _single_unit()}
-    path = write_report(results, tmp_path)
+def test_a_figure_that_fails_leaves_the_old_page_as_it_was(tmp_path):
+    def page(draw):
+        drawings = [Drawing(name, name, draw, "") for name in ("first", "second")]
+        return Page("Skin", "", [], [Chapter("Depth", drawings)])
+
+    write_html(page(lambda: new_figure(1.0, 1.0)), tmp_path / "page.html")
     before = {entry: entry.read_bytes() for entry in tmp_path.rglob("*.*")}
-    del results["single_unit"]["shift_mm"]
-    with pytest.raises(InputError, match=r"results\['single_unit'\] must hold 'shift_mm'"):
-        write_report(results, tmp_path)
+    assert len(before) == 3
+    figures = iter([new_figure(2.0, 2.0)])
+    with pytest.raises(StopIteration):
+        write_html(page(lambda: next(figures)), tmp_path / "page.html")
     assert {entry: entry.read_bytes() for entry in tmp_path.rglob("*.*")} == before
-    assert path in before
 
 
-def test_results_must_be_sections():
-    with pytest.raises(InputError, match="results must map"):
-        write_report([1, 2], "unused")
+def _page() -> Page:
+    table = Table("Depths", ("name", "depth [mm]"), [Row(("skin", "1.0"), "met")], "Half of the finger.")
+    drawing = Drawing("skin", "Skin", lambda: new_figure(1.0, 1.0), "It yields.", number=4)
+    text = Paragraph("See [the decision](decisions/skin.md), `fp.press` & others.")
+    chapters = [Chapter("", [text]), Chapter("Level 1: skin", [drawing, table])]
+    return Page("A title", "A subtitle.", ["A summary."], chapters)
+
+
+def test_one_page_is_written_as_html_and_as_markdown(tmp_path):
+    path = write_markdown(_page(), tmp_path / "page.md")
+    assert (tmp_path / "images" / "skin.png").read_bytes().startswith(b"\x89PNG")
+    assert path.read_text(encoding="utf-8") == markdown(_page())
+    assert markdown(_page()).split("\n\n") == [
+        "# A title",
+        "A subtitle.",
+        "A summary.",
+        "See [the decision](decisions/skin.md), `fp.press` & others.",
+        "## Level 1: skin",
+        "![Figure 4. Skin](images/skin.png)",
+        "It yields.",
+        "### Depths",
+        "| name | depth [mm] |\n| --- | --- |\n| skin | 1.0 |",
+        "Half of the finger.\n",
+    ]
+    text = write_html(_page(), tmp_path / "page.html").read_text(encoding="utf-8")
+    assert (
+        '<p>See <a href="decisions/skin.md">the decision</a>, <code>fp.press</code> &amp; others.</p>' in text
+    )
+    assert '<a href="#level-1-skin">' in text
+    assert '<section id="level-1-skin">' in text
+    assert "<figcaption><b>Figure 4. Skin.</b> It yields.</figcaption>" in text
+    assert '<tr class="met"><th scope="row">skin</th><td>1.0</td></tr>' in text
+    assert "Half of the finger." in text
 
 
 HOSTILE = "<script>alert('x')</script>&\""
@@ -739,13 +790,13 @@ def poisoned(value):
 
 
 def test_texts_are_escaped_wherever_they_stand(tmp_path):
-    parts = ("single_unit", "nail", "comparison", "inputs", "manifest")
-    results = poisoned({key: synthetic_results()[key] for key in parts})
-    results["manifest"][HOSTILE] = HOSTILE
-    results["manifest"]["packages"][HOSTILE] = HOSTILE
+    results = synthetic_results()
+    results |= poisoned({key: results[key] for key in ("single_unit", "nail", "comparison", "inputs")})
+    manifest = poisoned(results["manifest"])
+    manifest["packages"][HOSTILE] = HOSTILE
+    results["manifest"] = manifest
     results["single_unit"]["parameters"][HOSTILE] = 1.0
-    results["further"] = {HOSTILE: [HOSTILE]}
-    text = write_report(results, tmp_path).read_text(encoding="utf-8")
+    text = write_report(typed(results), tmp_path).read_text(encoding="utf-8")
     assert "<script" not in text
     assert text.count("&lt;script&gt;") > 40
 
@@ -763,23 +814,34 @@ def without_numbers(value):
 
 
 def test_what_does_not_exist_is_drawn_as_nothing_and_written_as_a_dash(tmp_path):
-    text = write_report(without_numbers(synthetic_results()), tmp_path).read_text(encoding="utf-8")
+    results = synthetic_results()
+    missing = without_numbers({key: item for key, item in results.items() if key != "manifest"})
+    text = write_report(typed(results | missing), tmp_path).read_text(encoding="utf-8")
     visible = re.sub(r"base64,[^\"]+", "", text)
     assert "nan" not in re.sub(r"<[^>]+>", " ", visible).lower().split()
     assert "None" not in visible
     assert visible.count("<td>–</td>") > 50
 
 
-def test_sections_that_a_run_does_not_have_are_named_as_absent(tmp_path):
-    text = write_report({}, tmp_path).read_text(encoding="utf-8")
-    assert text.count("These results do not have this part.") == len(page.CHAPTERS)
-    assert not (tmp_path / "figures").exists()
+BEYOND = (
+    "single_unit_uncertainty",
+    "drive_quantities",
+    "spike_fit",
+    "mesh_noise",
+    "curvature_thresholds",
+    "population_timing",
+)
 
 
-def test_sections_of_another_name_are_listed_as_they_stand(tmp_path):
-    text = write_report({"mesh_study": {"peak_sed_kpa": 2.75}}, tmp_path).read_text(encoding="utf-8")
-    assert "Further results" in text
-    assert "peak sed [kPa]</th><td>2.75</td>" in text
+def test_parts_beyond_the_paper_are_left_out_where_they_were_not_run():
+    whole = synthetic_results()
+    short = {key: section for key, section in whole.items() if key not in BEYOND}
+    titles = [
+        [chapter.title for chapter in reproduction_page(typed(results)).chapters]
+        for results in (whole, short)
+    ]
+    assert len(titles[0]) - len(titles[1]) == len(BEYOND)
+    assert [title for title in titles[0] if title in titles[1]] == titles[1]
 
 
 def test_a_miss_is_marked_in_words_and_by_its_row(report):
@@ -793,8 +855,8 @@ def test_a_miss_is_marked_in_words_and_by_its_row(report):
 
 
 def test_the_summary_counts_and_names_what_was_missed():
-    found, verdicts = summary.summary(synthetic_results())
-    assert "Trial 3 comes closest" in found
+    found, verdicts = reproduction_summary(typed(synthetic_results()))
+    assert "Trial 3 is closest" in found
     assert "0.84" in found
     assert "296 1/m in 63 % of trials (people: 58 %)" in found
     assert verdicts == (
@@ -807,21 +869,18 @@ def test_the_summary_follows_the_numbers():
     results = synthetic_results()
     results["skin_deflection"]["trial1"]["cylinder"]["r2"] = 0.99
     results["comparison"] = [{**row, "met": True} for row in results["comparison"]]
-    found, verdicts = summary.summary(results)
-    assert "Trial 1 comes closest" in found
+    found, verdicts = reproduction_summary(typed(results))
+    assert "Trial 1 is closest" in found
     assert verdicts == "Of 3 judged comparisons with the paper, 3 are met and 0 are missed."
 
 
 def test_inputs_are_listed_exactly_and_the_assumed_ones_are_marked():
-    numbers = [
-        {name: getattr(number, name) for name in ("name", "value", "unit", "source", "status")}
-        for number in all_published()
-    ]
-    meanings, listed = tables.inputs(numbers)
+    numbers = [PublishedNumber(**asdict(number)) for number in all_published()]
+    meanings, listed = reproduction.input_tables(numbers)
     assert [row.cells[0] for row in meanings.rows] == ["paper", "read", "recalled", "assumed"]
     assert sum(int(row.cells[2]) for row in meanings.rows) == len(numbers)
     for number, row in zip(numbers, listed.rows, strict=True):
-        values = number["value"] if isinstance(number["value"], tuple) else (number["value"],)
+        values = number.value if isinstance(number.value, tuple) else (number.value,)
         # Numbers are set in groups of three and with true minus signs; undone, they are the very numbers.
         texts = row.cells[1].replace("−", "-").replace("⁻", "-").split(", ")
         read = [
@@ -829,7 +888,7 @@ def test_inputs_are_listed_exactly_and_the_assumed_ones_are_marked():
             for text in texts
         ]
         assert [float(text) for text in read] == list(values)
-        assert (row.kind == "assumed") == (number["status"] == "assumed")
+        assert (row.kind == "assumed") == (number.status == "assumed")
 
 
 def test_the_last_step_of_the_papers_fold_is_marked_and_others_are_not():
@@ -858,9 +917,8 @@ def test_hit_rates_stand_in_the_table_as_they_are_drawn():
 
 
 def test_every_table_is_rectangular():
-    results = page.sections(synthetic_results())
-    made = [table for chapter in page.CHAPTERS for table in chapter.tables(results[chapter.section])]
-    made.append(tables.comparison(results["comparison"]))
+    page = reproduction_page(typed(synthetic_results()))
+    made = [table for chapter in page.chapters for table in chapter.tables]
     assert len(made) > 12
     for table in made:
         assert {len(row.cells) for row in table.rows} == {len(table.columns)}, table.title

@@ -19,11 +19,13 @@ import pytest
 
 from fingerpad import __version__
 from fingerpad.core.compilation import NOTICE
+from fingerpad.core.results import read_results
 from fingerpad.data import all_published
 from fingerpad.experiments.discrimination.task_files import read_task
 from fingerpad.experiments.discrimination.task_stimuli import touches
+from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.runner import STORE_FOLDER
-from fingerpad.report.page import CHAPTERS, METHODS
+from fingerpad.report.reproduction import reproduction_page
 from fingerpad.skin.store import Store
 
 COMMAND = (sys.executable, "-W", "error", "-m", "fingerpad", "reproduce")
@@ -53,13 +55,6 @@ BEYOND = {
 }
 """Sections that go beyond the paper, which a run at quick resolution leaves out unless asked."""
 
-DRAWINGS = [
-    drawing
-    for chapter in CHAPTERS
-    # Methods of fitting are part of the section of the afferent, where a run goes beyond the paper.
-    if chapter.section not in BEYOND | {METHODS}
-    for drawing in chapter.drawings
-]
 INDENTATIONS = 6 + 36 + 14 + 1
 
 
@@ -89,6 +84,11 @@ def run(folder, *options):
 def first(tmp_path_factory):
     """The run from nothing: minutes of mechanics, shared by all tests of this module."""
     return run(tmp_path_factory.mktemp("reproduction") / "out")
+
+
+def drawings(run):
+    """Figures that the page of a run has."""
+    return reproduction_page(read_results(run.folder / "results.json", ReproductionResult)).drawings
 
 
 @pytest.fixture(scope="session")
@@ -207,7 +207,7 @@ def test_what_goes_beyond_the_paper_comes_on_top(first, extended):
     assert [row for row in theirs["comparison"] if row in ours["comparison"]] == ours["comparison"]
     assert all(math.isfinite(number) for number in numbers(extended.results))
     page = (extended.folder / "report.html").read_text(encoding="utf-8")
-    assert Links(page).tags.count("img") == sum(len(chapter.drawings) for chapter in CHAPTERS)
+    assert Links(page).tags.count("img") == len(drawings(extended))
 
 
 def test_every_quantity_that_is_shown_is_judged_on_the_same_folds(extended):
@@ -351,9 +351,9 @@ class Links(HTMLParser):
                 self.loaded.append(attributes[name] or "")
 
 
-def test_the_page_needs_nothing_from_outside(page):
+def test_the_page_needs_nothing_from_outside(first, page):
     links = Links(page)
-    assert links.tags.count("img") == len(DRAWINGS)
+    assert links.tags.count("img") == len(drawings(first))
     assert all(link.startswith(("data:image/png;base64,", "#")) for link in links.loaded)
     assert not {"script", "link", "iframe", "object", "embed", "base"} & set(links.tags)
     without_data = re.sub(r"data:[^\"']*", "", page)
@@ -371,7 +371,7 @@ def test_the_page_shows_every_compared_number_and_no_machine_path(first, page):
 def test_figures_are_images_of_a_readable_size(first):
     figures = sorted((first.folder / "figures").iterdir())
     named = sorted(int(re.match(r"figure_(\d+)_\w+\.png$", path.name)[1]) for path in figures)
-    assert named == sorted(drawing.number for drawing in DRAWINGS)
+    assert named == sorted(drawing.number for drawing in drawings(first))
     assert named[:6] == [4, 5, 6, 7, 8, 9]
     for path in figures:
         content = path.read_bytes()

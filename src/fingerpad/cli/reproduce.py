@@ -9,7 +9,6 @@ import typer
 
 from fingerpad.cli.options import Jobs, Resolution, whole_number
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
-from fingerpad.core.results import to_json
 
 EXPECTED_TIME = {"quick": "a minute and a half", "standard": "about 6 minutes", "paper": "some hours"}
 """On two cores, nothing stored yet."""
@@ -33,14 +32,12 @@ def reproduce_command(
     ] = None,
 ) -> None:
     """Press, fire, fit and discriminate as in Gerling et al. 2014, and report beside the paper's numbers."""
-    import json
-
     from rich.console import Console
 
     from fingerpad.experiments.conditions import Conditions
     from fingerpad.experiments.gerling2014 import Reproduction, reproduce
     from fingerpad.experiments.schemas import write
-    from fingerpad.report import write_report
+    from fingerpad.report.reproduction import write_report
 
     conditions = Conditions(resolution=resolution, seed=seed)
     run = Reproduction(conditions, out, processes(jobs), extended)
@@ -55,7 +52,7 @@ def reproduce_command(
     with interruptible():
         results = reproduce(run, Bars(console))
         write(out / "results.json", results)
-        report = write_report(json.loads(to_json(results)), out)
+        report = write_report(results, out)
     missed = [row.quantity for row in results.comparison if row.met is False]
     typer.echo(f"Report: {report}")
     typer.echo(f"Results: {out / 'results.json'}")

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
-from fingerpad.core.results import to_json
 from fingerpad.experiments.discrimination.analysis import TaskResult
 from fingerpad.experiments.discrimination.decoding import SideCurve
 from fingerpad.experiments.discrimination.run import DiscriminationFile
-from fingerpad.report import tables
 from fingerpad.report.discrimination_task_figures import (
     CODES,
     caption_task_curves,
@@ -25,8 +23,9 @@ from fingerpad.report.discrimination_task_figures import (
     why_silent,
 )
 from fingerpad.report.formatting import ABSENT, fixed, joined, number, whole_percent
-from fingerpad.report.page import Chapter, Drawing, write_page
-from fingerpad.report.tables import Row, Table
+from fingerpad.report.manifest import edition, manifest_chapter
+from fingerpad.report.page import write_html
+from fingerpad.report.parts import Chapter, Drawing, Page, Row, Table
 
 PAGE = "discriminate.html"
 SEVERAL = {"static": "static rates", "dynamic": "dynamic rates", "latency": "first-spike latencies"}
@@ -36,25 +35,6 @@ def task_tables(found: TaskResult) -> list[Table]:
     """Tables of thresholds, hit rates, efficiencies and the population."""
     every = (_thresholds(found), _hit_rates(found), _efficiencies(found), _population(found))
     return [table for table in every if table.rows]
-
-
-CHAPTERS = (
-    Chapter(
-        "discrimination",
-        "Results",
-        (
-            Drawing(1, "curves", "Hit rates and psychometric curves", draw_task_curves, caption_task_curves),
-            Drawing(
-                2, "statistics", "Statistics of the codes", draw_task_statistics, caption_task_statistics
-            ),
-            Drawing(
-                3, "responses", "Responses of the population", draw_task_responses, caption_task_responses
-            ),
-        ),
-        task_tables,
-    ),
-    Chapter("manifest", "Provenance", (), tables.manifest),
-)
 
 
 def write_task_page(results: DiscriminationFile, folder: Path) -> Path:
@@ -72,15 +52,24 @@ def write_task_page(results: DiscriminationFile, folder: Path) -> Path:
     Path
         The page.
     """
-    return write_page(
-        {"discrimination": results.discrimination, "manifest": json.loads(to_json(results.manifest))},
-        CHAPTERS,
-        Path(folder) / PAGE,
-        heading=results.discrimination.question,
-        subtitle="A finite-element fingertip, a population of slowly adapting afferents and an observer, "
-        "after Gerling et al. 2014.",
-        paragraphs=task_summary(results.discrimination),
+    found = results.discrimination
+    drawings = (
+        ("curves", "Hit rates and psychometric curves", draw_task_curves, caption_task_curves),
+        ("statistics", "Statistics of the codes", draw_task_statistics, caption_task_statistics),
+        ("responses", "Responses of the population", draw_task_responses, caption_task_responses),
     )
+    parts = [
+        Drawing(name, title, partial(draw, found), caption(found), number)
+        for number, (name, title, draw, caption) in enumerate(drawings, start=1)
+    ]
+    page = Page(
+        found.question,
+        "A finite-element fingertip, a population of slowly adapting afferents and an observer, "
+        f"after Gerling et al. 2014. {edition(results.manifest)}",
+        task_summary(found),
+        [Chapter("Results", [*parts, *task_tables(found)]), manifest_chapter(results.manifest)],
+    )
+    return write_html(page, Path(folder) / PAGE)
 
 
 def task_summary(found: TaskResult) -> list[str]:

@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.report.formatting import ABSENT, PHASES, fixed
+from fingerpad.report.parts import Row, Table
 from fingerpad.report.single_unit import BAR_HALF_WIDTH_MM
 from fingerpad.report.style import BLACK, BLUE, GREY, PALE, new_figure, numbers
-from fingerpad.report.tables import Row, Table
 
 QUANTITIES = {
     "stored": "strain energy density",

@@ -1,360 +1,49 @@
-"""Results -> figures and one self-contained page."""
+"""A page written as HTML that holds its figures, or as Markdown beside its figures."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import html
+import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
-from matplotlib.figure import Figure
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
-from fingerpad.report import (
-    curvature_thresholds,
-    discrimination,
-    drive_quantities,
-    nail,
-    population,
-    population_rate,
-    recruitment,
-    single_unit,
-    single_unit_methods,
-    single_unit_uncertainty,
-    skin_deflection,
-    spike_fit,
-    tables,
-)
+from fingerpad.report.parts import Chapter, Drawing, Page, Paragraph, Part, Table
 from fingerpad.report.style import png
-from fingerpad.report.summary import summary
 
 
-@dataclass(frozen=True)
-class Drawing:
-    """One figure of the report: its number, file name, and what draws and explains it.
-
-    Numbers up to 9 are the paper's; figures that the paper does not have go on from 10.
-    """
-
-    number: int
-    name: str
-    title: str
-    draw: Callable[[Any], Figure]
-    caption: Callable[[Any], str]
-
-
-@dataclass(frozen=True)
-class Chapter:
-    """One section of the results on the page: its figures, then its tables."""
-
-    section: str
-    title: str
-    drawings: tuple[Drawing, ...]
-    tables: Callable[[Any], list[tables.Table]]
-
-
-def _no_tables(_: Any) -> list[tables.Table]:
-    return []
-
-
-METHODS = "single_unit_methods"
-"""What a page calls the part of the section single_unit that compares methods; its tables stand there."""
-
-CHAPTERS = (
-    Chapter(
-        "skin_deflection",
-        "Level 1: skin",
-        (
-            Drawing(
-                4,
-                "figure_4_skin_deflection",
-                "Deflection of the skin",
-                skin_deflection.draw,
-                skin_deflection.caption,
-            ),
-        ),
-        tables.skin_deflection,
-    ),
-    Chapter(
-        "single_unit",
-        "Level 2: single afferent",
-        (Drawing(5, "figure_5_single_unit", "Rates under a bar", single_unit.draw, single_unit.caption),),
-        lambda section: tables.single_unit(section) + single_unit_methods.tables(section),
-    ),
-    Chapter(
-        METHODS,
-        "Level 2: methods of fitting",
-        (
-            Drawing(
-                17,
-                "figure_17_methods",
-                "Methods of fitting on the same folds",
-                single_unit_methods.draw,
-                single_unit_methods.caption,
-            ),
-        ),
-        _no_tables,
-    ),
-    Chapter(
-        "single_unit_uncertainty",
-        "Level 2: what the rates determine",
-        (
-            Drawing(
-                12,
-                "figure_12_uncertainty",
-                "What rates under a bar determine",
-                single_unit_uncertainty.draw,
-                single_unit_uncertainty.caption,
-            ),
-        ),
-        single_unit_uncertainty.tables,
-    ),
-    Chapter(
-        "drive_quantities",
-        "Which quantity drives the afferent",
-        (
-            Drawing(
-                10,
-                "figure_10_drive_quantities",
-                "Rates by quantity",
-                drive_quantities.draw,
-                drive_quantities.caption,
-            ),
-        ),
-        drive_quantities.table,
-    ),
-    Chapter(
-        "spike_fit",
-        "Level 2: spike trains",
-        (Drawing(11, "figure_11_spike_fit", "Spikes and their fit", spike_fit.draw, spike_fit.caption),),
-        spike_fit.table,
-    ),
-    Chapter(
-        "population",
-        "Level 3: population",
-        (
-            Drawing(
-                6,
-                "figure_6_population",
-                "Rates and latencies under a sphere",
-                population.draw,
-                population.caption,
-            ),
-        ),
-        _no_tables,
-    ),
-    Chapter(
-        "population_timing",
-        "Level 3: when a population fires",
-        (
-            Drawing(
-                13,
-                "figure_13_recruitment",
-                "Order of first spikes",
-                lambda section: recruitment.draw(section["recruitment"]),
-                lambda section: recruitment.caption(section["recruitment"]),
-            ),
-            Drawing(
-                14,
-                "figure_14_population_rate",
-                "Population rate over time",
-                lambda section: population_rate.draw(section["rates"]),
-                lambda section: population_rate.caption(section["rates"]),
-            ),
-        ),
-        lambda section: recruitment.tables(section["recruitment"]),
-    ),
-    Chapter(
-        "discrimination",
-        "Level 3: discrimination",
-        (
-            Drawing(
-                7,
-                "figure_7_discrimination",
-                "Spheres told from the standard",
-                discrimination.draw_observers,
-                discrimination.caption_observers,
-            ),
-            Drawing(
-                8,
-                "figure_8_varied_criterion",
-                "The same with a varied criterion",
-                discrimination.draw_criterion,
-                discrimination.caption_criterion,
-            ),
-            Drawing(
-                15,
-                "figure_15_noise",
-                "How much noise",
-                discrimination.draw_noise,
-                discrimination.caption_noise,
-            ),
-        ),
-        lambda section: tables.hit_rates(section) + tables.readings(section),
-    ),
-    Chapter("mesh_noise", "Level 3: noise of the mesh", (), tables.mesh_noise),
-    Chapter(
-        "curvature_thresholds",
-        "Level 3: thresholds and efficiency",
-        (
-            Drawing(
-                16,
-                "figure_16_curvature_thresholds",
-                "Least difference of curvature",
-                curvature_thresholds.draw,
-                curvature_thresholds.caption,
-            ),
-        ),
-        curvature_thresholds.tables,
-    ),
-    Chapter(
-        "nail",
-        "The border of the nail",
-        (Drawing(9, "figure_9_nail", "Stress at the border of the nail", nail.draw, nail.caption),),
-        _no_tables,
-    ),
-    Chapter("inputs", "What this rests on", (), tables.inputs),
-    Chapter("manifest", "How this was made", (), tables.manifest),
-)
-
-
-def write_report(results: Mapping[str, Any], folder: Path) -> Path:
-    """Draw finished results: `figures/*.png` and `report.html`, which holds the figures itself.
+def write_html(page: Page, path: Path) -> Path:
+    """Write a page as one HTML file that holds its figures; they are also written beside it in `figures/`.
 
     Parameters
     ----------
-    results : mapping
-        JSON-able sections: skin_deflection, single_unit, drive_quantities, spike_fit, population,
-        population_timing, discrimination, nail, comparison, inputs and manifest. A section that is absent is
-        said to be so; one of another name is listed as it stands. None stands for what does not exist, such
-        as the latency of a silent afferent.
-    folder : Path
-        Made if needed; every file in it is written whole or not at all.
+    page : Page
+        What to write.
+    path : Path
+        The file. All figures are drawn before the first file is written, and each file is written whole.
 
     Returns
     -------
     Path
-        The page.
+        The file.
 
     Raises
     ------
-    InputError
-        If `results` is no mapping, or a section lacks a part.
     StoreError
         If the folder cannot be written.
 
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
+    >>> page = Page("Skin", "A sphere", ["It yields."], [Chapter("Depth", [Paragraph("1 mm.")])])
     >>> with TemporaryDirectory() as folder:
-    ...     page = write_report({"manifest": {"seed": 1, "wall_s": 4.2}}, Path(folder))
-    ...     page.name, "<td>4.2</td>" in page.read_text(encoding="utf-8")
-    ('report.html', True)
+    ...     "<p>1 mm.</p>" in write_html(page, Path(folder) / "skin.html").read_text(encoding="utf-8")
+    True
     """
-    if not isinstance(results, Mapping):
-        raise InputError(f"results must map names of sections to sections: got {type(results).__name__}.")
-    rows = results.get("comparison")
-    others = {key: value for key, value in results.items() if key not in _KNOWN}
-    return write_page(
-        sections(results),
-        CHAPTERS,
-        Path(folder) / "report.html",
-        heading="From a touch to a percept",
-        subtitle="A finite-element fingertip, slowly adapting afferents and an observer, after Gerling et "
-        "al. 2014.",
-        paragraphs=summary(results),
-        comparison=tables.comparison(rows) if rows else None,
-        others=[tables.generic(tables.spelled(key), others[key]) for key in others],
-    )
-
-
-def sections(results: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the results by chapter: a part that has a chapter of its own beside its section.
-
-    Examples
-    --------
-    >>> sections({"single_unit": {"methods": {"methods": []}}})["single_unit_methods"]
-    {'methods': []}
-    """
-    return {**results, METHODS: (results.get("single_unit") or {}).get("methods")}
-
-
-def write_page(
-    results: Mapping[str, Any],
-    chapters: Sequence[Chapter],
-    path: Path,
-    *,
-    heading: str,
-    subtitle: str,
-    paragraphs: Sequence[str],
-    comparison: tables.Table | None = None,
-    others: Sequence[tables.Table] = (),
-) -> Path:
-    """Draw the chapters of a page: the page at `path`, its figures also beside it in `figures/`.
-
-    Parameters
-    ----------
-    results : mapping
-        JSON-able sections, and "manifest".
-    chapters : sequence of Chapter
-        What the page has, in order.
-    path : Path
-        Where it shall be; every file is written whole or not at all.
-    heading, subtitle : str
-        Its title, and what it is about.
-    paragraphs : sequence of str
-        What it says first.
-    comparison : Table, optional
-        A table before the chapters.
-    others : sequence of Table
-        Tables after them.
-
-    Returns
-    -------
-    Path
-        The page.
-    """
-    drawn = [_drawn(chapter, results.get(chapter.section)) for chapter in chapters]
-    page = _template().render(
-        heading=heading,
-        subtitle=subtitle,
-        edition=_edition(results.get("manifest") or {}),
-        summary=paragraphs,
-        comparison=comparison,
-        chapters=drawn,
-        others=others,
-    )
-    for chapter in drawn:
-        for figure in chapter["figures"]:
-            write_atomically(path.parent / "figures" / f"{figure['drawing'].name}.png", figure["png"])
-    write_atomically(path, page.encode())
-    return path
-
-
-_KNOWN = {"format", "format_version", "comparison", *(chapter.section for chapter in CHAPTERS)}
-
-
-def _drawn(chapter: Chapter, section: Any) -> dict[str, Any]:
-    """Chapter with its figures and tables; empty if the results do not have it."""
-    try:
-        figures = [
-            {"drawing": drawing, "png": png(drawing.draw, section), "caption": drawing.caption(section)}
-            for drawing in (chapter.drawings if section else ())
-        ]
-        return {
-            "chapter": chapter,
-            "figures": figures,
-            "tables": chapter.tables(section) if section else [],
-            "absent": not section,
-        }
-    except KeyError as error:
-        raise InputError(f"results[{chapter.section!r}] must hold {error.args[0]!r}: it does not.") from error
-
-
-def _template() -> Template:
+    images = _images(page)
     environment = Environment(
         loader=PackageLoader("fingerpad.report", "."),
         autoescape=True,
@@ -363,12 +52,127 @@ def _template() -> Template:
         lstrip_blocks=True,
     )
     environment.filters["base64"] = lambda content: base64.b64encode(content).decode("ascii")
-    return environment.get_template("template.html")
+    environment.filters["inline"] = _inline
+    environment.tests |= {"table": lambda part: isinstance(part, Table)}
+    environment.tests |= {"drawing": lambda part: isinstance(part, Drawing)}
+    content = environment.get_template("template.html").render(page=page, images=images)
+    return _write(path, content, images, "figures")
 
 
-def _edition(manifest: Mapping[str, Any]) -> str:
-    """Which program made the page and how, as far as the manifest says."""
-    words = {"version": "fingerpad {}", "resolution": "{} resolution", "seed": "seed {}"}
-    return ", ".join(
-        form.format(manifest[key]) for key, form in words.items() if manifest.get(key) is not None
-    )
+def write_markdown(page: Page, path: Path) -> Path:
+    """Write a page as Markdown, its figures into `images/` beside it.
+
+    Parameters
+    ----------
+    page : Page
+        What to write.
+    path : Path
+        The file; as in `write_html`.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    StoreError
+        If the folder cannot be written.
+    """
+    return _write(path, markdown(page), _images(page), "images")
+
+
+def markdown(page: Page) -> str:
+    """Return a page as Markdown, with links to figures in `images/`.
+
+    Parameters
+    ----------
+    page : Page
+        Headings of tables stand one level below that of their chapter.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> from fingerpad.report.parts import Row
+    >>> meshes = Table("Meshes", ("mesh", "nodes"), [Row(("quick", "6730"))], "Half of the finger.")
+    >>> print(markdown(Page("Skin", "A sphere.", [], [Chapter("", [meshes])])))
+    # Skin
+    <BLANKLINE>
+    A sphere.
+    <BLANKLINE>
+    ## Meshes
+    <BLANKLINE>
+    | mesh | nodes |
+    | --- | --- |
+    | quick | 6730 |
+    <BLANKLINE>
+    Half of the finger.
+    <BLANKLINE>
+    """
+    blocks = [f"# {page.heading}", page.subtitle, *page.paragraphs]
+    for chapter in page.chapters:
+        blocks += markdown_blocks(chapter)
+    return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def markdown_blocks(chapter: Chapter) -> list[str]:
+    """Return a chapter as blocks of Markdown, between which an empty line belongs."""
+    blocks = [f"## {chapter.title}"] if chapter.title else []
+    for part in chapter.parts:
+        blocks += _block(part, "###" if chapter.title else "##")
+    return blocks
+
+
+def _block(part: Part, heading: str) -> list[str]:
+    if isinstance(part, Paragraph):
+        return [part.text]
+    if isinstance(part, Drawing):
+        return [f"![{part.label}](images/{part.name}.png)", part.caption]
+    title = [f"{heading} {part.title}"] if part.title else []
+    return [*title, markdown_table(part.columns, [row.cells for row in part.rows]), part.note]
+
+
+def markdown_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table in Markdown.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        Headings.
+    rows : sequence of sequences of str
+        Finished texts.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> print(markdown_table(("mesh", "nodes"), [("quick", "6730")]))
+    | mesh | nodes |
+    | --- | --- |
+    | quick | 6730 |
+    """
+    lines = [columns, ["---"] * len(columns), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _images(page: Page) -> dict[str, bytes]:
+    return {drawing.name: png(drawing.draw) for drawing in page.drawings}
+
+
+def _write(path: Path, content: str, images: dict[str, bytes], folder: str) -> Path:
+    path = Path(path)
+    for name, image in images.items():
+        write_atomically(path.parent / folder / f"{name}.png", image)
+    write_atomically(path, content.encode())
+    return path
+
+
+def _inline(text: str) -> str:
+    """Return a paragraph as HTML: escaped, with its links and code."""
+    linked = re.sub(r"\[([^\]]+)\]\(([^)\s]+)\)", r'<a href="\2">\1</a>', html.escape(text))
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", linked)

@@ -8,8 +8,8 @@ from typing import Any
 from matplotlib.axes import Axes
 
 from fingerpad.report.formatting import IDENTIFIABLE_SYMBOLS, fixed, number
+from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, numbers
-from fingerpad.report.tables import Row, Table
 
 LARGEST_LOSS = 5.0
 """Losses of log likelihood that are drawn."""

@@ -8,9 +8,9 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from fingerpad.report.formatting import ABSENT, IDENTIFIABLE_SYMBOLS, fixed, number
+from fingerpad.report.parts import Row, Table
 from fingerpad.report.rate_uncertainty import draw_indices, draw_profile, profile_ends, sensitivity_table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, numbers
-from fingerpad.report.tables import Row, Table
 
 FSS = ("fss_in_sample", "fss_in_sample_dynamic", "fss_in_sample_static", "fss_out_of_sample")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.report import recording_extras, tables
+from fingerpad.report import recording_extras
 from fingerpad.report.formatting import ABSENT, IDENTIFIABLE_SYMBOLS, PHASES, fixed, number, plain
-from fingerpad.report.page import Chapter, Drawing, write_page
+from fingerpad.report.manifest import manifest_chapter
+from fingerpad.report.page import write_html
+from fingerpad.report.parts import Chapter, Drawing, Page, Row, Table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, numbers
-from fingerpad.report.tables import PARAMETERS, Row, Table
+from fingerpad.report.tables import PARAMETERS
 
 PAGE = "fit.html"
 IDENTIFIABLE = IDENTIFIABLE_SYMBOLS | {"time_constant_ms": "time constant τ"}
@@ -137,66 +140,45 @@ def fit_tables(section: Mapping[str, Any]) -> list[Table]:
     ]
 
 
-CHAPTERS = (
-    Chapter(
-        "fit",
-        "The fit",
+def _chapters(section: dict[str, Any]) -> list[Chapter]:
+    """Return the fit itself, and what was asked for beside it."""
+    fitted = [
+        Drawing("fit", "Observed and predicted rates", partial(draw, section), caption(section), 1),
+        Drawing("residuals", "Residuals", partial(draw_residuals, section), caption_residuals(section), 2),
+    ]
+    chapters = [Chapter("The fit", [*fitted, *fit_tables(section)])]
+    for key, chapter, title, draw_it, caption_of, tables_of in (
         (
-            Drawing(1, "fit", "Observed and predicted rates", draw, caption),
-            Drawing(2, "residuals", "Residuals", draw_residuals, caption_residuals),
+            "profiles",
+            "How far each number may move",
+            "Profile likelihoods",
+            recording_extras.draw_profiles,
+            recording_extras.caption_profiles,
+            recording_extras.profile_tables,
         ),
-        fit_tables,
-    ),
-)
-"""The fit itself, which every page has."""
-
-BESIDE = (
-    Chapter(
-        "profiles",
-        "How far each number may move",
         (
-            Drawing(
-                3,
-                "profiles",
-                "Profile likelihoods",
-                recording_extras.draw_profiles,
-                recording_extras.caption_profiles,
-            ),
+            "sensitivity",
+            "What the fit is sensitive to",
+            "Sobol's indices",
+            recording_extras.draw_sensitivity,
+            recording_extras.caption_sensitivity,
+            recording_extras.sensitivity_tables,
         ),
-        recording_extras.profile_tables,
-    ),
-    Chapter(
-        "sensitivity",
-        "What the fit is sensitive to",
         (
-            Drawing(
-                4,
-                "sensitivity",
-                "Sobol's indices",
-                recording_extras.draw_sensitivity,
-                recording_extras.caption_sensitivity,
-            ),
+            "offset",
+            "The place of the receptor",
+            "A receptor beside its place",
+            recording_extras.draw_offset,
+            recording_extras.caption_offset,
+            recording_extras.offset_tables,
         ),
-        recording_extras.sensitivity_tables,
-    ),
-    Chapter(
-        "offset",
-        "The place of the receptor",
-        (
-            Drawing(
-                5,
-                "offset",
-                "A receptor beside its place",
-                recording_extras.draw_offset,
-                recording_extras.caption_offset,
-            ),
-        ),
-        recording_extras.offset_tables,
-    ),
-)
-"""What a page has if it was asked for, by the key of the fit's section that holds it."""
-
-MADE = Chapter("manifest", "How this was made", (), tables.manifest)
+    ):
+        if section.get(key):
+            drawing = Drawing(
+                key, title, partial(draw_it, section), caption_of(section), len(chapters) + len(fitted)
+            )
+            chapters.append(Chapter(chapter, [drawing, *tables_of(section)]))
+    return chapters
 
 
 def write_fit_page(results: Mapping[str, Any], folder: Path) -> Path:
@@ -214,17 +196,14 @@ def write_fit_page(results: Mapping[str, Any], folder: Path) -> Path:
     Path
         The page.
     """
-    section = results["fit"]
-    beside = [chapter for chapter in BESIDE if section.get(chapter.section)]
-    return write_page(
-        {**results, **{chapter.section: section for chapter in beside}},
-        (*CHAPTERS, *beside, MADE),
-        Path(folder) / PAGE,
-        heading="An afferent fitted to recordings",
-        subtitle="Strain energy density in a finite-element fingertip drives a leaky integrate-and-fire "
+    page = Page(
+        "An afferent fitted to recordings",
+        "Strain energy density in a finite-element fingertip drives a leaky integrate-and-fire "
         "afferent, after Gerling et al. 2014.",
-        paragraphs=summary(results["fit"]),
+        summary(results["fit"]),
+        [*_chapters(results["fit"]), manifest_chapter(results["manifest"])],
     )
+    return write_html(page, Path(folder) / PAGE)
 
 
 def summary(section: Mapping[str, Any]) -> list[str]:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from fingerpad.core.checks import FloatArray
 from fingerpad.data import protocol
 from fingerpad.report.formatting import fixed, number
+from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import (
     BLACK,
     BLUE,
@@ -23,7 +24,6 @@ from fingerpad.report.style import (
     numbers,
     say_nothing_to_draw,
 )
-from fingerpad.report.tables import Row, Table
 
 CONTOURS_MS = (10.0, 20.0, 30.0, 50.0, 100.0, 200.0)
 LEAST_FOR_CONTOURS = 12

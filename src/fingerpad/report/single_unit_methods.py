@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from fingerpad.data import paper
 from fingerpad.report.formatting import ABSENT, fixed, number, plain, whole_percent
+from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure, numbers
-from fingerpad.report.tables import Row, Table
 
 PLACES = {
     "dynamic_flat": "ramp, flat face over the receptor",

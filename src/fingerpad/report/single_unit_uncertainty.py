@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from fingerpad.data import protocol
 from fingerpad.report.formatting import ABSENT, IDENTIFIABLE_SYMBOLS, PHASES, fixed, number, whole_percent
+from fingerpad.report.parts import Row, Table
 from fingerpad.report.rate_uncertainty import draw_profile, profile_ends, sensitivity_table
 from fingerpad.report.style import BLACK, BLUE, PALE, new_figure, numbers
-from fingerpad.report.tables import Row, Table
 
 GAINS = {
     "intercept_ma": ("β", "mA"),

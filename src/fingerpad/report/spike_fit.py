@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.report.formatting import IDENTIFIABLE_SYMBOLS, fixed, number, whole_percent
+from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import (
     BLACK,
     BLUE,
@@ -22,7 +23,6 @@ from fingerpad.report.style import (
     numbers,
     say_nothing_to_draw,
 )
-from fingerpad.report.tables import Row, Table
 
 NAMES = IDENTIFIABLE_SYMBOLS | {"escape_width": "width δ/v"}
 STYLES = ((BLUE, "-"), (GREEN, "--"), (ORANGE, "-."), (BLACK, ":"), (GREY, "-"))

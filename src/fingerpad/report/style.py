@@ -67,11 +67,11 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return figure
 
 
-def png(draw: Callable[[Any], Figure], section: Any) -> bytes:
-    """Return what `draw` makes of a section of the results, as PNG; settings elsewhere stay as they are."""
+def png(draw: Callable[..., Figure], *parts: Any) -> bytes:
+    """Return what `draw` makes of its arguments, as PNG; settings elsewhere stay as they are."""
     buffer = io.BytesIO()
     with matplotlib.rc_context(STYLE):
-        draw(section).savefig(buffer, format="png", metadata={"Software": None})
+        draw(*parts).savefig(buffer, format="png", metadata={"Software": None})
     return buffer.getvalue()
 
 

@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
-from fingerpad.data import STATUSES, paper
+from fingerpad.data import paper
 from fingerpad.report import discrimination
 from fingerpad.report.formatting import fixed, number, plain, spelled
+from fingerpad.report.parts import Row, Table
 from fingerpad.report.skin_deflection import INDENTERS, TRIALS
 
-Kind = Literal["", "met", "missed", "open", "assumed", "final"]
-VERDICTS: dict[bool | None, tuple[Kind, str]] = {
-    True: ("met", "✓ met"),
-    False: ("missed", "✗ missed"),
-    None: ("open", "○ not judged"),
-}
 PARAMETERS = {
     "intercept_ma": "intercept β",
     "dynamic_gain": "dynamic gain k_d",
@@ -26,46 +20,7 @@ PARAMETERS = {
     "threshold_mv": "threshold v",
 }
 PAPER_FOLD, PAPER_START = 3, 2
-# Inputs are the record of what was used: nothing of them is rounded or left out.
-ALL_DIGITS, ALL_VALUES = 12, 1000
 UNBROKEN = "\N{NO-BREAK SPACE}"
-
-
-@dataclass(frozen=True)
-class Row:
-    """Texts of one row, the first its heading, and how the row is marked."""
-
-    cells: Sequence[str]
-    kind: Kind = ""
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table with its title, column headings, rows and a closing note."""
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Row]
-    note: str = ""
-
-
-def comparison(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """Return ours beside the paper's; a miss is marked in words as well as in colour."""
-    return Table(
-        "This run beside the paper",
-        ("quantity", "paper", "this run", "difference", "verdict", "rests on", "note"),
-        [
-            Row(
-                (
-                    *(plain(row.get(key)) for key in ("quantity", "paper", "ours", "difference")),
-                    VERDICTS[row.get("met")][1],
-                    *(plain(row.get(key) or "") for key in ("status", "note")),
-                ),
-                VERDICTS[row.get("met")][0],
-            )
-            for row in rows
-        ],
-    )
 
 
 def skin_deflection(section: Mapping[str, Any]) -> list[Table]:
@@ -97,8 +52,6 @@ def single_unit(section: Mapping[str, Any]) -> list[Table]:
         if (fold["fold"], climb["start"]) == (PAPER_FOLD, PAPER_START)
     ]
     tables.append(_modulation(section.get("modulation") or {}))
-    if section.get("edge_response"):
-        tables.append(generic("Response to an edge", section["edge_response"]))
     return [table for table in tables if table.rows]
 
 
@@ -300,50 +253,3 @@ def _with_spread(rates: Mapping[str, Any], suffix: str) -> list[str]:
         + ("" if mean is None or spread is None else f"{UNBROKEN}±{UNBROKEN}{fixed(spread, 2)}")
         for mean, spread in zip(means, spreads, strict=True)
     ]
-
-
-def inputs(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
-    """Return the meaning of the four words, and every published number with its own."""
-    counts = {status: sum(row["status"] == status for row in rows) for status in STATUSES}
-    words = [
-        Row((status, meaning, plain(counts[status])), "assumed" if status == "assumed" else "")
-        for status, meaning in STATUSES.items()
-    ]
-    listed = [
-        Row(
-            (
-                plain(row["name"]),
-                plain(row["value"], digits=ALL_DIGITS, longest=ALL_VALUES),
-                "" if row["unit"] == "1" else plain(row["unit"]),
-                plain(row["status"]),
-                plain(row["source"]),
-            ),
-            "assumed" if row["status"] == "assumed" else "",
-        )
-        for row in rows
-    ]
-    return [
-        Table("What the four words mean", ("status", "meaning", "numbers"), words),
-        Table("Published numbers", ("number", "value", "unit", "status", "source"), listed),
-    ]
-
-
-def manifest(content: Mapping[str, Any]) -> list[Table]:
-    """Return how the run was made: single facts, then its stages, then the packages."""
-    facts = {key: value for key, value in content.items() if key not in ("stages", "packages")}
-    tables = [generic("The run", facts)]
-    stages = content.get("stages") or []
-    if stages:
-        keys = list(dict.fromkeys(key for stage in stages for key in stage))
-        rows = [Row([plain(stage.get(key)) for key in keys]) for stage in stages]
-        tables.append(Table("Stages", [spelled(key) for key in keys], rows))
-    if content.get("packages"):
-        packages = [Row((name, plain(version))) for name, version in content["packages"].items()]
-        tables.append(Table("Packages", ("package", "version"), packages))
-    return tables
-
-
-def generic(title: str, content: Any) -> Table:
-    """Return any content as names and values."""
-    facts = content if isinstance(content, Mapping) else {"value": content}
-    return Table(title, ("", ""), [Row((spelled(str(key)), plain(value))) for key, value in facts.items()])

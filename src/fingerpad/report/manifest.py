@@ -1,0 +1,50 @@
+"""How the results of a page were made: the chapter that every page ends with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from fingerpad.experiments.manifest import Manifest
+from fingerpad.report.formatting import plain, spelled
+from fingerpad.report.parts import Chapter, Row, Table
+
+
+def manifest_chapter(manifest: Manifest | Mapping[str, Any]) -> Chapter:
+    """Return the chapter: facts about the run, its stages, and versions of packages.
+
+    Parameters
+    ----------
+    manifest : Manifest or a subclass of it
+        Fields that are None or empty are left out.
+
+    Returns
+    -------
+    Chapter
+    """
+    facts = dict(manifest) if isinstance(manifest, Mapping) else asdict(manifest)
+    stages, packages = facts.pop("stages", ()), facts.pop("packages", {})
+    tables = [facts_table("The run", facts)]
+    if stages:
+        names = [name for name in stages[0] if any(stage[name] for stage in stages)]
+        rows = [Row([plain(stage[name]) for name in names]) for stage in stages]
+        tables.append(Table("Stages", [spelled(name) for name in names], rows))
+    return Chapter("Provenance", [*tables, facts_table("Packages", packages)])
+
+
+def edition(manifest: Manifest) -> str:
+    """Return the version, resolution and seed of a run."""
+    return f"fingerpad {manifest.version}, {manifest.resolution} resolution, seed {manifest.seed}"
+
+
+def facts_table(title: str, facts: Mapping[str, Any]) -> Table:
+    """Return names and values as a table; what is None or empty is left out.
+
+    Examples
+    --------
+    >>> facts_table("The run", {"wall_s": 4.2, "command": None}).rows
+    [Row(cells=('wall [s]', '4.2'), kind='')]
+    """
+    given = {name: value for name, value in facts.items() if value is not None and value not in ({}, ())}
+    return Table(title, ("", ""), [Row((spelled(name), plain(value))) for name, value in given.items()])

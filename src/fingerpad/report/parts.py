@@ -1,0 +1,165 @@
+"""The parts of a page: paragraphs, tables and figures in chapters; `page` writes them as HTML or Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from matplotlib.figure import Figure
+
+Kind = Literal["", "met", "missed", "open", "assumed", "final"]
+"""How a row is marked in HTML: a verdict, an assumed input, or the row that is the result."""
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A paragraph.
+
+    Parameters
+    ----------
+    text : str
+        Plain text; links as `[text](address)` and code in backticks, as in Markdown.
+    """
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of a table.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        Finished texts, the first is the row's heading.
+    kind : str, optional
+        How the row is marked.
+    """
+
+    cells: Sequence[str]
+    kind: Kind = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    Parameters
+    ----------
+    title : str
+        Its heading.
+    columns : sequence of str
+        Headings with units; all empty where the table lists names and values.
+    rows : sequence of Row
+        One cell per column.
+    note : str, optional
+        A sentence below it.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Row]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure with its caption.
+
+    Parameters
+    ----------
+    name : str
+        Name of the image file, without its ending.
+    title : str
+        A few words.
+    draw : callable
+        Makes the figure.
+    caption : str
+        What it shows.
+    number : int, optional
+        Figures up to 9 of a reproduction have the paper's numbers; others go on from 10.
+    """
+
+    name: str
+    title: str
+    draw: Callable[[], Figure]
+    caption: str
+    number: int | None = None
+
+    @property
+    def label(self) -> str:
+        """Number and title.
+
+        Examples
+        --------
+        >>> Drawing("figure_9_nail", "The nail", Figure, "Stress.", number=9).label
+        'Figure 9. The nail'
+        """
+        return self.title if self.number is None else f"Figure {self.number}. {self.title}"
+
+
+Part = Paragraph | Table | Drawing
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """A heading and what stands below it.
+
+    Parameters
+    ----------
+    title : str
+        The heading; empty for parts that follow the introduction directly.
+    parts : sequence of Paragraph, Table or Drawing
+        In order.
+    """
+
+    title: str
+    parts: Sequence[Part]
+
+    @property
+    def anchor(self) -> str:
+        """Name for links within the page.
+
+        Examples
+        --------
+        >>> Chapter("Level 1: skin", ()).anchor
+        'level-1-skin'
+        """
+        kept = "".join(letter if letter.isalnum() else " " for letter in self.title.lower())
+        return "-".join(kept.split())
+
+    @property
+    def drawings(self) -> list[Drawing]:
+        """Figures of the chapter."""
+        return [part for part in self.parts if isinstance(part, Drawing)]
+
+    @property
+    def tables(self) -> list[Table]:
+        """Tables of the chapter."""
+        return [part for part in self.parts if isinstance(part, Table)]
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page.
+
+    Parameters
+    ----------
+    heading, subtitle : str
+        Title, and what the page is about.
+    paragraphs : sequence of str
+        Summary; links and code as in `Paragraph`.
+    chapters : sequence of Chapter
+        In order.
+    """
+
+    heading: str
+    subtitle: str
+    paragraphs: Sequence[str]
+    chapters: Sequence[Chapter]
+
+    @property
+    def drawings(self) -> list[Drawing]:
+        """Figures of all chapters."""
+        return [drawing for chapter in self.chapters for drawing in chapter.drawings]

@@ -1,0 +1,380 @@
+"""The page of a reproduction: summary, comparison with the paper, and a chapter per level."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from fingerpad.data import STATUSES, paper
+from fingerpad.experiments.gerling2014.claim_row import ClaimRow
+from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
+from fingerpad.report import (
+    curvature_thresholds,
+    discrimination,
+    drive_quantities,
+    nail,
+    population,
+    population_rate,
+    recruitment,
+    single_unit,
+    single_unit_methods,
+    single_unit_uncertainty,
+    skin_deflection,
+    spike_fit,
+    tables,
+)
+from fingerpad.report.formatting import fixed, joined, number, plain
+from fingerpad.report.manifest import edition, manifest_chapter
+from fingerpad.report.page import write_html
+from fingerpad.report.parts import Chapter, Drawing, Kind, Page, Row, Table
+
+VERDICTS: dict[bool | None, tuple[Kind, str]] = {
+    True: ("met", "✓ met"),
+    False: ("missed", "✗ missed"),
+    None: ("open", "○ not judged"),
+}
+# Inputs are the record of what was used: nothing of them is rounded or left out.
+ALL_DIGITS, ALL_VALUES = 12, 1000
+
+
+def write_report(result: ReproductionResult, folder: Path) -> Path:
+    """Write the page of a reproduction, `report.html` with its figures, and the figures as `figures/*.png`.
+
+    Parameters
+    ----------
+    result : ReproductionResult
+        From `fingerpad.experiments.gerling2014.reproduce`.
+    folder : Path
+        Made if needed; every file in it is written whole or not at all.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    StoreError
+        If the folder cannot be written.
+    """
+    return write_html(reproduction_page(result), Path(folder) / "report.html")
+
+
+def reproduction_page(result: ReproductionResult) -> Page:
+    """Return the page of a reproduction; parts beyond the paper are left out where they were not run."""
+    return Page(
+        "From a touch to a percept",
+        "A finite-element fingertip, slowly adapting afferents and an observer, after Gerling et al. 2014. "
+        f"{edition(result.manifest)}",
+        reproduction_summary(result),
+        [
+            Chapter("Comparison with the paper", [comparison_table(result.comparison)]),
+            *_skin_and_afferent(result),
+            *_population_and_percept(result),
+            Chapter("Published numbers used", input_tables(result.inputs)),
+            manifest_chapter(result.manifest),
+        ],
+    )
+
+
+def _drawing(
+    figure: int,
+    name: str,
+    title: str,
+    draw: Callable[[Any], Figure],
+    caption: Callable[[Any], str],
+    section: Any,
+) -> Drawing:
+    return Drawing(f"figure_{figure}_{name}", title, partial(draw, section), caption(section), figure)
+
+
+def _skin_and_afferent(result: ReproductionResult) -> list[Chapter]:
+    """Levels 1 and 2."""
+    skin, unit = result.skin_deflection, result.single_unit
+    chapters = [
+        Chapter(
+            "Level 1: skin",
+            [
+                _drawing(
+                    4,
+                    "skin_deflection",
+                    "Deflection of the skin",
+                    skin_deflection.draw,
+                    skin_deflection.caption,
+                    skin,
+                ),
+                *tables.skin_deflection(skin),
+            ],
+        ),
+        Chapter(
+            "Level 2: single afferent",
+            [
+                _drawing(5, "single_unit", "Rates under a bar", single_unit.draw, single_unit.caption, unit),
+                *tables.single_unit(unit),
+                *single_unit_methods.tables(unit),
+            ],
+        ),
+    ]
+    if methods := unit.get("methods"):
+        drawing = _drawing(
+            17,
+            "methods",
+            "Methods of fitting on the same folds",
+            single_unit_methods.draw,
+            single_unit_methods.caption,
+            methods,
+        )
+        chapters.append(Chapter("Level 2: methods of fitting", [drawing]))
+    if (uncertainty := result.single_unit_uncertainty) is not None:
+        drawing = _drawing(
+            12,
+            "uncertainty",
+            "What rates under a bar determine",
+            single_unit_uncertainty.draw,
+            single_unit_uncertainty.caption,
+            uncertainty,
+        )
+        chapters.append(
+            Chapter(
+                "Level 2: uncertainty of the fit", [drawing, *single_unit_uncertainty.tables(uncertainty)]
+            )
+        )
+    if (drives := result.drive_quantities) is not None:
+        drawing = _drawing(
+            10,
+            "drive_quantities",
+            "Rates by quantity",
+            drive_quantities.draw,
+            drive_quantities.caption,
+            drives,
+        )
+        chapters.append(
+            Chapter("Level 2: quantity that drives the afferent", [drawing, *drive_quantities.table(drives)])
+        )
+    if (spikes := result.spike_fit) is not None:
+        drawing = _drawing(11, "spike_fit", "Spikes and their fit", spike_fit.draw, spike_fit.caption, spikes)
+        chapters.append(Chapter("Level 2: spike trains", [drawing, *spike_fit.table(spikes)]))
+    return chapters
+
+
+def _population_and_percept(result: ReproductionResult) -> list[Chapter]:
+    """Level 3."""
+    found = result.discrimination
+    chapters = [
+        Chapter(
+            "Level 3: population",
+            [
+                _drawing(
+                    6,
+                    "population",
+                    "Rates and latencies under a sphere",
+                    population.draw,
+                    population.caption,
+                    result.population,
+                )
+            ],
+        )
+    ]
+    if (timing := result.population_timing) is not None:
+        order, rates = timing["recruitment"], timing["rates"]
+        chapters.append(
+            Chapter(
+                "Level 3: population over time",
+                [
+                    _drawing(
+                        13,
+                        "recruitment",
+                        "Order of first spikes",
+                        recruitment.draw,
+                        recruitment.caption,
+                        order,
+                    ),
+                    _drawing(
+                        14,
+                        "population_rate",
+                        "Population rate over time",
+                        population_rate.draw,
+                        population_rate.caption,
+                        rates,
+                    ),
+                    *recruitment.tables(order),
+                ],
+            )
+        )
+    chapters.append(
+        Chapter(
+            "Level 3: discrimination",
+            [
+                _drawing(
+                    7,
+                    "discrimination",
+                    "Spheres discriminated from the standard",
+                    discrimination.draw_observers,
+                    discrimination.caption_observers,
+                    found,
+                ),
+                _drawing(
+                    8,
+                    "varied_criterion",
+                    "The same with a varied criterion",
+                    discrimination.draw_criterion,
+                    discrimination.caption_criterion,
+                    found,
+                ),
+                _drawing(
+                    15,
+                    "noise",
+                    "Amount of noise",
+                    discrimination.draw_noise,
+                    discrimination.caption_noise,
+                    found,
+                ),
+                *tables.hit_rates(found),
+                *tables.readings(found),
+            ],
+        )
+    )
+    if (meshes := result.mesh_noise) is not None:
+        chapters.append(Chapter("Level 3: noise of the mesh", tables.mesh_noise(meshes)))
+    if (thresholds := result.curvature_thresholds) is not None:
+        drawing = _drawing(
+            16,
+            "curvature_thresholds",
+            "Least difference of curvature",
+            curvature_thresholds.draw,
+            curvature_thresholds.caption,
+            thresholds,
+        )
+        chapters.append(
+            Chapter("Level 3: thresholds and efficiency", [drawing, *curvature_thresholds.tables(thresholds)])
+        )
+    drawing = _drawing(9, "nail", "Stress at the border of the nail", nail.draw, nail.caption, result.nail)
+    return [*chapters, Chapter("The border of the nail", [drawing])]
+
+
+def reproduction_summary(result: ReproductionResult) -> list[str]:
+    """Return the paragraphs that open the report: the result of each level, then what was met and missed."""
+    found = " ".join(
+        [_skin(result.skin_deflection), _afferent(result.single_unit), _percept(result.discrimination)]
+    )
+    return [found.strip(), _verdicts(result.comparison)]
+
+
+def _skin(section: dict[str, Any]) -> str:
+    fits = {f"Trial {trial}": section[f"trial{trial}"]["cylinder"]["r2"] for trial in (1, 2, 3)}
+    best = max(fits, key=lambda name: fits[name] or 0.0)
+    listed = joined([f"{name} {fixed(fit, 2)}" for name, fit in fits.items()])
+    return (
+        f"Skin: of the material trials, {best} is closest to the observed deflection under the cylinder "
+        f"(R²: {listed}); in the paper Trial 3 is."
+    )
+
+
+def _afferent(section: dict[str, Any]) -> str:
+    return (
+        "Afferent: the fitted afferent reaches a fractional sum of squares (FSS) of "
+        f"{fixed(section['fss_out_of_sample'], 2)} out of sample, on positions of the bar that were not used "
+        f"for fitting (the paper: {fixed(paper.FSS_OUT_OF_SAMPLE.value, 2)}), and "
+        f"{fixed(section['fss_in_sample'], 2)} on all positions."
+    )
+
+
+def _percept(section: dict[str, Any]) -> str:
+    rates = section.get("gradient_sum", {}).get("static") or {}
+    people, comparison = section.get("goodwin") or {}, section["curvature_per_m"][1:]
+    told = [
+        f"{number(curvature)} 1/m in {_percent(rates['hit_rate'][comparison.index(curvature)])} of trials "
+        f"(people: {_percent(observed)})"
+        for curvature, observed in zip(
+            people.get("curvature_per_m", []), people.get("hit_rate", []), strict=True
+        )
+        if rates and curvature in comparison
+    ]
+    if not told:
+        return ""
+    return (
+        f"Percept: with noise of {number(section.get('noise_sigma'))}, the static Gradient Sum discriminates "
+        f"spheres of {joined(told)} from the standard; the paper's noise is "
+        f"{number(section.get('noise_sigma_paper'))}."
+    )
+
+
+def _percent(fraction: float | None) -> str:
+    return "an unknown share" if fraction is None else f"{100.0 * fraction:.0f} %"
+
+
+def _verdicts(comparison: Sequence[ClaimRow]) -> str:
+    met = [row for row in comparison if row.met is True]
+    missed = [row for row in comparison if row.met is False]
+    open_rows = len(comparison) - len(met) - len(missed)
+    judged = len(met) + len(missed)
+    text = (
+        f"Of {judged} judged comparison{'s' * (judged != 1)} with the paper, {len(met)} {_are(len(met))} met "
+        f"and {len(missed)} {_are(len(missed))} missed."
+    )
+    if missed:
+        text += (
+            f" Missed: {'; '.join(f'{row.quantity} ({row.ours}, the paper {row.paper})' for row in missed)}."
+        )
+    if open_rows:
+        text += f" {open_rows} more {_are(open_rows)} shown without a verdict."
+    return text
+
+
+def _are(count: int) -> str:
+    return "is" if count == 1 else "are"
+
+
+def comparison_table(rows: Sequence[ClaimRow]) -> Table:
+    """Return this run beside the paper; a miss is marked in words as well as in colour."""
+    return Table(
+        "",
+        ("quantity", "paper", "this run", "difference", "verdict", "status of the inputs", "note"),
+        [
+            Row(
+                (
+                    row.quantity,
+                    row.paper,
+                    row.ours,
+                    row.difference,
+                    VERDICTS[row.met][1],
+                    row.status,
+                    row.note,
+                ),
+                VERDICTS[row.met][0],
+            )
+            for row in rows
+        ],
+    )
+
+
+def input_tables(inputs: Sequence[PublishedNumber]) -> list[Table]:
+    """Return the meaning of each status, and every published number with its own."""
+    meanings = [
+        Row(
+            (status, meaning, plain(sum(entry.status == status for entry in inputs))),
+            "assumed" if status == "assumed" else "",
+        )
+        for status, meaning in STATUSES.items()
+    ]
+    listed = [
+        Row(
+            (
+                entry.name,
+                plain(entry.value, digits=ALL_DIGITS, longest=ALL_VALUES),
+                "" if entry.unit == "1" else entry.unit,
+                entry.status,
+                entry.source,
+            ),
+            "assumed" if entry.status == "assumed" else "",
+        )
+        for entry in inputs
+    ]
+    return [
+        Table("Status of a number", ("status", "meaning", "numbers"), meanings),
+        Table("Published numbers", ("number", "value", "unit", "status", "source"), listed),
+    ]
