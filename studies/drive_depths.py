@@ -30,6 +30,7 @@ from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.transduction import drive
+from fingerpad.skin.fields import FIELDS, Place
 from fingerpad.skin.sampling import SkinResponse
 
 
@@ -68,7 +69,10 @@ def read_in(skin: SkinResponse, layer: int) -> SkinResponse:
         raise InputError(f"layer must be one of the {through} of this mesh, from 0: got {layer}.")
     # Elements of one place on the skin are numbered in a row, from the skin downwards.
     elements = mesh.living_epidermis - mesh.living_epidermis % through + layer
-    return replace(skin, mesh=replace(mesh, living_epidermis=elements), sheet={})
+    everywhere = {
+        name: values for name, values in skin.fields.items() if FIELDS[name].place is not Place.WATCHED
+    }
+    return replace(skin, mesh=replace(mesh, living_epidermis=elements), fields=everywhere)
 
 
 def result(

@@ -19,7 +19,8 @@ from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
-from fingerpad.skin.store import Store, code_hash, solve_missing
+from fingerpad.skin.behaviour import code_hash
+from fingerpad.skin.store import Store, solve_missing
 from studies import drive_depths, dynamic_response
 from studies.dynamic_response import EXPLANATIONS, ExplainedModel, Explanation, Patch
 

@@ -17,7 +17,8 @@ from fingerpad.data import tissues as published
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.experiments.runner import STORE_FOLDER
-from fingerpad.skin.store import Store, code_hash, solve_missing
+from fingerpad.skin.behaviour import code_hash
+from fingerpad.skin.store import Store, solve_missing
 from studies import trial_order
 from studies.hyperfoam_fit import polynomial_of_hyperfoam
 from studies.material_candidates import candidates, deflection_candidates

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -87,7 +87,7 @@ def over_thickness(skin: SkinResponse, sheets: int) -> SkinResponse:
     sed = skin.sed_kpa.copy()
     # Elements are numbered from skin to bone, the last index running fastest.
     sed[:, lowest] = np.mean([skin.sed_kpa[:, lowest - above] for above in range(sheets)], axis=0)
-    return replace(skin, sed_kpa=sed)
+    return skin.with_fields(sed_kpa=sed)
 
 
 def read(responses: Mapping[Any, SkinResponse], receptors_mm: FloatArray, sheets: int) -> Reading:

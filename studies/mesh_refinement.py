@@ -25,8 +25,9 @@ from fingerpad.geometry.grading import Grading
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import neighbour_pairs
+from fingerpad.skin.behaviour import code_hash
 from fingerpad.skin.indentation import Touch
-from fingerpad.skin.store import Store, code_hash, solve_missing
+from fingerpad.skin.store import Store, solve_missing
 from studies.mesh_errors import (
     Reading,
     compare,

@@ -49,17 +49,14 @@ def skin(shift_mm):
     layer = np.arange(len(MESH.elements)) % MESH.shape[2]
     return SkinResponse(
         mesh=MESH,
-        times_ms=TIMES_MS,
         kinks_ms=(50.0,),
-        force_mn=np.zeros(9),
-        depth_mm=COURSE,
-        skin_displacement_mm=np.zeros((9, MESH.skin_nodes.size, 3)),
-        displacement_mm=np.zeros_like(MESH.nodes_mm),
-        sed_kpa=np.outer(COURSE, felt_kpa(layer, shift_mm)),
         axis_x_mm=RECEPTOR_X_MM,
         direction=np.array([0.0, 1.0, 0.0]),
-        sheet={"work": np.zeros((9, MESH.living_epidermis.size))},
-        von_mises_kpa=np.zeros(len(MESH.elements)),
+        fields={
+            "times_ms": TIMES_MS,
+            "sed_kpa": np.outer(COURSE, felt_kpa(layer, shift_mm)),
+            "work": np.zeros((9, MESH.living_epidermis.size)),
+        },
         force_imbalance=0.0,
         energy_imbalance=0.0,
         penetration_mm=0.0,

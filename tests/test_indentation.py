@@ -13,10 +13,10 @@ from fingerpad.geometry.indenters import Bar, Cylinder, Line, Plate, Sphere
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import place
-from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.mechanics.materials import Material, MaterialTable, Tissues
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.skin.fields import FIELDS, Place, sampled_fields
 from fingerpad.skin.indentation import Touch, indent, settings_of, touch_of
 
 FINGER, BALL = Fingertip(), Sphere(curvature_per_m=287)
@@ -75,9 +75,10 @@ def test_all_that_is_known_of_a_touch_agrees_with_what_the_skin_keeps(skin):
     assert done.fields.elements.tolist() == list(range(len(touch.mesh.elements)))
     np.testing.assert_array_equal(done.sed_kpa, skin.sed_kpa)
     np.testing.assert_array_equal(done.fields.von_mises_kpa[-1], skin.von_mises_kpa)
-    for name, kept in skin.sheet.items():
-        np.testing.assert_array_equal(done.fields.quantity(name)[:, sheet], kept)
-    assert set(skin.sheet) | {"stored"} == set(QUANTITIES)
+    kept = {name: field for name, field in FIELDS.items() if field.place is Place.WATCHED and field.sampled}
+    assert set(kept) == set(sampled_fields()) - {"stored"}
+    for name, field in kept.items():
+        np.testing.assert_array_equal(field.of(done, touch.mesh)[:, sheet], skin.fields[name])
     assert skin.energy_imbalance == done.energy.relative_imbalance > 0.0
     # What presses on the skin is the force, all of it below the ball and along its radius.
     area = np.array([touch.mesh.skin_area_of(touch.mesh.nodes_mm + moved) for moved in done.displacement_mm])
@@ -106,7 +107,7 @@ def test_the_nail_takes_its_share_of_the_reaction():
 
 def test_quantities_that_may_drive_an_afferent_peak_below_the_indenter(skin):
     x = np.linspace(12.0, 23.0, 45)
-    for name in QUANTITIES:
+    for name in sampled_fields():
         course = skin.sample(name, np.column_stack([x, np.zeros(45)]))
         assert course.shape == (skin.times_ms.size, 45)
         assert abs(x[course[2].argmax()] - 17.37) < 1.5

@@ -59,7 +59,8 @@ def pressed():
 
 def skin_with(pressed, sed_kpa, mesh=None):
     """Skin with a SED of our own, (n_times, n_elements)."""
-    return replace(pressed, sed_kpa=sed_kpa, mesh=mesh or pressed.mesh)
+    over_time = {name: pressed.fields[name] for name in ("times_ms", "force_mn", "depth_mm")}
+    return replace(pressed, fields={**over_time, "sed_kpa": sed_kpa}, mesh=mesh or pressed.mesh)
 
 
 # What is pressed

@@ -123,8 +123,7 @@ def results(tmp_path_factory):
                 factor = 1.0 + 1e-7
             width = 1000.0 / touch.indenter.curvature_per_m if isinstance(touch.indenter, Sphere) else 3.0
             bump = 5.0 / width * np.exp(-(((x - touch.at_mm[0]) / width) ** 2) - (z / width) ** 2)
-            return replace(
-                pressed,
+            return pressed.with_fields(
                 sed_kpa=over_time * bump * factor,
                 skin_displacement_mm=pressed.skin_displacement_mm * factor,
                 force_mn=pressed.force_mn * factor,

@@ -38,7 +38,6 @@ from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 from fingerpad.inference.soft_afferent import soft_spikes
 from fingerpad.inference.start_points import start_points
-from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.transduction import drive
 from fingerpad.report import recording_fit as report
@@ -576,7 +575,6 @@ def test_the_example_can_be_tried_as_it_says(call, tmp_path):
 
 def test_options_and_their_defaults_are_those_of_the_modules():
     assert tuple(METHODS) == choices.FITTING_METHODS
-    assert tuple(QUANTITIES) == choices.QUANTITIES
     assert set(INDENTERS) == set(choices.INDENTERS)
     defaults = {option.name: option.default for option in command().params}
     assert defaults["dynamic_window"] == protocol.DYNAMIC_WINDOW.value

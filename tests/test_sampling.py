@@ -34,17 +34,15 @@ def response(mesh, field=None, displacement=None, axis_x_mm=0.0):
     moved = np.zeros_like(mesh.nodes_mm) if displacement is None else displacement(mesh.nodes_mm)
     return SkinResponse(
         mesh=mesh,
-        times_ms=TIMES_MS,
         kinks_ms=(50.0,),
-        force_mn=np.zeros(3),
-        depth_mm=np.array([0.0, 0.5, 1.0]),
-        skin_displacement_mm=np.array([0.0, 0.5, 1.0])[:, None, None] * moved[mesh.skin_nodes],
-        displacement_mm=moved,
-        sed_kpa=sed,
         axis_x_mm=axis_x_mm,
         direction=np.array([0.0, 1.0, 0.0]),
-        sheet={"von_mises": 7.0 * sed[:, mesh.living_epidermis.ravel()]},
-        von_mises_kpa=np.zeros(len(mesh.elements)),
+        fields={
+            "times_ms": TIMES_MS,
+            "skin_displacement_mm": np.array([0.0, 0.5, 1.0])[:, None, None] * moved[mesh.skin_nodes],
+            "sed_kpa": sed,
+            "von_mises": 7.0 * sed[:, mesh.living_epidermis.ravel()],
+        },
         force_imbalance=0.0,
         energy_imbalance=0.0,
         penetration_mm=0.0,

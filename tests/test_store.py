@@ -2,29 +2,29 @@
 
 import os
 import pickle
-import re
 import signal
 import subprocess
 import sys
 import time
 from dataclasses import fields, is_dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
-from fingerpad.core.errors import ConvergenceError, StoreError
+from fingerpad.core.errors import ConvergenceError, InputError, StoreError
+from fingerpad.export.vtu import write_vtu_series
 from fingerpad.geometry.edged_indenters import Edge
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.mechanics.materials import Prony
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.skin import store as store_module
+from fingerpad.skin.fields import FIELDS, Field, Place, Times
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
 from fingerpad.skin.store import Store, solve_missing, touch_key
@@ -45,8 +45,15 @@ SIX = [
     replace(TINY, settings=PressSettings(3, 3), stimulus=RampAndHold(depth_mm=depth))
     for depth in (0.10, 0.12, 0.14, 0.16, 0.18, 0.20)
 ]
-ARRAYS = [field.name for field in fields(SkinResponse) if field.type == "FloatArray"]
-SINGLE = ("sed_kpa", "displacement_mm", "skin_displacement_mm", "von_mises_kpa")
+DOUBLE = {"times_ms": "t", "force_mn": "t", "depth_mm": "t"}
+SINGLE = {
+    "skin_displacement_mm": "ts3",
+    "displacement_mm": "n3",
+    "sed_kpa": "te",
+    "von_mises_kpa": "e",
+    **dict.fromkeys(("instantaneous", "work", "von_mises", "compressive_strain", "compressive_stress"), "tr"),
+}
+"""Arrays of a stored file: of times, skin nodes, nodes, elements, receptors' elements, components."""
 
 
 LIMIT_S = 120.0
@@ -182,85 +189,106 @@ def test_key_is_the_same_in_another_process():
     assert done.stdout.decode().strip() == touch_key(TINY)
 
 
-def test_key_changes_with_the_sources_of_mechanics_and_with_no_others(monkeypatch, tmp_path):
-    package = tmp_path / "package"
-    for name in store_module.MECHANICAL_SOURCES:
-        target = package / name if name.endswith(".py") else package / name / "law.py"
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(f"{name} = 1\n")
-    monkeypatch.setattr(store_module, "files", lambda _: package)
-
-    def key():
-        store_module.code_hash.cache_clear()
-        return touch_key(TINY)
-
-    before = key()
-    try:
-        (package / "report.py").write_text("colour = 'blue'\n")
-        (package / "mechanics" / "__pycache__").mkdir()
-        assert key() == before
-        seen = {before}
-        for name in store_module.MECHANICAL_SOURCES:
-            source = package / name if name.endswith(".py") else package / name / "law.py"
-            source.write_text(f"{name} = 2\n")
-            seen.add(key())
-        assert len(seen) == 1 + len(store_module.MECHANICAL_SOURCES)
-    finally:
-        store_module.code_hash.cache_clear()
-
-
-def test_every_source_that_mechanics_imports_counts_for_the_key():
-    """Apart from what cannot alter a solved number: checks, errors, a notice, the class of results, inputs.
-
-    Published values reach a touch as its own fields, which are in the key already.
-    """
-    package = Path(store_module.__file__).parent
-    sources = [package / name for name in store_module.MECHANICAL_SOURCES]
-    paths = [path for source in sources for path in ([source] if source.is_file() else source.glob("*.py"))]
-    assert len(paths) > len(sources)
-    imported = {
-        module
-        for path in paths
-        for module in re.findall(r"^from fingerpad\.(\w+)", path.read_text(encoding="utf-8"), re.MULTILINE)
-    }
-    counted = {name.removesuffix(".py") for name in store_module.MECHANICAL_SOURCES}
-    assert imported & counted
-    assert imported - counted <= {"checks", "compilation", "errors", "mesh_checks", "parameters", "sampling"}
-
-
 # What is stored
 
 
 def test_what_comes_back_is_what_went_in_rounded_to_single_precision(stored, skin):
     back = stored.load(TINY)
-    assert set(SINGLE) < set(ARRAYS)
-    for name in ARRAYS:
-        went, came = getattr(skin, name), getattr(back, name)
+    assert list(back.fields) == list(skin.fields)
+    assert set(skin.fields) == {*DOUBLE, *SINGLE}
+    for name, went in skin.fields.items():
+        came = back.fields[name]
         assert came.dtype == np.float64
         np.testing.assert_array_equal(came, went.astype(np.float32) if name in SINGLE else went)
-    for name in (
-        "kinks_ms",
-        "axis_x_mm",
-        "penetration_mm",
-        "energy_imbalance",
-        "newton_steps",
-        "linear_solver",
-    ):
-        assert getattr(back, name) == getattr(skin, name)
-    for name in QUANTITIES:
-        if name != "stored":
-            np.testing.assert_array_equal(back.sheet[name], skin.sheet[name].astype(np.float32))
-    assert set(back.sheet) == set(skin.sheet)
+    for field in fields(SkinResponse):
+        if field.name not in ("mesh", "direction", "fields"):
+            assert getattr(back, field.name) == getattr(skin, field.name)
+    np.testing.assert_array_equal(back.direction, skin.direction)
     assert back.mesh is TINY.mesh
     assert (skin.sed_kpa != back.sed_kpa).any()  # or rounding would not have been tested
+
+
+def test_files_of_the_first_layout_are_read(tmp_path):
+    """The layout before fields were declared, which held the direction of pressing as well."""
+    store, mesh, rng = Store(tmp_path), TINY.mesh, np.random.default_rng(3)
+    sizes = {
+        "t": 4,
+        "s": mesh.skin_nodes.size,
+        "n": len(mesh.nodes_mm),
+        "e": len(mesh.elements),
+        "r": mesh.living_epidermis.size,
+        "3": 3,
+    }
+    content = {
+        name: rng.random([sizes[axis] for axis in axes]).astype(np.float32 if name in SINGLE else np.float64)
+        for name, axes in {**DOUBLE, **SINGLE}.items()
+    }
+    solution = np.array([0.1, 0.2, 0.3, 4.0, 5.0])
+    np.savez(
+        store.path(TINY), **content, direction=np.array([0.0, 1.0, 0.0]), solution=solution,
+        linear_solver=np.array("multigrid"),
+    )  # fmt: skip
+    back = store.load(TINY)
+    assert set(back.fields) == set(content)
+    for name, values in content.items():
+        np.testing.assert_array_equal(back.fields[name], values)
+    assert (back.force_imbalance, back.energy_imbalance, back.penetration_mm) == (0.1, 0.2, 0.3)
+    assert (back.newton_steps, back.factorisations, back.linear_solver) == (4, 5, "multigrid")
+    assert back.direction.tolist() == [0.0, 1.0, 0.0]
+    store.save(TINY, back)
+    with np.load(store.path(TINY)) as file:
+        assert {name: file[name].dtype for name in content} == {
+            name: values.dtype for name, values in content.items()
+        }
+        np.testing.assert_array_equal(file["solution"], solution)
+
+
+def test_one_declaration_is_stored_loaded_sampled_and_exported(tmp_path, monkeypatch):
+    declared = Field(
+        "pore_pressure",
+        "kPa",
+        Place.WATCHED,
+        lambda deformation, _: deformation.fields.pressure_kpa,
+        stored=Times.ALL,
+        sampled="pore_pressure",
+        exported="pore_pressure_kpa",
+    )
+    monkeypatch.setitem(FIELDS, declared.name, declared)
+    store, done = Store(tmp_path), TINY.deform()
+    assert solve_missing([TINY], store, jobs=1) == 1
+    back = store.load(TINY)
+    elements = TINY.mesh.living_epidermis.ravel()
+    pressure = done.fields.pressure_kpa[:, elements].astype(np.float32)
+    np.testing.assert_array_equal(back.fields["pore_pressure"], pressure)
+    middle = TINY.mesh.nodes_mm[TINY.mesh.elements[elements]].mean(axis=1)
+    under = middle[np.hypot(middle[:, 0] - 17.37, middle[:, 2]) < 3.0][:, [0, 2]]
+    sampled = back.sample("pore_pressure", under)
+    assert sampled.shape == (back.times_ms.size, len(under))
+    assert sampled[-1].max() > 0.5 * pressure[-1].max() > 0.0
+    assert back.sed(under, dynamic_quantity="pore_pressure").dynamic_quantity == "pore_pressure"
+    reader = vtkXMLUnstructuredGridReader()
+    reader.SetFileName(str(write_vtu_series(tmp_path / "press.pvd", done, TINY.mesh)[-1]))
+    reader.Update()
+    written = vtk_to_numpy(reader.GetOutput().GetCellData().GetArray("pore_pressure_kpa"))
+    np.testing.assert_array_equal(written, done.fields.pressure_kpa[-1].astype(np.float32))
+
+
+def test_fields_that_are_not_declared_or_have_another_shape_are_refused(skin):
+    with pytest.raises(InputError, match=r"field must be one of times_ms, .*: got 'heat'"):
+        skin.with_fields(heat=skin.force_mn)
+    with pytest.raises(InputError, match=r"Field force_mn must have the shape \(3,\): got \(2,\)"):
+        skin.with_fields(force_mn=skin.force_mn[1:])
+    with pytest.raises(InputError, match="Field depth_mm must be finite everywhere"):
+        skin.with_fields(depth_mm=np.full(3, np.inf))
 
 
 def test_a_second_round_changes_no_bit(stored):
     first, content = stored.load(TINY), stored.path(TINY).read_bytes()
     stored.save(TINY, first)
     assert stored.path(TINY).read_bytes() == content
-    for name in ARRAYS:
-        np.testing.assert_array_equal(getattr(stored.load(TINY), name), getattr(first, name))
+    again = stored.load(TINY)
+    for name, values in first.fields.items():
+        np.testing.assert_array_equal(again.fields[name], values)
 
 
 def test_only_the_touch_itself_is_held(stored):
@@ -326,7 +354,6 @@ DAMAGES = {
     "times of other shape": with_array("times_ms", np.zeros((3, 1))),
     "one time too few": with_array("times_ms", np.array([0.0, 50.0])),
     "one force too few": with_array("force_mn", np.zeros(2)),
-    "direction in a plane": with_array("direction", np.ones(2)),
     "other mesh": with_array("sed_kpa", np.zeros((3, 7))),
     "not a number": with_array("force_mn", np.array([0.0, np.nan, 1.0])),
     "words": with_array("force_mn", np.array(["a", "b", "c"])),
@@ -360,7 +387,7 @@ def test_any_byte_changed_is_noticed_or_harmless(stored):
         except StoreError:
             noticed += 1
         else:
-            assert all((getattr(back, name) == getattr(before, name)).all() for name in ARRAYS)
+            assert all((back.fields[name] == values).all() for name, values in before.fields.items())
     assert noticed > len(places) // 4
 
 

@@ -561,7 +561,7 @@ def test_spikes_that_come_without_a_touch_recruit_nobody(tiny_skin):
     everybody = response_maps.recruitment({"standard": answer}, 0.0625)["touches"][0]
     assert everybody["recruited_mm2"] == answer.first_spike_latency_ms.size / 16
     # On the finger, untouched skin is left open in all three maps.
-    untouched = replace(tiny_skin, sed_kpa=np.zeros_like(tiny_skin.sed_kpa))
+    untouched = tiny_skin.with_fields(sed_kpa=np.zeros_like(tiny_skin.sed_kpa))
     finger = response_maps.on_the_finger(untouched, RESTLESS)
     assert all(np.isnan(finger[name]).all() for name in response_maps.MEASURES)
 
@@ -581,7 +581,7 @@ def test_the_finger_carries_the_answers_of_the_afferents_below_its_faces(tiny_sk
     mesh = tiny_skin.mesh
     x = mesh.nodes_mm[mesh.elements, 0].mean(axis=1)
     sed = np.outer(tiny_skin.times_ms / tiny_skin.times_ms[-1], 3.0 * np.exp(-np.square(x - 18.0)))
-    skin = replace(tiny_skin, sed_kpa=sed)
+    skin = tiny_skin.with_fields(sed_kpa=sed)
     found = response_maps.on_the_finger(skin, SENSITIVE)
     grid = mesh.nodes_mm[mesh.skin_grid]
     np.testing.assert_array_equal(found["y_mm"], (grid + skin.displacement_mm[mesh.skin_grid])[..., 1])
@@ -617,9 +617,12 @@ def scattered_skin(tiny_skin):
     return replace(
         tiny_skin,
         mesh=mesh,
-        displacement_mm=0.01 * rng.normal(size=mesh.nodes_mm.shape),
-        sed_kpa=rng.lognormal(size=(3, len(mesh.elements))),
-        von_mises_kpa=rng.lognormal(size=len(mesh.elements)),
+        fields={
+            "times_ms": tiny_skin.times_ms,
+            "displacement_mm": 0.01 * rng.normal(size=mesh.nodes_mm.shape),
+            "sed_kpa": rng.lognormal(size=(3, len(mesh.elements))),
+            "von_mises_kpa": rng.lognormal(size=len(mesh.elements)),
+        },
     )
 
 
@@ -685,7 +688,7 @@ def test_the_outline_of_the_nail_goes_around_its_footprint(scattered_skin):
 
 
 def test_stress_over_distance_holds_the_sections_that_cross_the_border(scattered_skin):
-    even = replace(scattered_skin, von_mises_kpa=np.full(len(scattered_skin.mesh.elements), 0.25))
+    even = scattered_skin.with_fields(von_mises_kpa=np.full(len(scattered_skin.mesh.elements), 0.25))
     profile = nail_border.result(even)["profile"]
     assert profile["distance_mm"].tolist() == np.arange(-1.75, 5.0, 0.5).tolist()
     for name in ("surface_kpa", "living_epidermis_kpa"):

@@ -1,5 +1,7 @@
 """What options may be, as the help names them. The modules behind them decide."""
 
+from fingerpad.skin.fields import sampled_fields
+
 RESOLUTIONS = ("quick", "standard", "paper")
 INDENTERS = {
     "sphere": "Sphere",
@@ -27,6 +29,6 @@ MATERIALS = (
 )
 FORMATS = ("vtu", "abaqus", "calculix", "febio")
 FITTING_METHODS = ("least_squares", "response_surface", "closed_form", "cma_es", "likelihood")
-QUANTITIES = ("stored", "instantaneous", "work", "von_mises", "compressive_strain", "compressive_stress")
+QUANTITIES = tuple(sampled_fields())
 REFINEMENTS = {"fine": "mesh_refinement", "paper": "paper_size"}
 """Each with its study and report."""

@@ -17,8 +17,8 @@ from fingerpad.geometry.mesh import LAYERS, IntArray, Mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import Placement, check_friction
 from fingerpad.mechanics.materials import Material
+from fingerpad.skin.behaviour import code_hash
 from fingerpad.skin.indentation import Touch
-from fingerpad.skin.store import code_hash
 
 CONTACT_KPA_PER_MM = 50_000.0
 """Penalty of the exported contact. Other solvers do not augment it as ours does: 50 kPa penetrate by 1 µm."""

@@ -18,6 +18,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.press import Deformation
+from fingerpad.skin.fields import FIELDS, Place
 
 HEXAHEDRON, WEDGE = 12, 13
 """VTK's numbers of the two cells."""
@@ -29,10 +30,11 @@ AXES = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[Path, ...]:
     """Write a press for ParaView.
 
-    Cell data: layer; energy densities stored, instantaneous and work; Cauchy stress, logarithmic and
-    Green-Lagrange strain; their principal values; von Mises stress, pressure, largest compressive strain and
-    stress. Point data: displacement, contact pressure, and the sets skin, bone, nail, symmetry and midline
-    as masks. Field data: time, depth and force of the indenter.
+    The exported fields are those of `skin.fields.FIELDS`. Cell data: layer; energy densities stored,
+    instantaneous and work; Cauchy stress, logarithmic and Green-Lagrange strain; their principal values; von
+    Mises stress, pressure, largest compressive strain and stress. Point data: displacement, contact pressure,
+    and the sets skin, bone, nail, symmetry and midline as masks. Field data: time, depth and force of the
+    indenter.
 
     Parameters
     ----------
@@ -75,19 +77,14 @@ def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[
             f"deformation must tell of all {len(mesh.elements)} elements of the mesh: it tells of "
             f"{len(deformation.fields.elements)}; press with Touch.deform()."
         )
-    cells, points = _cell_data(deformation, mesh), _point_data(deformation, mesh)
     names = [f"{path.stem}_{number:04d}.vtu" for number in range(deformation.times_ms.size)]
     grid = _grid(vtk, mesh)
     _add(vtk, grid.GetCellData(), {"layer": mesh.layer.astype(np.int32)})
     _add(vtk, grid.GetPointData(), _node_sets(mesh))
+    overall, points, cells = _exported(deformation, mesh)
     for number, name in enumerate(names):  # an array replaces the one of its name
         _add(vtk, grid.GetCellData(), {key: values[number] for key, values in cells.items()})
         _add(vtk, grid.GetPointData(), {key: values[number] for key, values in points.items()})
-        overall = {
-            "TimeValue": deformation.times_ms,
-            "depth_mm": deformation.depth_mm,
-            "force_mn": deformation.force_mn,
-        }
         _add(vtk, grid.GetFieldData(), {key: values[[number]] for key, values in overall.items()})
         write_atomically(path.with_name(name), _xml(vtk, grid))
     write_atomically(path, _index(names, deformation))
@@ -121,32 +118,28 @@ def load_vtk() -> Any:
     )
 
 
-def _cell_data(deformation: Deformation, mesh: Mesh) -> dict[str, np.ndarray]:
-    """Fields of the cells by name, each (n_times, n_elements, ...)."""
-    felt = deformation.fields
-    order = np.argsort(felt.elements)
-    fields = {
-        "sed_stored_kpa": felt.stored_kpa,
-        "sed_instantaneous_kpa": felt.instantaneous_kpa,
-        "sed_work_kpa": felt.work_kpa,
-        "stress_kpa": felt.stress_kpa,
-        "strain": felt.strain,
-        "green_lagrange_strain": felt.green_lagrange_strain,
-        "principal_stress_kpa": felt.principal_stress_kpa,
-        "principal_strain": felt.principal_strain,
-        "von_mises_kpa": felt.von_mises_kpa,
-        "pressure_kpa": felt.pressure_kpa,
-        "compressive_strain": felt.compressive_strain,
-        "compressive_stress_kpa": felt.compressive_stress_kpa,
-    }
-    return {name: values[:, order] for name, values in fields.items()}
-
-
-def _point_data(deformation: Deformation, mesh: Mesh) -> dict[str, np.ndarray]:
-    """Fields of the points by name, each (n_times, n_nodes, ...)."""
-    pressure = np.zeros(deformation.displacement_mm.shape[:2])
-    pressure[:, mesh.skin_nodes] = deformation.contact.pressure_kpa
-    return {"displacement_mm": deformation.displacement_mm, "contact_pressure_kpa": pressure}
+def _exported(deformation: Deformation, mesh: Mesh) -> tuple[dict[str, np.ndarray], ...]:
+    """Compute the exported fields of press (n_times,), points and cells (n_times, n, ...), by name."""
+    overall: dict[str, np.ndarray] = {}
+    points: dict[str, np.ndarray] = {}
+    cells: dict[str, np.ndarray] = {}
+    order = np.argsort(deformation.fields.elements)
+    for field in (field for field in FIELDS.values() if field.exported):
+        values = field.of(deformation, mesh)
+        match field.place:
+            case Place.PRESS:
+                overall[field.exported] = values
+            case Place.NODE:
+                points[field.exported] = values
+            case Place.SKIN_NODE:
+                padded = np.zeros((len(values), len(mesh.nodes_mm), *values.shape[2:]))
+                padded[:, mesh.skin_nodes] = values
+                points[field.exported] = padded
+            case Place.ELEMENT:
+                cells[field.exported] = values
+            case Place.WATCHED:
+                cells[field.exported] = values[:, order]
+    return overall, points, cells
 
 
 def _node_sets(mesh: Mesh) -> dict[str, np.ndarray]:

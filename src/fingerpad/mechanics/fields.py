@@ -16,14 +16,14 @@ Tensors are stored as xx, yy, zz, xy, yz, xz; shear strains are those of the ten
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray, one_of
+from fingerpad.core.checks import FloatArray
 from fingerpad.core.threads import even_chunks, in_chunks
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.element import N_NODES, N_POINTS, element_state, frame_scale, gradients_at_points
@@ -109,32 +109,6 @@ class ElementFields:
     def compressive_stress_kpa(self) -> FloatArray:
         """Largest compressive stress; 0 where there is none, (n_times, n_elements). [kPa]"""
         return np.maximum(-self.principal_stress_kpa[..., 0], 0.0)
-
-    def quantity(self, name: str) -> FloatArray:
-        """One number per time and element that may drive an afferent.
-
-        Parameters
-        ----------
-        name : str
-            One of `QUANTITIES`.
-
-        Returns
-        -------
-        array (n_times, n_elements)
-            In kPa, except strain.
-        """
-        return QUANTITIES[one_of("quantity", name, tuple(QUANTITIES))](self)
-
-
-QUANTITIES: dict[str, Callable[[ElementFields], FloatArray]] = {
-    "stored": lambda felt: felt.stored_kpa,
-    "instantaneous": lambda felt: felt.instantaneous_kpa,
-    "work": lambda felt: felt.work_kpa,
-    "von_mises": lambda felt: felt.von_mises_kpa,
-    "compressive_strain": lambda felt: felt.compressive_strain,
-    "compressive_stress": lambda felt: felt.compressive_stress_kpa,
-}
-"""What may drive an afferent, none of it negative: three energy densities, two stresses and a strain."""
 
 
 def von_mises(stress_kpa: FloatArray) -> FloatArray:

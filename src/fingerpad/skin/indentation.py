@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -23,10 +24,10 @@ from fingerpad.geometry.mesh import Mesh, finger_mesh
 from fingerpad.geometry.motion import Motion, RampAndHold, Stimulus
 from fingerpad.mechanics import assembly
 from fingerpad.mechanics.contact import Placement, check_friction, place
-from fingerpad.mechanics.fields import QUANTITIES, von_mises
 from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.press import Deformation, PressSettings, press
 from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.skin.fields import stored_fields
 from fingerpad.skin.sampling import SkinResponse
 
 CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
@@ -149,25 +150,33 @@ class Touch:
         """
         mesh = self.mesh
         done = self._press(mesh.living_epidermis.ravel(), threads)
-        return SkinResponse(
-            mesh=mesh,
-            times_ms=done.times_ms,
-            kinks_ms=(self.stimulus.ramp_ms,),
-            force_mn=done.force_mn,
-            depth_mm=done.depth_mm,
-            skin_displacement_mm=done.displacement_mm[:, mesh.skin_nodes],
-            displacement_mm=done.displacement_mm[-1],
-            sed_kpa=done.sed_kpa,
-            axis_x_mm=self.at_mm[0],
-            direction=self.placement.axis,
-            sheet={name: done.fields.quantity(name) for name in QUANTITIES if name != "stored"},
-            von_mises_kpa=von_mises(done.stress_kpa),
+        return self.response(
+            {field.name: field.stored_values(done, mesh) for field in stored_fields()},
             force_imbalance=done.force_imbalance,
             energy_imbalance=done.energy.relative_imbalance,
             penetration_mm=done.penetration_mm,
             newton_steps=done.newton_steps,
             factorisations=done.factorisations,
             linear_solver=done.linear_solver,
+        )
+
+    def response(self, fields: Mapping[str, FloatArray], **solution: Any) -> SkinResponse:
+        """Return the response to this indentation, given its fields and how it was solved.
+
+        Parameters
+        ----------
+        fields : mapping of str to array
+            Stored fields by name.
+        **solution
+            The parameters of `SkinResponse` from `force_imbalance` on.
+        """
+        return SkinResponse(
+            mesh=self.mesh,
+            kinks_ms=(self.stimulus.ramp_ms,),
+            axis_x_mm=self.at_mm[0],
+            direction=_rotation(self.tilt_deg, self.spin_deg)[:, 1].copy(),
+            fields=fields,
+            **solution,
         )
 
     def deform(self, threads: int | None = None) -> Deformation:

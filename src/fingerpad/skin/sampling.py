@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ from fingerpad.core.checks import FloatArray, float_array, one_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import STORED_ENERGY, SedTraces
 from fingerpad.geometry.mesh import Mesh
+from fingerpad.skin.fields import Place, sampled_fields, stored_fields
 from fingerpad.skin.receptor_sheet import ReceptorSheet
 from fingerpad.skin.section import Section, middle_section
 
@@ -42,35 +43,20 @@ class SurfaceProfile:
 
 @dataclass(frozen=True)
 class SkinResponse:
-    """What one touch did to the skin; the end of the mechanical half of the chain.
+    """What one indentation did to the skin; the end of the mechanical half of the chain.
 
     Parameters
     ----------
     mesh : Mesh
         The undeformed body.
-    times_ms : array (n_times,)
-        From 0, the unloaded state. [ms]
     kinks_ms : tuple of float
         Times at which the motion changes its speed abruptly: the end of the ramp. [ms]
-    force_mn : array (n_times,)
-        Force of the indenter along its axis, on the whole finger. [mN]
-    depth_mm : array (n_times,)
-        How far the indenter has advanced since first touch. [mm]
-    skin_displacement_mm : array (n_times, n_skin_nodes, 3)
-        Displacement of `mesh.skin_nodes`. [mm]
-    displacement_mm : array (n_nodes, 3)
-        Displacement of all nodes at the last time. [mm]
-    sed_kpa : array (n_times, n_elements)
-        Stored strain energy density, element mean. [kPa]
     axis_x_mm : float
         Where the indenter's axis meets the midline. [mm]
     direction : array (3,)
         Unit direction of pressing.
-    sheet : dict of str to array (n_times, n_sheet)
-        What else may drive an afferent, by the names of `mechanics.fields.QUANTITIES` except "stored", in the
-        elements `mesh.living_epidermis` (flattened).
-    von_mises_kpa : array (n_elements,)
-        Equivalent stress after von Mises at the last time. [kPa]
+    fields : mapping of str to array
+        Values of stored fields by their names in `skin.fields.FIELDS`, "times_ms" among them.
     force_imbalance : float
         Largest difference at any time between the indenter's force and the reaction of bone and nail, over
         that force.
@@ -83,26 +69,72 @@ class SkinResponse:
         Work that the solution took.
     linear_solver : str
         Which linear solver was chosen, and why.
+
+    Raises
+    ------
+    InputError
+        If a field is not declared as stored, has the wrong shape or holds a value that is not finite.
     """
 
     mesh: Mesh
-    times_ms: FloatArray
     kinks_ms: tuple[float, ...]
-    force_mn: FloatArray
-    depth_mm: FloatArray
-    skin_displacement_mm: FloatArray
-    displacement_mm: FloatArray
-    sed_kpa: FloatArray
     axis_x_mm: float
     direction: FloatArray
-    sheet: Mapping[str, FloatArray]
-    von_mises_kpa: FloatArray
+    fields: Mapping[str, FloatArray]
     force_imbalance: float
     energy_imbalance: float
     penetration_mm: float
     newton_steps: int
     factorisations: int
     linear_solver: str
+
+    def __post_init__(self) -> None:
+        declared = {field.name: field for field in stored_fields()}
+        for name, values in self.fields.items():
+            shape = declared[one_of("field", name, tuple(declared))].shape(self.mesh, self.times_ms.size)
+            if values.shape != shape:
+                raise InputError(f"Field {name} must have the shape {shape}: got {values.shape}.")
+            if not np.isfinite(values).all():
+                raise InputError(f"Field {name} must be finite everywhere: some values are not.")
+
+    def with_fields(self, **fields: FloatArray) -> SkinResponse:
+        """Return the same response with other values of some fields."""
+        return replace(self, fields={**self.fields, **fields})
+
+    @property
+    def times_ms(self) -> FloatArray:
+        """Times from 0, the unloaded state, (n_times,). [ms]"""
+        return self.fields["times_ms"]
+
+    @property
+    def force_mn(self) -> FloatArray:
+        """Force of the indenter along its axis, on the whole finger, (n_times,). [mN]"""
+        return self.fields["force_mn"]
+
+    @property
+    def depth_mm(self) -> FloatArray:
+        """Advance of the indenter since first touch, (n_times,). [mm]"""
+        return self.fields["depth_mm"]
+
+    @property
+    def skin_displacement_mm(self) -> FloatArray:
+        """Displacement of `mesh.skin_nodes`, (n_times, n_skin_nodes, 3). [mm]"""
+        return self.fields["skin_displacement_mm"]
+
+    @property
+    def displacement_mm(self) -> FloatArray:
+        """Displacement of all nodes at the last time, (n_nodes, 3). [mm]"""
+        return self.fields["displacement_mm"]
+
+    @property
+    def sed_kpa(self) -> FloatArray:
+        """Stored strain energy density, element mean, (n_times, n_elements). [kPa]"""
+        return self.fields["sed_kpa"]
+
+    @property
+    def von_mises_kpa(self) -> FloatArray:
+        """Equivalent stress after von Mises at the last time, (n_elements,). [kPa]"""
+        return self.fields["von_mises_kpa"]
 
     def surface_profile(self, time_index: int = -1) -> SurfaceProfile:
         """Deflection along the midline of the volar skin (paper, section 2.2.1).
@@ -168,8 +200,9 @@ class SkinResponse:
         Parameters
         ----------
         quantity : str
-            "stored", "instantaneous" or "work" (energy densities by their three definitions), "von_mises",
-            "compressive_stress" [all kPa] or "compressive_strain" (logarithmic).
+            One of `skin.fields.sampled_fields`: "stored", "instantaneous" or "work" (energy densities by
+            their three definitions), "von_mises", "compressive_stress" [all kPa] or "compressive_strain"
+            (logarithmic).
         sites : array (n_sites, 2) or (n_sites, 3)
             x and z of end organs on the volar side, or x, y and z of the skin above them on any side. [mm]
 
@@ -217,10 +250,10 @@ class SkinResponse:
 
     def _of_sheet(self, quantity: str) -> FloatArray:
         """One quantity in the elements `mesh.living_epidermis`, (n_times, n_sheet)."""
-        one_of("quantity", quantity, (STORED_ENERGY, *self.sheet))
-        if quantity == STORED_ENERGY:
-            return self.sed_kpa[:, self.mesh.living_epidermis.ravel()]
-        return self.sheet[quantity]
+        held = {name: field for name, field in sampled_fields().items() if field.name in self.fields}
+        field = held[one_of("quantity", quantity, tuple(held))]
+        values = self.fields[field.name]
+        return values if field.place is Place.WATCHED else values[:, self.mesh.living_epidermis.ravel()]
 
     @cached_property
     def _volar_sheet(self) -> tuple[Delaunay, np.ndarray]:

@@ -1,8 +1,8 @@
 """Finished touches on disk: found again by everything that determines them, and computed where missing.
 
 The key of a touch is a hash of its whole value (finger, indenter, motion, tissues, mesh, tolerances) and of
-the source code of the mechanical half. One file per touch, written atomically, so a run that is killed at any
-moment goes on from the last finished touch and ends with the same bits.
+the behaviour of the mechanical sources (`skin.behaviour`). One file per touch, written atomically, so a run
+that is killed at any moment goes on from the last finished touch and ends with the same bits.
 """
 
 from __future__ import annotations
@@ -19,8 +19,6 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import Field, fields, is_dataclass
-from functools import lru_cache
-from importlib.resources import files
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -32,47 +30,22 @@ from fingerpad.core.compilation import LOGGER, announce_compilation
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import write_atomically
 from fingerpad.core.threads import available_threads
-from fingerpad.mechanics.fields import QUANTITIES
+from fingerpad.skin.behaviour import class_tag, code_hash
+from fingerpad.skin.fields import Place, stored_fields
 from fingerpad.skin.indentation import SLOWEST_KERNEL, Touch
 from fingerpad.skin.sampling import SkinResponse
 
-MECHANICAL_SOURCES = (
-    "core/units.py",
-    "core/threads.py",
-    "geometry",
-    "skin/indentation.py",
-    "mechanics",
-)
-"""Source files and folders on which the stored numbers depend."""
+_SOLUTION = {
+    "force_imbalance": float,
+    "energy_imbalance": float,
+    "penetration_mm": float,
+    "newton_steps": int,
+    "factorisations": int,
+}
+"""Content of the stored array "solution", in this order."""
 
-_ARRAYS = (
-    "times_ms",
-    "force_mn",
-    "depth_mm",
-    "skin_displacement_mm",
-    "displacement_mm",
-    "sed_kpa",
-    "von_mises_kpa",
-    "direction",
-)
-_SHEET = tuple(name for name in QUANTITIES if name != "stored")
-_SINGLE_PRECISION = ("skin_displacement_mm", "displacement_mm", "sed_kpa", "von_mises_kpa", *_SHEET)
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _LOOK_FOR_PARENT_S = 0.1
-
-
-@lru_cache(maxsize=1)
-def code_hash() -> str:
-    """Hash of the source code on which stored results depend, 16 hexadecimal digits."""
-    digest = hashlib.sha256()
-    package = files("fingerpad")
-    for name in MECHANICAL_SOURCES:
-        entry = package / name
-        sources = [entry] if entry.is_file() else sorted(entry.iterdir(), key=lambda source: source.name)
-        for source in sources:
-            if source.name.endswith(".py"):
-                digest.update(source.name.encode() + b"\0" + source.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def touch_key(touch: Touch) -> str:
@@ -93,7 +66,7 @@ def _plain(value: Any, is_float: bool = False) -> Any:
     """Nested lists and exact numbers: the same for equal values, others for others."""
     if is_dataclass(value):
         return [
-            type(value).__name__,
+            class_tag(type(value)),
             {field.name: _plain(getattr(value, field.name), _holds_floats(field)) for field in fields(value)},
         ]
     if isinstance(value, tuple | list):
@@ -148,70 +121,36 @@ class Store:
         Raises
         ------
         StoreError
-            If its file is missing or damaged, or its arrays have not the shapes of this touch.
+            If its file is missing or damaged, or its fields have not the shapes of this touch.
         """
         path = self.path(touch)
         try:
             # Opened here, since np.load leaves the file open where the archive is damaged.
             with open(path, "rb") as opened, np.load(opened, allow_pickle=False) as file:
-                content = {name: file[name].astype(np.float64) for name in (*_ARRAYS, *_SHEET, "solution")}
-                linear_solver = str(file["linear_solver"])
+                fields = {field.name: file[field.name].astype(np.float64) for field in stored_fields()}
+                numbers, linear_solver = file["solution"].tolist(), str(file["linear_solver"])
+            solution = {
+                name: kind(number) for (name, kind), number in zip(_SOLUTION.items(), numbers, strict=True)
+            }
+            return touch.response(fields, linear_solver=linear_solver, **solution)
         except Exception as error:  # bytes that are not ours may fail in any way
             said = " ".join(str(error).split()).rstrip(".")
             raise StoreError(
                 f"The stored result {path} cannot be read ({said}): delete it and run again."
             ) from error
-        for name, shape in _shapes(touch, content["times_ms"].size).items():
-            if content[name].shape != shape or not np.isfinite(content[name]).all():
-                raise StoreError(f"The stored result {path} is damaged in {name}: delete it and run again.")
-        of_force, of_energy, penetration, newton_steps, factorisations = content.pop("solution")
-        return SkinResponse(
-            mesh=touch.mesh,
-            kinks_ms=(touch.stimulus.ramp_ms,),
-            axis_x_mm=touch.at_mm[0],
-            sheet={name: content.pop(name) for name in _SHEET},
-            force_imbalance=float(of_force),
-            energy_imbalance=float(of_energy),
-            penetration_mm=float(penetration),
-            newton_steps=int(newton_steps),
-            factorisations=int(factorisations),
-            linear_solver=linear_solver,
-            **content,
-        )
-
-
-def _shapes(touch: Touch, n_times: int) -> dict[str, tuple[int, ...]]:
-    """Shapes of the arrays that a stored file of this touch holds."""
-    mesh = touch.mesh
-    return {
-        "times_ms": (n_times,),
-        "force_mn": (n_times,),
-        "depth_mm": (n_times,),
-        "sed_kpa": (n_times, len(mesh.elements)),
-        "skin_displacement_mm": (n_times, mesh.skin_nodes.size, 3),
-        "displacement_mm": mesh.nodes_mm.shape,
-        "von_mises_kpa": (len(mesh.elements),),
-        "direction": (3,),
-        **dict.fromkeys(_SHEET, (n_times, mesh.living_epidermis.size)),
-        "solution": (5,),
-    }
 
 
 def _packed(response: SkinResponse) -> bytes:
     """Content of a stored file."""
-    content: dict[str, Any] = {name: getattr(response, name) for name in _ARRAYS} | dict(response.sheet)
-    for name in _SINGLE_PRECISION:
-        content[name] = content[name].astype(np.float32)
-    solution = [
-        response.force_imbalance,
-        response.energy_imbalance,
-        response.penetration_mm,
-        response.newton_steps,
-        response.factorisations,
-    ]
+    content: dict[str, Any] = {
+        field.name: response.fields[field.name].astype(
+            np.float64 if field.place is Place.PRESS else np.float32
+        )
+        for field in stored_fields()
+    }
+    solution = np.array([getattr(response, name) for name in _SOLUTION], dtype=np.float64)
     buffer = io.BytesIO()
-    content["linear_solver"] = np.array(response.linear_solver)
-    np.savez(buffer, **content, solution=np.array(solution, dtype=np.float64))
+    np.savez(buffer, **content, solution=solution, linear_solver=np.array(response.linear_solver))
     return buffer.getvalue()
 
 

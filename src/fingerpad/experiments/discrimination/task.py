@@ -30,10 +30,10 @@ from fingerpad.experiments.discrimination.task_types import (
 )
 from fingerpad.experiments.stimuli import INDENTERS, MOTION, SIZES
 from fingerpad.geometry.grading import RESOLUTIONS
-from fingerpad.mechanics.fields import QUANTITIES
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.psychophysics.discrimination import WAVERING
 from fingerpad.psychophysics.functions import SIGMOIDS
+from fingerpad.skin.fields import sampled_fields
 
 IDEAL = "ideal"
 CODES = ("gradient_sum", "euclidean", IDEAL)
@@ -224,7 +224,7 @@ class AfferentSettings(Part):
     capacitance_mf: Positive | None = None
     threshold_mv: Positive | None = None
     refractory_ms: NotNegative | None = None
-    dynamic_quantity: Annotated[str, one_of(QUANTITIES)] = STORED_ENERGY
+    dynamic_quantity: Annotated[str, one_of(sampled_fields())] = STORED_ENERGY
 
 
 class WindowSettings(Part):

@@ -35,7 +35,7 @@ from fingerpad.inference.fitting.problem import IntArray
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.rate_model import WINDOWS_MS, Windows
 from fingerpad.inference.recordings import RateRecordings
-from fingerpad.mechanics.fields import QUANTITIES
+from fingerpad.skin.fields import sampled_fields
 from fingerpad.skin.indentation import Touch, touch_of
 from fingerpad.skin.store import Store, solve_missing
 
@@ -96,7 +96,7 @@ class RecordingFit:
 
     def __post_init__(self) -> None:
         one_of("method", self.method, tuple(METHODS))
-        one_of("dynamic_quantity", self.dynamic_quantity, tuple(QUANTITIES))
+        one_of("dynamic_quantity", self.dynamic_quantity, tuple(sampled_fields()))
         whole("jobs", self.jobs, at_least=1)
         for start, end in self.windows_ms:
             if not 0.0 <= start < end:

@@ -1,0 +1,188 @@
+"""Fields of an indentation, each declared once: name, unit, place, how it is stored, sampled and exported.
+
+`Touch.solve` computes, `Store` writes and reads, `SkinResponse.sample` interpolates and `write_vtu_series`
+exports what stands in `FIELDS`. To add a field, add one entry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING
+
+# Only for types: the command line reads the names of the quantities here, without compiling anything.
+if TYPE_CHECKING:
+    from fingerpad.core.checks import FloatArray
+    from fingerpad.geometry.mesh import Mesh
+    from fingerpad.mechanics.press import Deformation
+
+
+class Place(Enum):
+    """Where a field has values."""
+
+    PRESS = "one value for the whole press"
+    NODE = "nodes"
+    SKIN_NODE = "nodes of `mesh.skin_nodes`"
+    ELEMENT = "elements"
+    WATCHED = "elements that are watched: those of `mesh.living_epidermis` when stored, all when exported"
+
+
+class Times(Enum):
+    """At which times a field is stored."""
+
+    NONE = "not stored"
+    ALL = "all times"
+    LAST = "last time"
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field of an indentation.
+
+    Parameters
+    ----------
+    name : str
+        Name in `SkinResponse.fields` and in stored files.
+    unit : str
+        Unit; empty for a pure number.
+    place : Place
+        Where it has values.
+    of : callable
+        Computes it from a `Deformation` and its mesh: array (n_times, n_places, n_components), without an
+        axis of places for `Place.PRESS` and without one of components for a scalar.
+    components : int
+        Number of components: 1 of a scalar, 3 of a vector, 6 of a symmetric tensor.
+    stored : Times
+        Times at which it is stored. Fields at places are stored in single precision.
+    sampled : str
+        Name under which receptors sample it, see `SkinResponse.sample`; empty if they do not. It needs a
+        scalar of elements that is stored at all times and is never negative.
+    exported : str
+        Name in VTU files; empty if it is not exported.
+
+    Examples
+    --------
+    >>> FIELDS["von_mises"].unit, FIELDS["von_mises"].sampled, FIELDS["von_mises"].exported
+    ('kPa', 'von_mises', 'von_mises_kpa')
+    """
+
+    name: str
+    unit: str
+    place: Place
+    of: Callable[[Deformation, Mesh], FloatArray]
+    components: int = 1
+    stored: Times = Times.NONE
+    sampled: str = ""
+    exported: str = ""
+
+    def shape(self, mesh: Mesh, n_times: int) -> tuple[int, ...]:
+        """Shape of the stored array."""
+        sizes = {
+            Place.PRESS: (),
+            Place.NODE: (len(mesh.nodes_mm),),
+            Place.SKIN_NODE: (mesh.skin_nodes.size,),
+            Place.ELEMENT: (len(mesh.elements),),
+            Place.WATCHED: (mesh.living_epidermis.size,),
+        }
+        times = (n_times,) if self.stored is Times.ALL else ()
+        return (*times, *sizes[self.place], *((self.components,) if self.components > 1 else ()))
+
+    def stored_values(self, deformation: Deformation, mesh: Mesh) -> FloatArray:
+        """Array to store, from a press in which the living epidermis was watched."""
+        values = self.of(deformation, mesh)
+        return values[-1] if self.stored is Times.LAST else values
+
+
+def _von_mises_at_last_time(deformation: Deformation, _: Mesh) -> FloatArray:
+    from fingerpad.mechanics.fields import von_mises
+
+    return von_mises(deformation.stress_kpa)[None]
+
+
+def _watched(
+    name: str, unit: str, attribute: str, *, components: int = 1, sampled: bool = False, exported: str = ""
+) -> Field:
+    """Field of elements that `ElementFields` computes; those that are sampled are stored."""
+    return Field(
+        name,
+        unit,
+        Place.WATCHED,
+        lambda deformation, _: getattr(deformation.fields, attribute),
+        components,
+        stored=Times.ALL if sampled else Times.NONE,
+        sampled=name if sampled else "",
+        exported=exported or attribute,
+    )
+
+
+FIELDS: dict[str, Field] = {
+    field.name: field
+    for field in (
+        Field("times_ms", "ms", Place.PRESS, lambda d, _: d.times_ms, stored=Times.ALL, exported="TimeValue"),
+        Field("force_mn", "mN", Place.PRESS, lambda d, _: d.force_mn, stored=Times.ALL, exported="force_mn"),
+        Field("depth_mm", "mm", Place.PRESS, lambda d, _: d.depth_mm, stored=Times.ALL, exported="depth_mm"),
+        Field(
+            "skin_displacement_mm",
+            "mm",
+            Place.SKIN_NODE,
+            lambda d, mesh: d.displacement_mm[:, mesh.skin_nodes],
+            components=3,
+            stored=Times.ALL,
+        ),
+        Field(
+            "displacement_mm",
+            "mm",
+            Place.NODE,
+            lambda d, _: d.displacement_mm,
+            components=3,
+            stored=Times.LAST,
+            exported="displacement_mm",
+        ),
+        Field(
+            "contact_pressure_kpa",
+            "kPa",
+            Place.SKIN_NODE,
+            lambda d, _: d.contact.pressure_kpa,
+            exported="contact_pressure_kpa",
+        ),
+        Field(
+            "sed_kpa",
+            "kPa",
+            Place.ELEMENT,
+            lambda d, _: d.sed_kpa,
+            stored=Times.ALL,
+            sampled="stored",
+            exported="sed_stored_kpa",
+        ),
+        Field("von_mises_kpa", "kPa", Place.ELEMENT, _von_mises_at_last_time, stored=Times.LAST),
+        _watched("instantaneous", "kPa", "instantaneous_kpa", sampled=True, exported="sed_instantaneous_kpa"),
+        _watched("work", "kPa", "work_kpa", sampled=True, exported="sed_work_kpa"),
+        _watched("von_mises", "kPa", "von_mises_kpa", sampled=True),
+        _watched("compressive_strain", "", "compressive_strain", sampled=True),
+        _watched("compressive_stress", "kPa", "compressive_stress_kpa", sampled=True),
+        _watched("stress", "kPa", "stress_kpa", components=6),
+        _watched("strain", "", "strain", components=6),
+        _watched("green_lagrange_strain", "", "green_lagrange_strain", components=6),
+        _watched("principal_stress", "kPa", "principal_stress_kpa", components=3),
+        _watched("principal_strain", "", "principal_strain", components=3),
+        _watched("pressure", "kPa", "pressure_kpa"),
+    )
+}
+"""All fields by their names."""
+
+
+def stored_fields() -> tuple[Field, ...]:
+    """Fields that a stored indentation holds."""
+    return tuple(field for field in FIELDS.values() if field.stored is not Times.NONE)
+
+
+def sampled_fields() -> dict[str, Field]:
+    """Fields that may drive an afferent, by the names under which receptors sample them.
+
+    Examples
+    --------
+    >>> list(sampled_fields())
+    ['stored', 'instantaneous', 'work', 'von_mises', 'compressive_strain', 'compressive_stress']
+    """
+    return {field.sampled: field for field in FIELDS.values() if field.sampled}
