@@ -93,7 +93,7 @@ def measure() -> Report:
         name="fitting",
         title="Fits",
         about=(
-            "One afferent, 36 positions of a bar, six folds, given what the receptor feels; one thread, "
+            "One afferent, 36 positions of a bar, six folds, given the SED at the receptor; one thread, "
             f"{REPEATS} runs each in fresh processes: median (smallest to largest)."
         ),
         tables=[
@@ -114,7 +114,8 @@ def measure() -> Report:
         ],
         measured={"session_s": seconds[paper].median},
         notes=[
-            f"The {paper} method is the paper's, from its two starts; the others fit four numbers, not six.",
-            f"Strain energy density at {RESOLUTION} resolution; FSS at standard is in docs/single-unit.md.",
+            f"The {paper} method is the paper's, from its two starts, with six parameters; "
+            "the others fit four.",
+            f"The SED is from {RESOLUTION} resolution; the FSS at standard is in docs/single-unit.md.",
         ],
     )

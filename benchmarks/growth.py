@@ -51,7 +51,7 @@ def measure(sizes: Sequence[tuple[float, tuple[int, int, int, int]]] = SIZES) ->
     memory_exponent = exponent(nodes, [_needed_mb(run) for run in runs])
     return Report(
         name="growth",
-        title="Growth with the mesh",
+        title="Scaling with the mesh size",
         about=(
             f"{PRESSED} in the steps of `standard`; half a finger, {THREADS} threads, one run each. Every "
             "element is refined by about the same factor in all directions."
@@ -59,14 +59,14 @@ def measure(sizes: Sequence[tuple[float, tuple[int, int, int, int]]] = SIZES) ->
         tables=[
             Table(
                 f"Fitted: time ~ nodes^{time_exponent:.3f}, memory ~ nodes^{memory_exponent:.3f}.",
-                [*COLUMNS, "solve, s", "ms a node", "memory, MB", "kB a node", "force, mN"],
+                [*COLUMNS, "solve, s", "ms per node", "memory, MB", "kB per node", "force, mN"],
                 [_row(run) for run in runs],
             )
         ],
         measured={"growth_time_exponent": time_exponent, "growth_memory_exponent": memory_exponent},
         notes=[
-            "The exponent of memory, and kB a node, are of what a press adds to a process that has imported "
-            "fingerpad: what Python itself takes would make growth look slower.",
+            "The exponent of memory, and kB per node, are of the memory that an indentation adds to a "
+            "process that has imported fingerpad. The memory of Python itself would reduce the exponent.",
             *dict.fromkeys(run.answer["linear_solver"] for run in runs),
         ],
     )

@@ -49,9 +49,9 @@ def neurons(afferents: int, threads: int) -> tuple[list[list[Any]], dict[str, fl
     exact_ms = checked["differences_ms"]
     left = ", ".join(f"{off:.2g} ms at {step:g} ms" for off, step in zip(exact_ms, STEPS_MS, strict=True))
     note = (
-        f"Our spike times, checked by Runge-Kutta on {checked['afferents']} of the afferents: they differ by "
-        f"at most {left}. That falls "
-        f"with the step, as Runge-Kutta's delay of up to a step for each spike does."
+        f"Our spike times compared with Runge-Kutta on {checked['afferents']} of the afferents: the largest "
+        f"difference is {left}. It decreases with the step, because Runge-Kutta delays each spike by up to "
+        "one step."
     )
     judged = [n for n, (_, step_ms) in enumerate(BRIAN2_RUNS) if step_ms == JUDGED_STEP_MS]
     measured = {
@@ -67,14 +67,14 @@ def measure(afferents: int = AFFERENTS, threads: int = THREADS) -> Report:
     rows, measured, note = neurons(afferents, threads)
     return Report(
         name="neurons",
-        title="Beside another simulator of neurons",
+        title="Comparison with another neuron simulator",
         about=(
             f"{afferents:,} leaky integrate-and-fire afferents for 1 s. Both programs read the same file of "
             f"currents and may use {threads} threads."
         ),
         tables=[
             Table(
-                "Differences are those of spikes of the same number in the same train:",
+                "Timing: differences between spikes of the same index in the same train:",
                 [
                     "program", "step, ms", "spikes", "s", "times our time", "timing, RMS, ms",
                     "largest, ms", "same number of spikes, %",
@@ -84,10 +84,10 @@ def measure(afferents: int = AFFERENTS, threads: int = THREADS) -> Report:
         ],
         measured=measured,
         notes=[
-            "Times are without imports and compiling.",
+            "Times exclude imports and compilation.",
             note,
-            "Brian2 notes spikes at its steps and begins the rest a step early, which adds up from spike to "
-            "spike; the target takes its fastest way at 0.1 ms. Its time grows with its steps, ours with the "
-            "number of spikes.",
+            "Brian2 records spikes at its time steps and starts the refractory period one step early; these "
+            "errors accumulate. The target uses its fastest mode at 0.1 ms. Its time is proportional to the "
+            "number of steps, ours to the number of spikes.",
         ],
     )  # fmt: skip

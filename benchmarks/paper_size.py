@@ -28,7 +28,7 @@ def measure(resolution: str = RESOLUTION) -> Report:
     same = both["force_mn"] == one["force_mn"] and both["sed_kpa"] == one["sed_kpa"]
     return Report(
         name="paper_size",
-        title="The paper's full-size finger",
+        title="Mesh of the paper's size",
         about=(
             f"{PRESSED} in {both['steps']} steps, each to a residual of 1e-5 of the contact force. The whole "
             "finger, no symmetry used; one run each."
@@ -56,8 +56,9 @@ def measure(resolution: str = RESOLUTION) -> Report:
             "paper_size_speedup": one["solve_s"] / both["solve_s"],
         },
         notes=[
-            f"Force and largest SED on one and two threads are {'the same bits' if same else 'not equal'}.",
-            "The time is that of `solve`, with meshing and loading of compiled kernels, without imports.",
+            f"Force and largest SED on one and two threads: {'equal bits' if same else 'not equal'}.",
+            "The time is that of `solve`; it includes meshing and loading of compiled kernels and "
+            "excludes imports.",
             both["linear_solver"],
         ],
     )

@@ -33,7 +33,7 @@ class Solution:
     force_mn : array (n_increments,)
         Force of the sphere. [mN]
     sed_kpa : array (n_elements,)
-        Strain energy density at the end, element means. [kPa]
+        The SED is from the end, element means. [kPa]
     version : str
         Of the program.
     """
@@ -149,7 +149,7 @@ def measure(sizes: Sequence[str] = SIZES, threads: int = THREADS) -> Report:
     of_block, block_numbers = blocks(sizes, threads)
     return Report(
         name="peers",
-        title="Beside other finite elements",
+        title="Comparison with other finite-element programs",
         about=(
             "A layered block, 14 x 12 x 5 mm, under a rigid frictionless sphere of 3 mm radius, 1.0 mm in "
             "ten equal increments, neo-Hookean layers with nu = 0.48. Every program reads the same file and "
@@ -157,8 +157,8 @@ def measure(sizes: Sequence[str] = SIZES, threads: int = THREADS) -> Report:
         ),
         tables=[
             Table(
-                "Block. Differences are the largest of force at any increment, and of SED in living "
-                "epidermis and dermis within 2 mm of the axis, as a share of its largest:",
+                "Block. Largest differences: of the force at any increment, and of the SED in living "
+                "epidermis and dermis within 2 mm of the axis, as a share of its largest value:",
                 [
                     "nodes", "program", "iterations", "s", "processor, s", "memory, MB", "force, mN",
                     "times our time", "times our processor time", "force, %", "SED, %",
@@ -168,13 +168,12 @@ def measure(sizes: Sequence[str] = SIZES, threads: int = THREADS) -> Report:
         ],
         measured=block_numbers,
         notes=[
-            "Times are without imports and compiling. Of CalculiX they are those of its whole process, which "
-            "reads and writes files, but not of our writing of its deck.",
-            "Solvers keep the tolerances that they come with, FElupe gets 1e-6; ours is 1e-5 of the force of "
-            "contact.",
-            "FElupe has our element, mean dilatation, and a penalty at the nodes; it solves with PARDISO. "
-            "CalculiX has incompatible modes (C3D8I), the closest it has, and solves with SPOOLES.",
-            "The target is held against the smaller of the two ratios. Processor time is of the whole "
-            "process, imports and loading of kernels included.",
+            "Times exclude imports and compilation. For CalculiX they are those of its whole process, "
+            "including its files but not the writing of the deck.",
+            "Solvers have their default tolerances, FElupe 1e-6; ours is 1e-5 of the contact force.",
+            "FElupe uses the same element, mean dilatation, with a penalty at the nodes and PARDISO. "
+            "CalculiX uses incompatible modes (C3D8I), its most similar element, and SPOOLES.",
+            "The target is compared with the smaller of the two ratios. Processor time is that of the whole "
+            "process, including imports and loading of kernels.",
         ],
     )  # fmt: skip

@@ -128,7 +128,7 @@ def measure() -> Report:
         ],
         measured={"afferents_s": time_s[THREADS[-1]].median, "gradient_sum_s": gradient_s.median},
         notes=[
-            "The time of the afferents includes interpolation, current and membrane; that of the membrane "
-            "alone is measured on every tenth afferent."
+            "The time of the afferents includes interpolation, current and membrane; the time of the "
+            "membrane alone is measured on every tenth afferent."
         ],
     )

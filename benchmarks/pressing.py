@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # a benchmark is listed and reported without importing what i
     from fingerpad.skin.sampling import SkinResponse
 
 CURVATURE_PER_M = 287.0
-PRESSED = f"A sphere of {CURVATURE_PER_M:g} per m pressed 1.0 mm deep, ramp of 50 ms and hold of 950 ms"
+PRESSED = f"A sphere of {CURVATURE_PER_M:g} per m indented by 1.0 mm, ramp of 50 ms and hold of 950 ms"
 COLUMNS = ("nodes", "elements", "Newton steps", "factors")
 """Headings of what `work` tells."""
 

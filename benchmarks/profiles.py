@@ -62,11 +62,11 @@ def measure(resolutions: tuple[str, ...] = RESOLUTIONS) -> Report:
         )
     return Report(
         name="profiles",
-        title="Where the time goes",
+        title="Profile",
         about=(
-            f"The {SHOWN} functions of a press that take most time of their own, by cProfile, {THREADS} "
+            f"The {SHOWN} functions with the largest own time in an indentation, by cProfile, {THREADS} "
             "threads; kernels compiled and loaded."
         ),
         tables=tables,
-        notes=["Compiled kernels count for the function that calls them."],
+        notes=["The time of compiled kernels is included in the function that calls them."],
     )

@@ -63,10 +63,10 @@ def measure() -> Report:
     last = Spread.of(answers[THREADS[-1]][SITES[-1]]["respond_s"])
     return Report(
         name="receptors",
-        title="Many receptors, one touch",
+        title="Many receptors under one touch",
         about=(
             f"{PRESSED}, half a finger at standard resolution; then {answers[1]['receptors']:,} receptors in "
-            f"a hexagonal layout over the pad answer {REPEATS} times: median (smallest to largest)."
+            f"a hexagonal layout over the pad, computed {REPEATS} times: median (smallest to largest)."
         ),
         tables=[
             Table(
@@ -86,5 +86,5 @@ def measure() -> Report:
             )
         ],
         measured={"receptors_s": last.median},
-        notes=["The rest of the time is that of current, membrane and spikes."],
+        notes=["The rest is the time of current, membrane and spikes."],
     )

@@ -50,7 +50,7 @@ def seconds_of_parts(manifest: Mapping[str, Any], whole_s: float) -> dict[str, f
     --------
     >>> stages = [{"name": "fit", "wall_s": 2.0}, {"name": "bars", "wall_s": 1.0, "indentations": 36}]
     >>> seconds_of_parts({"wall_s": 4.0, "stages": stages}, whole_s=9.0)
-    {'fit': 2.0, 'reading what is stored': 1.0, 'the rest of the study': 1.0,
+    {'fit': 2.0, 'loading stored indentations': 1.0, 'rest of the study': 1.0,
      'imports, figures and report': 5.0}
     """
     stages = manifest["stages"]
@@ -58,8 +58,8 @@ def seconds_of_parts(manifest: Mapping[str, Any], whole_s: float) -> dict[str, f
     reading_s = sum(stage["wall_s"] for stage in stages if stage.get("indentations") is not None)
     return {
         **work,
-        "reading what is stored": reading_s,
-        "the rest of the study": manifest["wall_s"] - sum(work.values()) - reading_s,
+        "loading stored indentations": reading_s,
+        "rest of the study": manifest["wall_s"] - sum(work.values()) - reading_s,
         "imports, figures and report": whole_s - manifest["wall_s"],
     }
 
@@ -80,12 +80,12 @@ def measure(resolutions: Sequence[str] = RESOLUTIONS) -> Report:
         name="reproduction",
         title="The whole reproduction",
         about=(
-            "`fingerpad reproduce --jobs 2` into an empty folder: all presses, fits, observers, figures and "
-            "the report. One run each; the time is that of the whole command, imports included."
+            "`fingerpad reproduce --jobs 2` into an empty folder: all indentations, fits, observers, figures "
+            "and the report. One run each; the time is that of the whole command, including imports."
         ),
         tables=[Table("Seconds of each part:", ["part", *resolutions], rows)],
         measured=measured,
         notes=[
-            "Memory is the sum over the command and its processes; what they share counts for each of them."
+            "Memory is the sum over the command and its processes; shared memory counts for each of them."
         ],
     )

@@ -145,13 +145,13 @@ def measure(runs: Sequence[tuple[str, str]] = RUNS) -> Report:
     return Report(
         name="solvers",
         title="Linear solvers",
-        about=f"{PRESSED}; half a finger, {THREADS} threads, one run with every linear solver there is.",
+        about=f"{PRESSED}; half a finger, {THREADS} threads, one run with each linear solver.",
         tables=[
             Table(
-                "Conjugate gradients around each:",
+                "Conjugate gradients with each preconditioner:",
                 [
                     "resolution", "nodes", "preconditioner", "set up", "solves", "iterations",
-                    "linear solves, s", "press, s", "memory, MB", "force, mN",
+                    "linear solves, s", "indentation, s", "memory, MB", "force, mN",
                 ],
                 rows,
             )

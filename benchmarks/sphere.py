@@ -53,7 +53,8 @@ def measure() -> Report:
         ],
         measured={"sphere_s": time_s.median, "sphere_gb": memory_mb.median / 1000.0},
         notes=[
-            "The time is that of `solve`, with meshing and loading of compiled kernels, without imports.",
+            "The time is that of `solve`; it includes meshing and loading of compiled kernels and "
+            "excludes imports.",
             first["linear_solver"],
         ],
     )

@@ -69,11 +69,11 @@ def measure() -> Report:
     commands = {options: [command_s(options) for _ in range(REPEATS)] for options in COMMANDS}
     return Report(
         name="startup",
-        title="Until it is there",
-        about=f"Every one in a new interpreter, {REPEATS} times: median (smallest to largest).",
+        title="Imports and commands",
+        about=f"Each in a new interpreter, {REPEATS} times: median (smallest to largest).",
         tables=[
             Table(
-                "Imports, without the start of the interpreter; and once without any bytecode:",
+                "Imports, without the start of the interpreter, with and without bytecode:",
                 ["statement", "s", "without bytecode, s"],
                 [
                     [f"`{statement}`", str(Spread.of(times)), first[statement]]
@@ -81,14 +81,14 @@ def measure() -> Report:
                 ],
             ),
             Table(
-                "Commands, with the start of the interpreter:",
+                "Commands, including the start of the interpreter:",
                 ["command", "s"],
                 [[f"`fingerpad {options}`", str(Spread.of(times))] for options, times in commands.items()],
             ),
         ],
         measured={"import_s": Spread.of(imports[IMPORTS[0]]).median},
         notes=[
-            "The package loads its names when they are first used; the other imports show what those cost.",
-            "Files are in the memory of the system: reading them from a disk comes on top.",
+            "The package loads its names at their first use; the other imports show the time of those.",
+            "Files are in the file cache; reading them from a disk takes additional time.",
         ],
     )

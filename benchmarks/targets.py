@@ -53,7 +53,7 @@ _PAPER = "paper size, full model, ramp and hold, residual 1e-5"
 _SPHERE = "`standard`, half model, one sphere, ramp and hold"
 _STANDARD = "`fingerpad reproduce --resolution standard`, everything, cold store"
 _QUICK = "`fingerpad reproduce --resolution quick`, everything, cold store"
-_GROWTH = "growth with nodes, 20k to 500k, exponent"
+_GROWTH = "scaling with nodes, 20k to 500k, exponent"
 _BLOCK = "layered block of 21,500 nodes"
 
 TARGETS = (
@@ -71,10 +71,10 @@ TARGETS = (
     Target("reproduce_quick_s", "reproduction", f"{_QUICK}: time", 90.0, "s"),
     Target("import_s", "startup", "`import fingerpad`, kernels compiled", 0.5, "s"),
     Target("growth_time_exponent", "growth", f"{_GROWTH} of time", 1.15, ""),
-    # "Linear" is read as an exponent of at most 1.05; the memory of Python itself flatters small meshes.
+    # "Linear" is read as an exponent of at most 1.05; the memory of Python itself would reduce the exponent.
     Target("growth_memory_exponent", "growth", f"{_GROWTH} of memory", 1.05, ""),
     Target("afferents_s", "population", "100,000 afferents, 1 s, exact spikes", 1.0, "s"),
-    Target("receptors_s", "receptors", "10,000 receptors answer one touch, skin solved", 1.0, "s"),
+    Target("receptors_s", "receptors", "responses of 10,000 receptors to one touch, skin solved", 1.0, "s"),
     Target("gradient_sum_s", "population", "Gradient Sum, 7 spheres x 100 x 100 x 100", 0.1, "s"),
     Target("session_s", "fitting", "response surfaces, two starts, six folds, given the SED", 30.0, "s"),
     Target("felupe_ratio", "peers", f"{_BLOCK}: times faster than FElupe", 10.0, "x", at_least=True),
