@@ -13,13 +13,14 @@ from benchmarks.measuring import Spread, run_job
 from benchmarks.results import Report, Table
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.gerling2014 import single_unit, single_unit_methods
+from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.inference.afferent_methods import four_number_problem
 from fingerpad.inference.fitting import Method, cross_validate, interleaved_folds
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.start_points import response_surface, start_points
 from fingerpad.neuron.transduction import drive
 from fingerpad.skin.store import Store, solve_missing
+from studies.fit_methods import methods
 
 JOBS, REPEATS = 2, 3
 RESOLUTION = "quick"
@@ -66,7 +67,7 @@ def fit(traces: str) -> dict[str, Any]:
     four = four_number_problem(six.model, six.recordings)
     folds = interleaved_folds(six.n_observations)
     cases: list[tuple[RateProblem, Method]] = [(six, response_surface())]
-    cases += [(four, method) for method in single_unit_methods.methods(four, driven)]
+    cases += [(four, method) for method in methods(four, driven)]
     start = start_points()[0]
     six.score(start, np.arange(six.n_observations))  # loads compiled kernels
     found: dict[str, Any] = {}

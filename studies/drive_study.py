@@ -22,6 +22,7 @@ from fingerpad.inference.recordings import RateRecordings
 from fingerpad.skin.behaviour import code_hash
 from fingerpad.skin.store import Store, solve_missing
 from studies import drive_depths, dynamic_response
+from studies.drive_fits import information, thorough_method
 from studies.dynamic_response import EXPLANATIONS, ExplainedModel, Explanation, Patch
 
 
@@ -91,7 +92,7 @@ def study_drives(study: DriveStudy, on_finished: Callable[[str], None] | None = 
         recordings,
         generator,
         (*drive_quantities.ALONE, *drive_quantities.APART),
-        drive_fits.thorough_method(conditions.seed),
+        thorough_method(conditions.seed),
         with_response_surface=True,
     )
     finished("quantities")
@@ -144,7 +145,7 @@ def explained(
     baseline: Judged | None = None
     for explanation in explanations:
         model = ExplainedModel.from_start(explanation, patch)
-        method = drive_fits.thorough_method(seed, len(explanation.added))
+        method = thorough_method(seed, len(explanation.added))
         judged = drive_fits.judge(RateProblem(model, recordings), method)
         baseline = baseline or judged
         free = len(RELATIVE_NAMES) + len(explanation.added)
@@ -154,7 +155,7 @@ def explained(
                 "free_numbers": free,
                 "added": _added(explanation, model.numbers(judged.fit.parameters)),
                 **drive_fits.row(judged, baseline, recordings, generator),
-                **drive_fits.information(judged.in_sample["total"], recordings.n_rates, free),
+                **information(judged.in_sample["total"], recordings.n_rates, free),
             }
         )
         on_finished(explanation.name)

@@ -7,7 +7,6 @@ from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.gerling2014 import code_efficiency
 from fingerpad.experiments.gerling2014 import curvature_thresholds as study
 from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.experiments.gerling2014.sphere_discrimination import CURVATURES
@@ -110,35 +109,6 @@ def test_ideal_threshold_is_fishers(found):
     assert yes_no(float(d)) == pytest.approx(0.75, abs=1e-3)
 
 
-def test_no_code_is_more_efficient_than_the_ideal_observer(found):
-    rows = found["efficiency"]
-    assert {(row["code"], row["measure"], row["noise"]) for row in rows} >= {
-        ("Gradient Sum", "static", "multiplied"),
-        ("Euclidean Distance", "latency", "multiplied"),
-        ("Gradient Sum", "static", "Poisson"),
-    }
-    for row in rows:
-        assert row["efficiency"] < 1.0 + 3.0 * row["efficiency_error"]
-        assert row["proportion_correct"] <= row["ideal_proportion_correct"] + 0.01
-
-
-def test_silent_receptors_are_left_out_of_efficiencies():
-    curvatures = np.array(code_efficiency.PAIR_PER_M)
-    static = np.array([[30.0, 0.0, 20.0, 10.0], [33.0, 0.0, 21.0, 9.0]])
-    latency = np.array([[10.0, np.nan, 12.0, 30.0], [10.0, 70.0, 11.0, 33.0]])
-    pairs = np.array([[0, 1], [1, 2], [0, 3]])
-    rows = code_efficiency.efficiencies(
-        curvatures, {"static": static, "latency": latency}, pairs, 0.1, seed=0
-    )
-    assert [row["receptors"] for row in rows] == [3, 3, 3, 3, 4, 4]
-    alone = code_efficiency.efficiencies(
-        curvatures, {"static": static, "latency": latency[:, [0, 3]]}, np.array([[0, 1]]), 0.1, seed=0
-    )
-    # Of the pairs of latencies only that of receptors 0 and 3 has both.
-    assert alone[2]["code"] == rows[2]["code"] == "Gradient Sum"
-    assert rows[2]["d_prime"] == pytest.approx(alone[2]["d_prime"], abs=0.1)
-
-
 def test_a_threshold_out_of_reach_is_said_and_costs_only_its_own_row(found):
     noisy = study.Observer(proportional(0.1).rates, PAIRS, 0.5, DRAWS)
     with pytest.raises(ConvergenceError, match="No sphere up to 700 /m is told from 287 /m in 75%"):
@@ -198,9 +168,8 @@ def test_page_shows_and_names_what_was_found(found):
     }
     assert "1/m" in fractions.get_xlabel()
     assert "%" in curves.get_xlabel()
-    thresholds, codes = page.tables(found)
+    (thresholds,) = page.tables(found)
     assert len(thresholds.rows) == 8
-    assert len(codes.rows) == len(found["efficiency"])
     assert "15 pressed spheres" in page.caption(found)
 
 

@@ -23,7 +23,6 @@ from fingerpad.report import (
     recruitment,
     reproduction,
     single_unit,
-    single_unit_methods,
     skin_deflection,
     tables,
 )
@@ -56,9 +55,7 @@ def synthetic_results() -> dict:
         "single_unit": _single_unit(),
         "single_unit_uncertainty": _single_unit_uncertainty(),
         "drive_quantities": _drive_quantities(),
-        "spike_fit": _spike_fit(),
         "discrimination": _discrimination(),
-        "mesh_noise": _mesh_noise(),
         "curvature_thresholds": _curvature_thresholds(),
         "population": _population(),
         "population_timing": _population_timing(),
@@ -201,40 +198,6 @@ def _single_unit() -> dict:
         ],
         "modulation": {phase: {"observed": observed, "ours": ours} for phase in ("dynamic", "static")},
         "edge_response": {"peak_distance_mm": 1.6, "profile_hz": SHIFT_MM.tolist()},
-        "methods": _methods(),
-    }
-
-
-def _methods() -> dict:
-    def scores(mean: float) -> dict:
-        return {"fss_in_sample": mean + 0.02, "fss_out_of_sample": mean, "fss_training_mean": mean + 0.03}
-
-    places = ("dynamic_flat", "dynamic_elsewhere", "static_flat", "static_elsewhere")
-    phases = {"dynamic": 0.95, "static": 0.98, "weighted": 0.97}
-    return {
-        "methods": [
-            {
-                "method": name,
-                "free_numbers": free,
-                **scores(mean),
-                "fss_train": [mean + 0.03 - 0.002 * fold for fold in range(6)],
-                "fss_test": [mean - 0.05 + 0.02 * fold for fold in range(6)],
-                "runs": runs,
-            }
-            for name, free, mean, runs in (("response surface", 6, 0.87, 5474), ("CMA-ES", 4, 0.88, 500))
-        ],
-        "models": [
-            {
-                "model": "receptor beside its place",
-                **scores(0.88),
-                "fss_in_sample_dynamic": 0.75,
-                "fss_in_sample_static": 0.96,
-                "residual_share": dict.fromkeys(places, 0.25),
-                "parameters": {"offset_mm": 0.05},
-            }
-        ],
-        "models_fitted_by": "CMA-ES",
-        "ceilings": {"symmetric": phases, "rising": phases},
     }
 
 
@@ -265,80 +228,6 @@ def _drive_quantities() -> dict:
                 **rates,
             }
             for dynamic in ("stored", "compressive_stress")
-        ],
-    }
-
-
-def _spike_fit() -> dict:
-    truth = [0.007, 3.2, 0.018, 71.8, 0.2]
-    curve = {"amount": [0.1, 0.2, 0.4], "current_factor": [1.0, 0.9, 0.5], "local_variation": [0.0, 0.1, 0.7]}
-    source = {"name": "soft threshold", "amount_is": "width", **curve}
-    source |= {"coefficient_of_variation": [0.1, 0.3, 0.9]}
-    at = {"amount": 0.36, "current_factor": 0.58, "local_variation": 0.58, "coefficient_of_variation": 0.78}
-    times = [0.5 * step for step in range(40)]
-    return {
-        "n_repeats": 5,
-        "n_positions": 36,
-        "names": [
-            "intercept_per_ms",
-            "dynamic_gain_per_kpa",
-            "static_gain_per_kpa_ms",
-            "time_constant_ms",
-            "escape_width",
-        ],
-        "units": ["1/ms", "1/kPa", "1/(kPa ms)", "ms", "1"],
-        "variability": {
-            "observed": 0.78,
-            "observed_spread": 0.09,
-            "rate_hz": 60.3,
-            "sources": [source | {"at_observed": at}, source | {"at_observed": None}],
-        },
-        "recovery": {
-            "n_spikes": 5464,
-            "level": 0.95,
-            "start": [0.0, 4.0, 0.014, 68.0, 0.5],
-            "truth": truth,
-            "estimate": [1.02 * value for value in truth],
-            "standard_error": [0.03 * value for value in truth],
-            "low": [0.96 * value for value in truth],
-            "high": [1.08 * value for value in truth],
-            "n_held": 5,
-            "correlation": np.eye(5).tolist(),
-            "log_likelihood": -21847.9,
-            "log_likelihood_of_truth": -21850.7,
-            "n_steps": 8,
-            "rescaled": {
-                "share": [0.25, 0.75],
-                "quantile": [0.251, 0.748],
-                "distance": 0.006,
-                "p_value": 0.99,
-                "distance_of_truth": 0.007,
-                "limit": 0.018,
-            },
-        },
-        "raster": {
-            "shift_mm": SHIFT_MM.tolist(),
-            "spikes_ms": [[float(10 + shift), 400.0] if shift % 2 else [] for shift in range(36)],
-            "shown": 1,
-            "times_ms": times,
-            "intensity_hz": {
-                "truth": [10.0 + time for time in times],
-                "fitted": [11.0 + time for time in times],
-            },
-        },
-        "other_noise": [
-            {
-                "name": "threshold, new for each interval",
-                "amount": 0.3,
-                "n_spikes": 2714,
-                "estimate": truth,
-                "over_truth": [0.35, 0.92, 1.18, 0.2],
-                "distance": 0.134,
-                "limit": 0.026,
-                "dynamic_rate_error_hz": 21.3,
-                "static_rate_error_hz": 3.9,
-            },
-            {"name": "white noise of the current", "amount": 0.3, "n_spikes": 3},
         ],
     }
 
@@ -461,19 +350,6 @@ def _discrimination() -> dict:
     }
 
 
-def _mesh_noise() -> dict:
-    return {
-        "curvature_per_m": [287.0, 296.0],
-        "meshes": ["as in the study", "another"],
-        "static_sum": [[1400.0, 1460.0], [1410.0, 1467.0]],
-        "sed_kpa": [[1.4, 1.5], [1.4, 1.5]],
-        "step": [60.0, 57.0],
-        "difference": [0.0, -0.05],
-        "largest_difference": 0.05,
-        "limit": 0.1,
-    }
-
-
 def _curvature_thresholds() -> dict:
     steps = [0.03, 0.06, 0.12]
 
@@ -513,22 +389,6 @@ def _curvature_thresholds() -> dict:
         },
         "interpolation": [
             {"curvature_per_m": 287.0, "pressed": 1400.0, "foretold": 1402.0, "error_per_m": 0.2}
-        ],
-        "efficiency": [
-            {
-                "code": "Gradient Sum",
-                "measure": "static",
-                "noise": "multiplied",
-                "receptors": 18,
-                "proportion_correct": 0.88,
-                "d_prime": 1.64,
-                "d_prime_error": 0.03,
-                "ideal_proportion_correct": 0.93,
-                "ideal_d_prime": 2.12,
-                "ideal_d_prime_error": 0.03,
-                "efficiency": 0.6,
-                "efficiency_error": 0.03,
-            }
         ],
     }
 
@@ -924,22 +784,6 @@ def test_every_table_is_rectangular():
         assert {len(row.cells) for row in table.rows} == {len(table.columns)}, table.title
 
 
-def test_methods_are_drawn_fold_by_fold_with_their_effort():
-    found = _methods()
-    scores, effort = single_unit_methods.draw(found).axes
-    by_height = {line.get_ydata()[0]: line.get_xdata().tolist() for line in scores.get_lines()}
-    for height, row in enumerate(found["methods"]):
-        assert by_height[height - 0.14] == row["fss_train"]
-        assert by_height[height + 0.14] == row["fss_test"]
-    means = [segments.get_segments()[0][0, 0] for segments in scores.collections]
-    keys = ("fss_training_mean", "fss_out_of_sample")
-    assert means == [row[key] for key in keys for row in found["methods"]]
-    assert [bar.get_width() for bar in effort.patches] == [row["runs"] for row in found["methods"]]
-    assert "lie within 0.010 of each other out of sample, the folds within 0.11" in (
-        single_unit_methods.caption(found)
-    )
-
-
 def lines(axes):
     return {line.get_label(): line for line in axes.get_lines()}
 
@@ -1113,11 +957,6 @@ def test_readings_stand_in_their_table_and_what_was_used_is_marked():
     assert [row.kind for row in table.rows] == ["final", ""]
     assert table.rows[0].cells[:3] == ("eight neighbours (used)", "18 / 17", "0.460 / 0.430")
     assert table.rows[1].cells[4] == table.rows[1].cells[6]
-
-
-def test_steps_on_other_meshes_are_shares_of_the_first():
-    (table,) = tables.mesh_noise(_mesh_noise())
-    assert [row.cells[-1] for row in table.rows] == ["0.000", "−0.050"]
 
 
 def test_figure_7_shows_rates_far_below_chance():

@@ -46,10 +46,8 @@ BALANCE = 0.01
 """Bound on the error of the balance of energy at quick resolution, where 0.0012 to 0.0034 are found."""
 
 BEYOND = {
-    "mesh_noise",
     "curvature_thresholds",
     "drive_quantities",
-    "spike_fit",
     "single_unit_uncertainty",
     "population_timing",
 }
@@ -200,9 +198,7 @@ def test_what_goes_beyond_the_paper_comes_on_top(first, extended):
     assert (extended.status, extended.errors) == (0, "")
     ours, theirs = unmeasured(first.results), unmeasured(extended.results)
     assert not {name for name, section in theirs.items() if section is None}
-    assert set(theirs["single_unit"]) == set(ours["single_unit"]) | {"starts", "methods"}
-    assert {name: theirs["single_unit"][name] for name in ours["single_unit"]} == ours["single_unit"]
-    for section in set(ours) - BEYOND - {"single_unit", "comparison"}:
+    for section in set(ours) - BEYOND - {"comparison"}:
         assert theirs[section] == ours[section]
     assert [row for row in theirs["comparison"] if row in ours["comparison"]] == ours["comparison"]
     assert all(math.isfinite(number) for number in numbers(extended.results))
@@ -226,33 +222,6 @@ def test_every_quantity_that_is_shown_is_judged_on_the_same_folds(extended):
     # The target of a fit by any method; the paper's model misses it.
     assert best["fit"]["fss_out_of_sample"] >= 0.92
     assert best["fit"]["fss_out_of_sample_dynamic"] > paper["fit"]["fss_out_of_sample_dynamic"] + 0.1
-
-
-def test_the_nearest_step_is_the_skins_and_not_the_meshs(extended):
-    """Two more meshes of the same resolution; at quick, steps differ by 2 %."""
-    found = extended.results["mesh_noise"]
-    assert np.shape(found["static_sum"]) == (3, 2)
-    assert found["step"] == pytest.approx(np.diff(found["static_sum"]).ravel(), rel=1e-9)
-    assert min(found["step"]) > 0.0
-    assert len(set(found["step"])) == 3
-    assert found["largest_difference"] < found["limit"] == 0.1
-    first, _ = found["static_sum"][0]
-    study = extended.results["discrimination"]["gradient_sums"]["static"][0][0]
-    assert first == pytest.approx(study, rel=1e-12)
-    (row,) = [row for row in extended.results["comparison"] if "other meshes" in row["quantity"]]
-    assert row["met"] is True
-
-
-def test_spike_trains_are_complete(extended):
-    found = extended.results["spike_fit"]
-    assert len(found["variability"]["sources"]) == 5
-    recovery = found["recovery"]
-    for name in ("start", "truth", "estimate", "standard_error", "low", "high"):
-        assert len(recovery[name]) == len(found["names"]) == 5
-    assert recovery["n_held"] >= 3
-    assert recovery["rescaled"]["distance"] < 2.0 * recovery["rescaled"]["limit"]
-    assert len(found["raster"]["spikes_ms"]) == 36
-    assert len(found["other_noise"]) == 3
 
 
 def test_discrimination_is_complete(first):

@@ -905,21 +905,6 @@ def test_a_number_made_worse_is_marked_as_a_miss_and_no_other(change, missed):
     assert sum(row.met is True for row in judged) == len(judged) - len(missed)
 
 
-@pytest.mark.parametrize(("difference", "met"), [(0.099, True), (0.101, False)])
-def test_other_meshes_make_a_row_only_where_they_were_pressed(difference, met):
-    results = good_results()
-    before = rows(results)
-    results["mesh_noise"] = {
-        "meshes": ["one", "another"],
-        "step": [70.0, 76.5],
-        "largest_difference": difference,
-        "limit": 0.1,
-    }
-    added = {name: row for name, row in rows(results).items() if name not in before}
-    assert [row.met for row in added.values()] == [met]
-    assert "70.0, 76.5" in next(iter(added.values())).note
-
-
 def test_deflection_far_from_the_indenter_does_not_decide_between_trials():
     results = good_results()
     line = results["skin_deflection"]["trial1"]["line"]

@@ -14,9 +14,9 @@ from fingerpad.core.files import write_atomically
 from fingerpad.report import drive_quantities
 from fingerpad.report.drive_quantities import gain
 from fingerpad.report.formatting import ABSENT, fixed
-from fingerpad.report.markdown import table as markdown_table
 from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, numbers, png
+from studies.pages.markdown import table as markdown_table
 
 FIGURES = {
     "quantities": "drive_quantities.png",

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from fingerpad.core.files import write_atomically
 from fingerpad.data import paper, psychophysics
 from fingerpad.report.formatting import fixed
-from fingerpad.report.markdown import table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, png
+from studies.pages.markdown import table
 
 FIGURE = "material_sets.png"
 _SIGMA = psychophysics.NOISE_SIGMA.value

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from fingerpad.data import protocol
 from fingerpad.report.formatting import ABSENT, fixed, number
-from fingerpad.report.markdown import PERCENT, share, signed, table
 from fingerpad.report.style import BLACK, BLUE, GREEN, ORANGE, new_figure, numbers, png
+from studies.pages.markdown import PERCENT, share, signed, table
 
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
 LINES: dict[str, dict[str, Any]] = {

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.report.formatting import fixed, joined, number
-from fingerpad.report.markdown import PERCENT, share, signed, table
 from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure, numbers, png
+from studies.pages.markdown import PERCENT, share, signed, table
 from studies.pages.mesh_refinement import ERROR_COLUMNS, RATES, errors
 
 PAGE, NUMBERS, FIGURE = "paper_size.md", "paper_size.json", "paper_size.png"

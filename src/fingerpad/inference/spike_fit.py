@@ -130,7 +130,7 @@ def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 10
 
     Examples
     --------
-    See `fingerpad.experiments.gerling2014.spike_fit`, which recovers an afferent from its own spikes.
+    `tests/test_estimation_spikes.py` recovers an afferent from its own spikes.
     """
     whole("most_steps", most_steps, 1)
     if recorded.n_spikes < N_PARAMETERS:

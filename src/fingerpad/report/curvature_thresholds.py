@@ -1,4 +1,4 @@
-"""Level 3, beyond the paper: curvature thresholds from standard to standard, and how good each code is."""
+"""Level 3, beyond the paper: curvature thresholds from standard to standard."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def caption(section: Mapping[str, Any]) -> str:
 
 
 def tables(section: Mapping[str, Any]) -> list[Table]:
-    """Return thresholds by standard, and efficiencies by code."""
+    """Return thresholds by standard."""
     thresholds = [
         Row(
             (
@@ -174,20 +174,6 @@ def tables(section: Mapping[str, Any]) -> list[Table]:
         for population in section["populations"]
         for entry in population["without_threshold"]
     ]
-    codes = [
-        Row(
-            (
-                plain(row["code"]),
-                plain(row["measure"]),
-                plain(row["noise"]),
-                number(row["receptors"]),
-                _with_error(row["d_prime"], row["d_prime_error"]),
-                _with_error(row["ideal_d_prime"], row["ideal_d_prime_error"]),
-                _with_error(row["efficiency"], row["efficiency_error"]),
-            )
-        )
-        for row in section["efficiency"]
-    ]
     return [
         Table(
             "Curvature thresholds",
@@ -203,15 +189,6 @@ def tables(section: Mapping[str, Any]) -> list[Table]:
             thresholds,
             " ".join(missed),
         ),
-        Table(
-            "How good the codes are",
-            ("code", "measure", "noise", "receptors", "d-prime", "that of the ideal observer", "efficiency"),
-            codes,
-            "Spheres of 287 and 316 1/m. Efficiency is the squared ratio of the two: the share of trials in "
-            "which the ideal observer, who knows how responses vary, would judge as well. Receptors that are "
-            "silent under one of the spheres are left out. The last rows take the spikes of the hold for "
-            "Poisson processes, without other noise.",
-        ),
     ]
 
 
@@ -221,7 +198,3 @@ def _layout(population: Mapping[str, Any]) -> str:
 
 def _per_cent(share: float | None) -> str:
     return fixed(None if share is None else PER_CENT * share, 1) + f"{UNBROKEN}%"
-
-
-def _with_error(value: float | None, error: float | None) -> str:
-    return f"{fixed(value, 2)}{UNBROKEN}±{UNBROKEN}{fixed(error, 2)}"

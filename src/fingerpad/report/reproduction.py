@@ -21,10 +21,8 @@ from fingerpad.report import (
     population_rate,
     recruitment,
     single_unit,
-    single_unit_methods,
     single_unit_uncertainty,
     skin_deflection,
-    spike_fit,
     tables,
 )
 from fingerpad.report.formatting import fixed, joined, number, plain
@@ -115,20 +113,9 @@ def _skin_and_afferent(result: ReproductionResult) -> list[Chapter]:
             [
                 _drawing(5, "single_unit", "Rates under a bar", single_unit.draw, single_unit.caption, unit),
                 *tables.single_unit(unit),
-                *single_unit_methods.tables(unit),
             ],
         ),
     ]
-    if methods := unit.get("methods"):
-        drawing = _drawing(
-            17,
-            "methods",
-            "Methods of fitting on the same folds",
-            single_unit_methods.draw,
-            single_unit_methods.caption,
-            methods,
-        )
-        chapters.append(Chapter("Level 2: methods of fitting", [drawing]))
     if (uncertainty := result.single_unit_uncertainty) is not None:
         drawing = _drawing(
             12,
@@ -155,9 +142,6 @@ def _skin_and_afferent(result: ReproductionResult) -> list[Chapter]:
         chapters.append(
             Chapter("Level 2: quantity that drives the afferent", [drawing, *drive_quantities.table(drives)])
         )
-    if (spikes := result.spike_fit) is not None:
-        drawing = _drawing(11, "spike_fit", "Spikes and their fit", spike_fit.draw, spike_fit.caption, spikes)
-        chapters.append(Chapter("Level 2: spike trains", [drawing, *spike_fit.table(spikes)]))
     return chapters
 
 
@@ -238,8 +222,6 @@ def _population_and_percept(result: ReproductionResult) -> list[Chapter]:
             ],
         )
     )
-    if (meshes := result.mesh_noise) is not None:
-        chapters.append(Chapter("Level 3: noise of the mesh", tables.mesh_noise(meshes)))
     if (thresholds := result.curvature_thresholds) is not None:
         drawing = _drawing(
             16,
@@ -250,7 +232,7 @@ def _population_and_percept(result: ReproductionResult) -> list[Chapter]:
             thresholds,
         )
         chapters.append(
-            Chapter("Level 3: thresholds and efficiency", [drawing, *curvature_thresholds.tables(thresholds)])
+            Chapter("Level 3: curvature thresholds", [drawing, *curvature_thresholds.tables(thresholds)])
         )
     drawing = _drawing(9, "nail", "Stress at the border of the nail", nail.draw, nail.caption, result.nail)
     return [*chapters, Chapter("The border of the nail", [drawing])]

@@ -224,27 +224,6 @@ def readings(section: Mapping[str, Any]) -> list[Table]:
     return [Table("Readings of steps that the paper leaves open", columns, rows, note)] if rows else []
 
 
-def mesh_noise(section: Mapping[str, Any]) -> list[Table]:
-    """Return the step from the standard to the nearest comparison on each mesh."""
-    rows = [
-        Row((mesh, *(fixed(value, 1) for value in sums), fixed(step, 2), fixed(difference, 3)))
-        for mesh, sums, step, difference in zip(
-            section["meshes"], section["static_sum"], section["step"], section["difference"], strict=True
-        )
-    ]
-    columns = (
-        "mesh",
-        *(f"static sum at {number(curvature)} 1/m" for curvature in section["curvature_per_m"]),
-        "step",
-        "step above the first, share",
-    )
-    note = (
-        "In spikes/s. All meshes have the resolution of the run; only where their lines lie differs. Steps "
-        f"shall agree within {number(section['limit'])} of the first."
-    )
-    return [Table("The nearest step on other meshes", columns, rows, note)]
-
-
 def _with_spread(rates: Mapping[str, Any], suffix: str) -> list[str]:
     means = rates[f"hit_rate{suffix}"]
     spreads = rates.get(f"hit_rate{suffix}_sd") or [None] * len(means)

@@ -9,7 +9,7 @@ from fingerpad.data import paper
 from fingerpad.data.published import Published
 from fingerpad.experiments.gerling2014.claim_row import MATERIALS, ClaimRow, claim_row, measured_row
 from fingerpad.experiments.gerling2014.curvature_thresholds import weber_rows
-from fingerpad.experiments.gerling2014.percept_claims import mesh_noise_rows, percept_rows
+from fingerpad.experiments.gerling2014.percept_claims import percept_rows
 
 LEAST_R2 = 0.93
 """R² that Trial 3 must reach under the cylinder: the laboratory's own later fit."""
@@ -31,7 +31,6 @@ def comparison(results: Mapping[str, Any]) -> list[ClaimRow]:
         *_deflection(results["skin_deflection"]),
         *_single_unit(results["single_unit"]),
         *percept_rows(results["discrimination"]),
-        *mesh_noise_rows(results.get("mesh_noise")),
         *weber_rows(results.get("curvature_thresholds")),
         *_nail(results["nail"]),
     ]

@@ -1,4 +1,4 @@
-"""Beyond the paper: the least curvature told apart, from standard to standard, and how good each code is.
+"""Beyond the paper: the least curvature told apart, from standard to standard.
 
     JND(s) = c - s,    where the comparison c is told from the standard s in 75 % of trials
     Weber fraction = JND / s
@@ -23,7 +23,6 @@ from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.data import psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014.claim_row import MATERIALS, ClaimRow, claim_row
-from fingerpad.experiments.gerling2014.code_efficiency import efficiencies
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics import (
@@ -33,7 +32,7 @@ from fingerpad.psychophysics import (
     posterior,
     yes_no,
 )
-from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, gradient_sum, neighbour_pairs
+from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.noise_fit import NOISE_DRAWS, expected_hit_rates, fit_noise_sigma
 from fingerpad.skin.sampling import SkinResponse
 
@@ -69,7 +68,7 @@ def sphere_touches(conditions: Conditions, curvatures_per_m: Sequence[float]) ->
 def result(
     responses: Mapping[float, SkinResponse], afferent: Afferent, noise_sigma: float, seed: int
 ) -> dict[str, Any]:
-    """Thresholds of the static Gradient Sum at several standards, and the efficiency of every code.
+    """Thresholds of the static Gradient Sum at several standards.
 
     Parameters
     ----------
@@ -94,10 +93,7 @@ def result(
     ]
     population = _population("paper", afferent)
     neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
-    answers = [population.respond(responses[curvature]) for curvature in curvatures.tolist()]
-    tables = {
-        name: np.array([read(answer) for answer in answers]) for name, read in RESPONSE_MEASURES.items()
-    }
+    static = np.array([population.respond(responses[at]).static_rate_hz for at in curvatures.tolist()])
     return {
         "seed": seed,
         "proportion": PROPORTION,
@@ -109,8 +105,7 @@ def result(
             "comparison_per_m": psychophysics.THRESHOLD_COMPARISONS.value,
             "weber_fractions": psychophysics.WEBER_FRACTIONS.value,
         },
-        "interpolation": interpolation_errors(curvatures, tables["static"], neighbours),
-        "efficiency": efficiencies(curvatures, tables, neighbours, noise_sigma, seed),
+        "interpolation": interpolation_errors(curvatures, static, neighbours),
     }
 
 

@@ -6,7 +6,7 @@ shifts of the bar and to six folds, and what one drive gains over another is tol
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -17,13 +17,11 @@ from fingerpad.data import protocol
 from fingerpad.inference.fitting import (
     Fit,
     Method,
-    best_of,
     cross_validate,
     interleaved_folds,
 )
-from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.least_squares import LeastSquares
-from fingerpad.inference.fitting.problem import IntArray, Problem
+from fingerpad.inference.fitting.problem import IntArray
 from fingerpad.inference.identifiable import identifiable, six_parameters
 from fingerpad.inference.rate_model import RateModel, Reparametrised
 from fingerpad.inference.rate_problem import RateProblem
@@ -135,51 +133,6 @@ def quick_method(n_added: int = 0) -> LeastSquares:
     """
     starts = np.hstack([START_GRID, np.zeros((len(START_GRID), n_added))])
     return LeastSquares(starts, np.ones(starts.shape[1]), n_refined=2, difference_steps=(0.1, 0.03))
-
-
-@dataclass(frozen=True)
-class BestOf:
-    """Several methods on the same observations, the best score kept: no quantity depends on one's luck.
-
-    Parameters
-    ----------
-    methods : tuple of Method
-        All are tried.
-    name : str
-        What tables call them together.
-    """
-
-    methods: tuple[Method, ...]
-    name: str
-
-    def fit(self, problem: Problem, chosen: IntArray) -> Fit:
-        """Fit by every method."""
-        return best_of(tuple(method.fit(problem, chosen) for method in self.methods))
-
-
-def thorough_method(seed: int, n_added: int = 0) -> Method:
-    """Return the better of least squares from four points and an evolution strategy.
-
-    Parameters
-    ----------
-    seed : int
-        Of the evolution strategy.
-    n_added : int, optional
-        Numbers of a model besides the four relative ones.
-
-    Returns
-    -------
-    Method
-    """
-    quick = quick_method(n_added)
-    start = np.zeros(len(RELATIVE_NAMES) + n_added)
-    return BestOf(
-        (
-            replace(quick, n_refined=4),
-            CovarianceAdaptation(start, np.ones(start.size), most_evaluations=800, seed=seed),
-        ),
-        "least squares and CMA-ES, the better",
-    )
 
 
 @dataclass(frozen=True)
@@ -301,38 +254,6 @@ def gain_interval(
 
     low, high = np.quantile(lost(reference_hz) - lost(better_hz), INTERVAL)
     return float(low), float(high)
-
-
-def information(fss: float, n_rates: int, n_parameters: int) -> dict[str, float]:
-    """Akaike's and the Bayesian information criterion of a least-squares fit; smaller is better.
-
-    With normal residuals whose variances stand in the ratio that the weights of FSS imply, and one unknown
-    scale, -2 ln L = n ln(1 - FSS) + constant, so that
-
-        AIC = n ln(1 - FSS) + 2 k,    BIC = n ln(1 - FSS) + k ln n.
-
-    Parameters
-    ----------
-    fss : float
-        In sample.
-    n_rates : int
-        Observed rates, n.
-    n_parameters : int
-        Free numbers that firing can tell, k.
-
-    Returns
-    -------
-    dict
-        "aic" and "bic", to be compared among fits to the same rates.
-
-    Examples
-    --------
-    >>> one, two = information(0.9, 72, 4), information(0.9, 72, 5)
-    >>> two["aic"] - one["aic"], round(two["bic"] - one["bic"], 2)
-    (2.0, 4.28)
-    """
-    misfit = n_rates * float(np.log1p(-fss))
-    return {"aic": misfit + 2.0 * n_parameters, "bic": misfit + n_parameters * float(np.log(n_rates))}
 
 
 def row(

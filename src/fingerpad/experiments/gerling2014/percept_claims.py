@@ -51,24 +51,6 @@ def percept_rows(found: Mapping[str, Any]) -> list[ClaimRow]:
     ]
 
 
-def mesh_noise_rows(found: Mapping[str, Any] | None) -> list[ClaimRow]:
-    """Judge whether the nearest step is the skin's; no row where no further mesh was pressed."""
-    if not found:
-        return []
-    steps = ", ".join(f"{step:.1f}" for step in found["step"])
-    return [
-        claim_row(
-            "Step of the static Gradient Sum from 287 to 296 /m on other meshes of the same resolution",
-            "not told",
-            f"differs by {found['largest_difference']:.1%} at most",
-            "",
-            MATERIALS,
-            bool(found["largest_difference"] <= found["limit"]),
-            f"judged: within {found['limit']:.0%}; steps of {steps} spikes/s on {', '.join(found['meshes'])}",
-        )
-    ]
-
-
 def _noise(found: Mapping[str, Any]) -> ClaimRow:
     rises, needed = (found["reasons"][key]["static"] for key in ("rise", "rise_for_paper_noise"))
     told = " and ".join("none" if rise is None else f"{rise:.0%}" for rise in needed)

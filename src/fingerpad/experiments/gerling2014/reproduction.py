@@ -13,21 +13,17 @@ import numpy as np
 from fingerpad.core.checks import whole
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
-from fingerpad.data import all_published, protocol
+from fingerpad.data import all_published
 from fingerpad.experiments.conditions import Conditions, Touch
 from fingerpad.experiments.gerling2014 import (
     curvature_thresholds,
     drive_quantities,
-    mesh_noise,
     nail_border,
     response_maps,
     single_unit,
-    single_unit_methods,
-    single_unit_starts,
     single_unit_uncertainty,
     skin_deflection,
     sphere_discrimination,
-    spike_fit,
 )
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow
 from fingerpad.experiments.gerling2014.comparison import comparison
@@ -110,7 +106,7 @@ class ReproductionResult:
         Level 2, see `single_unit`.
     discrimination, population, nail : dict
         Level 3, see `sphere_discrimination`, `response_maps` and `nail_border`.
-    mesh_noise, drive_quantities, spike_fit, single_unit_uncertainty, curvature_thresholds, population_timing
+    drive_quantities, single_unit_uncertainty, curvature_thresholds, population_timing : dict, optional
         What goes beyond the paper, None where it was not asked for.
     comparison : tuple of ClaimRow
         The paper's numbers beside ours.
@@ -127,9 +123,7 @@ class ReproductionResult:
     discrimination: dict[str, Any]
     population: dict[str, Any]
     nail: dict[str, Any]
-    mesh_noise: dict[str, Any] | None = None
     drive_quantities: dict[str, Any] | None = None
-    spike_fit: dict[str, Any] | None = None
     single_unit_uncertainty: dict[str, Any] | None = None
     curvature_thresholds: dict[str, Any] | None = None
     population_timing: dict[str, Any] | None = None
@@ -171,7 +165,6 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
         "spheres": spheres,
     }
     if run.goes_beyond:
-        wanted["spheres, other meshes"] = mesh_noise.touches(conditions)
         wanted["spheres, other curvatures"] = curvature_thresholds.touches(conditions)
     responses = runner.responses(wanted)
     deflection, bar_responses = responses["skin deflection"], responses["bar, 36 shifts"]
@@ -195,27 +188,11 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
         }
         advance()
     if run.goes_beyond:
-        with runner.stage("beyond the paper", 8) as advance:
+        with runner.stage("beyond the paper", 4) as advance:
             traces = drive_quantities.receptor_traces(bars, drive_quantities.SHOWN_QUANTITIES)
-            results["single_unit"]["starts"] = single_unit_starts.result(problem, traces["von_mises"])
-            advance()
-            results["single_unit"]["methods"] = single_unit_methods.result(
-                single_unit_methods.traces_beside(bars),
-                drive_quantities.traces_of(traces, drive_quantities.EXTENDED),
-                problem.recordings,
-                (best, folds),
-            )
-            advance()
-            results["mesh_noise"] = mesh_noise.result(
-                responses["spheres, other meshes"], sphere_responses, afferent
-            )
-            advance()
             results["drive_quantities"] = drive_quantities.result(
                 traces, problem.recordings, np.random.default_rng(conditions.seed)
             )
-            advance()
-            shift_mm = np.array(protocol.BAR_SHIFTS.value)
-            results["spike_fit"] = spike_fit.result(bar_sed, afferent, shift_mm, conditions.seed)
             advance()
             results["single_unit_uncertainty"] = single_unit_uncertainty.result(
                 bar_sed, best.parameters, conditions.seed

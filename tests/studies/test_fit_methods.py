@@ -9,7 +9,7 @@ import pytest
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import neuron, paper, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
-from fingerpad.experiments.gerling2014 import single_unit, single_unit_methods, single_unit_starts
+from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.inference import afferent_methods
 from fingerpad.inference.afferent_methods import OFFSETS_MM, four_number_problem
@@ -17,7 +17,8 @@ from fingerpad.inference.fitting import interleaved_folds
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import start_points
-from fingerpad.report import single_unit_methods as report
+from studies import fit_methods, fit_starts
+from studies.pages import fit_methods as report
 
 SHIFT_MM = np.array(protocol.BAR_SHIFTS.value)
 TIMES_MS = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 100.0, 300.0, 1000.0])
@@ -61,7 +62,7 @@ def recordings() -> RateRecordings:
 @pytest.fixture(scope="module")
 def starts(recordings) -> dict:
     problem = replace(single_unit.rate_problem(traces(scale=0.6)), recordings=recordings)
-    return single_unit_starts.result(problem, traces(scale=10.0))
+    return fit_starts.result(problem, traces(scale=10.0))
 
 
 def test_each_unit_multiplies_the_printed_gains(starts, recordings):
@@ -97,8 +98,8 @@ def test_the_papers_session_leaves_its_fold_out_and_begins_where_it_says(starts,
     assert (printed["static_scale"], printed["dynamic_scale"]) == (1.0, 1.0)
     assert second["dynamic_scale"] == pytest.approx(1000.0 * second["static_scale"])
     reached = [
-        problem.score(single_unit_starts.scaled_start(2, scale, 1000.0 * scale), training)
-        for scale in single_unit_starts.SEARCHED_SCALES
+        problem.score(fit_starts.scaled_start(2, scale, 1000.0 * scale), training)
+        for scale in fit_starts.SEARCHED_SCALES
     ]
     wanted = paper.FOLD_3_FSS_START.value
     assert abs(second["fss_start"] - wanted) == min(abs(fss - wanted) for fss in reached) > 0.0
@@ -120,7 +121,7 @@ def found(recordings) -> dict:
         patch.setattr(afferent_methods, "N_REFINED", 1)
         beside = {offset: traces(offset) for offset in OFFSETS_MM}
         problem = replace(single_unit.rate_problem(traces()), recordings=recordings)
-        return single_unit_methods.result(beside, extended(), recordings, single_unit.fit(problem))
+        return fit_methods.result(beside, extended(), recordings, single_unit.fit(problem))
 
 
 def test_every_method_is_judged_on_the_same_folds(found):
@@ -151,7 +152,7 @@ def test_the_model_that_made_the_rates_fits_them_and_the_papers_does_not(found):
 
 def test_residual_shares_are_the_squares_of_each_phase_and_place(recordings):
     problem = four_number_problem(AfferentModel.of_traces(traces()), recordings)
-    shares = single_unit_methods.residual_shares(problem, FOUR)
+    shares = fit_methods.residual_shares(problem, FOUR)
     dynamic, static = problem.model.evaluate(FOUR)
     flat = np.abs(SHIFT_MM) < 1.2
     lost = 1.0 - problem.score(FOUR, EVERYTHING)
@@ -166,7 +167,7 @@ def test_residual_shares_are_the_squares_of_each_phase_and_place(recordings):
 
 def test_ceilings_of_the_observed_rates_are_the_known_ones():
     """Reference: left-right symmetric predictions reach 0.957, 0.986 and 0.979."""
-    reached = single_unit_methods.ceilings(traces(), single_unit.bar_recordings())
+    reached = fit_methods.ceilings(traces(), single_unit.bar_recordings())
     assert [round(reached["symmetric"][key], 3) for key in ("dynamic", "static", "weighted")] == [
         0.957,
         0.986,
@@ -177,14 +178,14 @@ def test_ceilings_of_the_observed_rates_are_the_known_ones():
 def test_rates_that_rise_with_energy_can_be_predicted_by_a_rising_rate():
     felt = energy_kpa()[-1]
     rising = RateRecordings(tuple(f"{shift:g}" for shift in SHIFT_MM), 40.0 * felt, 10.0 * felt**2)
-    reached = single_unit_methods.ceilings(traces(), rising)
+    reached = fit_methods.ceilings(traces(), rising)
     assert reached["rising"] == {key: pytest.approx(1.0) for key in ("dynamic", "static", "weighted")}
     falling = replace(rising, static_rate_hz=10.0 - 3.0 * felt)
-    assert single_unit_methods.ceilings(traces(), falling)["rising"]["static"] < 0.99
+    assert fit_methods.ceilings(traces(), falling)["rising"]["static"] < 0.99
     # Nothing that rises is better than the mean then.
     static = falling.static_rate_hz
     constant = 1.0 - ((static - static.mean()) @ (static - static.mean())) / (static @ static)
-    assert single_unit_methods.ceilings(traces(), falling)["rising"]["static"] == pytest.approx(constant)
+    assert fit_methods.ceilings(traces(), falling)["rising"]["static"] == pytest.approx(constant)
 
 
 def test_the_skin_is_sampled_beside_the_receptor_and_for_the_other_quantity():
@@ -203,7 +204,7 @@ def test_the_skin_is_sampled_beside_the_receptor_and_for_the_other_quantity():
             return SedTraces(self.times_ms, self.sample("stored", sites), np.array(self.kinks_ms))
 
     skins = [Skin(1.0), Skin(2.0)]
-    beside = single_unit_methods.traces_beside(skins)
+    beside = fit_methods.traces_beside(skins)
     assert tuple(beside) == (-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
     np.testing.assert_allclose(beside[0.2].sed_kpa[1], [1.2, 2.4], rtol=1e-12)
     stress = single_unit.receptor_traces(skins, "von_mises")
@@ -231,3 +232,50 @@ def test_tables_show_what_was_found(starts, found):
     assert [row.cells[0] for row in methods.rows] == [row["method"] for row in found["methods"]]
     assert methods.rows[3].cells[4] == f"{found['methods'][3]['fss_out_of_sample']:.3f}"
     assert report.tables({}) == []
+
+
+def methods_found() -> dict:
+    def scores(mean: float) -> dict:
+        return {"fss_in_sample": mean + 0.02, "fss_out_of_sample": mean, "fss_training_mean": mean + 0.03}
+
+    places = ("dynamic_flat", "dynamic_elsewhere", "static_flat", "static_elsewhere")
+    phases = {"dynamic": 0.95, "static": 0.98, "weighted": 0.97}
+    return {
+        "methods": [
+            {
+                "method": name,
+                "free_numbers": free,
+                **scores(mean),
+                "fss_train": [mean + 0.03 - 0.002 * fold for fold in range(6)],
+                "fss_test": [mean - 0.05 + 0.02 * fold for fold in range(6)],
+                "runs": runs,
+            }
+            for name, free, mean, runs in (("response surface", 6, 0.87, 5474), ("CMA-ES", 4, 0.88, 500))
+        ],
+        "models": [
+            {
+                "model": "receptor beside its place",
+                **scores(0.88),
+                "fss_in_sample_dynamic": 0.75,
+                "fss_in_sample_static": 0.96,
+                "residual_share": dict.fromkeys(places, 0.25),
+                "parameters": {"offset_mm": 0.05},
+            }
+        ],
+        "models_fitted_by": "CMA-ES",
+        "ceilings": {"symmetric": phases, "rising": phases},
+    }
+
+
+def test_methods_are_drawn_fold_by_fold_with_their_effort():
+    found = methods_found()
+    scores, effort = report.draw(found).axes
+    by_height = {line.get_ydata()[0]: line.get_xdata().tolist() for line in scores.get_lines()}
+    for height, row in enumerate(found["methods"]):
+        assert by_height[height - 0.14] == row["fss_train"]
+        assert by_height[height + 0.14] == row["fss_test"]
+    means = [segments.get_segments()[0][0, 0] for segments in scores.collections]
+    keys = ("fss_training_mean", "fss_out_of_sample")
+    assert means == [row[key] for key in keys for row in found["methods"]]
+    assert [bar.get_width() for bar in effort.patches] == [row["runs"] for row in found["methods"]]
+    assert "lie within 0.010 of each other out of sample, the folds within 0.11" in (report.caption(found))

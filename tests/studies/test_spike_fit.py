@@ -8,8 +8,6 @@ import pytest
 
 from fingerpad.core.random_streams import Presentations
 from fingerpad.core.signals import SedTraces
-from fingerpad.experiments.gerling2014 import interval_variability, spike_fit
-from fingerpad.experiments.gerling2014.interval_variability import SETTLED_MS, SOURCES, held_at_its_rate
 from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.inference.soft_afferent import soft_spikes
 from fingerpad.inference.spike_parameters import (
@@ -18,8 +16,10 @@ from fingerpad.inference.spike_parameters import (
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.spikes import interval_statistics
 from fingerpad.neuron.transduction import drive
-from fingerpad.report import spike_fit as report
 from fingerpad.report.style import png
+from studies import isi_variability, spike_fit
+from studies.isi_variability import SETTLED_MS, SOURCES, held_at_its_rate
+from studies.pages import spike_fit as report
 
 SHIFT_MM = np.linspace(-3.5, 3.5, 8)
 AFFERENT = Afferent()
@@ -46,7 +46,7 @@ def found():
 def test_the_held_afferent_keeps_its_rate_whatever_the_noise(found):
     """Made again, at the factor that was found: as many spikes as without noise."""
     membrane = AFFERENT.membrane
-    current_ma = interval_variability.largest_held_current_ma(drive(bar(), pieces=8), AFFERENT)
+    current_ma = isi_variability.largest_held_current_ma(drive(bar(), pieces=8), AFFERENT)
     charging = -membrane.time_constant_ms * math.log1p(
         -membrane.threshold_mv * membrane.capacitance_mf / (current_ma * membrane.time_constant_ms)
     )
@@ -55,7 +55,7 @@ def test_the_held_afferent_keeps_its_rate_whatever_the_noise(found):
     for source in SOURCES[:4]:
         held = held_at_its_rate(source, membrane, current_ma, source.amounts[2], SEED)
         trains = source.spikes(membrane, current_ma, held.current_factor, source.amounts[2], SEED)
-        statistics = interval_statistics(trains, (SETTLED_MS, interval_variability.DURATION_MS))
+        statistics = interval_statistics(trains, (SETTLED_MS, isi_variability.DURATION_MS))
         assert held.rate_kept
         assert 1000.0 / np.mean(statistics.mean_ms) == pytest.approx(wanted_hz, rel=0.03)
         assert held.coefficient_of_variation == pytest.approx(
@@ -148,6 +148,14 @@ def test_a_silent_afferent_makes_an_empty_section_that_can_be_drawn():
 
 
 # The report
+
+
+def test_spikes_that_cannot_be_fitted_have_a_row_without_an_estimate(found):
+    section = plain(found)
+    section["other_noise"].append({"name": "white noise of the current", "amount": 0.3, "n_spikes": 3})
+    _, others, _ = report.table(section)
+    assert {len(row.cells) for row in others.rows} == {len(others.columns)}
+    assert others.rows[-1].cells[3:8] == ("–",) * 5
 
 
 def test_the_figure_and_the_tables_say_what_was_found(found):

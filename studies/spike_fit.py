@@ -18,8 +18,6 @@ from fingerpad.core.random_streams import Presentations
 from fingerpad.core.signals import SedTraces, SpikeTrains
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data import protocol
-from fingerpad.experiments.gerling2014 import interval_variability
-from fingerpad.experiments.gerling2014.interval_variability import CORRELATION_MS, SOFT_THRESHOLD, STEP_MS
 from fingerpad.inference.identifiable import identifiable
 from fingerpad.inference.soft_afferent import soft_membrane, soft_spikes
 from fingerpad.inference.spike_fit import SpikeFit, fit_spikes
@@ -41,6 +39,8 @@ from fingerpad.neuron.membrane_noise import (
 )
 from fingerpad.neuron.noisy_lif import noisy_spikes
 from fingerpad.neuron.transduction import Drive, drive
+from studies import isi_variability
+from studies.isi_variability import CORRELATION_MS, SOFT_THRESHOLD, STEP_MS
 
 WIDTH = 0.2
 """Width of the true threshold over the threshold."""
@@ -51,7 +51,7 @@ PIECES = 8
 """Linear pieces of the drive per interval of mechanics: spikes are made and fitted with the same ones."""
 
 OTHER_AMOUNT = 0.3
-"""Of each other noise; its meaning is that of `fingerpad.experiments.gerling2014.interval_variability`."""
+"""Of each other noise; its meaning is that of `studies.isi_variability`."""
 
 N_QUANTILES = 100
 SHOWN_MS = (0.0, 250.0)
@@ -76,8 +76,8 @@ def truth(driven: Drive, afferent: Afferent, seed: int) -> FloatArray:
     -------
     array (5,)
     """
-    current_ma = interval_variability.largest_held_current_ma(driven, afferent)
-    kept = interval_variability.held_at_its_rate(SOFT_THRESHOLD, afferent.membrane, current_ma, WIDTH, seed)
+    current_ma = isi_variability.largest_held_current_ma(driven, afferent)
+    kept = isi_variability.held_at_its_rate(SOFT_THRESHOLD, afferent.membrane, current_ma, WIDTH, seed)
     four = identifiable(afferent.parameters)
     return np.array([*(kept.current_factor * four[:3]), four[3], WIDTH])
 
@@ -99,7 +99,7 @@ def result(sed: SedTraces, afferent: Afferent, shift_mm: FloatArray, seed: int) 
     Returns
     -------
     dict
-        `variability` as `fingerpad.experiments.gerling2014.interval_variability.result`; `recovery` and
+        `variability` as `studies.isi_variability.result`; `recovery` and
         `raster`, None for an
         afferent that is silent or spikes that cannot be fitted; `other_noise`, a row per source.
     """
@@ -109,7 +109,7 @@ def result(sed: SedTraces, afferent: Afferent, shift_mm: FloatArray, seed: int) 
         "n_positions": sed.n_sites,
         "names": SPIKE_PARAMETER_NAMES,
         "units": SPIKE_PARAMETER_UNITS,
-        "variability": interval_variability.result(driven, afferent, seed),
+        "variability": isi_variability.result(driven, afferent, seed),
         "recovery": None,
         "raster": None,
         "other_noise": [],
@@ -191,7 +191,7 @@ def _other_noise(
 ) -> list[dict[str, Any]]:
     """Fit a soft threshold to spikes that the afferent made with a hard one and other noise."""
     current = afferent.transduction.current(driven)
-    held_ma = interval_variability.largest_held_current_ma(driven, afferent)
+    held_ma = isi_variability.largest_held_current_ma(driven, afferent)
     sources = {
         "white noise of the current": MembraneNoise(
             current=WhiteCurrentNoise(OTHER_AMOUNT * held_ma * CORRELATION_MS**0.5, STEP_MS)

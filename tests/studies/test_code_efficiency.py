@@ -1,0 +1,74 @@
+"""Efficiencies of codes against the ideal observer of the same responses."""
+
+import numpy as np
+import pytest
+
+from fingerpad.core.signals import SedTraces
+from fingerpad.experiments.conditions import RECEPTOR_X_MM
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.population import Population
+from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, neighbour_pairs
+from studies import code_efficiency
+from studies.pages import code_efficiency as page
+
+CURVATURES = (287.0, 316.0)
+AFFERENT = Afferent(static_gain=1.2e-6)
+POPULATION = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
+PAIRS = neighbour_pairs(POPULATION.positions_mm, POPULATION.pitch_mm)
+
+
+class BallSkin:
+    """SED below a ball: the more curved, the higher and narrower."""
+
+    def __init__(self, curvature_per_m):
+        sharpness = curvature_per_m / 287.0
+        self.peak_kpa, self.width_mm = 2.5 * sharpness, 2.5 / sharpness**0.25
+
+    def sed(self, sites):
+        squared = np.square(np.asarray(sites) - (RECEPTOR_X_MM, 0.0)).sum(axis=1)
+        peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
+        return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.85], peaks), kinks_ms=[50.0])
+
+
+@pytest.fixture(scope="module")
+def found():
+    answers = [POPULATION.respond(BallSkin(curvature)) for curvature in CURVATURES]
+    tables = {
+        name: np.array([read(answer) for answer in answers]) for name, read in RESPONSE_MEASURES.items()
+    }
+    return code_efficiency.efficiencies(np.array(CURVATURES), tables, PAIRS, 0.06, seed=0)
+
+
+def test_no_code_is_more_efficient_than_the_ideal_observer(found):
+    rows = found
+    assert {(row["code"], row["measure"], row["noise"]) for row in rows} >= {
+        ("Gradient Sum", "static", "multiplied"),
+        ("Euclidean Distance", "latency", "multiplied"),
+        ("Gradient Sum", "static", "Poisson"),
+    }
+    for row in rows:
+        assert row["efficiency"] < 1.0 + 3.0 * row["efficiency_error"]
+        assert row["proportion_correct"] <= row["ideal_proportion_correct"] + 0.01
+
+
+def test_silent_receptors_are_left_out_of_efficiencies():
+    curvatures = np.array(code_efficiency.PAIR_PER_M)
+    static = np.array([[30.0, 0.0, 20.0, 10.0], [33.0, 0.0, 21.0, 9.0]])
+    latency = np.array([[10.0, np.nan, 12.0, 30.0], [10.0, 70.0, 11.0, 33.0]])
+    pairs = np.array([[0, 1], [1, 2], [0, 3]])
+    rows = code_efficiency.efficiencies(
+        curvatures, {"static": static, "latency": latency}, pairs, 0.1, seed=0
+    )
+    assert [row["receptors"] for row in rows] == [3, 3, 3, 3, 4, 4]
+    alone = code_efficiency.efficiencies(
+        curvatures, {"static": static, "latency": latency[:, [0, 3]]}, np.array([[0, 1]]), 0.1, seed=0
+    )
+    # Of the pairs of latencies only that of receptors 0 and 3 has both.
+    assert alone[2]["code"] == rows[2]["code"] == "Gradient Sum"
+    assert rows[2]["d_prime"] == pytest.approx(alone[2]["d_prime"], abs=0.1)
+
+
+def test_the_table_has_a_row_per_code_measure_and_noise(found):
+    (table,) = page.tables(found)
+    assert len(table.rows) == len(found)
+    assert {len(row.cells) for row in table.rows} == {len(table.columns)}
