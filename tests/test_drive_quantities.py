@@ -26,6 +26,7 @@ from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.report import drive_quantities as report
 from fingerpad.report.style import png
 from studies import drive_study, dynamic_response
+from studies.drive_fits import BestOf, information, thorough_method
 from studies.dynamic_response import EXPLANATIONS, ExplainedModel, Patch, low_passed
 from studies.pages import drive_study as drives_report
 
@@ -227,9 +228,9 @@ def test_the_best_of_several_methods_is_kept_with_the_effort_of_all():
         def fit(self, asked, chosen):
             return Fit(np.zeros(1), next(scores), 10, 0.0, ())
 
-    best = drive_fits.BestOf((Fixed(), Fixed(), Fixed()), "three").fit(None, np.arange(2))
+    best = BestOf((Fixed(), Fixed(), Fixed()), "three").fit(None, np.arange(2))
     assert (best.score, best.n_evaluations) == (0.7, 30)
-    assert [method.name for method in drive_fits.thorough_method(3, 1).methods] == ["least squares", "CMA-ES"]
+    assert [method.name for method in thorough_method(3, 1).methods] == ["least squares", "CMA-ES"]
 
 
 # What a difference is worth
@@ -265,7 +266,7 @@ def test_information_criteria_are_those_of_normal_residuals_of_unknown_scale():
     rng = np.random.default_rng(5)
     residuals = [rng.normal(0.0, scale, 40) for scale in (1.0, 1.3)]
     squares = 200.0
-    criteria = [drive_fits.information(1.0 - r @ r / squares, 40, 3) for r in residuals]
+    criteria = [information(1.0 - r @ r / squares, 40, 3) for r in residuals]
     minus_two_log = [-2.0 * norm.logpdf(r, scale=np.sqrt(r @ r / 40)).sum() for r in residuals]
     assert_allclose(criteria[1]["aic"] - criteria[0]["aic"], minus_two_log[1] - minus_two_log[0], rtol=1e-10)
     assert_allclose(criteria[0]["bic"] - criteria[0]["aic"], 3 * (np.log(40) - 2.0), rtol=1e-10)
@@ -467,7 +468,7 @@ def test_explanations_are_judged_alike_and_told_by_what_they_add(monkeypatch):
     def short(seed, n_added):
         return replace(drive_fits.quick_method(n_added), n_refined=1, difference_steps=(0.1,))
 
-    monkeypatch.setattr(drive_fits, "thorough_method", short)
+    monkeypatch.setattr(drive_study, "thorough_method", short)
     by_name = {explanation.name: explanation for explanation in EXPLANATIONS}
     names = ("the paper's model", "offset of the receptor", "dynamic term follows compressive stress")
     chosen = tuple(by_name[name] for name in names)
