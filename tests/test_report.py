@@ -686,8 +686,6 @@ def test_what_does_not_exist_is_drawn_as_nothing_and_written_as_a_dash(tmp_path)
 BEYOND = (
     "single_unit_uncertainty",
     "drive_quantities",
-    "spike_fit",
-    "mesh_noise",
     "curvature_thresholds",
     "population_timing",
 )
