@@ -1,5 +1,7 @@
 """What a fit to recordings tells beside itself: the receptor's place, profiles, and sensitivity."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -9,7 +11,7 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.fit import rate_uncertainty
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.experiments.fit.offset import check_offset, fit_offset
-from fingerpad.experiments.fit.posterior import profiled
+from fingerpad.experiments.fit.posterior import RatePosterior, profiled
 from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_likelihood import RateLikelihood
@@ -84,29 +86,29 @@ def test_stimuli_that_move_in_their_own_time_are_felt_beside_as_well():
 @pytest.mark.parametrize("method", ["least_squares", "cma_es"])
 def test_a_receptor_beside_its_place_is_found(method, fitted):
     if method == "least_squares":
-        found, error = fitted["offset"], 0.02
+        found, error = fitted.offset, 0.02
     else:
         found, error = fit_offset(BESIDE, ASIDE, np.arange(9) % 2, method, WINDOWS_MS), 0.02
-    assert found["offset_mm"] == pytest.approx(TRUE_OFFSET_MM, abs=error)
-    assert found["fss_in_sample"] > 0.999
-    assert found["identifiable"]["dynamic_gain_per_kpa"] == pytest.approx(identifiable(KNOWN)[1], rel=0.1)
+    assert found.offset_mm == pytest.approx(TRUE_OFFSET_MM, abs=error)
+    assert found.fss_in_sample > 0.999
+    assert found.identifiable["dynamic_gain_per_kpa"] == pytest.approx(identifiable(KNOWN)[1], rel=0.1)
 
 
 def test_the_fit_in_its_place_stands_beside_it_and_the_receptor_held_there_is_that_fit(fitted):
-    found = fitted["offset"]
-    assert found["fss_out_of_sample"] > fitted["fss_out_of_sample"] + 0.01
-    held = dict(zip(found["held"]["offset_mm"], found["held"]["fss_in_sample"], strict=True))
-    assert held[0.0] == fitted["fss_in_sample"] < found["fss_in_sample"]
+    found = fitted.offset
+    assert found.fss_out_of_sample > fitted.fss_out_of_sample + 0.01
+    held = dict(zip(found.held.offset_mm, found.held.fss_in_sample, strict=True))
+    assert held[0.0] == fitted.fss_in_sample < found.fss_in_sample
     assert held[0.3] > held[-0.3]
-    assert len(found["folds_mm"]) == len(fitted["folds"])
-    scatter = np.array(found["folds_mm"]) - np.mean(found["folds_mm"])
-    assert found["standard_error_mm"] == pytest.approx(np.sqrt(2.0 / 3.0 * scatter @ scatter))
+    assert len(found.folds_mm) == len(fitted.folds)
+    scatter = np.array(found.folds_mm) - np.mean(found.folds_mm)
+    assert found.standard_error_mm == pytest.approx(np.sqrt(2.0 / 3.0 * scatter @ scatter))
 
 
 def test_a_receptor_that_may_move_never_fits_worse():
     found = fit_offset(BESIDE, IN_PLACE, np.arange(9) % 2, "least_squares", WINDOWS_MS)
-    assert found["fss_in_sample"] >= found["held"]["fss_in_sample"][1]
-    assert abs(found["offset_mm"]) < 0.02
+    assert found.fss_in_sample >= found.held.fss_in_sample[1]
+    assert abs(found.offset_mm) < 0.02
 
 
 @pytest.mark.parametrize(
@@ -183,8 +185,8 @@ def test_scores_of_rows_are_those_of_the_problem_for_one_phase_as_well():
 
 
 def test_ranges_are_shares_of_the_fit_and_a_gain_of_nothing_has_one_too(fitted):
-    found = fitted["sensitivity"]
-    four = np.array(list(fitted["identifiable"].values()))
+    found = fitted.sensitivity
+    four = np.array(list(fitted.identifiable.values()))
     assert_allclose(found["lower"], np.minimum(0.75 * four, 1.25 * four), rtol=1e-12)
     problem = RateProblem(four_number_model(MODEL), IN_PLACE)
     nothing = rate_uncertainty.sensitivity(problem, [0.0, 0.0, 0.018, 60.0], 1)
@@ -200,7 +202,7 @@ def test_ranges_are_shares_of_the_fit_and_a_gain_of_nothing_has_one_too(fitted):
 @pytest.fixture(scope="module")
 def section(fitted):
     profile = {"values": [1.0, 2.0, 3.0], "losses": [3.0, 0.0, 2.5], "low": None, "high": 2.8}
-    return fitted | {"profiles": [profile | {"name": name} for name in IDENTIFIABLE_NAMES]}
+    return replace(fitted, profiles=tuple(profile | {"name": name} for name in IDENTIFIABLE_NAMES))
 
 
 def test_figures_draw_what_was_found(section):
@@ -209,18 +211,30 @@ def test_figures_draw_what_was_found(section):
     assert panels[3].get_xlabel() == "τ [ms]"
     (bars,) = report.draw_sensitivity(section).axes
     heights = [patch.get_height() for patch in bars.patches]
-    assert heights == section["sensitivity"]["total"] + section["sensitivity"]["first"]
+    assert heights == section.sensitivity["total"] + section.sensitivity["first"]
     (axes,) = report.draw_offset(section).axes
     lines = {line.get_label(): line for line in axes.lines}
-    assert lines["held there"].get_ydata().tolist() == section["offset"]["held"]["fss_in_sample"]
-    assert lines["fitted to all"].get_xdata().tolist() == [section["offset"]["offset_mm"]]
-    assert lines["fitted without a fold"].get_xdata().tolist() == section["offset"]["folds_mm"]
+    assert lines["held there"].get_ydata().tolist() == section.offset.held.fss_in_sample.tolist()
+    assert lines["fitted to all"].get_xdata().tolist() == [section.offset.offset_mm]
+    assert lines["fitted without a fold"].get_xdata().tolist() == section.offset.folds_mm.tolist()
     for draw in (report.draw_profiles, report.draw_sensitivity, report.draw_offset):
         assert png(draw, section).startswith(b"\x89PNG")
 
 
 def test_credible_intervals_are_drawn_where_there_are_some(section):
-    drawn = section | {"posterior": {"interval": {name: [1.5, 2.5] for name in IDENTIFIABLE_NAMES}}}
+    posterior = RatePosterior(
+        level=0.95,
+        seed=1,
+        n_draws=10,
+        n_evaluations=20,
+        largest_r_hat=1.0,
+        smallest_effective_size=9.0,
+        median=dict.fromkeys(IDENTIFIABLE_NAMES, 2.0),
+        interval=dict.fromkeys(IDENTIFIABLE_NAMES, (1.5, 2.5)),
+        covariance=np.eye(4),
+        bands={},
+    )
+    drawn = replace(section, posterior=posterior)
     panels = zip(report.draw_profiles(drawn).axes, report.draw_profiles(section).axes, strict=True)
     assert all(len(more.lines) == len(fewer.lines) + 1 for more, fewer in panels)
     assert "credible interval" in report.caption_profiles(drawn)
@@ -228,13 +242,13 @@ def test_credible_intervals_are_drawn_where_there_are_some(section):
 
 
 def test_words_and_tables_hold_the_numbers(section):
-    found = section["offset"]
-    assert f"fitted at {found['offset_mm']:.3g} mm" in report.caption_offset(section)
+    found = section.offset
+    assert f"fitted offset is {found.offset_mm:.3g} mm" in report.caption_offset(section)
     (table,) = report.offset_tables(section)
-    assert table.rows[1].cells[3] == f"{found['fss_in_sample']:.3f}"
-    assert table.rows[0].cells[6] == f"{section['fss_out_of_sample']:.3f}"
+    assert table.rows[1].cells[3] == f"{found.fss_in_sample:.3f}"
+    assert table.rows[0].cells[6] == f"{section.fss_out_of_sample:.3f}"
     assert all(len(row.cells) == len(table.columns) for row in table.rows)
     assert report.profile_tables(section)[0].rows[0].cells[-1] == "open … 2.8"
-    most = max(zip(section["sensitivity"]["total"], ("β", "k_d", "k_s", "τ"), strict=True))[1]
+    most = max(zip(section.sensitivity["total"], ("β", "k_d", "k_s", "τ"), strict=True))[1]
     assert f"Most depends on {most}" in report.caption_sensitivity(section)
     assert len(report.sensitivity_tables(section)[0].rows) == 4

@@ -6,6 +6,7 @@ import re
 import shlex
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,15 +18,18 @@ from fingerpad.cli import choices
 from fingerpad.core.compilation import NOTICE
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Presentations
+from fingerpad.core.results import to_json
 from fingerpad.core.signals import SedTraces, SpikeTrains
 from fingerpad.data import bar_firing_rates, protocol
+from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.fit import fit as study
 from fingerpad.experiments.fit import posterior as recording_posterior
 from fingerpad.experiments.fit import session
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
-from fingerpad.experiments.fit.posterior import posterior
+from fingerpad.experiments.fit.posterior import PhaseBands, RateBand, RatePosterior, posterior
 from fingerpad.experiments.gerling2014 import single_unit
+from fingerpad.experiments.manifest import sha256
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.stimuli import INDENTERS, ShiftedBar, TactileStimulus
 from fingerpad.geometry.edged_indenters import Gap
@@ -71,10 +75,10 @@ def recovered():
 
 
 def test_rates_of_a_known_afferent_are_recovered_in_and_out_of_sample(recovered):
-    assert recovered["fss_in_sample"] > 0.9999
-    assert recovered["fss_out_of_sample"] > 0.998
-    np.testing.assert_allclose(recovered["static_rate_hz"], RATES.static_rate_hz, rtol=0, atol=1.0)
-    _, dynamic_gain, static_gain, _ = recovered["identifiable"].values()
+    assert recovered.fss_in_sample > 0.9999
+    assert recovered.fss_out_of_sample > 0.998
+    np.testing.assert_allclose(recovered.phases["static"].fitted_hz, RATES.static_rate_hz, rtol=0, atol=1.0)
+    _, dynamic_gain, static_gain, _ = recovered.identifiable.values()
     # The intercept and tau trade off along a valley; the gains do not.
     np.testing.assert_allclose([dynamic_gain, static_gain], identifiable(KNOWN)[1:3], rtol=0.05)
 
@@ -84,10 +88,10 @@ def test_rates_of_a_known_afferent_are_recovered_in_and_out_of_sample(recovered)
 )
 def test_every_method_recovers_them(method, fss):
     fitted = study.fit_recordings(SED, RATES, np.arange(8) % 2, method=method)
-    assert fitted["method"] == method
-    assert fitted["fss_in_sample"] > fss
-    assert fitted["fss_out_of_sample"] > 0.98
-    np.testing.assert_allclose(fitted["identifiable"]["dynamic_gain_per_kpa"], 2.4, rtol=0.05)
+    assert fitted.method == method
+    assert fitted.fss_in_sample > fss
+    assert fitted.fss_out_of_sample > 0.98
+    np.testing.assert_allclose(fitted.identifiable["dynamic_gain_per_kpa"], 2.4, rtol=0.05)
 
 
 def test_stimuli_that_move_in_their_own_time_have_slopes_in_closed_form_in_their_order():
@@ -105,15 +109,15 @@ def test_stimuli_that_move_in_their_own_time_have_slopes_in_closed_form_in_their
 def test_spikes_of_a_known_afferent_give_the_fit_of_their_rates(recovered):
     trains = AFFERENT.spikes(SED)
     fitted = study.fit_recordings(SED, SpikeRecordings(NAMES, trains, 1000.0, "simulated"), np.arange(8) % 2)
-    same = {key: value for key, value in recovered.items() if key not in ("seconds", "folds")}
-    assert {key: fitted[key] for key in same} == same
+    clocks = {"seconds": 0.0, "folds": ()}
+    assert to_json(replace(fitted, **clocks)) == to_json(replace(recovered, **clocks))
 
 
 def test_one_phase_is_enough_for_a_fit_and_the_other_is_said_to_be_missing():
     fitted = study.fit_recordings(SED, RateRecordings(NAMES, None, RATES.static_rate_hz), np.arange(8) % 2)
-    assert fitted["fss_in_sample"] == fitted["fss_in_sample_static"] > 0.99
-    assert fitted["observed_dynamic_rate_hz"] is None
-    assert fitted["fss_in_sample_dynamic"] is None
+    assert fitted.fss_in_sample == fitted.phases["static"].fss_in_sample > 0.99
+    assert fitted.phases["dynamic"].observed_hz is None
+    assert fitted.phases["dynamic"].fss_in_sample is None
 
 
 def test_noisy_rates_leave_a_posterior_that_holds_the_known_afferent():
@@ -122,13 +126,13 @@ def test_noisy_rates_leave_a_posterior_that_holds_the_known_afferent():
     model, known = AfferentModel.of_traces(SED), identifiable(KNOWN)
     few = {"n_ensembles": 2, "n_walkers": 32, "largest_r_hat": 1.1, "smallest_effective_size": 50.0}
     drawn = posterior(model, noisy, known, 1, **few)
-    for value, (low, high) in zip(known, drawn["interval"].values(), strict=True):
+    for value, (low, high) in zip(known, drawn.interval.values(), strict=True):
         assert low < value < high
-    assert 0.0 < np.diff(drawn["interval"]["static_gain_per_kpa_ms"])[0] < known[2]
-    band = drawn["bands"]["static"]
-    assert (band["predicted"]["high_hz"] >= band["predicted"]["low_hz"]).all()
+    assert 0.0 < np.diff(drawn.interval["static_gain_per_kpa_ms"])[0] < known[2]
+    band = drawn.bands["static"]
+    assert (band.predicted.high_hz >= band.predicted.low_hz).all()
     # A new recording has a residual of its own: its band is the wider one, nearly everywhere.
-    width = {kind: band[kind]["high_hz"] - band[kind]["low_hz"] for kind in ("predicted", "new")}
+    width = {kind: getattr(band, kind).high_hz - getattr(band, kind).low_hz for kind in ("predicted", "new")}
     assert (width["new"] > width["predicted"]).mean() > 0.9
 
 
@@ -147,20 +151,31 @@ def test_draws_begin_where_they_can_though_a_gain_ended_at_its_bound(monkeypatch
 
 def test_a_posterior_is_part_of_the_fit_and_of_its_page(recovered, monkeypatch):
     asked = []
-    interval = {name: [1.0, 2.0] for name in IDENTIFIABLE_NAMES}
-    band = {"low_hz": [1.0] * 8, "high_hz": [90.0] * 8}
-    told = {"interval": interval, "bands": {"static": {"predicted": band, "new": band}}, "level": 0.95}
-    monkeypatch.setattr(study, "posterior", lambda *given: asked.append(given) or told)
+    band = RateBand(low_hz=[1.0] * 8, high_hz=[90.0] * 8)
+    drawn = RatePosterior(
+        level=0.95,
+        seed=5,
+        n_draws=10,
+        n_evaluations=20,
+        largest_r_hat=1.0,
+        smallest_effective_size=9.0,
+        median=dict.fromkeys(IDENTIFIABLE_NAMES, 1.5),
+        interval=dict.fromkeys(IDENTIFIABLE_NAMES, (1.0, 2.0)),
+        covariance=np.eye(4),
+        bands={"static": PhaseBands(predicted=band, new=band)},
+    )
+    monkeypatch.setattr(study, "posterior", lambda *given: asked.append(given) or drawn)
     fitted = study.fit_recordings(
         SED, RATES, np.arange(8) % 2, seed=5, with_posterior=True, positions_mm=range(8)
     )
     ((model, rates, four, seed, positions),) = asked
     assert (model.n_stimuli, rates, seed, list(positions)) == (8, RATES, 5, list(range(8)))
-    assert four.tolist() == list(fitted["identifiable"].values())
-    assert fitted["posterior"] == told
-    assert recovered["posterior"] is None
+    assert four.tolist() == list(fitted.identifiable.values())
+    assert fitted.posterior is drawn
+    assert recovered.posterior is None
     assert report.fit_tables(fitted)[1].rows[0].cells[3] == "1 … 2"
-    assert len(report.draw(fitted).axes[1].collections) == len(report.draw(recovered).axes[1].collections) + 1
+    with_band, without = (report.draw_fit(fit).axes[1].collections for fit in (fitted, recovered))
+    assert len(with_band) == len(without) + 1
 
 
 def test_a_soft_threshold_is_recovered_from_its_spikes_within_their_information():
@@ -169,16 +184,16 @@ def test_a_soft_threshold_is_recovered_from_its_spikes_within_their_information(
     trains = soft_spikes(drive(SED), true, presentations, seed=3)
     recordings = SpikeRecordings(tuple(NAMES[site] for site in presentations.sites), trains, 1000.0)
     fitted = study.fit_recordings(SED, recordings, np.arange(8) % 2, method="likelihood")
-    spikes = fitted["spikes"]
-    found = [*fitted["identifiable"].values(), spikes["escape_width"]]
-    errors = [*fitted["identifiable_standard_error"].values(), spikes["escape_width_standard_error"]]
+    spikes = fitted.spikes
+    found = [*fitted.identifiable.values(), spikes.escape_width]
+    errors = [*fitted.identifiable_standard_error.values(), spikes.escape_width_standard_error]
     assert (np.abs(found - true) < 2.6 * np.array(errors)).all()  # 99 % of each
     assert (np.array(errors) < [0.01, 0.2, 0.002, 20.0, 0.02]).all()
-    assert spikes["n_spikes"] == trains.times_ms.size
+    assert spikes.n_spikes == trains.times_ms.size
     # Out of sample it can only be worse, by about one for every parameter of each fold.
-    assert 0.0 < spikes["log_likelihood"] - spikes["log_likelihood_out_of_sample"] < 20.0
-    assert spikes["time_rescaling_p_value"] > 0.01
-    assert fitted["fss_out_of_sample"] > 0.97
+    assert 0.0 < spikes.log_likelihood - spikes.log_likelihood_out_of_sample < 20.0
+    assert spikes.time_rescaling_p_value > 0.01
+    assert fitted.fss_out_of_sample > 0.97
     assert len(report.fit_tables(fitted)) == 6
 
 
@@ -186,25 +201,27 @@ def test_a_soft_threshold_is_recovered_from_its_spikes_within_their_information(
 
 
 def test_every_stimulus_is_predicted_without_its_fold(recovered):
-    assert recovered["stimulus"] == list(NAMES)
-    assert recovered["fold"] == [1, 2] * 4
-    assert [fold["stimuli"] for fold in recovered["folds"]] == [list(NAMES[::2]), list(NAMES[1::2])]
-    for fold in recovered["folds"]:
-        dynamic, static = Afferent.from_parameters(list(fold["parameters"].values())).rates(SED)
-        rows = np.flatnonzero(np.array(recovered["fold"]) == fold["fold"])
-        np.testing.assert_array_equal(np.array(recovered["out_of_sample_static_rate_hz"])[rows], static[rows])
+    assert recovered.stimulus == NAMES
+    assert recovered.fold.tolist() == [1, 2] * 4
+    assert [fold.stimuli for fold in recovered.folds] == [NAMES[::2], NAMES[1::2]]
+    for fold in recovered.folds:
+        dynamic, static = Afferent.from_parameters(list(fold.parameters.values())).rates(SED)
+        rows = np.flatnonzero(np.array(recovered.fold) == fold.fold)
         np.testing.assert_array_equal(
-            np.array(recovered["out_of_sample_dynamic_rate_hz"])[rows], dynamic[rows]
+            np.array(recovered.phases["static"].out_of_sample_hz)[rows], static[rows]
         )
-    scores = [fold["fss_test"] for fold in recovered["folds"]]
-    assert recovered["fss_out_of_sample"] == pytest.approx(np.mean(scores), rel=1e-12)
+        np.testing.assert_array_equal(
+            np.array(recovered.phases["dynamic"].out_of_sample_hz)[rows], dynamic[rows]
+        )
+    scores = [fold.fss_test for fold in recovered.folds]
+    assert recovered.fss_out_of_sample == pytest.approx(np.mean(scores), rel=1e-12)
 
 
 def test_both_forms_of_the_parameters_are_one_afferent_and_the_errors_are_those_of_the_covariance(recovered):
-    six, four = (list(recovered[key].values()) for key in ("parameters", "identifiable"))
+    six, four = list(recovered.parameters.values()), list(recovered.identifiable.values())
     np.testing.assert_allclose(identifiable(six), four, rtol=1e-12)
-    assert recovered["identifiable_covariance"] is None  # two folds
-    assert set(recovered["identifiable_standard_error"].values()) == {None}
+    assert recovered.identifiable_covariance is None  # two folds
+    assert np.isnan(list(recovered.identifiable_standard_error.values())).all()
 
 
 def test_standard_errors_are_the_scatter_of_the_folds(call, tmp_path):
@@ -219,8 +236,8 @@ def test_standard_errors_are_the_scatter_of_the_folds(call, tmp_path):
 
 
 def test_six_folds_are_dealt_out_by_default_and_one_per_stimulus_where_there_are_fewer():
-    assert study.dealt_folds(14).tolist() == [0, 1, 2, 3, 4, 5, 0, 1, 2, 3, 4, 5, 0, 1]
-    assert study.dealt_folds(4).tolist() == [0, 1, 2, 3]
+    assert study.folds_in_turn(14).tolist() == [0, 1, 2, 3, 4, 5, 0, 1, 2, 3, 4, 5, 0, 1]
+    assert study.folds_in_turn(4).tolist() == [0, 1, 2, 3]
 
 
 def test_stimuli_that_move_in_their_own_time_are_answered_each_in_theirs():
@@ -288,10 +305,12 @@ def test_a_stimulus_that_ends_before_a_window_is_refused():
 
 def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
     path = tmp_path / session.EXAMPLE
-    path.write_bytes(session.example()[session.EXAMPLE])
+    path.write_bytes(session.example_recordings()[session.EXAMPLE])
     recorded = read_recordings(path, ShiftedBar())
     conditions = Conditions("quick")
-    assert list(session.touches(recorded.stimuli, conditions).values()) == single_unit.touches(conditions)
+    assert list(session.stimulus_touches(recorded.stimuli, conditions).values()) == single_unit.touches(
+        conditions
+    )
     observed = bar_firing_rates()
     np.testing.assert_array_equal(recorded.recordings.dynamic_rate_hz, observed.dynamic_rate_hz)
     np.testing.assert_array_equal(recorded.recordings.static_rate_hz, observed.static_rate_hz)
@@ -300,7 +319,7 @@ def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
 
 def test_stimuli_are_pressed_where_and_how_they_say():
     conditions = Conditions("quick")
-    pressed = session.touches(
+    pressed = session.stimulus_touches(
         {
             "beside": TactileStimulus(Sphere(340.0), RampAndHold(0.4), x_mm=1.0, z_mm=0.5, tilt_deg=3.0),
             "wire": TactileStimulus(Line(), ForceRampAndHold(50.0)),
@@ -333,7 +352,7 @@ def test_stimuli_are_pressed_where_and_how_they_say():
 )
 def test_a_stimulus_that_cannot_be_pressed_is_named(stimulus, said):
     with pytest.raises(InputError, match=said):
-        session.touches({"deep": stimulus}, Conditions("quick"))
+        session.stimulus_touches({"deep": stimulus}, Conditions("quick"))
 
 
 # The command
@@ -342,8 +361,12 @@ def test_a_stimulus_that_cannot_be_pressed_is_named(stimulus, said):
 class Pressed:
     """Stands for the skin under a touch: two humps of energy density where the edges of the bar are."""
 
+    force_imbalance = energy_imbalance = 0.0
+    linear_solver = "none"
+
     def __init__(self, touch):
         self.shift_mm, self.depth_mm = touch.at_mm[0] - RECEPTOR_X_MM, touch.stimulus.depth_mm
+        self.mesh = touch.mesh
 
     def height(self, offset_mm):
         return 3.0 * np.exp(-((np.abs(self.shift_mm - offset_mm) - 1.5) ** 2)) * self.depth_mm
@@ -361,8 +384,8 @@ class Pressed:
 def call(monkeypatch, capsys, tmp_path):
     """Run the command in an empty folder; presses take no time."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(session, "solve_missing", lambda touches, *_: len(touches))
-    monkeypatch.setattr(session.Store, "load", lambda self, touch: Pressed(touch))
+    monkeypatch.setattr(runner, "solve_missing", lambda touches, *_: len(touches))
+    monkeypatch.setattr(runner.Store, "load", lambda self, touch: Pressed(touch))
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["fingerpad", "fit", *map(str, arguments)])
@@ -396,9 +419,9 @@ def test_a_fit_writes_page_figures_and_numbers_and_says_where_they_came_from(cal
     assert fit["shift_mm"] == list(SHIFTS_MM)
     assert fit["presentations"] == [1] * 6
     assert manifest["command"] == shlex.join(["fingerpad", "fit", *arguments])
-    assert manifest["inputs"] == [{"file": "mine.csv", "sha256": session.sha256(tmp_path / "mine.csv")}]
+    assert manifest["inputs"] == {"mine.csv": sha256(tmp_path / "mine.csv")}
     assert (manifest["seed"], manifest["resolution"], manifest["materials"]) == (3, "quick", "trial3")
-    assert manifest["windows_ms"] == [[30.0, 50.0], [600.0, 950.0]]
+    assert results["windows_ms"] == [[30.0, 50.0], [600.0, 950.0]]
     page = (tmp_path / "fit" / "fit.html").read_text()
     assert "<h1>An afferent fitted to recordings</h1>" in page
     assert page.count("data:image/png;base64,") == 2
@@ -443,7 +466,7 @@ def test_what_is_asked_for_beside_the_fit_is_on_its_page(call, tmp_path, monkeyp
     figures = {path.stem for path in (tmp_path / "fit" / "figures").iterdir()}
     assert figures == {"fit", "residuals", "profiles", "sensitivity", "offset"}
     page = (tmp_path / "fit" / "fit.html").read_text()
-    for words in ("<td>1.2 … open</td>", "What the fit is sensitive to (Sobol)", "The place of the receptor"):
+    for words in ("<td>1.2 … open</td>", "What the fit is sensitive to (Sobol)", "Offset of the receptor"):
         assert words in page
 
 
@@ -463,8 +486,8 @@ def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_pa
     fit, manifest = results["fit"], results["manifest"]
     assert (fit["stimulus"], fit["fold"]) == ([f"bar {row}" for row in (0, 2, 1, 3, 4)], [1, 3, 2, 4, 5])
     assert fit["shift_mm"] is None
-    assert [entry["file"] for entry in manifest["inputs"]] == ["mine.csv", "list.csv"]
-    assert (manifest["windows_ms"][1], manifest["materials"]) == ([500.0, 900.0], "trial1")
+    assert sorted(manifest["inputs"]) == ["list.csv", "mine.csv"]
+    assert (results["windows_ms"][1], manifest["materials"]) == ([500.0, 900.0], "trial1")
 
 
 @pytest.mark.parametrize(
@@ -541,7 +564,7 @@ def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_pa
         (
             ["mine.csv", "--stimulus", "bar", "--folds", "2"],
             "shift_mm,static_rate_hz,fold\n" + "".join(f"{row},9,{row + 1}\n" for row in range(6)),
-            "from the column fold or be dealt out, not both",
+            "from the column fold or from --folds, not both",
         ),
         (
             ["mine.csv", "--stimulus", "bar"],
@@ -600,24 +623,25 @@ def test_the_page_of_the_format_names_every_option_and_shows_commands_that_parse
 
 
 def test_figures_show_what_was_recorded_and_nothing_else(recovered):
-    both = report.draw(recovered)
+    both = report.draw_fit(recovered)
     assert [axes.get_title().split(",")[0] for axes in both.axes] == ["dynamic ramp", "static hold"]
     (observed,) = (line for line in both.axes[1].lines if line.get_label() == "observed")
     np.testing.assert_allclose(observed.get_ydata(), RATES.static_rate_hz, rtol=1e-12)
-    alone = report.draw(recovered | {"observed_dynamic_rate_hz": None})
+    unrecorded = replace(recovered.phases["dynamic"], observed_hz=None, fss_in_sample=None)
+    alone = report.draw_fit(replace(recovered, phases=recovered.phases | {"dynamic": unrecorded}))
     assert [axes.get_title().split(",")[0] for axes in alone.axes] == ["static hold"]
-    shifted = report.draw_residuals(recovered | {"shift_mm": list(range(8, 0, -1))})
+    shifted = report.draw_fit_residuals(replace(recovered, shift_mm=list(range(8, 0, -1))))
     points = next(line for line in shifted.axes[0].lines if line.get_label() == "fitted to all")
     assert list(points.get_xdata()) == list(range(1, 9))
-    missed = RATES.dynamic_rate_hz - np.array(recovered["dynamic_rate_hz"])
+    missed = RATES.dynamic_rate_hz - np.array(recovered.phases["dynamic"].fitted_hz)
     np.testing.assert_allclose(points.get_ydata(), missed[::-1], rtol=0, atol=1e-9)
 
 
 def test_what_is_not_determined_is_said(recovered):
-    nothing = dict.fromkeys(IDENTIFIABLE_NAMES)
-    undetermined = recovered | {"identifiable_covariance": None, "identifiable_standard_error": nothing}
-    assert "need five folds or more" in report.summary(undetermined)[1]
-    assert len(report.summary(recovered | {"identifiable_covariance": [[1.0] * 4] * 4})) == 1
+    nothing = dict.fromkeys(IDENTIFIABLE_NAMES, np.nan)
+    undetermined = replace(recovered, identifiable_covariance=None, identifiable_standard_error=nothing)
+    assert "need five folds or more" in report.fit_summary(undetermined)[1]
+    assert len(report.fit_summary(replace(recovered, identifiable_covariance=[[1.0] * 4] * 4))) == 1
     table = report.fit_tables(undetermined)[1]
     assert [row.cells[2] for row in table.rows] == ["–"] * 4
 
@@ -636,14 +660,14 @@ def test_a_fit_from_nothing_recovers_a_known_afferent(call, monkeypatch, tmp_pat
     )  # fmt: skip
     assert (shell.returncode, shell.stderr.replace(f"{NOTICE}\n", "")) == (0, "")
     folder = tmp_path / "fit"
-    assert json.loads((folder / "fit.json").read_text())["manifest"]["computed"] == 3
+    assert json.loads((folder / "fit.json").read_text())["manifest"]["stages"][1]["computed"] == 3
 
     monkeypatch.undo()
     monkeypatch.chdir(tmp_path)
     stimuli = {name: ShiftedBar().named(name)[1] for name in listed}
     store, pressed = (
-        session.Store(folder / session.STORE_FOLDER),
-        session.touches(stimuli, Conditions("quick")),
+        runner.Store(folder / runner.STORE_FOLDER),
+        session.stimulus_touches(stimuli, Conditions("quick")),
     )
     sed = [store.load(touch).sed([[RECEPTOR_X_MM, 0.0]]) for touch in pressed.values()]
     rates = zip(listed, *AfferentModel.of_traces(sed).evaluate(strong), strict=True)
@@ -653,6 +677,6 @@ def test_a_fit_from_nothing_recovers_a_known_afferent(call, monkeypatch, tmp_pat
     status, _, errors = call(*options)
     assert (status, errors) == (0, "")
     second = json.loads((folder / "fit.json").read_text())
-    assert second["manifest"]["computed"] == 0
+    assert second["manifest"]["stages"][1]["computed"] == 0
     assert second["fit"]["fss_in_sample"] > 0.99
     assert second["fit"]["fss_out_of_sample"] > 0.98

@@ -181,10 +181,10 @@ def test_an_afferent_is_ours_or_ones_own_numbers_or_of_a_file_of_results(tmp_pat
     six = dict(zip(PARAMETER_NAMES, [2e-7, 1e-4, 9e-7, 60.0, 1e-6, 50.0], strict=True))
     expected = Afferent.from_parameters(list(six.values()))
     for name, results in (
-        ("fit.json", {"fit": {"parameters": six}, "manifest": {"dynamic_quantity": "stored"}}),
-        ("results.json", {"single_unit": {"parameters": six}, "manifest": {}}),
+        ("fit.json", {"format": "fingerpad fit", "fit": {"parameters": six}, "dynamic_quantity": "stored"}),
+        ("results.json", {"format": "fingerpad reproduction", "single_unit": {"parameters": six}}),
     ):
-        (tmp_path / name).write_text(json.dumps(results))
+        (tmp_path / name).write_text(json.dumps(results | {"format_version": 1}))
         assert task_afferent(parse_task(changed(SPHERES, afferent=name)), tmp_path) == expected
 
 
@@ -438,7 +438,17 @@ def test_neither_a_file_nor_a_ready_made_question_lists_those():
         read_task("gone.yaml")
 
 
-@pytest.mark.parametrize("content", ["[1]", "{}", '{"fit": {"parameters": {"tau": 3}}}', "no json"])
+@pytest.mark.parametrize(
+    "content",
+    [
+        "[1]",
+        "{}",
+        '{"fit": {"parameters": {"tau": 3}}}',
+        '{"format": "fingerpad fit", "format_version": 1, "fit": {"parameters": {"tau": 3}}}',
+        '{"format": "fingerpad fit", "format_version": 99, "fit": {}}',
+        "no json",
+    ],
+)
 def test_a_file_without_fitted_parameters_is_refused(tmp_path, content):
     (tmp_path / "fit.json").write_text(content)
     question = parse_task(changed(SPHERES, afferent="fit.json"))

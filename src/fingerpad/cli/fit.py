@@ -1,4 +1,4 @@
-"""`fingerpad fit`: an afferent from recordings of one's own."""
+"""`fingerpad fit`: fit an afferent to recordings."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from fingerpad.cli.choices import FITTING_METHODS, QUANTITIES
 from fingerpad.cli.options import Jobs, Materials, Resolution, number, whole_number
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import write_atomically, write_json
+from fingerpad.core.files import write_atomically
 
 if TYPE_CHECKING:
     from fingerpad.experiments.stimuli import Stimuli
 
 BAR = "bar"
-"""What `--stimulus` calls the bar of the paper; anything else is a file."""
+"""Value of `--stimulus` for the bar of the paper; any other value is a file."""
 
 
 def fit_command(
@@ -68,17 +68,17 @@ def fit_command(
         bool, typer.Option("--profiles", help="Profile the likelihood of each number as well.")
     ] = False,
     sensitivity: Annotated[
-        bool, typer.Option("--sensitivity", help="Tell by Sobol's indices what the fit is sensitive to.")
+        bool, typer.Option("--sensitivity", help="Compute Sobol indices of the fit's score.")
     ] = False,
     offset: Annotated[
-        bool, typer.Option("--offset", help="Fit the receptor's place along the finger as well.")
+        bool, typer.Option("--offset", help="Fit the receptor's offset along the finger as well.")
     ] = False,
     folds: Annotated[
         int | None,
         typer.Option(
             parser=whole_number,
             metavar="INTEGER",
-            help="Folds dealt out in turn; 6 by default, unless the recordings have a column fold.",
+            help="Number of folds, assigned in turn; 6 by default, unless the recordings have a column fold.",
         ),
     ] = None,
     out: Annotated[
@@ -91,24 +91,24 @@ def fit_command(
         int, typer.Option(parser=whole_number, metavar="INTEGER", help="Seed of methods that draw.")
     ] = 0,
     example: Annotated[
-        Path | None, typer.Option(help="Write recordings to try it with into this folder, and end.")
+        Path | None, typer.Option(help="Write example recordings into this folder, and end.")
     ] = None,
 ) -> None:
     """Fit an afferent to recordings of your own: rates or spikes under known stimuli."""
     from rich.console import Console
 
+    from fingerpad.experiments import schemas
     from fingerpad.experiments.conditions import Conditions
-    from fingerpad.experiments.fit import session as recording_session
+    from fingerpad.experiments.fit.session import EXAMPLE, FitRequest, example_recordings, run_fit
+    from fingerpad.experiments.manifest import sha256
     from fingerpad.experiments.recording_files import read_recordings
-    from fingerpad.report.recording_fit import summary, write_fit_page
+    from fingerpad.report.recording_fit import fit_summary, write_fit_page
 
     if example is not None:
         make_writable(example, "--example")
-        for file, content in recording_session.example().items():
+        for file, content in example_recordings().items():
             write_atomically(example / file, content)
-        typer.echo(
-            f"Try: fingerpad fit {example / recording_session.EXAMPLE} --stimulus bar --resolution quick"
-        )
+        typer.echo(f"Try: fingerpad fit {example / EXAMPLE} --stimulus bar --resolution quick")
         return
     if recordings is None or stimulus is None:
         raise InputError(
@@ -116,7 +116,7 @@ def fit_command(
         )
     sizes = {"width": width, "fillet": fillet, "depth": depth}
     stimuli = _stimuli(stimulus, stimulus_column, sizes)
-    task = recording_session.RecordingFit(
+    request = FitRequest(
         read_recordings(recordings, stimuli, unit),
         Conditions(resolution=resolution, seed=seed, materials=materials),
         out,
@@ -133,22 +133,22 @@ def fit_command(
     make_writable(out)
     inputs = [recordings, *([] if stimulus == BAR else [Path(stimulus)])]
     with interruptible():
-        results = recording_session.run(
-            task,
+        results = run_fit(
+            request,
             Bars(Console(stderr=True)),
             command=shlex.join(["fingerpad", *sys.argv[1:]]),
-            inputs=[{"file": str(path), "sha256": recording_session.sha256(path)} for path in inputs],
+            inputs={str(path): sha256(path) for path in inputs},
         )
-        write_json(out / "fit.json", results)
         page = write_fit_page(results, out)
-    for paragraph in summary(results["fit"]):
+        schemas.write(out / "fit.json", results)
+    for paragraph in fit_summary(results.fit):
         typer.echo(paragraph)
     typer.echo(f"Report: {page}")
     typer.echo(f"Results: {out / 'fit.json'}")
 
 
 def _stimuli(stimulus: str, column: str | None, given: dict[str, float | None]) -> Stimuli:
-    """Make what `--stimulus` names, with the sizes that are given where it is the bar."""
+    """Make the stimuli that `--stimulus` names, with the given sizes where it is the bar."""
     from dataclasses import replace
 
     from fingerpad.experiments.stimuli import ShiftedBar, read_stimuli

@@ -252,23 +252,32 @@ def read_results(path: Path, cls: type[Kind]) -> Kind:
     StoreError
         If the file cannot be read, has another format or version, or is damaged.
     """
+    check_format(path, read_json(path), cls)
     try:
-        content = Path(path).read_bytes()
-        values = json.loads(content)
-    except (OSError, ValueError) as error:
-        raise StoreError(f"{path} cannot be read as JSON ({error}): run the command again.") from error
-    found = (values.get("format"), values.get("format_version")) if isinstance(values, dict) else (None, None)
-    wanted = file_format(cls)
-    if found != wanted:
-        raise StoreError(
-            f"{path} must have the format {wanted[0]}, version {wanted[1]}: got "
-            f"{'no format' if found[0] is None else f'{found[0]}, version {found[1]}'}; "
-            "run the command again to write it anew."
-        )
-    try:
-        return from_json(cls, content)
+        return from_json(cls, Path(path).read_bytes())
     except InputError as error:
         raise StoreError(f"{path} is damaged: {error} Run the command again.") from error
+
+
+def read_json(path: Path) -> Any:
+    """Read a file as JSON, else raise `StoreError`."""
+    try:
+        return json.loads(Path(path).read_bytes())
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{path} cannot be read as JSON ({error}): run the command again.") from error
+
+
+def check_format(path: Path, values: Any, *classes: type) -> str:
+    """Return the format of a file's values if it is that of one of `classes`, else raise `StoreError`."""
+    found = (values.get("format"), values.get("format_version")) if isinstance(values, dict) else (None, None)
+    wanted = [file_format(cls) for cls in classes]
+    if found not in wanted:
+        names = " or ".join(f"{name}, version {version}" for name, version in wanted)
+        came = "no format" if found[0] is None else f"{found[0]}, version {found[1]}"
+        raise StoreError(
+            f"{path} must have the format {names}: got {came}; run the command again to write it anew."
+        )
+    return str(found[0])
 
 
 def file_format(cls: Any) -> tuple[str, int]:

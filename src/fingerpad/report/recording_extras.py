@@ -1,46 +1,48 @@
-"""What a fit to recordings tells beside itself: profiles, sensitivity, and the place of the receptor."""
+"""Further parts of the page of a fit: profile likelihoods, sensitivity, and offset of the receptor."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Sequence
+from typing import TypeVar
 
 from matplotlib.figure import Figure
 
+from fingerpad.experiments.fit.fit import FitResult
+from fingerpad.experiments.fit.offset import OffsetFit
 from fingerpad.report.formatting import ABSENT, IDENTIFIABLE_SYMBOLS, fixed, number
 from fingerpad.report.parts import Row, Table
 from fingerpad.report.rate_uncertainty import draw_indices, draw_profile, profile_ends, sensitivity_table
-from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, numbers
+from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure
 
-FSS = ("fss_in_sample", "fss_in_sample_dynamic", "fss_in_sample_static", "fss_out_of_sample")
+Part = TypeVar("Part")
 
 
-def draw_profiles(section: Mapping[str, Any]) -> Figure:
+def draw_profiles(found: FitResult) -> Figure:
     """Draw the profile of each of the four numbers.
 
     Parameters
     ----------
-    section : dict
-        `results["fit"]` of `studies.recording_session.run`.
+    found : FitResult
+        From `fit_recordings`.
 
     Returns
     -------
     Figure
     """
     figure = new_figure(10.0, 3.2)
-    intervals = (section["posterior"] or {}).get("interval") or {}
-    panels = figure.subplots(1, len(section["profiles"]), sharey=True)
-    for axes, profile in zip(panels, section["profiles"], strict=True):
+    intervals = found.posterior.interval if found.posterior else {}
+    panels = figure.subplots(1, len(_present(found.profiles)), sharey=True)
+    for axes, profile in zip(panels, _present(found.profiles), strict=True):
         name = profile["name"]
-        unit = section["identifiable_units"][name]
-        draw_profile(axes, profile, unit, section["identifiable"][name], intervals.get(name))
+        unit = found.identifiable_units[name]
+        draw_profile(axes, profile, unit, found.identifiable[name], intervals.get(name))
     panels[0].set_ylabel("loss of log likelihood")
     return figure
 
 
-def caption_profiles(section: Mapping[str, Any]) -> str:
-    """Say what a profile is and what is marked."""
-    beneath = ", the bar beneath is the credible interval" if section["posterior"] else ""
+def caption_profiles(found: FitResult) -> str:
+    """Caption of the profiles."""
+    beneath = ", the bar beneath is the credible interval" if found.posterior else ""
     return (
         "Loss of log likelihood with one number held and the others fitted anew. Values below the dashed "
         "line are within the 95 % interval; a side that never crosses it is open: the rates do not bound the "
@@ -50,31 +52,31 @@ def caption_profiles(section: Mapping[str, Any]) -> str:
     )
 
 
-def profile_tables(section: Mapping[str, Any]) -> list[Table]:
-    """Return the intervals of the profiles beside the fit."""
+def profile_tables(found: FitResult) -> list[Table]:
+    """Tables of the intervals of the profiles."""
     rows = [
         Row(
             (
-                f"{IDENTIFIABLE_SYMBOLS[profile['name']]} [{section['identifiable_units'][profile['name']]}]",
-                number(section["identifiable"][profile["name"]]),
+                f"{IDENTIFIABLE_SYMBOLS[profile['name']]} [{found.identifiable_units[profile['name']]}]",
+                number(found.identifiable[profile["name"]]),
                 profile_ends(profile),
             )
         )
-        for profile in section["profiles"]
+        for profile in _present(found.profiles)
     ]
     return [Table("Intervals by profile likelihood", ("number", "fitted", "95 % interval"), rows)]
 
 
-def draw_sensitivity(section: Mapping[str, Any]) -> Figure:
-    """Draw Sobol's indices of the four numbers; the section is that of `draw_profiles`."""
+def draw_sensitivity(found: FitResult) -> Figure:
+    """Draw the Sobol indices of the four numbers."""
     figure = new_figure(6.5, 3.8)
-    draw_indices(figure.subplots(), section["sensitivity"])
+    draw_indices(figure.subplots(), _present(found.sensitivity))
     return figure
 
 
-def caption_sensitivity(section: Mapping[str, Any]) -> str:
-    """Say which number moves FSS most."""
-    total = section["sensitivity"]["total"]
+def caption_sensitivity(found: FitResult) -> str:
+    """Caption of the Sobol indices."""
+    total = _present(found.sensitivity)["total"]
     most = max(zip(total, IDENTIFIABLE_SYMBOLS.values(), strict=True), key=lambda pair: pair[0] or 0.0)[1]
     return (
         "Share of the variance of FSS that each number brings when all are uniform within a quarter of their "
@@ -83,34 +85,31 @@ def caption_sensitivity(section: Mapping[str, Any]) -> str:
     )
 
 
-def sensitivity_tables(section: Mapping[str, Any]) -> list[Table]:
-    """Return the indices and their ranges."""
-    return [sensitivity_table(section["sensitivity"], section["identifiable_units"])]
+def sensitivity_tables(found: FitResult) -> list[Table]:
+    """Tables of the indices and their ranges."""
+    return [sensitivity_table(_present(found.sensitivity), found.identifiable_units)]
 
 
-def draw_offset(section: Mapping[str, Any]) -> Figure:
-    """Draw the best FSS with the receptor held beside its place, and where fit and folds put it.
+def draw_offset(found: FitResult) -> Figure:
+    """Draw the best FSS with the receptor held at each offset, and the offsets of the fit and the folds.
 
     Parameters
     ----------
-    section : dict
-        As in `draw_profiles`.
+    found : FitResult
+        From `fit_recordings`.
 
     Returns
     -------
     Figure
     """
-    found = section["offset"]
+    offset = _present(found.offset)
     figure = new_figure(6.5, 3.8)
     axes = figure.subplots()
     axes.axvline(0.0, color=GREY, linewidth=1.0)
-    held = found["held"]
+    axes.plot(offset.held.offset_mm, offset.held.fss_in_sample, "o-", color=BLACK, label="held there")
     axes.plot(
-        numbers(held["offset_mm"]), numbers(held["fss_in_sample"]), "o-", color=BLACK, label="held there"
-    )
-    axes.plot(
-        [found["offset_mm"]],
-        [found["fss_in_sample"]],
+        [offset.offset_mm],
+        [offset.fss_in_sample],
         "D",
         color=ORANGE,
         markersize=7.0,
@@ -118,8 +117,8 @@ def draw_offset(section: Mapping[str, Any]) -> Figure:
     )
     low = axes.get_ylim()[0]
     axes.plot(
-        numbers(found["folds_mm"]),
-        [low] * len(found["folds_mm"]),
+        offset.folds_mm,
+        [low] * len(offset.folds_mm),
         "|",
         color=BLUE,
         markersize=14.0,
@@ -128,39 +127,40 @@ def draw_offset(section: Mapping[str, Any]) -> Figure:
         clip_on=False,
     )
     axes.set_ylim(bottom=low)
-    axes.set_xlabel("place of the receptor, distal positive [mm]")
+    axes.set_xlabel("offset of the receptor, distal positive [mm]")
     axes.set_ylabel("FSS in sample [1]")
     axes.legend()
     return figure
 
 
-def caption_offset(section: Mapping[str, Any]) -> str:
-    """Say what the place of the receptor takes of the residual."""
-    found = section["offset"]
-    residual = 1.0 - section["fss_in_sample"]
-    taken = (found["fss_in_sample"] - section["fss_in_sample"]) / residual if residual > 0.0 else 0.0
+def caption_offset(found: FitResult) -> str:
+    """Caption of the offset: which part of the residual it explains."""
+    offset = _present(found.offset)
+    residual = 1.0 - found.fss_in_sample
+    taken = (offset.fss_in_sample - found.fss_in_sample) / residual if residual > 0.0 else 0.0
     return (
-        "The receptor's place along the finger as one more number. Line: best FSS over all stimuli with the "
-        f"receptor held at each place. It is fitted at {number(found['offset_mm'])} mm, which takes "
-        f"{fixed(100.0 * taken, 0)} % of the residual in sample; "
-        f"out of sample FSS is {fixed(found['fss_out_of_sample'], 3)} instead of "
-        f"{fixed(section['fss_out_of_sample'], 3)}. What is gained in sample alone is no evidence that the "
-        "receptor lies there."
+        "The receptor's offset along the finger as one more parameter. Line: best FSS over all stimuli with "
+        f"the receptor held at each offset. The fitted offset is {number(offset.offset_mm)} mm; it explains "
+        f"{fixed(100.0 * taken, 0)} % of the residual in sample. Out of sample FSS is "
+        f"{fixed(offset.fss_out_of_sample, 3)} instead of {fixed(found.fss_out_of_sample, 3)}. A gain in "
+        "sample alone is no evidence that the receptor lies there."
     )
 
 
-def offset_tables(section: Mapping[str, Any]) -> list[Table]:
-    """Return both fits side by side."""
-    found, units = section["offset"], section["identifiable_units"]
+def offset_tables(found: FitResult) -> list[Table]:
+    """Tables of both fits side by side."""
+    offset, units, phases = _present(found.offset), found.identifiable_units, ("dynamic", "static")
 
-    def row(said: str, fit: Mapping[str, Any], offset: str, error: str) -> Row:
-        scores = (fixed(fit.get(key), 3) for key in FSS)
-        four = (number(fit["identifiable"][name]) for name in IDENTIFIABLE_SYMBOLS)
-        return Row((said, offset, error, *scores, *four))
+    def cells(fit: FitResult | OffsetFit, fss_by_phase: Sequence[float | None]) -> list[str]:
+        scores = (fit.fss_in_sample, *fss_by_phase, fit.fss_out_of_sample)
+        four = (number(fit.identifiable[name]) for name in IDENTIFIABLE_SYMBOLS)
+        return [*(fixed(score, 3) for score in scores), *four]
 
+    at_zero = cells(found, [found.phases[phase].fss_in_sample for phase in phases])
+    fitted = cells(offset, [offset.fss_by_phase.get(phase) for phase in phases])
     rows = [
-        row("in its place", section, number(0.0), ABSENT),
-        row("fitted as well", found, number(found["offset_mm"]), number(found["standard_error_mm"])),
+        Row(("at 0 mm", number(0.0), ABSENT, *at_zero)),
+        Row(("offset fitted", number(offset.offset_mm), number(offset.standard_error_mm), *fitted)),
     ]
     columns = (
         "receptor",
@@ -174,7 +174,13 @@ def offset_tables(section: Mapping[str, Any]) -> list[Table]:
     )
     note = (
         "Standard error: from the scatter of the folds' fits. Offsets end at "
-        f"{number(found['held']['offset_mm'][0])} and {number(found['held']['offset_mm'][-1])} mm, where the "
-        "skin was sampled."
+        f"{number(offset.held.offset_mm[0])} and {number(offset.held.offset_mm[-1])} mm, where the skin was "
+        "sampled."
     )
-    return [Table("The place of the receptor", columns, rows, note)]
+    return [Table("Offset of the receptor", columns, rows, note)]
+
+
+def _present(part: Part | None) -> Part:
+    """Return a part of a fit; a chapter is only drawn where its part is there."""
+    assert part is not None
+    return part

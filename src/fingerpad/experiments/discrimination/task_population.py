@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.layouts import PATTERNS, Layout, hexagonal, jittered, poisson_disc, rectangular, uniform
 from fingerpad.core.regions import Ellipse, Polygon, Rectangle, Region
+from fingerpad.core.results import check_format, file_format, read_json
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.discrimination.task import (
@@ -23,6 +23,8 @@ from fingerpad.experiments.discrimination.task import (
     PopulationSettings,
     RegionSettings,
 )
+from fingerpad.experiments.fit.session import FitFile
+from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.inference.tables import read_text
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.population import Population, sensitivities
@@ -73,21 +75,18 @@ def task_afferent(task: DiscriminationTask, beside: Path = Path()) -> Afferent:
 def _fitted(path: Path) -> Afferent:
     """Afferent of a file of results: `fit.json`, or `results.json` of a reproduction."""
     try:
-        results = json.loads(read_text(path))
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise InputError(f"afferent: {error}") from error
-        raise InputError(f"afferent: {path} cannot be read as JSON ({error}): take another file.") from error
-    content = results if isinstance(results, dict) else {}
-    section = content.get("fit") or content.get("single_unit") or {}
-    parameters = section.get("parameters") if isinstance(section, dict) else None
-    if not isinstance(parameters, dict) or not set(PARAMETER_NAMES) <= parameters.keys():
+        read_text(path)  # names a file that cannot be read
+        values = read_json(path)
+        is_fit = check_format(path, values, FitFile, ReproductionResult) == file_format(FitFile)[0]
+        parameters = values["fit" if is_fit else "single_unit"]["parameters"]
+        quantity = values["dynamic_quantity"] if is_fit else STORED_ENERGY
+        six = [parameters[name] for name in PARAMETER_NAMES]
+    except (InputError, StoreError) as error:
+        raise InputError(f"afferent: {error}") from error
+    except (KeyError, TypeError) as error:
         raise InputError(
-            f"afferent must be {DEFAULT}, or a file with fitted parameters such as fit.json of fingerpad "
-            f"fit: {path} holds none."
-        )
-    quantity = (content.get("manifest") or {}).get("dynamic_quantity", STORED_ENERGY)
-    six = [parameters[name] for name in PARAMETER_NAMES]
+            f"afferent: {path} must hold fitted parameters: it holds none; run its command again."
+        ) from error
     return Afferent.from_parameters(six, dynamic_quantity=quantity)
 
 

@@ -1,4 +1,4 @@
-"""Fit an afferent to recordings of one's own: press what was pressed, fit, judge out of sample, report."""
+"""Fit an afferent to recordings under known stimuli, and score the fit out of sample."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, one_of, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_class
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
-from fingerpad.experiments.fit.methods import METHODS, Prepared, four_number_problem
-from fingerpad.experiments.fit.offset import Beside, check_beside, fit_offset
-from fingerpad.experiments.fit.posterior import posterior, profiled
+from fingerpad.experiments.fit.methods import METHODS, Prepared, SpikeFitSummary, four_number_problem
+from fingerpad.experiments.fit.offset import Beside, OffsetFit, check_beside, fit_offset
+from fingerpad.experiments.fit.posterior import RatePosterior, posterior, profiled
 from fingerpad.experiments.fit.rate_uncertainty import sensitivity
 from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.inference.fitting import (
     CrossValidation,
-    Fit,
     cross_validate,
     fractional_sum_of_squares,
     interleaved_folds,
@@ -36,6 +36,133 @@ from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordin
 from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
 
 
+@result_class
+class PhaseRates:
+    """Rates of one phase, in the ramp or in the hold.
+
+    Parameters
+    ----------
+    fss_in_sample : float, optional
+        Fractional sum of squares over all stimuli; absent where the phase was not recorded.
+    observed_hz : array (n_stimuli,), optional
+        Recorded rates. [spikes/s]
+    fitted_hz : array (n_stimuli,)
+        Rates of the afferent that is fitted to all stimuli. [spikes/s]
+    out_of_sample_hz : array (n_stimuli,)
+        Rates that the fit without the stimulus' fold predicts. [spikes/s]
+    """
+
+    fss_in_sample: float | None
+    observed_hz: Vector | None
+    fitted_hz: Vector
+    out_of_sample_hz: Vector
+
+
+@result_class
+class FittedFold:
+    """One fold of the cross validation.
+
+    Parameters
+    ----------
+    fold : int
+        Number, from 1.
+    stimuli : tuple of str
+        Left out of the fit.
+    fss_train, fss_test : float
+        Fractional sum of squares over the other stimuli and over these.
+    n_evaluations : int
+        Evaluations of the model.
+    seconds : float
+        Time on the clock. [s]
+    parameters, identifiable : dict of str to float
+        The paper's six parameters, and the four that rates identify.
+    """
+
+    fold: int
+    stimuli: tuple[str, ...]
+    fss_train: float
+    fss_test: float
+    n_evaluations: int
+    seconds: float
+    parameters: dict[str, float]
+    identifiable: dict[str, float]
+
+
+@result_class
+class FitResult:
+    """Result of a fit to recordings.
+
+    Parameters
+    ----------
+    method, source : str
+        How it was fitted, and where the recordings come from.
+    n_evaluations : int
+        Evaluations of the model.
+    seconds : float
+        Time on the clock. [s]
+    parameters, identifiable : dict of str to float
+        The paper's six parameters, and the four that rates identify.
+    units, identifiable_units : dict of str to str
+        Their units.
+    identifiable_standard_error : dict of str to float
+        NaN where there is no covariance.
+    identifiable_covariance : array (4, 4), optional
+        Of the four numbers.
+    fss_in_sample, fss_training_mean, fss_out_of_sample : float
+        Over all stimuli; over training sets and testing sets, mean of the folds.
+    stimulus : tuple of str
+        Names.
+    fold : int array (n_stimuli,)
+        Fold of each stimulus, from 1.
+    phases : dict of str to PhaseRates
+        Rates by phase, "dynamic" and "static".
+    folds : tuple of FittedFold
+        The cross validation.
+    spikes : SpikeFitSummary, optional
+        Of the likelihood of spikes.
+    posterior : RatePosterior, optional
+        Credible intervals, where they were asked for.
+    profiles : tuple of dict, optional
+        Profile likelihoods, where they were asked for.
+    sensitivity : dict, optional
+        Sobol indices, where they were asked for.
+    offset : OffsetFit, optional
+        The fit with the receptor's offset as a further parameter.
+    shift_mm : array (n_stimuli,), optional
+        Shift of each stimulus, proximal positive, where stimuli differ in nothing else. [mm]
+    presentations : tuple of int
+        Presentations of each stimulus.
+    spikes_after_hold : int
+        Spikes that were left out because they came after the hold.
+    """
+
+    method: str
+    source: str
+    n_evaluations: int
+    seconds: float
+    parameters: dict[str, float]
+    identifiable: dict[str, float]
+    units: dict[str, str]
+    identifiable_units: dict[str, str]
+    identifiable_standard_error: dict[str, Number]
+    identifiable_covariance: Matrix | None
+    fss_in_sample: float
+    fss_training_mean: float
+    fss_out_of_sample: float
+    stimulus: tuple[str, ...]
+    fold: WholeVector
+    phases: dict[str, PhaseRates]
+    folds: tuple[FittedFold, ...]
+    spikes: SpikeFitSummary | None
+    posterior: RatePosterior | None
+    profiles: tuple[dict[str, Any], ...] | None
+    sensitivity: dict[str, Any] | None
+    offset: OffsetFit | None
+    shift_mm: Vector | None = None
+    presentations: tuple[int, ...] = ()
+    spikes_after_hold: int = 0
+
+
 def fit_recordings(
     sed: SedTraces | Sequence[SedTraces],
     recordings: RateRecordings | SpikeRecordings,
@@ -49,8 +176,8 @@ def fit_recordings(
     with_sensitivity: bool = False,
     beside: Beside | None = None,
     positions_mm: ArrayLike | None = None,
-) -> dict[str, Any]:
-    """Fit an afferent to what was recorded under stimuli whose strain energy density is known.
+) -> FitResult:
+    """Fit an afferent to recordings under stimuli whose strain energy density is known.
 
     Parameters
     ----------
@@ -58,9 +185,9 @@ def fit_recordings(
         Strain energy density at the receptor, one column per stimulus, in the order in which `recordings`
         names them first; several traces follow each other.
     recordings : RateRecordings or SpikeRecordings
-        What the afferent answered; spikes are counted in `windows_ms`, mean over presentations.
+        Recorded responses; spikes are counted in `windows_ms`, mean over presentations.
     memberships : int array (n_stimuli,), optional
-        Fold of each stimulus from 0; by default six folds are dealt out in turn, or one per stimulus where
+        Fold of each stimulus from 0; by default assigned in turn to six folds, or to one per stimulus where
         there are fewer.
     method : str, optional
         One of `METHODS`.
@@ -83,9 +210,7 @@ def fit_recordings(
 
     Returns
     -------
-    dict
-        Plain numbers and lists, as in fit.json: parameters in both forms with their covariance, scores,
-        folds, and observed and predicted rates.
+    FitResult
 
     Raises
     ------
@@ -105,47 +230,55 @@ def fit_recordings(
     >>> known = fp.Afferent.from_parameters([0.0, 1.5e-4, 9e-7, 60.0, 1e-6, 50.0])
     >>> recordings = RateRecordings(("low", "middle", "high", "highest"), *known.rates(sed))
     >>> fit = fit_recordings(sed, recordings, memberships=[0, 1, 0, 1])
-    >>> fit["fss_in_sample"] > 0.99, fit["fss_out_of_sample"] > 0.97
+    >>> fit.fss_in_sample > 0.99, fit.fss_out_of_sample > 0.97
     (True, True)
     """
     rates = recordings if isinstance(recordings, RateRecordings) else recordings.rates(windows_ms)
     if beside is not None:
         check_beside(beside)
-    folds = dealt_folds(len(rates.stimuli)) if memberships is None else np.asarray(memberships)
+    folds = folds_in_turn(len(rates.stimuli)) if memberships is None else np.asarray(memberships)
     check_enough(rates, folds, len(IDENTIFIABLE_NAMES) + (beside is not None))
     model = AfferentModel.of_traces(sed, windows_ms)
     prepared = METHODS[one_of("method", method, tuple(METHODS))](model, recordings, rates, seed)
     best = prepared.method.fit(prepared.problem, np.arange(len(rates.stimuli)))
     validation = cross_validate(prepared.problem, prepared.method, folds)
     four = identifiable(prepared.six(best.parameters))
-    return plain(
-        {
-            "method": method,
-            "source": rates.source,
-            "n_evaluations": best.n_evaluations,
-            "seconds": best.seconds,
-        }
-        | _parameters(prepared, best, validation)
-        | _scores(prepared.problem, rates, best.parameters, validation)
-        | {
-            "folds": _folds(prepared, rates, validation),
-            "spikes": prepared.spikes(best, validation),
-            "posterior": posterior(model, rates, four, seed, positions_mm) if with_posterior else None,
-            "profiles": profiled(model, rates, four, positions_mm) if with_profiles else None,
-            "sensitivity": (
-                sensitivity(four_number_problem(model, rates), four, seed) if with_sensitivity else None
-            ),
-            "offset": None if beside is None else fit_offset(beside, rates, folds, method, windows_ms, seed),
-        }
+    covariance = prepared.covariance(best, validation)
+    errors = np.full(len(IDENTIFIABLE_NAMES), np.nan) if covariance is None else np.sqrt(np.diag(covariance))
+    return FitResult(
+        method=method,
+        source=rates.source,
+        n_evaluations=best.n_evaluations,
+        seconds=best.seconds,
+        parameters=_six_by_name(prepared.six(best.parameters)),
+        identifiable=_four_by_name(prepared.six(best.parameters)),
+        units=dict(zip(PARAMETER_NAMES, PARAMETER_UNITS, strict=True)),
+        identifiable_units=dict(zip(IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, strict=True)),
+        identifiable_standard_error=dict(zip(IDENTIFIABLE_NAMES, errors.tolist(), strict=True)),
+        identifiable_covariance=covariance,
+        fss_in_sample=prepared.problem.score(best.parameters, np.arange(prepared.problem.n_observations)),
+        fss_training_mean=validation.score_train,
+        fss_out_of_sample=validation.score_test,
+        stimulus=tuple(rates.stimuli),
+        fold=folds + 1,
+        phases=_phases(prepared.problem, rates, best.parameters, validation),
+        folds=_folds(prepared, rates, validation),
+        spikes=prepared.spikes(best, validation),
+        posterior=posterior(model, rates, four, seed, positions_mm) if with_posterior else None,
+        profiles=tuple(plain(profiled(model, rates, four, positions_mm))) if with_profiles else None,
+        sensitivity=(
+            plain(sensitivity(four_number_problem(model, rates), four, seed)) if with_sensitivity else None
+        ),
+        offset=None if beside is None else fit_offset(beside, rates, folds, method, windows_ms, seed),
     )
 
 
-def dealt_folds(n_stimuli: int, n_folds: int | None = None) -> IntArray:
-    """Fold of each stimulus, dealt out in turn: six, or one per stimulus where there are fewer.
+def folds_in_turn(n_stimuli: int, n_folds: int | None = None) -> IntArray:
+    """Fold of each stimulus, assigned in turn: six folds, or one per stimulus where there are fewer.
 
     Examples
     --------
-    >>> dealt_folds(8).tolist(), dealt_folds(3).tolist(), dealt_folds(3, 2).tolist()
+    >>> folds_in_turn(8).tolist(), folds_in_turn(3).tolist(), folds_in_turn(3, 2).tolist()
     ([0, 1, 2, 3, 4, 5, 0, 1], [0, 1, 2], [0, 1, 0])
     """
     whole("stimuli", n_stimuli, at_least=2)
@@ -183,72 +316,55 @@ def check_enough(rates: RateRecordings, memberships: IntArray, n_free: int = len
                 if not np.any(getattr(part, f"{phase}_rate_hz")):
                     raise InputError(
                         f"{phase}_rate_hz must not be 0 for all stimuli of a fold "
-                        f"({', '.join(part.stimuli)}), since FSS divides by their squares: deal the folds "
-                        "otherwise, by a column fold."
+                        f"({', '.join(part.stimuli)}), since FSS divides by their squares: assign the "
+                        "folds otherwise, by a column fold."
                     )
 
 
-def _parameters(prepared: Prepared, best: Fit, validation: CrossValidation) -> dict[str, Any]:
-    """Parameters in both forms, and how well the recordings determine those four that they can."""
-    covariance = prepared.covariance(best, validation)
-    errors = [None] * 4 if covariance is None else np.sqrt(np.diag(covariance)).tolist()
-    return _named(prepared.six(best.parameters)) | {
-        "units": dict(zip(PARAMETER_NAMES, PARAMETER_UNITS, strict=True)),
-        "identifiable_units": dict(zip(IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, strict=True)),
-        "identifiable_standard_error": dict(zip(IDENTIFIABLE_NAMES, errors, strict=True)),
-        "identifiable_covariance": covariance,
-    }
+def _six_by_name(six: FloatArray) -> dict[str, float]:
+    return dict(zip(PARAMETER_NAMES, six.tolist(), strict=True))
 
 
-def _named(six: FloatArray) -> dict[str, dict[str, float]]:
-    """Six parameters, and the four that firing can tell, under their names."""
-    return {
-        "parameters": dict(zip(PARAMETER_NAMES, six.tolist(), strict=True)),
-        "identifiable": dict(zip(IDENTIFIABLE_NAMES, identifiable(six).tolist(), strict=True)),
-    }
+def _four_by_name(six: FloatArray) -> dict[str, float]:
+    return dict(zip(IDENTIFIABLE_NAMES, identifiable(six).tolist(), strict=True))
 
 
-def _scores(
+def _phases(
     problem: RateProblem, rates: RateRecordings, fitted: FloatArray, validation: CrossValidation
-) -> dict[str, Any]:
-    """FSS in and out of sample, and every rate as observed, predicted, and predicted without its fold."""
+) -> dict[str, PhaseRates]:
+    """Every rate as observed, fitted, and predicted without its fold; FSS in sample."""
     predicted = dict(zip(PHASES, problem.model.evaluate(fitted), strict=True))
     left_out = {phase: np.empty(problem.n_observations) for phase in PHASES}
-    memberships = np.empty(problem.n_observations, dtype=np.int64)
     for fold in validation.folds:
-        memberships[fold.testing] = fold.fold
         for phase, rate in zip(PHASES, problem.model.evaluate(fold.fit.parameters), strict=True):
             left_out[phase][fold.testing] = rate[fold.testing]
-    found: dict[str, Any] = {
-        "fss_in_sample": problem.score(fitted, np.arange(problem.n_observations)),
-        "fss_training_mean": validation.score_train,
-        "fss_out_of_sample": validation.score_test,
-        "stimulus": rates.stimuli,
-        "fold": memberships + 1,
-    }
-    for phase in PHASES:
-        observed = getattr(rates, f"{phase}_rate_hz")
-        found |= {
-            f"fss_in_sample_{phase}": (
-                None if observed is None else fractional_sum_of_squares(observed, predicted[phase])
+    observed = {phase: getattr(rates, f"{phase}_rate_hz") for phase in PHASES}
+    return {
+        phase: PhaseRates(
+            fss_in_sample=(
+                None
+                if observed[phase] is None
+                else fractional_sum_of_squares(observed[phase], predicted[phase])
             ),
-            f"observed_{phase}_rate_hz": observed,
-            f"{phase}_rate_hz": predicted[phase],
-            f"out_of_sample_{phase}_rate_hz": left_out[phase],
-        }
-    return found
+            observed_hz=observed[phase],
+            fitted_hz=predicted[phase],
+            out_of_sample_hz=left_out[phase],
+        )
+        for phase in PHASES
+    }
 
 
-def _folds(prepared: Prepared, rates: RateRecordings, validation: CrossValidation) -> list[dict[str, Any]]:
-    return [
-        {
-            "fold": fold.fold + 1,
-            "stimuli": [rates.stimuli[row] for row in fold.testing],
-            "fss_train": fold.score_train,
-            "fss_test": fold.score_test,
-            "n_evaluations": fold.fit.n_evaluations,
-            "seconds": fold.fit.seconds,
-        }
-        | _named(prepared.six(fold.fit.parameters))
+def _folds(prepared: Prepared, rates: RateRecordings, validation: CrossValidation) -> tuple[FittedFold, ...]:
+    return tuple(
+        FittedFold(
+            fold=fold.fold + 1,
+            stimuli=tuple(rates.stimuli[row] for row in fold.testing),
+            fss_train=fold.score_train,
+            fss_test=fold.score_test,
+            n_evaluations=fold.fit.n_evaluations,
+            seconds=fold.fit.seconds,
+            parameters=_six_by_name(prepared.six(fold.fit.parameters)),
+            identifiable=_four_by_name(prepared.six(fold.fit.parameters)),
+        )
         for fold in validation.folds
-    ]
+    )

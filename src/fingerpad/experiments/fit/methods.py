@@ -1,16 +1,16 @@
-"""Ways to fit recordings of one's own: each a problem, a method, and what its parameters mean."""
+"""Methods of fitting recordings: each a problem, a method, and the meaning of its parameters."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.results import Number, result_class
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.data import neuron
 from fingerpad.inference.afferent_methods import (
@@ -45,9 +45,34 @@ from fingerpad.neuron.transduction import Drive
 MethodOf = Callable[[RateProblem, Bounds], Method]
 
 
+@result_class
+class SpikeFitSummary:
+    """Maximum likelihood of spike trains under a soft threshold.
+
+    Parameters
+    ----------
+    n_spikes : int
+        How many were fitted.
+    log_likelihood, log_likelihood_out_of_sample : float
+        Of all spikes, and of each fold's spikes fitted without it.
+    escape_width, escape_width_standard_error : float
+        Width of the threshold over the threshold.
+    time_rescaling_distance, time_rescaling_p_value : float
+        Kolmogorov-Smirnov test of the rescaled intervals.
+    """
+
+    n_spikes: int
+    log_likelihood: float
+    log_likelihood_out_of_sample: float
+    escape_width: float
+    escape_width_standard_error: Number
+    time_rescaling_distance: float
+    time_rescaling_p_value: float
+
+
 @dataclass(frozen=True)
 class Prepared:
-    """A problem, the method that fits it, and what its parameters mean.
+    """A problem, the method that fits it, and the meaning of its parameters.
 
     Parameters
     ----------
@@ -60,14 +85,14 @@ class Prepared:
     covariance : callable
         From the fit to all and the folds to the covariance (4, 4) of the identifiable numbers, or None.
     spikes : callable
-        From the fit to all and the folds to what only spikes tell; an empty dict for rates.
+        From the fit to all and the folds to the summary of a fit to spikes; None for rates.
     """
 
     problem: RateProblem
     method: Method
     six: Callable[[FloatArray], FloatArray]
     covariance: Callable[[Fit, CrossValidation], FloatArray | None]
-    spikes: Callable[[Fit, CrossValidation], dict[str, Any]] = lambda fit, folds: {}
+    spikes: Callable[[Fit, CrossValidation], SpikeFitSummary | None] = lambda fit, folds: None
 
 
 def check_spikes(recordings: RateRecordings | SpikeRecordings, n_motions: int) -> SpikeRecordings:
@@ -116,7 +141,9 @@ def _response_surface(
     )
 
 
-def _scatter_of(six: Callable[[FloatArray], FloatArray]) -> Callable[[Fit, CrossValidation], Any]:
+def _scatter_of(
+    six: Callable[[FloatArray], FloatArray],
+) -> Callable[[Fit, CrossValidation], FloatArray | None]:
     """Return what finds the covariance of the four numbers in the fits of the folds."""
     return lambda fit, folds: jackknife_covariance(
         [identifiable(six(fold.fit.parameters)) for fold in folds.folds]
@@ -211,25 +238,25 @@ def _likelihood(
     def covariance(five: FloatArray) -> FloatArray:
         return np.linalg.inv(everything.derivatives(five)[2]).astype(np.float64)
 
-    def told(fit: Fit, folds: CrossValidation) -> dict[str, Any]:
+    def summary(fit: Fit, folds: CrossValidation) -> SpikeFitSummary:
         left_out = [(method.of(fold.testing), fold.fit.parameters) for fold in folds.folds]
         test = time_rescaling(everything, fit.parameters)
-        return {
-            "n_spikes": everything.n_spikes,
-            "log_likelihood": everything.log_likelihood(fit.parameters),
-            "log_likelihood_out_of_sample": sum(part.log_likelihood(five) for part, five in left_out),
-            "escape_width": fit.parameters[4],
-            "escape_width_standard_error": np.sqrt(covariance(fit.parameters)[4, 4]),
-            "time_rescaling_distance": test.statistic,
-            "time_rescaling_p_value": test.p_value,
-        }
+        return SpikeFitSummary(
+            n_spikes=everything.n_spikes,
+            log_likelihood=everything.log_likelihood(fit.parameters),
+            log_likelihood_out_of_sample=sum(part.log_likelihood(five) for part, five in left_out),
+            escape_width=fit.parameters[4],
+            escape_width_standard_error=np.sqrt(covariance(fit.parameters)[4, 4]),
+            time_rescaling_distance=test.statistic,
+            time_rescaling_p_value=test.p_value,
+        )
 
     return Prepared(
         RateProblem(SoftAfferent(drive, model.windows_ms, seed), rates),
         method,
         lambda five: six_parameters(five[:4]),
         lambda fit, folds: covariance(fit.parameters)[:4, :4],
-        told,
+        summary,
     )
 
 

@@ -1,17 +1,18 @@
-"""Recordings of one's own with a seventh parameter: a receptor that may lie beside the middle of its field.
+"""Fit with the receptor's offset from the middle of its receptive field as a further parameter.
 
-The middle is read off the recordings themselves. How much of what a fit misses is only that?
+The middle of the field is read from the recordings. The offset shows how much of the residual an error of
+that reading explains.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, one_of
 from fingerpad.core.errors import InputError
+from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.fit.methods import (
     METHODS,
@@ -34,6 +35,51 @@ from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.rate_model import Windows
 from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import RateRecordings
+
+
+@result_class
+class HeldOffset:
+    """Best FSS in sample with the receptor held at each offset [mm], (n_offsets,)."""
+
+    offset_mm: Vector
+    fss_in_sample: Vector
+
+
+@result_class
+class OffsetFit:
+    """Fit of the four numbers and the receptor's offset.
+
+    Parameters
+    ----------
+    offset_mm, standard_error_mm : float
+        Offset along the finger, distal positive, and its standard error, NaN where it is not known. [mm]
+    folds_mm : array (n_folds,)
+        Offsets that the folds give. [mm]
+    identifiable : dict of str to float
+        The four numbers.
+    fss_in_sample, fss_out_of_sample : float
+        Fractional sum of squares over all stimuli, and mean over the folds.
+    fss_by_phase : dict of str to float
+        In sample, "dynamic" and "static".
+    n_evaluations : int
+        Evaluations of the model.
+    seconds : float
+        Time on the clock. [s]
+    held : HeldOffset
+        Fits with the receptor held.
+    """
+
+    offset_mm: float
+    standard_error_mm: Number
+    folds_mm: Vector
+    identifiable: dict[str, float]
+    fss_in_sample: float
+    fss_out_of_sample: float
+    fss_by_phase: dict[str, float]
+    n_evaluations: int
+    seconds: float
+    held: HeldOffset
+
 
 Beside = Mapping[float, SedTraces | Sequence[SedTraces]]
 """Strain energy density by offset from the believed place, distal positive [mm], one column per stimulus."""
@@ -76,13 +122,13 @@ def fit_offset(
     method: str,
     windows_ms: Windows,
     seed: int = 0,
-) -> dict[str, Any]:
+) -> OffsetFit:
     """Fit the four numbers and the receptor's offset together, on the same folds.
 
     Parameters
     ----------
     beside : mapping of float to SedTraces or to a sequence of SedTraces
-        What a receptor in each place feels, at two places or more on both sides of 0. [mm]
+        Strain energy density at a receptor in each place, two places or more on both sides of 0. [mm]
     rates : RateRecordings
         What was observed.
     memberships : int array (n_stimuli,)
@@ -96,9 +142,7 @@ def fit_offset(
 
     Returns
     -------
-    dict
-        Offset and its standard error, offsets of the folds, scores in and out of sample, the four numbers
-        beside it, and `held`: the best FSS with the receptor held at each of the places.
+    OffsetFit
 
     Raises
     ------
@@ -115,24 +159,21 @@ def fit_offset(
     folds_mm = [float(fold.fit.parameters[-1]) for fold in crossed.folds]
     error = jackknife_covariance(np.reshape(folds_mm, (-1, 1)))
     held = [METHODS[method](place, rates, rates, seed) for place in roving.models]
-    return {
-        "offset_mm": offset_mm,
-        "standard_error_mm": None if error is None else float(np.sqrt(error[0, 0])),
-        "folds_mm": folds_mm,
-        "identifiable": dict(zip(IDENTIFIABLE_NAMES, four, strict=True)),
-        "fss_in_sample": best.score,
-        **{
-            f"fss_in_sample_{phase}": score
-            for phase, score in problem.score_by_phase(best.parameters, everything).items()
-        },
-        "fss_out_of_sample": crossed.score_test,
-        "n_evaluations": best.n_evaluations,
-        "seconds": best.seconds,
-        "held": {
-            "offset_mm": beside_mm,
-            "fss_in_sample": [one.method.fit(one.problem, everything).score for one in held],
-        },
-    }
+    return OffsetFit(
+        offset_mm=offset_mm,
+        standard_error_mm=np.nan if error is None else np.sqrt(error[0, 0]),
+        folds_mm=np.array(folds_mm),
+        identifiable=dict(zip(IDENTIFIABLE_NAMES, four, strict=True)),
+        fss_in_sample=best.score,
+        fss_out_of_sample=crossed.score_test,
+        fss_by_phase=problem.score_by_phase(best.parameters, everything),
+        n_evaluations=best.n_evaluations,
+        seconds=best.seconds,
+        held=HeldOffset(
+            offset_mm=beside_mm,
+            fss_in_sample=np.array([one.method.fit(one.problem, everything).score for one in held]),
+        ),
+    )
 
 
 def _least_squares(roving: ReceptorOffset, rates: RateRecordings, seed: int) -> Method:

@@ -1,4 +1,4 @@
-"""What recorded rates leave uncertain: intervals and profiles of the four numbers, and bands of rates."""
+"""Uncertainty of a fit to rates: credible intervals and profiles of the four numbers, and bands of rates."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.results import Matrix, Vector, result_class
 from fingerpad.experiments.fit.rate_uncertainty import LEVEL, likely_points, possible, profiles
 from fingerpad.inference.afferent_posterior import afferent_posterior
 from fingerpad.inference.fitting.posterior import credible_band
@@ -17,6 +18,58 @@ from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.recordings import RateRecordings
 
 
+@result_class
+class RateBand:
+    """Ends of a credible band of rates, (n_stimuli,). [spikes/s]"""
+
+    low_hz: Vector
+    high_hz: Vector
+
+
+@result_class
+class PhaseBands:
+    """Bands of the predicted rates, and of new recordings with their noise."""
+
+    predicted: RateBand
+    new: RateBand
+
+
+@result_class
+class RatePosterior:
+    """Posterior of the four identifiable numbers.
+
+    Parameters
+    ----------
+    level : float
+        Probability within each interval and band.
+    seed : int
+        Of the random numbers.
+    n_draws, n_evaluations : int
+        Draws that were kept, and evaluations of the likelihood.
+    largest_r_hat, smallest_effective_size : float
+        Convergence: split R-hat and effective number of draws, the worst of the four.
+    median : dict of str to float
+        Of each number.
+    interval : dict of str to (float, float)
+        Credible interval of each number.
+    covariance : array (4, 4)
+        Of the draws.
+    bands : dict of str to PhaseBands
+        By phase.
+    """
+
+    level: float
+    seed: int
+    n_draws: int
+    n_evaluations: int
+    largest_r_hat: float
+    smallest_effective_size: float
+    median: dict[str, float]
+    interval: dict[str, tuple[float, float]]
+    covariance: Matrix
+    bands: dict[str, PhaseBands]
+
+
 def posterior(
     model: AfferentModel,
     rates: RateRecordings,
@@ -24,8 +77,8 @@ def posterior(
     seed: int,
     positions_mm: ArrayLike | None = None,
     **settings: Any,
-) -> dict[str, Any]:
-    """Draw the four identifiable numbers from what the rates leave possible.
+) -> RatePosterior:
+    """Draw the four identifiable numbers from their posterior given the rates.
 
     Parameters
     ----------
@@ -44,9 +97,7 @@ def posterior(
 
     Returns
     -------
-    dict
-        Median and ends of the credible interval of each number, their covariance, and by phase the bands of
-        predicted rates and of new recordings, `low_hz` and `high_hz`.
+    RatePosterior
 
     Raises
     ------
@@ -55,21 +106,22 @@ def posterior(
     """
     likelihood = _likelihood(model, rates, positions_mm)
     found = afferent_posterior(likelihood, possible(four), seed=seed, **settings)
-    return {
-        "level": LEVEL,
-        "seed": seed,
-        "n_draws": len(found.four),
-        "n_evaluations": found.chains.n_evaluations,
-        "largest_r_hat": found.chains.r_hat.max(),
-        "smallest_effective_size": found.chains.effective_sizes.min(),
-        "median": dict(zip(IDENTIFIABLE_NAMES, np.median(found.four, axis=0), strict=True)),
-        "interval": dict(zip(IDENTIFIABLE_NAMES, credible_band(found.four, LEVEL).T, strict=True)),
-        "covariance": np.cov(found.four, rowvar=False),
-        "bands": {
-            phase: {"predicted": _band(drawn.predicted_hz), "new": _band(drawn.new_hz)}
+    ends = credible_band(found.four, LEVEL).T
+    return RatePosterior(
+        level=LEVEL,
+        seed=seed,
+        n_draws=len(found.four),
+        n_evaluations=found.chains.n_evaluations,
+        largest_r_hat=found.chains.r_hat.max(),
+        smallest_effective_size=found.chains.effective_sizes.min(),
+        median=dict(zip(IDENTIFIABLE_NAMES, np.median(found.four, axis=0).tolist(), strict=True)),
+        interval=dict(zip(IDENTIFIABLE_NAMES, (tuple(pair) for pair in ends.tolist()), strict=True)),
+        covariance=np.cov(found.four, rowvar=False),
+        bands={
+            phase: PhaseBands(predicted=_band(drawn.predicted_hz), new=_band(drawn.new_hz))
             for phase, drawn in found.rates.items()
         },
-    }
+    )
 
 
 def profiled(
@@ -98,6 +150,6 @@ def _likelihood(
     return RateLikelihood(four_number_model(model), rates, places)
 
 
-def _band(draws_hz: FloatArray) -> dict[str, FloatArray]:
+def _band(draws_hz: FloatArray) -> RateBand:
     low, high = credible_band(draws_hz, LEVEL)
-    return {"low_hz": low, "high_hz": high}
+    return RateBand(low_hz=low, high_hz=high)

@@ -1,31 +1,28 @@
-"""Recordings of one's own from file to fit: press what was pressed, read the receptor, fit, say how."""
+"""Run of a fit to recordings: solve the indentations, sample the receptor, fit, record."""
 
 from __future__ import annotations
 
-import hashlib
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 import numpy as np
 
 from fingerpad.core.checks import one_of, whole
 from fingerpad.core.errors import InputError
-from fingerpad.core.progress import NoProgress, Progress
+from fingerpad.core.progress import Progress
+from fingerpad.core.results import result_class
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.fit.fit import check_enough, dealt_folds, fit_recordings
+from fingerpad.experiments.fit.fit import FitResult, check_enough, fit_recordings, folds_in_turn
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
 from fingerpad.experiments.fit.offset import check_offset
-from fingerpad.experiments.gerling2014.reproduction import plain
-from fingerpad.experiments.manifest import software
+from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.recording_files import Recorded
-from fingerpad.experiments.runner import STORE_FOLDER
+from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.stimuli import TactileStimulus
 from fingerpad.geometry.grading import Grading, covering
 from fingerpad.geometry.indenter_grading import grading_about
@@ -37,15 +34,40 @@ from fingerpad.inference.rate_model import WINDOWS_MS, Windows
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.skin.fields import sampled_fields
 from fingerpad.skin.indentation import Touch, touch_of
-from fingerpad.skin.store import Store, solve_missing
 
 EXAMPLE = "bar.csv"
-"""Name of the file of `example`."""
+"""Name of the file of `example_recordings`."""
+
+
+@result_class
+class FitFile:
+    """The file `fit.json`.
+
+    Parameters
+    ----------
+    format, format_version
+        By which a reader knows the file.
+    fit : FitResult
+        What was found.
+    windows_ms : ((float, float), (float, float))
+        Windows of the dynamic and of the static rate. [ms]
+    dynamic_quantity : str
+        Quantity of the dynamic term.
+    manifest : Manifest
+        What ran.
+    """
+
+    format: Literal["fingerpad fit"] = "fingerpad fit"
+    format_version: Literal[1] = 1
+    fit: FitResult
+    windows_ms: tuple[tuple[float, ...], tuple[float, ...]]
+    dynamic_quantity: str
+    manifest: Manifest
 
 
 @dataclass(frozen=True)
-class RecordingFit:
-    """A fit to recordings with all that it needs.
+class FitRequest:
+    """A fit to recordings with all that it takes to run it.
 
     Parameters
     ----------
@@ -58,7 +80,7 @@ class RecordingFit:
     method : str
         One of `METHODS`.
     n_folds : int, optional
-        How many folds to deal out; not together with folds that the recordings bring.
+        Number of folds; not together with folds that the recordings give.
     windows_ms : ((float, float), (float, float))
         Windows of the dynamic and of the static rate. [ms]
     jobs : int
@@ -71,14 +93,15 @@ class RecordingFit:
     with_profiles : bool
         Whether the likelihood of each number is profiled.
     with_sensitivity : bool
-        Whether Sobol's indices of FSS are told.
+        Whether Sobol indices of FSS are computed.
     with_offset : bool
-        Whether the receptor's place along the finger is fitted as well.
+        Whether the receptor's offset along the finger is fitted as well.
 
     Raises
     ------
     InputError
-        If the recordings cannot be fitted or a stimulus not be pressed; nothing has been pressed then.
+        If the recordings cannot be fitted or a stimulus cannot be indented; this is checked before
+        anything is solved.
     """
 
     recorded: Recorded
@@ -116,7 +139,7 @@ class RecordingFit:
         if self.method == "likelihood":
             motions = {stimulus.motion for stimulus in self.recorded.stimuli.values()}
             check_spikes(self.recorded.recordings, len(motions))
-        # Built once here: what cannot be pressed is said before anything is.
+        # Built here, so that an error comes before anything is solved.
         self.touches  # noqa: B018
 
     @cached_property
@@ -130,17 +153,17 @@ class RecordingFit:
         """Fold of each stimulus."""
         given = self.recorded.memberships
         if given is not None and self.n_folds is not None:
-            raise InputError("folds must come from the column fold or be dealt out, not both: leave one out.")
-        return dealt_folds(len(self.rates.stimuli), self.n_folds) if given is None else given
+            raise InputError("folds must come from the column fold or from --folds, not both: leave one out.")
+        return folds_in_turn(len(self.rates.stimuli), self.n_folds) if given is None else given
 
     @cached_property
     def touches(self) -> dict[str, Touch]:
         """One touch per stimulus."""
-        return touches(self.recorded.stimuli, self.conditions)
+        return stimulus_touches(self.recorded.stimuli, self.conditions)
 
 
-def touches(stimuli: Mapping[str, TactileStimulus], conditions: Conditions) -> dict[str, Touch]:
-    """One touch per stimulus; those of the paper's bar are the very touches of the reproduction.
+def stimulus_touches(stimuli: Mapping[str, TactileStimulus], conditions: Conditions) -> dict[str, Touch]:
+    """One touch per stimulus; those of the paper's bar are the touches of the reproduction.
 
     Parameters
     ----------
@@ -196,82 +219,77 @@ def _grading(stimulus: TactileStimulus, conditions: Conditions) -> Grading:
     return replace(grading, full=True) if stimulus.z_mm != 0.0 else grading
 
 
-def run(fit: RecordingFit, progress: Progress | None = None, **provenance: Any) -> dict[str, Any]:
-    """Press all stimuli, fit, and say how it was done.
+def run_fit(
+    request: FitRequest,
+    progress: Progress | None = None,
+    command: str | None = None,
+    inputs: Mapping[str, str] | None = None,
+) -> FitFile:
+    """Indent with all stimuli, fit, and record what ran.
 
     Parameters
     ----------
-    fit : RecordingFit
+    request : FitRequest
         What to fit and how.
     progress : Progress, optional
-        Told about each finished press.
-    **provenance
-        What else the results shall say of their origin, such as the command and hashes of its files.
+        Shown each finished indentation.
+    command : str, optional
+        The command line, for the manifest.
+    inputs : mapping of str to str, optional
+        SHA-256 of the input files, by name.
 
     Returns
     -------
-    dict
-        "fit" as `fit_recordings` returns it, with the stimuli's presentations, and "manifest".
+    FitFile
 
     Raises
     ------
     ConvergenceError
-        If a press or a fit does not end; finished presses stay stored.
+        If an indentation or a fit does not converge; finished indentations stay stored.
     StoreError
-        If a stored press is damaged or the folder cannot be written.
+        If a stored indentation is damaged or the folder cannot be written.
     """
-    progress, recorded = progress or NoProgress(), fit.recorded
-    started, clock = datetime.now(UTC), time.perf_counter()
-    store = Store(fit.folder / STORE_FOLDER)
-    wanted = list(fit.touches.values())
-    with progress.stage("indentations", sum(not store.holds(touch) for touch in wanted)) as advance:
-        computed = solve_missing(wanted, store, fit.jobs, lambda seconds: advance())
-    offsets_mm = OFFSETS_MM if fit.with_offset else (0.0,)
+    recorded, runner = request.recorded, Runner(request.folder, request.jobs, progress)
+    skins = runner.responses({"stimuli": request.touches})["stimuli"]
+    offsets_mm = OFFSETS_MM if request.with_offset else (0.0,)
     sites = [[RECEPTOR_X_MM + offset, 0.0] for offset in offsets_mm]
-    felt = [store.load(touch).sed(sites, fit.dynamic_quantity) for touch in wanted]
+    sampled = [skin.sed(sites, request.dynamic_quantity) for skin in skins.values()]
     beside = {
-        offset: [traces.part(slice(place, place + 1)) for traces in felt]
+        offset: [traces.part(slice(place, place + 1)) for traces in sampled]
         for place, offset in enumerate(offsets_mm)
     }
     shifts_mm = _shifts_mm(list(recorded.stimuli.values()))
-    with progress.stage("fit", 1) as advance:
+    with runner.stage("fit", 1) as advance:
         found = fit_recordings(
             beside[0.0],
             recorded.recordings,
-            fit.memberships,
-            method=fit.method,
-            windows_ms=fit.windows_ms,
-            seed=fit.conditions.seed,
-            with_posterior=fit.with_posterior,
-            with_profiles=fit.with_profiles,
-            with_sensitivity=fit.with_sensitivity,
-            beside=beside if fit.with_offset else None,
-            # Two stimuli in one place have no distance over which residuals could be alike.
+            request.memberships,
+            method=request.method,
+            windows_ms=request.windows_ms,
+            seed=request.conditions.seed,
+            with_posterior=request.with_posterior,
+            with_profiles=request.with_profiles,
+            with_sensitivity=request.with_sensitivity,
+            beside=beside if request.with_offset else None,
+            # Two stimuli at one place have no distance for a correlation of residuals.
             positions_mm=shifts_mm if shifts_mm and len(set(shifts_mm)) == len(shifts_mm) else None,
         )
         advance()
-    return plain(
-        {
-            "fit": found
-            | {
-                "presentations": list(recorded.presentations.values()),
-                "spikes_after_hold": recorded.spikes_after_hold,
-                "shift_mm": shifts_mm,
-            },
-            "manifest": software()
-            | {
-                "seed": fit.conditions.seed,
-                "resolution": fit.conditions.resolution,
-                "materials": fit.conditions.materials,
-                "windows_ms": fit.windows_ms,
-                "dynamic_quantity": fit.dynamic_quantity,
-                "indentations": len(wanted),
-                "computed": computed,
-                "started": started.isoformat(timespec="seconds"),
-                "wall_s": round(time.perf_counter() - clock, 2),
-            }
-            | provenance,
-        }
+    return FitFile(
+        fit=replace(
+            found,
+            shift_mm=None if shifts_mm is None else np.array(shifts_mm),
+            presentations=tuple(recorded.presentations.values()),
+            spikes_after_hold=recorded.spikes_after_hold,
+        ),
+        windows_ms=request.windows_ms,
+        dynamic_quantity=request.dynamic_quantity,
+        manifest=runner.manifest(
+            request.conditions,
+            {"stimuli": next(iter(skins.values())).mesh},
+            command=command,
+            inputs=inputs,
+        ),
     )
 
 
@@ -282,8 +300,8 @@ def _shifts_mm(stimuli: Sequence[TactileStimulus]) -> list[float] | None:
     return [0.0 - stimulus.x_mm for stimulus in stimuli]
 
 
-def example() -> dict[str, bytes]:
-    """Files to try a fit with: the rates under the paper's bar that come with the package.
+def example_recordings() -> dict[str, bytes]:
+    """Return example recordings: the rates under the paper's bar that come with the package.
 
     Returns
     -------
@@ -292,7 +310,7 @@ def example() -> dict[str, bytes]:
 
     Examples
     --------
-    >>> print(example()[EXAMPLE].decode().splitlines()[3])
+    >>> print(example_recordings()[EXAMPLE].decode().splitlines()[3])
     -3.5,0,0
     """
     observed = bar_firing_rates()
@@ -304,8 +322,3 @@ def example() -> dict[str, bytes]:
         *(",".join(f"{value:g}" for value in row) for row in rows),
     ]
     return {EXAMPLE: ("\n".join(lines) + "\n").encode()}
-
-
-def sha256(path: Path) -> str:
-    """Hash of a file's content, by which it is known again."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()

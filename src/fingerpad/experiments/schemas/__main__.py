@@ -7,10 +7,11 @@ from pathlib import Path
 from fingerpad.core.files import write_json
 from fingerpad.core.results import file_format, schema_of
 from fingerpad.experiments.discrimination.run import DiscriminationFile
+from fingerpad.experiments.fit.session import FitFile
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.schemas import file_name
 
-RESULT_FILES: tuple[type, ...] = (ReproductionResult, DiscriminationFile)
+RESULT_FILES: tuple[type, ...] = (ReproductionResult, FitFile, DiscriminationFile)
 """Classes of results that are written to a file of their own."""
 
 
