@@ -1,5 +1,5 @@
-"""Evidence for the mechanics: cases with known answers, run by pytest and shown on docs/verification.md.
+"""Verification of the mechanics: cases with known solutions, run by pytest, shown on docs/verification.md.
 
-A case is a function that returns rows: a quantity, what mathematics expects, what fingerpad got, and how far
-apart they may be. `python -m tests.verification` runs all of them and writes the page.
+A case is a function that returns rows: a quantity, the expected value, the computed value and the
+tolerance. `python -m tests.verification` runs all of them and writes the page.
 """

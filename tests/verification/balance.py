@@ -61,13 +61,14 @@ def ordinary(name):
 
 @case(
     THEME,
-    "What the indenter gives, bone and nail take",
+    "Contact force and reaction of the supports",
     "Newton's third law; our own bound, 1e-4, which every press checks",
 )
 def force_balance() -> list[Row]:
     """A relaxing layered block under every indenter, ramp and hold, default settings: largest difference at
-    any time between contact force and reaction of the supports, over the contact force; the product checks
-    it too."""
+    any time between contact force and reaction of the supports, over the contact force. Every indentation
+    checks this as well.
+    """
     return [
         at_most(f"{name}: imbalance over force", 1e-4, ordinary(name).force_imbalance) for name in INDENTERS
     ]
@@ -75,7 +76,7 @@ def force_balance() -> list[Row]:
 
 @case(THEME, "Reaction from internal forces", "Newton's third law")
 def reaction_by_hand() -> list[Row]:
-    """An elastic block; the reaction is summed here from the internal forces at its bottom, the last step."""
+    """Elastic block. The reaction is summed here from the internal forces at its bottom in the last step."""
     rows = []
     for name, indenter in INDENTERS.items():
         mesh = block()
@@ -88,7 +89,7 @@ def reaction_by_hand() -> list[Row]:
 
 @case(THEME, "Penetration", "Our own bound: below 0.5 % of the depth")
 def penetration() -> list[Row]:
-    """The presses of the first case: deepest penetration of any skin node at any time over the depth."""
+    """Indentations of the first case: deepest penetration of any skin node at any time, over the depth."""
     return [
         at_most(f"{name}: penetration over depth", 0.005, ordinary(name).penetration_mm / DEPTH_MM)
         for name in INDENTERS
@@ -111,10 +112,11 @@ def work_and_energy(relaxing, ramp_steps):
     return np.trapezoid(done.force_mn[ramp], done.depth_mm[ramp]), stored
 
 
-@case(THEME, "Work of the indenter is stored in an elastic body", "Conservation of energy")
+@case(THEME, "Work and stored energy of an elastic body", "Conservation of energy")
 def work_is_stored() -> list[Row]:
-    """A sphere pressed 0.3 mm into an elastic block. The trapezoidal rule makes a few steps count too much
-    work; the error must fall as steps are halved, by its order 1.5 or more (force grows as depth^1.5)."""
+    """A sphere indents an elastic block by 0.3 mm. With few steps the trapezoidal rule overestimates the
+    work. The error must decrease as steps are halved, with order 1.5 or more (force increases as depth^1.5).
+    """
     errors = [work / stored - 1 for work, stored in (work_and_energy(False, n) for n in (3, 6, 12))]
     stored = work_and_energy(False, 12)[1]
     return [
@@ -124,7 +126,7 @@ def work_is_stored() -> list[Row]:
     ]
 
 
-@case(THEME, "A relaxing body stores less than the work", "Second law: dissipation is not negative")
+@case(THEME, "Work and stored energy of a relaxing body", "Second law: dissipation is not negative")
 def relaxing_stores_less() -> list[Row]:
     """The same block with two Prony terms: stored energy over work at the end of a ramp of 50 ms."""
     work, stored = work_and_energy(True, 6)
@@ -134,12 +136,13 @@ def relaxing_stores_less() -> list[Row]:
     ]
 
 
-@case(THEME, "Stored and dissipated energy add up to the work", "Conservation of energy")
+@case(THEME, "Sum of stored and dissipated energy", "Conservation of energy")
 def energy_adds_up() -> list[Row]:
-    """The presses of the first case, which turn a third of the work into heat. Work by cubic splines of force
+    """The indentations of the first case, which dissipate a third of the work. Work by cubic splines of force
     over depth, energy stored in the tissue, heat from the branches of the Prony series by their exponentials,
-    and energy of the contact's springs: largest difference at any time over the work. Four steps for the ramp
-    are few for a sphere, whose first step alone leaves 0.3 %."""
+    and energy of the contact springs: largest difference at any time, over the work. Four steps for the ramp
+    are few for a sphere: the first step alone causes 0.3 %.
+    """
     return [
         at_most(f"{name}: imbalance over work", 0.01, ordinary(name).energy.relative_imbalance)
         for name in INDENTERS
@@ -153,7 +156,7 @@ def energy_adds_up() -> list[Row]:
     slow=True,
 )
 def energy_balance_many_steps() -> list[Row]:
-    """The same with 24 + 12 steps and tight contact."""
+    """The same with 24 + 12 steps and a smaller penetration tolerance."""
     tight = PressSettings(24, 12, NewtonSettings(residual_tolerance=1e-6, penetration_tolerance=1e-3))
     return [
         at_most(f"{name}: imbalance over work", 0.005,

@@ -367,13 +367,13 @@ def sphere_nearly_incompressible() -> list[Row]:
 
 @case(THEME, "Sphere at the limit of incompressibility", SPHERE_SOURCE)
 def sphere_at_the_limit() -> list[Row]:
-    """The same at nu = 0.4999, the nearest to 0.5 that the product promises with its direct factor."""
+    """The same at nu = 0.4999, the largest value that is supported, with the direct factor."""
     return sphere_rows(0.4999)
 
 
-@case(THEME, "Sphere pressed by force", SPHERE_SOURCE)
+@case(THEME, "Sphere with prescribed force", SPHERE_SOURCE)
 def sphere_force_control() -> list[Row]:
-    """The first sphere again, given the force on it instead of its depth, 4/3 E* a³ / R."""
+    """The first sphere, with prescribed force 4/3 E* a³ / R instead of prescribed depth."""
     done, force = sphere_by_force(), 2 / 3 * reduced_modulus(0.3) * CONTACT_MM**3 / RADIUS_MM
     return [
         near("force of half the sphere", force, done.force_mn, 1e-4, "mN"),
@@ -383,8 +383,9 @@ def sphere_force_control() -> list[Row]:
 
 @case(THEME, "Cylinder", "Hertz 1882; McEwen 1949; Johnson 1985, ch. 4")
 def cylinder() -> list[Row]:
-    """R = 50 mm, plane strain. In two dimensions depth depends on the size of the block, so everything is
-    compared at the force that was found: a² = 4 F R / (pi E*)."""
+    """R = 50 mm, plane strain. In two dimensions the depth depends on the size of the block, so everything is
+    compared at the computed force: a² = 4 F R / (pi E*).
+    """
     return cylinder_rows(0.3)
 
 
@@ -429,9 +430,9 @@ def rounded_punch_force(fillet, depth_mm):
     return reduced_modulus(0.3) * (contact * depth_mm - missing), contact
 
 
-@case(THEME, "Flat punch with the product's rounded rim", "Sneddon 1965, by quadrature")
+@case(THEME, "Flat punch with a rounded rim", "Sneddon 1965, by quadrature")
 def rounded_punch() -> list[Row]:
-    """A fillet of 0.1 mm, 2 µm deep: contact ends on the fillet. Elements of 0.02 mm there."""
+    """A fillet of 0.1 mm, depth 2 µm: contact ends on the fillet. Elements of 0.02 mm there."""
     force, _ = rounded_punch_force(0.1, 0.002)
     done = punch(fillet=0.1, even=0.12)
     return [near("force of half the punch", force, done.force_mn, 0.02, "mN")]
@@ -439,9 +440,10 @@ def rounded_punch() -> list[Row]:
 
 @case(THEME, "Line load", "Flamant 1892; Johnson 1985, ch. 2")
 def line() -> list[Row]:
-    """The product's line pressed on a slice in plane strain: below it there is only the vertical stress
-    2 P / (pi y) in the plane, whence SED, with P the force found. The strip of 50 µm that the line pushes
-    does not slide; what that changes falls like strip over depth."""
+    """The line indents a slice in plane strain. Below it the only stress in the plane is the vertical one, 2
+    P / (pi y), which gives SED; P is the computed force. The strip of 50 µm under the line does not slide;
+    the effect of this decreases as strip width over depth.
+    """
     done = line_load()
     rows = []
     for depth in (1.0, 2.0, 4.0):

@@ -44,9 +44,9 @@ def worst(measure):
     return {name: np.max(values) for name, values in found.items()}
 
 
-@case(THEME, "A rigid rotation leaves no stress", "Objectivity of a hyperelastic law")
+@case(THEME, "No stress after a rigid rotation", "Objectivity of a hyperelastic law")
 def rigid_rotation() -> list[Row]:
-    """A patch is turned by a large angle and shifted: largest nodal force over bulk modulus times 1 mm²."""
+    """Patch, rotated by a large angle and displaced: largest nodal force over bulk modulus times 1 mm²."""
 
     def force(solid):
         _, forces, _ = solid.evaluate(moved_rigidly(solid, np.zeros_like(solid.mesh.nodes_mm)))
@@ -57,12 +57,13 @@ def rigid_rotation() -> list[Row]:
 
 @case(
     THEME,
-    "A turned body keeps its energy and turns its forces and tangent",
+    "Energy, forces and tangent of a rotated body",
     "Objectivity of a hyperelastic law",
 )
 def objectivity() -> list[Row]:
-    """A patch is deformed at random, then turned as well: largest change of the energy, of the
-    turned forces and of the turned tangent times a direction, relative."""
+    """A patch is deformed at random, then rotated as well: largest relative change of the energy, of the
+    rotated forces and of the rotated tangent times a direction.
+    """
 
     def change(solid):
         displacement, direction = shake(solid), shake(solid, seed=1, size=1.0)
@@ -80,9 +81,10 @@ def objectivity() -> list[Row]:
 
 @case(THEME, "Rotation after loading, with Prony history", "Objectivity of the convected history")
 def rotation_of_a_relaxing_body() -> list[Row]:
-    """Patches of a relaxing tissue are deformed, and held for 30 ms either where they are or while they turn.
-    Forces of the turned body must be the turned forces, and the body back in its first shape but turned must
-    carry the same remembered stress, turned."""
+    """Patches of a relaxing tissue are deformed and held for 30 ms, either fixed or while they rotate. The
+    forces of the rotated body must be the rotated forces. The body in its first shape, but rotated, must have
+    the same stress history, rotated.
+    """
     material = Material.polynomial(4.0, 1.5, 2.5, 0.7, 0.9, poisson=0.48, prony=PRONY)
     rows = []
     for patch, make in PATCHES.items():
@@ -110,10 +112,11 @@ def two_steps(solid, first, last):
     return force
 
 
-@case(THEME, "Forces balance and exert no moment", "Newton's third law")
+@case(THEME, "Resultant and moment of internal forces", "Newton's third law")
 def self_equilibrium() -> list[Row]:
     """Resultant and moment of the internal forces of a patch deformed at random, over the sum of their
-    sizes (and 1 mm)."""
+    magnitudes (and 1 mm).
+    """
 
     def resultant(solid):
         displacement = shake(solid)
@@ -124,7 +127,7 @@ def self_equilibrium() -> list[Row]:
     return [at_most(name, 1e-13, value) for name, value in worst(resultant).items()]
 
 
-@case(THEME, "The force is the slope of the potential", "Central differences of fourth order")
+@case(THEME, "Force as derivative of the potential", "Central differences of fourth order")
 def force_against_differences() -> list[Row]:
     """Slope of the potential along a random direction against internal forces, relative."""
 
@@ -142,7 +145,7 @@ def tangent_at(solid, displacement):
     return solid.sparsity.matrix(solid.evaluate(displacement, True)[2]).tocsr()
 
 
-@case(THEME, "The tangent is the slope of the force", "Central differences of fourth order")
+@case(THEME, "Tangent as derivative of the force", "Central differences of fourth order")
 def tangent_against_differences() -> list[Row]:
     """Slope of the forces along a random direction against tangent times direction, relative to the
     largest."""
@@ -156,9 +159,9 @@ def tangent_against_differences() -> list[Row]:
     return [at_most(name, 1e-8, value) for name, value in worst(error).items()]
 
 
-@case(THEME, "The tangent is symmetric", "Second derivatives of a potential")
+@case(THEME, "Symmetry of the tangent", "Second derivatives of a potential")
 def tangent_is_symmetric() -> list[Row]:
-    """Largest entry of tangent less its transpose over the largest entry."""
+    """Largest entry of tangent minus its transpose, over the largest entry."""
 
     def asymmetry(solid):
         tangent = tangent_at(solid, shake(solid))

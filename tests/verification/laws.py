@@ -207,16 +207,19 @@ def small_strain_error(reference):
     return np.abs(got - hooke).max() / np.abs(hooke).max()
 
 
-@case(THEME, "Small strain is Hooke's law", "Hooke's law with the initial moduli")
+@case(THEME, "Hooke's law at small strain", "Hooke's law with the initial moduli")
 def small_strain() -> list[Row]:
-    """Largest deviation from 2 G dev(e) + K tr(e) at a strain of 1e-6, relative; its second order remains."""
+    """Largest relative deviation from 2 G dev(e) + K tr(e) at a strain of 1e-6. The second-order term
+    remains.
+    """
     return [at_most(name, 1e-5, small_strain_error(reference)) for name, reference in LAWS.items()]
 
 
-@case(THEME, "A free bar tends to the incompressible one", "Rivlin 1948")
+@case(THEME, "Incompressible limit of a bar", "Rivlin 1948")
 def incompressible_limit() -> list[Row]:
-    """Axial stress at stretch 1.4 over the incompressible 2 (l² - 1/l)(W1 + W2 / l), less 1: first order in
-    1 - 2 nu."""
+    """Axial stress at stretch 1.4 over the incompressible 2 (l² - 1/l)(W1 + W2 / l), minus 1: first order in
+    1 - 2 nu.
+    """
     stretch, coefficients = 1.4, (4.0, 1.5, 2.5, 0.7, 0.9)
     first, second = stretch**2 + 2 / stretch, 2 * stretch + stretch**-2
     c10, c01, c20, c11, c02 = coefficients

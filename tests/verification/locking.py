@@ -107,7 +107,9 @@ def cook_membrane_fine() -> list[Row]:
 )
 def cook_pressure() -> list[Row]:
     """Share of the pressure that alternates from element to element (rms of mixed second differences over
-    rms), without the quarter at the clamped side. It must fall with the mesh: noise, not a mode."""
+    rms), without the quarter at the clamped side. It must decrease with the mesh size: then it is noise, not
+    a mode.
+    """
     coarse, fine = cook_checkerboard(8), cook_checkerboard(16)
     return [
         at_most("alternating share on 16 x 16", 0.12, fine),
@@ -148,11 +150,12 @@ def cube_checkerboard(n, poisson):
     return checkerboard(pressure(solid, displacement).reshape(n, n, n))
 
 
-@case(THEME, "A block under partial pressure does not lock", "Convergence to itself; after Reese et al. 1999")
+@case(THEME, "Block under partial pressure: locking", "Convergence to itself; after Reese et al. 1999")
 def cube_does_not_lock() -> list[Row]:
     """Quarter of a block with 60 kPa on the middle of its top, finite strain, neo-Hooke, E = 240.565 kPa.
-    Deflection under the middle on 4³ bricks against 8³: a locking element loses more the nearer nu is to
-    0.5, here the error stays where it is."""
+    Deflection under the middle on 4³ bricks against 8³. The error of a locking element increases as nu
+    approaches 0.5; here it is constant.
+    """
     rows = [
         near(f"nu = {poisson}: deflection on 4³", cube_deflection_mm(8, poisson),
              cube_deflection_mm(4, poisson), 0.005, "mm")
@@ -162,10 +165,12 @@ def cube_does_not_lock() -> list[Row]:
     return [*rows, near("deflection at nu = 0.4999 over that at 0.499", 1.0, limit, 0.002)]
 
 
-@case(THEME, "Pressure of the block has no checkerboard", "Bound of our own")
+@case(THEME, "Block under partial pressure: checkerboard", "Bound of our own")
 def cube_pressure() -> list[Row]:
-    """Alternating share of the pressure as for Cook's membrane, here everywhere. The edge of the load makes
-    the pressure jump, which counts too; a checkerboard would grow with nu and stay on finer meshes."""
+    """Alternating share of the pressure as for Cook's membrane, here everywhere. The pressure is
+    discontinuous at the edge of the load, which contributes to this share. A checkerboard would increase with
+    nu and remain on finer meshes.
+    """
     coarse, fine = cube_checkerboard(4, 0.4999), cube_checkerboard(8, 0.4999)
     return [
         at_most("alternating share on 8³, nu = 0.4999", 0.08, fine),
@@ -174,12 +179,11 @@ def cube_pressure() -> list[Row]:
     ]
 
 
-@case(
-    THEME, "The reference of Cook's membrane", "`plane_reference`, its order against a finer one", slow=True
-)
+@case(THEME, "Reference of Cook's membrane", "`plane_reference`, its order against a finer one", slow=True)
 def cook_reference() -> list[Row]:
-    """7 x 7 elements of order 6, graded to the clamped corners, solved again: this is how 6.9207 mm was found
-    (order 8 on 5 x 5 elements)."""
+    """7 x 7 elements of order 6, graded to the clamped corners, solved again. The reference of 6.9207 mm was
+    computed in the same way (order 8 on 5 x 5 elements).
+    """
     order = 6
     body = PlaneBody(
         [0, 0.01, 0.05, 0.15, 0.35, 0.6, 0.8, 1.0], [0, 0.1, 0.3, 0.5, 0.7, 0.87, 0.96, 1.0], order,

@@ -167,9 +167,10 @@ SOURCE = "Method of manufactured solutions (Roache 2002); orders of the linear b
 
 @case(THEME, "Orders of convergence, nu = 0.3 and 0.49", SOURCE)
 def manufactured_orders() -> list[Row]:
-    """Polynomial law N = 2, stretches from 0.76 to 1.28, on 4³ and 8³ distorted bricks. Errors in L2; stress
-    is Cauchy stress at the Gauss points, where orders of 2 and 1 are to be expected, and the mean that the
-    product reports for each element."""
+    """Polynomial law N = 2, stretches from 0.76 to 1.28, on 4³ and 8³ distorted bricks. Errors in L2. Stress
+    is the Cauchy stress at the Gauss points and the mean that is reported for each element; the expected
+    orders are 2 and 1.
+    """
     return [
         at_least(f"nu = {poisson}: order of {what}", bound, order(4, 8, errors_at(poisson), index))
         for poisson in (0.3, 0.49)
@@ -179,7 +180,7 @@ def manufactured_orders() -> list[Row]:
 
 @case(THEME, "Orders of convergence on finer meshes", SOURCE, slow=True)
 def manufactured_orders_fine() -> list[Row]:
-    """The same from 8³ to 12³ bricks, and how large the errors then are."""
+    """The same from 8³ to 12³ bricks, with the size of the errors."""
     rows = []
     for poisson in (0.3, 0.49):
         for index, (what, target) in enumerate(TARGETS):

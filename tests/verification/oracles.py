@@ -70,10 +70,9 @@ def _share(difference: np.ndarray, field: np.ndarray) -> float:
 
 @case(THEME, "FElupe, layered block under a sphere", FELUPE, slow=True, runs=RUNS)
 def felupe_block() -> list[Row]:
-    """Neo-Hookean layers with nu = 0.48 and Trial 1's moduli under a sphere of 3.5 mm radius, 0.8 mm deep.
-
-    FElupe's brick has one pressure like ours and contact is at the nodes in both, so mesh and element are the
-    same and only tolerances of Newton's method and of contact are left.
+    """Neo-Hookean layers with nu = 0.48 and the moduli of Trial 1 under a sphere of 3.5 mm radius, depth 0.8
+    mm. FElupe's brick has one pressure like ours, and both have contact at the nodes. Mesh and element are
+    therefore the same; only the tolerances of Newton's method and of contact differ.
     """
     from . import felupe_press  # GPL: only tests import it
 
@@ -83,12 +82,10 @@ def felupe_block() -> list[Row]:
 
 @case(THEME, "CalculiX, layered block under a sphere", CALCULIX, slow=True, runs=RUNS)
 def calculix_block() -> list[Row]:
-    """The same job as an exported deck.
-
-    Fair because the nodes, the trilinear shape, the law and the contact at nodes are the same. What differs
-    is the remedy against locking: incompatible modes (C3D8I) there, one pressure per element here. Plain C3D8
-    would lock and be stiffer by percents. CalculiX sums energies up over its increments by the trapezoidal
-    rule, so eight are taken, and printed each.
+    """The same job as an exported deck. Nodes, trilinear shape, law and contact at nodes are the same. The
+    method against locking differs: incompatible modes (C3D8I) there, one pressure per element here. Plain
+    C3D8 would lock and be stiffer by several per cent. CalculiX accumulates energies over its increments by
+    the trapezoidal rule; eight increments are used, and each is printed.
     """
     element = job().mesh.layer
     with tempfile.TemporaryDirectory() as folder:
@@ -119,11 +116,10 @@ PRESSES = {  # indenter, its axes, friction
 
 @case(THEME, "CalculiX, every indenter", CALCULIX, slow=True, runs=RUNS)
 def calculix_indenters() -> list[Row]:
-    """Each indenter 0.3 mm deep in a coarse layered block, nu = 0.45: force at the end.
-
-    Shows that outlines, facets, placement and contact of a deck are those of our press. The mesh is coarse,
-    0.4 mm under edges of 0.6 mm radius, so the two elements against locking differ by more than on the fine
-    block. Friction raises the force under the plate by 15 %.
+    """Each indenter at a depth of 0.3 mm in a coarse layered block, nu = 0.45: force at the end. It verifies
+    outlines, facets, placement and contact of a deck. The mesh is coarse, 0.4 mm under edges of 0.6 mm
+    radius, so the two elements against locking differ by more than on the fine block. Friction increases the
+    force under the plate by 15 %.
     """
     lines = np.array([0.0, 0.4, 0.8, 1.2, 1.6, 2.0, 2.8, 4.0])
     both = np.concatenate([-lines[:0:-1], lines])
@@ -145,9 +141,8 @@ def calculix_indenters() -> list[Row]:
 
 @case(THEME, "CalculiX, a bar with a gap", CALCULIX, slow=True, runs=RUNS)
 def calculix_gap() -> list[Row]:
-    """Two ridges 0.3 mm deep in the layered block, lines 0.2 mm apart along it: force at the end.
-
-    Four edges bend the skin where other bodies have two. On the coarse block of those the two elements
+    """Two ridges at a depth of 0.3 mm in the layered block, mesh lines 0.2 mm apart along it: force at the
+    end. Four edges bend the skin where other bodies have two. On the coarse block of those the two elements
     differ by 2.3 % under such a bar; here they agree.
     """
     half = np.concatenate([np.arange(0.0, 3.1, 0.2), [3.4, 4.0]])
@@ -168,10 +163,9 @@ def calculix_gap() -> list[Row]:
 
 @case(THEME, "CalculiX, the tip of a finger", CALCULIX, slow=True, runs=RUNS)
 def calculix_finger() -> list[Row]:
-    """A coarse finger of Trial 1's moduli, a sphere 0.4 mm deep on the slope of its tip: force at the end.
-
-    Wedges (C3D6) lie among the bricks that may touch. Tilted by -20 degrees, the sphere meets the skin with
-    its side, not with its pole.
+    """A coarse finger with the moduli of Trial 1 and a sphere at a depth of 0.4 mm on the slope of its tip:
+    force at the end. There are wedges (C3D6) among the bricks in contact. Tilted by -20 degrees, the sphere
+    touches the skin with its side, not with its pole.
     """
     finger = Fingertip()
     grading = Grading(
@@ -217,9 +211,9 @@ INCREMENTS = 100
 @case(THEME, "CalculiX, one element of every law", CALCULIX, slow=True, runs=RUNS)
 def calculix_laws() -> list[Row]:
     """A cube per law deformed by the same gradient, J = 1.11, in 100 increments: energy density at the end.
-
-    Decks avoid two traps: where a D is 0, CalculiX puts a stiffness of its own into a polynomial or Ogden law
-    without a word, so they write 1e20; and a foam of one term is read wrongly, so they halve it into two.
+    Decks work around two properties of CalculiX. It replaces a D of 0 by a stiffness of its own in a
+    polynomial or Ogden law without a message, so decks write 1e20. It reads a foam of one term wrongly, so
+    decks write it as two halves.
     """
     energies = cube_energies()
     strain = np.log(np.linalg.svd(GRADIENT, compute_uv=False))

@@ -14,11 +14,11 @@ IMAGES = ROOT / "docs" / "images"
 INTRODUCTION = """\
 # Verification of the mechanics
 
-Cases with known answers: what mathematics expects, what fingerpad got, and how far apart the two may be.
+Cases with known solutions: the expected value, the value computed by fingerpad, and the tolerance.
 `make verification` runs all of them and writes this page; the fast ones run in every `make test`. The cases
-are in `tests/verification`, one module per theme. Closed forms are written out there in NumPy, apart from the
-product's code; problems that a press does not offer are solved by a small Newton's method around the
-product's kernel. Units are mm, ms, kPa, mN, µJ.
+are in `tests/verification`, one module per theme. Closed forms are written there in NumPy, independently of
+the package. Problems that are not indentations of a finger are solved by a small Newton's method around the
+element of the package. Units are mm, ms, kPa, mN, µJ.
 """
 
 
@@ -58,7 +58,7 @@ def difference(row: Row) -> str:
 
 
 def case_text(case: Case) -> str:
-    """Heading, story and table of one case."""
+    """Heading, description and table of one case."""
     lines = [f"### {case.title}", "", f"{case.about}", "", f"*Source: {case.source}.* `{case.name}`", ""]
     if case.slow:
         lines[4] += f", {case.runs}"

@@ -83,7 +83,7 @@ def both_errors(material, gradient, bound, tolerance):
 
 @case(THEME, "Small strain, nu = 0.3", "Irons & Razzaque 1972: the patch test")
 def patch_small_strain() -> list[Row]:
-    """Boundary nodes follow a strain of 1e-4; largest errors inside. Zero up to round-off."""
+    """Boundary nodes follow a strain of 1e-4; largest errors inside. Zero to round-off."""
     return both_errors(LINEAR, 1e-4 * STRAIN, 1e-14, tolerance=1e-11)
 
 
@@ -93,10 +93,11 @@ def patch_finite_strain() -> list[Row]:
     return both_errors(POLYNOMIAL, 0.3 * STRAIN, 1e-12, tolerance=1e-13)
 
 
-@case(THEME, "The patches are distorted", "Shape of the meshes above")
+@case(THEME, "Distortion of the patches", "Shape of the meshes above")
 def patch_distortion() -> list[Row]:
-    """Smallest over largest Jacobian of any element, away from 1 but above 0: else the patch tests show
-    little."""
+    """Smallest over largest Jacobian of any element: away from 1, so that the patch tests are sensitive, and
+    above 0.
+    """
     rows = []
     for patch, make in PATCHES.items():
         mesh, _ = make()

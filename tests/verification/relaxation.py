@@ -92,8 +92,9 @@ def held_element() -> list[Row]:
 
 @case(THEME, "Ramp and hold of a Maxwell solid", "Generalised Maxwell solid, springs and dashpots one by one")
 def maxwell_solid() -> list[Row]:
-    """A cube is sheared by 0.001 in 50 ms and held. Shear force, energy that the springs hold, and work less
-    that energy, which the dashpots must have turned into heat: h_i' = g' - h_i / tau_i, G_i h_i² / tau_i."""
+    """A cube is sheared by 0.001 in 50 ms and held. Shear force, energy stored in the springs, and work minus
+    that energy, which is dissipated in the dashpots: h_i' = g' - h_i / tau_i, G_i h_i² / tau_i.
+    """
     final, ramp = 1e-3, 50.0
     times = np.concatenate([np.linspace(0.5, 50.0, 100), 50 + np.geomspace(0.5, 1450.0, 100)])
     amounts = final * np.minimum(times / ramp, 1.0)
@@ -130,8 +131,9 @@ def maxwell_solid() -> list[Row]:
 
 @case(THEME, "Limits in time", "Definition of instantaneous and long-term moduli")
 def limits_in_time() -> list[Row]:
-    """The same cube, sheared by 0.6: forces at once and after 10^7 ms against elastic cubes with the
-    instantaneous and the long-term coefficients; largest difference, relative."""
+    """The same cube, sheared by 0.6: instantaneous forces and forces after 10^7 ms against elastic cubes with
+    the instantaneous and the long-term coefficients; largest relative difference.
+    """
     names = ("c10", "c01", "c20", "c11", "c02")
 
     def elastic(factor):
@@ -164,10 +166,12 @@ def pressed_block(poisson, hold_ms):
     return hold[1:], done.force_mn[4:] / done.force_mn[3]
 
 
-@case(THEME, "A pressed block relaxes by the same series", "Prony series; exact for an incompressible body")
+@case(THEME, "Relaxation of an indented block", "Prony series; exact for an incompressible body")
 def relaxing_block() -> list[Row]:
-    """A sphere of 2 mm is pressed 0.4 mm into a block of three stiffnesses within a microsecond and held. All
-    stress of an incompressible body relaxes by g(t) and its shape stays; what is left falls with 1 - 2 nu."""
+    """A sphere of 2 mm indents a block of three stiffnesses by 0.4 mm within a microsecond and is held. All
+    stress of an incompressible body relaxes by g(t) at constant shape; the difference decreases with 1 - 2
+    nu.
+    """
     rows, errors = [], {}
     for poisson, relative in ((0.49, 0.05), (0.499, 0.005)):
         hold, share = pressed_block(poisson, 2000.0)
@@ -185,12 +189,19 @@ def relaxing_block() -> list[Row]:
     return [*rows, at_most("largest error at nu = 0.499 over that at nu = 0.49", 0.15, ratio)]
 
 
-@case(THEME, "Steps in time by a bound on SED", "120 even and growing steps; the tolerance itself", slow=True)
+@case(
+    THEME,
+    "Time steps chosen by a bound on SED",
+    "120 even and growing steps; the tolerance itself",
+    slow=True,
+)
 def chosen_steps() -> list[Row]:
-    """A relaxing layered block pressed 0.3 mm deep by steps that a tolerance on SED chooses, linear in
+    """A relaxing layered block, indented by 0.3 mm with steps chosen by a tolerance on SED, linear in
     between: largest difference from 40 + 80 steps at any of their times in the living epidermis, over its
-    largest SED. Under a sphere on elements as coarse as these (0.4 mm), a node that first meets it within a
-    step bends SED there, which no earlier step can tell; half of the tolerance is kept for that."""
+    largest SED. Under a sphere on elements of this size (0.4 mm), a node that comes into contact within a
+    step causes a kink in SED there, which earlier steps cannot predict. Half of the tolerance is reserved for
+    that.
+    """
     fine = PressSettings(40, 80, NewtonSettings(residual_tolerance=1e-6, penetration_tolerance=2e-4))
     rows = []
     for name in ("plate", "sphere"):

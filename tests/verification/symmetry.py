@@ -26,7 +26,7 @@ BALL = Sphere(curvature_per_m=500.0)
 
 @case(THEME, "Block", "Symmetry about z = 0")
 def symmetric_block() -> list[Row]:
-    """Sphere on a relaxing layered block, half and whole, at the end of the hold."""
+    """Sphere on a relaxing layered block, half and whole model, at the end of the hold."""
     half, whole = (
         pressed(block(symmetric), BALL, RELAXING, settings=PressSettings(4, 3, TIGHT))
         for symmetric in (True, False)
@@ -83,7 +83,7 @@ def finger_rows(indenter):
 
 @case(THEME, "Finger under a sphere", "Symmetry about z = 0")
 def symmetric_finger() -> list[Row]:
-    """Coarse finger of Trial 3, 0.5 mm deep, at the end of the hold."""
+    """Coarse finger of Trial 3, depth 0.5 mm, at the end of the hold."""
     return finger_rows(BALL)
 
 
