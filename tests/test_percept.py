@@ -21,6 +21,7 @@ from fingerpad.experiments.gerling2014.discrepancy import (
 from fingerpad.experiments.gerling2014.percept_sessions import SWEPT_NOISE, Measured, Observers, observe
 from fingerpad.experiments.gerling2014.percept_statistics import estimate, extreme, statistics
 from fingerpad.neuron.population import Population
+from fingerpad.psychophysics.counts import binomial_interval
 from fingerpad.psychophysics.discrimination import (
     Experiment,
     discriminate_euclidean,
@@ -52,13 +53,13 @@ def test_a_binomial_interval_leaves_half_of_the_doubt_on_either_side(hits, trial
     def tail(chance, numbers):
         return sum(math.comb(trials, k) * chance**k * (1.0 - chance) ** (trials - k) for k in numbers)
 
-    low, high = goodwin.binomial_interval(hits / trials, trials)
+    low, high = binomial_interval(hits / trials, trials)
     assert tail(float(low), range(hits, trials + 1)) == pytest.approx(0.025, rel=1e-9)
     assert tail(float(high), range(hits + 1)) == pytest.approx(0.025, rel=1e-9)
 
 
 def test_a_binomial_interval_of_always_or_never_ends_there():
-    low, high = goodwin.binomial_interval([0.0, 1.0], 10)
+    low, high = binomial_interval([0.0, 1.0], 10)
     assert (low[0], high[1]) == (0.0, 1.0)
     assert low[1] == pytest.approx(0.025 ** (1 / 10))
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import betaln, gammaln, xlog1py, xlogy
+from scipy.stats import binomtest
 
 from fingerpad.core.checks import FloatArray, float_array
 from fingerpad.core.errors import InputError
@@ -114,3 +115,36 @@ def log_probability(
 
 
 _NEARLY_NEVER = 1e-12
+
+
+def binomial_interval(
+    proportion: ArrayLike, trials: int, confidence: float = 0.95
+) -> tuple[FloatArray, FloatArray]:
+    """Exact confidence interval of a probability, given an observed proportion (Clopper & Pearson 1934).
+
+    Parameters
+    ----------
+    proportion : array_like
+        Observed proportions of successes; their counts are rounded to whole numbers. [0-1]
+    trials : int
+        Trials behind each of them.
+    confidence : float, optional
+        Least probability that such an interval contains the true one. [0-1]
+
+    Returns
+    -------
+    (array, array)
+        Lower and upper end. [0-1]
+
+    Examples
+    --------
+    After three successes in three trials the lower end is where three successes have a probability of 2.5 %.
+
+    >>> low, high = binomial_interval(1.0, trials=3)
+    >>> round(float(low) ** 3, 6), float(high)
+    (0.025, 1.0)
+    """
+    successes = np.rint(np.asarray(proportion, dtype=np.float64) * trials).astype(np.int64)
+    intervals = [binomtest(int(count), trials).proportion_ci(confidence) for count in successes.ravel()]
+    low, high = np.moveaxis(np.reshape(intervals, (*successes.shape, 2)), -1, 0)
+    return low, high

@@ -36,9 +36,9 @@ from fingerpad.experiments.discrimination.task import (
     VariedStimuli,
 )
 from fingerpad.experiments.discrimination.task_stimuli import TaskStimulus, stimulus_index
-from fingerpad.experiments.gerling2014.goodwin import binomial_interval
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics import Presentation
+from fingerpad.psychophysics.counts import binomial_interval
 from fingerpad.psychophysics.discrimination import Experiment
 from fingerpad.psychophysics.encoding import neighbours_of
 
