@@ -1,18 +1,17 @@
 """The command line as a shell meets it: what it says, where, and with which status."""
 
-import json
 import re
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 import fingerpad as fp
-from fingerpad import __version__, cli, studies
+from fingerpad import __version__, cli
 from fingerpad.cli import choices
 from fingerpad.core.errors import ConvergenceError, FingerpadError, StoreError
+from fingerpad.experiments import gerling2014
 from fingerpad.export import formats
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS
@@ -20,10 +19,6 @@ from fingerpad.geometry.indenters import Indenter, Plate, Sphere
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.skin.indentation import touch_of
-from studies import drive_study, mesh_refinement, paper_size
-from studies.pages import drive_study as drives_report
-from studies.pages import mesh_refinement as report
-from studies.pages import paper_size as paper_report
 
 COMMAND = [sys.executable, "-W", "error", "-m", "fingerpad"]
 
@@ -32,9 +27,7 @@ COMMAND = [sys.executable, "-W", "error", "-m", "fingerpad"]
 def call(monkeypatch, capsys, tmp_path):
     """Run the command line in this process, in an empty folder; a study would fail the test."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(studies, "reproduce", pytest.fail)
-    monkeypatch.setattr(mesh_refinement, "run", pytest.fail)
-    monkeypatch.setattr(paper_size, "run", pytest.fail)
+    monkeypatch.setattr(gerling2014, "reproduce", pytest.fail)
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["fingerpad", *arguments])
@@ -66,46 +59,6 @@ def test_the_help_names_what_the_modules_know():
     assert all(issubclass(getattr(fp, name), Indenter) for name in choices.INDENTERS.values())
 
 
-@pytest.mark.parametrize(
-    ("chosen", "study", "name"),
-    [
-        ((), mesh_refinement, "mesh_refinement.md"),
-        (("--against", "fine"), mesh_refinement, "mesh_refinement.md"),
-        (("--against", "paper"), paper_size, "paper_size.md"),
-    ],
-    ids=["default", "fine", "paper"],
-)
-def test_refine_writes_its_page_numbers_and_figure(call, monkeypatch, tmp_path, chosen, study, name):
-    asked = []
-    page = {mesh_refinement: report, paper_size: paper_report}[study]
-    monkeypatch.setattr(study, "run", lambda *arguments: asked.append(arguments[:2]) or {})
-    monkeypatch.setattr(page, "documents", lambda results: {name: b"errors"})
-    status, said, _ = call("refine", "--out", "meshes", "--jobs", "3", *chosen)
-    assert (status, asked) == (0, [(Path("meshes"), 3)])
-    assert said == f"Report: {Path('meshes') / name}\n"
-    assert (tmp_path / "meshes" / name).read_bytes() == b"errors"
-
-
-def test_drives_writes_its_page_and_numbers_for_the_conditions_given(call, monkeypatch, tmp_path):
-    asked = []
-
-    def study(task, on_finished):
-        asked.append((task.conditions.resolution, task.conditions.seed, task.folder, task.jobs))
-        return {"candidates": []}
-
-    def write(results, folder, command):
-        (folder / "page.md").write_text(command)
-        return folder / "page.md"
-
-    monkeypatch.setattr(drive_study, "study_drives", study)
-    monkeypatch.setattr(drives_report, "write_drive_page", write)
-    status, said, _ = call("drives", "--resolution", "quick", "--out", "found", "--jobs", "2", "--seed", "5")
-    assert (status, asked) == (0, [("quick", 5, Path("found"), 2)])
-    assert said == f"Page: {Path('found/page.md')}\nResults: {Path('found/drive_quantities.json')}\n"
-    assert (tmp_path / "found" / "page.md").read_text() == "python -m studies drives --resolution quick"
-    assert json.loads((tmp_path / "found" / "drive_quantities.json").read_text()) == {"candidates": []}
-
-
 def test_without_a_command_the_help_is_shown(call):
     status, said, errors = call()
     assert (status, errors) == (2, "")
@@ -129,12 +82,6 @@ def test_without_a_command_the_help_is_shown(call):
         (["reproduce", "--seed", "inf"], "'--seed': must be a whole number", "'inf'"),
         (["reproduce", "--seed", ""], "'--seed': must be a whole number", "''"),
         (["reproduce", "--seed"], "--seed", "requires an argument"),
-        (["drives", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
-        (["drives", "--seed", "-1"], "seed must be a whole number of at least 0", "-1"),
-        (["drives", "--resolution", "fine"], "resolution must be one of quick, standard, paper", "'fine'"),
-        (["refine", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
-        (["refine", "--against", "coarse"], "against must be one of fine, paper", "'coarse'"),
-        (["refine", "--resolution", "quick"], "No such option", "--resolution"),
         (["export"], "Missing argument", "'folder'"),
         (["export", "out", "--indenter", "cone"], "indenter must be one of sphere, cylinder, bar", "'cone'"),
         (
@@ -169,7 +116,7 @@ def test_a_folder_that_cannot_be_is_named_and_what_is_there_stays(call, tmp_path
     (tmp_path / "note").write_text("mine")
     status, said, errors = call("reproduce", "--out", f"note{below}")
     assert (status, said, errors.count("\n")) == (2, "", 1)
-    assert f"--out must be a folder that can be written: note{below} cannot" in errors
+    assert f"--out must be a writable folder: note{below} is not" in errors
     assert [path.name for path in tmp_path.iterdir()] == ["note"]
     assert (tmp_path / "note").read_text() == "mine"
 
@@ -189,7 +136,7 @@ def test_failures_of_a_run_are_said_without_a_traceback(call, monkeypatch, tmp_p
     def fail(*_):
         raise failure
 
-    monkeypatch.setattr(studies, "reproduce", fail)
+    monkeypatch.setattr(gerling2014, "reproduce", fail)
     status, said, errors = call("reproduce", "--out", "run")
     assert (status, said, errors) == (2, "", f"fingerpad: {failure}\n")
     assert list((tmp_path / "run").iterdir()) == []
@@ -199,11 +146,12 @@ def test_an_interrupted_run_says_how_it_goes_on(call, monkeypatch):
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(studies, "reproduce", stop)
+    monkeypatch.setattr(gerling2014, "reproduce", stop)
     status, said, errors = call("reproduce")
     assert (status, said) == (128 + signal.SIGINT, "")
     assert (
-        errors.strip() == "fingerpad: stopped; the same command goes on from the last finished indentation."
+        errors.strip()
+        == "fingerpad: stopped. The same command continues after the last finished indentation."
     )
 
 
@@ -214,7 +162,7 @@ def test_options_reach_the_run(call, monkeypatch, tmp_path):
         runs.append(run)
         raise FingerpadError("Enough.")
 
-    monkeypatch.setattr(studies, "reproduce", note)
+    monkeypatch.setattr(gerling2014, "reproduce", note)
     call("reproduce", "--resolution", "paper", "--out", "a/b", "--jobs", "3", "--seed", "7")
     call("reproduce")
     given, default = runs

@@ -7,10 +7,12 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.choices import REFINEMENTS
 from fingerpad.cli.options import Jobs
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.core.files import write_atomically
+
+REFINEMENTS = {"fine": "mesh_refinement", "paper": "paper_size"}
+"""Values of `--against`, each with the name of its study and page."""
 
 
 def refine_command(
@@ -32,7 +34,7 @@ def refine_command(
 
     one_of("against", against, tuple(REFINEMENTS))
     study, report = (
-        import_module(f"fingerpad.{part}.{REFINEMENTS[against]}") for part in ("studies", "report")
+        import_module(f"{package}.{REFINEMENTS[against]}") for package in ("studies", "studies.pages")
     )
     workers = whole("jobs", processes(jobs), at_least=1)
     make_writable(out)

@@ -17,7 +17,7 @@ from fingerpad.core.errors import FingerpadError
 # What a command runs is imported where it runs: help and version need none of it and come at once.
 
 app = typer.Typer(
-    help="From a touch on a finite-element human fingertip to the spikes of SAI afferents to a percept.",
+    help="Simulate touch: a finite-element fingertip, the spikes of SAI afferents, discrimination.",
     add_completion=False,
     pretty_exceptions_enable=False,
 )
@@ -53,12 +53,17 @@ app.command("export")(export_command)
 
 
 def main() -> None:
-    """Run the command line; a failure is one sentence on standard error and exit status 2."""
+    """Run the command line `fingerpad`."""
+    run(app, "fingerpad")
+
+
+def run(commands: typer.Typer, program: str) -> None:
+    """Run a command line; an error is one sentence on standard error and exit status 2."""
     try:
-        sys.exit(app(standalone_mode=False))
+        sys.exit(commands(standalone_mode=False))
     except FingerpadError as error:
-        print(f"fingerpad: {error}", file=sys.stderr)
+        print(f"{program}: {error}", file=sys.stderr)
         sys.exit(2)
     except MISUSE as error:
-        print(f"fingerpad: {error.format_message().rstrip('.')}.", file=sys.stderr)
+        print(f"{program}: {error.format_message().rstrip('.')}.", file=sys.stderr)
         sys.exit(2)

@@ -1,4 +1,4 @@
-"""What options may be, as the help names them. The modules behind them decide."""
+"""Values of options, for the help. The modules behind the commands check them."""
 
 from fingerpad.skin.fields import sampled_fields
 
@@ -30,5 +30,3 @@ MATERIALS = (
 FORMATS = ("vtu", "abaqus", "calculix", "febio")
 FITTING_METHODS = ("least_squares", "response_surface", "closed_form", "cma_es", "likelihood")
 QUANTITIES = tuple(sampled_fields())
-REFINEMENTS = {"fine": "mesh_refinement", "paper": "paper_size"}
-"""Each with its study and report."""

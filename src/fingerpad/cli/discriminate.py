@@ -1,4 +1,4 @@
-"""`fingerpad discriminate`: run a discrimination task."""
+"""`fingerpad discriminate`: thresholds in a discrimination task."""
 
 from __future__ import annotations
 
@@ -20,22 +20,24 @@ def discriminate_command(
         str | None,
         typer.Argument(
             metavar="TASK",
-            help="YAML file, see docs/discriminate.md, or the name of an example task.",
+            help="YAML file (format: docs/discriminate.md), or the name of an example task.",
         ),
     ] = None,
     out: Annotated[
         Path, typer.Option(help="Folder for page, figures, results and stored indentations.")
     ] = Path("discriminate"),
     resolution: Annotated[
-        str | None, typer.Option(help=f"Replaces the resolution of the task: {', '.join(RESOLUTIONS)}.")
+        str | None, typer.Option(help=f"One of {', '.join(RESOLUTIONS)}. Default: that of the task.")
     ] = None,
     jobs: Jobs = None,
     listed: Annotated[
-        bool, typer.Option("--list", help="List the example tasks that come with the package, and end.")
+        bool, typer.Option("--list", help="List the example tasks of the package, and exit.")
     ] = False,
-    example: Annotated[str | None, typer.Option(help="Print the file of an example task, and end.")] = None,
+    example: Annotated[
+        str | None, typer.Option(help="Print the YAML file of an example task, and exit.")
+    ] = None,
 ) -> None:
-    """Run a discrimination task: any stimuli, any population, any code."""
+    """Predict hit rates, psychometric curves and thresholds of a discrimination task."""
     from rich.console import Console
 
     from fingerpad.core.checks import one_of

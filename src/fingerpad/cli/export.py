@@ -1,4 +1,4 @@
-"""`fingerpad export`: one touch for another program."""
+"""`fingerpad export`: one touch as files for other programs."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from fingerpad.core.errors import InputError
 
 
 def export_command(
-    folder: Annotated[Path, typer.Argument(help="Where to write; made if need be.")],
+    folder: Annotated[Path, typer.Argument(help="Folder for the files; it is created if needed.")],
     indenter: Annotated[str, typer.Option(help=f"One of {', '.join(INDENTERS)}.")] = "sphere",
     curvature: Annotated[
         float | None,
-        typer.Option(parser=number, metavar="NUMBER", help="Curvature of the sphere; 287 by default. [1/m]"),
+        typer.Option(parser=number, metavar="NUMBER", help="Curvature of the sphere. Default: 287. [1/m]"),
     ] = None,
     depth: Annotated[
         float, typer.Option(parser=number, metavar="NUMBER", help="Depth of the hold. [mm]")
@@ -28,10 +28,10 @@ def export_command(
     format_name: Annotated[str, typer.Option("--format", help=f"One of {', '.join(FORMATS)}.")] = "vtu",
     elastic_moduli: Annotated[
         str | None,
-        typer.Option(help="For calculix, which cannot relax tissue: long_term or instantaneous."),
+        typer.Option(help="For calculix, whose materials do not relax: long_term or instantaneous."),
     ] = None,
 ) -> None:
-    """Press one indenter into the finger and write the touch for another program, ParaView by default."""
+    """Press an indenter into the finger and write the touch for ParaView or another solver."""
     import fingerpad
     from fingerpad.core.checks import one_of
     from fingerpad.export.formats import export_touch
@@ -50,6 +50,8 @@ def export_command(
     try:
         files = export_touch(touch, folder, format_name, elastic_moduli)
     except KeyboardInterrupt as error:
-        typer.echo("fingerpad: stopped; what was written is whole, the rest is not there.", err=True)
+        typer.echo(
+            "fingerpad: stopped. Files that exist are complete; the others were not written.", err=True
+        )
         raise typer.Exit(INTERRUPTED) from error
     typer.echo(f"Open: {files[0]}")

@@ -1,4 +1,4 @@
-"""`fingerpad fit`: fit an afferent to recordings."""
+"""`fingerpad fit`: an afferent fitted to recordings."""
 
 from __future__ import annotations
 
@@ -24,77 +24,84 @@ BAR = "bar"
 
 def fit_command(
     recordings: Annotated[
-        Path | None, typer.Argument(help="CSV or NWB file, see docs/fit.md; not needed with --example.")
+        Path | None, typer.Argument(help="CSV or NWB file (format: docs/fit.md). Not needed with --example.")
     ] = None,
     stimulus: Annotated[
         str | None,
-        typer.Option(help="bar (shifted along the finger), or a CSV or YAML file that lists the stimuli."),
+        typer.Option(help="bar (shifted along the finger), or a CSV or YAML file with the stimuli."),
     ] = None,
     stimulus_column: Annotated[
-        str | None, typer.Option(help="Column that names the stimulus; shift_mm or stimulus by default.")
+        str | None, typer.Option(help="Column with the name of the stimulus. Default: shift_mm or stimulus.")
     ] = None,
     unit: Annotated[
         int | None,
         typer.Option(parser=whole_number, metavar="INTEGER", help="Id of the spike unit of an NWB file."),
     ] = None,
     width: Annotated[
-        float | None, typer.Option(parser=number, metavar="NUMBER", help="Width of the bar; 3 mm. [mm]")
+        float | None, typer.Option(parser=number, metavar="NUMBER", help="Width of the bar. Default: 3. [mm]")
     ] = None,
     fillet: Annotated[
         float | None,
-        typer.Option(parser=number, metavar="NUMBER", help="Radius of the bar's edges; 0.3 mm. [mm]"),
+        typer.Option(
+            parser=number, metavar="NUMBER", help="Radius of the edges of the bar. Default: 0.3. [mm]"
+        ),
     ] = None,
     depth: Annotated[
-        float | None, typer.Option(parser=number, metavar="NUMBER", help="Depth of the bar; 1 mm. [mm]")
+        float | None,
+        typer.Option(parser=number, metavar="NUMBER", help="Depth of the hold. Default: 1. [mm]"),
     ] = None,
     dynamic_window: Annotated[
-        tuple[float, float], typer.Option(help="Start and end of the window of the dynamic rate. [ms]")
+        tuple[float, float], typer.Option(help="Window of the dynamic rate: start and end. [ms]")
     ] = (30.0, 50.0),
     static_window: Annotated[
-        tuple[float, float], typer.Option(help="Start and end of the window of the static rate. [ms]")
+        tuple[float, float], typer.Option(help="Window of the static rate: start and end. [ms]")
     ] = (600.0, 950.0),
     dynamic_quantity: Annotated[
         str,
         typer.Option(
-            help=f"What the dynamic term follows: {QUANTITIES[0]} as in the paper, or as an extension "
-            f"{', '.join(QUANTITIES[1:])}."
+            help=f"Quantity whose rate drives the dynamic term: {QUANTITIES[0]} (the paper's SED), or, as an "
+            f"extension, {', '.join(QUANTITIES[1:])}."
         ),
     ] = "stored",
     method: Annotated[str, typer.Option(help=f"One of {', '.join(FITTING_METHODS)}.")] = "least_squares",
     posterior: Annotated[
-        bool, typer.Option("--posterior", help="Draw credible intervals of parameters and rates as well.")
+        bool,
+        typer.Option(
+            "--posterior", help="Also sample the posterior: credible intervals of parameters and rates."
+        ),
     ] = False,
     profiles: Annotated[
-        bool, typer.Option("--profiles", help="Profile the likelihood of each number as well.")
+        bool, typer.Option("--profiles", help="Also compute the profile likelihood of each parameter.")
     ] = False,
     sensitivity: Annotated[
-        bool, typer.Option("--sensitivity", help="Compute Sobol indices of the fit's score.")
+        bool, typer.Option("--sensitivity", help="Also compute Sobol indices of the score.")
     ] = False,
     offset: Annotated[
-        bool, typer.Option("--offset", help="Fit the receptor's offset along the finger as well.")
+        bool, typer.Option("--offset", help="Also fit the position of the receptor along the finger.")
     ] = False,
     folds: Annotated[
         int | None,
         typer.Option(
             parser=whole_number,
             metavar="INTEGER",
-            help="Number of folds, assigned in turn; 6 by default, unless the recordings have a column fold.",
+            help="Number of interleaved folds. Default: 6, or the column fold of the recordings.",
         ),
     ] = None,
     out: Annotated[
-        Path, typer.Option(help="Folder for page, figures, results and stored indentations.")
+        Path,
+        typer.Option(help="Folder for the report, the figures, the results and the stored indentations."),
     ] = Path("fit"),
     resolution: Resolution = "standard",
     materials: Materials = "trial3",
     jobs: Jobs = None,
     seed: Annotated[
-        int, typer.Option(parser=whole_number, metavar="INTEGER", help="Seed of methods that draw.")
+        int, typer.Option(parser=whole_number, metavar="INTEGER", help="Seed of the random numbers.")
     ] = 0,
     example: Annotated[
-        Path | None, typer.Option(help="Write example recordings into this folder, and end.")
+        Path | None, typer.Option(help="Write example recordings into this folder, and exit.")
     ] = None,
 ) -> None:
-    """Fit an afferent to recordings of your own: rates or spikes under known stimuli."""
+    """Fit an afferent to your own recordings: firing rates or spike times under known stimuli."""
     from rich.console import Console
 
     from fingerpad.experiments import schemas

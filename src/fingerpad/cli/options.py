@@ -29,5 +29,5 @@ Resolution = Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTIONS)}.
 Materials = Annotated[str, typer.Option(help=f"One of {', '.join(MATERIALS)}.")]
 Jobs = Annotated[
     int | None,
-    typer.Option(parser=whole_number, metavar="INTEGER", help="Processes; one per core by default."),
+    typer.Option(parser=whole_number, metavar="INTEGER", help="Number of processes. Default: one per core."),
 ]

@@ -1,4 +1,4 @@
-"""`fingerpad reproduce`: the paper again, beside its numbers."""
+"""`fingerpad reproduce`: the experiments of the paper, compared with its numbers."""
 
 from __future__ import annotations
 
@@ -11,27 +11,29 @@ from fingerpad.cli.options import Jobs, Resolution, whole_number
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 
 EXPECTED_TIME = {"quick": "a minute and a half", "standard": "about 6 minutes", "paper": "some hours"}
-"""On two cores, nothing stored yet."""
+"""Time on two cores if no indentation is stored yet."""
 
 
 def reproduce_command(
     resolution: Resolution = "standard",
     out: Annotated[
-        Path, typer.Option(help="Folder for report, figures, results and stored indentations.")
+        Path,
+        typer.Option(help="Folder for the report, the figures, the results and the stored indentations."),
     ] = Path("reproduction"),
     jobs: Jobs = None,
     seed: Annotated[
-        int, typer.Option(parser=whole_number, metavar="INTEGER", help="Seed of the observer's noise.")
+        int, typer.Option(parser=whole_number, metavar="INTEGER", help="Seed of the random numbers.")
     ] = 0,
     extended: Annotated[
         bool | None,
         typer.Option(
             "--extended/--no-extended",
-            help="Go beyond the paper: other fits and drives, spikes, uncertainty; not at quick by default.",
+            help="Also run what goes beyond the paper: other methods and drives, spike trains, uncertainty. "
+            "Default: yes, except at quick resolution.",
         ),
     ] = None,
 ) -> None:
-    """Press, fire, fit and discriminate as in Gerling et al. 2014, and report beside the paper's numbers."""
+    """Reproduce Gerling et al. (2014) and compare every result with the paper."""
     from rich.console import Console
 
     from fingerpad.experiments.conditions import Conditions
@@ -47,7 +49,7 @@ def reproduce_command(
         console.print(
             f"Reproducing at {resolution} resolution with {run.jobs} process(es): "
             f"{EXPECTED_TIME[resolution]} on two cores. "
-            "Stop it at any time; it goes on from the last finished indentation."
+            "You can stop at any time: the same command continues after the last finished indentation."
         )
     with interruptible():
         results = reproduce(run, Bars(console))

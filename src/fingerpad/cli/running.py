@@ -1,4 +1,4 @@
-"""What a command needs while it runs: a folder to write into, processes, progress, an end after Ctrl-C."""
+"""What every command needs while it runs: a writable folder, processes, progress bars, Ctrl-C."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ INTERRUPTED = 130
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """End after Ctrl-C with a sentence on how the run goes on."""
+    """After Ctrl-C, exit with a sentence on how to continue."""
     try:
         yield
     except KeyboardInterrupt as error:
         typer.echo(
-            "fingerpad: stopped; the same command goes on from the last finished indentation.", err=True
+            "fingerpad: stopped. The same command continues after the last finished indentation.", err=True
         )
         raise typer.Exit(INTERRUPTED) from error
 
@@ -43,19 +43,17 @@ def processes(jobs: int | None) -> int:
 
 
 def make_writable(folder: Path, name: str = "--out") -> None:
-    """Make `folder` if need be, and see whether a file can be written into it."""
+    """Create `folder` if needed, and check that a file can be written into it."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise InputError(
-            f"{name} must be a folder that can be written: {folder} cannot ({error.strerror})."
-        ) from error
+        raise InputError(f"{name} must be a writable folder: {folder} is not ({error.strerror}).") from error
 
 
 class Bars:
-    """A bar per stage on a terminal, silence elsewhere."""
+    """One progress bar per stage on a terminal; nothing elsewhere."""
 
     def __init__(self, console: Console):
         self._console = console

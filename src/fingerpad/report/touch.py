@@ -268,7 +268,7 @@ def draw_spikes(axes: Axes, skin: Skin, response: Response) -> None:
     )
     axes.set(
         xlabel="time [ms]",
-        ylabel=f"{len(firing)} of {len(trains)} afferents\nfire, nearest lowest",
+        ylabel=f"{len(firing)} of {len(trains)} afferents fire,\nnearest at the bottom",
         xlim=(0.0, skin.times_ms[-1]),
         ylim=(0.25, len(firing) + 0.75),
         yticks=[],

@@ -1,0 +1,52 @@
+"""docs/command-line.md: the options of every command, as its help states them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import typer
+
+from fingerpad.cli import app
+from studies.pages.markdown import table
+
+INTRODUCTION = """# Command line
+
+`fingerpad` has four commands. The option `--help` of each shows the same text.
+`make reproduce ARGS="--resolution quick"` runs `fingerpad reproduce` in the environment of the repository.
+`python -m studies results` writes this page.
+"""
+
+GUIDES = {
+    "fit": "Formats and results: [fit.md](fit.md).",
+    "discriminate": "Format and results: [discriminate.md](discriminate.md).",
+    "export": "What is exported: [mechanics.md](mechanics.md#export).",
+    "reproduce": "Results of a run: [results.md](results.md).",
+}
+"""Pages that explain a command."""
+
+
+def command_line_page() -> str:
+    """Return the page."""
+    group: Any = typer.main.get_command(app)
+    parts = [INTRODUCTION.rstrip("\n")]
+    for name, command in group.commands.items():
+        parts += [
+            f"## fingerpad {name}",
+            " ".join([" ".join(command.help.split()), GUIDES[name]]),
+            table(("option", "default", "meaning"), [_row(parameter) for parameter in command.params]),
+        ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _row(parameter: Any) -> tuple[str, str, str]:
+    named = [name for name in (*parameter.opts, *parameter.secondary_opts) if name.startswith("--")]
+    name = " / ".join(named) or parameter.metavar or parameter.name.upper()
+    return f"`{name}`", _default(parameter.default), parameter.help.replace("|", "\\|")
+
+
+def _default(value: Any) -> str:
+    if value is None or value is False:
+        return ""
+    if isinstance(value, tuple):
+        return f"`{' '.join(f'{each:g}' for each in value)}`"
+    return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"

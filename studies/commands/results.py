@@ -1,0 +1,48 @@
+"""`python -m studies results`: the pages that show the numbers of a reproduction."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fingerpad.core.files import write_atomically
+from fingerpad.core.results import from_json, to_json
+
+ROOT = Path(__file__).parents[2]
+README, DOCS = ROOT / "README.md", ROOT / "docs"
+PAGE, NUMBERS, PICTURE = DOCS / "results.md", DOCS / "results.json", DOCS / "images" / "chain.png"
+COMMANDS = DOCS / "command-line.md"
+
+
+def results_command(
+    results: Annotated[Path, typer.Argument(help="results.json of `fingerpad reproduce --extended`.")] = Path(
+        "reproduction/results.json"
+    ),
+    methods: Annotated[
+        Path | None,
+        typer.Option(help="JSON file of the study on methods of fitting. Default: keep the rows shown now."),
+    ] = None,
+    picture: Annotated[
+        bool, typer.Option(help="Also press the standard sphere and draw the README's picture.")
+    ] = True,
+) -> None:
+    """Write docs/results.md, docs/command-line.md, and the table and the picture of the README."""
+    from fingerpad.report.style import write_png
+    from studies import chain_picture, command_line_page, results_page
+
+    before = from_json(results_page.Excerpt, NUMBERS.read_bytes()) if NUMBERS.exists() else None
+    shown = results_page.read_excerpt(results, methods, before)
+    readme = results_page.with_table(README.read_text(encoding="utf-8"), shown)
+    write_atomically(NUMBERS, to_json(shown) + b"\n")
+    write_atomically(PAGE, results_page.results_page(shown).encode())
+    write_atomically(README, readme.encode())
+    write_atomically(COMMANDS, command_line_page.command_line_page().encode())
+    written = [NUMBERS, PAGE, README, COMMANDS]
+    if picture:
+        skin, response = chain_picture.touched(shown.percept.standard_per_m, shown.resolution)
+        write_png(lambda parts: chain_picture.draw(*parts), (skin, response, shown.percept), PICTURE)
+        written.append(PICTURE)
+    for path in written:
+        typer.echo(f"Written: {path.relative_to(ROOT)}")

@@ -1,0 +1,376 @@
+"""The numbers of a reproduction that pages show: docs/results.md and the table of the README.
+
+A number that stands on several pages stands in these tables, and the other pages link to them.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.results import Number, Vector, result_class
+from fingerpad.report.formatting import ABSENT, fixed, number
+from studies.pages.markdown import table
+
+COMMAND = "python -m studies results"
+README_START, README_END = f"<!-- {COMMAND} writes this table -->", "<!-- end of the table -->"
+VERDICTS = {True: "✓", False: "✗", None: "○"}
+
+README_ROWS = (
+    ("skin", "Trial 3, deflection under the cylinder, R²"),
+    ("skin", "Trial 1, deflection under the cylinder, against Trial 3"),
+    ("afferent", "Single unit, FSS out of sample (mean of six folds)"),
+    ("afferent", "Dynamic rate, largest [spikes/s]"),
+    ("afferent", "Static rate, difference [spikes/s]"),
+    ("percept", "Hit rate at 296 /m, static Gradient Sum at 0.0 mm, noise fitted"),
+    ("percept", "Hit rate at 365 /m, static Gradient Sum at 0.0 mm, noise fitted"),
+    ("percept", "Noise sigma_1 that fits Goodwin's two points"),
+    ("percept", "Static hit rates do not mind the 0.2 mm shift, largest change"),
+)
+"""Rows of the README's table: the level, and the quantity as the comparison names it."""
+
+QUANTITIES = {
+    "stored": "strain energy density",
+    "von_mises": "von Mises stress",
+    "compressive_stress": "compressive stress",
+    "compressive_strain": "compressive strain",
+}
+
+
+@result_class
+class Compared:
+    """One quantity of the paper and of the run; `met` is None without a criterion."""
+
+    quantity: str
+    paper: str
+    ours: str
+    met: bool | None
+    note: str
+
+
+@result_class
+class Method:
+    """FSS of one method of fitting."""
+
+    method: str
+    free_numbers: int
+    fss_in_sample: Number
+    fss_training_mean: Number
+    fss_out_of_sample: Number
+    fss_test: Vector
+    runs: int
+
+
+@result_class
+class Model:
+    """FSS of one variant of the model; the offset of its receptor is 0 if it is not fitted. [mm]"""
+
+    model: str
+    fss_in_sample_dynamic: Number
+    fss_in_sample_static: Number
+    fss_in_sample: Number
+    fss_out_of_sample: Number
+    offset_mm: Number
+
+
+@result_class
+class Drive:
+    """FSS with one quantity in the static and one in the dynamic term."""
+
+    static: str
+    dynamic: str
+    fss_in_sample: Number
+    fss_out_of_sample: Number
+    fss_out_of_sample_dynamic: Number
+    fss_out_of_sample_static: Number
+
+
+@result_class
+class HitRates:
+    """Hit rates of one code at both places of the sphere, (n_curvatures,)."""
+
+    code: str
+    hit_rate: Vector
+    hit_rate_shifted: Vector
+
+
+@result_class
+class Percept:
+    """Hit rates of the codes and of people, with 95 % intervals.
+
+    Parameters
+    ----------
+    standard_per_m : float
+        Curvature of the standard. [1/m]
+    curvature_per_m : array (n_curvatures,)
+        Curvatures of the comparisons. [1/m]
+    codes : tuple of HitRates
+        The model's.
+    noise_sigma : float
+        Noise of all codes, fitted to people with the first.
+    people_curvature_per_m, people, people_low, people_high : array (n_people,)
+        Hit rates of people and their binomial intervals.
+    """
+
+    standard_per_m: float
+    curvature_per_m: Vector
+    codes: tuple[HitRates, ...]
+    noise_sigma: Number
+    people_curvature_per_m: Vector
+    people: Vector
+    people_low: Vector
+    people_high: Vector
+
+
+@result_class
+class Excerpt:
+    """What of a run the pages show; `indentations` counts them by part of the run."""
+
+    version: str
+    resolution: str
+    materials: str
+    seed: int
+    indentations: dict[str, int]
+    comparison: tuple[Compared, ...]
+    methods: tuple[Method, ...]
+    models: tuple[Model, ...]
+    drives: tuple[Drive, ...]
+    percept: Percept
+
+
+def read_excerpt(path: Path, methods: Path | None = None, before: Excerpt | None = None) -> Excerpt:
+    """Take from the results of `fingerpad reproduce --extended` what the pages show.
+
+    Parameters
+    ----------
+    path : Path
+        Its results.json.
+    methods : Path, optional
+        Numbers of the study that compares methods of fitting, as `studies.fit_methods.result` returns them.
+    before : Excerpt, optional
+        What the pages show now; without `methods` they keep its methods and models.
+
+    Raises
+    ------
+    StoreError
+        If a file cannot be read, or a section that a page shows is missing.
+    """
+    try:
+        results = json.loads(path.read_text(encoding="utf-8"))
+        compared = None if methods is None else json.loads(methods.read_text(encoding="utf-8"))
+        shown = excerpt(results, compared)
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{path} cannot be read as JSON ({error}): run `make reproduce` first.") from error
+    except (KeyError, TypeError) as error:
+        raise StoreError(
+            f"{path} must hold all that `fingerpad reproduce --extended` writes: {error} is missing."
+        ) from error
+    if not shown.drives:
+        raise StoreError(f"{path} must come from `fingerpad reproduce --extended`: the drives are missing.")
+    if compared is None and before is not None:
+        return replace(shown, methods=before.methods, models=before.models)
+    return shown
+
+
+def excerpt(results: Mapping[str, Any], methods: Mapping[str, Any] | None = None) -> Excerpt:
+    """Pick from whole results what the pages show; a missing section is a `KeyError`."""
+    manifest, found = results["manifest"], results["discrimination"]
+    compared = methods or {"methods": (), "models": ()}
+    # Absent from a run that does not go beyond the paper.
+    drives = results.get("drive_quantities") or {"candidates": ()}
+    people, codes = found["goodwin"], dict(found["gradient_sum"])
+    return Excerpt(
+        **{key: manifest[key] for key in ("version", "resolution", "materials", "seed")},
+        indentations={
+            stage["name"]: stage["indentations"] for stage in manifest["stages"] if stage.get("indentations")
+        },
+        comparison=tuple(_picked(Compared, row) for row in results["comparison"]),
+        methods=tuple(_picked(Method, row) for row in compared["methods"]),
+        models=tuple(
+            _picked(Model, row | {"offset_mm": row["parameters"].get("offset_mm") or 0.0})
+            for row in compared["models"]
+        ),
+        drives=tuple(
+            _picked(Drive, candidate["fit"] | {term: candidate[term] for term in ("static", "dynamic")})
+            for candidate in drives["candidates"]
+        ),
+        percept=Percept(
+            standard_per_m=found["curvature_per_m"][0],
+            curvature_per_m=found["curvature_per_m"][1:],
+            codes=tuple(
+                _picked(HitRates, rates | {"code": name})
+                for name, rates in [
+                    *((f"Gradient Sum, {phase}", codes[phase]) for phase in ("static", "dynamic", "latency")),
+                    ("Euclidean Distance, static", found["euclidean"]["static"]),
+                ]
+            ),
+            noise_sigma=found["noise_sigma"],
+            people_curvature_per_m=people["curvature_per_m"],
+            people=people["hit_rate"],
+            people_low=people["low"],
+            people_high=people["high"],
+        ),
+    )
+
+
+def _picked(cls: Any, values: Mapping[str, Any]) -> Any:
+    """Make an instance of a class of results from those values that are its fields."""
+    return cls(**{name: values[name] for name in cls.__dataclass_fields__})
+
+
+def results_page(shown: Excerpt) -> str:
+    """Return docs/results.md."""
+    judged = [row.met for row in shown.comparison if row.met is not None]
+    parts = [
+        "# Results of the reproduction",
+        "The numbers on this page come from one run of "
+        f"`fingerpad reproduce --resolution {shown.resolution} --extended` "
+        f"(fingerpad {shown.version}, tissues {shown.materials}, seed {shown.seed}). "
+        f"`{COMMAND}` writes the page from `results.json`; do not edit it by hand. Other pages link to it. "
+        "The times are in the [benchmarks](../benchmarks/README.md).",
+        "## Indentations",
+        _indentations(shown.indentations),
+        "## This run and the paper",
+        f"{sum(judged)} of {len(judged)} criteria are met (✓), {len(judged) - sum(judged)} are missed (✗). "
+        "○: the paper gives no criterion. The report of a run also says what each row rests on.",
+        table(
+            ("quantity", "paper", "this run", "", "note"),
+            [
+                (row.quantity, row.paper, row.ours, VERDICTS[row.met], _linked(row.note))
+                for row in shown.comparison
+            ],
+        ),
+        "## FSS by method of fitting",
+        "Fractional sum of squares (FSS, Eqs. 12-14) of one afferent under the bar. "
+        "Out of sample: mean of six folds. From the study `studies.fit_methods`, on the same recordings. "
+        "[How the methods are set](decisions/methods-of-fitting.md), "
+        "[what limits them](single-unit.md#what-limits-the-fit).",
+        _methods(shown.methods),
+        "## FSS by variant of the model, and the offset of the receptor",
+        "All fitted by CMA-ES. The offset is the distance of the receptor from its nominal position "
+        "along the finger ([decision](decisions/receptor-offset.md)).",
+        _models(shown.models),
+        "## FSS by the quantity that drives the afferent",
+        "All fitted by least squares ([discussion](single-unit.md#quantities-that-drive-the-afferent)).",
+        _drives(shown.drives),
+        "## Hit rates",
+        f"Share of trials in which a sphere is told from one of {number(shown.percept.standard_per_m)} /m. "
+        f"The noise, {fixed(shown.percept.noise_sigma, 3)}, is fitted to people's two hit rates "
+        "with the static Gradient Sum ([decision](decisions/noise-fitted.md)); all codes use it.",
+        _hit_rates(shown.percept),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _linked(note: str) -> str:
+    """Pages that a note names, as links from docs/."""
+    return re.sub(r"docs/(decisions/([\w-]+)\.md)", r"[\2](\1)", note)
+
+
+def _indentations(counts: Mapping[str, int]) -> str:
+    rows = [(name, str(count)) for name, count in counts.items()]
+    return table(("part of the run", "indentations"), [*rows, ("together", f"**{sum(counts.values())}**")])
+
+
+def _methods(rows: Sequence[Method]) -> str:
+    columns = ("method", "free parameters", "all shifts", "training", "out of sample", "fold by fold", "runs")
+    return table(
+        columns,
+        [
+            (
+                row.method,
+                str(row.free_numbers),
+                *(fixed(score, 3) for score in (row.fss_in_sample, row.fss_training_mean)),
+                f"**{fixed(row.fss_out_of_sample, 3)}**",
+                " ".join(fixed(score, 2) for score in row.fss_test),
+                str(row.runs),
+            )
+            for row in rows
+        ],
+    )
+
+
+def _models(rows: Sequence[Model]) -> str:
+    columns = ("model", "dynamic", "static", "all shifts", "out of sample", "offset [mm]")
+    return table(
+        columns,
+        [
+            (
+                row.model,
+                *(
+                    fixed(score, 3)
+                    for score in (row.fss_in_sample_dynamic, row.fss_in_sample_static, row.fss_in_sample)
+                ),
+                f"**{fixed(row.fss_out_of_sample, 3)}**",
+                fixed(row.offset_mm, 3) if row.offset_mm else ABSENT,
+            )
+            for row in rows
+        ],
+    )
+
+
+def _drives(rows: Sequence[Drive]) -> str:
+    columns = ("static term", "dynamic term", "in sample", "out of sample", "dynamic", "static")
+    return table(
+        columns,
+        [
+            (
+                *(QUANTITIES.get(term, term) for term in (row.static, row.dynamic)),
+                fixed(row.fss_in_sample, 3),
+                f"**{fixed(row.fss_out_of_sample, 3)}**",
+                *(fixed(score, 3) for score in (row.fss_out_of_sample_dynamic, row.fss_out_of_sample_static)),
+            )
+            for row in rows
+        ],
+    )
+
+
+def _hit_rates(percept: Percept) -> str:
+    columns = ("code", "sphere at [mm]", *(f"{number(each)} /m" for each in percept.curvature_per_m))
+    rows = [
+        (code.code, place, *(fixed(rate, 2) for rate in rates))
+        for code in percept.codes
+        for place, rates in (("0.0", code.hit_rate), ("0.2", code.hit_rate_shifted))
+    ]
+    people = dict(zip(percept.people_curvature_per_m, percept.people, strict=True))
+    observed = (fixed(people.get(each), 2) for each in percept.curvature_per_m)
+    return table(columns, [*rows, ("people (Goodwin et al.)", "", *observed)])
+
+
+def readme_table(shown: Excerpt) -> str:
+    """Return the table of the README.
+
+    Raises
+    ------
+    InputError
+        If the comparison lacks a row of `README_ROWS`.
+    """
+    rows = {row.quantity: row for row in shown.comparison}
+    if missing := [quantity for _, quantity in README_ROWS if quantity not in rows]:
+        raise InputError(f"The comparison must hold the rows of README_ROWS: it lacks {', '.join(missing)}.")
+    return table(
+        ("level", "quantity", "paper", "here", ""),
+        [
+            (level, quantity, rows[quantity].paper, rows[quantity].ours, VERDICTS[rows[quantity].met])
+            for level, quantity in README_ROWS
+        ],
+    )
+
+
+def with_table(readme: str, shown: Excerpt) -> str:
+    """Return the README with its table written anew.
+
+    Raises
+    ------
+    InputError
+        If the marks around the table are missing.
+    """
+    start, end = readme.find(README_START), readme.find(README_END)
+    if start < 0 or end < start:
+        raise InputError(f"README.md must hold {README_START} and {README_END}, in this order: it does not.")
+    return readme[: start + len(README_START)] + f"\n{readme_table(shown)}\n" + readme[end:]

@@ -1,0 +1,47 @@
+"""docs/architecture.md and the contract of imports say what the packages are and may do."""
+
+import ast
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src" / "fingerpad"
+FOLDERS = sorted(path.parent.name for path in PACKAGE.glob("*/__init__.py"))
+PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+ROWS = {
+    cells[0].strip("` "): cells
+    for cells in (line.strip("|").split("|") for line in PAGE.splitlines() if line.startswith("| `"))
+}
+LAYERS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
+    "contracts"
+][0]["layers"]
+
+
+def imported(package: str) -> set[str]:
+    """Other packages that the modules of one name in an import."""
+    found = set()
+    for module in (PACKAGE / package).rglob("*.py"):
+        for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            found |= {match[1] for name in names if (match := re.match(r"fingerpad\.(\w+)", name))}
+    return found - {package}
+
+
+def test_the_page_and_the_contract_list_every_package_in_the_same_order():
+    assert [f"fingerpad.{name}" for name in ROWS] == LAYERS
+    assert sorted(ROWS) == FOLDERS
+
+
+def test_no_module_lies_beside_the_packages():
+    assert sorted(path.name for path in PACKAGE.glob("*.py")) == ["__init__.py", "__main__.py"]
+
+
+@pytest.mark.parametrize("package", FOLDERS)
+def test_a_package_imports_only_what_its_row_names(package):
+    stated = ROWS[package][2]
+    named = set(FOLDERS) if "all others" in stated else set(re.findall(r"`(\w+)`", stated))
+    assert imported(package) <= named | ({"core", "data"} if package not in ("core", "data") else {"core"})

@@ -1,0 +1,92 @@
+"""Pages that show numbers of a run or options of a command are those that the code writes."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import fingerpad as fp
+from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.results import from_json
+from studies import chain_picture
+from studies.command_line_page import command_line_page
+from studies.results_page import (
+    README_END,
+    README_ROWS,
+    README_START,
+    Excerpt,
+    read_excerpt,
+    readme_table,
+    results_page,
+    with_table,
+)
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def shown():
+    return from_json(Excerpt, (ROOT / "docs" / "results.json").read_bytes())
+
+
+def page(name):
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def test_the_page_of_results_is_written_from_its_numbers(shown):
+    assert page("docs/results.md") == results_page(shown)
+
+
+def test_the_table_of_the_readme_is_written_from_the_same_numbers(shown):
+    assert with_table(page("README.md"), shown) == page("README.md")
+
+
+def test_the_page_of_the_command_line_is_written_from_the_commands():
+    assert page("docs/command-line.md") == command_line_page()
+
+
+def test_a_changed_number_changes_the_table_and_nothing_else_of_the_readme(shown):
+    rows = [
+        replace(row, ours="changed") if row.quantity == README_ROWS[0][1] else row for row in shown.comparison
+    ]
+    readme = f"before\n{README_START}\n| old |\n{README_END}\nafter\n"
+    written = with_table(readme, replace(shown, comparison=tuple(rows)))
+    assert written.startswith(f"before\n{README_START}\n| level |")
+    assert written.endswith(f"{README_END}\nafter\n")
+    assert "| changed |" in written
+    assert "| old |" not in written
+
+
+def test_a_readme_without_its_marks_and_a_comparison_without_its_rows_are_refused(shown):
+    with pytest.raises(InputError, match=r"README\.md must hold"):
+        with_table("no marks", shown)
+    with pytest.raises(InputError, match="lacks Trial 3"):
+        readme_table(replace(shown, comparison=()))
+
+
+def test_results_that_lack_a_section_are_refused_by_its_name(tmp_path):
+    file = tmp_path / "results.json"
+    with pytest.raises(StoreError, match="run `make reproduce` first"):
+        read_excerpt(file)
+    file.write_text(json.dumps({"manifest": {}, "discrimination": {}}))
+    with pytest.raises(StoreError, match="'goodwin' is missing"):
+        read_excerpt(file)
+
+
+def test_the_picture_shows_the_hit_rates_of_the_run_and_all_axes_have_names(shown):
+    skin = fp.indent(
+        fp.Fingertip(),
+        fp.Sphere(curvature_per_m=287),
+        fp.RampAndHold(depth_mm=1.0),
+        settings=fp.PressSettings(ramp_steps=3, hold_steps=2),
+    )
+    response = fp.Population.grid(density_per_cm2=100).respond(skin)
+    figure = chain_picture.draw(skin, response, shown.percept)
+    section, curve, motion, spikes, _ = figure.axes
+    model, *_ = curve.lines
+    assert model.get_xydata().tolist() == list(
+        map(list, zip(shown.percept.curvature_per_m, shown.percept.codes[0].hit_rate, strict=True))
+    )
+    assert all(axes.get_xlabel() and axes.get_ylabel() for axes in (section, curve, spikes))
+    assert motion.get_ylabel() == "depth\n[mm]"
