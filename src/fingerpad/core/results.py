@@ -227,14 +227,19 @@ def write_results(path: Path, results: ResultFile, schema: dict[str, Any]) -> No
         If the results do not meet the schema, or as `write_atomically`.
     """
     content = to_json(results)
+    check_schema(path, json.loads(content), schema)
+    write_atomically(path, content + b"\n")
+
+
+def check_schema(path: Path, values: dict[str, Any], schema: dict[str, Any]) -> None:
+    """Raise `StoreError` if the values of a file do not meet a JSON schema."""
     try:
-        fastjsonschema.compile(schema)(json.loads(content))
+        fastjsonschema.compile(schema)(values)
     except fastjsonschema.JsonSchemaValueException as error:
         raise StoreError(
-            f"{path} was not written: the results do not meet their schema ({error.message}); "
-            "write the schemas anew with `python -m fingerpad.experiments.schemas`."
+            f"{path} must meet the schema of its format: {error.message}; run the command again, or, after a "
+            "change of a type, `python -m fingerpad.experiments.schemas`."
         ) from error
-    write_atomically(path, content + b"\n")
 
 
 def read_results(path: Path, cls: type[Kind]) -> Kind:
@@ -252,32 +257,40 @@ def read_results(path: Path, cls: type[Kind]) -> Kind:
     StoreError
         If the file cannot be read, has another format or version, or is damaged.
     """
-    check_format(path, read_json(path), cls)
+    content = read_format(path, dict([file_format(cls)]))
     try:
-        return from_json(cls, Path(path).read_bytes())
+        return from_json(cls, json.dumps(content).encode())
     except InputError as error:
         raise StoreError(f"{path} is damaged: {error} Run the command again.") from error
 
 
-def read_json(path: Path) -> Any:
-    """Read a file as JSON, else raise `StoreError`."""
+def read_format(path: Path, versions: Mapping[str, int]) -> dict[str, Any]:
+    """Read the JSON values of a file whose format and version are known.
+
+    Parameters
+    ----------
+    path : Path
+        Written by `write_results`.
+    versions : mapping of str to int
+        Version of each format that will do.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read as JSON, or has another format or version.
+    """
     try:
-        return json.loads(Path(path).read_bytes())
+        values = json.loads(Path(path).read_bytes())
     except (OSError, ValueError) as error:
         raise StoreError(f"{path} cannot be read as JSON ({error}): run the command again.") from error
-
-
-def check_format(path: Path, values: Any, *classes: type) -> str:
-    """Return the format of a file's values if it is that of one of `classes`, else raise `StoreError`."""
     found = (values.get("format"), values.get("format_version")) if isinstance(values, dict) else (None, None)
-    wanted = [file_format(cls) for cls in classes]
-    if found not in wanted:
-        names = " or ".join(f"{name}, version {version}" for name, version in wanted)
+    if found not in versions.items():
+        wanted = " or ".join(f"{name}, version {version}" for name, version in versions.items())
         came = "no format" if found[0] is None else f"{found[0]}, version {found[1]}"
         raise StoreError(
-            f"{path} must have the format {names}: got {came}; run the command again to write it anew."
+            f"{path} must have the format {wanted}: got {came}; run the command again to write it anew."
         )
-    return str(found[0])
+    return values
 
 
 def file_format(cls: Any) -> tuple[str, int]:

@@ -8,6 +8,16 @@ from typing import Any
 
 ABSENT = "–"
 PHASES = {"dynamic": "dynamic ramp", "static": "static hold"}
+PARAMETER_SYMBOLS = {
+    "intercept_ma": "intercept β",
+    "dynamic_gain": "dynamic gain k_d",
+    "static_gain": "static gain k_s",
+    "time_constant_ms": "time constant τ",
+    "capacitance_mf": "capacitance C",
+    "threshold_mv": "threshold v",
+}
+"""The six parameters of the paper, with their symbols."""
+
 IDENTIFIABLE_SYMBOLS = {
     "intercept_per_ms": "β/(C v)",
     "dynamic_gain_per_kpa": "k_d/(C v)",

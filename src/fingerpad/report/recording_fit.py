@@ -13,7 +13,15 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.experiments.fit.fit import FitResult, PhaseRates
 from fingerpad.experiments.fit.methods import SpikeFitSummary
 from fingerpad.experiments.fit.session import FitFile
-from fingerpad.report.formatting import ABSENT, IDENTIFIABLE_SYMBOLS, PHASES, fixed, number, plain
+from fingerpad.report.formatting import (
+    ABSENT,
+    IDENTIFIABLE_SYMBOLS,
+    PARAMETER_SYMBOLS,
+    PHASES,
+    fixed,
+    number,
+    plain,
+)
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.page import write_html
 from fingerpad.report.parts import Chapter, Drawing, Page, Row, Table
@@ -29,7 +37,6 @@ from fingerpad.report.recording_extras import (
     sensitivity_tables,
 )
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure
-from fingerpad.report.tables import PARAMETERS
 
 PAGE = "fit.html"
 IDENTIFIABLE = IDENTIFIABLE_SYMBOLS | {"time_constant_ms": "time constant τ"}
@@ -315,7 +322,8 @@ def _identifiable(found: FitResult) -> Table:
 
 def _parameters(found: FitResult) -> Table:
     rows = [
-        Row((PARAMETERS[name], number(value), found.units[name])) for name, value in found.parameters.items()
+        Row((PARAMETER_SYMBOLS[name], number(value), found.units[name]))
+        for name, value in found.parameters.items()
     ]
     note = "One of the many sets of six with the same firing."
     return Table("The same as parameters of the paper", ("parameter", "fitted", "unit"), rows, note)

@@ -7,18 +7,10 @@ from typing import Any
 
 from fingerpad.data import paper
 from fingerpad.report import discrimination
-from fingerpad.report.formatting import fixed, number, plain, spelled
+from fingerpad.report.formatting import PARAMETER_SYMBOLS, fixed, number, plain, spelled
 from fingerpad.report.parts import Row, Table
 from fingerpad.report.skin_deflection import INDENTERS, TRIALS
 
-PARAMETERS = {
-    "intercept_ma": "intercept β",
-    "dynamic_gain": "dynamic gain k_d",
-    "static_gain": "static gain k_s",
-    "time_constant_ms": "time constant τ",
-    "capacitance_mf": "capacitance C",
-    "threshold_mv": "threshold v",
-}
 PAPER_FOLD, PAPER_START = 3, 2
 UNBROKEN = "\N{NO-BREAK SPACE}"
 
@@ -77,7 +69,7 @@ def _parameters(section: Mapping[str, Any]) -> Table:
     rows = [
         Row(
             (
-                PARAMETERS.get(name, spelled(name)),
+                PARAMETER_SYMBOLS.get(name, spelled(name)),
                 *(number(start.get(name)) for start in starts),
                 number(value),
                 units.get(name, ""),
@@ -151,7 +143,8 @@ def _history(fold: int, climb: Mapping[str, Any], units: Mapping[str, str]) -> T
     )
     title = f"Steps of the fit: fold {fold}, start {plain(climb['start'])} (the paper's Table 4)"
     headings = [
-        PARAMETERS.get(name, spelled(name)) + (f" [{units[name]}]" if name in units else "") for name in names
+        PARAMETER_SYMBOLS.get(name, spelled(name)) + (f" [{units[name]}]" if name in units else "")
+        for name in names
     ]
     columns = ("iteration", "FSS, training", *headings)
     return Table(title, columns, rows, note)

@@ -10,8 +10,8 @@ from pathlib import Path
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.layouts import PATTERNS, Layout, hexagonal, jittered, poisson_disc, rectangular, uniform
 from fingerpad.core.regions import Ellipse, Polygon, Rectangle, Region
-from fingerpad.core.results import check_format, file_format, read_json
 from fingerpad.core.signals import STORED_ENERGY
+from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.discrimination.task import (
     DEFAULT,
@@ -23,8 +23,6 @@ from fingerpad.experiments.discrimination.task import (
     PopulationSettings,
     RegionSettings,
 )
-from fingerpad.experiments.fit.session import FitFile
-from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.inference.tables import read_text
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.population import Population, sensitivities
@@ -76,18 +74,13 @@ def _fitted(path: Path) -> Afferent:
     """Afferent of a file of results: `fit.json`, or `results.json` of a reproduction."""
     try:
         read_text(path)  # names a file that cannot be read
-        values = read_json(path)
-        is_fit = check_format(path, values, FitFile, ReproductionResult) == file_format(FitFile)[0]
-        parameters = values["fit" if is_fit else "single_unit"]["parameters"]
-        quantity = values["dynamic_quantity"] if is_fit else STORED_ENERGY
-        six = [parameters[name] for name in PARAMETER_NAMES]
+        values = schemas.read(path, "fingerpad fit", "fingerpad reproduction")
     except (InputError, StoreError) as error:
         raise InputError(f"afferent: {error}") from error
-    except (KeyError, TypeError) as error:
-        raise InputError(
-            f"afferent: {path} must hold fitted parameters: it holds none; run its command again."
-        ) from error
-    return Afferent.from_parameters(six, dynamic_quantity=quantity)
+    is_fit = "fit" in values
+    parameters = values["fit" if is_fit else "single_unit"]["parameters"]
+    quantity = values["dynamic_quantity"] if is_fit else STORED_ENERGY
+    return Afferent.from_parameters([parameters[name] for name in PARAMETER_NAMES], dynamic_quantity=quantity)
 
 
 def task_population(task: DiscriminationTask, beside: Path = Path()) -> Population:

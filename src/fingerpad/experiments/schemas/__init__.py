@@ -11,7 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from fingerpad.core.results import ResultFile, write_results
+from fingerpad.core.results import ResultFile, check_schema, read_format, write_results
 
 
 @cache
@@ -53,3 +53,29 @@ def write(path: Path, results: ResultFile) -> None:
         If the results do not meet the schema or the file cannot be written.
     """
     write_results(path, results, schema(results.format))
+
+
+def read(path: Path, *formats: str) -> dict[str, Any]:
+    """Read the values of a file of results without its types.
+
+    Parameters
+    ----------
+    path : Path
+        Written by `write`.
+    *formats : str
+        Formats that will do, in the version of this package.
+
+    Returns
+    -------
+    dict
+        JSON values that meet the schema of their format.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read, has another format or version, or does not meet its schema.
+    """
+    versions = {name: schema(name)["properties"]["format_version"]["const"] for name in formats}
+    values = read_format(path, versions)
+    check_schema(path, values, schema(values["format"]))
+    return values
