@@ -161,7 +161,7 @@ THIN_CORNER = Polygon(((0, 0), (100, 0), (100, 0.02), (0.02, 0.02), (0.02, 100),
     [
         (lambda: rectangular(PAD, 0.0), "density_per_cm2 must be greater than 0"),
         (lambda: hexagonal(PAD, math.inf), "density_per_cm2 must be a finite number"),
-        (lambda: uniform(Rectangle(0.1, 0.1), 10.0, 1), "No receptor is to be expected"),
+        (lambda: uniform(Rectangle(0.1, 0.1), 10.0, 1), "gives no receptor"),
         (lambda: poisson_disc(PAD, 1e7, 1), f"A layout may have {MOST_RECEPTORS:,} receptors"),
         (lambda: rectangular(THIN_CORNER, 100.0), "No receptor of a rectangular lattice"),
         (lambda: uniform(PAD, 70.0, -1), "seed must be a whole number"),

@@ -217,7 +217,7 @@ def test_each_source_draws_its_own_numbers():
             lambda: noisy_spikes(NEURON, steady(1.0), MembraneNoise(), SEED, Presentations([1], [0], [0])),
             "sites must be within 0 ... 0: got 1",
         ),
-        (lambda: Presentations([0, 0], [0, 0], [3, 3]), "another trial for each train of a receptor"),
+        (lambda: Presentations([0, 0], [0, 0], [3, 3]), "different trial for each train of a receptor"),
         (lambda: Presentations([0, 0], [0], [3]), "one site, trial and receptor per train"),
         (lambda: Presentations([-1], [0], [3]), "sites must be a whole number"),
     ],

@@ -351,7 +351,7 @@ population: {layout: uniform, region: {shape: rectangle, length_mm: 3, width_mm:
 population: {layout: uniform, region: {shape: polygon, corners_mm: [[0, 0], [1, 1], [2, 2]]}}
     population.region: corners_mm must enclose an area
 population: {layout: uniform, density_per_cm2: 0.1, region: {shape: rectangle, length_mm: 3, width_mm: 6}}
-    population: No receptor is to be expected
+    population: A density of
 population: {layout: uniform, density_per_cm2: 1.0e+9, region: {shape: rectangle, length_mm: 3, width_mm: 6}}
     population: A layout may have
 population: {seed: -1}

@@ -1,1 +1,1 @@
-"""Units, errors, checks, files, threads, keyed random numbers and hand-over types; knows no finger."""
+"""Units, errors, checks, files, threads, keyed random numbers and shared types; independent of the finger."""

@@ -1,4 +1,4 @@
-"""Checks at the boundary: used once where a value enters, trusted afterwards."""
+"""Checks of arguments, used once where a value enters the package."""
 
 from __future__ import annotations
 

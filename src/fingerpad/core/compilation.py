@@ -1,4 +1,4 @@
-"""Say that the first press compiles its kernels: for a minute nothing else seems to happen."""
+"""A message before the first indentation compiles its kernels, which takes about a minute."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from fingerpad.core.numba_internals import is_compiled
 NOTICE = "fingerpad compiles its kernels, once: about a minute."
 
 LOGGER = logging.getLogger("fingerpad")
-"""Where the notice goes: to standard error, unless logging is set up otherwise."""
+"""Logger of the message: standard error, unless logging is configured otherwise."""
 
 
 def announce_compilation(kernel: Any) -> None:
     """Log one line, once per process, if a kernel is about to be compiled.
 
-    Its level is WARNING: without any set-up Python writes that to standard error, and an INFO nowhere.
-    `logging.getLogger("fingerpad").setLevel("ERROR")` silences it.
+    Its level is WARNING: without configuration Python writes WARNING to standard error and drops INFO.
+    `logging.getLogger("fingerpad").setLevel("ERROR")` turns it off.
 
     Parameters
     ----------
     kernel : Numba dispatcher
-        The one whose compilation takes longest.
+        The kernel with the longest compilation.
     """
     if not is_compiled(kernel):
         _say_once()

@@ -1,8 +1,8 @@
-"""The failures everybody shares: one sentence that says what was expected, what came and what to do."""
+"""Errors of the package: one sentence with the expected value, the actual value and the remedy."""
 
 
 class FingerpadError(Exception):
-    """Base of every error that fingerpad raises on purpose."""
+    """Base class of every error that fingerpad raises deliberately."""
 
 
 class InputError(FingerpadError, ValueError):
@@ -14,7 +14,7 @@ class StoreError(FingerpadError):
 
 
 class ConvergenceError(FingerpadError, RuntimeError):
-    """A solve that did not converge; nothing of it is kept.
+    """A solution that did not converge; no result is returned.
 
     Parameters
     ----------
@@ -33,4 +33,4 @@ class ConvergenceError(FingerpadError, RuntimeError):
 
 
 class MaterialWarning(UserWarning):
-    """A material that can be used, but loses its stability within the range of stretches of a touch."""
+    """A material that becomes unstable within the range of stretches of a touch."""

@@ -1,4 +1,4 @@
-"""Files that are whole or absent: a run may be killed at any moment."""
+"""Atomic writing of files: after an interruption a file is complete or absent."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from fingerpad.core.errors import StoreError
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file so that its name never stands for half of it.
+    """Write a file atomically.
 
-    The bytes go to a temporary file in the same folder, reach the disk, and only then take the name.
-    Whoever reads meanwhile finds the old file or the new one.
+    The bytes are written to a temporary file in the same folder, flushed to the disk, and renamed.
+    A concurrent reader gets the old file or the new one, never a part.
 
     Parameters
     ----------
     path : Path
-        Where the file shall be; folders are made as needed.
+        Path of the file; folders are created.
     content : bytes
-        All of it.
+        The complete content.
 
     Raises
     ------
     StoreError
-        If the folder cannot be made or the file not be written; a file that was there before is untouched.
+        If the folder or the file cannot be written; an existing file is then unchanged.
 
     Examples
     --------
@@ -39,7 +39,7 @@ def write_atomically(path: Path, content: bytes) -> None:
     b'whole'
     """
     path = Path(path)
-    # Same folder, hence same file system: only there is a rename atomic. Hidden, and unique among processes.
+    # A rename is atomic within one file system only. The name is hidden and unique among processes.
     unfinished = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -60,12 +60,12 @@ def write_atomically(path: Path, content: bytes) -> None:
 
 
 def write_json(path: Path, results: Any) -> None:
-    """Write results as JSON, whole or not at all; a number that is not finite is an error.
+    """Write results as JSON, atomically; a number that is not finite is an error.
 
     Parameters
     ----------
     path : Path
-        Where the file shall be; folders are made as needed.
+        Path of the file; folders are created.
     results : nested dicts and lists of plain values
         Such as `studies.reproduction.plain` returns.
 
@@ -90,7 +90,7 @@ def write_json(path: Path, results: Any) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Let the new name itself reach the disk, where the system can open folders."""
+    """Flush the directory entry to the disk, where the system can open folders."""
     if not hasattr(os, "O_DIRECTORY"):
         return
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)

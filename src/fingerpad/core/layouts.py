@@ -1,8 +1,8 @@
-"""How receptors are strewn over a region of the skin: in lattices, or at random, at a given density.
+"""Layouts of receptors in a region of the skin: lattices, or random positions, at a given density.
 
-Lattices have a pitch, the distance of nearest neighbours; random layouts one too, 1/sqrt(density), the length
-that belongs to each receptor. Every random number has a key, the seed and the receptor's own number: the same
-seed gives the same places, whatever else is drawn.
+The pitch of a lattice is the distance of nearest neighbours. Random layouts have a nominal pitch of
+1/sqrt(density). Every random number has a key, the seed and the number of the receptor: the same seed gives
+the same positions, whatever other random numbers are used.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from fingerpad.core.random_streams import Purpose, normals, uniforms
 from fingerpad.core.regions import Region
 
 Place = Callable[[FloatArray], FloatArray]
-"""From places in the plane (n, 2) to points of the skin (n, 3), both in mm."""
+"""From positions in the plane (n, 2) to points of the skin (n, 3), both in mm."""
 
 PATTERNS = ("rectangular", "hexagonal", "uniform", "jittered", "poisson-disc")
 
 MM2_PER_CM2 = 100.0
 MOST_RECEPTORS = 1_000_000
-"""A layout of more is a slip of the pen: the whole finger has some thousands."""
+"""Upper limit, to detect a wrong unit: the whole finger has some thousands."""
 
 SEPARATION = 0.75
-"""Least distance in a Poisson-disc layout over 1/sqrt(density). Discs dropped at random jam at 0.83."""
+"""Least distance in a Poisson-disc layout over 1/sqrt(density). Random placement saturates at 0.83."""
 
 LARGEST_SEPARATION = 0.8
 _MOST_ATTEMPTS = 1000
@@ -37,23 +37,23 @@ _MOST_ATTEMPTS = 1000
 
 @dataclass(frozen=True)
 class Layout:
-    """Places of receptors in a plane.
+    """Positions of receptors in a plane.
 
     Parameters
     ----------
     places_mm : array (n_receptors, 2)
         In the plane of the region. [mm]
     pitch_mm : float
-        Distance of neighbours in a lattice; 1/sqrt(density) where they lie at random. [mm]
+        Distance of neighbours in a lattice; 1/sqrt(density) in a random layout. [mm]
     pattern : str
         One of `PATTERNS`.
     seed : int, optional
-        What random places were drawn with; None for a lattice.
+        Seed of random positions; None for a lattice.
 
     Raises
     ------
     InputError
-        If there is no place or they are not pairs of finite numbers.
+        If there is no position or they are not pairs of finite numbers.
     """
 
     places_mm: FloatArray
@@ -112,7 +112,7 @@ def rectangular(region: Region, density_per_cm2: float) -> Layout:
 
 
 def hexagonal(region: Region, density_per_cm2: float) -> Layout:
-    """Triangular lattice of six neighbours each, the densest there is: pitch^2 = 2/(sqrt(3) density).
+    """Triangular lattice with six neighbours per receptor: pitch^2 = 2/(sqrt(3) density).
 
     Parameters
     ----------
@@ -122,8 +122,8 @@ def hexagonal(region: Region, density_per_cm2: float) -> Layout:
     Returns
     -------
     Layout
-        With a receptor in the middle of the region's bounds, one of three directions of neighbours being
-        the second axis.
+        With a receptor in the middle of the region's bounds. One of three directions of neighbours is the
+        second axis.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def hexagonal(region: Region, density_per_cm2: float) -> Layout:
 
 
 def uniform(region: Region, density_per_cm2: float, seed: int) -> Layout:
-    """Independent places, each as likely as any other.
+    """Independent positions with uniform probability.
 
     Parameters
     ----------
@@ -171,8 +171,8 @@ def uniform(region: Region, density_per_cm2: float, seed: int) -> Layout:
     --------
     >>> from fingerpad.core.regions import Ellipse
     >>> disc = Ellipse(5.0, 5.0)
-    >>> strewn = uniform(disc, density_per_cm2=100.0, seed=7)
-    >>> len(strewn), bool(disc.contains(strewn.places_mm).all())
+    >>> random = uniform(disc, density_per_cm2=100.0, seed=7)
+    >>> len(random), bool(disc.contains(random.places_mm).all())
     (79, True)
     """
     count = _expected(region, density_per_cm2)
@@ -181,7 +181,7 @@ def uniform(region: Region, density_per_cm2: float, seed: int) -> Layout:
 
 
 def jittered(region: Region, density_per_cm2: float, seed: int, jitter: float = 0.2) -> Layout:
-    """Square lattice whose receptors stray: each coordinate by Normal(0, jitter times the pitch).
+    """Square lattice with random displacements: each coordinate by Normal(0, jitter times the pitch).
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def jittered(region: Region, density_per_cm2: float, seed: int, jitter: float = 
     Returns
     -------
     Layout
-        A receptor that would leave the region strays anew.
+        A displacement out of the region is sampled again.
 
     Raises
     ------
@@ -206,8 +206,8 @@ def jittered(region: Region, density_per_cm2: float, seed: int, jitter: float = 
     --------
     >>> from fingerpad.core.regions import Rectangle
     >>> patch = Rectangle(3.0, 6.0)
-    >>> strayed = jittered(patch, 100.0, seed=7, jitter=0.1).places_mm - rectangular(patch, 100.0).places_mm
-    >>> 0.05 < float(strayed.std()) < 0.15
+    >>> moved = jittered(patch, 100.0, seed=7, jitter=0.1).places_mm - rectangular(patch, 100.0).places_mm
+    >>> 0.05 < float(moved.std()) < 0.15
     True
     """
     lattice = rectangular(region, density_per_cm2)
@@ -229,9 +229,10 @@ def poisson_disc(
     separation: float = SEPARATION,
     place: Place | None = None,
 ) -> Layout:
-    """Random places that keep a distance from each other.
+    """Random positions with a least distance from each other.
 
-    Places are drawn one after the other, anywhere in the region; one too close to an earlier one is dropped.
+    Positions are sampled one after the other, uniformly in the region. A position too close to an earlier one
+    is rejected.
 
     Parameters
     ----------
@@ -242,8 +243,8 @@ def poisson_disc(
     separation : float, optional
         Least distance, over 1/sqrt(density).
     place : callable, optional
-        Points of the skin (n, 3) at places in the plane (n, 2), such as `UnrolledSkin.points`: distances are
-        then straight lines between those, however the plane distorts them.
+        Points of the skin (n, 3) at positions in the plane (n, 2), such as `UnrolledSkin.points`. Distances
+        are then measured between these points.
 
     Returns
     -------
@@ -255,21 +256,21 @@ def poisson_disc(
     InputError
         As `rectangular`, or if the separation is not within 0 ... `LARGEST_SEPARATION`.
     ConvergenceError
-        If no more receptors find room.
+        If the positions cannot be placed within the allowed number of attempts.
 
     Examples
     --------
     >>> from fingerpad.core.regions import Rectangle
-    >>> strewn = poisson_disc(Rectangle(8.0, 8.0), density_per_cm2=100.0, seed=7)
-    >>> nearest_mm, _ = cKDTree(strewn.places_mm).query(strewn.places_mm, k=[2])
-    >>> len(strewn), bool(nearest_mm.min() >= 0.75)
+    >>> random = poisson_disc(Rectangle(8.0, 8.0), density_per_cm2=100.0, seed=7)
+    >>> nearest_mm, _ = cKDTree(random.places_mm).query(random.places_mm, k=[2])
+    >>> len(random), bool(nearest_mm.min() >= 0.75)
     (64, True)
     """
     count = _expected(region, density_per_cm2)
     if not_negative("separation", separation) > LARGEST_SEPARATION:
         raise InputError(
-            f"separation must not exceed {LARGEST_SEPARATION:g} of 1/sqrt(density), beyond which discs jam: "
-            f"got {separation:g}."
+            f"separation must not exceed {LARGEST_SEPARATION:g} of 1/sqrt(density), the limit of random "
+            f"placement: got {separation:g}."
         )
     pitch = mean_spacing_mm(density_per_cm2)
     least = separation * pitch
@@ -279,7 +280,7 @@ def poisson_disc(
     while len(places) < count:
         if drawn > _MOST_ATTEMPTS * count:
             raise ConvergenceError(
-                f"Only {len(places)} of {count} receptors found room {least:.3g} mm apart after {drawn} "
+                f"Only {len(places)} of {count} receptors could be placed {least:.3g} mm apart after {drawn} "
                 "attempts: lower the separation or the density."
             )
         candidates = _anywhere(region, seed, 0, np.arange(drawn, drawn + batch))
@@ -293,7 +294,7 @@ def poisson_disc(
 
 
 def _apart(settled: FloatArray, candidates: FloatArray, least: float) -> np.ndarray:
-    """Which candidates keep the distance from the settled and from the candidates kept before them."""
+    """Candidates that have the least distance from placed receptors and from earlier candidates."""
     free = np.ones(len(candidates), dtype=bool)
     if len(settled) and len(candidates):
         distance, _ = cKDTree(settled).query(candidates, distance_upper_bound=least)
@@ -309,7 +310,7 @@ def _apart(settled: FloatArray, candidates: FloatArray, least: float) -> np.ndar
 
 
 def _inside(region: Region, count: int, draw: Callable[[np.ndarray, int], FloatArray]) -> FloatArray:
-    """Places of receptors, drawn again where they miss; `draw` takes their numbers and the attempt."""
+    """Positions in the region, sampled again while outside; `draw` takes receptor numbers and the attempt."""
     places = np.empty((count, 2))
     missing = np.arange(count)
     for attempt in range(_MOST_ATTEMPTS):
@@ -320,13 +321,13 @@ def _inside(region: Region, count: int, draw: Callable[[np.ndarray, int], FloatA
         if not missing.size:
             return places
     raise ConvergenceError(
-        f"{missing.size} of {count} receptors missed the region {_MOST_ATTEMPTS} times: it fills too little "
-        "of its bounds, or receptors stray too far; cut it into parts or lower the jitter."
+        f"{missing.size} of {count} receptors were outside the region {_MOST_ATTEMPTS} times: it fills too "
+        "little of its bounds, or the jitter is too large; divide the region or lower the jitter."
     )
 
 
 def _anywhere(region: Region, seed: int, attempt: int, receptors: np.ndarray) -> FloatArray:
-    """Places within the bounds of the region, (n, 2)."""
+    """Random positions within the bounds of the region, (n, 2)."""
     lower, upper = np.array(region.bounds_mm)
     return lower + (upper - lower) * uniforms(seed, [attempt], receptors, Purpose.LAYOUT, 2)[0]
 
@@ -343,25 +344,25 @@ def _lattice(region: Region, points: FloatArray, pitch: float, pattern: str) -> 
 
 
 def _expected(region: Region, density_per_cm2: float) -> int:
-    """Receptors to expect, density times area, after a check that there is at least one and not too many."""
+    """Return density times area, rounded, if it is at least one and at most the limit."""
     density = positive("density_per_cm2", density_per_cm2, "1/cm²")
     area_mm2 = region.area_mm2
     count = round(density * area_mm2 / MM2_PER_CM2)
     if count < 1:
         raise InputError(
-            f"No receptor is to be expected at {density:g} /cm² on {area_mm2:.3g} mm²: raise the density or "
+            f"A density of {density:g} /cm² on {area_mm2:.3g} mm² gives no receptor: raise the density or "
             "enlarge the region."
         )
     if count > MOST_RECEPTORS:
         raise InputError(
-            f"A layout may have {MOST_RECEPTORS:,} receptors: {density:g} /cm² on {area_mm2:.3g} mm² would "
-            f"be {count:,}; is the density per cm²?"
+            f"A layout may have {MOST_RECEPTORS:,} receptors at most: {density:g} /cm² on {area_mm2:.3g} "
+            f"mm² gives {count:,}; check that the density is per cm²."
         )
     return count
 
 
 def mean_spacing_mm(density_per_cm2: float) -> float:
-    """Side of the square that belongs to one receptor, 1/sqrt(density). [mm]
+    """Side of the square with the area per receptor, 1/sqrt(density). [mm]
 
     Examples
     --------
@@ -377,7 +378,7 @@ def _middle_and_extent(region: Region) -> tuple[FloatArray, FloatArray]:
 
 
 def around_zero(count: int) -> FloatArray:
-    """Places of a row of so many, one apart, with their middle at 0, (count,).
+    """Positions of `count` points with unit distance, centred on 0, (count,).
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """What the package uses of Numba beyond its documented interface: the only file that does.
 
 Numba may change these parts in any release. `TRIED` names the versions with which the tests of this file have
-passed; a test fails with any other, so that a new version is looked at before it is allowed.
+passed; a test fails with any other version, which must be checked before it is allowed.
 
 Small arrays live on the stack of a compiled function, for kernels that run once per element. `np.empty`
 allocates on the heap, which costs as much as dozens of multiplications, and the compiler must assume that the

@@ -1,7 +1,7 @@
-"""The generator behind `fingerpad.core.random_streams`: Philox 4x64 with 10 rounds, for kernels.
+"""The generator of `fingerpad.core.random_streams`: Philox 4x64 with 10 rounds, for kernels.
 
-A key and a counter are scrambled into four words of 64 bits (Salmon, Moraes, Dror & Shaw 2011). No state is
-kept: any block of any stream is made at once.
+A key and a counter are mapped to four words of 64 bits (Salmon, Moraes, Dror & Shaw 2011). The generator has
+no state: any block of any stream is computed directly.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numba import njit, uint64
 WORDS = 4
 """Numbers of one block."""
 
-# Constants of Philox 4x64 as published: two multipliers, and what is added to the key each round.
+# Constants of Philox 4x64 as published: two multipliers, and the increments of the key per round.
 _MULTIPLIER_0 = np.uint64(0xD2E7470EE14C6C93)
 _MULTIPLIER_1 = np.uint64(0xCA5A826395121157)
 _ADDED_0 = np.uint64(0x9E3779B97F4A7C15)
@@ -40,7 +40,7 @@ def _high_word(a: np.uint64, b: np.uint64) -> np.uint64:
 def words(
     seed: int, purpose: int, block: int, receptor: int, trial: int
 ) -> tuple[np.uint64, np.uint64, np.uint64, np.uint64]:
-    """Scramble a key and a counter into four words (Salmon et al. 2011, section 4.3)."""
+    """Map a key and a counter to four words (Salmon et al. 2011, section 4.3)."""
     k0, k1 = uint64(seed), uint64(purpose)
     c0, c1, c2, c3 = uint64(block), uint64(0), uint64(receptor), uint64(trial)
     for _ in range(_ROUNDS):

@@ -1,4 +1,4 @@
-"""YAML as people mean it: plain values, numbers in any form, and no key that replaces another in silence."""
+"""Reading YAML: plain values, numbers in any form, and an error for a duplicate key."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def read_yaml(text: str, source: str) -> Any:
     text : str
         One document.
     source : str
-        Where it comes from, for errors.
+        Name of the source, for errors.
 
     Returns
     -------
@@ -27,11 +27,11 @@ def read_yaml(text: str, source: str) -> Any:
     Raises
     ------
     InputError
-        If it is no YAML, or a key stands twice in a mapping.
+        If the text is not YAML, or a mapping has a duplicate key.
 
     Examples
     --------
-    Numbers such as 1e-6, which YAML takes for text where a point or a sign is missing, are numbers here:
+    Numbers such as 1e-6, without a point, are text in YAML 1.1. They are numbers here:
 
     >>> read_yaml("{gain: 1e-6, name: edge, off: [1, 2.5]}", "an example")
     {'gain': 1e-06, 'name': 'edge', 'off': [1, 2.5]}
@@ -48,7 +48,7 @@ def read_yaml(text: str, source: str) -> Any:
 
 
 class _Loader(yaml.SafeLoader):
-    """Refuses a key that stands twice, of which YAML would keep the second in silence."""
+    """Raises an error for a duplicate key, of which YAML would keep the second."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         keys = [key.value for key, _ in node.value]
@@ -58,7 +58,7 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-# A copy of the table of resolvers: that of SafeLoader belongs to every program in this process.
+# A copy of the table of resolvers, because SafeLoader is shared by all code in this process.
 _Loader.yaml_implicit_resolvers = {
     first: [
         (tag, form)

@@ -1,4 +1,4 @@
-"""How far a run is: one protocol for every command and every function that takes long."""
+"""Progress of a run: one protocol for every command and every long computation."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Protocol
 
 
 class Progress(Protocol):
-    """Shows how far a run is."""
+    """Reports the progress of a run."""
 
     def stage(self, name: str, total: int) -> AbstractContextManager[Callable[[], None]]:
         """Open a stage of `total` parts; call the result once per finished part."""

@@ -1,14 +1,13 @@
-"""Random numbers by key: the same key gives the same numbers, on any number of threads and in any order.
+"""Keyed random numbers: the same key gives the same numbers, on any number of threads and in any order.
 
-A key says what a number is for: the seed of the run, the presentation, the receptor and the purpose. The
-generator is counter-based (Philox 4x64, 10 rounds; Salmon, Moraes, Dror & Shaw 2011): it scrambles the
-key and a counter into four words of 64 bits, so that any number of any stream is made at once, without the
-ones before it.
+A key consists of the seed of the run, the presentation, the receptor and the purpose. The generator is
+counter-based (Philox 4x64, 10 rounds; Salmon, Moraes, Dror & Shaw 2011): it maps the key and a counter to
+four words of 64 bits, so any number of any stream is computed directly, without the ones before it.
 
     key     = (seed, purpose)
     counter = (block, 0, receptor, trial),    block = 1, 2, ...
 
-NumPy has the same generator and counts the same way: `generator` and `uniforms` agree to the last bit.
+NumPy has the same generator with the same counter: `generator` and `uniforms` agree to the last bit.
 """
 
 from __future__ import annotations
@@ -27,45 +26,45 @@ from fingerpad.core.philox import WORDS, four_normals, four_uniforms
 
 IntArray = NDArray[np.int64]
 Numbers = int | Sequence[int] | np.ndarray
-"""Which trials or receptors: their own numbers, or how many of them from 0."""
+"""Trials or receptors: their numbers, or their count, numbered from 0."""
 
 LARGEST_SEED = 2**63 - 1
-"""Seeds, trials and receptors fit into a signed word, as NumPy's integers do."""
+"""Seeds, trials and receptors fit into a signed 64-bit integer, as in NumPy."""
 
 
 class Purpose(IntEnum):
-    """What random numbers are for. Streams of different purposes have nothing in common.
+    """Purpose of random numbers. Streams of different purposes are independent.
 
-    The numbers are part of every key: a new purpose takes a new one, and none ever changes.
+    The values are part of every key: a new purpose takes a new value, and no value is changed.
     """
 
     CURRENT = 1
     """Noise of the current through a membrane."""
     THRESHOLD = 2
-    """Threshold of each interval between spikes."""
+    """Threshold of each interspike interval."""
     GAIN = 3
-    """How strongly an end organ answers."""
+    """Gain of an end organ in a presentation."""
     ESCAPE = 4
-    """When a membrane with an escape rate fires."""
+    """Spikes of a membrane with an escape rate."""
     RESPONSE = 5
-    """Noise that multiplies a finished response, such as a rate."""
+    """Multiplicative noise of a response, such as a rate."""
     SENSITIVITY = 6
-    """How one end organ's sensitivity differs from the others', for good."""
+    """Constant sensitivity of an end organ."""
     LAYOUT = 7
-    """Where an end organ lies."""
+    """Position of an end organ."""
     PICK = 8
-    """Which of many distributions or sets an observer compares."""
+    """Selection of the distributions or sets that an observer compares."""
     CRITERION = 9
-    """Where an observer decides, if that wavers."""
+    """Variation of an observer's criterion."""
     JUDGEMENT = 10
-    """Whether a judge who follows a psychometric function is right."""
+    """Correct or incorrect judgements that follow a psychometric function."""
     SPIKE_COUNT = 11
-    """How many spikes a Poisson process has in a window."""
+    """Spike counts of a Poisson process in a window."""
 
 
 @dataclass(frozen=True)
 class Presentations:
-    """Which drive each spike train answers, and whose random numbers it draws.
+    """Site, trial and receptor of each spike train; trial and receptor are part of its random key.
 
     Parameters
     ----------
@@ -103,8 +102,9 @@ class Presentations:
             raise InputError(f"Presentations needs one site, trial and receptor per train: got {sizes}.")
         if len(np.unique(np.stack([self.trials, self.receptors]), axis=1).T) < len(self):
             raise InputError(
-                "Presentations needs another trial for each train of a receptor, or they draw the same "
-                f"numbers: got trials {self.trials[:8].tolist()} of receptors {self.receptors[:8].tolist()}."
+                "Presentations needs a different trial for each train of a receptor, otherwise their random "
+                f"numbers are equal: got trials {self.trials[:8].tolist()} of receptors "
+                f"{self.receptors[:8].tolist()}."
             )
 
     @classmethod
@@ -125,19 +125,19 @@ class Presentations:
         return self.sites.size
 
     def part(self, trains: slice) -> Presentations:
-        """Return what belongs to some of the trains."""
+        """Return the presentations of some of the trains."""
         return Presentations(self.sites[trains], self.trials[trains], self.receptors[trains])
 
 
 def checked_sites(sites: IntArray, n_sites: int) -> IntArray:
-    """Return the sites that trains answer if a current has as many columns, else raise `InputError`.
+    """Return the sites of spike trains if a current has these columns, else raise `InputError`.
 
     Parameters
     ----------
     sites : int array (n_trains,)
         Of presentations, or chosen by the user.
     n_sites : int
-        Columns that there are.
+        Number of columns of the current.
 
     Returns
     -------
@@ -164,11 +164,11 @@ def generator(seed: int, trial: int, receptor: int, purpose: Purpose) -> np.rand
     Parameters
     ----------
     seed : int
-        Of the whole run; written down with its results.
+        Of the whole run; saved with its results.
     trial, receptor : int
-        Which presentation and which end organ, from 0.
+        Number of the presentation and of the end organ, from 0.
     purpose : Purpose
-        What the numbers are for.
+        Purpose of the numbers.
 
     Returns
     -------
@@ -178,7 +178,7 @@ def generator(seed: int, trial: int, receptor: int, purpose: Purpose) -> np.rand
     Raises
     ------
     InputError
-        If a number is negative or not whole, or the purpose is none.
+        If a number is negative or not whole, or the purpose is not a `Purpose`.
 
     Examples
     --------
@@ -201,17 +201,16 @@ def uniforms(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, c
     seed : int
         Of the whole run.
     trials, receptors : int or sequence of int
-        Which presentations and which end organs: their own numbers, such as `range(3, 5)`, or how many of
-        them from 0.
+        Presentations and end organs: their numbers, such as `range(3, 5)`, or their count, numbered from 0.
     purpose : Purpose
-        What the numbers are for.
+        Purpose of the numbers.
     count : int
-        How many each stream gives.
+        Numbers per stream.
 
     Returns
     -------
     array (n_trials, n_receptors, count)
-        Within 0 ... 1, without 1; what `generator` of the same key gives by `random`.
+        In [0, 1); equal to `generator(...).random` with the same key.
 
     Raises
     ------
@@ -252,7 +251,7 @@ def normals(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, co
 
     Notes
     -----
-    Box & Muller 1958. `generator` makes normal numbers in another way: they differ from these.
+    Box & Muller 1958. `generator` computes normal numbers by another method; they differ from these.
 
     Examples
     --------
@@ -289,12 +288,12 @@ def normals_of(seed: int, presentations: Presentations, purpose: Purpose, count:
     seed, purpose, count
         As in `uniforms`.
     presentations : Presentations
-        Whose numbers to draw.
+        Trials and receptors of the trains.
 
     Returns
     -------
     array (n_trains, count)
-        The numbers that `normals` gives to the trial and receptor of each train.
+        The numbers of `normals` for the trial and receptor of each train.
 
     Raises
     ------
@@ -323,14 +322,14 @@ def _fill_trains(seed, trials, receptors, purpose, numbers):  # type: ignore[no-
 
 
 def numbered(name: str, which: Numbers) -> IntArray:
-    """Return the numbers of trials or receptors: the ones given, or so many from 0.
+    """Return the numbers of trials or receptors: the given ones, or the first `which` from 0.
 
     Parameters
     ----------
     name : str
-        What they are, for the message.
+        Name of the argument, for the message.
     which : int or sequence of int
-        How many, or which.
+        Count, or the numbers themselves.
 
     Returns
     -------

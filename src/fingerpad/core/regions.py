@@ -1,8 +1,7 @@
-"""Where in a plane receptors may lie: rectangles, ellipses and polygons, each with its area.
+"""Regions of a plane for receptors: rectangles, ellipses and polygons, each with its area.
 
-The plane is the skin seen from its volar side (x and z), or the skin unrolled,
-`fingerpad.skin.unrolled_skin`,
-where an area in the plane is the same area of skin.
+The plane is the skin seen from its volar side (x and z), or the unrolled skin of
+`fingerpad.skin.unrolled_skin`, where an area in the plane is the same area of skin.
 """
 
 from __future__ import annotations
@@ -20,11 +19,11 @@ from fingerpad.core.errors import InputError
 Point = tuple[float, float]
 
 _ROUND_OFF = 1e-9
-"""How far beyond its border, over its size, a region still holds a point that rounding has pushed there."""
+"""Tolerance for points on the border of a region, over its size, because of round-off."""
 
 
 class Region(Protocol):
-    """A part of the plane that has an area and knows its points."""
+    """A part of the plane with an area and a test for points."""
 
     @property
     def area_mm2(self) -> float:
@@ -43,7 +42,7 @@ class Region(Protocol):
 
 @dataclass(frozen=True)
 class Rectangle:
-    """Upright rectangle.
+    """Rectangle with sides parallel to the axes.
 
     Parameters
     ----------
@@ -91,7 +90,7 @@ class Rectangle:
 
 @dataclass(frozen=True)
 class Ellipse:
-    """Upright ellipse; a disc where both semi-axes agree.
+    """Ellipse with axes parallel to the coordinate axes; a disc if both semi-axes are equal.
 
     Parameters
     ----------
@@ -144,7 +143,7 @@ class Polygon:
     Parameters
     ----------
     corners_mm : sequence of (float, float)
-        Three corners or more, either way around; the last joins the first. [mm]
+        Three corners or more, in either direction; the last is joined to the first. [mm]
 
     Raises
     ------
@@ -177,7 +176,7 @@ class Polygon:
 
     @property
     def area_mm2(self) -> float:
-        """Area, from the cross products of neighbouring corners. [mm²]"""
+        """Area, from the cross products of adjacent corners. [mm²]"""
         corners = np.array(self.corners_mm) - self.corners_mm[0]
         return 0.5 * abs(float(_cross(corners, np.roll(corners, -1, axis=0)).sum()))
 
@@ -190,7 +189,7 @@ class Polygon:
     def contains(self, points_mm: ArrayLike) -> np.ndarray:
         """Whether each of the points (n, 2) lies inside, bool (n,).
 
-        A line from the point to one side meets an odd number of edges.
+        A half-line from an inner point crosses an odd number of edges.
         """
         points = _points(points_mm)
         inside = np.zeros(len(points), dtype=bool)
@@ -204,7 +203,7 @@ class Polygon:
 
 
 def _first_crossing(corners: FloatArray) -> tuple[int, int] | None:
-    """Numbers of the first two edges, not neighbours, that cross or touch."""
+    """Numbers of the first two edges, not adjacent, that cross or touch."""
     count, ends = len(corners), np.roll(corners, -1, axis=0)
     for first in range(count):
         others = np.arange(first + 2, count - (first == 0))
@@ -213,7 +212,7 @@ def _first_crossing(corners: FloatArray) -> tuple[int, int] | None:
         a, b, c, d = corners[first], ends[first], corners[others], ends[others]
         apart = _cross(b - a, c - a) * _cross(b - a, d - a) > 0.0
         apart |= _cross(d - c, a - c) * _cross(d - c, b - c) > 0.0
-        # Edges on one line meet where their extents do.
+        # Edges on one line meet if their extents overlap.
         apart |= (np.maximum(c, d) < np.minimum(a, b)).any(axis=1)
         apart |= (np.minimum(c, d) > np.maximum(a, b)).any(axis=1)
         if not apart.all():

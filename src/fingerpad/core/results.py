@@ -210,12 +210,12 @@ def schema_of(cls: type) -> dict[str, Any]:
 
 
 def write_results(path: Path, results: ResultFile, schema: dict[str, Any]) -> None:
-    """Write a file of results, whole or not at all.
+    """Write a file of results atomically.
 
     Parameters
     ----------
     path : Path
-        Where the file shall be; folders are made as needed.
+        Path of the file; folders are created.
     results : ResultFile
         An instance of a `result_class` with format and version.
     schema : dict

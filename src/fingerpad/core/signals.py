@@ -1,7 +1,7 @@
-"""What one stage of the chain hands to the next: frozen, read-only, checked on construction.
+"""Values passed between the stages of the model: frozen, read-only, checked on construction.
 
 Skin -> `SedTraces` -> `CurrentTraces` -> `SpikeTrains` -> `ResponseMap` -> `HitRates`.
-The mechanical and the neural half of the package meet in `SedTraces` and nowhere else.
+`SedTraces` is the only interface between the mechanical and the neural half of the package.
 """
 
 from __future__ import annotations
@@ -17,19 +17,17 @@ from fingerpad.core.checks import FloatArray, float_array, increasing, positive
 from fingerpad.core.errors import InputError
 
 STORED_ENERGY = "stored"
-"""Name of the quantity that both terms of the current follow in the paper: strain energy density."""
+"""Name of the quantity that drives both terms of the current in the paper: strain energy density."""
 
 
 class Skin(Protocol):
-    """Anything that can tell the strain energy density below points of its surface."""
+    """Any object that returns the strain energy density below points of its surface."""
 
     def sed(self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY) -> SedTraces:
         """Strain energy density over time below `sites` of the skin. [mm]
 
-        These are x and z of end organs on the volar side (n_sites, 2), or x, y and z of the skin above them
-        on any side (n_sites, 3).
-
-        With it comes what the dynamic response follows, if that is another quantity.
+        Sites are x and z of end organs on the volar side (n_sites, 2), or x, y and z of the skin above them
+        on any side (n_sites, 3). The traces include the quantity of the dynamic term, if it is another one.
         """
         ...
 
@@ -52,7 +50,7 @@ def _traces(kind: str, name: str, times_ms: ArrayLike, values: ArrayLike) -> tup
 
 @dataclass(frozen=True)
 class SedTraces:
-    """Strain energy density at receptor sites, known at some times.
+    """Strain energy density at receptor sites and at given times.
 
     Parameters
     ----------
@@ -62,18 +60,18 @@ class SedTraces:
         Strain energy density; not negative. [kPa = µJ/mm³]
     kinks_ms : array (n_kinks,), optional
         Those of `times_ms` at which the motion changes abruptly, as from ramp to hold: there the
-        rate of change of SED jumps, and whoever interpolates must not smooth across. [ms]
+        rate of change of SED is discontinuous, and interpolation must not smooth it. [ms]
     dynamic_kpa : array (n_times, n_sites), optional
-        What the dynamic response follows instead of SED, an extension of the paper's model; not negative.
-        [kPa, a strain in mm/mm]
+        Quantity that drives the dynamic term instead of SED, an extension of the paper's model; not
+        negative. [kPa, a strain in mm/mm]
     dynamic_quantity : str, optional
         Its name, one of those of `SkinResponse.sample`; "stored" is SED itself.
 
     Raises
     ------
     InputError
-        If shapes disagree, a value is not finite or negative, a kink is not among the times, or one of
-        `dynamic_kpa` and its name comes without the other.
+        If shapes disagree, a value is not finite or negative, a kink is not among the times, or only one of
+        `dynamic_kpa` and its name is given.
 
     Examples
     --------
@@ -141,12 +139,12 @@ class SedTraces:
 class CurrentTraces:
     """Membrane current at receptor sites, piecewise linear between its times.
 
-    A time that stands twice is a jump: its first row is the current just before, its second just after.
+    A repeated time is a discontinuity: its first row is the current just before, its second just after.
 
     Parameters
     ----------
     times_ms : array (n_times,)
-        Knots, in order; a time may stand twice, not more often. [ms]
+        Knots, in order; a time may be repeated once. [ms]
     current_ma : array (n_times, n_sites)
         Current at the knots. [mA]
 
@@ -188,7 +186,7 @@ class SpikeTrains:
     times_ms : array (n_spikes,)
         Spike times, afferent by afferent, increasing within each. [ms]
     offsets : int array (n_afferents + 1,)
-        Afferent `i` owns `times_ms[offsets[i]:offsets[i + 1]]`.
+        Afferent `i` has `times_ms[offsets[i]:offsets[i + 1]]`.
 
     Examples
     --------
@@ -250,7 +248,7 @@ class SpikeTrains:
 
 @dataclass(frozen=True)
 class ResponseMap:
-    """What a population of afferents answers to one touch.
+    """Response of a population of afferents to one touch.
 
     Parameters
     ----------
@@ -304,7 +302,7 @@ class ResponseMap:
 
 @dataclass(frozen=True)
 class HitRates:
-    """How often each comparison is told from the standard.
+    """Hit rate of each comparison with the standard.
 
     Parameters
     ----------
@@ -313,7 +311,7 @@ class HitRates:
     hit_rate_sd : array (n_comparisons,)
         Its standard deviation over repetitions, sigma_3. [0-1]
     seed, session : int, optional
-        Whose random numbers the noise and the observer drew.
+        Key of the random numbers of the noise and the observer.
     """
 
     hit_rate: FloatArray

@@ -1,6 +1,6 @@
 """Units inside fingerpad: mm, ms, kPa, mN, mA, mF, mV.
 
-They close among themselves: 1 kPa mm² = 1 mN, 1 kPa = 1 µJ/mm³ (so strain energy density, SED, in
+They are consistent: 1 kPa mm² = 1 mN, 1 kPa = 1 µJ/mm³ (so strain energy density, SED, in
 kPa is energy per volume), and 1 mF mV/ms = 1 mA, so no factor appears in any equation of the paper.
 """
 
