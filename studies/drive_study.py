@@ -82,7 +82,7 @@ def study_drives(study: DriveStudy, on_finished: Callable[[str], None] | None = 
             on_finished(part)
 
     conditions = study.conditions
-    store, touches = Store(study.folder / STORE_FOLDER), single_unit.touches(conditions)
+    store, touches = Store(study.folder / STORE_FOLDER), single_unit.bar_touches(conditions)
     solve_missing(touches, store, study.jobs)
     responses = [store.load(touch) for touch in touches]
     finished("presses")

@@ -117,7 +117,7 @@ def touches(
     pressed = {("cylinder", Cylinder().diameter_mm): _cylinder_touch(candidate, conditions)}
     conditions = replace(conditions, materials=candidate.tissues)
     if shifted_bars:
-        bars = zip(protocol.BAR_SHIFTS.value, single_unit.touches(conditions), strict=True)
+        bars = zip(protocol.BAR_SHIFTS.value, single_unit.bar_touches(conditions), strict=True)
         pressed |= {("bar", shift): touch for shift, touch in bars}
     else:
         pressed["bar", 0.0] = conditions.touch(

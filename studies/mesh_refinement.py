@@ -88,7 +88,7 @@ class Level:
 
     def bars(self) -> dict[int, Touch]:
         """Touches of the bar, by the number of their shift."""
-        touches = single_unit.touches(Conditions(self.resolution))
+        touches = single_unit.bar_touches(Conditions(self.resolution))
         return {shift: _at_factor(touches[shift], self.factor) for shift in self.shifts}
 
     def balls(self) -> dict[Sphere, Touch]:
@@ -197,7 +197,7 @@ def step_changes() -> dict[str, dict[int, Touch]]:
 def _examples(conditions: Conditions) -> dict[str, Touch]:
     """Return the bar at its highest peak and the standard sphere."""
     return {
-        "bar": single_unit.touches(conditions)[PEAK_SHIFT],
+        "bar": single_unit.bar_touches(conditions)[PEAK_SHIFT],
         "sphere": sphere_discrimination.touches(conditions)[CHOSEN_SPHERES[0]],
     }
 

@@ -87,9 +87,9 @@ class Touches:
     def of(cls, resolution: str) -> Touches:
         """Touches of a named resolution, half of the finger."""
         conditions = Conditions(resolution)
-        bars, spheres = single_unit.touches(conditions), sphere_discrimination.touches(conditions)
+        bars, spheres = single_unit.bar_touches(conditions), sphere_discrimination.touches(conditions)
         return cls(
-            {trial: half(touch) for trial, touch in skin_deflection.touches(conditions).items()},
+            {trial: half(touch) for trial, touch in skin_deflection.deflection_touches(conditions).items()},
             {shift: half(bars[shift]) for shift in CHOSEN_SHIFTS},
             {
                 (position, curvature): half(spheres[position, curvature])

@@ -308,7 +308,7 @@ def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
     path.write_bytes(session.example_recordings()[session.EXAMPLE])
     recorded = read_recordings(path, ShiftedBar())
     conditions = Conditions("quick")
-    assert list(session.stimulus_touches(recorded.stimuli, conditions).values()) == single_unit.touches(
+    assert list(session.stimulus_touches(recorded.stimuli, conditions).values()) == single_unit.bar_touches(
         conditions
     )
     observed = bar_firing_rates()

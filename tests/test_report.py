@@ -120,6 +120,7 @@ def _skin_deflection() -> dict:
 
     def profile(width: float, **more: float) -> dict:
         deflection = np.exp(-((np.abs(distance) / width) ** 1.2))
+        more |= {"peak_force_mn": 250.0, "penetration_mm": 0.001}
         return {"distance_mm": distance.tolist(), "deflection_mm": deflection.tolist(), **more}
 
     widths = {"trial1": 2.6, "trial2": 3.8, "trial3": 3.1}
@@ -157,6 +158,7 @@ def _single_unit() -> dict:
         "fss_in_sample_dynamic": 0.7,
         "fss_in_sample_static": 0.92,
         "fss_out_of_sample": 0.84,
+        "fss_training_mean": 0.85,
         "parameters": PARAMETERS,
         "units": {
             "intercept_ma": "mA",
@@ -179,6 +181,7 @@ def _single_unit() -> dict:
             {
                 "fold": fold,
                 "start": 1 + fold % 2,
+                "fss_start": [0.7, 0.7],
                 "testing_shift_mm": SHIFT_MM[fold - 1 :: 6].tolist(),
                 "fss_train": 0.85,
                 "fss_test": 0.80 + 0.01 * fold,
@@ -197,7 +200,6 @@ def _single_unit() -> dict:
             for fold in range(1, 7)
         ],
         "modulation": {phase: {"observed": observed, "ours": ours} for phase in ("dynamic", "static")},
-        "edge_response": {"peak_distance_mm": 1.6, "profile_hz": SHIFT_MM.tolist()},
     }
 
 
@@ -670,7 +672,7 @@ def without_numbers(value):
         return {key: item if key in keep else without_numbers(item) for key, item in value.items()}
     if isinstance(value, list):
         return [without_numbers(item) for item in value]
-    return None if isinstance(value, int | float) else value
+    return None if isinstance(value, float) else value
 
 
 def test_what_does_not_exist_is_drawn_as_nothing_and_written_as_a_dash(tmp_path):
@@ -750,14 +752,16 @@ def test_inputs_are_listed_exactly_and_the_assumed_ones_are_marked():
 
 
 def test_the_last_step_of_the_papers_fold_is_marked_and_others_are_not():
-    table = next(table for table in tables.single_unit(_single_unit()) if table.title.startswith("Steps"))
+    made = single_unit.single_unit_tables(typed(synthetic_results()).single_unit)
+    table = next(table for table in made if table.title.startswith("Steps"))
     assert "fold 3, start 2" in table.title
     assert [row.kind for row in table.rows] == ["", "", "", "", "final"]
     assert table.rows[-1].cells[:2] == ("4", "0.820")
 
 
 def test_every_fold_and_start_has_its_climb_and_the_better_ones_are_marked():
-    table = next(table for table in tables.single_unit(_single_unit()) if table.title.startswith("Climbs"))
+    made = single_unit.single_unit_tables(typed(synthetic_results()).single_unit)
+    table = next(table for table in made if table.title.startswith("Searches"))
     assert [row.cells[0] for row in table.rows] == [
         f"{fold}, {start}" for fold in range(1, 7) for start in (1, 2)
     ]
@@ -788,7 +792,8 @@ def lines(axes):
 
 def test_figure_4_draws_the_profiles_given_and_sets_the_artefact_apart():
     section = _skin_deflection()
-    line, _, cylinder, near = skin_deflection.draw(section).axes
+    given = typed(synthetic_results()).skin_deflection
+    line, _, cylinder, near = skin_deflection.draw_skin_deflection(given).axes
     for trial, name in (("trial1", "Trial 1"), ("trial2", "Trial 2"), ("trial3", "Trial 3")):
         np.testing.assert_array_equal(lines(line)[name].get_ydata(), section[trial]["line"]["deflection_mm"])
     drawn = lines(cylinder)
@@ -802,7 +807,8 @@ def test_figure_4_draws_the_profiles_given_and_sets_the_artefact_apart():
 
 def test_figure_5_draws_predicted_lines_over_observed_points():
     section = _single_unit()
-    for axes, phase in zip(single_unit.draw(section).axes, ("dynamic", "static"), strict=True):
+    given = typed(synthetic_results()).single_unit
+    for axes, phase in zip(single_unit.draw_single_unit(given).axes, ("dynamic", "static"), strict=True):
         drawn = lines(axes)
         np.testing.assert_array_equal(drawn["predicted"].get_ydata(), section[f"{phase}_rate_hz"])
         np.testing.assert_array_equal(drawn["observed"].get_ydata(), section[f"observed_{phase}_rate_hz"])
@@ -1007,7 +1013,7 @@ def test_colours_of_trials_differ_in_grey_and_lines_differ_without_colour():
         np.dot(matplotlib.colors.to_rgb(colour), (0.2126, 0.7152, 0.0722)) for colour in (BLUE, ORANGE, GREEN)
     ]
     assert min(abs(np.subtract.outer(greys, greys))[np.triu_indices(3, 1)]) > 0.08
-    assert len({style for _, _, style in skin_deflection.TRIALS.values()}) == 3
+    assert len({style for _, style in skin_deflection.TRIAL_STYLES.values()}) == 3
 
 
 @pytest.mark.parametrize(

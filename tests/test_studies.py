@@ -1,6 +1,5 @@
 """The studies press what the paper pressed and read from it what they say, miss or no miss."""
 
-import copy
 import json
 from dataclasses import replace
 
@@ -8,6 +7,7 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
+from fingerpad.core.results import from_json, to_json
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import bar_firing_rates, cylinder_deflection, neuron, paper, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
@@ -52,7 +52,7 @@ def follows_the_protocol(touch):
 
 
 def test_three_trials_press_a_line_and_a_cylinder_at_one_place(conditions):
-    touches = skin_deflection.touches(conditions)
+    touches = skin_deflection.deflection_touches(conditions)
     assert set(touches) == {
         (trial, name) for trial in ("trial1", "trial2", "trial3") for name in ("line", "cylinder")
     }
@@ -66,7 +66,7 @@ def test_three_trials_press_a_line_and_a_cylinder_at_one_place(conditions):
 
 
 def test_the_bar_is_shifted_36_times_along_the_skin_over_one_mesh(conditions):
-    touches = single_unit.touches(conditions)
+    touches = single_unit.bar_touches(conditions)
     shift = -np.array([touch.at_mm[0] - 17.37 for touch in touches])  # positive towards the proximal end
     tilt_deg = touches[0].tilt_deg
     along_skin = shift / np.cos(np.deg2rad(tilt_deg))
@@ -113,9 +113,11 @@ def test_seven_spheres_are_pressed_at_two_places_over_one_mesh(conditions):
 def test_materials_of_the_conditions_reach_the_later_studies_but_not_the_trials(materials):
     conditions = Conditions("quick", materials=materials)
     tissues = named_tissues(materials)
-    assert {touch.tissues for touch in single_unit.touches(conditions)} == {tissues}
+    assert {touch.tissues for touch in single_unit.bar_touches(conditions)} == {tissues}
     assert {touch.tissues for touch in sphere_discrimination.touches(conditions).values()} == {tissues}
-    assert skin_deflection.touches(conditions) == skin_deflection.touches(Conditions("quick"))
+    assert skin_deflection.deflection_touches(conditions) == skin_deflection.deflection_touches(
+        Conditions("quick")
+    )
 
 
 @pytest.mark.parametrize(
@@ -202,20 +204,17 @@ def test_deflection_is_reported_from_the_observations_side(tiny_skin):
     responses = {
         (trial, name): tiny_skin for trial in skin_deflection.TRIALS for name in ("line", "cylinder")
     }
-    found = skin_deflection.result(responses)
+    found = skin_deflection.deflection_result(responses)
     profile = tiny_skin.surface_profile()
-    for trial in skin_deflection.TRIALS:
-        for name in ("line", "cylinder"):
-            shown = found[trial][name]
-            assert (np.diff(shown["distance_mm"]) > 0).all()
-            assert np.abs(shown["distance_mm"]).max() <= 10.0
-            np.testing.assert_allclose(shown["deflection_mm"], profile.at(-shown["distance_mm"]), rtol=1e-12)
-            assert shown["force_mn"] == tiny_skin.force_mn[-1]
-            assert ("r2" in shown) == (name == "cylinder")
-        cylinder = found[trial]["cylinder"]
-        assert cylinder["r2"] == skin_deflection.deflection_r2(profile)
-        assert cylinder["r2_mirrored"] == skin_deflection.deflection_r2(profile, proximal_positive=False)
-    assert found["observed"]["distance_mm"].size == cylinder_deflection().distance_mm.size
+    for trial in (found.trial1, found.trial2, found.trial3):
+        for shown in (trial.line, trial.cylinder):
+            assert (np.diff(shown.distance_mm) > 0).all()
+            assert np.abs(shown.distance_mm).max() <= 10.0
+            np.testing.assert_allclose(shown.deflection_mm, profile.at(-shown.distance_mm), rtol=1e-12)
+            assert shown.force_mn == tiny_skin.force_mn[-1]
+        assert trial.cylinder.r2 == skin_deflection.deflection_r2(profile)
+        assert trial.cylinder.r2_mirrored == skin_deflection.deflection_r2(profile, proximal_positive=False)
+    assert found.observed.distance_mm.size == cylinder_deflection().distance_mm.size
 
 
 # Level 2
@@ -268,33 +267,33 @@ def test_the_fit_finds_what_a_known_afferent_answered(synthetic_problem, synthet
 def test_single_unit_result_names_every_number(synthetic_problem, synthetic_fit):
     problem, _ = synthetic_problem
     best, folds = synthetic_fit
-    found = single_unit.result(problem, best, folds)
+    found = single_unit.single_unit_result(problem, best, folds)
     shift_mm = bar_firing_rates().shift_mm
     dynamic, static = problem.model.evaluate(best.parameters)
-    np.testing.assert_array_equal(found["dynamic_rate_hz"], dynamic)
-    np.testing.assert_array_equal(found["static_rate_hz"], static)
-    assert list(found["parameters"].values()) == best.parameters.tolist()
-    assert set(found["parameters"]) == set(found["units"])
-    assert [fold["fold"] for fold in found["folds"]] == [1, 2, 3, 4, 5, 6]
-    tested = np.concatenate([fold["testing_shift_mm"] for fold in found["folds"]])
+    np.testing.assert_array_equal(found.dynamic_rate_hz, dynamic)
+    np.testing.assert_array_equal(found.static_rate_hz, static)
+    assert list(found.parameters.values()) == best.parameters.tolist()
+    assert set(found.parameters) == set(found.units)
+    assert [fold.fold for fold in found.folds] == [1, 2, 3, 4, 5, 6]
+    tested = np.concatenate([fold.testing_shift_mm for fold in found.folds])
     np.testing.assert_array_equal(np.sort(tested), shift_mm)
-    assert found["fss_out_of_sample"] == pytest.approx(np.mean([fold["fss_test"] for fold in found["folds"]]))
-    for fold in found["folds"]:
-        assert fold["fss_train"] >= max(fold["fss_start"])
-        assert [climb["start"] for climb in fold["climbs"]] == [1, 2]
-        better = fold["climbs"][fold["start"] - 1]
-        assert fold["fss_train"] == better["fss_train"] == max(climb["fss_train"] for climb in fold["climbs"])
-        assert fold["fss_test"] == better["fss_test"]
-        for climb, begun in zip(fold["climbs"], fold["fss_start"], strict=True):
-            assert climb["history"][0]["fss"] == begun
-            assert climb["history"][-1]["fss"] == climb["fss_train"]
-            assert climb["runs"] >= 65 * len(climb["history"])
-    weighted = 0.25 * found["fss_in_sample_dynamic"] + 0.75 * found["fss_in_sample_static"]
-    assert found["fss_in_sample"] == pytest.approx(weighted, rel=1e-12)
-    ours = found["modulation"]["static"]["ours"]
+    assert found.fss_out_of_sample == pytest.approx(np.mean([fold.fss_test for fold in found.folds]))
+    for fold in found.folds:
+        assert fold.fss_train >= max(fold.fss_start)
+        assert [search.start for search in fold.climbs] == [1, 2]
+        better = fold.climbs[fold.start - 1]
+        assert fold.fss_train == better.fss_train == max(search.fss_train for search in fold.climbs)
+        assert fold.fss_test == better.fss_test
+        for search, begun in zip(fold.climbs, fold.fss_start, strict=True):
+            assert search.history[0].fss == begun
+            assert search.history[-1].fss == search.fss_train
+            assert search.runs >= 65 * len(search.history)
+    weighted = 0.25 * found.fss_in_sample_dynamic + 0.75 * found.fss_in_sample_static
+    assert found.fss_in_sample == pytest.approx(weighted, rel=1e-12)
+    ours = found.modulation.static.ours
     under = static[np.abs(shift_mm) < 1.2]
-    assert (ours["maximum_hz"], ours["minimum_hz"]) == (static.max(), under.min())
-    json.dumps(plain(found), allow_nan=False)
+    assert (ours.maximum_hz, ours.minimum_hz) == (static.max(), under.min())
+    assert to_json(from_json(single_unit.SingleUnitResult, to_json(found))) == to_json(found)
 
 
 def test_both_start_points_are_the_papers_with_both_gains_rescaled_alike():
@@ -774,35 +773,63 @@ def good_results():
 
     def profile(scale):
         x = np.arange(-6.0, 6.5, 0.5)
-        return {"distance_mm": x, "deflection_mm": scale * np.exp(-np.abs(x))}
+        deflection = scale * np.exp(-np.abs(x))
+        forces = dict.fromkeys(("force_mn", "peak_force_mn", "penetration_mm"), 1.0)
+        return {"distance_mm": x.tolist(), "deflection_mm": deflection.tolist(), **forces}
 
     trials = {
-        f"trial{number}": {name: profile(scale) for name in ("line", "cylinder")}
+        f"trial{number}": {
+            "line": profile(scale),
+            "cylinder": profile(scale) | {"r2": 0.95, "r2_mirrored": 0.91},
+        }
         for number, scale in ((1, 1.1), (2, 0.9), (3, 1.0))
     }
-    trials["trial3"]["cylinder"] |= {"r2": 0.95, "r2_mirrored": 0.91}
-    dynamic = {"minimum_hz": 54.0, "maximum_hz": 212.0, "difference_hz": 158.0}
-    static = {"minimum_hz": 5.0, "maximum_hz": 57.0, "difference_hz": 52.0}
-    fold = {"fss_start": [0.7, 0.78], "fss_test": 0.84}
+    observed = {"distance_mm": [0.0], "deflection_mm": [1.0], "is_artefact": [False]}
+    dynamic = {"minimum_hz": 54.0, "maximum_hz": 212.0, "difference_hz": 158.0, "index": 0.6}
+    static = {"minimum_hz": 5.0, "maximum_hz": 57.0, "difference_hz": 52.0, "index": 0.8}
+    scores = {"fss_train": 0.85, "fss_test": 0.84}
+    fold = {"start": 1, "testing_shift_mm": [], "fss_start": [0.7, 0.78], "parameters": {}, "climbs": []}
+    rates = ("dynamic_rate_hz", "static_rate_hz", "observed_dynamic_rate_hz", "observed_static_rate_hz")
     return {
-        "skin_deflection": trials,
+        "skin_deflection": {**trials, "observed": observed},
         "single_unit": {
             "fss_out_of_sample": 0.82,
             "fss_in_sample": 0.83,
-            "folds": [copy.deepcopy(fold) for _ in range(6)],
-            "modulation": {"dynamic": {"ours": dynamic}, "static": {"ours": static}},
+            "fss_in_sample_dynamic": 0.7,
+            "fss_in_sample_static": 0.9,
+            "fss_training_mean": 0.85,
+            "parameters": {},
+            "units": {},
+            "shift_mm": [],
+            **{name: [] for name in rates},
+            "start_points": [],
+            "folds": [{"fold": number, **fold, **scores} for number in range(1, 7)],
+            "modulation": {
+                "dynamic": {"ours": dynamic, "observed": dynamic},
+                "static": {"ours": static, "observed": static},
+            },
         },
         "discrimination": good_percept(),
         "nail": {"ratio": 3.0, "ratio_range": [1.5, 4.0], "ratio_energy": 2.0, "border_kpa": 0.8},
     }
 
 
+def compared(results):
+    return comparison.comparison(
+        from_json(skin_deflection.SkinDeflectionResult, json.dumps(results["skin_deflection"]).encode()),
+        from_json(single_unit.SingleUnitResult, json.dumps(results["single_unit"]).encode()),
+        results["discrimination"],
+        results["nail"],
+        results.get("curvature_thresholds"),
+    )
+
+
 def rows(results):
-    return {row.quantity: row for row in comparison.comparison(results)}
+    return {row.quantity: row for row in compared(results)}
 
 
 def test_a_good_run_meets_every_criterion():
-    found = comparison.comparison(good_results())
+    found = compared(good_results())
     # The paper shows the border of the nail without a number to judge by.
     assert [row.quantity.split()[-2:] for row in found if row.met is not True] == [["(Figure", "9)"]]
     assert len({row.quantity for row in found}) == len(found) > 20
@@ -886,11 +913,11 @@ STATISTICS = ("discrimination", "statistics")
         (worse(*STATISTICS, "misfit", "euclidean", "value", 0.051), {EUCLIDEAN}),
         (worse(*STATISTICS, "misfit", "dynamic", "value", 0.015), {EUCLIDEAN}),
         (
-            worse("skin_deflection", "trial1", "line", "deflection_mm", np.full(25, -1.0)),
+            worse("skin_deflection", "trial1", "line", "deflection_mm", [-1.0] * 25),
             {"Trial 1, deflection under the line, against Trial 3"},
         ),
         (
-            worse("skin_deflection", "trial2", "cylinder", "deflection_mm", np.full(25, 2.0)),
+            worse("skin_deflection", "trial2", "cylinder", "deflection_mm", [2.0] * 25),
             {"Trial 2, deflection under the cylinder, against Trial 3"},
         ),
     ],
@@ -908,7 +935,8 @@ def test_a_number_made_worse_is_marked_as_a_miss_and_no_other(change, missed):
 def test_deflection_far_from_the_indenter_does_not_decide_between_trials():
     results = good_results()
     line = results["skin_deflection"]["trial1"]["line"]
-    line["deflection_mm"] = np.where(np.abs(line["distance_mm"]) > 5.0, -100.0, line["deflection_mm"])
+    far = np.abs(line["distance_mm"]) > 5.0
+    line["deflection_mm"] = np.where(far, -100.0, line["deflection_mm"]).tolist()
     assert rows(results)["Trial 1, deflection under the line, against Trial 3"].met is True
 
 

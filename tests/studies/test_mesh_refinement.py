@@ -91,13 +91,13 @@ def test_quick_and_standard_are_the_meshes_of_the_studies():
     levels = {level.name: level for level in mesh_refinement.LEVELS}
     for name in ("quick", "standard"):
         conditions = Conditions(name)
-        assert list(levels[name].bars().values()) == single_unit.touches(conditions)
+        assert list(levels[name].bars().values()) == single_unit.bar_touches(conditions)
         assert levels[name].balls() == sphere_discrimination.touches(conditions)
 
 
 def test_similar_meshes_press_the_same_at_the_same_places():
     levels = [level for level in mesh_refinement.LEVELS if level.resolution == "standard"]
-    standard = single_unit.touches(Conditions("standard"))
+    standard = single_unit.bar_touches(Conditions("standard"))
     assert [level.factor for level in levels] == sorted(level.factor for level in levels)
     for level in levels:
         for shift, touch in level.bars().items():
@@ -107,7 +107,7 @@ def test_similar_meshes_press_the_same_at_the_same_places():
 
 def test_each_single_change_moves_only_the_mesh_or_only_the_steps():
     standard = {
-        "bar": single_unit.touches(Conditions("standard"))[mesh_refinement.PEAK_SHIFT],
+        "bar": single_unit.bar_touches(Conditions("standard"))[mesh_refinement.PEAK_SHIFT],
         "sphere": sphere_discrimination.touches(Conditions("standard"))[0.0, 287.0],
     }
     for name, touches in mesh_refinement.single_changes().items():

@@ -33,7 +33,7 @@ def touches():
 @pytest.mark.parametrize("name", paper_size.MESHES)
 def test_touches_are_those_of_the_studies_on_half_of_the_finger(touches, name):
     conditions, mine = Conditions(name), touches[name]
-    bars = single_unit.touches(conditions)
+    bars = single_unit.bar_touches(conditions)
     asked = [
         *(bars[shift] for shift in paper_size.CHOSEN_SHIFTS),
         *(
@@ -41,7 +41,7 @@ def test_touches_are_those_of_the_studies_on_half_of_the_finger(touches, name):
             for (_, curvature), touch in sphere_discrimination.touches(conditions).items()
             if curvature in paper_size.CURVATURES
         ),
-        *skin_deflection.touches(conditions).values(),
+        *skin_deflection.deflection_touches(conditions).values(),
     ]
     assert [replace(touch.grading, full=False) for touch in asked] == [touch.grading for touch in mine.all()]
     assert [replace(touch, grading=COARSE) for touch in asked] == [

@@ -12,6 +12,8 @@ from matplotlib.figure import Figure
 from fingerpad.data import STATUSES, paper
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
+from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
+from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult
 from fingerpad.report import (
     curvature_thresholds,
     discrimination,
@@ -20,15 +22,19 @@ from fingerpad.report import (
     population,
     population_rate,
     recruitment,
-    single_unit,
     single_unit_uncertainty,
-    skin_deflection,
     tables,
 )
 from fingerpad.report.formatting import fixed, joined, number, plain
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.page import write_html
 from fingerpad.report.parts import Chapter, Drawing, Kind, Page, Row, Table
+from fingerpad.report.single_unit import caption_single_unit, draw_single_unit, single_unit_tables
+from fingerpad.report.skin_deflection import (
+    caption_skin_deflection,
+    draw_skin_deflection,
+    skin_deflection_tables,
+)
 
 VERDICTS: dict[bool | None, tuple[Kind, str]] = {
     True: ("met", "✓ met"),
@@ -101,18 +107,18 @@ def _skin_and_afferent(result: ReproductionResult) -> list[Chapter]:
                     4,
                     "skin_deflection",
                     "Deflection of the skin",
-                    skin_deflection.draw,
-                    skin_deflection.caption,
+                    draw_skin_deflection,
+                    caption_skin_deflection,
                     skin,
                 ),
-                *tables.skin_deflection(skin),
+                *skin_deflection_tables(skin),
             ],
         ),
         Chapter(
             "Level 2: single afferent",
             [
-                _drawing(5, "single_unit", "Rates under a bar", single_unit.draw, single_unit.caption, unit),
-                *tables.single_unit(unit),
+                _drawing(5, "single_unit", "Rates under a bar", draw_single_unit, caption_single_unit, unit),
+                *single_unit_tables(unit),
             ],
         ),
     ]
@@ -246,9 +252,10 @@ def reproduction_summary(result: ReproductionResult) -> list[str]:
     return [found.strip(), _verdicts(result.comparison)]
 
 
-def _skin(section: dict[str, Any]) -> str:
-    fits = {f"Trial {trial}": section[f"trial{trial}"]["cylinder"]["r2"] for trial in (1, 2, 3)}
-    best = max(fits, key=lambda name: fits[name] or 0.0)
+def _skin(section: SkinDeflectionResult) -> str:
+    trials = (section.trial1, section.trial2, section.trial3)
+    fits = {f"Trial {number}": trial.cylinder.r2 for number, trial in enumerate(trials, start=1)}
+    best = max(fits, key=lambda name: fits[name])
     listed = joined([f"{name} {fixed(fit, 2)}" for name, fit in fits.items()])
     return (
         f"Skin: of the material trials, {best} is closest to the observed deflection under the cylinder "
@@ -256,12 +263,12 @@ def _skin(section: dict[str, Any]) -> str:
     )
 
 
-def _afferent(section: dict[str, Any]) -> str:
+def _afferent(section: SingleUnitResult) -> str:
     return (
         "Afferent: the fitted afferent reaches a fractional sum of squares (FSS) of "
-        f"{fixed(section['fss_out_of_sample'], 2)} out of sample, on positions of the bar that were not used "
+        f"{fixed(section.fss_out_of_sample, 2)} out of sample, on positions of the bar that were not used "
         f"for fitting (the paper: {fixed(paper.FSS_OUT_OF_SAMPLE.value, 2)}), and "
-        f"{fixed(section['fss_in_sample'], 2)} on all positions."
+        f"{fixed(section.fss_in_sample, 2)} on all positions."
     )
 
 

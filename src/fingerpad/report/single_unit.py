@@ -2,50 +2,51 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
 from fingerpad.data import paper, protocol
-from fingerpad.report.formatting import PHASES, fixed, number
-from fingerpad.report.style import BLACK, BLUE, new_figure, numbers
+from fingerpad.experiments.gerling2014.single_unit import FoldResult, RateModulation, Search, SingleUnitResult
+from fingerpad.report.formatting import PARAMETER_SYMBOLS, fixed, number, spelled
+from fingerpad.report.parts import Row, Table
+from fingerpad.report.style import BLACK, BLUE, new_figure
 
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
+PAPER_FOLD, PAPER_START = 3, 2
+"""Fold and start point whose steps the paper's Table 4 lists."""
 
 
-def draw(section: dict[str, Any]) -> Figure:
-    """Draw Figure 5: dynamic rates on the left, static rates on the right.
-
-    Parameters
-    ----------
-    section : dict
-        `results["single_unit"]`.
-
-    Returns
-    -------
-    Figure
-    """
+def draw_single_unit(section: SingleUnitResult) -> Figure:
+    """Draw Figure 5: dynamic rates on the left, static rates on the right."""
     figure = new_figure(10.0, 4.5)
-    shift = numbers(section["shift_mm"])
-    for axes, (phase, name) in zip(figure.subplots(1, 2), PHASES.items(), strict=True):
-        fit = section.get(f"fss_in_sample_{phase}")
+    phases = (
+        (
+            "(a) dynamic ramp",
+            section.dynamic_rate_hz,
+            section.observed_dynamic_rate_hz,
+            section.fss_in_sample_dynamic,
+        ),
+        (
+            "(b) static hold",
+            section.static_rate_hz,
+            section.observed_static_rate_hz,
+            section.fss_in_sample_static,
+        ),
+    )
+    for axes, (title, predicted_hz, observed_hz, fss) in zip(figure.subplots(1, 2), phases, strict=True):
         axes.axvspan(-BAR_HALF_WIDTH_MM, BAR_HALF_WIDTH_MM, color="#f3f1ea", zorder=0)
+        axes.plot(section.shift_mm, predicted_hz, color=BLUE, label="predicted")
         axes.plot(
-            shift,
-            numbers(section[f"{phase}_rate_hz"]),
-            color=BLUE,
-            label="predicted",
-        )
-        axes.plot(
-            shift,
-            numbers(section[f"observed_{phase}_rate_hz"]),
+            section.shift_mm,
+            observed_hz,
             "o",
             color=BLACK,
             markerfacecolor="white",
             markersize=5.0,
             label="observed",
         )
-        axes.set_title(f"({'ab'[phase == 'static']}) {name}" + ("" if fit is None else f", FSS = {fit:.2f}"))
+        axes.set_title(f"{title}, FSS = {fixed(fss, 2)}")
         axes.set_xlabel("position of the bar, proximal positive [mm]")
         axes.set_ylabel("firing rate [spikes/s]")
         axes.set_ylim(bottom=0.0)
@@ -53,15 +54,152 @@ def draw(section: dict[str, Any]) -> Figure:
     return figure
 
 
-def caption(section: dict[str, Any]) -> str:
-    """Say what Figure 5 shows and what the paper found."""
-    ours = section.get("fss_out_of_sample")
+def caption_single_unit(section: SingleUnitResult) -> str:
+    """Describe Figure 5 and what the paper found."""
     return (
         f"Firing rate of one SAI afferent under a bar {protocol.BAR_WIDTH.value} mm wide, pressed in by "
-        f"{protocol.DEPTH.value} mm at {len(section['shift_mm'])} positions relative to the centre of its "
+        f"{protocol.DEPTH.value} mm at {section.shift_mm.size} positions relative to the centre of its "
         "receptive field; shaded: positions at which the bar covers the centre. Observed: Phillips & "
         "Johnson 1981. The line is predicted with the parameters below. Fractional sum of squares (FSS, 1 "
-        f"is perfect) on positions that were not used for fitting: {fixed(ours, 2)} here, "
-        f"{fixed(paper.FSS_OUT_OF_SAMPLE.value, 2)} in the paper. The paper's dynamic rates run from "
+        f"is perfect) out of sample: {fixed(section.fss_out_of_sample, 2)} here, "
+        f"{fixed(paper.FSS_OUT_OF_SAMPLE.value, 2)} in the paper. The paper's dynamic rates range from "
         f"{number(paper.DYNAMIC_RATE_MINIMUM.value)} to {number(paper.DYNAMIC_RATE_MAXIMUM.value)} spikes/s."
     )
+
+
+def single_unit_tables(section: SingleUnitResult) -> list[Table]:
+    """Return scores, parameters, folds, the steps of one search, and modulation."""
+    paper_search = section.folds[PAPER_FOLD - 1].climbs[PAPER_START - 1]
+    return [
+        _scores(section),
+        _parameters(section),
+        _folds(section.folds),
+        _searches(section.folds),
+        _steps(paper_search, section),
+        _modulation(section.modulation),
+    ]
+
+
+def _scores(section: SingleUnitResult) -> Table:
+    rows = (
+        ("out of sample, mean of the folds", paper.FSS_OUT_OF_SAMPLE.value, section.fss_out_of_sample),
+        ("all positions, dynamic and static weighted 1:3", None, section.fss_in_sample),
+        ("all positions, dynamic rates", None, section.fss_in_sample_dynamic),
+        ("all positions, static rates", None, section.fss_in_sample_static),
+    )
+    return Table(
+        "Fractional sum of squares (FSS)",
+        ("over", "paper", "this run"),
+        [Row((name, fixed(printed, 2), fixed(ours, 3))) for name, printed, ours in rows],
+    )
+
+
+def _parameters(section: SingleUnitResult) -> Table:
+    rows = [
+        Row(
+            (
+                PARAMETER_SYMBOLS.get(name, spelled(name)),
+                *(number(start.get(name)) for start in section.start_points),
+                number(value),
+                section.units.get(name, ""),
+            )
+        )
+        for name, value in section.parameters.items()
+    ]
+    starts = (f"start {index}" for index in range(1, len(section.start_points) + 1))
+    return Table("Parameters of the afferent", ("parameter", *starts, "fitted", "unit"), rows)
+
+
+def _folds(folds: Sequence[FoldResult]) -> Table:
+    rows = [
+        Row(
+            (
+                str(fold.fold),
+                ", ".join(f"{shift:+.1f}".replace("-", "−") for shift in fold.testing_shift_mm),
+                str(fold.start),
+                fixed(fold.fss_train, 3),
+                fixed(fold.fss_test, 3),
+            )
+        )
+        for fold in folds
+    ]
+    columns = ("fold", "positions kept for testing [mm]", "better start", "FSS, training", "FSS, testing")
+    return Table("Folds of the cross-validation (the paper's Table 3)", columns, rows)
+
+
+def _searches(folds: Sequence[FoldResult]) -> Table:
+    rows = [
+        Row(
+            (
+                f"{fold.fold}, {search.start}",
+                fixed(search.history[0].fss, 3),
+                fixed(search.fss_train, 3),
+                fixed(search.fss_test, 3),
+                str(len(search.history) - 1),
+                number(search.runs),
+            ),
+            "final" if search.start == fold.start else "",
+        )
+        for fold in folds
+        for search in fold.climbs
+    ]
+    columns = (
+        "fold, start",
+        "FSS at the start",
+        "FSS, training",
+        "FSS, testing",
+        "iterations",
+        "evaluations",
+    )
+    note = "In bold: the better start on the training positions, which is the result of the fold."
+    return Table("Searches from both start points", columns, rows, note)
+
+
+def _steps(search: Search, section: SingleUnitResult) -> Table:
+    names = list(search.history[0].parameters)
+    rows = [
+        Row(
+            (str(step.iteration), fixed(step.fss, 3), *(number(step.parameters[name]) for name in names)),
+            "final" if step is search.history[-1] else "",
+        )
+        for step in search.history
+    ]
+    note = (
+        "The last row, in bold, is final; its FSS on the testing positions is "
+        f"{fixed(search.fss_test, 3)}. In the paper FSS rose from "
+        f"{number(paper.FOLD_3_FSS_START.value)} to {number(paper.FOLD_3_FSS_FITTED.value)} in "
+        f"{number(paper.FOLD_3_ITERATIONS.value)} iterations, and was "
+        f"{number(paper.FOLD_3_FSS_TEST.value)} on its testing positions. results.json holds these steps for "
+        "each fold and start."
+    )
+    title = f"Steps of the fit: fold {PAPER_FOLD}, start {search.start} (the paper's Table 4)"
+    headings = [
+        PARAMETER_SYMBOLS.get(name, spelled(name))
+        + (f" [{section.units[name]}]" if name in section.units else "")
+        for name in names
+    ]
+    return Table(title, ("iteration", "FSS, training", *headings), rows, note)
+
+
+def _modulation(modulation: RateModulation) -> Table:
+    rows = [
+        Row(
+            (
+                f"{phase}, {source}",
+                number(found.maximum_hz),
+                number(found.minimum_hz),
+                number(found.difference_hz),
+                number(found.index),
+            )
+        )
+        for phase, both in (("dynamic", modulation.dynamic), ("static", modulation.static))
+        for source, found in (("observed", both.observed), ("this run", both.ours))
+    ]
+    note = (
+        "All but the index in spikes/s. The paper predicts a dynamic minimum of "
+        f"{number(paper.DYNAMIC_RATE_MINIMUM.value)}, maximum of {number(paper.DYNAMIC_RATE_MAXIMUM.value)} "
+        f"and difference of {number(paper.DYNAMIC_RATE_DIFFERENCE.value)}, and a static difference of "
+        f"{number(paper.STATIC_RATE_DIFFERENCE.value)}; it calls the differences modulation indices."
+    )
+    columns = ("rates", "maximum", "minimum", "difference", "index, Eq. 11")
+    return Table("Modulation at the edge of the bar (the paper's Table 5)", columns, rows, note)

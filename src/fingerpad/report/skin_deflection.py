@@ -1,81 +1,73 @@
-"""Level 1, Figure 4: how the skin's surface yields under a line and a cylinder."""
+"""Level 1, Figure 4: deflection of the skin under a line load and a cylinder."""
 
 from __future__ import annotations
-
-from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.data import protocol
-from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, numbers
+from fingerpad.experiments.gerling2014.skin_deflection import (
+    CylinderDeflection,
+    IndenterDeflection,
+    ObservedDeflection,
+    SkinDeflectionResult,
+)
+from fingerpad.report.formatting import fixed
+from fingerpad.report.parts import Row, Table
+from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure
 
 UM_PER_MM = 1000.0
-TRIALS = {
-    "trial1": ("Trial 1", BLUE, (0, (5, 2))),
-    "trial2": ("Trial 2", ORANGE, (0, (1, 1.2))),
-    "trial3": ("Trial 3", GREEN, "-"),
+TRIAL_STYLES = {
+    "Trial 1": (BLUE, (0, (5, 2))),
+    "Trial 2": (ORANGE, (0, (1, 1.2))),
+    "Trial 3": (GREEN, "-"),
 }
-INDENTERS = {
-    "line": f"{protocol.LINE_DIAMETER.value * UM_PER_MM:.0f} µm line",
-    "cylinder": f"{protocol.CYLINDER_DIAMETER.value} mm cylinder",
-}
+LINE = f"{protocol.LINE_DIAMETER.value * UM_PER_MM:.0f} µm line"
+CYLINDER = f"{protocol.CYLINDER_DIAMETER.value} mm cylinder"
 NEAR_MM = 2.5
 
 
-def draw(section: dict[str, Any]) -> Figure:
-    """Draw Figure 4: both indenters, the whole profile on the left and the middle enlarged on the right.
+def _trials(section: SkinDeflectionResult) -> dict[str, dict[str, IndenterDeflection]]:
+    """Deflections by trial and indenter, as they are named on the page."""
+    trials = (section.trial1, section.trial2, section.trial3)
+    return {
+        name: {LINE: trial.line, CYLINDER: trial.cylinder}
+        for name, trial in zip(TRIAL_STYLES, trials, strict=True)
+    }
 
-    Parameters
-    ----------
-    section : dict
-        `results["skin_deflection"]`.
 
-    Returns
-    -------
-    Figure
-    """
+def draw_skin_deflection(section: SkinDeflectionResult) -> Figure:
+    """Draw Figure 4: one row per indenter, the whole profile on the left and its middle on the right."""
     figure = new_figure(10.0, 7.0)
     panels = figure.subplots(2, 2, width_ratios=(1.7, 1.0), sharey="row")
-    for row, (indenter, name) in enumerate(INDENTERS.items()):
+    for row, indenter in enumerate((LINE, CYLINDER)):
         whole, near = panels[row]
         for axes in (whole, near):
-            _profiles(axes, section, indenter)
-            if indenter == "cylinder":
-                _observed(axes, section.get("observed"))
-        whole.set_title(f"({'ab'[row]}) {name}, {protocol.DEPTH.value} mm deep")
+            for name, trial in _trials(section).items():
+                _draw_profile(axes, name, trial[indenter])
+            if indenter == CYLINDER:
+                _draw_observed(axes, section.observed)
+        whole.set_title(f"({'ab'[row]}) {indenter}, {protocol.DEPTH.value} mm deep")
         whole.margins(x=0.01)
         whole.set_ylabel("deflection towards the bone [mm]")
         near.set_title("the middle, enlarged")
         near.set_xlim(-NEAR_MM, NEAR_MM)
         whole.legend(loc="lower left")
-        whole.invert_yaxis()  # Skin that yields goes down; the row shares this axis.
+        whole.invert_yaxis()  # Deflection is drawn downwards; the row shares this axis.
     for axes in panels[-1]:
         axes.set_xlabel("distance from the indenter's axis along the finger, proximal positive [mm]")
     panels[-1, 1].set_xlabel("distance [mm]")
     return figure
 
 
-def _profiles(axes: Axes, section: dict[str, Any], indenter: str) -> None:
-    for trial, (name, colour, style) in TRIALS.items():
-        if trial not in section or indenter not in section[trial]:
-            continue
-        profile = section[trial][indenter]
-        fit = profile.get("r2")
-        axes.plot(
-            numbers(profile["distance_mm"]),
-            numbers(profile["deflection_mm"]),
-            color=colour,
-            linestyle=style,
-            label=name if fit is None else f"{name}, $R^2$ = {fit:.2f}",
-        )
+def _draw_profile(axes: Axes, name: str, profile: IndenterDeflection) -> None:
+    colour, style = TRIAL_STYLES[name]
+    fit = f", $R^2$ = {fixed(profile.r2, 2)}" if isinstance(profile, CylinderDeflection) else ""
+    axes.plot(profile.distance_mm, profile.deflection_mm, color=colour, linestyle=style, label=name + fit)
 
 
-def _observed(axes: Axes, observed: dict[str, Any] | None) -> None:
-    if not observed:
-        return
-    distance, deflection = numbers(observed["distance_mm"]), numbers(observed["deflection_mm"])
-    artefact = numbers(observed["is_artefact"]).astype(bool)
+def _draw_observed(axes: Axes, observed: ObservedDeflection) -> None:
+    distance, deflection, artefact = observed.distance_mm, observed.deflection_mm, observed.is_artefact
     axes.plot(
         distance[~artefact],
         deflection[~artefact],
@@ -96,12 +88,25 @@ def _observed(axes: Axes, observed: dict[str, Any] | None) -> None:
         )
 
 
-def caption(_: dict[str, Any]) -> str:
-    """Say what Figure 4 shows and what the paper found."""
+def caption_skin_deflection(_: SkinDeflectionResult) -> str:
+    """Describe Figure 4 and what the paper found."""
     return (
         "Deflection of the skin along the midline of the fingertip at the end of the indentation, drawn "
-        "downwards as the skin goes. Points: a living human fingertip under the cylinder; the cross is a "
-        "step that digitising left at the end of the curve and is left out of R². No observations under the "
-        "line are available to us. The paper found that Trial 1 overshoots, Trial 2 undershoots and Trial "
-        "3, which combines the two, matches."
+        "downwards. Points: a living human fingertip under the cylinder; the cross is an artefact of "
+        "digitising at the end of the curve and is left out of R². No observations under the line are "
+        "available. In the paper Trial 1 overshoots, Trial 2 undershoots and Trial 3, which combines the "
+        "two, matches."
     )
+
+
+def skin_deflection_tables(section: SkinDeflectionResult) -> list[Table]:
+    """Return fit and force of each material trial."""
+    rows = []
+    for name, trial in _trials(section).items():
+        for indenter, profile in trial.items():
+            compared = profile if isinstance(profile, CylinderDeflection) else None
+            fits = (compared.r2, compared.r2_mirrored) if compared else (None, None)
+            cells = (f"{name}, {indenter}", *(fixed(fit, 3) for fit in fits), fixed(profile.force_mn, 1))
+            rows.append(Row(cells))
+    note = "R², mirrored: with the proximal and the distal side of the observations exchanged."
+    return [Table("Fit and force", ("trial", "R²", "R², mirrored", "force [mN]"), rows, note)]

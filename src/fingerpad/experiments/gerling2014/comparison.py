@@ -1,45 +1,56 @@
-"""The paper's numbers beside ours, misses included."""
+"""Comparison of a reproduction with the numbers of the paper."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from fingerpad.data import paper
 from fingerpad.data.published import Published
 from fingerpad.experiments.gerling2014.claim_row import MATERIALS, ClaimRow, claim_row, measured_row
 from fingerpad.experiments.gerling2014.curvature_thresholds import weber_rows
 from fingerpad.experiments.gerling2014.percept_claims import percept_rows
+from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
+from fingerpad.experiments.gerling2014.skin_deflection import IndenterDeflection, SkinDeflectionResult
 
 LEAST_R2 = 0.93
 """R² that Trial 3 must reach under the cylinder: the laboratory's own later fit."""
 
 
-def comparison(results: Mapping[str, Any]) -> list[ClaimRow]:
-    """Rows of the table "paper | ours | difference | status of the inputs".
+def comparison(
+    skin: SkinDeflectionResult,
+    unit: SingleUnitResult,
+    discrimination: Mapping[str, Any],
+    nail: Mapping[str, Any],
+    curvature_thresholds: Mapping[str, Any] | None = None,
+) -> list[ClaimRow]:
+    """Rows of the table that compares a reproduction with the paper.
 
     Parameters
     ----------
-    results : dict
-        The finished studies.
+    skin, unit, discrimination, nail
+        Results of the three levels.
+    curvature_thresholds : optional
+        Result beyond the paper.
 
     Returns
     -------
     list of ClaimRow
     """
     return [
-        *_deflection(results["skin_deflection"]),
-        *_single_unit(results["single_unit"]),
-        *percept_rows(results["discrimination"]),
-        *weber_rows(results.get("curvature_thresholds")),
-        *_nail(results["nail"]),
+        *_deflection(skin),
+        *_single_unit(unit),
+        *percept_rows(discrimination),
+        *weber_rows(curvature_thresholds),
+        *_nail(nail),
     ]
 
 
-def _deflection(found: Mapping[str, Any]) -> list[ClaimRow]:
+def _deflection(found: SkinDeflectionResult) -> list[ClaimRow]:
     later: Published = paper.LATER_DEFLECTION_R2
-    trial_3 = found["trial3"]["cylinder"]
-    r2 = trial_3["r2"]
+    r2 = found.trial3.cylinder.r2
     rows = [
         claim_row(
             "Trial 3, deflection under the cylinder, R²",
@@ -48,15 +59,22 @@ def _deflection(found: Mapping[str, Any]) -> list[ClaimRow]:
             f"{r2 - later.value:+.3f}",
             MATERIALS,
             r2 >= LEAST_R2,
-            f"with the observations' direction read the other way {trial_3['r2_mirrored']:.3f}",
+            f"with the observations' direction read the other way {found.trial3.cylinder.r2_mirrored:.3f}",
         )
     ]
-    for trial, expected, sign in (("trial1", "overshoots", 1), ("trial2", "undershoots", -1)):
-        for indenter in ("line", "cylinder"):
-            excess = _mean_excess(found[trial][indenter], found["trial3"][indenter])
+    third = found.trial3
+    for number, trial, expected, sign in (
+        (1, found.trial1, "overshoots", 1),
+        (2, found.trial2, "undershoots", -1),
+    ):
+        for indenter, ours, reference in (
+            ("line", trial.line, third.line),
+            ("cylinder", trial.cylinder, third.cylinder),
+        ):
+            excess = _mean_excess(ours, reference)
             rows.append(
                 claim_row(
-                    f"Trial {trial[-1]}, deflection under the {indenter}, against Trial 3",
+                    f"Trial {number}, deflection under the {indenter}, against Trial 3",
                     expected,
                     f"{'more' if excess > 0 else 'less'} by {abs(excess):.3f} mm on average within 5 mm",
                     "",
@@ -69,53 +87,49 @@ def _deflection(found: Mapping[str, Any]) -> list[ClaimRow]:
     return rows
 
 
-def _mean_excess(trial: Mapping[str, Any], reference: Mapping[str, Any]) -> float:
+def _mean_excess(ours: IndenterDeflection, reference: IndenterDeflection) -> float:
     """Mean deflection above the reference's, over the nodes within 5 mm that both have. [mm]"""
-    pairs = [
-        a - b
-        for x, a, b in zip(
-            trial["distance_mm"], trial["deflection_mm"], reference["deflection_mm"], strict=True
-        )
-        if abs(x) <= 5.0
-    ]
-    return float(sum(pairs) / len(pairs))
+    near = np.abs(ours.distance_mm) <= 5.0
+    return float((ours.deflection_mm - reference.deflection_mm)[near].mean())
 
 
-def _single_unit(found: Mapping[str, Any]) -> list[ClaimRow]:
+def _single_unit(found: SingleUnitResult) -> list[ClaimRow]:
     status = MATERIALS + "; recordings read"
     rows = [
         measured_row(
             "Single unit, FSS out of sample (mean of six folds)",
             paper.FSS_OUT_OF_SAMPLE,
-            found["fss_out_of_sample"],
+            found.fss_out_of_sample,
             status,
             at_least=True,
         ),
         measured_row(
             "Single unit, FSS in sample (all 36 shifts)",
             paper.FOLD_3_FSS_FITTED,
-            found["fss_in_sample"],
+            found.fss_in_sample,
             status + "; the paper's value is of fold 3",
             at_least=True,
         ),
     ]
-    fold_3 = found["folds"][2]
+    fold_3 = found.folds[2]
     rows += [
-        measured_row("Fold 3, FSS at start point 2", paper.FOLD_3_FSS_START, fold_3["fss_start"][1], status),
         measured_row(
-            "Fold 3, FSS of the testing set", paper.FOLD_3_FSS_TEST, fold_3["fss_test"], status, at_least=True
+            "Fold 3, FSS at start point 2", paper.FOLD_3_FSS_START, float(fold_3.fss_start[1]), status
+        ),
+        measured_row(
+            "Fold 3, FSS of the testing set", paper.FOLD_3_FSS_TEST, fold_3.fss_test, status, at_least=True
         ),
     ]
-    dynamic, static = found["modulation"]["dynamic"]["ours"], found["modulation"]["static"]["ours"]
+    dynamic, static = found.modulation.dynamic.ours, found.modulation.static.ours
     for quantity, published, ours in (
         (
             "Dynamic rate, smallest under the flat face [spikes/s]",
             paper.DYNAMIC_RATE_MINIMUM,
-            dynamic["minimum_hz"],
+            dynamic.minimum_hz,
         ),
-        ("Dynamic rate, largest [spikes/s]", paper.DYNAMIC_RATE_MAXIMUM, dynamic["maximum_hz"]),
-        ("Dynamic rate, difference [spikes/s]", paper.DYNAMIC_RATE_DIFFERENCE, dynamic["difference_hz"]),
-        ("Static rate, difference [spikes/s]", paper.STATIC_RATE_DIFFERENCE, static["difference_hz"]),
+        ("Dynamic rate, largest [spikes/s]", paper.DYNAMIC_RATE_MAXIMUM, dynamic.maximum_hz),
+        ("Dynamic rate, difference [spikes/s]", paper.DYNAMIC_RATE_DIFFERENCE, dynamic.difference_hz),
+        ("Static rate, difference [spikes/s]", paper.STATIC_RATE_DIFFERENCE, static.difference_hz),
     ):
         rows.append(measured_row(quantity, published, ours, status, digits=0))
     return rows

@@ -27,6 +27,8 @@ from fingerpad.experiments.gerling2014 import (
 )
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow
 from fingerpad.experiments.gerling2014.comparison import comparison
+from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
+from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.neuron.afferent import Afferent
@@ -100,10 +102,10 @@ class ReproductionResult:
     ----------
     format, format_version : str, int
         Of the file.
-    skin_deflection : dict
-        Level 1, see `skin_deflection`.
-    single_unit : dict
-        Level 2, see `single_unit`.
+    skin_deflection : SkinDeflectionResult
+        Level 1.
+    single_unit : SingleUnitResult
+        Level 2.
     discrimination, population, nail : dict
         Level 3, see `sphere_discrimination`, `response_maps` and `nail_border`.
     drive_quantities, single_unit_uncertainty, curvature_thresholds, population_timing : dict, optional
@@ -118,8 +120,8 @@ class ReproductionResult:
 
     format: Literal["fingerpad reproduction"] = "fingerpad reproduction"
     format_version: Literal[1] = 1
-    skin_deflection: dict[str, Any]
-    single_unit: dict[str, Any]
+    skin_deflection: SkinDeflectionResult
+    single_unit: SingleUnitResult
     discrimination: dict[str, Any]
     population: dict[str, Any]
     nail: dict[str, Any]
@@ -160,8 +162,8 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
     wanted: dict[str, Mapping[Any, Touch]] = {
         # The longest indentations first: short ones fill the end, and hardly a core waits for another.
         "nail": {"nail": nail_border.touch(conditions)},
-        "skin deflection": skin_deflection.touches(conditions),
-        "bar, 36 shifts": dict(enumerate(single_unit.touches(conditions))),
+        "skin deflection": skin_deflection.deflection_touches(conditions),
+        "bar, 36 shifts": dict(enumerate(single_unit.bar_touches(conditions))),
         "spheres": spheres,
     }
     if run.goes_beyond:
@@ -179,9 +181,8 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
         afferent = Afferent.from_parameters(best.parameters)
         discrimination = sphere_discrimination.result(sphere_responses, afferent, conditions.seed)
         advance()
+        unit = single_unit.single_unit_result(problem, best, folds)
         results: dict[str, Any] = {
-            "skin_deflection": skin_deflection.result(deflection),
-            "single_unit": single_unit.result(problem, best, folds),
             "discrimination": discrimination,
             "population": response_maps.result(sphere_responses[STANDARD_SPHERE], afferent),
             "nail": nail_border.result(nail_response),
@@ -213,9 +214,19 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
     meshes = {"sphere": spheres[STANDARD_SPHERE].mesh, "bar": bar_responses[0].mesh} | {
         name: deflection["trial3", name].mesh for name in skin_deflection.INDENTERS
     }
+    skin, plain_results = skin_deflection.deflection_result(deflection), plain(results)
+    rows = comparison(
+        skin,
+        unit,
+        plain_results["discrimination"],
+        plain_results["nail"],
+        plain_results.get("curvature_thresholds"),
+    )
     return ReproductionResult(
-        **plain(results),
-        comparison=tuple(comparison(results)),
+        **plain_results,
+        skin_deflection=skin,
+        single_unit=unit,
+        comparison=tuple(rows),
         inputs=tuple(PublishedNumber(**asdict(number)) for number in all_published()),
         manifest=runner.manifest(conditions, meshes, half_model=not spheres[STANDARD_SPHERE].grading.full),
     )

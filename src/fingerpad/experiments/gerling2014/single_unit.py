@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import STORED_ENERGY, SedTraces
 from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
@@ -22,7 +22,7 @@ from fingerpad.inference.fitting import (
 )
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
-from fingerpad.inference.recordings import PHASES, RateRecordings
+from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import response_surface, start_points
 from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
 from fingerpad.neuron.spikes import modulation_difference, modulation_index
@@ -32,7 +32,7 @@ RECEPTOR = ((RECEPTOR_X_MM, 0.0),)
 """Where the end organ lies: x and z on the skin. [mm]"""
 
 
-def touches(conditions: Conditions) -> list[Touch]:
+def bar_touches(conditions: Conditions) -> list[Touch]:
     """36 touches of the bar, shifted along the finger.
 
     Its flat face stays parallel to the skin at the receptor (docs/decisions/bar-orientation.md). A positive
@@ -124,71 +124,252 @@ def fit(problem: RateProblem, memberships: ArrayLike | None = None) -> tuple[Fit
     return method.fit(problem, everything), cross_validate(problem, method, folds)
 
 
-def result(problem: RateProblem, best: Fit, folds: CrossValidation) -> dict[str, Any]:
-    """Rates, fits and modulation, ready for the report."""
-    shift_mm = bar_firing_rates().shift_mm
-    observed = {phase: getattr(problem.recordings, f"{phase}_rate_hz") for phase in PHASES}
-    predicted = dict(zip(PHASES, problem.model.evaluate(best.parameters), strict=True))
+@result_class
+class Modulation:
+    """Modulation of the rate at the edge of the bar (Eq. 11).
+
+    Parameters
+    ----------
+    maximum_hz : float
+        Largest rate. [spikes/s]
+    minimum_hz : float
+        Smallest rate with the flat face of the bar over the receptor. [spikes/s]
+    difference_hz : float
+        Their difference. [spikes/s]
+    index : float
+        Modulation index; NaN if there are no spikes. [1]
+    """
+
+    maximum_hz: Number
+    minimum_hz: Number
+    difference_hz: Number
+    index: Number
+
+
+@result_class
+class PhaseModulation:
+    """Modulation of the rates of one phase.
+
+    Parameters
+    ----------
+    observed, ours : Modulation
+        Of the recorded and of the predicted rates.
+    """
+
+    observed: Modulation
+    ours: Modulation
+
+
+@result_class
+class RateModulation:
+    """Modulation of both rates.
+
+    Parameters
+    ----------
+    dynamic, static : PhaseModulation
+        During the ramp and during the hold.
+    """
+
+    dynamic: PhaseModulation
+    static: PhaseModulation
+
+
+@result_class
+class SearchStep:
+    """One iteration of the response-surface method.
+
+    Parameters
+    ----------
+    iteration : int
+        From 0, the start point.
+    fss : float
+        Fractional sum of squares of the training set. [1]
+    parameters : dict of str to float
+        Six parameters, by name.
+    """
+
+    iteration: int
+    fss: Number
+    parameters: dict[str, Number]
+
+
+@result_class
+class Search:
+    """Search of one fold from one start point.
+
+    Parameters
+    ----------
+    start : int
+        Number of the start point, from 1.
+    fss_train, fss_test : float
+        Fractional sum of squares of the training and of the testing set. [1]
+    runs : int
+        Evaluations of the model.
+    history : tuple of SearchStep
+        Steps from the start point to the end.
+    """
+
+    start: int
+    fss_train: Number
+    fss_test: Number
+    runs: int
+    history: tuple[SearchStep, ...]
+
+
+@result_class
+class FoldResult:
+    """One fold of the cross-validation.
+
+    Parameters
+    ----------
+    fold, start : int
+        Number of the fold and of the better start point, from 1.
+    testing_shift_mm : array (n_testing,)
+        Shifts left out. [mm]
+    fss_start : array (n_starts,)
+        Fractional sum of squares of the training set at the start points. [1]
+    fss_train, fss_test : float
+        Of the better search. [1]
+    parameters : dict of str to float
+        Six parameters of the better search, by name.
+    climbs : tuple of Search
+        One per start point.
+    """
+
+    fold: int
+    start: int
+    testing_shift_mm: Vector
+    fss_start: Vector
+    fss_train: Number
+    fss_test: Number
+    parameters: dict[str, Number]
+    climbs: tuple[Search, ...]
+
+
+@result_class
+class SingleUnitResult:
+    """Result of level 2.
+
+    Parameters
+    ----------
+    fss_in_sample, fss_in_sample_dynamic, fss_in_sample_static : float
+        Fractional sum of squares over all shifts, weighted and by phase. [1]
+    fss_out_of_sample, fss_training_mean : float
+        Mean over the folds, of the testing and of the training sets. [1]
+    parameters, units : dict
+        Six parameters fitted to all shifts, and their units, by name.
+    shift_mm : array (n_shifts,)
+        Shifts of the bar, proximal positive. [mm]
+    dynamic_rate_hz, static_rate_hz : array (n_shifts,)
+        Predicted rates. [spikes/s]
+    observed_dynamic_rate_hz, observed_static_rate_hz : array (n_shifts,)
+        Recorded rates. [spikes/s]
+    start_points : tuple of dict
+        Both start points, by name of the parameter.
+    folds : tuple of FoldResult
+        Cross-validation.
+    modulation : RateModulation
+        At the edge of the bar.
+    """
+
+    fss_in_sample: Number
+    fss_in_sample_dynamic: Number
+    fss_in_sample_static: Number
+    fss_out_of_sample: Number
+    fss_training_mean: Number
+    parameters: dict[str, Number]
+    units: dict[str, str]
+    shift_mm: Vector
+    dynamic_rate_hz: Vector
+    static_rate_hz: Vector
+    observed_dynamic_rate_hz: Vector
+    observed_static_rate_hz: Vector
+    start_points: tuple[dict[str, Number], ...]
+    folds: tuple[FoldResult, ...]
+    modulation: RateModulation
+
+
+def single_unit_result(problem: RateProblem, best: Fit, folds: CrossValidation) -> SingleUnitResult:
+    """Rates, fits and modulation.
+
+    Parameters
+    ----------
+    problem : RateProblem
+        From `rate_problem`.
+    best : Fit
+        To all shifts.
+    folds : CrossValidation
+        The six folds.
+    """
+    shift_mm, recordings = bar_firing_rates().shift_mm, problem.recordings
+    observed_dynamic, observed_static = recordings.dynamic_rate_hz, recordings.static_rate_hz
+    assert observed_dynamic is not None
+    assert observed_static is not None
+    dynamic, static = problem.model.evaluate(best.parameters)
     by_phase = problem.score_by_phase(best.parameters, np.arange(problem.n_observations))
-    return {
-        "fss_in_sample": best.score,
-        **{f"fss_in_sample_{phase}": by_phase[phase] for phase in PHASES},
-        "fss_out_of_sample": folds.score_test,
-        "fss_training_mean": folds.score_train,
-        "parameters": _named(best.parameters),
-        "units": dict(zip(PARAMETER_NAMES, PARAMETER_UNITS, strict=True)),
-        "shift_mm": shift_mm,
-        **{f"{phase}_rate_hz": predicted[phase] for phase in PHASES},
-        **{f"observed_{phase}_rate_hz": observed[phase] for phase in PHASES},
-        "start_points": [_named(start) for start in start_points()],
-        "folds": [_fold(problem, fold, shift_mm) for fold in folds.folds],
-        "modulation": {
-            phase: {
-                "observed": _modulation(shift_mm, observed[phase]),
-                "ours": _modulation(shift_mm, predicted[phase]),
-            }
-            for phase in PHASES
-        },
-    }
+    return SingleUnitResult(
+        fss_in_sample=best.score,
+        fss_in_sample_dynamic=by_phase["dynamic"],
+        fss_in_sample_static=by_phase["static"],
+        fss_out_of_sample=folds.score_test,
+        fss_training_mean=folds.score_train,
+        parameters=_named(best.parameters),
+        units=dict(zip(PARAMETER_NAMES, PARAMETER_UNITS, strict=True)),
+        shift_mm=shift_mm,
+        dynamic_rate_hz=dynamic,
+        static_rate_hz=static,
+        observed_dynamic_rate_hz=observed_dynamic,
+        observed_static_rate_hz=observed_static,
+        start_points=tuple(_named(start) for start in start_points()),
+        folds=tuple(_fold(problem, fold, shift_mm) for fold in folds.folds),
+        modulation=RateModulation(
+            dynamic=PhaseModulation(
+                observed=_modulation(shift_mm, observed_dynamic), ours=_modulation(shift_mm, dynamic)
+            ),
+            static=PhaseModulation(
+                observed=_modulation(shift_mm, observed_static), ours=_modulation(shift_mm, static)
+            ),
+        ),
+    )
 
 
-def _fold(problem: RateProblem, fold: FoldFit, shift_mm: FloatArray) -> dict[str, Any]:
-    """One fold: which shifts were left out, the better of its climbs, and the steps of each."""
-    return {
-        "fold": fold.fold + 1,
-        "start": fold.fit.start + 1,
-        "testing_shift_mm": shift_mm[fold.testing],
-        "fss_start": [climb.history[0].score for climb in fold.fit.attempts],
-        "fss_train": fold.score_train,
-        "fss_test": fold.score_test,
-        "parameters": _named(fold.fit.parameters),
-        "climbs": [
-            {
-                "start": number + 1,
-                "fss_train": climb.score,
-                "fss_test": problem.score(climb.parameters, fold.testing),
-                "runs": climb.n_evaluations,
-                "history": [
-                    {"iteration": iteration, "fss": step.score, "parameters": _named(step.parameters)}
-                    for iteration, step in enumerate(climb.history)
-                ],
-            }
-            for number, climb in enumerate(fold.fit.attempts)
-        ],
-    }
+def _fold(problem: RateProblem, fold: FoldFit, shift_mm: FloatArray) -> FoldResult:
+    """One fold: shifts left out, the better of its searches, and the steps of each."""
+    searches = [
+        Search(
+            start=number,
+            fss_train=search.score,
+            fss_test=problem.score(search.parameters, fold.testing),
+            runs=search.n_evaluations,
+            history=tuple(
+                SearchStep(iteration=iteration, fss=step.score, parameters=_named(step.parameters))
+                for iteration, step in enumerate(search.history)
+            ),
+        )
+        for number, search in enumerate(fold.fit.attempts, start=1)
+    ]
+    return FoldResult(
+        fold=fold.fold + 1,
+        start=fold.fit.start + 1,
+        testing_shift_mm=shift_mm[fold.testing],
+        fss_start=np.array([search.history[0].score for search in fold.fit.attempts]),
+        fss_train=fold.score_train,
+        fss_test=fold.score_test,
+        parameters=_named(fold.fit.parameters),
+        climbs=tuple(searches),
+    )
 
 
 def _named(parameters: FloatArray) -> dict[str, float]:
-    return {name: float(value) for name, value in zip(PARAMETER_NAMES, parameters, strict=True)}
+    return dict(zip(PARAMETER_NAMES, parameters.tolist(), strict=True))
 
 
-def _modulation(shift_mm: FloatArray, rate_hz: FloatArray) -> dict[str, float | None]:
-    """Largest rate against the smallest with the bar's flat face over the receptor (Eq. 11)."""
+def _modulation(shift_mm: FloatArray, rate_hz: FloatArray) -> Modulation:
     under_flat = np.abs(shift_mm) < protocol.BAR_WIDTH.value / 2 - protocol.BAR_FILLET.value
     largest, smallest = float(rate_hz.max()), float(rate_hz[under_flat].min())
-    return {
-        "maximum_hz": largest,
-        "minimum_hz": smallest,
-        "difference_hz": float(modulation_difference(largest, smallest)),
-        "index": float(modulation_index(largest, smallest)) if largest > 0.0 else None,
-    }
+    return Modulation(
+        maximum_hz=largest,
+        minimum_hz=smallest,
+        difference_hz=float(modulation_difference(largest, smallest)),
+        index=float(modulation_index(largest, smallest)) if largest > 0.0 else np.nan,
+    )

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fingerpad.core.results import Number, TruthVector, Vector, result_class
 from fingerpad.data import cylinder_deflection
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.geometry.indenters import Cylinder, Indenter, Line
@@ -18,7 +17,95 @@ SHOWN_MM = 10.0
 """Distance from the indenter up to which the profile is kept; the observations end at 9.25 mm. [mm]"""
 
 
-def touches(conditions: Conditions) -> dict[tuple[str, str], Touch]:
+@result_class
+class IndenterDeflection:
+    """Deflection of the skin under one indenter.
+
+    Parameters
+    ----------
+    distance_mm, deflection_mm : array (n_nodes,)
+        Profile along the midline: distance from the indenter's axis, proximal positive. [mm]
+    force_mn, peak_force_mn : float
+        Force at the end of the hold, and the largest force. [mN]
+    penetration_mm : float
+        Largest overlap of skin and indenter. [mm]
+    """
+
+    distance_mm: Vector
+    deflection_mm: Vector
+    force_mn: Number
+    peak_force_mn: Number
+    penetration_mm: Number
+
+
+@result_class
+class CylinderDeflection(IndenterDeflection):
+    """Deflection of the skin under the cylinder, compared with the observations.
+
+    Parameters
+    ----------
+    r2 : float
+        Coefficient of determination, see `deflection_r2`.
+    r2_mirrored : float
+        The same with proximal and distal exchanged.
+    """
+
+    r2: Number
+    r2_mirrored: Number
+
+
+@result_class
+class TrialDeflection:
+    """Deflections with the tissues of one trial.
+
+    Parameters
+    ----------
+    line : IndenterDeflection
+        Under the line load.
+    cylinder : CylinderDeflection
+        Under the cylinder.
+    """
+
+    line: IndenterDeflection
+    cylinder: CylinderDeflection
+
+
+@result_class
+class ObservedDeflection:
+    """Observed deflection under the cylinder.
+
+    Parameters
+    ----------
+    distance_mm, deflection_mm : array (n_points,)
+        [mm]
+    is_artefact : bool array (n_points,)
+        Points that R² leaves out.
+    """
+
+    distance_mm: Vector
+    deflection_mm: Vector
+    is_artefact: TruthVector
+
+
+@result_class
+class SkinDeflectionResult:
+    """Result of level 1.
+
+    Parameters
+    ----------
+    trial1, trial2, trial3 : TrialDeflection
+        By the tissues of the paper's trials.
+    observed : ObservedDeflection
+        What they are compared with.
+    """
+
+    trial1: TrialDeflection
+    trial2: TrialDeflection
+    trial3: TrialDeflection
+    observed: ObservedDeflection
+
+
+def deflection_touches(conditions: Conditions) -> dict[tuple[str, str], Touch]:
     """Six touches: three trials, two indenters."""
     return {
         (trial, name): conditions.touch(
@@ -54,26 +141,48 @@ def deflection_r2(profile: SurfaceProfile, proximal_positive: bool = True) -> fl
     return coefficient_of_determination(observed.deflection_mm[kept], profile.at(distance))
 
 
-def result(responses: dict[tuple[str, str], SkinResponse]) -> dict[str, Any]:
-    """Profiles, forces and R², with distances in the direction of the observations."""
-    found: dict[str, Any] = {trial: {} for trial in TRIALS}
-    for (trial, name), skin in responses.items():
-        profile = skin.surface_profile()
-        shown = np.flatnonzero(np.abs(profile.distance_mm) <= SHOWN_MM)[::-1]
-        found[trial][name] = {
-            "distance_mm": -profile.distance_mm[shown],
-            "deflection_mm": profile.deflection_mm[shown],
-            "force_mn": skin.force_mn[-1],
-            "peak_force_mn": skin.force_mn.max(),
-            "penetration_mm": skin.penetration_mm,
-        }
-        if name == "cylinder":
-            found[trial][name]["r2"] = deflection_r2(profile)
-            found[trial][name]["r2_mirrored"] = deflection_r2(profile, proximal_positive=False)
+def deflection_result(responses: dict[tuple[str, str], SkinResponse]) -> SkinDeflectionResult:
+    """Profiles, forces and R², with distances in the direction of the observations.
+
+    Parameters
+    ----------
+    responses : dict of (trial, indenter) to SkinResponse
+        Of all `deflection_touches`.
+    """
     observed = cylinder_deflection()
-    found["observed"] = {
-        "distance_mm": observed.distance_mm,
-        "deflection_mm": observed.deflection_mm,
-        "is_artefact": observed.is_artefact,
+    trials = {
+        trial: TrialDeflection(
+            line=_under_indenter(responses[trial, "line"]),
+            cylinder=_under_cylinder(responses[trial, "cylinder"]),
+        )
+        for trial in TRIALS
     }
-    return found
+    return SkinDeflectionResult(
+        **trials,
+        observed=ObservedDeflection(
+            distance_mm=observed.distance_mm,
+            deflection_mm=observed.deflection_mm,
+            is_artefact=observed.is_artefact,
+        ),
+    )
+
+
+def _under_indenter(skin: SkinResponse) -> IndenterDeflection:
+    profile = skin.surface_profile()
+    shown = np.flatnonzero(np.abs(profile.distance_mm) <= SHOWN_MM)[::-1]
+    return IndenterDeflection(
+        distance_mm=-profile.distance_mm[shown],
+        deflection_mm=profile.deflection_mm[shown],
+        force_mn=float(skin.force_mn[-1]),
+        peak_force_mn=float(skin.force_mn.max()),
+        penetration_mm=skin.penetration_mm,
+    )
+
+
+def _under_cylinder(skin: SkinResponse) -> CylinderDeflection:
+    profile = skin.surface_profile()
+    return CylinderDeflection(
+        **vars(_under_indenter(skin)),
+        r2=deflection_r2(profile),
+        r2_mirrored=deflection_r2(profile, proximal_positive=False),
+    )
