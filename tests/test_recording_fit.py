@@ -31,10 +31,11 @@ from fingerpad.experiments.fit.posterior import PhaseBands, RateBand, RatePoster
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.manifest import sha256
 from fingerpad.experiments.recording_files import read_recordings
-from fingerpad.experiments.stimuli import INDENTERS, ShiftedBar, TactileStimulus
+from fingerpad.experiments.stimuli import ShiftedBar, TactileStimulus
 from fingerpad.geometry.edged_indenters import Gap
 from fingerpad.geometry.indenters import Bar, Line, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad.geometry.names import INDENTERS
 from fingerpad.inference.afferent_methods import OFFSETS_MM
 from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable

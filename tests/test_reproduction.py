@@ -22,7 +22,7 @@ from fingerpad.core.compilation import NOTICE
 from fingerpad.core.results import read_results
 from fingerpad.data import all_published
 from fingerpad.experiments.discrimination.task_files import read_task
-from fingerpad.experiments.discrimination.task_stimuli import touches
+from fingerpad.experiments.discrimination.task_stimuli import task_touches
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.report.reproduction import reproduction_page
@@ -464,7 +464,9 @@ def test_the_papers_question_asked_as_ones_own_has_the_papers_hit_rates(first, a
 def test_a_question_killed_at_any_moment_goes_on_and_ends_with_the_same_bits(first, asked, tmp_path):
     folder = prepared(first, tmp_path)
     store = folder / STORE_FOLDER
-    spheres = [Store(store).path(touch) for touch in touches(read_task(folder / "question.yaml")).values()]
+    spheres = [
+        Store(store).path(touch) for touch in task_touches(read_task(folder / "question.yaml")).values()
+    ]
     for path in spheres[:3]:
         path.unlink()
     run = discriminate(folder, "--jobs", "2", start_new_session=True)

@@ -18,9 +18,9 @@ from fingerpad.experiments.discrimination.task_files import example_tasks, parse
 from fingerpad.experiments.discrimination.task_population import task_afferent, task_population
 from fingerpad.experiments.discrimination.task_stimuli import task_stimuli, task_touches
 from fingerpad.experiments.gerling2014.sphere_discrimination import touches as sphere_touches
-from fingerpad.experiments.stimuli import INDENTERS
 from fingerpad.geometry.indenters import Bar, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad.geometry.names import INDENTERS
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.skin.nail_edge import NailEdge

@@ -8,7 +8,7 @@ import secrets
 from pathlib import Path
 from typing import Any
 
-from fingerpad.core.errors import StoreError
+from fingerpad.core.errors import InputError, StoreError
 
 
 def write_atomically(path: Path, content: bytes) -> None:
@@ -56,6 +56,18 @@ def write_atomically(path: Path, content: bytes) -> None:
     except OSError as error:
         raise StoreError(
             f"{path} cannot be written ({error.strerror or error}): free it or choose another."
+        ) from error
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file in UTF-8, else raise `InputError`."""
+    try:
+        return Path(path).read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(f"{path} must be a file that can be read: {error.strerror}.") from error
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path} must be text in UTF-8: byte {error.start + 1} is not; save it as UTF-8."
         ) from error
 
 

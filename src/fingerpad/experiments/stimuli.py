@@ -9,31 +9,15 @@ from typing import Any, Protocol
 
 from fingerpad.core.checks import finite, one_of
 from fingerpad.core.errors import InputError
+from fingerpad.core.files import read_text
 from fingerpad.core.plain_yaml import read_yaml
-from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
-from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Plate, Sphere
-from fingerpad.geometry.indenters import Line as Wire
+from fingerpad.geometry.indenters import Bar, Indenter
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Stimulus
-from fingerpad.inference.tables import Line, read_csv, read_text
+from fingerpad.geometry.names import INDENTERS, MOTION_UNITS, SIZE_UNITS
+from fingerpad.inference.tables import Line, read_csv
 
-INDENTERS: dict[str, type[Indenter]] = {
-    "sphere": Sphere,
-    "cylinder": Cylinder,
-    "bar": Bar,
-    "line": Wire,
-    "punch": FlatPunch,
-    "plate": Plate,
-    "edge": Edge,
-    "gap": Gap,
-    "grating": Grating,
-}
-"""Indenters by the names that the command line gives them."""
-
-LENGTHS = ("diameter_mm", "width_mm", "gap_mm", "ridge_mm", "groove_mm", "fillet_mm", "lip_mm")
-SIZES = {"curvature_per_m": "1/m"} | dict.fromkeys(LENGTHS, "mm")
-MOTION = {"depth_mm": "mm", "force_mn": "mN", "ramp_ms": "ms", "hold_ms": "ms"}
 PLACE = {"x_mm": "mm", "z_mm": "mm", "tilt_deg": "degrees", "spin_deg": "degrees"}
-COLUMNS = ("stimulus", "indenter", *SIZES, *MOTION, *PLACE)
+COLUMNS = ("stimulus", "indenter", *SIZE_UNITS, *MOTION_UNITS, *PLACE)
 """Columns of a file of stimuli; only the first two are needed."""
 
 
@@ -183,14 +167,14 @@ def _stimulus(line: Line) -> TactileStimulus:
     with line.placed():
         indenter = INDENTERS[one_of("indenter", kind, tuple(INDENTERS))]
     sizes = tuple(size.name for size in fields(indenter))  # type: ignore[arg-type]
-    line.refuse_others(("stimulus", "indenter", *sizes, *MOTION, *PLACE), kind)
+    line.refuse_others(("stimulus", "indenter", *sizes, *MOTION_UNITS, *PLACE), kind)
     if line.has("depth_mm") and line.has("force_mn"):
         raise InputError(f"{line.place}: depth_mm and force_mn exclude each other: leave one empty.")
     motion = ForceRampAndHold if line.has("force_mn") else RampAndHold
     with line.placed():
         return TactileStimulus(
-            indenter(**_given(line, {name: SIZES[name] for name in sizes})),
-            motion(**_given(line, MOTION)),
+            indenter(**_given(line, {name: SIZE_UNITS[name] for name in sizes})),
+            motion(**_given(line, MOTION_UNITS)),
             **_given(line, PLACE),
         )
 

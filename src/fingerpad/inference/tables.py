@@ -12,6 +12,7 @@ from typing import Any
 
 from fingerpad.core.checks import finite
 from fingerpad.core.errors import InputError
+from fingerpad.core.files import read_text
 
 Check = Callable[[str, Any, str], float]
 
@@ -69,18 +70,6 @@ class Line:
             yield
         except InputError as error:
             raise InputError(f"{self.place}: {error}") from error
-
-
-def read_text(path: Path) -> str:
-    """Text of a file in UTF-8, else raise `InputError`."""
-    try:
-        return Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"{path} must be a file that can be read: {error.strerror}.") from error
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path} must be text in UTF-8: byte {error.start + 1} is not; save it as UTF-8."
-        ) from error
 
 
 def read_csv(path: Path, known: Sequence[str]) -> list[Line]:

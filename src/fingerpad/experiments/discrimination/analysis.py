@@ -37,10 +37,10 @@ from fingerpad.experiments.discrimination.task import (
 )
 from fingerpad.experiments.discrimination.task_stimuli import TaskStimulus, stimulus_index
 from fingerpad.neuron.population import Population
-from fingerpad.psychophysics import Presentation
 from fingerpad.psychophysics.counts import binomial_interval
 from fingerpad.psychophysics.discrimination import Experiment
 from fingerpad.psychophysics.encoding import neighbours_of
+from fingerpad.psychophysics.ideal_observer import Presentation
 
 Encoded = tuple[FloatArray, np.ndarray]
 """A measure of all receptors under every stimulus, and the pairs of neighbours that take part."""

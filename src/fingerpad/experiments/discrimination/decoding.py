@@ -12,7 +12,6 @@ from fingerpad.core.random_streams import IntArray, Purpose, normals
 from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import HitRates, ResponseMap
 from fingerpad.experiments.discrimination.task import CurveSettings
-from fingerpad.psychophysics import bootstrap, fit_psychometric, posterior
 from fingerpad.psychophysics.discrimination import (
     Experiment,
     discriminate_euclidean,
@@ -21,6 +20,8 @@ from fingerpad.psychophysics.discrimination import (
 from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, answering_neighbours, distance
 from fingerpad.psychophysics.noise_fit import NOISE_DRAWS, NoiseFit, expected_hit_rates, fit_noise_sigma
 from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, noisy_responses, session_trials
+from fingerpad.psychophysics.psychometric import fit_psychometric
+from fingerpad.psychophysics.uncertainty import bootstrap, posterior
 
 SESSION = 1
 """Session of the random numbers: that of the reproduction's spheres at 0.0 mm."""

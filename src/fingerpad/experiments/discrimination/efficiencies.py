@@ -8,10 +8,10 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Vector, result_class
-from fingerpad.psychophysics import Presentation, efficiency, multiplied_responses, present
 from fingerpad.psychophysics.encoding import distance, gradient_sum
-from fingerpad.psychophysics.ideal_observer import Statistic
+from fingerpad.psychophysics.ideal_observer import Presentation, Statistic, efficiency, present
 from fingerpad.psychophysics.noisy_responses import session_trials
+from fingerpad.psychophysics.response_models import multiplied_responses
 
 SESSION = 2
 """Session of the random numbers: not that of the hit rates."""

@@ -28,8 +28,8 @@ from fingerpad.experiments.discrimination.task_types import (
     expected,
     one_of,
 )
-from fingerpad.experiments.stimuli import INDENTERS, MOTION, SIZES
 from fingerpad.geometry.grading import RESOLUTIONS
+from fingerpad.geometry.names import INDENTERS, MOTION_UNITS, SIZE_UNITS
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.psychophysics.discrimination import WAVERING
 from fingerpad.psychophysics.functions import SIGMOIDS
@@ -54,7 +54,7 @@ SHAPES = ("rectangle", "ellipse", "polygon", PAD)
 LISTED, VARIED, NAMED, SPELLED = "listed", "varied", "named", "spelled"
 """Forms that a part of a task may have; pydantic puts them into the places of errors."""
 
-UNITS = SIZES | MOTION | {"spin_deg": "degrees", "tilt_deg": "degrees", "friction": ""}
+UNITS = SIZE_UNITS | MOTION_UNITS | {"spin_deg": "degrees", "tilt_deg": "degrees", "friction": ""}
 """What can be varied from stimulus to stimulus, and in which unit."""
 
 _REPETITIONS = int(psychophysics.REPETITIONS.value)

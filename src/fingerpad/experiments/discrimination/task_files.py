@@ -12,6 +12,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from fingerpad.core.errors import InputError
+from fingerpad.core.files import read_text
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.experiments.discrimination.task import (
     DEFAULT,
@@ -22,7 +23,6 @@ from fingerpad.experiments.discrimination.task import (
     DiscriminationTask,
 )
 from fingerpad.experiments.manifest import sha256
-from fingerpad.inference.tables import read_text
 
 SUFFIX = ".yaml"
 _FORMS = (LISTED, VARIED, NAMED, SPELLED)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.files import read_text
 from fingerpad.core.layouts import PATTERNS, Layout, hexagonal, jittered, poisson_disc, rectangular, uniform
 from fingerpad.core.regions import Ellipse, Polygon, Rectangle, Region
 from fingerpad.core.signals import STORED_ENERGY
@@ -23,7 +24,6 @@ from fingerpad.experiments.discrimination.task import (
     PopulationSettings,
     RegionSettings,
 )
-from fingerpad.inference.tables import read_text
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.population import Population, sensitivities
 from fingerpad.skin.nail_edge import NailEdge

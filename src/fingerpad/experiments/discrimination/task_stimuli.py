@@ -13,11 +13,11 @@ from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.discrimination.task import DiscriminationTask, StimulusSettings, VariedStimuli
 from fingerpad.experiments.discrimination.task_files import error_sentence
-from fingerpad.experiments.stimuli import INDENTERS
 from fingerpad.geometry.grading import Grading, covering
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Indenter, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Stimulus
+from fingerpad.geometry.names import INDENTERS
 from fingerpad.skin.indentation import Touch, touch_of
 
 _NEAR_MM = max(protocol.SPHERE_POSITIONS.value)
