@@ -1,7 +1,7 @@
 """Published parameters and reference observations, each with unit, source and status; no algorithm.
 
-`fingertip`, `tissues`, `neuron`, `protocol` and `psychophysics` are what the chain starts from, `paper` is
-what its results are compared with.
+`fingertip`, `tissues`, `neuron`, `protocol` and `psychophysics` are inputs of the model; `paper` contains the
+results for comparison.
 """
 
 from types import ModuleType

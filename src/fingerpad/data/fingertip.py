@@ -1,4 +1,4 @@
-"""The fingertip as geometry: x proximal -> distal, y dorsal positive, z lateral, all in mm.
+"""Geometry of the fingertip: x proximal -> distal, y dorsal positive, z lateral, all in mm.
 
 The outline, the bone and the nail were read from the model that the authors' laboratory made public
 later; the layer thicknesses are printed in the paper. The volar skin lies at negative y.

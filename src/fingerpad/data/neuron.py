@@ -1,7 +1,7 @@
 """Transduction and membrane of one SAI afferent: the two start points of the paper's fit.
 
 The units printed for the gains contradict each other. With the membrane as printed, the static gain gives
-rates like the observed ones if strain energy density is counted in kPa, so both gains are read that way.
+rates of the observed order if strain energy density is in kPa; both gains therefore refer to kPa.
 """
 
 from fingerpad.data.published import Published

@@ -1,4 +1,4 @@
-"""What was observed in skin, nerve and people: one loader per experiment."""
+"""Observations of skin, afferents and participants: one loader per experiment."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class BarObservations:
     dynamic_rate_hz, static_rate_hz : array (n_shifts,)
         Observed rates during the ramp and the hold. [spikes/s]
     source, status : str
-        Who published them, and how far the numbers can be trusted.
+        Publication, and status of the numbers (see `STATUSES`).
     """
 
     shift_mm: FloatArray
@@ -43,9 +43,9 @@ class DeflectionObservations:
     deflection_mm : array (n_points,)
         Towards the bone. [mm]
     is_artefact : bool array (n_points,)
-        Points that digitising left and the skin did not have; leave them out of comparisons.
+        Artefacts of the digitisation; leave them out of comparisons.
     source, status : str
-        Who published them, and how far the numbers can be trusted.
+        Publication, and status of the numbers (see `STATUSES`).
     """
 
     distance_mm: FloatArray
@@ -57,7 +57,7 @@ class DeflectionObservations:
 
 @dataclass(frozen=True)
 class HitRateObservations:
-    """How often people tell spheres from a standard.
+    """Hit rates of participants who discriminate spheres from a standard.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class HitRateObservations:
     hit_rate : array (n_comparisons,)
         Fraction of correct trials. [0-1]
     source, status : str
-        Who published them, and how far the numbers can be trusted.
+        Publication, and status of the numbers (see `STATUSES`).
     """
 
     standard_per_m: float
@@ -79,7 +79,7 @@ class HitRateObservations:
 
 
 def bar_firing_rates() -> BarObservations:
-    """Rates under a 3.0 mm bar pressed in by 1.0 mm at 36 positions (Phillips & Johnson 1981).
+    """Rates under a 3.0 mm bar at a depth of 1.0 mm and 36 positions (Phillips & Johnson 1981).
 
     Returns
     -------
@@ -103,7 +103,7 @@ def bar_firing_rates() -> BarObservations:
 
 
 def cylinder_deflection() -> DeflectionObservations:
-    """Deflection under a 3.17 mm cylinder pressed in by 1.0 mm (Dandekar 1995, Srinivasan's laboratory).
+    """Deflection under a 3.17 mm cylinder at a depth of 1.0 mm (Dandekar 1995, Srinivasan's laboratory).
 
     The observations under the 50 µm line, which the paper also uses, are not available to us.
 
@@ -131,7 +131,7 @@ def cylinder_deflection() -> DeflectionObservations:
 
 
 def goodwin_hit_rates() -> HitRateObservations:
-    """Hit rates of people who compare spheres with a standard of 287 /m (Goodwin et al. 1991).
+    """Hit rates of participants who compare spheres with a standard of 287 /m (Goodwin et al. 1991).
 
     Returns
     -------

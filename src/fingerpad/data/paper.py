@@ -1,4 +1,4 @@
-"""What the paper reports: numbers to compare results with, never to compute them from."""
+"""Results that the paper reports, for comparison only; no computation uses them."""
 
 from fingerpad.data.published import Published
 

@@ -1,4 +1,4 @@
-"""How the skin is touched and when spikes are counted."""
+"""Protocol of the experiments: stimuli, motion and time windows."""
 
 from fingerpad.data.published import Published
 

@@ -1,4 +1,4 @@
-"""Spheres to tell apart, who observes them, and how often people succeed."""
+"""Spheres of the discrimination task, the model observer, the population, and observed hit rates."""
 
 from fingerpad.data.published import Published
 

@@ -1,4 +1,4 @@
-"""One published number: value, unit, source and how far it can be trusted."""
+"""One published number: value, unit, source and status."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ Value = TypeVar("Value", float, tuple[float, ...])
 
 @dataclass(frozen=True)
 class Published(Generic[Value]):
-    """A number, or a row of numbers, with its unit and its story.
+    """A number, or a row of numbers, with unit, source and status.
 
     Parameters
     ----------
     name : str
-        What it is, in words; unique within the package.
+        Description; unique within the package.
     value : float or tuple of float
         The number(s), in `unit`.
     unit : str
         Unit of `value`; "1" for pure numbers.
     source : str
-        Where the value comes from.
+        Source of the value.
     status : {"paper", "read", "recalled", "assumed"}
-        How far it can be trusted; the four words are explained in `STATUSES`.
+        Reliability of the value; the four words are defined in `STATUSES`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Reads the package's own tables of observations: comment lines first, then columns of numbers."""
+"""Tables of observations in the package: comment lines first, then columns of numbers."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from fingerpad.data.published import STATUSES
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of numbers with their story.
+    """Columns of numbers with content, source and status.
 
     Parameters
     ----------
     columns : dict of str to array (n_rows,)
         Values by column name; the name carries the unit.
     content, source, status : str
-        What was observed, who published it, and how far the numbers can be trusted.
+        Observed quantity, publication, and status of the numbers.
     """
 
     columns: dict[str, FloatArray]
@@ -57,7 +57,7 @@ def parsed_table(name: str, text: str) -> Table:
     Raises
     ------
     InputError
-        If the story is incomplete, a row has too few or too many entries, or an entry is not a number.
+        If a comment line is missing, a row has too few or too many entries, or an entry is not a number.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """Stiffness and relaxation of the tissues: moduli in kPa, times in s as published.
 
-The paper's Tables 1 and 2 are lost in every copy at hand. The hyperelastic coefficients of its
-Trials 2 and 3 (polynomial N = 2) are therefore not here; what stands in for them says so.
+The paper's Tables 1 and 2 are missing from every copy at hand. The hyperelastic coefficients of its
+Trials 2 and 3 (polynomial N = 2) are therefore not here; their substitutes are marked as such.
 """
 
 from fingerpad.data.published import Published
