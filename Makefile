@@ -1,5 +1,7 @@
 # make reproduce     run the studies of the paper      (ARGS="..." goes to `fingerpad reproduce`)
-# make test          check style, types, imports and behaviour; stops at the first failure
+# make test          check style, types, imports, behaviour and the wheel; stops at the first failure
+# make wheel         build the wheel, install it into an empty environment and run the README's ten lines there
+# make results       reproduce at standard resolution, and write the numbers and the picture of README and docs
 # make verification  run every verification case, slow ones too, and write docs/verification.md
 # make benchmarks    run benchmarks, some by ARGS="sphere growth", and write benchmarks/README.md (no part of the tests)
 # make clean         remove what these have made, the environment included
@@ -16,7 +18,7 @@ bin := .venv/bin
 export PYTHONNOUSERSITE := 1
 unexport PYTHONPATH
 
-.PHONY: reproduce test verification benchmarks clean
+.PHONY: reproduce test wheel results verification benchmarks clean
 .DEFAULT_GOAL := test
 
 reproduce: .venv/installed
@@ -28,6 +30,14 @@ test: .venv/installed-for-tests
 	$(bin)/mypy
 	$(bin)/lint-imports
 	$(bin)/pytest $(PYTEST_ARGS)
+	$(bin)/python -m tests.installed_wheel
+
+wheel: .venv/installed-for-tests
+	$(bin)/python -m tests.installed_wheel
+
+results: .venv/installed
+	$(bin)/fingerpad reproduce --extended $(ARGS)
+	$(bin)/python -m studies results
 
 verification: .venv/installed-for-tests
 	$(bin)/python -m tests.verification $(ARGS)
@@ -51,4 +61,4 @@ $(bin)/python:
 
 clean:
 	rm -rf .venv build dist reproduction .mypy_cache .ruff_cache .hypothesis .import_linter_cache
-	find src tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+	find src tests benchmarks studies -name __pycache__ -type d -prune -exec rm -rf {} +
