@@ -1,15 +1,15 @@
-"""Beyond the paper: how much of what a population's responses tell each code makes use of."""
+"""Beyond the paper: the efficiency of each code, relative to the ideal observer of the same responses."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.results import Number, result_class
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data import protocol
 from fingerpad.psychophysics import (
@@ -24,22 +24,54 @@ from fingerpad.psychophysics import (
 from fingerpad.psychophysics.encoding import distance, gradient_sum
 
 PAIR_PER_M = (287.0, 316.0)
-"""Two spheres near the threshold of people, at which codes are measured."""
+"""Two spheres near the threshold of people, at which efficiency is measured. [1/m]"""
 
 TRIALS = 4000
 """Presentations of each sphere to the observers whose efficiency is measured."""
 
 SESSION, REFERENCE_SESSION = 11, 12
-"""Of the random numbers; other studies have others."""
+"""Sessions of the random numbers; other studies have others."""
 
 
-def efficiencies(
+@result_class
+class CodeEfficiency:
+    """Efficiency of a code for one measure and kind of noise.
+
+    Parameters
+    ----------
+    code, measure, noise : str
+        Which.
+    receptors : int
+        Receptors that take part.
+    proportion_correct, ideal_proportion_correct : float
+        Of the code and of the ideal observer. [0-1]
+    d_prime, d_prime_error, ideal_d_prime, ideal_d_prime_error : float
+        Sensitivities and standard errors; inf where no trial is wrong.
+    efficiency, efficiency_error : float
+        Squared ratio of the sensitivities; NaN where the ideal observer is always right, or only guesses.
+    """
+
+    code: str
+    measure: str
+    noise: str
+    receptors: int
+    proportion_correct: float
+    d_prime: Number
+    d_prime_error: Number
+    ideal_proportion_correct: float
+    ideal_d_prime: Number
+    ideal_d_prime_error: Number
+    efficiency: Number
+    efficiency_error: Number
+
+
+def code_efficiencies(
     curvature_per_m: FloatArray,
     tables: Mapping[str, FloatArray],
     neighbours: np.ndarray,
     noise_sigma: float,
     seed: int,
-) -> list[dict[str, Any]]:
+) -> tuple[CodeEfficiency, ...]:
     """Measure codes against the ideal observer of the same responses, on two spheres near people's threshold.
 
     Parameters
@@ -57,12 +89,12 @@ def efficiencies(
 
     Returns
     -------
-    list of dict
+    tuple of CodeEfficiency
         One row per code, measure and kind of noise. A receptor that is silent under one of the spheres has no
         noise that multiplies, and would tell them apart for certain: it is left out, for all observers.
     """
     rows = [int(np.flatnonzero(curvature_per_m == curvature)[0]) for curvature in PAIR_PER_M]
-    found = []
+    found: list[CodeEfficiency] = []
     for measure, table in tables.items():
         standard, comparison = table[rows]
         # A latency of NaN, as of a silent receptor, is not above 0 either.
@@ -76,7 +108,7 @@ def efficiencies(
     seconds = (window_ms[1] - window_ms[0]) / MS_PER_S
     counts = [PoissonResponses(tables["static"][row] * seconds) for row in rows]
     everyone = np.ones(tables["static"].shape[1], dtype=bool)
-    return found + _observed("static", "Poisson", (counts[0], counts[1]), everyone, neighbours, seed)
+    return (*found, *_observed("static", "Poisson", (counts[0], counts[1]), everyone, neighbours, seed))
 
 
 def _observed(
@@ -86,7 +118,7 @@ def _observed(
     heard: np.ndarray,
     neighbours: np.ndarray,
     seed: int,
-) -> list[dict[str, Any]]:
+) -> list[CodeEfficiency]:
     """Measure both codes on responses with one kind of noise."""
     standard, comparison = models
     shown = present(standard, comparison, seed, TRIALS, SESSION)
@@ -97,14 +129,7 @@ def _observed(
         "Euclidean Distance": lambda responses: distance(responses, reference),
     }
     return [
-        {
-            "code": code,
-            "measure": measure,
-            "noise": noise,
-            "receptors": int(heard.sum()),
-            **_judged(shown, of),
-        }
-        for code, of in codes.items()
+        _judged(code, measure, noise, int(heard.sum()), shown, statistic) for code, statistic in codes.items()
     ]
 
 
@@ -115,20 +140,26 @@ def _placed(responses: FloatArray, heard: np.ndarray) -> FloatArray:
     return everyone
 
 
-def _judged(shown: Presentation, statistic: Statistic) -> dict[str, float | None]:
-    """D' of a code and of the ideal observer; no efficiency where that one never fails, or only guesses."""
+def _judged(
+    code: str, measure: str, noise: str, receptors: int, shown: Presentation, statistic: Statistic
+) -> CodeEfficiency:
+    """Compare a code with the ideal observer; no efficiency where that one never fails, or only guesses."""
     judged, ideal = shown.of(statistic), shown.ideal()
     try:
         share, error = efficiency(judged, ideal)
     except InputError:
         share, error = math.nan, math.nan
-    return {
-        "proportion_correct": judged.proportion_correct,
-        "d_prime": judged.d_prime,
-        "d_prime_error": judged.d_prime_error,
-        "ideal_proportion_correct": ideal.proportion_correct,
-        "ideal_d_prime": ideal.d_prime,
-        "ideal_d_prime_error": ideal.d_prime_error,
-        "efficiency": share,
-        "efficiency_error": error,
-    }
+    return CodeEfficiency(
+        code=code,
+        measure=measure,
+        noise=noise,
+        receptors=receptors,
+        proportion_correct=judged.proportion_correct,
+        d_prime=judged.d_prime,
+        d_prime_error=judged.d_prime_error,
+        ideal_proportion_correct=ideal.proportion_correct,
+        ideal_d_prime=ideal.d_prime,
+        ideal_d_prime_error=ideal.d_prime_error,
+        efficiency=share,
+        efficiency_error=error,
+    )

@@ -123,7 +123,7 @@ def touches(
         pressed["bar", 0.0] = conditions.touch(
             Bar(), RECEPTOR_X_MM, _wide_bar_grading(conditions), tilt_deg=conditions.skin_tilt_deg
         )
-    spheres = sphere_discrimination.touches(conditions)
+    spheres = sphere_discrimination.discrimination_touches(conditions)
     position = sphere_discrimination.POSITIONS_MM[0]
     return pressed | {("sphere", curvature): spheres[position, curvature] for curvature in SPHERES}
 

@@ -93,7 +93,7 @@ class Level:
 
     def balls(self) -> dict[Sphere, Touch]:
         """Touches of the spheres, by position and curvature."""
-        touches = sphere_discrimination.touches(Conditions(self.resolution))
+        touches = sphere_discrimination.discrimination_touches(Conditions(self.resolution))
         return {sphere: _at_factor(touches[sphere], self.factor) for sphere in self.spheres}
 
 
@@ -198,7 +198,7 @@ def _examples(conditions: Conditions) -> dict[str, Touch]:
     """Return the bar at its highest peak and the standard sphere."""
     return {
         "bar": single_unit.bar_touches(conditions)[PEAK_SHIFT],
-        "sphere": sphere_discrimination.touches(conditions)[CHOSEN_SPHERES[0]],
+        "sphere": sphere_discrimination.discrimination_touches(conditions)[CHOSEN_SPHERES[0]],
     }
 
 

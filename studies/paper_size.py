@@ -87,7 +87,8 @@ class Touches:
     def of(cls, resolution: str) -> Touches:
         """Touches of a named resolution, half of the finger."""
         conditions = Conditions(resolution)
-        bars, spheres = single_unit.bar_touches(conditions), sphere_discrimination.touches(conditions)
+        bars = single_unit.bar_touches(conditions)
+        spheres = sphere_discrimination.discrimination_touches(conditions)
         return cls(
             {trial: half(touch) for trial, touch in skin_deflection.deflection_touches(conditions).items()},
             {shift: half(bars[shift]) for shift in CHOSEN_SHIFTS},

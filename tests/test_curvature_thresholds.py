@@ -1,5 +1,7 @@
 """Curvature thresholds and efficiencies: on skins with a formula, and interpolation against a press."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,6 @@ from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import curvature_thresholds as study
-from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.experiments.gerling2014.sphere_discrimination import CURVATURES
 from fingerpad.geometry.grading import Grading
 from fingerpad.neuron.afferent import Afferent
@@ -43,7 +44,7 @@ SKINS = {curvature: BallSkin(curvature) for curvature in (*CURVATURES, *study.PR
 
 @pytest.fixture(scope="module")
 def found():
-    return plain(study.result(SKINS, AFFERENT, 0.06, seed=0))
+    return study.curvature_thresholds(SKINS, AFFERENT, 0.06, seed=0)
 
 
 def proportional(power):
@@ -55,55 +56,55 @@ def proportional(power):
 
 def test_rates_that_scale_with_curvature_obey_webers_law():
     observer = proportional(0.7)
-    fractions = [study.threshold_at(observer, s)["weber_fraction"] for s in (144.0, 287.0, 400.0)]
+    fractions = [study.threshold_at(observer, s).weber_fraction for s in (144.0, 287.0, 400.0)]
     assert fractions == pytest.approx([fractions[0]] * 3, rel=2e-3)
-    steeper = study.threshold_at(proportional(1.4), 287.0)["weber_fraction"]
+    steeper = study.threshold_at(proportional(1.4), 287.0).weber_fraction
     assert steeper == pytest.approx((1.0 + fractions[1]) ** 0.5 - 1.0, rel=2e-3)
 
 
 def test_threshold_is_where_three_quarters_are_told_apart(found):
-    entry = found["populations"][1]["standards"][2]
-    assert entry["standard_per_m"] == 287.0
+    entry = found.populations[1].standards[2]
+    assert entry.standard_per_m == 287.0
     population = Population.grid(rows=6, columns=6, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
     pairs = neighbour_pairs(population.positions_mm, population.pitch_mm)
     table = [
         population.respond(BallSkin(curvature)).static_rate_hz
-        for curvature in (287.0, 287.0 + entry["jnd_per_m"])
+        for curvature in (287.0, 287.0 + entry.jnd_per_m)
     ]
     draws = normals(0, 1, 36, Purpose.RESPONSE, 4000)[0].T
-    noise = found["populations"][1]["noise_sigma"]
+    noise = found.populations[1].noise_sigma
     # The comparison answers here by itself, not by interpolation.
     assert expected_hit_rates(table, pairs, noise, draws)[0] == pytest.approx(0.75, abs=0.01)
-    lower, upper = entry["fitted_interval"]
-    assert lower < entry["weber_fraction"] < upper
+    lower, upper = entry.fitted_interval
+    assert lower < entry.weber_fraction < upper
 
 
 def test_second_population_has_the_noise_that_fits_people(found):
-    population = found["populations"][1]
-    at = found["pressed_per_m"]
+    population = found.populations[1]
+    at = found.pressed_per_m
     layout = Population.grid(rows=6, columns=6, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
     table = [layout.respond(BallSkin(curvature)).static_rate_hz for curvature in (287.0, 296.0, 365.0)]
     pairs = neighbour_pairs(layout.positions_mm, layout.pitch_mm)
     draws = normals(0, 1, 36, Purpose.RESPONSE, 4000)[0].T
-    near, far = expected_hit_rates(table, pairs, population["noise_sigma"], draws)
+    near, far = expected_hit_rates(table, pairs, population.noise_sigma, draws)
     assert abs(near - 0.58) < 0.05
     assert abs(far - 0.95) < 0.05
-    assert population["gradient_sum"][at.index(287.0)] == pytest.approx(gradient_sum(table[0], pairs))
-    assert found["populations"][0]["noise_sigma"] == 0.06
+    assert population.gradient_sum[at.tolist().index(287.0)] == pytest.approx(gradient_sum(table[0], pairs))
+    assert found.populations[0].noise_sigma == 0.06
 
 
 def test_the_ideal_observer_needs_the_least_difference(found):
-    entries = [entry for population in found["populations"] for entry in population["standards"]]
+    entries = [entry for population in found.populations for entry in population.standards]
     assert len(entries) == 8
     for entry in entries:
-        assert entry["ideal_weber_fraction"] < entry["weber_fraction"]
+        assert entry.ideal_weber_fraction < entry.weber_fraction
 
 
 def test_ideal_threshold_is_fishers(found):
     """The ideal observer of two spheres that far apart judges three quarters of single looks correctly."""
     observer = proportional(0.7)
     entry = study.threshold_at(observer, 287.0)
-    step = entry["ideal_weber_fraction"]
+    step = entry.ideal_weber_fraction
     rates = [observer.responses(287.0 * (1.0 + side * step)) for side in (-0.5, 0.5)]
     d = np.sqrt(np.square((rates[1] - rates[0]) / observer.responses(287.0)).sum() * (0.03**-2 + 2.0))
     assert yes_no(float(d)) == pytest.approx(0.75, abs=1e-3)
@@ -113,15 +114,15 @@ def test_a_threshold_out_of_reach_is_said_and_costs_only_its_own_row(found):
     noisy = study.Observer(proportional(0.1).rates, PAIRS, 0.5, DRAWS)
     with pytest.raises(ConvergenceError, match="No sphere up to 700 /m is told from 287 /m in 75%"):
         study.threshold_at(noisy, 287.0)
-    loud = plain(study.result(SKINS, AFFERENT, 3.0, seed=0))
-    reached, missed = (loud["populations"][0][name] for name in ("standards", "without_threshold"))
-    assert [entry["standard_per_m"] for entry in reached] == [144.0, 200.0]
-    assert [entry["standard_per_m"] for entry in missed] == [287.0, 400.0]
-    rows = study.weber_rows(loud)
+    loud = study.curvature_thresholds(SKINS, AFFERENT, 3.0, seed=0)
+    reached, missed = (getattr(loud.populations[0], name) for name in ("standards", "without_threshold"))
+    assert [entry.standard_per_m for entry in reached] == [144.0, 200.0]
+    assert [entry.standard_per_m for entry in missed] == [287.0, 400.0]
+    rows = study.weber_claims(loud)
     assert rows[0].met is False
     assert "No sphere" in rows[0].note
-    assert png(page.draw, loud)[:4] == b"\x89PNG"
-    assert "No sphere" in page.tables(loud)[0].note
+    assert png(page.draw_thresholds, loud)[:4] == b"\x89PNG"
+    assert "No sphere" in page.threshold_tables(loud)[0].note
 
 
 def test_receptors_that_are_silent_under_a_standard_tell_its_threshold_nothing():
@@ -131,32 +132,32 @@ def test_receptors_that_are_silent_under_a_standard_tell_its_threshold_nothing()
     draws = np.hstack([DRAWS, DRAWS[:, :1]])
     observer = study.Observer(study.interpolated(at, with_silent), PAIRS, 0.03, draws)
     found, expected = (study.threshold_at(one, 287.0) for one in (observer, proportional(0.7)))
-    assert found["ideal_weber_fraction"] == pytest.approx(expected["ideal_weber_fraction"], rel=1e-9)
-    assert found["jnd_per_m"] == pytest.approx(expected["jnd_per_m"], rel=1e-9)
+    assert found.ideal_weber_fraction == pytest.approx(expected.ideal_weber_fraction, rel=1e-9)
+    assert found.jnd_per_m == pytest.approx(expected.jnd_per_m, rel=1e-9)
 
 
 def test_noise_that_meets_no_person_is_said_where_thresholds_would_stand():
-    same = plain(study.result(dict.fromkeys(SKINS, BallSkin(287.0)), AFFERENT, 0.06, seed=0))
-    paper, square = same["populations"]
-    assert len(paper["without_threshold"]) == 4
-    assert square["noise_sigma"] is None
-    assert "No noise within" in square["without_threshold"][0]["why_not"]
-    assert png(page.draw, same)[:4] == b"\x89PNG"
-    assert page.caption(same)
+    same = study.curvature_thresholds(dict.fromkeys(SKINS, BallSkin(287.0)), AFFERENT, 0.06, seed=0)
+    paper, square = same.populations
+    assert len(paper.without_threshold) == 4
+    assert np.isnan(square.noise_sigma)
+    assert "No noise within" in square.without_threshold[0].why_not
+    assert png(page.draw_thresholds, same)[:4] == b"\x89PNG"
+    assert page.caption_thresholds(same)
 
 
 def test_weber_rows_are_judged_in_whole_per_cent(found):
-    assert study.weber_rows(None) == []
-    section = {**found, "populations": [dict(found["populations"][0])]}
+    assert study.weber_claims(None) == []
+    population = found.populations[0]
+    threshold = population.standards[0]
     for fractions, met in (([0.0951, 0.144], True), ([0.0949, 0.12], False), ([0.12, 0.146], False)):
-        section["populations"][0]["standards"] = [
-            {"standard_per_m": 287.0, "weber_fraction": fraction} for fraction in fractions
-        ]
-        assert study.weber_rows(section)[0].met is met
+        standards = tuple(replace(threshold, weber_fraction=fraction) for fraction in fractions)
+        changed = replace(found, populations=(replace(population, standards=standards),))
+        assert study.weber_claims(changed)[0].met is met
 
 
 def test_page_shows_and_names_what_was_found(found):
-    figure = page.draw(found)
+    figure = page.draw_thresholds(found)
     fractions, curves = figure.axes
     labels = fractions.get_legend_handles_labels()[1]
     assert set(labels) == {
@@ -168,9 +169,9 @@ def test_page_shows_and_names_what_was_found(found):
     }
     assert "1/m" in fractions.get_xlabel()
     assert "%" in curves.get_xlabel()
-    (thresholds,) = page.tables(found)
+    (thresholds,) = page.threshold_tables(found)
     assert len(thresholds.rows) == 8
-    assert "15 pressed spheres" in page.caption(found)
+    assert "15 pressed spheres" in page.caption_thresholds(found)
 
 
 class Coarse(Conditions):
@@ -182,7 +183,7 @@ class Coarse(Conditions):
 
 def test_spheres_are_pressed_like_the_papers():
     conditions = Coarse("quick")
-    touches = study.touches(conditions)
+    touches = study.threshold_touches(conditions)
     assert tuple(touches) == study.PRESSED_PER_M
     assert min(study.STANDARDS_PER_M) >= min(touches)
     first, last = touches[144.0], touches[540.0]
@@ -200,5 +201,5 @@ def test_interpolation_agrees_with_a_press():
     skins = [touch.solve(1) for touch in study.sphere_touches(Coarse("quick"), curvatures.tolist()).values()]
     table = np.array([POPULATION.respond(skin).static_rate_hz for skin in skins])
     (error,) = study.interpolation_errors(curvatures, table, PAIRS)
-    assert error["curvature_per_m"] == 316.0
-    assert abs(error["error_per_m"]) < 2.5
+    assert error.curvature_per_m == 316.0
+    assert abs(error.error_per_m) < 2.5

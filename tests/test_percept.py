@@ -9,17 +9,25 @@ from scipy.special import ndtri
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.experiments.gerling2014 import discrepancy as percept_reasons
-from fingerpad.experiments.gerling2014 import goodwin
+from fingerpad.experiments.gerling2014 import discrepancy, goodwin
 from fingerpad.experiments.gerling2014.discrepancy import (
-    expected,
-    first_spikes,
-    fitted_noise,
-    reasons,
+    answering_latencies,
+    discrepancy_analysis,
+    expected_of_measure,
     rise_needed,
 )
-from fingerpad.experiments.gerling2014.percept_sessions import SWEPT_NOISE, Measured, Observers, observe
-from fingerpad.experiments.gerling2014.percept_statistics import estimate, extreme, statistics
+from fingerpad.experiments.gerling2014.discrimination_sessions import (
+    SWEPT_NOISE,
+    Measured,
+    Observers,
+    observe,
+)
+from fingerpad.experiments.gerling2014.discrimination_statistics import (
+    Estimate,
+    discrimination_statistics,
+    estimate,
+    extreme,
+)
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.counts import binomial_interval
 from fingerpad.psychophysics.discrimination import (
@@ -79,10 +87,10 @@ def test_the_line_is_straight_in_z_and_goes_through_both_points():
 
 
 def test_what_is_known_of_people_has_intervals_around_the_points():
-    known = goodwin.observed(CURVATURES[1:])
-    assert (known["low"] < known["hit_rate"]).all()
-    assert (known["hit_rate"] < known["high"]).all()
-    assert known["line"].shape == (6,)
+    known = goodwin.goodwin_hit_rates(CURVATURES[1:])
+    assert (known.low < known.hit_rate).all()
+    assert (known.hit_rate < known.high).all()
+    assert known.line.shape == (6,)
 
 
 # Sessions
@@ -164,54 +172,52 @@ def made_up(seed=3, n_sessions=400, spread=0.05):
 
 def test_an_estimate_is_a_mean_with_its_standard_error():
     values = np.array([1.0, 2.0, 4.0, 5.0])
-    assert estimate(values) == {"value": 3.0, "error": pytest.approx(np.std(values, ddof=1) / 2.0)}
+    found = estimate(values)
+    assert (found.value, found.error) == (3.0, pytest.approx(np.std(values, ddof=1) / 2.0))
 
 
 def test_the_largest_of_noisy_changes_is_sought_in_their_means():
     """Ten changes of 0 but one: in any session the largest is noise, over many it is the one."""
     changes = np.random.default_rng(1).standard_normal((400, 10)) + np.eye(10)[3] * 0.5
-    assert extreme(changes, np.argmax)["value"] == pytest.approx(0.5, abs=0.15)
+    assert extreme(changes, np.argmax).value == pytest.approx(0.5, abs=0.15)
     assert changes.max(axis=1).mean() > 1.4
 
 
 def test_statistics_are_those_of_known_hit_rates():
-    found = statistics(made_up(spread=1e-9), CURVATURES, ("static", "dynamic"))
+    found = discrimination_statistics(made_up(spread=1e-9), CURVATURES, ("static", "dynamic"))
 
-    def value(*path):
-        place = found
-        for key in path:
-            place = place[key]
-        return pytest.approx(place["value"], abs=1e-6)
+    def value(found: Estimate):
+        return pytest.approx(found.value, abs=1e-6)
 
-    assert value("misfit", "static") == math.sqrt((0.01**2 + 0.03**2) / 4)
-    assert value("misfit", "dynamic") == math.sqrt((3 * 0.1**2) / 4)
-    assert value("misfit_above_static", "euclidean") == -found["misfit"]["static"]["value"]
-    assert value("shift", "static") == 0.03
-    assert value("shift", "dynamic") == 0.2
-    assert value("shift_above_static", "dynamic") == 0.17
-    assert value("smallest_rise", "static", 0) == 0.07
-    assert value("smallest_rise", "dynamic", 1) == -0.02  # from chance to the first comparison
-    assert value("noise_lowers", "smallest_fall") == 0.01
-    assert value("ten_matrices", "ratio") == 3.0
-    assert value("criterion", "ratio") == 1.5
-    assert value("criterion", "change") == 0.004
-    assert value("unsteadiness", "ratio") == 3.0
-    assert value("targets", 1, "at_goodwin", 0) == 0.59
+    assert value(found.misfit["static"]) == math.sqrt((0.01**2 + 0.03**2) / 4)
+    assert value(found.misfit["dynamic"]) == math.sqrt((3 * 0.1**2) / 4)
+    assert value(found.misfit_above_static["euclidean"]) == -found.misfit["static"].value
+    assert value(found.shift["static"]) == 0.03
+    assert value(found.shift["dynamic"]) == 0.2
+    assert value(found.shift_above_static["dynamic"]) == 0.17
+    assert value(found.smallest_rise["static"][0]) == 0.07
+    assert value(found.smallest_rise["dynamic"][1]) == -0.02  # from chance to the first comparison
+    assert value(found.noise_lowers.smallest_fall) == 0.01
+    assert value(found.ten_matrices.ratio) == 3.0
+    assert value(found.criterion.ratio) == 1.5
+    assert value(found.criterion.change) == 0.004
+    assert value(found.unsteadiness.ratio) == 3.0
+    assert value(found.targets[1].at_goodwin[0]) == 0.59
     line = goodwin.line_in_z(CURVATURES[1:])
     away = np.array([0.65, 0.73, 0.80, 0.87]) - line[1:5]
-    assert value("targets", 0, "largest_from_line") == np.abs(away).max()
+    assert value(found.targets[0].largest_from_line) == np.abs(away).max()
     # Goodwin's own points, the last of which is farther from the line here, do not count.
-    assert value("targets", 1, "largest_from_line") == np.abs(away + 0.01).max()
-    assert value("sweep", "misfit", 0, 1) == 0.025
+    assert value(found.targets[1].largest_from_line) == np.abs(away + 0.01).max()
+    assert value(found.sweep.misfit[0][1]) == 0.025
 
 
 def test_noise_of_sessions_stands_in_the_errors():
-    found = statistics(made_up(), CURVATURES, ("static", "dynamic"))
-    assert found["targets"][0]["at_goodwin"][0]["error"] == pytest.approx(0.05 / 20.0, rel=0.15)
-    assert found["shift"]["dynamic"]["error"] == pytest.approx(0.05 * math.sqrt(2.0) / 20.0, rel=0.15)
+    found = discrimination_statistics(made_up(), CURVATURES, ("static", "dynamic"))
+    assert found.targets[0].at_goodwin[0].error == pytest.approx(0.05 / 20.0, rel=0.15)
+    assert found.shift["dynamic"].error == pytest.approx(0.05 * math.sqrt(2.0) / 20.0, rel=0.15)
 
 
-# Readings
+# Interpretations of the steps
 
 
 def test_the_distance_of_many_receptors_is_judged_as_the_closed_form_says():
@@ -233,7 +239,7 @@ def test_a_receptor_silent_under_both_spheres_changes_no_distance():
 def test_receptors_that_are_silent_once_take_no_part_in_latencies():
     latency_ms = 60.0 - bumps()
     latency_ms[3, [0, 5]] = np.nan
-    measured = first_spikes(latency_ms, PAIRS)
+    measured = answering_latencies(latency_ms, PAIRS)
     assert not np.isin(measured.neighbours, [0, 5]).any()
     assert len(measured.neighbours) == len(PAIRS) - 6  # two corners of the grid, three neighbours each
     without = np.delete(np.arange(18), [0, 5])
@@ -242,17 +248,22 @@ def test_receptors_that_are_silent_once_take_no_part_in_latencies():
         gradient_sum(measured.responses, measured.neighbours), gradient_sum(latency_ms[:, without], fewer)
     )
     with pytest.raises(InputError, match="no hit rate from zeros"):
-        first_spikes(np.full((7, 18), np.nan), PAIRS)
+        answering_latencies(np.full((7, 18), np.nan), PAIRS)
 
 
 def test_one_noise_for_two_positions_is_that_of_equal_ones():
     draws = normals(0, 1, 18, Purpose.RESPONSE, 2000)[0].T
     here = Measured(bumps(steepness=0.6), PAIRS)
     columns = [0, 5]
-    alone = fitted_noise([here], CURVATURES, draws)
-    both = fitted_noise([here, here], CURVATURES, draws)
+
+    def fit(measures):
+        return goodwin.fit_noise_to_goodwin(
+            lambda sigma: expected_of_measure(measures, sigma, draws), CURVATURES, len(measures)
+        )
+
+    alone, both = fit([here]), fit([here, here])
     assert both.noise_sigma == pytest.approx(alone.noise_sigma, rel=1e-6)
-    assert_allclose(expected([here], alone.noise_sigma, draws)[0, columns], alone.hit_rates)
+    assert_allclose(expected_of_measure([here], alone.noise_sigma, draws)[0, columns], alone.hit_rates)
 
 
 def test_the_rise_that_a_noise_needs_has_its_closed_form():
@@ -265,41 +276,45 @@ def test_the_rise_that_a_noise_needs_has_its_closed_form():
     assert (farther - 80.0) / (2.0 * sigma * math.hypot(50.0, farther)) == pytest.approx(z, rel=0.01)
     # So little noise that the usual rise is too much, and one that no such rise overcomes.
     assert rise_needed(measured, 0.002, draws) < rise
-    assert rise_needed(measured, 0.9, draws) is None
+    assert math.isnan(rise_needed(measured, 0.9, draws))
 
 
-def test_reasons_name_every_reading_and_the_noise_that_it_would_choose():
+def test_the_analysis_names_every_interpretation_and_the_noise_that_fits_it():
     static = [Measured(bumps(17.37, 0.6), PAIRS), Measured(bumps(17.57, 0.6), PAIRS)]
     latency_ms = [60.0 - one.responses for one in static]
     latency_ms[0][:, 0] = np.nan
     measures = {
         "static": static,
         "dynamic": static,
-        "latency": [first_spikes(latency, PAIRS) for latency in latency_ms],
+        "latency": [answering_latencies(latency, PAIRS) for latency in latency_ms],
     }
     draws = normals(0, 1, 18, Purpose.RESPONSE, 1000)[0].T
-    found = reasons(measures, latency_ms, GRID.positions_mm, GRID.pitch_mm, CURVATURES, 0.06, draws, seed=1)
-    named = {reading["reading"]: reading for reading in found["readings"]}
+    found = discrepancy_analysis(
+        measures, latency_ms, GRID.positions_mm, GRID.pitch_mm, CURVATURES, 0.06, draws, seed=1
+    )
+    named = {one.reading: one for one in found.readings}
     assert len(named) == 7
-    assert named["latency of receptors that fire under every sphere (used)"]["receptors"] == [17, 18]
+    assert named["latency of receptors that fire under every sphere (used)"].receptors.tolist() == [17, 18]
     used = named["static, eight neighbours (used)"]
-    assert named["dynamic, eight neighbours (used)"]["noise_sigma"] == used["noise_sigma"]
-    at_own = expected(static, used["noise_sigma"], draws)[:, [0, 5]]
-    assert used["misfit"] == pytest.approx(np.sqrt(np.square(at_own - goodwin.HIT_RATES).mean()))
-    assert used["rise"][0] == pytest.approx(found["rise"]["static"][0])
-    curve = found["misfit_curve"]
-    lowest = curve["noise_sigma"][int(np.argmin(curve["misfit"]["static"]))]
-    assert lowest == pytest.approx(used["noise_sigma"], abs=0.01)
+    assert named["dynamic, eight neighbours (used)"].noise_sigma == used.noise_sigma
+    at_own = expected_of_measure(static, used.noise_sigma, draws)[:, [0, 5]]
+    assert used.misfit == pytest.approx(np.sqrt(np.square(at_own - goodwin.HIT_RATES).mean()))
+    assert used.rise[0] == pytest.approx(found.rise["static"][0])
+    curve = found.misfit_curve
+    lowest = curve.noise_sigma[int(np.argmin(curve.misfit["static"]))]
+    assert lowest == pytest.approx(used.noise_sigma, abs=0.01)
     # A wavering fraction moves the point by a share of the small way between means, not of the point.
-    point, fraction = (np.array(found["criterion"][moves]) for moves in ("point", "fraction"))
+    point, fraction = found.criterion.point, found.criterion.fraction
     assert (fraction < 0.2 * point).all()
 
 
 def test_the_patience_reading_has_nobody_wait_beyond_the_ramp():
     late = np.where(bumps() > 20.0, 80.0 - bumps(), np.nan)
-    found = percept_reasons._readings({"static": [Measured(bumps(), PAIRS)]}, [late], GRID.positions_mm, 1.0)
+    found = discrepancy._interpretations(
+        {"static": [Measured(bumps(), PAIRS)]}, [late], GRID.positions_mm, 1.0
+    )
     waiting = found["latency, waiting until the ramp ends"][0].responses
-    assert waiting.max() == percept_reasons.PATIENCE_MS == 50.0
+    assert waiting.max() == discrepancy.PATIENCE_MS == 50.0
     counted = found["latency, a silent receptor counting as the end of the stimulus"][0].responses
     assert_array_equal(counted == 1000.0, np.isnan(late))
 

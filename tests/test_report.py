@@ -1,20 +1,22 @@
 """The report draws finished numbers: all of them, escaped, and whole or not at all."""
 
 import base64
-import json
 import re
 import struct
 import subprocess
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import matplotlib
 import numpy as np
 import pytest
 
-from fingerpad.core.results import from_json, to_json
+from fingerpad.core.results import schema_of, to_json
 from fingerpad.data import all_published
+from fingerpad.experiments.gerling2014.nail_border import NailBorder
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
+from fingerpad.experiments.gerling2014.response_maps import PopulationMaps, PopulationTiming
+from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 from fingerpad.report import (
     discrimination,
     nail,
@@ -24,16 +26,15 @@ from fingerpad.report import (
     reproduction,
     single_unit,
     skin_deflection,
-    tables,
 )
 from fingerpad.report import formatting as words
 from fingerpad.report.page import markdown, write_html, write_markdown
 from fingerpad.report.parts import Chapter, Drawing, Page, Paragraph, Row, Table
 from fingerpad.report.reproduction import reproduction_page, reproduction_summary, write_report
 from fingerpad.report.style import BLUE, GREEN, ORANGE, RESOLUTION_DPI, new_figure
+from sections import CURVATURE_PER_M, discrimination_section, nail_section, typed
 
 SHIFT_MM = np.linspace(-3.5, 3.5, 36)
-CURVATURE_PER_M = [287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0]
 PARAMETERS = {
     "intercept_ma": 4.1e-7,
     "dynamic_gain": 2.2e-4,
@@ -44,10 +45,6 @@ PARAMETERS = {
 }
 
 
-def typed(results: dict) -> ReproductionResult:
-    return from_json(ReproductionResult, json.dumps(results).encode())
-
-
 def synthetic_results() -> dict:
     """Results with every section, shaped like a run and plausible in size."""
     return {
@@ -55,11 +52,11 @@ def synthetic_results() -> dict:
         "single_unit": _single_unit(),
         "single_unit_uncertainty": _single_unit_uncertainty(),
         "drive_quantities": _drive_quantities(),
-        "discrimination": _discrimination(),
+        "discrimination": discrimination_section(),
         "curvature_thresholds": _curvature_thresholds(),
         "population": _population(),
         "population_timing": _population_timing(),
-        "nail": _nail(),
+        "nail": nail_section(),
         "comparison": [
             _compared("FSS out of sample", "0.81", "0.84", "+0.03", True),
             _compared("hit rate at 296 /m", "0.58", "0.71", "+0.13", False),
@@ -282,76 +279,6 @@ def _single_unit_uncertainty() -> dict:
     }
 
 
-def _discrimination() -> dict:
-    rise = 1.0 - 0.5 * np.exp(-(np.array(CURVATURE_PER_M[1:]) - 287.0) / 30.0)
-
-    def rates(shift: float, spread: float) -> dict:
-        return {
-            "hit_rate": rise.tolist(),
-            "hit_rate_sd": [spread] * 6,
-            "hit_rate_shifted": (rise - shift).tolist(),
-            "hit_rate_shifted_sd": [spread] * 6,
-        }
-
-    return {
-        "curvature_per_m": CURVATURE_PER_M,
-        "noise_sigma": 0.12,
-        "noise_sigma_paper": 0.055,
-        "sessions": 5,
-        "goodwin": {
-            "curvature_per_m": [296.0, 365.0],
-            "hit_rate": [0.58, 0.95],
-            "trials": 100,
-            "low": [0.48, 0.89],
-            "high": [0.68, 0.98],
-        },
-        "statistics": {
-            "sweep": {
-                "noise_sigma": [0.015, 0.055, 0.085],
-                "misfit": [
-                    [{"value": value + place, "error": 0.001} for value in (0.3, 0.15, 0.08)]
-                    for place in (0.0, 0.01)
-                ],
-            }
-        },
-        "reasons": {
-            "rise": {"static": [0.46, 0.43]},
-            "rise_for_paper_noise": {"static": [0.16, None]},
-            "misfit_curve": {
-                "noise_sigma": [0.01, 0.1, 0.2],
-                "misfit": {name: [0.3, 0.1, 0.2] for name in ("static", "latency", "euclidean")},
-            },
-            "readings": [
-                {
-                    "reading": name,
-                    "receptors": [18, 17],
-                    "rise": [0.46, 0.43],
-                    "hit_rate": [[0.6] * 6] * 2,
-                    "largest_shift": 0.01,
-                    "noise_sigma": noise,
-                    "misfit": noise,
-                    "own_largest_shift": noise,
-                }
-                for name, noise in (("eight neighbours (used)", 0.14), ("four neighbours", None))
-            ],
-        },
-        "gradient_sum": {
-            "static": rates(0.01, 0.02),
-            "dynamic": rates(0.1, 0.03),
-            "latency": rates(0.08, 0.04),
-        },
-        "euclidean": {"static": rates(0.02, 0.02)},
-        "variants": {
-            "sigma_0.025": rates(0.0, 0.01),
-            "sigma_0.055": rates(0.0, 0.01),
-            "sigma_0.085": rates(0.0, 0.02),
-            "ten_matrices": rates(0.02, 0.06),
-            "criterion_0.01": rates(0.01, 0.03),
-            "criterion_0.02": rates(0.01, 0.06),
-        },
-    }
-
-
 def _curvature_thresholds() -> dict:
     steps = [0.03, 0.06, 0.12]
 
@@ -487,60 +414,16 @@ def _rates() -> dict:
     }
 
 
-def _nail() -> dict:
-    along, angle = np.meshgrid(np.linspace(0.0, 31.0, 20), np.linspace(0.0, np.pi, 16), indexing="ij")
-    taper = np.sqrt(1.0 - (along / 31.78) ** 6)
-    y = -np.cos(angle) * np.where(angle < np.pi / 2, 10.0, 4.5) * taper
-    z = 9.8 * np.sin(angle) * taper
-
-    def stress(x, y, z):
-        return 20.0 * np.exp(-np.hypot(x - 17.4, np.hypot(y + 9.85, z)) / 1.5) + 0.4 * (y > 2.0)
-
-    x_faces, y_faces, z_faces = (values[:-1, :-1] for values in (along, y, z))
-    columns, rows = np.meshgrid(np.arange(0.0, 30.0, 1.0), np.arange(-9.0, 3.0, 1.0), indexing="ij")
-    corners_x = columns.ravel()[:, None] + [0.0, 1.0, 1.0, 0.0]
-    corners_y = rows.ravel()[:, None] + [0.0, 0.0, 1.0, 1.0]
-    nail = np.array([[[17.0, 3.0, 0.0], [17.0, 2.5, 5.0]], [[17.0, 2.5, 5.0], [28.0, 1.0, 5.0]]])
-    distance = np.arange(-1.75, 5.0, 0.5)
-    course = [[0.2, 0.4 + 0.1 * np.exp(-abs(d)), 0.6] if abs(d) > 0.3 else [None] * 3 for d in distance]
-    return {
-        "x_mm": along.tolist(),
-        "y_mm": y.tolist(),
-        "z_mm": z.tolist(),
-        "von_mises_kpa": stress(x_faces, y_faces, z_faces).tolist(),
-        "nail_mm": nail.tolist(),
-        "ratio": 1.8,
-        "ratio_range": [1.5, 3.9],
-        "ratio_energy": 1.5,
-        "border_kpa": 0.8,
-        "text": "Skin at the border bears 1.8 times what skin beside it bears.",
-        "profile": {
-            "distance_mm": distance.tolist(),
-            "surface_kpa": course,
-            "living_epidermis_kpa": course,
-        },
-        "middle": {
-            "x_mm": corners_x.tolist(),
-            "y_mm": corners_y.tolist(),
-            "von_mises_kpa": stress(columns, rows, 0.0).ravel().tolist(),
-        },
-        "across": {
-            "x_mm": 22.0,
-            "y_mm": corners_y[:12].tolist(),
-            "z_mm": corners_y[:12].tolist(),
-            "von_mises_kpa": np.linspace(0.0, 0.8, 12).tolist(),
-        },
-    }
-
-
-DRAWINGS = reproduction_page(typed(synthetic_results())).drawings
+DRAWINGS = reproduction_page(typed(ReproductionResult, synthetic_results())).drawings
 
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
-    results, settings = typed(synthetic_results()), dict(matplotlib.rcParams)
+    results, settings = typed(ReproductionResult, synthetic_results()), dict(matplotlib.rcParams)
     path = write_report(results, tmp_path_factory.mktemp("report"))
-    assert to_json(results) == to_json(typed(synthetic_results())), "drawing changed the results"
+    assert to_json(results) == to_json(typed(ReproductionResult, synthetic_results())), (
+        "drawing changed the results"
+    )
     assert dict(matplotlib.rcParams) == settings, "drawing changed settings that others share"
     return path
 
@@ -577,7 +460,7 @@ def test_nothing_unfinished_is_left_beside_the_report(report):
 
 
 def test_equal_results_give_equal_bytes(tmp_path):
-    results = typed(synthetic_results())
+    results = typed(ReproductionResult, synthetic_results())
     first, second = (write_report(results, tmp_path / name).read_bytes() for name in "ab")
     assert first == second
 
@@ -658,27 +541,44 @@ def test_texts_are_escaped_wherever_they_stand(tmp_path):
     manifest["packages"][HOSTILE] = HOSTILE
     results["manifest"] = manifest
     results["single_unit"]["parameters"][HOSTILE] = 1.0
-    text = write_report(typed(results), tmp_path).read_text(encoding="utf-8")
+    text = write_report(typed(ReproductionResult, results), tmp_path).read_text(encoding="utf-8")
     assert "<script" not in text
     assert text.count("&lt;script&gt;") > 40
 
 
-def without_numbers(value):
-    """The same results with None for every number that a run may fail to have."""
-    keep = ("distance_mm", "shift_mm", "x_mm", "y_mm", "z_mm", "receptors_mm", "curvature_per_m", "fold")
-    keep += ("testing_shift_mm", "is_artefact", "inputs", "iteration", "shown", "positions_mm", "radii_mm")
-    keep += ("edges_ms", "active_edges_ms", "density_per_cm2", "area_per_afferent_mm2")
+KEPT = (
+    *("distance_mm", "shift_mm", "x_mm", "y_mm", "z_mm", "receptors_mm", "curvature_per_m", "fold"),
+    *("testing_shift_mm", "is_artefact", "inputs", "iteration", "shown", "positions_mm", "radii_mm"),
+    *("edges_ms", "active_edges_ms", "density_per_cm2", "area_per_afferent_mm2", "manifest"),
+)
+"""Numbers without which there is no axis to draw on, and the manifest, which is always complete."""
+
+
+def without_numbers(value, schema, shapes):
+    """The same results with None for every number that the schema lets be absent."""
+    if not isinstance(schema, dict) or not schema.keys() - {"additionalProperties", "type"}:
+        schema = {"additionalProperties": True} | (schema if isinstance(schema, dict) else {})
+    schema = next((kind for kind in schema.get("anyOf", []) if kind.get("type") != "null"), schema)
+    schema = shapes[schema["$ref"].rsplit("/")[-1]] if "$ref" in schema else schema
     if isinstance(value, dict):
-        return {key: item if key in keep else without_numbers(item) for key, item in value.items()}
+        fields, others = schema.get("properties", {}), schema.get("additionalProperties")
+        return {
+            key: item if key in KEPT else without_numbers(item, fields.get(key, others), shapes)
+            for key, item in value.items()
+        }
     if isinstance(value, list):
-        return [without_numbers(item) for item in value]
-    return None if isinstance(value, float) else value
+        kinds = schema.get("prefixItems") or [schema.get("items", True)] * len(value)
+        return [without_numbers(item, kind, shapes) for item, kind in zip(value, kinds, strict=True)]
+    absent = schema.get("type") in (None, ["number", "null"])
+    return None if absent and isinstance(value, int | float) else value
 
 
 def test_what_does_not_exist_is_drawn_as_nothing_and_written_as_a_dash(tmp_path):
-    results = synthetic_results()
-    missing = without_numbers({key: item for key, item in results.items() if key != "manifest"})
-    text = write_report(typed(results | missing), tmp_path).read_text(encoding="utf-8")
+    schema = schema_of(ReproductionResult)
+    results = without_numbers(synthetic_results(), schema, schema["$defs"])
+    assert results["discrimination"]["statistics"]["misfit"]["static"]["value"] is None
+    assert results["skin_deflection"]["trial1"]["cylinder"]["r2"] is None
+    text = write_report(typed(ReproductionResult, results), tmp_path).read_text(encoding="utf-8")
     visible = re.sub(r"base64,[^\"]+", "", text)
     assert "nan" not in re.sub(r"<[^>]+>", " ", visible).lower().split()
     assert "None" not in visible
@@ -697,7 +597,7 @@ def test_parts_beyond_the_paper_are_left_out_where_they_were_not_run():
     whole = synthetic_results()
     short = {key: section for key, section in whole.items() if key not in BEYOND}
     titles = [
-        [chapter.title for chapter in reproduction_page(typed(results)).chapters]
+        [chapter.title for chapter in reproduction_page(typed(ReproductionResult, results)).chapters]
         for results in (whole, short)
     ]
     assert len(titles[0]) - len(titles[1]) == len(BEYOND)
@@ -715,7 +615,7 @@ def test_a_miss_is_marked_in_words_and_by_its_row(report):
 
 
 def test_the_summary_counts_and_names_what_was_missed():
-    found, verdicts = reproduction_summary(typed(synthetic_results()))
+    found, verdicts = reproduction_summary(typed(ReproductionResult, synthetic_results()))
     assert "Trial 3 is closest" in found
     assert "0.84" in found
     assert "296 1/m in 63 % of trials (people: 58 %)" in found
@@ -729,7 +629,7 @@ def test_the_summary_follows_the_numbers():
     results = synthetic_results()
     results["skin_deflection"]["trial1"]["cylinder"]["r2"] = 0.99
     results["comparison"] = [{**row, "met": True} for row in results["comparison"]]
-    found, verdicts = reproduction_summary(typed(results))
+    found, verdicts = reproduction_summary(typed(ReproductionResult, results))
     assert "Trial 1 is closest" in found
     assert verdicts == "Of 3 judged comparisons with the paper, 3 are met and 0 are missed."
 
@@ -752,7 +652,7 @@ def test_inputs_are_listed_exactly_and_the_assumed_ones_are_marked():
 
 
 def test_the_last_step_of_the_papers_fold_is_marked_and_others_are_not():
-    made = single_unit.single_unit_tables(typed(synthetic_results()).single_unit)
+    made = single_unit.single_unit_tables(typed(ReproductionResult, synthetic_results()).single_unit)
     table = next(table for table in made if table.title.startswith("Steps"))
     assert "fold 3, start 2" in table.title
     assert [row.kind for row in table.rows] == ["", "", "", "", "final"]
@@ -760,7 +660,7 @@ def test_the_last_step_of_the_papers_fold_is_marked_and_others_are_not():
 
 
 def test_every_fold_and_start_has_its_climb_and_the_better_ones_are_marked():
-    made = single_unit.single_unit_tables(typed(synthetic_results()).single_unit)
+    made = single_unit.single_unit_tables(typed(ReproductionResult, synthetic_results()).single_unit)
     table = next(table for table in made if table.title.startswith("Searches"))
     assert [row.cells[0] for row in table.rows] == [
         f"{fold}, {start}" for fold in range(1, 7) for start in (1, 2)
@@ -770,16 +670,17 @@ def test_every_fold_and_start_has_its_climb_and_the_better_ones_are_marked():
 
 
 def test_hit_rates_stand_in_the_table_as_they_are_drawn():
-    (table,) = tables.hit_rates(_discrimination())
+    section = typed(SphereDiscrimination, discrimination_section())
+    table = discrimination.discrimination_tables(section)[0]
     assert table.columns[2:] == ("296 1/m", "305 1/m", "316 1/m", "328 1/m", "340 1/m", "365 1/m")
     assert len(table.rows) == 20
-    first = _discrimination()["gradient_sum"]["static"]
-    assert table.rows[0].cells[2] == f"{first['hit_rate'][0]:.2f}\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}0.02"
+    first = section.gradient_sum["static"]
+    assert table.rows[0].cells[2] == f"{first.hit_rate[0]:.2f}\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}0.02"
     assert all(len(row.cells) == len(table.columns) for row in table.rows)
 
 
 def test_every_table_is_rectangular():
-    page = reproduction_page(typed(synthetic_results()))
+    page = reproduction_page(typed(ReproductionResult, synthetic_results()))
     made = [table for chapter in page.chapters for table in chapter.tables]
     assert len(made) > 12
     for table in made:
@@ -792,7 +693,7 @@ def lines(axes):
 
 def test_figure_4_draws_the_profiles_given_and_sets_the_artefact_apart():
     section = _skin_deflection()
-    given = typed(synthetic_results()).skin_deflection
+    given = typed(ReproductionResult, synthetic_results()).skin_deflection
     line, _, cylinder, near = skin_deflection.draw_skin_deflection(given).axes
     for trial, name in (("trial1", "Trial 1"), ("trial2", "Trial 2"), ("trial3", "Trial 3")):
         np.testing.assert_array_equal(lines(line)[name].get_ydata(), section[trial]["line"]["deflection_mm"])
@@ -807,7 +708,7 @@ def test_figure_4_draws_the_profiles_given_and_sets_the_artefact_apart():
 
 def test_figure_5_draws_predicted_lines_over_observed_points():
     section = _single_unit()
-    given = typed(synthetic_results()).single_unit
+    given = typed(ReproductionResult, synthetic_results()).single_unit
     for axes, phase in zip(single_unit.draw_single_unit(given).axes, ("dynamic", "static"), strict=True):
         drawn = lines(axes)
         np.testing.assert_array_equal(drawn["predicted"].get_ydata(), section[f"{phase}_rate_hz"])
@@ -817,26 +718,32 @@ def test_figure_5_draws_predicted_lines_over_observed_points():
 
 
 def test_figure_6_leaves_silent_places_open():
-    section = _population()
-    maps = [axes for axes in population.draw(section).axes if axes.name != "3d" and axes.get_xlabel()]
+    section = typed(PopulationMaps, _population())
+    maps = [
+        axes for axes in population.draw_population(section).axes if axes.name != "3d" and axes.get_xlabel()
+    ]
     assert len(maps) == 3
     shown = np.ma.getmaskarray(maps[2].collections[0].get_array()).reshape(13, 11)
-    silent = np.array([[value is None for value in row] for row in section["first_spike_latency_ms"]])
+    silent = np.isnan(section.first_spike_latency_ms)
     assert 0 < silent.sum() < silent.size
     np.testing.assert_array_equal(shown, silent.T)
     for axes in maps:
-        np.testing.assert_array_equal(axes.get_lines()[0].get_xydata(), section["receptors_mm"])
+        np.testing.assert_array_equal(axes.get_lines()[0].get_xydata(), section.receptors_mm)
 
 
 def test_figure_6_colours_the_finger_where_afferents_fire_and_mirrors_half_of_it():
-    section = _population()
-    panels = [axes for axes in population.draw(section).axes if axes.name == "3d" and not axes.get_xlabel()]
+    section = typed(PopulationMaps, _population())
+    panels = [
+        axes
+        for axes in population.draw_population(section).axes
+        if axes.name == "3d" and not axes.get_xlabel()
+    ]
     assert len(panels) == 3
-    finger = section["finger"]
-    x, y = (np.array(finger[key]) for key in ("x_mm", "y_mm"))
+    finger = section.finger
+    x, y = finger.x_mm, finger.y_mm
     middle = [0.25 * (v[:-1, :-1] + v[1:, :-1] + v[1:, 1:] + v[:-1, 1:]) for v in (x, y)]
     drawn = (middle[0] > population.PAD_FROM_MM) & (middle[1] < population.PAD_BELOW_MM)
-    known = np.array([[value is not None for value in row] for row in finger["first_spike_latency_ms"]])
+    known = np.isfinite(finger.first_spike_latency_ms)
     # The picture lists its faces by their distance from the eye: they are counted, not compared.
     colours = panels[2].collections[0].get_facecolor()[:, :3]
     coloured = np.ptp(colours, axis=1) > 0.1  # grey has hardly a hue
@@ -847,27 +754,27 @@ def test_figure_6_colours_the_finger_where_afferents_fire_and_mirrors_half_of_it
 
 
 def test_captions_say_what_afferents_do_without_a_touch():
-    section, timing = _population(), _population_timing()
-    assert "without any touch too, 4 spikes/s from 251 ms on" in population.caption(section)
-    silent = section | {"at_rest": {"static_rate_hz": 0.0, "first_spike_latency_ms": None}}
-    assert "without any touch" not in population.caption(silent)
-    assert "first fire at 251 ms. All start" in population_rate.caption(timing["rates"])
-    assert "Without any touch" not in recruitment.caption(timing["recruitment"])
-    firing = timing["recruitment"] | {"resting_latency_ms": 251.0}
-    assert "first fire at 251 ms. They count as recruited" in recruitment.caption(firing)
+    section, timing = typed(PopulationMaps, _population()), typed(PopulationTiming, _population_timing())
+    assert "without any touch too, 4 spikes/s from 251 ms on" in population.caption_population(section)
+    silent = replace(section, at_rest=replace(section.at_rest, first_spike_latency_ms=np.nan))
+    assert "without any touch" not in population.caption_population(silent)
+    assert "first fire at 251 ms. All start" in population_rate.caption_population_rate(timing.rates)
+    assert "Without any touch" not in recruitment.caption_recruitment(timing.recruitment)
+    firing = replace(timing.recruitment, resting_latency_ms=251.0)
+    assert "first fire at 251 ms. They count as recruited" in recruitment.caption_recruitment(firing)
 
 
 def test_figure_13_ranks_every_afferent_that_fires_and_counts_skin():
-    section = _population_timing()["recruitment"]
-    drawn = recruitment.draw(section).axes
-    first, silent = section["afferents"][0], drawn[0].collections[0]
-    latency = np.array(first["first_spike_latency_ms"], dtype=float)
+    section = typed(PopulationTiming, _population_timing()).recruitment
+    drawn = recruitment.draw_recruitment(section).axes
+    first, silent = section.afferents[0], drawn[0].collections[0]
+    latency = np.array(first.first_spike_latency_ms, dtype=float)
     fires = np.isfinite(latency)
     assert len(silent.get_offsets()) == (~fires).sum() > 0
-    ranks = np.array(first["recruitment_rank"], dtype=float)[fires]
+    ranks = np.array(first.recruitment_rank, dtype=float)[fires]
     np.testing.assert_array_equal(drawn[0].collections[1].get_array(), ranks)
     np.testing.assert_array_equal(
-        drawn[0].collections[1].get_offsets(), np.array(section["positions_mm"])[fires]
+        drawn[0].collections[1].get_offsets(), np.array(section.positions_mm)[fires]
     )
     steps = lines(drawn[2])["365 /m"]
     np.testing.assert_array_equal(steps.get_xdata(), 1.5 * np.sort(latency[fires]))
@@ -877,26 +784,28 @@ def test_figure_13_ranks_every_afferent_that_fires_and_counts_skin():
 
 
 def test_figure_13_and_its_table_say_how_much_the_order_changes():
-    section = _population_timing()["recruitment"]
-    assert "365 /m: rank correlation 0.987, 3.1 % of the pairs swap" in recruitment.caption(section)
-    table = recruitment.tables(section)[0]
+    section = typed(PopulationTiming, _population_timing()).recruitment
+    assert "365 /m: rank correlation 0.987, 3.1 % of the pairs swap" in recruitment.caption_recruitment(
+        section
+    )
+    table = recruitment.recruitment_tables(section)[0]
     assert list(table.rows[1].cells) == ["365 /m", "22.5", "16.8", "6.0", "20.0", "0.987", "3.1 %"]
 
 
 def test_figure_13_of_one_touch_leaves_the_comparison_empty():
-    section = _population_timing()["recruitment"]
-    alone = {**section, "touches": section["touches"][:1], "afferents": section["afferents"][:1]}
-    texts = [text.get_text() for axes in recruitment.draw(alone).axes for text in axes.texts]
+    section = typed(PopulationTiming, _population_timing()).recruitment
+    alone = replace(section, touches=section.touches[:1], afferents=section.afferents[:1])
+    texts = [text.get_text() for axes in recruitment.draw_recruitment(alone).axes for text in axes.texts]
     assert texts.count("no other touch") == 2
-    assert "rank correlation" not in recruitment.caption(alone)
+    assert "rank correlation" not in recruitment.caption_recruitment(alone)
 
 
 def test_figure_14_has_one_scale_per_afferent_and_per_area():
-    section = _population_timing()["rates"]
-    figure = population_rate.draw(section)
+    section = typed(PopulationTiming, _population_timing()).rates
+    figure = population_rate.draw_population_rate(section)
     early = figure.axes[0]
     assert [patch.get_label() for patch in early.patches] == ["0 to 1 mm", "1 to 2 mm"]
-    np.testing.assert_array_equal(early.patches[1].get_data().values, section["touches"][0]["rate_hz"][1])
+    np.testing.assert_array_equal(early.patches[1].get_data().values, section.touches[0].rate_hz[1])
     beside = figure.axes[1].child_axes[0]
     figure.draw_without_rendering()
     # 100 per cm2 that fire 50 spikes/s each make 5000 spikes/s per cm2.
@@ -905,7 +814,7 @@ def test_figure_14_has_one_scale_per_afferent_and_per_area():
 
 
 def test_figure_7_keeps_the_papers_letters_and_shows_people_in_every_panel():
-    section = _discrimination()
+    section = typed(SphereDiscrimination, discrimination_section())
     panels = [axes for axes in discrimination.draw_observers(section).axes if axes.get_title()]
     titles = [axes.get_title().replace("\n", " ") for axes in panels]
     assert titles[0] == "(a) Gradient Sum, static σ₁ = 0.12"
@@ -924,20 +833,20 @@ def test_figure_7_keeps_the_papers_letters_and_shows_people_in_every_panel():
 
 
 def test_figure_7_draws_solid_in_place_and_dotted_shifted_with_bars_of_one_deviation():
-    section = _discrimination()
+    section = typed(SphereDiscrimination, discrimination_section())
     axes = discrimination.draw_observers(section).axes[1]
-    rates = section["gradient_sum"]["dynamic"]
+    rates = section.gradient_sum["dynamic"]
     ours = [bars for bars in axes.containers if bars.get_label().startswith("predicted")]
     for container, suffix, style in zip(ours, ("", "_shifted"), ("-", ":"), strict=True):
         curve, _, (bars,) = container.lines
         assert curve.get_linestyle() == style
-        assert curve.get_ydata().tolist() == rates[f"hit_rate{suffix}"]
+        assert curve.get_ydata().tolist() == getattr(rates, f"hit_rate{suffix}").tolist()
         lengths = [bar[1, 1] - bar[0, 1] for bar in bars.get_segments()]
-        np.testing.assert_allclose(lengths, 2.0 * np.array(rates[f"hit_rate{suffix}_sd"]))
+        np.testing.assert_allclose(lengths, 2.0 * getattr(rates, f"hit_rate{suffix}_sd"))
 
 
 def test_figure_15_draws_every_code_that_answers_and_both_positions_of_the_sweep():
-    section = _discrimination()
+    section = typed(SphereDiscrimination, discrimination_section())
     codes, sweep = discrimination.draw_noise(section).axes
     drawn = lines(codes)
     assert set(drawn) == {
@@ -956,22 +865,22 @@ def test_figure_15_draws_every_code_that_answers_and_both_positions_of_the_sweep
     assert "16 %" in discrimination.caption_noise(section)
 
 
-def test_readings_stand_in_their_table_and_what_was_used_is_marked():
-    (table,) = tables.readings(_discrimination())
+def test_interpretations_stand_in_their_table_and_what_was_used_is_marked():
+    table = discrimination.discrimination_tables(typed(SphereDiscrimination, discrimination_section()))[1]
     assert [row.kind for row in table.rows] == ["final", ""]
     assert table.rows[0].cells[:3] == ("eight neighbours (used)", "18 / 17", "0.460 / 0.430")
     assert table.rows[1].cells[4] == table.rows[1].cells[6]
 
 
 def test_figure_7_shows_rates_far_below_chance():
-    section = _discrimination()
+    section = discrimination_section()
     section["gradient_sum"]["latency"]["hit_rate_shifted"] = [0.1] * 6
-    assert discrimination.draw_observers(section).axes[0].get_ylim()[0] < 0.1
+    assert discrimination.draw_observers(typed(SphereDiscrimination, section)).axes[0].get_ylim()[0] < 0.1
 
 
 def test_figure_9_shows_each_place_from_the_side_it_is_seen_from():
-    section = _nail()
-    below, side, middle, above, across, profile = nail.draw(section).axes[:6]
+    section = typed(NailBorder, nail_section())
+    below, side, middle, above, across, profile = nail.draw_nail(section).axes[:6]
     half = 19 * 15
     sizes = [axes.collections[0].get_array().size for axes in (below, side, above)]
     assert sizes == [2 * half, half, 2 * half]
@@ -980,8 +889,8 @@ def test_figure_9_shows_each_place_from_the_side_it_is_seen_from():
     assert seen[0].argmax() > half > seen[1].argmax()
     corners = np.array([path.vertices[:4] for path in side.collections[0].get_paths()])
     assert corners[..., 1].min() == pytest.approx(-10.0)
-    assert len(middle.collections[0].get_paths()) == len(section["middle"]["von_mises_kpa"])
-    assert len(across.collections[0].get_paths()) == 2 * len(section["across"]["von_mises_kpa"])
+    assert len(middle.collections[0].get_paths()) == len(section.middle.von_mises_kpa)
+    assert len(across.collections[0].get_paths()) == 2 * len(section.across.von_mises_kpa)
     assert [line.get_label() for line in profile.get_lines()[:2]] == [
         "surface of the skin",
         "living epidermis",
@@ -989,20 +898,20 @@ def test_figure_9_shows_each_place_from_the_side_it_is_seen_from():
 
 
 def test_figure_9_has_one_scale_for_the_whole_finger_and_one_for_the_nail():
-    section = _nail()
-    panels = nail.draw(section).axes[:5]
+    section = typed(NailBorder, nail_section())
+    panels = nail.draw_nail(section).axes[:5]
     scales = [axes.collections[0].norm for axes in panels]
     wide, near = (
         {(scale.vmin, scale.vmax) for scale in scales[:3]},
         {(scale.vmin, scale.vmax) for scale in scales[3:]},
     )
-    peak = max(np.max(section["von_mises_kpa"]), np.max(section["middle"]["von_mises_kpa"]))
+    peak = max(np.max(section.von_mises_kpa), np.max(section.middle.von_mises_kpa))
     assert wide == {(peak / 1e4, peak)}
-    assert near == {(0.0, section["border_kpa"])}
+    assert near == {(0.0, section.border_kpa)}
 
 
 def test_figure_9_draws_the_nail_on_both_halves():
-    above = nail.draw(_nail()).axes[3]
+    above = nail.draw_nail(typed(NailBorder, nail_section())).axes[3]
     edges = [np.array(lines.get_segments()) for lines in above.collections[1:]]
     np.testing.assert_array_equal(edges[0] * [1.0, -1.0], edges[1])
     assert edges[0][0].tolist() == [[17.0, 0.0], [17.0, 5.0]]

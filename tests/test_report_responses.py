@@ -26,7 +26,7 @@ def response(columns: int = 2, count: int = 12, gain: float = 1.0) -> ResponseMa
 
 def test_receptors_that_answer_have_the_colour_of_it_and_the_others_none():
     answer = response()
-    panels = [axes for axes in responses.draw({"mine": answer}).axes if axes.get_xlabel()]
+    panels = [axes for axes in responses.draw_responses({"mine": answer}).axes if axes.get_xlabel()]
     for axes, name in ((panels[0], "dynamic_rate_hz"), (panels[2], "first_spike_latency_ms")):
         silent, dots, *_ = axes.collections
         values = getattr(answer, name)
@@ -40,7 +40,7 @@ def test_receptors_that_answer_have_the_colour_of_it_and_the_others_none():
 
 def test_a_column_has_one_scale():
     weak, strong = response(), response(gain=7.0)
-    axes = responses.draw({"weak": weak, "strong": strong}).axes
+    axes = responses.draw_responses({"weak": weak, "strong": strong}).axes
     panels = [panel for panel in axes if panel.get_title().endswith("dynamic ramp")]
     assert [panel.get_title() for panel in panels] == ["weak: dynamic ramp", "strong: dynamic ramp"]
     assert [panel.collections[1].get_clim() for panel in panels] == [(0.0, 77.0)] * 2
@@ -48,7 +48,7 @@ def test_a_column_has_one_scale():
 
 def test_receptors_in_space_are_seen_from_below_and_dorsal_ones_are_squares():
     answer = response(columns=3)
-    axes = responses.draw({"mine": answer}).axes[0]
+    axes = responses.draw_responses({"mine": answer}).axes[0]
     answers = answer.dynamic_rate_hz > 0.0
     dorsal = answer.positions_mm[:, 1] > 0.0
     sides = [answers & ~dorsal, answers & dorsal]
@@ -63,14 +63,14 @@ def test_receptors_in_space_are_seen_from_below_and_dorsal_ones_are_squares():
 
 def test_a_population_that_stays_silent_is_drawn_hollow():
     silent = ResponseMap([[0.0, 0.0]], 1.0, SpikeTrains.from_lists([[]]), [0.0], [0.0], [np.nan])
-    assert png(responses.draw, {"silent": silent}).startswith(b"\x89PNG")
+    assert png(responses.draw_responses, {"silent": silent}).startswith(b"\x89PNG")
 
 
 def test_nobody_is_refused():
     with pytest.raises(InputError, match="at least one population"):
-        responses.draw({})
+        responses.draw_responses({})
 
 
 def test_a_picture_is_written_as_it_is_drawn(tmp_path):
-    path = write_png(responses.draw, {"mine": response()}, tmp_path / "deeper" / "map.png")
-    assert path.read_bytes() == png(responses.draw, {"mine": response()})
+    path = write_png(responses.draw_responses, {"mine": response()}, tmp_path / "deeper" / "map.png")
+    assert path.read_bytes() == png(responses.draw_responses, {"mine": response()})

@@ -17,7 +17,7 @@ from fingerpad.experiments.discrimination.task import DiscriminationTask, Stimul
 from fingerpad.experiments.discrimination.task_files import example_tasks, parse_task, read_task
 from fingerpad.experiments.discrimination.task_population import task_afferent, task_population
 from fingerpad.experiments.discrimination.task_stimuli import task_stimuli, task_touches
-from fingerpad.experiments.gerling2014.sphere_discrimination import touches as sphere_touches
+from fingerpad.experiments.gerling2014.sphere_discrimination import discrimination_touches
 from fingerpad.geometry.indenters import Bar, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.geometry.names import INDENTERS
@@ -97,7 +97,7 @@ def test_the_papers_spheres_are_the_very_touches_of_a_reproduction():
     ours = task_touches(read_task("sphere_curvature", resolution="quick"))
     theirs = {
         f"{curvature:g}": touch
-        for (at, curvature), touch in sphere_touches(Conditions("quick")).items()
+        for (at, curvature), touch in discrimination_touches(Conditions("quick")).items()
         if at == 0.0
     }
     assert ours == theirs

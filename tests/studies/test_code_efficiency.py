@@ -36,19 +36,19 @@ def found():
     tables = {
         name: np.array([read(answer) for answer in answers]) for name, read in RESPONSE_MEASURES.items()
     }
-    return code_efficiency.efficiencies(np.array(CURVATURES), tables, PAIRS, 0.06, seed=0)
+    return code_efficiency.code_efficiencies(np.array(CURVATURES), tables, PAIRS, 0.06, seed=0)
 
 
 def test_no_code_is_more_efficient_than_the_ideal_observer(found):
     rows = found
-    assert {(row["code"], row["measure"], row["noise"]) for row in rows} >= {
+    assert {(row.code, row.measure, row.noise) for row in rows} >= {
         ("Gradient Sum", "static", "multiplied"),
         ("Euclidean Distance", "latency", "multiplied"),
         ("Gradient Sum", "static", "Poisson"),
     }
     for row in rows:
-        assert row["efficiency"] < 1.0 + 3.0 * row["efficiency_error"]
-        assert row["proportion_correct"] <= row["ideal_proportion_correct"] + 0.01
+        assert row.efficiency < 1.0 + 3.0 * row.efficiency_error
+        assert row.proportion_correct <= row.ideal_proportion_correct + 0.01
 
 
 def test_silent_receptors_are_left_out_of_efficiencies():
@@ -56,16 +56,16 @@ def test_silent_receptors_are_left_out_of_efficiencies():
     static = np.array([[30.0, 0.0, 20.0, 10.0], [33.0, 0.0, 21.0, 9.0]])
     latency = np.array([[10.0, np.nan, 12.0, 30.0], [10.0, 70.0, 11.0, 33.0]])
     pairs = np.array([[0, 1], [1, 2], [0, 3]])
-    rows = code_efficiency.efficiencies(
+    rows = code_efficiency.code_efficiencies(
         curvatures, {"static": static, "latency": latency}, pairs, 0.1, seed=0
     )
-    assert [row["receptors"] for row in rows] == [3, 3, 3, 3, 4, 4]
-    alone = code_efficiency.efficiencies(
+    assert [row.receptors for row in rows] == [3, 3, 3, 3, 4, 4]
+    alone = code_efficiency.code_efficiencies(
         curvatures, {"static": static, "latency": latency[:, [0, 3]]}, np.array([[0, 1]]), 0.1, seed=0
     )
     # Of the pairs of latencies only that of receptors 0 and 3 has both.
-    assert alone[2]["code"] == rows[2]["code"] == "Gradient Sum"
-    assert rows[2]["d_prime"] == pytest.approx(alone[2]["d_prime"], abs=0.1)
+    assert alone[2].code == rows[2].code == "Gradient Sum"
+    assert rows[2].d_prime == pytest.approx(alone[2].d_prime, abs=0.1)
 
 
 def test_the_table_has_a_row_per_code_measure_and_noise(found):

@@ -92,7 +92,7 @@ def test_quick_and_standard_are_the_meshes_of_the_studies():
     for name in ("quick", "standard"):
         conditions = Conditions(name)
         assert list(levels[name].bars().values()) == single_unit.bar_touches(conditions)
-        assert levels[name].balls() == sphere_discrimination.touches(conditions)
+        assert levels[name].balls() == sphere_discrimination.discrimination_touches(conditions)
 
 
 def test_similar_meshes_press_the_same_at_the_same_places():
@@ -108,7 +108,7 @@ def test_similar_meshes_press_the_same_at_the_same_places():
 def test_each_single_change_moves_only_the_mesh_or_only_the_steps():
     standard = {
         "bar": single_unit.bar_touches(Conditions("standard"))[mesh_refinement.PEAK_SHIFT],
-        "sphere": sphere_discrimination.touches(Conditions("standard"))[0.0, 287.0],
+        "sphere": sphere_discrimination.discrimination_touches(Conditions("standard"))[0.0, 287.0],
     }
     for name, touches in mesh_refinement.single_changes().items():
         for touch in touches.values():

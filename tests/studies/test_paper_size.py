@@ -38,7 +38,7 @@ def test_touches_are_those_of_the_studies_on_half_of_the_finger(touches, name):
         *(bars[shift] for shift in paper_size.CHOSEN_SHIFTS),
         *(
             touch
-            for (_, curvature), touch in sphere_discrimination.touches(conditions).items()
+            for (_, curvature), touch in sphere_discrimination.discrimination_touches(conditions).items()
             if curvature in paper_size.CURVATURES
         ),
         *skin_deflection.deflection_touches(conditions).values(),

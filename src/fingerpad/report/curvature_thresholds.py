@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.report.formatting import fixed, number, plain
+from fingerpad.experiments.gerling2014.curvature_thresholds import CurvatureThresholds, PopulationThresholds
+from fingerpad.report.formatting import UNBROKEN, fixed, number
+from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import (
     BLACK,
     BLUE,
@@ -17,18 +16,17 @@ from fingerpad.report.style import (
     GREY,
     ORANGE,
     PALE,
+    LineStyle,
     new_figure,
-    numbers,
     say_nothing_to_draw,
 )
-from fingerpad.report.tables import UNBROKEN, Row, Table
 
 PER_CENT = 100.0
 CHANCE = 50.0
 _TOP = 45.0
-"""End of the axis of Weber fractions: an interval that no comparison bounds runs out of it. [%]"""
+"""End of the axis of Weber fractions; an interval without an upper bound extends beyond it. [%]"""
 
-STYLES: tuple[dict[str, Any], ...] = (
+STYLES: tuple[LineStyle, ...] = (
     {"color": BLACK, "linestyle": "-", "marker": "o"},
     {"color": BLUE, "linestyle": "--", "marker": "s"},
     {"color": ORANGE, "linestyle": "-.", "marker": "^"},
@@ -36,18 +34,8 @@ STYLES: tuple[dict[str, Any], ...] = (
 )
 
 
-def draw(section: Mapping[str, Any]) -> Figure:
-    """Draw Weber fractions by standard, and the curves behind them.
-
-    Parameters
-    ----------
-    section : mapping
-        `results["curvature_thresholds"]`.
-
-    Returns
-    -------
-    Figure
-    """
+def draw_thresholds(section: CurvatureThresholds) -> Figure:
+    """Draw Weber fractions by standard, and the curves behind them."""
     figure = new_figure(11.0, 4.6)
     fractions, curves = figure.subplots(1, 2)
     _fractions(fractions, section)
@@ -55,29 +43,28 @@ def draw(section: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def _fractions(axes: Axes, section: Mapping[str, Any]) -> None:
-    people, paper = section["literature"], section["populations"][0]
-    low, high = PER_CENT * numbers(people["weber_fractions"])
+def _fractions(axes: Axes, section: CurvatureThresholds) -> None:
+    people, paper = section.literature, section.populations[0]
+    low, high = PER_CENT * people.weber_fractions
     axes.axhspan(low, high, color=PALE, label=f"people, as reported: {number(low, 2)}-{number(high, 2)} %")
-    for population, style in zip(section["populations"], STYLES[1:], strict=False):
+    for population, style in zip(section.populations, STYLES[1:], strict=False):
         axes.plot(
-            numbers([entry["standard_per_m"] for entry in population["standards"]]),
-            PER_CENT * numbers([entry["weber_fraction"] for entry in population["standards"]]),
+            [entry.standard_per_m for entry in population.standards],
+            [PER_CENT * entry.weber_fraction for entry in population.standards],
             label=f"Gradient Sum, {_layout(population)} receptors",
             markersize=4.0,
             **style,
         )
-    at = numbers([entry["standard_per_m"] for entry in paper["standards"]])
-    fitted = PER_CENT * numbers([entry["fitted_weber_fraction"] for entry in paper["standards"]])
-    interval = PER_CENT * numbers([entry["fitted_interval"] for entry in paper["standards"]]).reshape(-1, 2).T
+    at = [entry.standard_per_m for entry in paper.standards]
+    fitted = PER_CENT * np.array([entry.fitted_weber_fraction for entry in paper.standards])
+    interval = PER_CENT * np.array([entry.fitted_interval for entry in paper.standards]).reshape(-1, 2).T
     axes.errorbar(at, fitted, yerr=np.abs(interval - fitted), color=BLUE, linestyle="none", capsize=3.0)
-    best = PER_CENT * numbers([entry["ideal_weber_fraction"] for entry in paper["standards"]])
+    best = [PER_CENT * entry.ideal_weber_fraction for entry in paper.standards]
     label = f"ideal observer, {_layout(paper)} receptors"
     axes.plot(at, best, color=GREY, linestyle=(0, (5, 2)), marker=".", label=label)
-    standard, comparison = numbers(people["standard_per_m"]), numbers(people["comparison_per_m"])
     axes.plot(
-        standard,
-        PER_CENT * (comparison / standard - 1.0),
+        people.standard_per_m,
+        PER_CENT * (people.comparison_per_m / people.standard_per_m - 1.0),
         "D",
         color=BLACK,
         markerfacecolor="none",
@@ -93,24 +80,23 @@ def _fractions(axes: Axes, section: Mapping[str, Any]) -> None:
     axes.legend(loc="upper right", fontsize=8.0)
 
 
-def _curves(axes: Axes, section: Mapping[str, Any]) -> None:
-    standards = section["populations"][0]["standards"]
+def _curves(axes: Axes, section: CurvatureThresholds) -> None:
+    standards = section.populations[0].standards
     if not standards:
-        say_nothing_to_draw(axes, "no sphere is told from any standard")
+        say_nothing_to_draw(axes, "no standard has a threshold")
         return
     axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)))
-    axes.axhline(PER_CENT * float(numbers(section["proportion"])), color=GREY, linewidth=0.8)
+    axes.axhline(PER_CENT * section.proportion, color=GREY, linewidth=0.8)
     for entry, style in zip(standards, _cycled(len(standards)), strict=True):
-        curve = entry["curve"]
         axes.plot(
-            PER_CENT * numbers(curve["step"]),
-            PER_CENT * numbers(curve["hit_rate"]),
+            PER_CENT * entry.curve.step,
+            PER_CENT * entry.curve.hit_rate,
             color=style["color"],
             linestyle=style["linestyle"],
         )
         axes.plot(
-            PER_CENT * numbers(entry["step"]),
-            PER_CENT * numbers(entry["hit_rate"]),
+            PER_CENT * entry.step,
+            PER_CENT * entry.hit_rate,
             color=style["color"],
             marker=style["marker"],
             linestyle=style["linestyle"],
@@ -118,7 +104,7 @@ def _curves(axes: Axes, section: Mapping[str, Any]) -> None:
             markersize=5.0,
         )
         # The legend shows line and marker together.
-        axes.plot([], [], label=f"{number(entry['standard_per_m'])} 1/m", markersize=5.0, **style)
+        axes.plot([], [], label=f"{number(entry.standard_per_m)} 1/m", markersize=5.0, **style)
     axes.set_title("(b) hit rates of the Gradient Sum and Weibull functions")
     axes.set_xlabel("comparison above the standard [%]")
     axes.set_ylabel("told from the standard [% of trials]")
@@ -126,13 +112,13 @@ def _curves(axes: Axes, section: Mapping[str, Any]) -> None:
     axes.legend(title="standard", loc="upper left")
 
 
-def _cycled(count: int) -> list[dict[str, Any]]:
+def _cycled(count: int) -> list[LineStyle]:
     return [STYLES[index % len(STYLES)] for index in range(count)]
 
 
-def caption(section: Mapping[str, Any]) -> str:
-    """Say what the figure shows, and how far to trust it."""
-    errors = np.abs(numbers([entry["error_per_m"] for entry in section["interpolation"]]))
+def caption_thresholds(section: CurvatureThresholds) -> str:
+    """Caption of the figure, with the error of interpolation."""
+    errors = np.abs([entry.error_per_m for entry in section.interpolation])
     foretold = (
         " Spheres of the paper, left out and foretold from the others, are met within "
         f"{number(float(errors.max()), 2)} 1/m."
@@ -144,36 +130,32 @@ def caption(section: Mapping[str, Any]) -> str:
         "of the standard: by the Gradient Sum of static rates of two populations, each with the noise that "
         "fits people at 287 1/m; by the ideal observer of the same rates (dashed); by people "
         "(diamonds; recalled, not read in the original). Bars: the 95 % interval of an experiment with "
-        f"{number(section['judgements'])} judgements of each comparison. (b) The hit rates of that "
+        f"{number(section.judgements)} judgements of each comparison. (b) The hit rates of that "
         "experiment and the psychometric functions through them, first population. Rates are interpolated "
         "between "
-        f"{len(section['pressed_per_m'])} pressed spheres.{foretold}"
+        f"{len(section.pressed_per_m)} pressed spheres.{foretold}"
     )
 
 
-def tables(section: Mapping[str, Any]) -> list[Table]:
+def threshold_tables(section: CurvatureThresholds) -> list[Table]:
     """Return thresholds by standard."""
     thresholds = [
         Row(
             (
                 _layout(population),
-                fixed(population["noise_sigma"], 3),
-                number(entry["standard_per_m"]),
-                fixed(entry["jnd_per_m"], 1),
-                _per_cent(entry["weber_fraction"]),
-                f"{_per_cent(entry['fitted_weber_fraction'])} "
-                f"({_per_cent(entry['fitted_interval'][0])} to {_per_cent(entry['fitted_interval'][1])})",
-                _per_cent(entry["ideal_weber_fraction"]),
+                fixed(population.noise_sigma, 3),
+                number(entry.standard_per_m),
+                fixed(entry.jnd_per_m, 1),
+                _per_cent(entry.weber_fraction),
+                f"{_per_cent(entry.fitted_weber_fraction)} "
+                f"({_per_cent(entry.fitted_interval[0])} to {_per_cent(entry.fitted_interval[1])})",
+                _per_cent(entry.ideal_weber_fraction),
             )
         )
-        for population in section["populations"]
-        for entry in population["standards"]
+        for population in section.populations
+        for entry in population.standards
     ]
-    missed = [
-        plain(entry["why_not"])
-        for population in section["populations"]
-        for entry in population["without_threshold"]
-    ]
+    missed = [entry.why_not for population in section.populations for entry in population.without_threshold]
     return [
         Table(
             "Curvature thresholds",
@@ -192,8 +174,8 @@ def tables(section: Mapping[str, Any]) -> list[Table]:
     ]
 
 
-def _layout(population: Mapping[str, Any]) -> str:
-    return f"{number(population['rows'])} by {number(population['columns'])}"
+def _layout(population: PopulationThresholds) -> str:
+    return f"{number(population.rows)} by {number(population.columns)}"
 
 
 def _per_cent(share: float | None) -> str:

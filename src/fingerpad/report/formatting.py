@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 ABSENT = "–"
+UNBROKEN = "\N{NO-BREAK SPACE}"
 PHASES = {"dynamic": "dynamic ramp", "static": "static hold"}
 PARAMETER_SYMBOLS = {
     "intercept_ma": "intercept β",
@@ -157,3 +158,14 @@ def whole_percent(share: float | None) -> str:
     ('93 %', '– %')
     """
     return f"{fixed(None if share is None else 100.0 * share, 0)} %"
+
+
+def with_error(value: float | None, error: float | None, decimals: int = 2) -> str:
+    """Return a number with its error, which no line break separates.
+
+    Examples
+    --------
+    >>> with_error(1.5, 0.25).replace(UNBROKEN, " ")
+    '1.50 ± 0.25'
+    """
+    return f"{fixed(value, decimals)}{UNBROKEN}±{UNBROKEN}{fixed(error, decimals)}"

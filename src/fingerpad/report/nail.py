@@ -1,8 +1,6 @@
-"""Figure 9: stress of the skin all over the finger, and how it rises at the border of the nail."""
+"""Figure 9: stress of the skin all over the finger, and its concentration at the border of the nail."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -12,57 +10,43 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.experiments.gerling2014.nail_border import NailBorder, StressProfile
 from fingerpad.report.formatting import number
-from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, numbers
+from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure
 
 DECADES = 4.0
 LABEL = "von Mises stress [kPa]"
 NEAR_NAIL = "von Mises stress about the nail [kPa]"
 
 
-def draw(section: dict[str, Any]) -> Figure:
-    """Draw Figure 9: the pressed finger to a logarithmic scale, and the nail's border to a linear one.
-
-    Parameters
-    ----------
-    section : dict
-        `results["nail"]`.
-
-    Returns
-    -------
-    Figure
-    """
+def draw_nail(section: NailBorder) -> Figure:
+    """Draw Figure 9: the pressed finger on a logarithmic scale, the border of the nail on a linear one."""
     figure = new_figure(13.0, 7.0)
     panels = figure.subplots(2, 3)
-    x, y, z = (numbers(section[key]) for key in ("x_mm", "y_mm", "z_mm"))
-    faces = numbers(section["von_mises_kpa"])
-    middle, across = section["middle"], section["across"]
-    inside = numbers(middle["von_mises_kpa"])
-    wide = _logarithmic(np.concatenate([faces.ravel(), inside]))
-    near = Normalize(0.0, section["border_kpa"] or 1.0)
-    nail = numbers(section["nail_mm"])
-    outlines = {name: _corners(values) for name, values in (("x", x), ("y", y), ("z", z))}
+    middle, across, nail = section.middle, section.across, section.nail_mm
+    stress = section.von_mises_kpa.ravel()
+    wide = _logarithmic(np.concatenate([stress, middle.von_mises_kpa]))
+    near = Normalize(0.0, section.border_kpa or 1.0)
+    outlines = {"x": _corners(section.x_mm), "y": _corners(section.y_mm), "z": _corners(section.z_mm)}
     both = [{**outlines, "z": sign * outlines["z"]} for sign in (1.0, -1.0)]
-    stress = faces.ravel()
 
     _seen(panels[0, 0], both, ("x", "z"), -outlines["y"], stress, wide)
     _seen(panels[0, 1], both[:1], ("x", "y"), outlines["z"], stress, wide)
-    _paint(panels[0, 2], np.stack([numbers(middle["x_mm"]), numbers(middle["y_mm"])], axis=-1), inside, wide)
+    _paint(panels[0, 2], np.stack([middle.x_mm, middle.y_mm], axis=-1), middle.von_mises_kpa, wide)
     _seen(panels[1, 0], both, ("x", "z"), outlines["y"], stress, near)
     for sign in (1.0, -1.0):
         _border(panels[1, 0], nail[..., [0, 2]] * [1.0, sign])
     _border(panels[0, 1], nail[..., [0, 1]])
-    cut = np.stack([numbers(across["z_mm"]), numbers(across["y_mm"])], axis=-1)
-    cut_stress = numbers(across["von_mises_kpa"])
-    _paint(panels[1, 1], np.concatenate([cut, cut * [-1.0, 1.0]]), np.tile(cut_stress, 2), near)
-    _profiles(panels[1, 2], section["profile"])
+    cut = np.stack([across.z_mm, across.y_mm], axis=-1)
+    _paint(panels[1, 1], np.concatenate([cut, cut * [-1.0, 1.0]]), np.tile(across.von_mises_kpa, 2), near)
+    _profiles(panels[1, 2], section.profile)
 
     titles = (
         ("(a) skin from below: the pad", "x, distal [mm]", "z, lateral [mm]"),
         ("(b) skin from the side", "x, distal [mm]", "y, dorsal [mm]"),
         ("(c) middle section, z = 0", "x, distal [mm]", "y, dorsal [mm]"),
         ("(d) skin from above: the nail", "x, distal [mm]", "z, lateral [mm]"),
-        (f"(e) section across, x = {number(across['x_mm'])} mm", "z, lateral [mm]", "y, dorsal [mm]"),
+        (f"(e) section across, x = {number(across.x_mm)} mm", "z, lateral [mm]", "y, dorsal [mm]"),
         ("(f) across the border of the nail", "distance from the nail [mm]", LABEL),
     )
     for axes, (title, right, up) in zip(panels.flat, titles, strict=True):
@@ -79,7 +63,7 @@ def draw(section: dict[str, Any]) -> Figure:
 
 
 def _logarithmic(stress: FloatArray) -> LogNorm:
-    """Colours over a fixed number of decades below the peak; what is weaker shares the darkest."""
+    """Colours over a fixed number of decades below the peak; smaller values have the darkest colour."""
     known = stress[np.isfinite(stress)]
     peak = known.max() if known.size and known.max() > 0.0 else 1.0
     return LogNorm(vmin=peak / 10.0**DECADES, vmax=peak, clip=True)
@@ -99,7 +83,7 @@ def _seen(
     stress: FloatArray,
     scale: Normalize,
 ) -> None:
-    """Draw the skin as seen from far away: what is nearer to the eye is drawn later and hides the rest."""
+    """Draw the skin as seen from far away: nearer faces are drawn later and hide the others."""
     outlines = np.concatenate([np.stack([half[plane[0]], half[plane[1]]], axis=-1) for half in halves])
     order = np.argsort(np.tile(near.mean(axis=1), len(halves)), kind="stable")
     _paint(axes, outlines[order], np.tile(stress, len(halves))[order], scale)
@@ -127,16 +111,15 @@ def _border(axes: Axes, edges: FloatArray) -> None:
     axes.add_collection(LineCollection(list(edges), colors="white", linewidths=1.2))
 
 
-def _profiles(axes: Axes, profile: dict[str, Any]) -> None:
+def _profiles(axes: Axes, profile: StressProfile) -> None:
     """Stress over distance from the nail: median and middle 80 % of the sections that cross its border."""
-    distance = numbers(profile["distance_mm"])
-    for key, name, colour, style in (
-        ("surface_kpa", "surface of the skin", ORANGE, "-"),
-        ("living_epidermis_kpa", "living epidermis", BLUE, "--"),
+    for stress_kpa, name, colour, style in (
+        (profile.surface_kpa, "surface of the skin", ORANGE, "-"),
+        (profile.living_epidermis_kpa, "living epidermis", BLUE, "--"),
     ):
-        low, median, high = numbers(profile[key]).T
-        axes.fill_between(distance, low, high, color=colour, alpha=0.2, linewidth=0.0)
-        axes.plot(distance, median, style, color=colour, label=name)
+        low, median, high = stress_kpa.T
+        axes.fill_between(profile.distance_mm, low, high, color=colour, alpha=0.2, linewidth=0.0)
+        axes.plot(profile.distance_mm, median, style, color=colour, label=name)
     axes.axvline(0.0, color=BLACK, linewidth=0.8)
     axes.set_ylim(bottom=0.0)
     axes.text(
@@ -145,9 +128,9 @@ def _profiles(axes: Axes, profile: dict[str, Any]) -> None:
     axes.legend(loc="upper right")
 
 
-def caption(section: dict[str, Any]) -> str:
-    """Say what Figure 9 shows and what the paper found."""
-    low, high = section["ratio_range"]
+def caption_nail(section: NailBorder) -> str:
+    """Caption of Figure 9."""
+    low, high = section.ratio_range
     return (
         "Von Mises stress under the standard sphere at the end of the hold, on the deformed finger: (a, b) "
         "in the outermost elements of the skin and (c) in the middle section, logarithmic over "
@@ -155,6 +138,6 @@ def caption(section: dict[str, Any]) -> str:
         "on a linear scale that ends at the highest stress at the border of the nail (its outline in white); "
         "(f) median and middle 80 % of all sections that cross that border. One half is computed and drawn "
         "with its mirror image. The paper shows high stresses at the border of the nail. "
-        f"Ratio of the border to the skin 2 to 3 mm away: {number(section['ratio'])} "
-        f"({number(low)} to {number(high)}). {section['text']}"
+        f"Ratio of the border to the skin 2 to 3 mm away: {number(section.ratio)} "
+        f"({number(low)} to {number(high)}). {section.text}"
     )

@@ -1,4 +1,4 @@
-"""Level 3, Figure 6: what a sheet of afferents answers to one sphere, as height, on the finger and flat."""
+"""Level 3, Figure 6: responses of a sheet of afferents to one sphere, as height, on the finger and flat."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.data import protocol
+from fingerpad.experiments.gerling2014.response_maps import FingerMap, PopulationMaps, RestingResponse
 from fingerpad.report.formatting import number
-from fingerpad.report.style import GREY, PALE, new_figure, numbers, say_nothing_to_draw
+from fingerpad.report.style import GREY, PALE, new_figure, say_nothing_to_draw
 
 QUANTITIES = {
     "dynamic_rate_hz": ("dynamic ramp", "rate [spikes/s]", "viridis", Normalize),
@@ -33,31 +34,20 @@ LIGHT = np.array([0.8, 0.3, -0.52])
 """Where the light on the finger comes from: distal, a little from the side, mostly from below (x, z, y)."""
 
 
-def draw(section: dict[str, Any]) -> Figure:
-    """Draw Figure 6: each quantity as a surface, as a map on the pressed finger, and flat with the receptors.
-
-    Parameters
-    ----------
-    section : dict
-        `results["population"]`.
-
-    Returns
-    -------
-    Figure
-    """
+def draw_population(section: PopulationMaps) -> Figure:
+    """Draw Figure 6: each quantity as a surface, on the pressed finger, and flat with the receptors."""
     figure = new_figure(14.0, 11.0)
     grid = figure.add_gridspec(3, 3, width_ratios=(1.05, 1.1, 1.0))
-    finger = _faces(section["finger"])
-    x, z = numbers(section["x_mm"]), numbers(section["z_mm"])
-    receptors = numbers(section["receptors_mm"]).reshape(-1, 2)
+    finger = _faces(section.finger)
+    x, z, receptors = section.x_mm, section.z_mm, section.receptors_mm
     for row, (key, (phase, label, colours, scaling)) in enumerate(QUANTITIES.items()):
-        values = numbers(section[key])
+        values = getattr(section, key)
         surface = figure.add_subplot(grid[row, 0], projection="3d")
         surface.set_title(f"({'abc'[row]}) {phase}")
         solid = figure.add_subplot(grid[row, 1], projection="3d")
         plane = figure.add_subplot(grid[row, 2])
         if np.isnan(values).all():
-            say_nothing_to_draw(plane, "no afferent fires a spike")
+            say_nothing_to_draw(plane, "no afferent fires")
             surface.set_axis_off()
             solid.set_axis_off()
             continue
@@ -95,7 +85,7 @@ def _surface(
     scale: Normalize,
 ) -> None:
     along, lateral = np.meshgrid(x, z, indexing="ij")
-    # Surfaces know no logarithmic axis: the heights are logarithms, and the ticks say of what.
+    # Surfaces have no logarithmic axis: the heights are logarithms, and the ticks show the values.
     logarithmic = isinstance(scale, LogNorm)
     axes.plot_surface(
         along,
@@ -119,17 +109,16 @@ def _surface(
     axes.set_box_aspect((1.25, 1.05, 0.85), zoom=1.0)
 
 
-def _faces(finger: dict[str, Any]) -> dict[str, FloatArray]:
-    """Corners of the deformed faces, (n_faces, 4, 3) in the order x, z, y, and what is known below each."""
-    x, y, z = (numbers(finger[key]) for key in ("x_mm", "y_mm", "z_mm"))
-    corners = np.stack([x, z, y], axis=-1)
+def _faces(finger: FingerMap) -> dict[str, FloatArray]:
+    """Corners of the deformed faces, (n_faces, 4, 3) in the order x, z, y, and the responses below each."""
+    corners = np.stack([finger.x_mm, finger.z_mm, finger.y_mm], axis=-1)
     around = (corners[:-1, :-1], corners[1:, :-1], corners[1:, 1:], corners[:-1, 1:])
     faces = np.stack(around, axis=2).reshape(-1, 4, 3)
     middle = faces.mean(axis=1)
     pad = (middle[:, 0] > PAD_FROM_MM) & (middle[:, 2] < PAD_BELOW_MM)
-    values = {key: numbers(finger[key]).ravel()[pad] for key in QUANTITIES}
+    values = {key: getattr(finger, key).ravel()[pad] for key in QUANTITIES}
     faces = faces[pad]
-    if finger["half"]:
+    if finger.half:
         faces = np.concatenate([faces, faces * [1.0, -1.0, 1.0]])
         values = {key: np.tile(entries, 2) for key, entries in values.items()}
     return {"corners_mm": faces} | values
@@ -194,23 +183,23 @@ def _map(
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
 
 
-def caption(section: dict[str, Any]) -> str:
-    """Say what Figure 6 shows."""
+def caption_population(section: PopulationMaps) -> str:
+    """Caption of Figure 6."""
     return (
-        f"Response of afferents all over the pad to a sphere of {number(section['curvature_per_m'])} 1/m, "
+        f"Response of afferents all over the pad to a sphere of {number(section.curvature_per_m)} 1/m, "
         f"{protocol.DEPTH.value} mm deep. Left: the quantity as a height, as the paper draws it, but "
         "latencies to a logarithmic scale. Middle: the same on the skin as it lies under the sphere at the "
         "end of the hold, seen from below, the tip to the right; grey skin does not answer. Right: seen from "
         "above; circles are the receptors that the observers of Figures 7 and 8 read, hatched places never "
-        f"fire.{_resting(section['at_rest'])}"
+        f"fire.{_resting(section.at_rest)}"
     )
 
 
-def _resting(rest: dict[str, Any]) -> str:
-    """Say what afferents do that are not touched, if they do anything."""
-    if rest["first_spike_latency_ms"] is None or np.isnan(rest["first_spike_latency_ms"]):
+def _resting(rest: RestingResponse) -> str:
+    """Describe the response of afferents without any touch, if there is one."""
+    if np.isnan(rest.first_spike_latency_ms):
         return ""
     return (
-        f" This afferent fires without any touch too, {number(rest['static_rate_hz'])} spikes/s from "
-        f"{number(rest['first_spike_latency_ms'])} ms on: grey is skin that makes it less than twice as fast."
+        f" This afferent fires without any touch too, {number(rest.static_rate_hz)} spikes/s from "
+        f"{number(rest.first_spike_latency_ms)} ms on: grey is skin that makes it less than twice as fast."
     )

@@ -1,9 +1,8 @@
-"""Level 3, beyond the paper: in which order a touch recruits afferents, and what changes that order."""
+"""Level 3, beyond the paper: the order in which a touch recruits afferents, and changes of that order."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,6 +10,7 @@ from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.data import protocol
+from fingerpad.experiments.gerling2014.response_maps import AfferentRecruitment, Recruitment
 from fingerpad.report.formatting import fixed, number
 from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import (
@@ -20,14 +20,14 @@ from fingerpad.report.style import (
     GREY,
     ORANGE,
     PALE,
+    LineStyle,
     new_figure,
-    numbers,
     say_nothing_to_draw,
 )
 
 CONTOURS_MS = (10.0, 20.0, 30.0, 50.0, 100.0, 200.0)
 LEAST_FOR_CONTOURS = 12
-LINES: tuple[dict[str, Any], ...] = (
+LINES: tuple[LineStyle, ...] = (
     {"color": BLUE, "linestyle": "-"},
     {"color": ORANGE, "linestyle": "--"},
     {"color": GREEN, "linestyle": ":"},
@@ -36,27 +36,15 @@ LINES: tuple[dict[str, Any], ...] = (
 MARKERS = ("o", "+", "x", "^")
 
 
-def draw(section: Mapping[str, Any]) -> Figure:
-    """Draw who fires when: ranks on the skin, recruitment over time, and latencies of one touch by another's.
-
-    Parameters
-    ----------
-    section : mapping
-        `results["population_timing"]["recruitment"]`, or what `studies.response_maps.recruitment` makes of
-        any responses.
-
-    Returns
-    -------
-    Figure
-    """
+def draw_recruitment(section: Recruitment) -> Figure:
+    """Draw the order of first spikes: ranks on the skin, recruitment over time, latencies of two touches."""
     figure = new_figure(11.0, 9.0)
     panels = figure.subplots(2, 2)
-    positions = numbers(section["positions_mm"])
-    shown = section["afferents"]
+    positions, shown = section.positions_mm, section.afferents
     window = _window(positions, shown)
     for axes, letter, touch in zip(panels[0], "ab", shown, strict=False):
         _ranks(axes, positions, touch, window)
-        axes.set_title(f"({letter}) order of first spikes, {touch['name']}")
+        axes.set_title(f"({letter}) order of first spikes, {touch.name}")
     if len(shown) < 2:
         say_nothing_to_draw(panels[0, 1], "no other touch")
     _over_time(panels[1, 0], section)
@@ -66,9 +54,9 @@ def draw(section: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def _window(positions: FloatArray, shown: Sequence[Mapping[str, Any]]) -> FloatArray:
+def _window(positions: FloatArray, shown: Sequence[AfferentRecruitment]) -> FloatArray:
     """Return the square about all afferents that fire, rows x and z, columns low and high. [mm]"""
-    fires = np.any([np.isfinite(numbers(touch["recruitment_rank"])) for touch in shown], axis=0)
+    fires = np.any([np.isfinite(touch.recruitment_rank) for touch in shown], axis=0)
     plane = positions[fires if fires.any() else slice(None)][:, [0, -1]]
     low, high = plane.min(axis=0), plane.max(axis=0)
     reach = 0.55 * max(float((high - low).max()), 1.0)
@@ -76,10 +64,10 @@ def _window(positions: FloatArray, shown: Sequence[Mapping[str, Any]]) -> FloatA
     return np.stack([middle - reach, middle + reach], axis=1)
 
 
-def _ranks(axes: Axes, positions: FloatArray, touch: Mapping[str, Any], window: FloatArray) -> None:
-    """Colour each afferent by its place in the order, and join places that fire together."""
+def _ranks(axes: Axes, positions: FloatArray, touch: AfferentRecruitment, window: FloatArray) -> None:
+    """Colour each afferent by its place in the order, with lines of equal latency."""
     x, z = positions[:, 0], positions[:, -1]
-    rank, latency = numbers(touch["recruitment_rank"]), numbers(touch["first_spike_latency_ms"])
+    rank, latency = touch.recruitment_rank, touch.first_spike_latency_ms
     fires = np.isfinite(rank)
     inside = (positions[:, [0, -1]] >= window[:, 0]) & (positions[:, [0, -1]] <= window[:, 1])
     size = _dot(int(inside.all(axis=1).sum()))
@@ -90,7 +78,7 @@ def _ranks(axes: Axes, positions: FloatArray, touch: Mapping[str, Any], window: 
     axes.set_xlabel("along the finger, x [mm]")
     axes.set_ylabel("across, z [mm]")
     if not fires.any():
-        axes.text(0.5, 0.5, "no afferent fires a spike", ha="center", color=GREY, transform=axes.transAxes)
+        axes.text(0.5, 0.5, "no afferent fires", ha="center", color=GREY, transform=axes.transAxes)
         return
     dots = axes.scatter(x[fires], z[fires], s=size, c=rank[fires], cmap="viridis_r", linewidths=0.0, vmin=1.0)
     axes.figure.colorbar(dots, ax=axes, label="place in the order", shrink=0.85)
@@ -101,16 +89,16 @@ def _ranks(axes: Axes, positions: FloatArray, touch: Mapping[str, Any], window: 
 
 
 def _dot(count: int) -> float:
-    """Area of a dot, so that many of them neither hide each other nor vanish. [points2]"""
+    """Area of a dot: smaller for more dots, within limits. [points2]"""
     return float(np.clip(30_000.0 / max(count, 1), 8.0, 120.0))
 
 
-def _over_time(axes: Axes, section: Mapping[str, Any]) -> None:
-    area = section["area_per_afferent_mm2"]
-    for line, touch in zip(LINES, section["afferents"], strict=False):
-        latency = np.sort(numbers(touch["first_spike_latency_ms"]))
+def _over_time(axes: Axes, section: Recruitment) -> None:
+    area = section.area_per_afferent_mm2
+    for line, touch in zip(LINES, section.afferents, strict=False):
+        latency = np.sort(touch.first_spike_latency_ms)
         latency = latency[np.isfinite(latency)]
-        axes.step(latency, area * np.arange(1, latency.size + 1), where="post", label=touch["name"], **line)
+        axes.step(latency, area * np.arange(1, latency.size + 1), where="post", label=touch.name, **line)
     axes.axvline(protocol.RAMP.value, color=GREY, linewidth=0.8)
     axes.text(
         protocol.RAMP.value, 0.02, " end of ramp", transform=axes.get_xaxis_transform(), color=GREY, size=8
@@ -123,14 +111,14 @@ def _over_time(axes: Axes, section: Mapping[str, Any]) -> None:
     axes.legend(loc="upper left")
 
 
-def _beside(axes: Axes, shown: Sequence[Mapping[str, Any]]) -> None:
+def _beside(axes: Axes, shown: Sequence[AfferentRecruitment]) -> None:
     if len(shown) < 2:
         say_nothing_to_draw(axes, "no other touch")
         return
-    first = numbers(shown[0]["first_spike_latency_ms"])
+    first = shown[0].first_spike_latency_ms
     for line, marker, touch in zip(LINES[1:], MARKERS[1:], shown[1:], strict=False):
-        other = numbers(touch["first_spike_latency_ms"])
-        axes.plot(first, other, marker, markersize=3.5, color=line["color"], label=touch["name"])
+        other = touch.first_spike_latency_ms
+        axes.plot(first, other, marker, markersize=3.5, color=line["color"], label=touch.name)
     known = first[np.isfinite(first)]
     if known.size:
         span = [known.min(), known.max()]
@@ -139,19 +127,19 @@ def _beside(axes: Axes, shown: Sequence[Mapping[str, Any]]) -> None:
         axes.set_yscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_major_formatter("{x:g}")
-    axes.set_xlabel(f"latency under {shown[0]['name']} [ms]")
+    axes.set_xlabel(f"latency under {shown[0].name} [ms]")
     axes.set_ylabel("latency under another touch [ms]")
     axes.legend(loc="upper left")
 
 
-def caption(section: Mapping[str, Any]) -> str:
-    """Say what the figure shows, and how little or how much the order changes."""
-    first, *others = section["touches"]
+def caption_recruitment(section: Recruitment) -> str:
+    """Caption of the figure, with the changes of the order."""
+    first, *others = section.touches
     changes = "; ".join(
-        f"{touch['name']}: rank correlation {fixed(touch['rank_correlation'], 3)}, "
-        f"{percent(touch['swapped'])} of the pairs swap"
+        f"{touch.name}: rank correlation {fixed(touch.rank_correlation, 3)}, "
+        f"{percent(touch.swapped)} of the pairs swap"
         for touch in others
-        if touch["name"] in {shown["name"] for shown in section["afferents"]}
+        if touch.name in {shown.name for shown in section.afferents}
     )
     return (
         "Recruitment by first spikes; one dot per afferent of a dense sheet. (a, b) Place in the order, the "
@@ -159,39 +147,31 @@ def caption(section: Mapping[str, Any]) -> str:
         "recruited. (c) Skin whose afferents have fired. (d) Latency of each afferent under one touch and "
         "another: on the line nothing changes, and an order changes only where dots scatter about a rising "
         "curve. "
-        + (f"Against {first['name']}: {changes}. " if changes else "")
-        + resting(section, "They count as recruited if touch halves that time at least. ")
+        + (f"Against {first.name}: {changes}. " if changes else "")
+        + resting_note(
+            section.resting_latency_ms, "They count as recruited if touch halves that time at least. "
+        )
         + "The paper (section 4.2) names the order of first spikes as a code and does not use it."
     )
 
 
-def tables(section: Mapping[str, Any]) -> list[Table]:
-    """Return recruitment under every touch, and how its order differs from that under the first.
-
-    Parameters
-    ----------
-    section : mapping
-        As for `draw`.
-
-    Returns
-    -------
-    list of Table
-    """
+def recruitment_tables(section: Recruitment) -> list[Table]:
+    """Return recruitment under every touch, and how its order differs from that under the first."""
     rows = [
         Row(
             (
-                touch["name"],
-                fixed(touch["recruited_mm2"], 1),
-                fixed(touch["recruited_in_ramp_mm2"], 1),
-                fixed(touch["first_ms"], 1),
-                fixed(touch["median_ms"], 1),
-                fixed(touch["rank_correlation"], 3),
-                percent(touch["swapped"]),
+                touch.name,
+                fixed(touch.recruited_mm2, 1),
+                fixed(touch.recruited_in_ramp_mm2, 1),
+                fixed(touch.first_ms, 1),
+                fixed(touch.median_ms, 1),
+                fixed(touch.rank_correlation, 3),
+                percent(touch.swapped),
             )
         )
-        for touch in section["touches"]
+        for touch in section.touches
     ]
-    first = section["touches"][0]["name"]
+    first = section.touches[0].name
     return [
         Table(
             "Recruitment by first spikes",
@@ -211,18 +191,17 @@ def tables(section: Mapping[str, Any]) -> list[Table]:
     ]
 
 
-def resting(section: Mapping[str, Any], then: str) -> str:
-    """Say when afferents fire without a touch and what follows from it; nothing if they do not.
+def resting_note(latency_ms: float, then: str) -> str:
+    """Return when afferents fire without a touch, and what follows from it; nothing if they do not.
 
     Examples
     --------
-    >>> resting({"resting_latency_ms": 258.3}, "So they do.")
+    >>> resting_note(258.3, "So they do.")
     'Without any touch these afferents first fire at 258 ms. So they do.'
-    >>> resting({"resting_latency_ms": None}, "So they do.")
+    >>> resting_note(np.nan, "So they do.")
     ''
     """
-    latency_ms = section["resting_latency_ms"]
-    if latency_ms is None or not np.isfinite(latency_ms):
+    if not np.isfinite(latency_ms):
         return ""
     return f"Without any touch these afferents first fire at {number(latency_ms)} ms. {then}"
 

@@ -14,6 +14,7 @@ from fingerpad.experiments.gerling2014.claim_row import ClaimRow
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult
+from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 from fingerpad.report import (
     curvature_thresholds,
     discrimination,
@@ -23,9 +24,8 @@ from fingerpad.report import (
     population_rate,
     recruitment,
     single_unit_uncertainty,
-    tables,
 )
-from fingerpad.report.formatting import fixed, joined, number, plain
+from fingerpad.report.formatting import fixed, joined, number, plain, whole_percent
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.page import write_html
 from fingerpad.report.parts import Chapter, Drawing, Kind, Page, Row, Table
@@ -162,15 +162,15 @@ def _population_and_percept(result: ReproductionResult) -> list[Chapter]:
                     6,
                     "population",
                     "Rates and latencies under a sphere",
-                    population.draw,
-                    population.caption,
+                    population.draw_population,
+                    population.caption_population,
                     result.population,
                 )
             ],
         )
     ]
     if (timing := result.population_timing) is not None:
-        order, rates = timing["recruitment"], timing["rates"]
+        order, rates = timing.recruitment, timing.rates
         chapters.append(
             Chapter(
                 "Level 3: population over time",
@@ -179,19 +179,19 @@ def _population_and_percept(result: ReproductionResult) -> list[Chapter]:
                         13,
                         "recruitment",
                         "Order of first spikes",
-                        recruitment.draw,
-                        recruitment.caption,
+                        recruitment.draw_recruitment,
+                        recruitment.caption_recruitment,
                         order,
                     ),
                     _drawing(
                         14,
                         "population_rate",
                         "Population rate over time",
-                        population_rate.draw,
-                        population_rate.caption,
+                        population_rate.draw_population_rate,
+                        population_rate.caption_population_rate,
                         rates,
                     ),
-                    *recruitment.tables(order),
+                    *recruitment.recruitment_tables(order),
                 ],
             )
         )
@@ -223,8 +223,7 @@ def _population_and_percept(result: ReproductionResult) -> list[Chapter]:
                     discrimination.caption_noise,
                     found,
                 ),
-                *tables.hit_rates(found),
-                *tables.readings(found),
+                *discrimination.discrimination_tables(found),
             ],
         )
     )
@@ -233,14 +232,19 @@ def _population_and_percept(result: ReproductionResult) -> list[Chapter]:
             16,
             "curvature_thresholds",
             "Least difference of curvature",
-            curvature_thresholds.draw,
-            curvature_thresholds.caption,
+            curvature_thresholds.draw_thresholds,
+            curvature_thresholds.caption_thresholds,
             thresholds,
         )
         chapters.append(
-            Chapter("Level 3: curvature thresholds", [drawing, *curvature_thresholds.tables(thresholds)])
+            Chapter(
+                "Level 3: curvature thresholds",
+                [drawing, *curvature_thresholds.threshold_tables(thresholds)],
+            )
         )
-    drawing = _drawing(9, "nail", "Stress at the border of the nail", nail.draw, nail.caption, result.nail)
+    drawing = _drawing(
+        9, "nail", "Stress at the border of the nail", nail.draw_nail, nail.caption_nail, result.nail
+    )
     return [*chapters, Chapter("The border of the nail", [drawing])]
 
 
@@ -272,28 +276,19 @@ def _afferent(section: SingleUnitResult) -> str:
     )
 
 
-def _percept(section: dict[str, Any]) -> str:
-    rates = section.get("gradient_sum", {}).get("static") or {}
-    people, comparison = section.get("goodwin") or {}, section["curvature_per_m"][1:]
+def _percept(section: SphereDiscrimination) -> str:
+    people, comparison = section.goodwin, section.curvature_per_m[1:].tolist()
+    rates = section.gradient_sum["static"].hit_rate
     told = [
-        f"{number(curvature)} 1/m in {_percent(rates['hit_rate'][comparison.index(curvature)])} of trials "
-        f"(people: {_percent(observed)})"
-        for curvature, observed in zip(
-            people.get("curvature_per_m", []), people.get("hit_rate", []), strict=True
-        )
-        if rates and curvature in comparison
+        f"{number(curvature)} 1/m in {whole_percent(rates[comparison.index(curvature)])} of trials "
+        f"(people: {whole_percent(observed)})"
+        for curvature, observed in zip(people.curvature_per_m.tolist(), people.hit_rate, strict=True)
     ]
-    if not told:
-        return ""
     return (
-        f"Percept: with noise of {number(section.get('noise_sigma'))}, the static Gradient Sum discriminates "
+        f"Percept: with noise of {number(section.noise_sigma)}, the static Gradient Sum discriminates "
         f"spheres of {joined(told)} from the standard; the paper's noise is "
-        f"{number(section.get('noise_sigma_paper'))}."
+        f"{number(section.noise_sigma_paper)}."
     )
-
-
-def _percent(fraction: float | None) -> str:
-    return "an unknown share" if fraction is None else f"{100.0 * fraction:.0f} %"
 
 
 def _verdicts(comparison: Sequence[ClaimRow]) -> str:

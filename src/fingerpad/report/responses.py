@@ -1,9 +1,9 @@
-"""Figures of any population: where its afferents lie and what each of them answers to a touch."""
+"""Figures of any population: where its afferents lie and how each of them responds to a touch."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import LogNorm, Normalize
@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.signals import ResponseMap
 from fingerpad.report.population import QUANTITIES, round_ticks
-from fingerpad.report.style import GREY, new_figure, numbers
+from fingerpad.report.style import GREY, new_figure
 
 PANEL_IN = (3.9, 3.3)
 POINTS_PER_PANEL = 180.0
@@ -22,40 +23,16 @@ ROOM_MM = 0.5
 """Least skin to be seen about the receptors. [mm]"""
 
 
-class Response(Protocol):
-    """What a `ResponseMap` knows, or anything like it."""
-
-    @property
-    def positions_mm(self) -> FloatArray:
-        """Places of the receptors, (n, 2) or (n, 3). [mm]"""
-
-    @property
-    def pitch_mm(self) -> float:
-        """Distance between neighbours. [mm]"""
-
-    @property
-    def dynamic_rate_hz(self) -> FloatArray:
-        """Rate in the ramp, (n,). [spikes/s]"""
-
-    @property
-    def static_rate_hz(self) -> FloatArray:
-        """Rate in the hold, (n,). [spikes/s]"""
-
-    @property
-    def first_spike_latency_ms(self) -> FloatArray:
-        """Time of the first spike, NaN without one, (n,). [ms]"""
-
-
-def draw(responses: Mapping[str, Response]) -> Figure:
+def draw_responses(responses: Mapping[str, ResponseMap]) -> Figure:
     """Draw populations, one per row, coloured by dynamic rate, static rate and first-spike latency.
 
-    They are seen from below, x to the right; receptors on the dorsal side (y above 0) are squares, and hollow
-    ones stay silent. A column has one scale.
+    They are seen from below, x to the right. Receptors on the dorsal side (y above 0) are squares; hollow
+    ones do not respond. A column has one scale.
 
     Parameters
     ----------
     responses : mapping of str to ResponseMap
-        Answers by the name of the population, of the touch, or both.
+        Responses by the name of the population, of the touch, or both.
 
     Returns
     -------
@@ -72,10 +49,10 @@ def draw(responses: Mapping[str, Response]) -> Figure:
     figure = new_figure(3 * width, len(responses) * height)
     grid = figure.subplots(len(responses), 3, squeeze=False)
     for panels, (key, (phase, label, colours, scaling)) in zip(grid.T, QUANTITIES.items(), strict=True):
-        scale = _scale([numbers(getattr(response, key)) for response in responses.values()], scaling)
+        scale = _scale([getattr(response, key) for response in responses.values()], scaling)
         for axes, (name, response) in zip(panels, responses.items(), strict=True):
             axes.set_title(f"{name}: {phase}" if axes in grid[:, 0] else phase)
-            dots = _dots(axes, response, numbers(getattr(response, key)), colours, scale)
+            dots = _dots(axes, response, getattr(response, key), colours, scale)
         bar = figure.colorbar(dots, ax=panels.tolist(), label=label, shrink=0.85, fraction=0.05, aspect=30)
         if isinstance(scale, LogNorm):
             bar.set_ticks(round_ticks(scale))
@@ -93,9 +70,9 @@ def _scale(columns: list[FloatArray], scaling: type[Normalize]) -> Normalize:
     return scaling(low if low < high else 0.5 * high, high)
 
 
-def _dots(axes: Any, response: Response, values: FloatArray, colours: str, scale: Normalize) -> Any:
-    """Draw one mark per receptor; those that do not answer hollow."""
-    positions = numbers(response.positions_mm)
+def _dots(axes: Any, response: ResponseMap, values: FloatArray, colours: str, scale: Normalize) -> Any:
+    """Draw one mark per receptor; those that do not respond are hollow."""
+    positions = response.positions_mm
     plane = positions[:, [0, -1]]
     low, high = plane.min(axis=0) - ROOM_MM, plane.max(axis=0) + ROOM_MM
     spacing_pt = POINTS_PER_PANEL * response.pitch_mm / float((high - low).max())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import matplotlib
 import numpy as np
@@ -47,6 +47,14 @@ STYLE: Any = {
     "hatch.linewidth": 0.6,
     "savefig.dpi": RESOLUTION_DPI,
 }
+
+
+class LineStyle(TypedDict, total=False):
+    """How a line is drawn, as keywords of Matplotlib."""
+
+    color: str
+    linestyle: str
+    marker: str
 
 
 def numbers(values: Any) -> FloatArray:

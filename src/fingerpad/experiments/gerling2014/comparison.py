@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from fingerpad.data import paper
 from fingerpad.data.published import Published
 from fingerpad.experiments.gerling2014.claim_row import MATERIALS, ClaimRow, claim_row, measured_row
-from fingerpad.experiments.gerling2014.curvature_thresholds import weber_rows
-from fingerpad.experiments.gerling2014.percept_claims import percept_rows
+from fingerpad.experiments.gerling2014.curvature_thresholds import CurvatureThresholds, weber_claims
+from fingerpad.experiments.gerling2014.discrimination_claims import discrimination_claims
+from fingerpad.experiments.gerling2014.nail_border import NailBorder
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.skin_deflection import IndenterDeflection, SkinDeflectionResult
+from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 
 LEAST_R2 = 0.93
 """R² that Trial 3 must reach under the cylinder: the laboratory's own later fit."""
@@ -22,9 +21,9 @@ LEAST_R2 = 0.93
 def comparison(
     skin: SkinDeflectionResult,
     unit: SingleUnitResult,
-    discrimination: Mapping[str, Any],
-    nail: Mapping[str, Any],
-    curvature_thresholds: Mapping[str, Any] | None = None,
+    discrimination: SphereDiscrimination,
+    nail: NailBorder,
+    curvature_thresholds: CurvatureThresholds | None = None,
 ) -> list[ClaimRow]:
     """Rows of the table that compares a reproduction with the paper.
 
@@ -42,8 +41,8 @@ def comparison(
     return [
         *_deflection(skin),
         *_single_unit(unit),
-        *percept_rows(discrimination),
-        *weber_rows(curvature_thresholds),
+        *discrimination_claims(discrimination),
+        *weber_claims(curvature_thresholds),
         *_nail(nail),
     ]
 
@@ -135,17 +134,17 @@ def _single_unit(found: SingleUnitResult) -> list[ClaimRow]:
     return rows
 
 
-def _nail(found: Mapping[str, Any]) -> list[ClaimRow]:
-    low, high = found["ratio_range"]
+def _nail(found: NailBorder) -> list[ClaimRow]:
+    low, high = found.ratio_range
     return [
         claim_row(
             "Von Mises stress of the skin at the border of the nail over that 2 to 3 mm away (Figure 9)",
             "high concentrations (figure)",
-            f"{found['ratio']:.1f} times",
+            f"{found.ratio:.1f} times",
             "",
             MATERIALS + "; width of the nail assumed",
             None,
-            f"{low:.1f} to {high:.1f} over the sections, {found['border_kpa']:.2g} kPa at most; energy "
-            f"density in the living epidermis {found['ratio_energy']:.1f} times; the paper gives no number",
+            f"{low:.1f} to {high:.1f} over the sections, {found.border_kpa:.2g} kPa at most; energy "
+            f"density in the living epidermis {found.ratio_energy:.1f} times; the paper gives no number",
         )
     ]

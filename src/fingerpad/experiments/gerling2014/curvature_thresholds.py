@@ -1,9 +1,9 @@
-"""Beyond the paper: the least curvature told apart, from standard to standard.
+"""Beyond the paper: curvature thresholds from standard to standard.
 
     JND(s) = c - s,    where the comparison c is told from the standard s in 75 % of trials
     Weber fraction = JND / s
 
-A few spheres are pressed; between them the rates of every receptor are interpolated in the logarithm of the
+A few spheres are pressed. Between them the rates of every receptor are interpolated in the logarithm of the
 curvature (monotone cubic), so that any sphere can be a standard or a comparison.
 """
 
@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -20,6 +19,7 @@ from scipy.optimize import brentq
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.random_streams import Purpose, normals
+from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.data import psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014.claim_row import MATERIALS, ClaimRow, claim_row
@@ -38,11 +38,11 @@ from fingerpad.skin.sampling import SkinResponse
 
 STANDARDS_PER_M = (144.0, 200.0, 287.0, 400.0)
 PRESSED_PER_M = (144.0, 165.0, 190.0, 218.0, 250.0, 400.0, 445.0, 540.0)
-"""Beside the paper's spheres: they reach from the least standard to beyond what the greatest is told from."""
+"""Beside the paper's spheres: from the least standard to beyond the threshold of the greatest."""
 
 LAYOUTS = {"paper": (3, 6), "square": (6, 6)}
-"""Receptors along the finger and across: the paper's 18, and as many along as across, which see all sides of
-a sphere that is flat and touches more skin."""
+"""Receptors along the finger and across: the paper's 18, and as many along as across, which cover the larger
+contact of a flatter sphere on all sides."""
 
 STEPS = (0.03, 0.06, 0.09, 0.12, 0.16, 0.21)
 """Comparisons of an experiment: how much more curved than the standard, as a share of it."""
@@ -52,10 +52,168 @@ JUDGEMENTS = int(psychophysics.GOODWIN_TRIALS.value)
 """Per comparison of an experiment."""
 
 LEFT_OUT_PER_M = (296.0, 305.0, 316.0, 328.0, 340.0)
-"""Spheres that are also foretold from the others, to see what interpolation is worth."""
+"""Spheres whose responses are also predicted from the others, which gives the error of interpolation."""
 
 
-def touches(conditions: Conditions) -> dict[float, Touch]:
+@result_class
+class PsychometricCurve:
+    """A psychometric function of the difference.
+
+    Parameters
+    ----------
+    step : array (n,)
+        How much more curved than the standard, as a share of it.
+    hit_rate : array (n,)
+        [0-1]
+    """
+
+    step: Vector
+    hit_rate: Vector
+
+
+@result_class
+class CurvatureThreshold:
+    """Threshold at one standard.
+
+    Parameters
+    ----------
+    standard_per_m, jnd_per_m : float
+        The standard and the just noticeable difference of the model. [1/m]
+    weber_fraction, ideal_weber_fraction : float
+        Threshold over standard, and that of the ideal observer from Fisher's information.
+    step, hit_rate : array (n_comparisons,)
+        Comparisons of an experiment as shares of the standard, and their hit rates. [0-1]
+    fitted_weber_fraction, fitted_interval : float, (float, float)
+        Threshold of the Weibull function through the counts of that experiment, and its 95 % interval.
+    curve : PsychometricCurve
+        That function.
+    """
+
+    standard_per_m: float
+    jnd_per_m: float
+    weber_fraction: float
+    ideal_weber_fraction: float
+    step: Vector
+    hit_rate: Vector
+    fitted_weber_fraction: Number
+    fitted_interval: tuple[Number, Number]
+    curve: PsychometricCurve
+
+
+@result_class
+class MissingThreshold:
+    """A standard without a threshold.
+
+    Parameters
+    ----------
+    standard_per_m : float or None
+        None stands for all standards. [1/m]
+    why_not : str
+        The reason.
+    """
+
+    standard_per_m: float | None
+    why_not: str
+
+
+@result_class
+class PopulationThresholds:
+    """Thresholds of one population.
+
+    Parameters
+    ----------
+    layout : str
+        One of `LAYOUTS`.
+    rows, columns : int
+        Receptors along the finger and across.
+    noise_sigma : float
+        Standard deviation of the multiplicative noise; NaN if none fits people.
+    gradient_sum : array (n_spheres,)
+        Of static rates, without noise. [spikes/s]
+    standards : tuple of CurvatureThreshold
+        Standards with a threshold.
+    without_threshold : tuple of MissingThreshold
+        The others.
+    """
+
+    layout: str
+    rows: int
+    columns: int
+    noise_sigma: Number
+    gradient_sum: Vector
+    standards: tuple[CurvatureThreshold, ...]
+    without_threshold: tuple[MissingThreshold, ...]
+
+
+@result_class
+class ThresholdsOfPeople:
+    """Thresholds of people in the literature.
+
+    Parameters
+    ----------
+    standard_per_m, comparison_per_m : array (n,)
+        Standards and the comparisons at threshold. [1/m]
+    weber_fractions : array (2,)
+        Smallest and largest reported fraction.
+    """
+
+    standard_per_m: Vector
+    comparison_per_m: Vector
+    weber_fractions: Vector
+
+
+@result_class
+class InterpolationError:
+    """Gradient Sum of a pressed sphere and of its interpolation from the others.
+
+    Parameters
+    ----------
+    curvature_per_m : float
+        Of the sphere. [1/m]
+    pressed, foretold : float
+        The two sums. [spikes/s]
+    error_per_m : float
+        Difference as a curvature, by the slope of the sum. [1/m]
+    """
+
+    curvature_per_m: float
+    pressed: float
+    foretold: float
+    error_per_m: Number
+
+
+@result_class
+class CurvatureThresholds:
+    """Thresholds of the static Gradient Sum at several standards.
+
+    Parameters
+    ----------
+    seed : int
+        Of the random numbers.
+    proportion : float
+        Hit rate at threshold. [0-1]
+    judgements : int
+        Per comparison of an experiment.
+    pressed_per_m : array (n_spheres,)
+        Pressed spheres. [1/m]
+    populations : tuple of PopulationThresholds
+        By layout, the paper's first.
+    literature : ThresholdsOfPeople
+        To compare with.
+    interpolation : tuple of InterpolationError
+        Of the spheres in `LEFT_OUT_PER_M`.
+    """
+
+    seed: int
+    proportion: float
+    judgements: int
+    pressed_per_m: Vector
+    populations: tuple[PopulationThresholds, ...]
+    literature: ThresholdsOfPeople
+    interpolation: tuple[InterpolationError, ...]
+
+
+def threshold_touches(conditions: Conditions) -> dict[float, Touch]:
     """Spheres that the paper does not have; keys are curvatures. [1/m]"""
     return sphere_touches(conditions, PRESSED_PER_M)
 
@@ -65,17 +223,17 @@ def sphere_touches(conditions: Conditions, curvatures_per_m: Sequence[float]) ->
     return {curvature: conditions.sphere_touch(curvature) for curvature in curvatures_per_m}
 
 
-def result(
+def curvature_thresholds(
     responses: Mapping[float, SkinResponse], afferent: Afferent, noise_sigma: float, seed: int
-) -> dict[str, Any]:
+) -> CurvatureThresholds:
     """Thresholds of the static Gradient Sum at several standards.
 
     Parameters
     ----------
     responses : mapping
-        From curvature to solved touch at 0.0 mm: `touches`, and the paper's spheres. [1/m]
+        From curvature to solved touch at 0.0 mm: `threshold_touches`, and the paper's spheres. [1/m]
     afferent : Afferent
-        All of the population.
+        Model of every afferent of the population.
     noise_sigma : float
         Standard deviation of the multiplicative noise, as fitted to Goodwin's two points.
     seed : int
@@ -83,30 +241,30 @@ def result(
 
     Returns
     -------
-    dict
-        Plain numbers, units in the names.
+    CurvatureThresholds
     """
     curvatures = np.array(sorted(responses))
-    populations = [
-        _thresholds_of(name, responses, curvatures, afferent, noise_sigma if name == "paper" else None, seed)
-        for name in LAYOUTS
-    ]
     population = _population("paper", afferent)
     neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
     static = np.array([population.respond(responses[at]).static_rate_hz for at in curvatures.tolist()])
-    return {
-        "seed": seed,
-        "proportion": PROPORTION,
-        "judgements": JUDGEMENTS,
-        "pressed_per_m": curvatures,
-        "populations": populations,
-        "literature": {
-            "standard_per_m": psychophysics.THRESHOLD_STANDARDS.value,
-            "comparison_per_m": psychophysics.THRESHOLD_COMPARISONS.value,
-            "weber_fractions": psychophysics.WEBER_FRACTIONS.value,
-        },
-        "interpolation": interpolation_errors(curvatures, static, neighbours),
-    }
+    return CurvatureThresholds(
+        seed=seed,
+        proportion=PROPORTION,
+        judgements=JUDGEMENTS,
+        pressed_per_m=curvatures,
+        populations=tuple(
+            _thresholds_of(
+                name, responses, curvatures, afferent, noise_sigma if name == "paper" else None, seed
+            )
+            for name in LAYOUTS
+        ),
+        literature=ThresholdsOfPeople(
+            standard_per_m=np.array(psychophysics.THRESHOLD_STANDARDS.value),
+            comparison_per_m=np.array(psychophysics.THRESHOLD_COMPARISONS.value),
+            weber_fractions=np.array(psychophysics.WEBER_FRACTIONS.value),
+        ),
+        interpolation=interpolation_errors(curvatures, static, neighbours),
+    )
 
 
 def _population(name: str, afferent: Afferent) -> Population:
@@ -121,33 +279,33 @@ def _thresholds_of(
     afferent: Afferent,
     noise_sigma: float | None,
     seed: int,
-) -> dict[str, Any]:
+) -> PopulationThresholds:
     """Thresholds of one population at every standard; its noise is fitted to people unless it is given."""
     population = _population(name, afferent)
     neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
     static = np.array([population.respond(responses[c]).static_rate_hz for c in curvatures.tolist()])
     draws = normals(seed, 1, len(population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
-    found: list[dict[str, Any]] = []
-    missed: list[dict[str, Any]] = []
+    found: list[CurvatureThreshold] = []
+    missed: list[MissingThreshold] = []
     try:
         noise = _fitted_noise(curvatures, static, neighbours, draws) if noise_sigma is None else noise_sigma
     except ConvergenceError as error:
-        noise, missed = math.nan, [{"standard_per_m": None, "why_not": _first_line(error)}]
+        noise, missed = math.nan, [MissingThreshold(standard_per_m=None, why_not=_first_line(error))]
     observer = Observer(interpolated(curvatures, static), neighbours, noise, draws)
     for standard in STANDARDS_PER_M if math.isfinite(noise) else ():
         try:
             found.append(threshold_at(observer, standard))
         except ConvergenceError as error:
-            missed.append({"standard_per_m": standard, "why_not": _first_line(error)})
-    return {
-        "layout": name,
-        "rows": LAYOUTS[name][0],
-        "columns": LAYOUTS[name][1],
-        "noise_sigma": noise,
-        "gradient_sum": gradient_sum(static, neighbours),
-        "standards": found,
-        "without_threshold": missed,
-    }
+            missed.append(MissingThreshold(standard_per_m=standard, why_not=_first_line(error)))
+    return PopulationThresholds(
+        layout=name,
+        rows=LAYOUTS[name][0],
+        columns=LAYOUTS[name][1],
+        noise_sigma=noise,
+        gradient_sum=gradient_sum(static, neighbours),
+        standards=tuple(found),
+        without_threshold=tuple(missed),
+    )
 
 
 def _fitted_noise(
@@ -163,24 +321,34 @@ def _first_line(error: Exception) -> str:
     return str(error).splitlines()[0]
 
 
-def weber_rows(section: Mapping[str, Any] | None) -> list[ClaimRow]:
-    """Hold Weber fractions beside people's, a row per population; none where nothing was pressed."""
-    if not section:
+def weber_claims(found: CurvatureThresholds | None) -> list[ClaimRow]:
+    """Compare Weber fractions with people's, one row per population.
+
+    Parameters
+    ----------
+    found : CurvatureThresholds or None
+        Without it there are no rows.
+
+    Returns
+    -------
+    list of ClaimRow
+    """
+    if found is None:
         return []
-    low, high = section["literature"]["weber_fractions"]
+    low, high = found.literature.weber_fractions
     rows = []
-    for population in section["populations"]:
-        found = [entry["weber_fraction"] for entry in population["standards"]]
-        at = ", ".join(f"{entry['standard_per_m']:g}" for entry in population["standards"])
-        missed = [entry["why_not"] for entry in population["without_threshold"]]
+    for population in found.populations:
+        fractions = [threshold.weber_fraction for threshold in population.standards]
+        at = ", ".join(f"{threshold.standard_per_m:g}" for threshold in population.standards)
+        missed = [missing.why_not for missing in population.without_threshold]
         rows.append(
             claim_row(
-                f"Curvature told apart in 75 %, {population['rows']} by {population['columns']} receptors",
+                f"Curvature told apart in 75 %, {population.rows} by {population.columns} receptors",
                 f"people: {low:.0%} to {high:.0%} of the standard",
-                ", ".join(f"{fraction:.1%}" for fraction in found),
+                ", ".join(f"{fraction:.1%}" for fraction in fractions),
                 "",
                 MATERIALS + "; people's fractions recalled",
-                bool(found) and not missed and all(low <= round(share, 2) <= high for share in found),
+                bool(fractions) and not missed and all(low <= round(share, 2) <= high for share in fractions),
                 "; ".join([f"static Gradient Sum, standards {at} /m; judged in whole per cent", *missed]),
             )
         )
@@ -193,7 +361,7 @@ def interpolated(curvature_per_m: FloatArray, table: FloatArray) -> PchipInterpo
 
 
 class Observer:
-    """Tells spheres apart by the Gradient Sum of interpolated rates.
+    """Discriminates spheres by the Gradient Sum of interpolated rates.
 
     Parameters
     ----------
@@ -221,27 +389,24 @@ class Observer:
         return self.rates(np.log(curvature_per_m), 1) / curvature_per_m
 
     def hit_rate(self, standard_per_m: float, comparison_per_m: float) -> float:
-        """How often the comparison is told from the standard."""
+        """Hit rate of the comparison against the standard. [0-1]"""
         pair = [self.responses(standard_per_m), self.responses(comparison_per_m)]
         return float(expected_hit_rates(pair, self.neighbours, self.noise_sigma, self.draws)[0])
 
 
-def threshold_at(observer: Observer, standard_per_m: float) -> dict[str, Any]:
-    """Just noticeable difference at a standard, and what an experiment would find there.
+def threshold_at(observer: Observer, standard_per_m: float) -> CurvatureThreshold:
+    """Just noticeable difference at a standard, and the result of an experiment there.
 
     Parameters
     ----------
     observer : Observer
-        Who judges.
+        Model that judges.
     standard_per_m : float
         Curvature of the standard. [1/m]
 
     Returns
     -------
-    dict
-        The model's own threshold, and threshold and interval of a psychometric function of the difference
-        (Weibull's) through the counts of an experiment. The ideal observer's threshold is that of Fisher's
-        information.
+    CurvatureThreshold
 
     Raises
     ------
@@ -269,23 +434,23 @@ def threshold_at(observer: Observer, standard_per_m: float) -> dict[str, Any]:
     heard = rates > 0.0  # noise that multiplies silence is none: docs/decisions/ideal-observer.md
     information = gaussian_information(rates[heard], slopes[heard], observer.noise_sigma)
     ideal_jnd_per_m = d_prime_of_proportion(PROPORTION, yes_no) / np.sqrt(information)
-    return {
-        "standard_per_m": standard_per_m,
-        "jnd_per_m": jnd_per_m,
-        "weber_fraction": jnd_per_m / standard_per_m,
-        "ideal_weber_fraction": float(ideal_jnd_per_m) / standard_per_m,
-        "step": steps,
-        "hit_rate": hit_rate,
-        "fitted_weber_fraction": fit.threshold(PROPORTION),
-        "fitted_interval": posterior(fit).threshold_interval(PROPORTION),
-        "curve": {"step": at, "hit_rate": fit.predict(at)},
-    }
+    return CurvatureThreshold(
+        standard_per_m=standard_per_m,
+        jnd_per_m=jnd_per_m,
+        weber_fraction=jnd_per_m / standard_per_m,
+        ideal_weber_fraction=float(ideal_jnd_per_m) / standard_per_m,
+        step=steps,
+        hit_rate=hit_rate,
+        fitted_weber_fraction=fit.threshold(PROPORTION),
+        fitted_interval=posterior(fit).threshold_interval(PROPORTION),
+        curve=PsychometricCurve(step=at, hit_rate=fit.predict(at)),
+    )
 
 
 def interpolation_errors(
     curvature_per_m: FloatArray, table: FloatArray, neighbours: np.ndarray
-) -> list[dict[str, float]]:
-    """Say what the Gradient Sum of some pressed spheres would be if they had been interpolated.
+) -> tuple[InterpolationError, ...]:
+    """Predict the Gradient Sum of some pressed spheres from the others.
 
     Parameters
     ----------
@@ -298,9 +463,8 @@ def interpolation_errors(
 
     Returns
     -------
-    list of dict
-        `curvature_per_m`, the sum as `pressed` and `foretold` [spikes/s], and the error as a curvature, by
-        the rise of the sum there: `error_per_m`.
+    tuple of InterpolationError
+        One per sphere of `LEFT_OUT_PER_M` among them.
     """
     sums = gradient_sum(table, neighbours)
     rise = np.gradient(sums, curvature_per_m)
@@ -310,11 +474,11 @@ def interpolation_errors(
         rates = interpolated(curvature_per_m[others], table[others])(np.log(curvature_per_m[row]))
         foretold = float(gradient_sum(rates, neighbours))
         found.append(
-            {
-                "curvature_per_m": float(curvature_per_m[row]),
-                "pressed": float(sums[row]),
-                "foretold": foretold,
-                "error_per_m": float((foretold - sums[row]) / rise[row]) if rise[row] else math.nan,
-            }
+            InterpolationError(
+                curvature_per_m=float(curvature_per_m[row]),
+                pressed=float(sums[row]),
+                foretold=foretold,
+                error_per_m=float((foretold - sums[row]) / rise[row]) if rise[row] else math.nan,
+            )
         )
-    return found
+    return tuple(found)

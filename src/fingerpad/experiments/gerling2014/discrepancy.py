@@ -1,84 +1,173 @@
-"""Why our percept differs from the paper's: how steeply responses rise, and how else a step may be read."""
+"""Analysis of the discrepancy between the percept of the model and the paper's.
+
+How steeply responses rise with curvature, which rise the paper's noise would need, and what other
+interpretations of steps that the paper leaves open would give.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError
+from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_class
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.gerling2014 import goodwin
-from fingerpad.experiments.gerling2014.percept_sessions import CRITERION_SIGMAS, Measured
+from fingerpad.experiments.gerling2014.discrimination_sessions import CRITERION_SIGMAS, Measured
 from fingerpad.psychophysics.discrimination import END_OF_STIMULUS_MS, Experiment, discriminate_gradient_sum
 from fingerpad.psychophysics.encoding import answering_neighbours, gradient_sum, neighbour_pairs
-from fingerpad.psychophysics.noise_fit import (
-    NoiseFit,
-    expected_euclidean_hit_rates,
-    expected_hit_rates,
-    fit_noise_sigma,
-)
+from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
 
 PATIENCE_MS = protocol.RAMP.value
 """How long an observer waits who waits for first spikes until the ramp ends. [ms]"""
 
 DRAWS = 1000
-"""Common random presentations behind each reading."""
+"""Common random presentations behind each interpretation."""
 
-SMALLEST_NOISE, LARGEST_NOISE = 1e-4, 2.0
 CURVE_NOISE = tuple(round(0.01 * step, 2) for step in range(1, 31))
-"""Noise over which the misfit of every code is told."""
+"""Noise at which the misfit of every code is computed."""
 
 STEEPEST = 20.0
-"""Times our rise, beyond which no rise is looked for."""
+"""Largest multiple of the model's rise that is tried."""
 
 
-def expected(measures: Sequence[Measured], noise_sigma: float, standard_normals: FloatArray) -> FloatArray:
-    """Return the expected hit rates (n_positions, n_comparisons) of the Gradient Sum."""
-    return np.array(
-        [expected_hit_rates(one.responses, one.neighbours, noise_sigma, standard_normals) for one in measures]
-    )
+@result_class
+class Interpretation:
+    """One interpretation of the steps that the paper leaves open, and its hit rates.
+
+    Parameters
+    ----------
+    reading : str
+        What it is.
+    receptors : int array (n_positions,)
+        Receptors that take part.
+    rise : array (n_positions,)
+        Share by which the Gradient Sum rises from the standard to the farthest sphere.
+    hit_rate : array (n_positions, n_comparisons)
+        With the noise of the study. [0-1]
+    largest_shift : float
+        Largest change of these by the shift. [0-1]
+    noise_sigma, misfit, own_largest_shift : float
+        Noise that fits people best, root mean square distance to them and largest change by the shift with
+        it; NaN where no noise does. [1], [0-1], [0-1]
+    """
+
+    reading: str
+    receptors: WholeVector
+    rise: Vector
+    hit_rate: Matrix
+    largest_shift: Number
+    noise_sigma: Number = np.nan
+    misfit: Number = np.nan
+    own_largest_shift: Number = np.nan
 
 
-def fitted_noise(
-    measures: Sequence[Measured], curvature_per_m: Sequence[float], standard_normals: FloatArray
-) -> NoiseFit:
-    """Fit one noise to Goodwin's two points at all positions.
+@result_class
+class CriterionErrorBars:
+    """Mean error bar by the spread of the criterion, for two interpretations of what varies.
+
+    Parameters
+    ----------
+    criterion_sigma : array (n_spreads,)
+        Standard deviation of the criterion.
+    point, fraction : array (n_spreads,)
+        Error bar if the decision point varies, or the fraction beta that places it. [0-1]
+    """
+
+    criterion_sigma: Vector
+    point: Vector
+    fraction: Vector
+
+
+@result_class
+class MisfitCurve:
+    """Expected root mean square distance to Goodwin's points over the noise.
+
+    Parameters
+    ----------
+    noise_sigma : array (n_levels,)
+        Noise sigma_1.
+    misfit : dict of array (n_levels,)
+        By code. [0-1]
+    """
+
+    noise_sigma: Vector
+    misfit: dict[str, Vector]
+
+
+@result_class
+class EuclideanFit:
+    """Noise that fits the Euclidean Distance to people, NaN and None if none does.
+
+    Parameters
+    ----------
+    noise_sigma : float
+        Noise sigma_1.
+    misfit : float
+        Root mean square distance to Goodwin's points. [0-1]
+    hit_rate : array (n_positions, n_comparisons) or None
+        With that noise. [0-1]
+    """
+
+    noise_sigma: Number = np.nan
+    misfit: Number = np.nan
+    hit_rate: Matrix | None = None
+
+
+@result_class
+class DiscrepancyAnalysis:
+    """Numbers behind the differences between the model's percept and the paper's.
+
+    Parameters
+    ----------
+    rise : dict of array (n_positions,)
+        Share by which the Gradient Sum rises from the standard to the farthest sphere, by measure.
+    rise_for_paper_noise : dict of array (n_positions,)
+        Rise with which the paper's noise would give Goodwin's hit rate; NaN if none does.
+    readings : tuple of Interpretation
+        Interpretations of the steps that the paper leaves open.
+    criterion : CriterionErrorBars
+        Of a varied criterion.
+    misfit_curve : MisfitCurve
+        Of every code.
+    euclidean : EuclideanFit
+        With a noise of its own.
+    """
+
+    rise: dict[str, Vector]
+    rise_for_paper_noise: dict[str, Vector]
+    readings: tuple[Interpretation, ...]
+    criterion: CriterionErrorBars
+    misfit_curve: MisfitCurve
+    euclidean: EuclideanFit
+
+
+def expected_of_measure(
+    measures: Sequence[Measured], noise_sigma: float, standard_normals: FloatArray
+) -> FloatArray:
+    """Return the expected hit rates (n_positions, n_comparisons) of the Gradient Sum.
 
     Parameters
     ----------
     measures : sequence of Measured
         One response measure, position by position.
-    curvature_per_m : sequence of float
-        The spheres, the standard first. [1/m]
+    noise_sigma : float
+        Standard deviation of the noise.
     standard_normals : array (n_draws, n_receptors)
         Draws from Normal(0, 1).
-
-    Returns
-    -------
-    NoiseFit
-        `hit_rates` position by position.
-
-    Raises
-    ------
-    ConvergenceError
-        If no noise meets the points.
     """
-    columns = [list(curvature_per_m).index(curvature) - 1 for curvature in goodwin.CURVATURES]
-    return fit_noise_sigma(
-        lambda sigma: expected(measures, sigma, standard_normals)[:, columns].ravel(),
-        np.tile(goodwin.HIT_RATES, len(measures)),
-        (SMALLEST_NOISE, LARGEST_NOISE),
+    return np.array(
+        [expected_hit_rates(one.responses, one.neighbours, noise_sigma, standard_normals) for one in measures]
     )
 
 
-def first_spikes(latency_ms: FloatArray, neighbours: np.ndarray) -> Measured:
-    """Latencies of the receptors that fire under every sphere; the others take no part.
+def answering_latencies(latency_ms: FloatArray, neighbours: np.ndarray) -> Measured:
+    """Latencies of the receptors that fire under every sphere; the others are left out.
 
     Parameters
     ----------
@@ -101,7 +190,7 @@ def first_spikes(latency_ms: FloatArray, neighbours: np.ndarray) -> Measured:
     return Measured(np.where(silent, 0.0, latency_ms), pairs)
 
 
-def reasons(
+def discrepancy_analysis(
     measures: Mapping[str, Sequence[Measured]],
     latency_ms: Sequence[FloatArray],
     positions_mm: FloatArray,
@@ -110,13 +199,13 @@ def reasons(
     noise_sigma: float,
     standard_normals: FloatArray,
     seed: int,
-) -> dict[str, Any]:
-    """Put numbers behind the disagreements.
+) -> DiscrepancyAnalysis:
+    """Compute the numbers behind the discrepancies.
 
     Parameters
     ----------
     measures : dict of sequences of Measured
-        As the study reads them, by measure and position.
+        As the study decodes them, by measure and position.
     latency_ms : sequence of arrays (n_spheres, n_receptors)
         First spikes at every position, NaN without one. [ms]
     positions_mm, pitch_mm
@@ -132,71 +221,58 @@ def reasons(
 
     Returns
     -------
-    dict
-        `rise` of the Gradient Sum from the standard to the farthest comparison, by measure and position, and
-        the rise with which the paper's noise would give Goodwin's hit rate, `rise_for_paper_noise`, as
-        shares; `readings` of steps that the paper leaves open; `criterion`, error bars of both readings of a
-        varied criterion; `misfit_curve`, root mean square distance to Goodwin's points over the noise, by
-        code; `euclidean`, the noise that this strategy would choose.
+    DiscrepancyAnalysis
     """
     draws = standard_normals[:DRAWS]
-    columns = [list(curvature_per_m).index(curvature) - 1 for curvature in goodwin.CURVATURES]
-    codes = {name: partial(expected, both, standard_normals=draws) for name, both in measures.items()}
+    columns = goodwin.goodwin_columns(curvature_per_m)
+    codes: dict[str, Callable[..., FloatArray]] = {
+        name: partial(expected_of_measure, both, standard_normals=draws) for name, both in measures.items()
+    }
     codes["euclidean"] = partial(_expected_euclidean, measures["static"])
-    return {
-        "rise": {
-            name: [_rise(one.responses, one.neighbours) for one in both] for name, both in measures.items()
-        },
-        "rise_for_paper_noise": {
-            name: [rise_needed(one, psychophysics.NOISE_SIGMA.value, draws) for one in both]
+    interpretations = _interpretations(measures, latency_ms, positions_mm, pitch_mm)
+    return DiscrepancyAnalysis(
+        rise={name: _rises(both) for name, both in measures.items()},
+        rise_for_paper_noise={
+            name: np.array([rise_needed(one, psychophysics.NOISE_SIGMA.value, draws) for one in both])
             for name, both in measures.items()
         },
-        "readings": [
-            {"reading": name, **_judged(both, curvature_per_m, noise_sigma, draws)}
-            for name, both in _readings(measures, latency_ms, positions_mm, pitch_mm).items()
-        ],
-        "criterion": _criterion(measures["static"][0], noise_sigma, seed),
-        "misfit_curve": {
-            "noise_sigma": CURVE_NOISE,
-            "misfit": {
-                name: [_misfit(rates(noise_sigma=sigma)[:, columns]) for sigma in CURVE_NOISE]
+        readings=tuple(
+            _judged(name, both, curvature_per_m, noise_sigma, draws) for name, both in interpretations.items()
+        ),
+        criterion=_criterion(measures["static"][0], noise_sigma, seed),
+        misfit_curve=MisfitCurve(
+            noise_sigma=np.array(CURVE_NOISE),
+            misfit={
+                name: np.array(
+                    [goodwin.goodwin_misfit(rates(noise_sigma=sigma)[:, columns]) for sigma in CURVE_NOISE]
+                )
                 for name, rates in codes.items()
             },
-        },
-        "euclidean": _own_euclidean(codes["euclidean"], columns),
-    }
+        ),
+        euclidean=_euclidean_fit(measures["static"], curvature_per_m),
+    )
 
 
 def _expected_euclidean(static: Sequence[Measured], noise_sigma: float) -> FloatArray:
     return np.array([expected_euclidean_hit_rates(one.responses, noise_sigma) for one in static])
 
 
-def _misfit(hit_rates: FloatArray) -> float:
-    return float(np.sqrt(np.square(hit_rates - goodwin.HIT_RATES).mean()))
-
-
-def _own_euclidean(rates: Callable[..., FloatArray], columns: list[int]) -> dict[str, Any]:
-    """Noise that the Euclidean Distance would choose, and what it reaches with it."""
+def _euclidean_fit(static: Sequence[Measured], curvature_per_m: Sequence[float]) -> EuclideanFit:
+    """Noise that fits the Euclidean Distance best, and what it reaches with it."""
+    rates = partial(_expected_euclidean, static)
     try:
-        own = fit_noise_sigma(
-            lambda sigma: rates(noise_sigma=sigma)[:, columns].ravel(),
-            np.tile(goodwin.HIT_RATES, len(rates(noise_sigma=LARGEST_NOISE))),
-            (SMALLEST_NOISE, LARGEST_NOISE),
-        )
+        own = goodwin.fit_noise_to_goodwin(rates, curvature_per_m, len(static))
     except ConvergenceError:
-        return {"noise_sigma": None, "misfit": None, "hit_rate": None}
-    return {
-        "noise_sigma": own.noise_sigma,
-        "misfit": own.root_mean_square_error,
-        "hit_rate": rates(noise_sigma=own.noise_sigma),
-    }
+        return EuclideanFit()
+    return EuclideanFit(
+        noise_sigma=own.noise_sigma, misfit=own.root_mean_square_error, hit_rate=rates(own.noise_sigma)
+    )
 
 
-def rise_needed(measured: Measured, noise_sigma: float, standard_normals: FloatArray) -> float | None:
+def rise_needed(measured: Measured, noise_sigma: float, standard_normals: FloatArray) -> float:
     """Rise of the Gradient Sum that gives the farthest sphere Goodwin's hit rate at some noise.
 
-    The pattern is kept: responses go the way from the standard's to the farthest comparison's, less or more
-    far than they do.
+    The pattern is kept: the change of responses from the standard to the farthest comparison is scaled.
 
     Parameters
     ----------
@@ -209,8 +285,8 @@ def rise_needed(measured: Measured, noise_sigma: float, standard_normals: FloatA
 
     Returns
     -------
-    float or None
-        As a share of the standard's sum; None if no rise does it.
+    float
+        As a share of the standard's sum; NaN if no rise does it.
     """
     standard, farthest = measured.responses[[0, -1]]
 
@@ -222,7 +298,7 @@ def rise_needed(measured: Measured, noise_sigma: float, standard_normals: FloatA
         return float(rates[0]) - goodwin.HIT_RATES[-1]
 
     if np.array_equal(standard, farthest) or missed(STEEPEST) < 0.0:
-        return None
+        return float("nan")
     return _rise(pair(brentq(missed, 0.0, STEEPEST, xtol=1e-6)), measured.neighbours)
 
 
@@ -232,13 +308,17 @@ def _rise(responses: FloatArray, neighbours: np.ndarray) -> float:
     return float(sums[-1] / sums[0] - 1.0) if sums[0] else float("nan")
 
 
-def _readings(
+def _rises(measures: Sequence[Measured]) -> FloatArray:
+    return np.array([_rise(one.responses, one.neighbours) for one in measures])
+
+
+def _interpretations(
     measures: Mapping[str, Sequence[Measured]],
     latency_ms: Sequence[FloatArray],
     positions_mm: FloatArray,
     pitch_mm: float,
 ) -> dict[str, list[Measured]]:
-    """Measures as the study reads them, and as one might; a reading that leaves nothing falls away."""
+    """Measures as the study decodes them, and alternatives; one without any pair of receptors is left out."""
     eight, four = (neighbour_pairs(positions_mm, pitch_mm, count) for count in (8, 4))
     early = [np.where(latency <= PATIENCE_MS, latency, np.nan) for latency in latency_ms]
     found = {
@@ -247,7 +327,7 @@ def _readings(
         "dynamic, eight neighbours (used)": list(measures.get("dynamic", [])),
         "latency of receptors that fire under every sphere (used)": list(measures.get("latency", [])),
         "latency of receptors that fire within the ramp under every sphere": [
-            first_spikes(latency, eight) for latency in early if np.isfinite(latency).any()
+            answering_latencies(latency, eight) for latency in early if np.isfinite(latency).any()
         ],
         "latency, waiting until the ramp ends": [
             Measured(np.fmin(latency, PATIENCE_MS), eight) for latency in latency_ms
@@ -265,42 +345,45 @@ def _readings(
 
 
 def _judged(
-    both: Sequence[Measured], curvature_per_m: Sequence[float], noise_sigma: float, draws: FloatArray
-) -> dict[str, Any]:
-    """Hit rates of a reading at the study's noise and at its own, which may not exist."""
-    at_study = expected(both, noise_sigma, draws)
-    judged = {
-        "receptors": [len(np.unique(one.neighbours)) for one in both],
-        "rise": [_rise(one.responses, one.neighbours) for one in both],
-        "hit_rate": at_study,
-        "largest_shift": float(np.abs(at_study[1] - at_study[0]).max()),
-    }
+    name: str,
+    both: Sequence[Measured],
+    curvature_per_m: Sequence[float],
+    noise_sigma: float,
+    draws: FloatArray,
+) -> Interpretation:
+    """Hit rates of an interpretation at the study's noise and at its own, which may not exist."""
+    rates = partial(expected_of_measure, both, standard_normals=draws)
+    at_study = rates(noise_sigma)
+    found = Interpretation(
+        reading=name,
+        receptors=np.array([len(np.unique(one.neighbours)) for one in both]),
+        rise=_rises(both),
+        hit_rate=at_study,
+        largest_shift=float(np.abs(at_study[1] - at_study[0]).max()),
+    )
     try:
-        own = fitted_noise(both, curvature_per_m, draws)
+        own = goodwin.fit_noise_to_goodwin(rates, curvature_per_m, len(both))
     except ConvergenceError:
-        return judged | {"noise_sigma": None, "misfit": None, "own_largest_shift": None}
-    at_own = expected(both, own.noise_sigma, draws)
-    return judged | {
-        "noise_sigma": own.noise_sigma,
-        "misfit": own.root_mean_square_error,
-        "own_largest_shift": float(np.abs(at_own[1] - at_own[0]).max()),
-    }
+        return found
+    at_own = rates(own.noise_sigma)
+    return replace(
+        found,
+        noise_sigma=own.noise_sigma,
+        misfit=own.root_mean_square_error,
+        own_largest_shift=float(np.abs(at_own[1] - at_own[0]).max()),
+    )
 
 
-def _criterion(static: Measured, noise_sigma: float, seed: int) -> dict[str, Any]:
+def _criterion(static: Measured, noise_sigma: float, seed: int) -> CriterionErrorBars:
     """Mean error bar when the decision point varies, and when the fraction that places it does."""
-    return {
-        moves: [
-            float(
-                discriminate_gradient_sum(
-                    static.responses,
-                    static.neighbours,
-                    noise_sigma,
-                    seed,
-                    Experiment(criterion_sigma=sigma, criterion_moves=moves),
-                ).hit_rate_sd.mean()
-            )
-            for sigma in CRITERION_SIGMAS
-        ]
+
+    def mean_error_bar(sigma: float, moves: str) -> float:
+        plan = Experiment(criterion_sigma=sigma, criterion_moves=moves)
+        rates = discriminate_gradient_sum(static.responses, static.neighbours, noise_sigma, seed, plan)
+        return float(rates.hit_rate_sd.mean())
+
+    point, fraction = (
+        np.array([mean_error_bar(sigma, moves) for sigma in CRITERION_SIGMAS])
         for moves in ("point", "fraction")
-    } | {"criterion_sigma": CRITERION_SIGMAS}
+    )
+    return CriterionErrorBars(criterion_sigma=np.array(CRITERION_SIGMAS), point=point, fraction=fraction)

@@ -1,20 +1,49 @@
-"""What people did with Goodwin's spheres: two hit rates, how sure they are, and the line through them."""
+"""Hit rates of people with Goodwin's spheres: two points, their uncertainty, and the line through them."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtr, ndtri
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.results import Vector, result_class
 from fingerpad.data import psychophysics
 from fingerpad.psychophysics.counts import binomial_interval
+from fingerpad.psychophysics.noise_fit import NoiseFit, fit_noise_sigma
 
 CURVATURES = psychophysics.GOODWIN_CURVATURES.value
 HIT_RATES = psychophysics.GOODWIN_HIT_RATES.value
 TRIALS = int(psychophysics.GOODWIN_TRIALS.value)
+
+SMALLEST_NOISE, LARGEST_NOISE = 1e-4, 2.0
+"""Range in which the noise that fits people is sought."""
+
+
+@result_class
+class GoodwinHitRates:
+    """Hit rates of people.
+
+    Parameters
+    ----------
+    curvature_per_m : array (2,)
+        Comparison spheres. [1/m]
+    hit_rate, low, high : array (2,)
+        Observed fractions and their binomial 95 % intervals. [0-1]
+    trials : int
+        Trials behind each fraction (assumed).
+    line : array (n_comparisons,)
+        Hit rates at the spheres of the study on the line that is straight in z. [0-1]
+    """
+
+    curvature_per_m: Vector
+    hit_rate: Vector
+    trials: int
+    low: Vector
+    high: Vector
+    line: Vector
 
 
 def line_in_z(curvature_per_m: ArrayLike) -> FloatArray:
@@ -40,8 +69,8 @@ def line_in_z(curvature_per_m: ArrayLike) -> FloatArray:
     return ndtr(z_near + slope_m * (np.asarray(curvature_per_m, dtype=np.float64) - near))
 
 
-def observed(curvature_per_m: ArrayLike) -> dict[str, Any]:
-    """Gather what is known of people, and the line at the spheres that are compared.
+def goodwin_hit_rates(curvature_per_m: ArrayLike) -> GoodwinHitRates:
+    """Observed hit rates of people, and the line at the comparison spheres.
 
     Parameters
     ----------
@@ -50,15 +79,90 @@ def observed(curvature_per_m: ArrayLike) -> dict[str, Any]:
 
     Returns
     -------
-    dict
-        `curvature_per_m`, `hit_rate`, `trials`, `low` and `high` of the two points, and `line`.
+    GoodwinHitRates
     """
     low, high = binomial_interval(HIT_RATES, TRIALS)
-    return {
-        "curvature_per_m": CURVATURES,
-        "hit_rate": HIT_RATES,
-        "trials": TRIALS,
-        "low": low,
-        "high": high,
-        "line": line_in_z(curvature_per_m),
-    }
+    return GoodwinHitRates(
+        curvature_per_m=np.array(CURVATURES),
+        hit_rate=np.array(HIT_RATES),
+        trials=TRIALS,
+        low=low,
+        high=high,
+        line=line_in_z(curvature_per_m),
+    )
+
+
+def goodwin_columns(curvature_per_m: Sequence[float]) -> list[int]:
+    """Find Goodwin's two spheres among the comparisons.
+
+    Parameters
+    ----------
+    curvature_per_m : sequence of float
+        The spheres of the study, the standard first. [1/m]
+
+    Returns
+    -------
+    list of int
+        Their places among the comparisons, from 0.
+
+    Examples
+    --------
+    >>> goodwin_columns([287.0, 296.0, 316.0, 365.0])
+    [0, 2]
+    """
+    return [list(curvature_per_m).index(curvature) - 1 for curvature in CURVATURES]
+
+
+def goodwin_misfit(hit_rates: FloatArray, axis: int | tuple[int, ...] | None = None) -> FloatArray:
+    """Root mean square distance of hit rates to people's.
+
+    Parameters
+    ----------
+    hit_rates : array (..., 2)
+        At Goodwin's two spheres. [0-1]
+    axis : int or tuple of int, optional
+        Over which to take the mean. Default: all.
+
+    Returns
+    -------
+    array
+        [0-1]
+
+    Examples
+    --------
+    >>> float(goodwin_misfit(np.array([0.58, 0.93])).round(4))
+    0.0141
+    """
+    return np.sqrt(np.square(hit_rates - np.array(HIT_RATES)).mean(axis=axis))
+
+
+def fit_noise_to_goodwin(
+    hit_rates: Callable[[float], FloatArray], curvature_per_m: Sequence[float], n_positions: int
+) -> NoiseFit:
+    """Fit one noise to Goodwin's two points at all positions of the spheres.
+
+    Parameters
+    ----------
+    hit_rates : callable
+        Hit rates (n_positions, n_comparisons) at a given noise sigma_1.
+    curvature_per_m : sequence of float
+        The spheres, the standard first. [1/m]
+    n_positions : int
+        Positions of the spheres.
+
+    Returns
+    -------
+    NoiseFit
+        `hit_rates` position by position.
+
+    Raises
+    ------
+    ConvergenceError
+        If no noise meets the points.
+    """
+    columns = goodwin_columns(curvature_per_m)
+    return fit_noise_sigma(
+        lambda sigma: hit_rates(sigma)[:, columns].ravel(),
+        np.tile(HIT_RATES, n_positions),
+        (SMALLEST_NOISE, LARGEST_NOISE),
+    )

@@ -1,22 +1,22 @@
-"""Figure 9: stress concentrates at the border of the nail when a sphere presses the pad.
+"""Figure 9: stress concentration at the border of the nail when a sphere presses the pad.
 
-The paper shows a picture and gives no number. Stress falls off steadily from the pad around the finger to its
-back, so "far" has to mean the same part of the finger: the concentration is judged section by section, as the
-stress of the skin at the lateral border of the nail over that of the skin 2 to 3 mm away from it in the same
-section. Where a fixed nail ends, the stress of an elastic body grows without bound as elements shrink; the
-size of the elements is therefore part of the number (docs/decisions/nail-border.md).
+The paper shows a figure and gives no number. Stress decreases steadily from the pad around the finger to its
+back, so both stresses are taken from the same section of the finger: the concentration is the stress of the
+skin at the lateral border of the nail over that of the skin 2 to 3 mm away from it. At the end of a fixed
+nail, the stress of an elastic body grows without bound as elements shrink; the number therefore depends on
+the size of the elements (docs/decisions/nail-border.md).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.results import Matrix, Number, Stack, Vector, result_class
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.geometry.grading import resolution_grading
@@ -33,9 +33,112 @@ ELEMENT_MM = {"quick": 0.8, "standard": 0.6, "paper": 0.6}
 """Largest elements on the skin: the other studies' grow to several mm on the back of the finger. [mm]"""
 
 
-def touch(conditions: Conditions) -> Touch:
+@result_class
+class StressProfile:
+    """Stress over distance from the nail, over the sections that cross its border.
+
+    Parameters
+    ----------
+    distance_mm : array (n,)
+        From the nail, negative under it. [mm]
+    surface_kpa, living_epidermis_kpa : array (n, 3)
+        Quantiles 0.1, 0.5 and 0.9; NaN without an element. [kPa]
+    """
+
+    distance_mm: Vector
+    surface_kpa: Matrix
+    living_epidermis_kpa: Matrix
+
+
+@result_class
+class MiddleSection:
+    """Deformed faces of the elements on the plane z = 0, and their stress.
+
+    Parameters
+    ----------
+    x_mm, y_mm : array (n_faces, 4)
+        Corners. [mm]
+    von_mises_kpa : array (n_faces,)
+        Stress of the element. [kPa]
+    """
+
+    x_mm: Matrix
+    y_mm: Matrix
+    von_mises_kpa: Vector
+
+
+@result_class
+class CrossSection:
+    """Deformed quadrilaterals in the middle of a section's elements, and their stress.
+
+    Parameters
+    ----------
+    x_mm : float
+        Where the section lies. [mm]
+    y_mm, z_mm : array (n_elements, 4)
+        Corners. [mm]
+    von_mises_kpa : array (n_elements,)
+        Stress. [kPa]
+    """
+
+    x_mm: float
+    y_mm: Matrix
+    z_mm: Matrix
+    von_mises_kpa: Vector
+
+
+@result_class
+class NailBorder:
+    """Stress of the skin and in two sections at the end of the hold, and its concentration at the nail.
+
+    Parameters
+    ----------
+    x_mm, y_mm, z_mm : array (n_along + 1, n_around + 1)
+        Deformed corners of the faces of the skin. [mm]
+    von_mises_kpa : array (n_along, n_around)
+        Stress of the element below each face. [kPa]
+    nail_mm : array (n_edges, 2, 3)
+        Outline of the nail. [mm]
+    ratio, ratio_range : float, (float, float)
+        Stress of the skin at the border over that away from it: median and range over the sections.
+    ratio_living_epidermis, ratio_energy : float
+        The same median in the living epidermis, for stress and for strain energy density.
+    border_kpa, far_kpa, peak_kpa : float
+        Largest stress at the border, median stress away from it, largest stress anywhere. [kPa]
+    border_energy_kpa : float
+        Largest strain energy density at the border. [kPa]
+    text : str
+        A sentence with these numbers.
+    profile : StressProfile
+        Stress over distance from the nail.
+    middle : MiddleSection
+        The plane z = 0.
+    across : CrossSection
+        The section with the highest ratio.
+    """
+
+    x_mm: Matrix
+    y_mm: Matrix
+    z_mm: Matrix
+    von_mises_kpa: Matrix
+    nail_mm: Stack
+    ratio: Number
+    ratio_range: tuple[Number, Number]
+    ratio_living_epidermis: Number
+    ratio_energy: Number
+    border_kpa: Number
+    far_kpa: Number
+    border_energy_kpa: Number
+    peak_kpa: Number
+    text: str
+    profile: StressProfile
+    middle: MiddleSection
+    across: CrossSection
+
+
+def nail_touch(conditions: Conditions) -> Touch:
     """Return the standard sphere on a mesh that is fine all over the finger."""
-    # Beneath the sphere no finer than at quick resolution: the nail is a finger's thickness away.
+    # Below the sphere no finer than at quick resolution: the nail is a finger's thickness away.
     grading = replace(
         resolution_grading("quick", RECEPTOR_X_MM), largest_mm=ELEMENT_MM[conditions.resolution]
     )
@@ -64,8 +167,23 @@ class Concentration:
         return self.border_kpa / self.far_kpa
 
 
-def result(skin: SkinResponse) -> dict[str, Any]:
-    """Stress on the skin and in two sections at the end of the hold, and how it concentrates at the nail."""
+def nail_border(skin: SkinResponse) -> NailBorder:
+    """Evaluate stress at the end of the hold, and its concentration at the nail.
+
+    Parameters
+    ----------
+    skin : SkinResponse
+        To `nail_touch`.
+
+    Returns
+    -------
+    NailBorder
+
+    Raises
+    ------
+    InputError
+        If the mesh does not resolve the border of the nail.
+    """
     mesh = skin.mesh
     numbers = np.arange(len(mesh.elements)).reshape(mesh.shape)
     surface, deep = numbers[:, :, 0], mesh.living_epidermis
@@ -75,23 +193,22 @@ def result(skin: SkinResponse) -> dict[str, Any]:
     energy = concentration(mesh, skin.sed_kpa[-1][deep], distance)
     highest = int(outside.station[outside.ratios.argmax()])
     grid = (mesh.nodes_mm + skin.displacement_mm)[mesh.skin_grid]
-    ratio = float(np.median(outside.ratios))
-    middle = skin.section()
-    return {
-        "x_mm": grid[..., 0],
-        "y_mm": grid[..., 1],
-        "z_mm": grid[..., 2],
-        "von_mises_kpa": skin.von_mises_kpa[surface],
-        "nail_mm": _outline(mesh, grid),
-        "ratio": ratio,
-        "ratio_range": [float(outside.ratios.min()), float(outside.ratios.max())],
-        "ratio_living_epidermis": float(np.median(inside.ratios)),
-        "ratio_energy": float(np.median(energy.ratios)),
-        "border_kpa": float(outside.border_kpa.max()),
-        "far_kpa": float(np.median(outside.far_kpa)),
-        "border_energy_kpa": float(energy.border_kpa.max()),
-        "peak_kpa": float(skin.von_mises_kpa.max()),
-        "text": (
+    ratio, middle = float(np.median(outside.ratios)), skin.section()
+    return NailBorder(
+        x_mm=grid[..., 0],
+        y_mm=grid[..., 1],
+        z_mm=grid[..., 2],
+        von_mises_kpa=skin.von_mises_kpa[surface],
+        nail_mm=_outline(mesh, grid),
+        ratio=ratio,
+        ratio_range=(float(outside.ratios.min()), float(outside.ratios.max())),
+        ratio_living_epidermis=float(np.median(inside.ratios)),
+        ratio_energy=float(np.median(energy.ratios)),
+        border_kpa=float(outside.border_kpa.max()),
+        far_kpa=float(np.median(outside.far_kpa)),
+        border_energy_kpa=float(energy.border_kpa.max()),
+        peak_kpa=float(skin.von_mises_kpa.max()),
+        text=(
             "At the lateral border of the nail the von Mises stress of the skin reaches "
             f"{outside.border_kpa.max():.2g} kPa. In the median section it is {ratio:.2g} times that of the "
             f"skin {FAR_MM[0]:g} to {FAR_MM[1]:g} mm away ({outside.ratios.min():.2g} to "
@@ -99,14 +216,14 @@ def result(skin: SkinResponse) -> dict[str, Any]:
             f"where receptors lie, {np.median(inside.ratios):.2g} times, and strain energy density there "
             f"{np.median(energy.ratios):.2g} times."
         ),
-        "profile": _profile(skin, surface, deep, distance, outside.station),
-        "middle": {
-            "x_mm": middle.corners_mm[..., 0],
-            "y_mm": middle.corners_mm[..., 1],
-            "von_mises_kpa": skin.von_mises_kpa[middle.elements],
-        },
-        "across": _across(mesh, skin, numbers[highest]),
-    }
+        profile=_profile(skin, surface, deep, distance, outside.station),
+        middle=MiddleSection(
+            x_mm=middle.corners_mm[..., 0],
+            y_mm=middle.corners_mm[..., 1],
+            von_mises_kpa=skin.von_mises_kpa[middle.elements],
+        ),
+        across=_across(mesh, skin, numbers[highest]),
+    )
 
 
 def distance_to_nail(mesh: Mesh) -> FloatArray:
@@ -182,31 +299,35 @@ def _outline(mesh: Mesh, grid: FloatArray) -> FloatArray:
 
 def _profile(
     skin: SkinResponse, surface: np.ndarray, deep: np.ndarray, distance: FloatArray, stations: np.ndarray
-) -> dict[str, Any]:
-    """Stress over distance from the nail, median and range over the sections that cross its border."""
+) -> StressProfile:
+    """Stress over distance from the nail: quantiles over the sections that cross its border."""
     edges = np.arange(-2.0, 5.01, 0.5)
-    found: dict[str, Any] = {"distance_mm": 0.5 * (edges[1:] + edges[:-1])}
     chosen = np.zeros(distance.shape, dtype=bool)
     chosen[stations] = True
-    for name, elements in (("surface", surface), ("living_epidermis", deep)):
-        stress = skin.von_mises_kpa[elements]
+
+    def quantiles(stress: FloatArray) -> FloatArray:
         table = np.full((edges.size - 1, 3), np.nan)
         for row, (low, high) in enumerate(pairwise(edges)):
             here = stress[chosen & (distance > low) & (distance <= high)]
             if here.size:
                 table[row] = np.quantile(here, (0.1, 0.5, 0.9))
-        found[f"{name}_kpa"] = table
-    return found
+        return table
+
+    return StressProfile(
+        distance_mm=0.5 * (edges[1:] + edges[:-1]),
+        surface_kpa=quantiles(skin.von_mises_kpa[surface]),
+        living_epidermis_kpa=quantiles(skin.von_mises_kpa[deep]),
+    )
 
 
-def _across(mesh: Mesh, skin: SkinResponse, elements: np.ndarray) -> dict[str, Any]:
-    """Deformed quadrilaterals half way between the two ends of a section's elements, and their stress."""
+def _across(mesh: Mesh, skin: SkinResponse, elements: np.ndarray) -> CrossSection:
+    """Cut a section's elements half way between their two ends."""
     nodes = mesh.elements[elements.ravel()]
     moved = (mesh.nodes_mm + skin.displacement_mm)[nodes]
     quads = 0.5 * (moved[:, [0, 3, 7, 4]] + moved[:, [1, 2, 6, 5]])
-    return {
-        "x_mm": round(float(quads[..., 0].mean()), 1),
-        "y_mm": quads[..., 1],
-        "z_mm": quads[..., 2],
-        "von_mises_kpa": skin.von_mises_kpa[elements.ravel()],
-    }
+    return CrossSection(
+        x_mm=round(float(quads[..., 0].mean()), 1),
+        y_mm=quads[..., 1],
+        z_mm=quads[..., 2],
+        von_mises_kpa=skin.von_mises_kpa[elements.ravel()],
+    )

@@ -27,8 +27,12 @@ from fingerpad.experiments.gerling2014 import (
 )
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow
 from fingerpad.experiments.gerling2014.comparison import comparison
+from fingerpad.experiments.gerling2014.curvature_thresholds import CurvatureThresholds
+from fingerpad.experiments.gerling2014.nail_border import NailBorder
+from fingerpad.experiments.gerling2014.response_maps import PopulationMaps, PopulationTiming
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult
+from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.neuron.afferent import Afferent
@@ -106,9 +110,10 @@ class ReproductionResult:
         Level 1.
     single_unit : SingleUnitResult
         Level 2.
-    discrimination, population, nail : dict
-        Level 3, see `sphere_discrimination`, `response_maps` and `nail_border`.
-    drive_quantities, single_unit_uncertainty, curvature_thresholds, population_timing : dict, optional
+    discrimination, population, nail : SphereDiscrimination, PopulationMaps, NailBorder
+        Level 3.
+    drive_quantities, single_unit_uncertainty : dict, optional
+    curvature_thresholds, population_timing : CurvatureThresholds, PopulationTiming, optional
         What goes beyond the paper, None where it was not asked for.
     comparison : tuple of ClaimRow
         The paper's numbers beside ours.
@@ -122,13 +127,13 @@ class ReproductionResult:
     format_version: Literal[1] = 1
     skin_deflection: SkinDeflectionResult
     single_unit: SingleUnitResult
-    discrimination: dict[str, Any]
-    population: dict[str, Any]
-    nail: dict[str, Any]
+    discrimination: SphereDiscrimination
+    population: PopulationMaps
+    nail: NailBorder
     drive_quantities: dict[str, Any] | None = None
     single_unit_uncertainty: dict[str, Any] | None = None
-    curvature_thresholds: dict[str, Any] | None = None
-    population_timing: dict[str, Any] | None = None
+    curvature_thresholds: CurvatureThresholds | None = None
+    population_timing: PopulationTiming | None = None
     comparison: tuple[ClaimRow, ...]
     inputs: tuple[PublishedNumber, ...]
     manifest: Manifest
@@ -158,16 +163,16 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
     """
     runner, conditions = Runner(run.folder, run.jobs, progress), run.conditions
 
-    spheres = sphere_discrimination.touches(conditions)
+    spheres = sphere_discrimination.discrimination_touches(conditions)
     wanted: dict[str, Mapping[Any, Touch]] = {
         # The longest indentations first: short ones fill the end, and hardly a core waits for another.
-        "nail": {"nail": nail_border.touch(conditions)},
+        "nail": {"nail": nail_border.nail_touch(conditions)},
         "skin deflection": skin_deflection.deflection_touches(conditions),
         "bar, 36 shifts": dict(enumerate(single_unit.bar_touches(conditions))),
         "spheres": spheres,
     }
     if run.goes_beyond:
-        wanted["spheres, other curvatures"] = curvature_thresholds.touches(conditions)
+        wanted["spheres, other curvatures"] = curvature_thresholds.threshold_touches(conditions)
     responses = runner.responses(wanted)
     deflection, bar_responses = responses["skin deflection"], responses["bar, 36 shifts"]
     sphere_responses, nail_response = responses["spheres"], responses["nail"]["nail"]
@@ -179,13 +184,15 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
         best, folds = single_unit.fit(problem)
         advance()
         afferent = Afferent.from_parameters(best.parameters)
-        discrimination = sphere_discrimination.result(sphere_responses, afferent, conditions.seed)
+        discrimination = sphere_discrimination.discriminate_spheres(
+            sphere_responses, afferent, conditions.seed
+        )
         advance()
         unit = single_unit.single_unit_result(problem, best, folds)
         results: dict[str, Any] = {
             "discrimination": discrimination,
-            "population": response_maps.result(sphere_responses[STANDARD_SPHERE], afferent),
-            "nail": nail_border.result(nail_response),
+            "population": response_maps.population_maps(sphere_responses[STANDARD_SPHERE], afferent),
+            "nail": nail_border.nail_border(nail_response),
         }
         advance()
     if run.goes_beyond:
@@ -202,14 +209,16 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
             centred = {
                 curvature: skin for (position, curvature), skin in sphere_responses.items() if position == 0.0
             }
-            results["curvature_thresholds"] = curvature_thresholds.result(
+            results["curvature_thresholds"] = curvature_thresholds.curvature_thresholds(
                 centred | responses["spheres, other curvatures"],
                 afferent,
-                discrimination["noise_sigma"],
+                discrimination.noise_sigma,
                 conditions.seed,
             )
             advance()
-            results["population_timing"] = response_maps.timing(sphere_responses, afferent, conditions.finger)
+            results["population_timing"] = response_maps.population_timing(
+                sphere_responses, afferent, conditions.finger
+            )
             advance()
     meshes = {"sphere": spheres[STANDARD_SPHERE].mesh, "bar": bar_responses[0].mesh} | {
         name: deflection["trial3", name].mesh for name in skin_deflection.INDENTERS

@@ -1,19 +1,32 @@
-"""Level 3: can a person tell two spheres apart? (paper, 2.2.3, 3.3, Figures 6-8)."""
+"""Level 3: how often two spheres are discriminated (paper, 2.2.3, 3.3, Figures 6-8)."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.random_streams import Purpose, normals
+from fingerpad.core.results import Matrix, Vector, result_class
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
-from fingerpad.experiments.gerling2014 import goodwin
-from fingerpad.experiments.gerling2014.discrepancy import first_spikes, fitted_noise, reasons
-from fingerpad.experiments.gerling2014.percept_sessions import SESSIONS, Measured, Observers, observe
-from fingerpad.experiments.gerling2014.percept_statistics import statistics
+from fingerpad.experiments.gerling2014.discrepancy import (
+    DiscrepancyAnalysis,
+    answering_latencies,
+    discrepancy_analysis,
+    expected_of_measure,
+)
+from fingerpad.experiments.gerling2014.discrimination_sessions import SESSIONS, Measured, Observers, observe
+from fingerpad.experiments.gerling2014.discrimination_statistics import (
+    DiscriminationStatistics,
+    discrimination_statistics,
+)
+from fingerpad.experiments.gerling2014.goodwin import (
+    GoodwinHitRates,
+    fit_noise_to_goodwin,
+    goodwin_hit_rates,
+)
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import (
@@ -29,7 +42,67 @@ CURVATURES = psychophysics.SPHERE_CURVATURES.value
 POSITIONS_MM = protocol.SPHERE_POSITIONS.value
 
 
-def touches(conditions: Conditions) -> dict[tuple[float, float], Touch]:
+@result_class
+class ObserverHitRates:
+    """Hit rates of one observer in one session, as the paper reports them.
+
+    Parameters
+    ----------
+    hit_rate, hit_rate_shifted : array (n_comparisons,)
+        Means with the spheres at 0.0 and at 0.2 mm. [0-1]
+    hit_rate_sd, hit_rate_shifted_sd : array (n_comparisons,)
+        Standard deviations. [0-1]
+    """
+
+    hit_rate: Vector
+    hit_rate_sd: Vector
+    hit_rate_shifted: Vector
+    hit_rate_shifted_sd: Vector
+
+
+@result_class
+class SphereDiscrimination:
+    """Hit rates of all observers at the noise that fits Goodwin's two points best.
+
+    Parameters
+    ----------
+    seed, sessions : int
+        Of all noise; repetitions of the protocol.
+    curvature_per_m : array (7,)
+        The spheres, the standard first. [1/m]
+    noise_sigma, noise_fit_error, noise_sigma_paper : float
+        Fitted noise, root mean square error of the fit [0-1], and the paper's noise.
+    goodwin : GoodwinHitRates
+        Of people.
+    gradient_sums : dict of array (n_positions, 7)
+        Without noise, by measure. [spikes/s or ms]
+    gradient_sum, euclidean, variants : dict of ObserverHitRates
+        First session: by measure for the two codes, and variants of the static Gradient Sum by name.
+    silent : tuple of str
+        Measures that are left out because the population stays silent.
+    statistics : DiscriminationStatistics
+        Behind the paper's statements.
+    reasons : DiscrepancyAnalysis
+        Why the numbers differ from the paper's.
+    """
+
+    seed: int
+    sessions: int
+    curvature_per_m: Vector
+    noise_sigma: float
+    noise_fit_error: float
+    noise_sigma_paper: float
+    goodwin: GoodwinHitRates
+    gradient_sums: dict[str, Matrix]
+    gradient_sum: dict[str, ObserverHitRates]
+    euclidean: dict[str, ObserverHitRates]
+    variants: dict[str, ObserverHitRates]
+    silent: tuple[str, ...]
+    statistics: DiscriminationStatistics
+    reasons: DiscrepancyAnalysis
+
+
+def discrimination_touches(conditions: Conditions) -> dict[tuple[float, float], Touch]:
     """Seven spheres at two positions along the finger; keys are position and curvature.
 
     They press along the skin's normal, so that a sphere at 0.0 mm is centred on the population.
@@ -41,31 +114,29 @@ def touches(conditions: Conditions) -> dict[tuple[float, float], Touch]:
     }
 
 
-def result(
+def discriminate_spheres(
     responses: dict[tuple[float, float], SkinResponse],
     afferent: Afferent,
     seed: int,
     sessions: int = SESSIONS,
-) -> dict[str, Any]:
-    """Hit rates of both strategies and all measures, at the noise that fits Goodwin's two points best.
+) -> SphereDiscrimination:
+    """Hit rates of both codes and all measures, at the noise that fits Goodwin's two points best.
 
     Parameters
     ----------
     responses : dict of SkinResponse
-        By position and curvature, from `touches`.
+        By position and curvature, from `discrimination_touches`.
     afferent : Afferent
-        What every receptor is.
+        Model of every receptor.
     seed : int
         Of all noise.
     sessions : int, optional
-        How often the protocol is repeated; the first session is drawn, all of them tell the Monte-Carlo
+        How often the protocol is repeated. The first session is drawn; all of them give the Monte-Carlo
         errors.
 
     Returns
     -------
-    dict
-        The noise; hit rates of the first session by strategy, measure and variant; what is known of people;
-        `statistics` behind each of the paper's statements; and `reasons`, why ours differ.
+    SphereDiscrimination
     """
     population = Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0))
     neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
@@ -83,29 +154,30 @@ def result(
         if name == "static" or _answers(name, both, neighbours)
     }
     draws = normals(seed, 1, len(population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
-    noise = fitted_noise(measures["static"], CURVATURES, draws)
+    noise = fit_noise_to_goodwin(
+        lambda sigma: expected_of_measure(measures["static"], sigma, draws), CURVATURES, len(POSITIONS_MM)
+    )
     observers = observe(measures, noise.noise_sigma, seed, sessions)
     drawn = {name: _first_session(observers, name) for name in observers.mean}
-    return {
-        "seed": seed,
-        "sessions": sessions,
-        "curvature_per_m": CURVATURES,
-        "noise_sigma": noise.noise_sigma,
-        "noise_fit_error": noise.root_mean_square_error,
-        "noise_sigma_paper": psychophysics.NOISE_SIGMA.value,
-        "goodwin": goodwin.observed(CURVATURES[1:]),
-        "gradient_sums": {
-            name: [gradient_sum(one.responses, one.neighbours) for one in both]
+    codes = (*measures, "euclidean")
+    return SphereDiscrimination(
+        seed=seed,
+        sessions=sessions,
+        curvature_per_m=np.array(CURVATURES),
+        noise_sigma=noise.noise_sigma,
+        noise_fit_error=noise.root_mean_square_error,
+        noise_sigma_paper=psychophysics.NOISE_SIGMA.value,
+        goodwin=goodwin_hit_rates(CURVATURES[1:]),
+        gradient_sums={
+            name: np.array([gradient_sum(one.responses, one.neighbours) for one in both])
             for name, both in measures.items()
         },
-        "gradient_sum": {name: drawn[name] for name in measures},
-        "euclidean": {"static": drawn["euclidean"]},
-        "variants": {
-            name: rates for name, rates in drawn.items() if name not in measures and name != "euclidean"
-        },
-        "silent": [name for name in RESPONSE_MEASURES if name not in measures],
-        "statistics": statistics(observers, CURVATURES, tuple(measures)),
-        "reasons": reasons(
+        gradient_sum={name: drawn[name] for name in measures},
+        euclidean={"static": drawn["euclidean"]},
+        variants={name: rates for name, rates in drawn.items() if name not in codes},
+        silent=tuple(name for name in RESPONSE_MEASURES if name not in measures),
+        statistics=discrimination_statistics(observers, CURVATURES, tuple(measures)),
+        reasons=discrepancy_analysis(
             measures,
             tables["latency"],
             population.positions_mm,
@@ -115,29 +187,29 @@ def result(
             draws,
             seed,
         ),
-    }
+    )
 
 
-def _answers(name: str, tables: list[FloatArray], neighbours: np.ndarray) -> bool:
-    """Whether a measure is more than silence: otherwise it is left out, for zeros give no hit rate."""
+def _answers(name: str, tables: Sequence[FloatArray], neighbours: np.ndarray) -> bool:
+    """Whether receptors respond: otherwise the measure is left out, for zeros give no hit rate."""
     if name == "latency":
         return all(len(answering_neighbours(table, neighbours)) > 0 for table in tables)
     return all(table.any() for table in tables)
 
 
-def _measured(name: str, tables: list[FloatArray], neighbours: np.ndarray) -> list[Measured]:
-    """Give a measure the pairs of receptors that its Gradient Sum goes over, position by position."""
+def _measured(name: str, tables: Sequence[FloatArray], neighbours: np.ndarray) -> list[Measured]:
+    """Combine a measure with the pairs of receptors of its Gradient Sum, position by position."""
     if name == "latency":
-        return [first_spikes(table, neighbours) for table in tables]
+        return [answering_latencies(table, neighbours) for table in tables]
     return [Measured(table, neighbours) for table in tables]
 
 
-def _first_session(observers: Observers, name: str) -> dict[str, FloatArray]:
-    """Hit rates of one observer as the paper reports them, one session at both positions."""
-    (first, shifted), (spread, spread_shifted) = observers.mean[name][0], observers.spread[name][0]
-    return {
-        "hit_rate": first,
-        "hit_rate_sd": spread,
-        "hit_rate_shifted": shifted,
-        "hit_rate_shifted_sd": spread_shifted,
-    }
+def _first_session(observers: Observers, name: str) -> ObserverHitRates:
+    """Hit rates of one observer in the first session, at both positions."""
+    (rate, shifted), (spread, spread_shifted) = observers.mean[name][0], observers.spread[name][0]
+    return ObserverHitRates(
+        hit_rate=rate,
+        hit_rate_sd=spread,
+        hit_rate_shifted=shifted,
+        hit_rate_shifted_sd=spread_shifted,
+    )

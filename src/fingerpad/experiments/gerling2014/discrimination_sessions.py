@@ -1,8 +1,8 @@
-"""The paper's protocol several times over: every observer of Figures 7 and 8, at both positions.
+"""The paper's protocol several times: every observer of Figures 7 and 8, at both positions.
 
-A session is the whole protocol with noise of its own. One session is what the paper reports; several say how
-far chance moves it, so that a verdict can name its Monte-Carlo error. Within a session all observers of one
-position meet the same noise, and what sets them apart is not chance.
+A session is the whole protocol with its own noise. The paper reports one session. Several sessions give the
+Monte-Carlo error of a verdict. Within a session all observers of one position share the same noise, so that
+differences between them are not due to chance.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from fingerpad.psychophysics.encoding import check_neighbours
 from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, session_trials
 
 SESSIONS = 5
-"""Sessions of a study. The first is drawn; all of them tell the Monte-Carlo error."""
+"""Sessions of a study. The first is drawn; all of them give the Monte-Carlo error."""
 
 SWEPT_NOISE = tuple(round(0.015 + 0.01 * step, 3) for step in range(8))
 """Noise sigma_1 that is tried, over the paper's range."""
@@ -35,7 +35,7 @@ FEW = 10
 """Noise matrices, and hit rates, of the paper's smaller experiments."""
 
 AGAIN = 20
-"""How often the judgements of one session are repeated, to see how stable their mean is."""
+"""Repetitions of the judgements of one session, which show how stable their mean is."""
 
 CRITERION_SIGMAS = psychophysics.DECISION_CRITERION_SIGMA.value
 
@@ -58,7 +58,7 @@ class Measured:
     Raises
     ------
     InputError
-        If no two neighbours answer, or the pairs are none of its receptors'.
+        If no two neighbours respond, or the pairs name receptors that do not exist.
     """
 
     responses: FloatArray
@@ -68,7 +68,7 @@ class Measured:
         responses = checked_responses(self.responses)
         neighbours = check_neighbours(self.neighbours, responses.shape[1])
         if not len(neighbours):
-            raise InputError("Measured needs neighbours that answer every sphere: there are none.")
+            raise InputError("Measured needs neighbours that respond to every sphere: there are none.")
         object.__setattr__(self, "responses", responses)
         object.__setattr__(self, "neighbours", neighbours)
 
@@ -94,7 +94,7 @@ class Observers:
 def observe(
     measures: Mapping[str, Sequence[Measured]], noise_sigma: float, seed: int, sessions: int = SESSIONS
 ) -> Observers:
-    """Let every observer judge the spheres at every position, several times.
+    """Simulate the judgements of every observer at every position in several sessions.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def observe(
     seed : int
         Of the run.
     sessions : int, optional
-        How often all is repeated.
+        Repetitions of the whole protocol.
 
     Returns
     -------
@@ -116,7 +116,7 @@ def observe(
     Raises
     ------
     InputError
-        If there are fewer than two sessions, which would tell no error.
+        If there are fewer than two sessions, from which no error follows.
     """
     whole("sessions", sessions, 2)
     n_positions = len(measures["static"])
@@ -141,7 +141,7 @@ def observe(
 def _judge(
     measures: Mapping[str, Measured], noise_sigma: float, seed: int, session: int
 ) -> tuple[dict[str, HitRates], dict[int, float]]:
-    """Hit rates of every observer at one position in one session, and how unsteady their means are."""
+    """Hit rates of every observer at one position in one session, and how unstable their means are."""
     static, pairs = measures["static"].responses, measures["static"].neighbours
 
     def sums(
@@ -162,7 +162,7 @@ def _judge(
     by_level = sums(np.array([static] * len(levels)), pairs, np.array(levels), _PAPER)
     for name, one in zip(("static", *(f"sigma_{sigma:g}" for sigma in SWEPT_NOISE)), by_level, strict=True):
         rates[name] = hit_rates_of_sums(one, seed, session=session)
-    # The first of many presentations, or hit rates, are those that a smaller experiment would have had.
+    # The first of many presentations, or hit rates, are those of a smaller experiment.
     rates["ten_matrices"] = hit_rates_of_sums(by_level[0][:, :, :FEW], seed, session=session)
     rates["ten_hit_rates"] = hit_rates_of_sums(by_level[0], seed, Experiment(hit_rates=FEW), session)
     plans = [Experiment(criterion_sigma=sigma) for sigma in CRITERION_SIGMAS]
@@ -178,7 +178,7 @@ def _unsteadiness(sums: FloatArray, hit_rates: int, seed: int, session: int) -> 
     """Return how much the mean of so many hit rates varies (1 sd) between picks of the same sums."""
     plan = Experiment(hit_rates=hit_rates)
     means = [
-        # Sessions far beyond those of the study: their picks are nobody else's.
+        # Session numbers far beyond those of the study: no other step uses their random numbers.
         hit_rates_of_sums(sums, seed, plan, session * 1000 + 1_000_000 + again).hit_rate
         for again in range(AGAIN)
     ]
