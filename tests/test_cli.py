@@ -53,10 +53,10 @@ def test_help_names_every_option_and_resolution(call):
 
 
 def test_the_help_names_what_the_modules_know():
-    assert choices.RESOLUTIONS == RESOLUTIONS
-    assert tuple(TISSUES) == choices.MATERIALS
-    assert tuple(formats.FORMATS) == choices.FORMATS
-    assert all(issubclass(getattr(fp, name), Indenter) for name in choices.INDENTERS.values())
+    assert choices.RESOLUTION_CHOICES == RESOLUTIONS
+    assert tuple(TISSUES) == choices.MATERIAL_CHOICES
+    assert tuple(formats.FORMATS) == choices.FORMAT_CHOICES
+    assert all(issubclass(getattr(fp, name), Indenter) for name in choices.INDENTER_CHOICES.values())
 
 
 def test_without_a_command_the_help_is_shown(call):

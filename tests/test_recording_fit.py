@@ -24,10 +24,10 @@ from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.fit import fit as study
-from fingerpad.experiments.fit import posterior as recording_posterior
+from fingerpad.experiments.fit import rate_posterior as recording_posterior
 from fingerpad.experiments.fit import session
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
-from fingerpad.experiments.fit.posterior import PhaseBands, RateBand, RatePosterior, posterior
+from fingerpad.experiments.fit.posterior import PhaseBands, RateBand, RatePosterior, rate_posterior
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.manifest import sha256
 from fingerpad.experiments.recording_files import read_recordings
@@ -126,7 +126,7 @@ def test_noisy_rates_leave_a_posterior_that_holds_the_known_afferent():
     noisy = RateRecordings(NAMES, *np.maximum(AFFERENT.rates(SED) + noise, 0.0))
     model, known = AfferentModel.of_traces(SED), identifiable(KNOWN)
     few = {"n_ensembles": 2, "n_walkers": 32, "largest_r_hat": 1.1, "smallest_effective_size": 50.0}
-    drawn = posterior(model, noisy, known, 1, **few)
+    drawn = rate_posterior(model, noisy, known, 1, **few)
     for value, (low, high) in zip(known, drawn.interval.values(), strict=True):
         assert low < value < high
     assert 0.0 < np.diff(drawn.interval["static_gain_per_kpa_ms"])[0] < known[2]
@@ -146,7 +146,7 @@ def test_draws_begin_where_they_can_though_a_gain_ended_at_its_bound(monkeypatch
 
     monkeypatch.setattr(recording_posterior, "afferent_posterior", note)
     with pytest.raises(ConvergenceError, match="Enough"):
-        posterior(AfferentModel.of_traces(SED), RATES, [-0.1, 0.0, 0.03, 40.0], 1)
+        rate_posterior(AfferentModel.of_traces(SED), RATES, [-0.1, 0.0, 0.03, 40.0], 1)
     assert begun[0].tolist() == [-0.1, identifiable(start_points()[0])[1], 0.03, 40.0]
 
 
@@ -598,8 +598,8 @@ def test_the_example_can_be_tried_as_it_says(call, tmp_path):
 
 
 def test_options_and_their_defaults_are_those_of_the_modules():
-    assert tuple(METHODS) == choices.FITTING_METHODS
-    assert set(INDENTERS) == set(choices.INDENTERS)
+    assert tuple(METHODS) == choices.METHOD_CHOICES
+    assert set(INDENTERS) == set(choices.INDENTER_CHOICES)
     defaults = {option.name: option.default for option in command().params}
     assert defaults["dynamic_window"] == protocol.DYNAMIC_WINDOW.value
     assert defaults["static_window"] == protocol.STATIC_WINDOW.value

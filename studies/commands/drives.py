@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.options import Jobs, Resolution, whole_number
+from fingerpad.cli.options import Jobs, Resolution, to_whole
 from fingerpad.cli.running import interruptible, make_writable, processes
 from fingerpad.core.files import write_json
 
@@ -21,7 +21,7 @@ def drives_command(
     ] = Path("reproduction"),
     jobs: Jobs = None,
     seed: Annotated[
-        int, typer.Option(parser=whole_number, metavar="INTEGER", help="Seed of search and bootstrap.")
+        int, typer.Option(parser=to_whole, metavar="INTEGER", help="Seed of search and bootstrap.")
     ] = 0,
 ) -> None:
     """Compare what may drive the afferent: quantities in the skin, and explanations of the dynamic rates."""

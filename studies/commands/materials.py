@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.options import Jobs, Resolution, whole_number
+from fingerpad.cli.options import Jobs, Resolution, to_whole
 from fingerpad.cli.running import interruptible, make_writable, processes
 from fingerpad.core.files import write_json
 
@@ -20,7 +20,7 @@ def materials_command(
     ] = Path("materials"),
     jobs: Jobs = None,
     seed: Annotated[
-        int, typer.Option(parser=whole_number, metavar="INTEGER", help="Seed of noise and search.")
+        int, typer.Option(parser=to_whole, metavar="INTEGER", help="Seed of noise and search.")
     ] = 0,
     name: Annotated[
         list[str] | None, typer.Option(help="A set to compare; may be given several times; all by default.")

@@ -2,8 +2,8 @@
 
 from fingerpad.skin.fields import sampled_fields
 
-RESOLUTIONS = ("quick", "standard", "paper")
-INDENTERS = {
+RESOLUTION_CHOICES = ("quick", "standard", "paper")
+INDENTER_CHOICES = {
     "sphere": "Sphere",
     "cylinder": "Cylinder",
     "bar": "Bar",
@@ -16,7 +16,7 @@ INDENTERS = {
 }
 """Each with its class."""
 
-MATERIALS = (
+MATERIAL_CHOICES = (
     "trial1",
     "trial2",
     "trial3",
@@ -27,6 +27,6 @@ MATERIALS = (
     "wu2007",
     "gerling2014_fit",
 )
-FORMATS = ("vtu", "abaqus", "calculix", "febio")
-FITTING_METHODS = ("least_squares", "response_surface", "closed_form", "cma_es", "likelihood")
-QUANTITIES = tuple(sampled_fields())
+FORMAT_CHOICES = ("vtu", "abaqus", "calculix", "febio")
+METHOD_CHOICES = ("least_squares", "response_surface", "closed_form", "cma_es", "likelihood")
+QUANTITY_CHOICES = tuple(sampled_fields())

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.choices import RESOLUTIONS
+from fingerpad.cli.choices import RESOLUTION_CHOICES
 from fingerpad.cli.options import Jobs
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.core.errors import InputError
@@ -27,7 +27,7 @@ def discriminate_command(
         Path, typer.Option(help="Folder for page, figures, results and stored indentations.")
     ] = Path("discriminate"),
     resolution: Annotated[
-        str | None, typer.Option(help=f"One of {', '.join(RESOLUTIONS)}. Default: that of the task.")
+        str | None, typer.Option(help=f"One of {', '.join(RESOLUTION_CHOICES)}. Default: that of the task.")
     ] = None,
     jobs: Jobs = None,
     listed: Annotated[

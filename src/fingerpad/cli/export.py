@@ -7,25 +7,27 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.choices import FORMATS, INDENTERS
-from fingerpad.cli.options import Materials, Resolution, number
+from fingerpad.cli.choices import FORMAT_CHOICES, INDENTER_CHOICES
+from fingerpad.cli.options import Materials, Resolution, to_number
 from fingerpad.cli.running import INTERRUPTED, make_writable
 from fingerpad.core.errors import InputError
 
 
 def export_command(
     folder: Annotated[Path, typer.Argument(help="Folder for the files; it is created if needed.")],
-    indenter: Annotated[str, typer.Option(help=f"One of {', '.join(INDENTERS)}.")] = "sphere",
+    indenter: Annotated[str, typer.Option(help=f"One of {', '.join(INDENTER_CHOICES)}.")] = "sphere",
     curvature: Annotated[
         float | None,
-        typer.Option(parser=number, metavar="NUMBER", help="Curvature of the sphere. Default: 287. [1/m]"),
+        typer.Option(parser=to_number, metavar="NUMBER", help="Curvature of the sphere. Default: 287. [1/m]"),
     ] = None,
     depth: Annotated[
-        float, typer.Option(parser=number, metavar="NUMBER", help="Depth of the hold. [mm]")
+        float, typer.Option(parser=to_number, metavar="NUMBER", help="Depth of the hold. [mm]")
     ] = 1.0,
     materials: Materials = "trial3",
     resolution: Resolution = "quick",
-    format_name: Annotated[str, typer.Option("--format", help=f"One of {', '.join(FORMATS)}.")] = "vtu",
+    format_name: Annotated[
+        str, typer.Option("--format", help=f"One of {', '.join(FORMAT_CHOICES)}.")
+    ] = "vtu",
     elastic_moduli: Annotated[
         str | None,
         typer.Option(help="For calculix, whose materials do not relax: long_term or instantaneous."),
@@ -39,12 +41,12 @@ def export_command(
     from fingerpad.geometry.motion import RampAndHold
     from fingerpad.skin.indentation import touch_of
 
-    one_of("indenter", indenter, tuple(INDENTERS))
-    one_of("format", format_name, FORMATS)
+    one_of("indenter", indenter, tuple(INDENTER_CHOICES))
+    one_of("format", format_name, FORMAT_CHOICES)
     if curvature is not None and indenter != "sphere":
         raise InputError(f"--curvature is that of a sphere, and a {indenter} has none: leave it out.")
     shape = {} if curvature is None else {"curvature_per_m": curvature}
-    body = getattr(fingerpad, INDENTERS[indenter])(**shape)
+    body = getattr(fingerpad, INDENTER_CHOICES[indenter])(**shape)
     touch = touch_of(Fingertip(), body, RampAndHold(depth_mm=depth), materials, resolution)
     make_writable(folder, "FOLDER")
     try:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fingerpad.cli.choices import FITTING_METHODS, QUANTITIES
-from fingerpad.cli.options import Jobs, Materials, Resolution, number, whole_number
+from fingerpad.cli.choices import METHOD_CHOICES, QUANTITY_CHOICES
+from fingerpad.cli.options import Jobs, Materials, Resolution, to_number, to_whole
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
@@ -35,20 +35,21 @@ def fit_command(
     ] = None,
     unit: Annotated[
         int | None,
-        typer.Option(parser=whole_number, metavar="INTEGER", help="Id of the spike unit of an NWB file."),
+        typer.Option(parser=to_whole, metavar="INTEGER", help="Id of the spike unit of an NWB file."),
     ] = None,
     width: Annotated[
-        float | None, typer.Option(parser=number, metavar="NUMBER", help="Width of the bar. Default: 3. [mm]")
+        float | None,
+        typer.Option(parser=to_number, metavar="NUMBER", help="Width of the bar. Default: 3. [mm]"),
     ] = None,
     fillet: Annotated[
         float | None,
         typer.Option(
-            parser=number, metavar="NUMBER", help="Radius of the edges of the bar. Default: 0.3. [mm]"
+            parser=to_number, metavar="NUMBER", help="Radius of the edges of the bar. Default: 0.3. [mm]"
         ),
     ] = None,
     depth: Annotated[
         float | None,
-        typer.Option(parser=number, metavar="NUMBER", help="Depth of the hold. Default: 1. [mm]"),
+        typer.Option(parser=to_number, metavar="NUMBER", help="Depth of the hold. Default: 1. [mm]"),
     ] = None,
     dynamic_window: Annotated[
         tuple[float, float], typer.Option(help="Window of the dynamic rate: start and end. [ms]")
@@ -59,11 +60,11 @@ def fit_command(
     dynamic_quantity: Annotated[
         str,
         typer.Option(
-            help=f"Quantity whose rate drives the dynamic term: {QUANTITIES[0]} (the paper's SED), or, as an "
-            f"extension, {', '.join(QUANTITIES[1:])}."
+            help=f"Quantity whose rate drives the dynamic term: {QUANTITY_CHOICES[0]} (the paper's SED), or, "
+            f"as an extension, {', '.join(QUANTITY_CHOICES[1:])}."
         ),
     ] = "stored",
-    method: Annotated[str, typer.Option(help=f"One of {', '.join(FITTING_METHODS)}.")] = "least_squares",
+    method: Annotated[str, typer.Option(help=f"One of {', '.join(METHOD_CHOICES)}.")] = "least_squares",
     posterior: Annotated[
         bool,
         typer.Option(
@@ -82,7 +83,7 @@ def fit_command(
     folds: Annotated[
         int | None,
         typer.Option(
-            parser=whole_number,
+            parser=to_whole,
             metavar="INTEGER",
             help="Number of interleaved folds. Default: 6, or the column fold of the recordings.",
         ),
@@ -95,7 +96,7 @@ def fit_command(
     materials: Materials = "trial3",
     jobs: Jobs = None,
     seed: Annotated[
-        int, typer.Option(parser=whole_number, metavar="INTEGER", help="Seed of the random numbers.")
+        int, typer.Option(parser=to_whole, metavar="INTEGER", help="Seed of the random numbers.")
     ] = 0,
     example: Annotated[
         Path | None, typer.Option(help="Write example recordings into this folder, and exit.")

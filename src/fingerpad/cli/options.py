@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.choices import MATERIALS, RESOLUTIONS
+from fingerpad.cli.choices import MATERIAL_CHOICES, RESOLUTION_CHOICES
 
 
-def whole_number(text: str) -> int:
+def to_whole(text: str) -> int:
     """Read an option, and repeat what came where it cannot be read."""
     try:
         return int(text)
@@ -17,7 +17,7 @@ def whole_number(text: str) -> int:
         raise typer.BadParameter(f"must be a whole number: got {text!r}.") from error
 
 
-def number(text: str) -> float:
+def to_number(text: str) -> float:
     """Read an option, and repeat what came where it cannot be read."""
     try:
         return float(text)
@@ -25,9 +25,9 @@ def number(text: str) -> float:
         raise typer.BadParameter(f"must be a number: got {text!r}.") from error
 
 
-Resolution = Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTIONS)}.")]
-Materials = Annotated[str, typer.Option(help=f"One of {', '.join(MATERIALS)}.")]
+Resolution = Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTION_CHOICES)}.")]
+Materials = Annotated[str, typer.Option(help=f"One of {', '.join(MATERIAL_CHOICES)}.")]
 Jobs = Annotated[
     int | None,
-    typer.Option(parser=whole_number, metavar="INTEGER", help="Number of processes. Default: one per core."),
+    typer.Option(parser=to_whole, metavar="INTEGER", help="Number of processes. Default: one per core."),
 ]

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.options import Jobs, Resolution, whole_number
+from fingerpad.cli.options import Jobs, Resolution, to_whole
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 
 EXPECTED_TIME = {"quick": "a minute and a half", "standard": "about 6 minutes", "paper": "some hours"}
@@ -22,7 +22,7 @@ def reproduce_command(
     ] = Path("reproduction"),
     jobs: Jobs = None,
     seed: Annotated[
-        int, typer.Option(parser=whole_number, metavar="INTEGER", help="Seed of the random numbers.")
+        int, typer.Option(parser=to_whole, metavar="INTEGER", help="Seed of the random numbers.")
     ] = 0,
     extended: Annotated[
         bool | None,

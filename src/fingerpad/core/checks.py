@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from fingerpad.core.errors import InputError
 
 FloatArray = NDArray[np.float64]
-Kind = TypeVar("Kind")
+_Kind = TypeVar("_Kind")
 
 
 def finite(name: str, value: float, unit: str = "") -> float:
@@ -62,7 +62,7 @@ def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
     return value
 
 
-def instance(name: str, value: Kind, kind: type) -> Kind:
+def instance(name: str, value: _Kind, kind: type) -> _Kind:
     """Return `value` if it is a `kind`, else raise `InputError`."""
     if not isinstance(value, kind):
         raise InputError(f"{name} must be of type {kind.__name__}: got {value!r}.")

@@ -19,7 +19,7 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Purpose, normals, uniforms
 from fingerpad.core.regions import Region
 
-Place = Callable[[FloatArray], FloatArray]
+_Place = Callable[[FloatArray], FloatArray]
 """From positions in the plane (n, 2) to points of the skin (n, 3), both in mm."""
 
 PATTERNS = ("rectangular", "hexagonal", "uniform", "jittered", "poisson-disc")
@@ -227,7 +227,7 @@ def poisson_disc(
     density_per_cm2: float,
     seed: int,
     separation: float = SEPARATION,
-    place: Place | None = None,
+    place: _Place | None = None,
 ) -> Layout:
     """Random positions with a least distance from each other.
 

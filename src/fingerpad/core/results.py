@@ -32,7 +32,7 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import write_atomically
 
-Kind = TypeVar("Kind")
+_Kind = TypeVar("_Kind")
 
 
 def _array(dtype: type, ndim: int | None, item: dict[str, Any]) -> GetPydanticSchema:
@@ -115,7 +115,7 @@ class ResultFile(Protocol):
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
-def result_class(cls: type[Kind]) -> type[Kind]:
+def result_class(cls: type[_Kind]) -> type[_Kind]:
     """Make a class a frozen dataclass with named fields that are checked on construction.
 
     Parameters
@@ -179,7 +179,7 @@ def to_json(result: Any, indent: int | None = 1) -> bytes:
     return _adapter(type(result)).dump_json(result, indent=indent)
 
 
-def from_json(cls: type[Kind], content: bytes) -> Kind:
+def from_json(cls: type[_Kind], content: bytes) -> _Kind:
     """Read a result from its JSON.
 
     Parameters
@@ -242,7 +242,7 @@ def check_schema(path: Path, values: dict[str, Any], schema: dict[str, Any]) -> 
         ) from error
 
 
-def read_results(path: Path, cls: type[Kind]) -> Kind:
+def read_results(path: Path, cls: type[_Kind]) -> _Kind:
     """Read a file of results.
 
     Parameters

@@ -79,7 +79,7 @@ def abaqus_deck(job: Job) -> str:
     lines += cards.support_sets(job)
     lines += _skin(job)
     lines += _rigid_surface(job, reference)
-    lines += [f"*SURFACE INTERACTION, NAME={CONTACT}", "1.", "*FRICTION", cards.number(job.friction),
+    lines += [f"*SURFACE INTERACTION, NAME={CONTACT}", "1.", "*FRICTION", cards.digits(job.friction),
               "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", *data([CONTACT_KPA_PER_MM])]  # fmt: skip
     kind = "NODE TO SURFACE" if job.indenter.grips else "SURFACE TO SURFACE"
     lines += [f"*CONTACT PAIR, INTERACTION={CONTACT}, TYPE={kind}", f"{SKIN}, {INDENTER}"]
@@ -105,7 +105,7 @@ def _material(material: Material) -> list[str]:
     moduli = "LONG TERM" if material.moduli == "long_term" else "INSTANTANEOUS"
     # A foam relaxes as a whole, and Abaqus then wants the same shares for shape and volume.
     bulk = shares if isinstance(material.law, Hyperfoam) else (0.0,) * len(shares)
-    rows = [", ".join(map(cards.number, row)) for row in zip(shares, bulk, times, strict=True)]
+    rows = [", ".join(map(cards.digits, row)) for row in zip(shares, bulk, times, strict=True)]
     return [*cards.law(material, 1.0, f", MODULI={moduli}"), "*VISCOELASTIC, TIME=PRONY", *rows]
 
 
@@ -114,7 +114,7 @@ def _skin(job: Job) -> list[str]:
         return cards.surface(SKIN, job.touching_elements + 1, UPPER_FACE)
     skin, area = job.mesh.skin_nodes, job.mesh.skin_area_mm2
     share = area[np.searchsorted(skin, job.touching_nodes)]
-    rows = (f"{node + 1}, {cards.number(mm2)}" for node, mm2 in zip(job.touching_nodes, share, strict=True))
+    rows = (f"{node + 1}, {cards.digits(mm2)}" for node, mm2 in zip(job.touching_nodes, share, strict=True))
     return [f"*SURFACE, NAME={SKIN}, TYPE=NODE", *rows]
 
 
@@ -129,22 +129,22 @@ def _rigid_surface(job: Job, reference: int) -> list[str]:
         # The generator is -z: Abaqus takes local y as the vector product of local x and the generator.
         lines += [f"*SURFACE, TYPE=CYLINDER, NAME={INDENTER}", *data([*origin, *(origin + x)])]
         lines += data(origin - z)
-    lines += [", ".join(["START", *map(cards.number, outline.corners[0])])]
+    lines += [", ".join(["START", *map(cards.digits, outline.corners[0])])]
     for corner, centre in zip(outline.corners[1:], outline.centres, strict=True):
         word, values = ("LINE", corner) if centre is None else ("CIRCL", (*corner, *centre))
-        lines.append(", ".join([word, *map(cards.number, values)]))
+        lines.append(", ".join([word, *map(cards.digits, values)]))
     return [*lines, f"*RIGID BODY, ANALYTICAL SURFACE={INDENTER}, REF NODE={reference}"]
 
 
 def _step(job: Job, phase: Phase, relaxes: bool) -> list[str]:
     """Cards of one step: our own increments, ramped motion, and what to write."""
     length = phase.end_ms - phase.start_ms
-    step = cards.number(length / phase.steps)
-    time = f"{step}, {cards.number(length)}"
+    step = cards.digits(length / phase.steps)
+    time = f"{step}, {cards.digits(length)}"
     # *VISCO without CETOL keeps to its first increment; *STATIC is held to ours, and may take smaller ones.
-    procedure = ["*VISCO", time] if relaxes else ["*STATIC", f"{time}, {cards.number(length * 1e-6)}, {step}"]
+    procedure = ["*VISCO", time] if relaxes else ["*STATIC", f"{time}, {cards.digits(length * 1e-6)}, {step}"]
     moves = (
-        f"{REFERENCE}, {axis}, {axis}, {cards.number(phase.depth_mm * component)}"
+        f"{REFERENCE}, {axis}, {axis}, {cards.digits(phase.depth_mm * component)}"
         for axis, component in enumerate(job.placement.axis, 1)
     )
     unsymmetric = ", UNSYMM=YES" if job.friction else ""

@@ -222,13 +222,13 @@ def _step(job: Job, phase: Phase) -> list[str]:
     length = phase.end_ms - phase.start_ms
     step = length / phase.steps
     moves = (
-        f"{INDENTER}, {axis}, {axis}, {cards.number(phase.depth_mm * component)}"
+        f"{INDENTER}, {axis}, {axis}, {cards.digits(phase.depth_mm * component)}"
         for axis, component in enumerate(job.placement.axis, 1)
     )
     lines = [
         f"*STEP, NLGEOM, INC={100 * phase.steps}",
         "*STATIC",
-        ", ".join(map(cards.number, (step, length, SLOWEST_SHARE * step, step))),
+        ", ".join(map(cards.digits, (step, length, SLOWEST_SHARE * step, step))),
         "*BOUNDARY", *moves,
         f"*NODE PRINT, NSET={INDENTER}, TOTALS=ONLY, FREQUENCY=1", "RF",
     ]  # fmt: skip

@@ -23,12 +23,12 @@ FIXED, SYMMETRY, GRIPPED, SKIN, INDENTER = "FIXED", "SYMMETRY", "GRIPPED", "SKIN
 """Names of sets and surfaces in a deck."""
 
 
-def number(value: float) -> str:
+def digits(value: float) -> str:
     """Write a number in at most 20 characters, all that CalculiX reads, with 12 digits.
 
     Examples
     --------
-    >>> number(-1 / 3), number(2.0)
+    >>> digits(-1 / 3), number(2.0)
     ('-0.333333333333', '2')
     """
     return f"{value:.12g}"
@@ -36,7 +36,7 @@ def number(value: float) -> str:
 
 def data(values: Iterable[float | int | str], per_line: int = PER_LINE) -> list[str]:
     """Write the data lines of a card, up to `per_line` values each."""
-    texts = [value if isinstance(value, str) else number(value) for value in values]
+    texts = [value if isinstance(value, str) else digits(value) for value in values]
     return [", ".join(texts[n : n + per_line]) for n in range(0, len(texts), per_line)]
 
 
@@ -47,7 +47,7 @@ def comments(lines: Iterable[str]) -> list[str]:
 
 def nodes(points_mm: FloatArray, first: int, name: str) -> list[str]:
     """Cards of nodes that are numbered from `first`."""
-    rows = (f"{n}, {number(x)}, {number(y)}, {number(z)}" for n, (x, y, z) in enumerate(points_mm, first))
+    rows = (f"{n}, {digits(x)}, {digits(y)}, {digits(z)}" for n, (x, y, z) in enumerate(points_mm, first))
     return [f"*NODE, NSET={name}", *rows]
 
 

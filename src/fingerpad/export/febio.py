@@ -16,7 +16,7 @@ import numpy as np
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
-from fingerpad.export.cards import FIXED, GRIPPED, INDENTER, SKIN, SYMMETRY, number
+from fingerpad.export.cards import FIXED, GRIPPED, INDENTER, SKIN, SYMMETRY, digits
 from fingerpad.export.job import CONTACT_KPA_PER_MM, Job
 from fingerpad.geometry.mesh import IntArray
 from fingerpad.mechanics.laws import Ogden, Polynomial
@@ -109,11 +109,11 @@ def _add(parent: xml.Element, tag: str, text: str | None = None, **attributes: s
 
 def _add_all(parent: xml.Element, values: dict[str, float | int | str]) -> None:
     for tag, value in values.items():
-        _add(parent, tag, value if isinstance(value, str) else number(value))
+        _add(parent, tag, value if isinstance(value, str) else digits(value))
 
 
 def _listed(values: Iterable[float]) -> str:
-    return ",".join(number(value) for value in values)
+    return ",".join(digits(value) for value in values)
 
 
 STEPS_CURVE, DEPTH_CURVE = 1, 2
@@ -187,7 +187,7 @@ def _law(material: Material, name: str) -> tuple[str, dict[str, float | int | st
             (law.c10, "(I1-3)"), (law.c01, "(I2-3)"), (law.c20, "(I1-3)^2"),
             (law.c11, "(I1-3)*(I2-3)"), (law.c02, "(I2-3)^2"),
         )  # fmt: skip
-        energy = "+".join(f"({number(value)})*{powers}" for value, powers in terms if value)
+        energy = "+".join(f"({digits(value)})*{powers}" for value, powers in terms if value)
         return "uncoupled hyperelastic", {"W": energy}, law.bulk_modulus_kpa
     if isinstance(law, Ogden):
         values: dict[str, float | int | str] = {}
@@ -289,7 +289,7 @@ def _rigid(root: xml.Element, job: Job) -> None:
     for axis, share in zip("xyz", job.placement.axis, strict=True):
         condition = _add(section, "rigid_bc", name=f"motion along {axis}", type="rigid_displacement")
         _add_all(condition, {"rb": INDENTER, "dof": axis})
-        _add(condition, "value", number(float(share) + 0.0), lc=str(DEPTH_CURVE))
+        _add(condition, "value", digits(float(share) + 0.0), lc=str(DEPTH_CURVE))
         _add(condition, "relative", "0")
 
 

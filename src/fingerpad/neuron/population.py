@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, positive, whole
 from fingerpad.core.errors import InputError
-from fingerpad.core.layouts import Layout, Place, around_zero
+from fingerpad.core.layouts import Layout, _Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Skin
 from fingerpad.data import fingertip, protocol, psychophysics
@@ -120,7 +120,7 @@ class Population:
     def of_layout(
         cls,
         layout: Layout,
-        place: Place | None = None,
+        place: _Place | None = None,
         afferent: Afferent | None = None,
         sensitivity: ArrayLike | None = None,
     ) -> Population:

@@ -11,7 +11,7 @@ from fingerpad.experiments.discrimination.analysis import TaskResult
 from fingerpad.experiments.discrimination.decoding import SideCurve
 from fingerpad.experiments.discrimination.run import DiscriminationFile
 from fingerpad.report.discrimination_task_figures import (
-    CODES,
+    CODE_LABELS,
     caption_task_curves,
     caption_task_responses,
     caption_task_statistics,
@@ -27,7 +27,7 @@ from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.page import write_html
 from fingerpad.report.parts import Chapter, Drawing, Page, Row, Table
 
-PAGE = "discriminate.html"
+_PAGE = "discriminate.html"
 SEVERAL = {"static": "static rates", "dynamic": "dynamic rates", "latency": "first-spike latencies"}
 
 
@@ -69,7 +69,7 @@ def write_task_page(results: DiscriminationFile, folder: Path) -> Path:
         task_summary(found),
         [Chapter("Results", [*parts, *task_tables(found)]), manifest_chapter(results.manifest)],
     )
-    return write_html(page, Path(folder) / PAGE)
+    return write_html(page, Path(folder) / _PAGE)
 
 
 def task_summary(found: TaskResult) -> list[str]:
@@ -84,7 +84,7 @@ def task_summary(found: TaskResult) -> list[str]:
     fitted = f", fitted to {joined(list(noise.fitted_to.stimulus))}" if noise.fitted_to else ""
     of = "" if found.level is None else f" ({found.axis})"
     sentence = (
-        f"{CODES[main.code]} of {SEVERAL[main.measure]} discriminates {joined(rates)} of trials{of}, "
+        f"{CODE_LABELS[main.code]} of {SEVERAL[main.measure]} discriminates {joined(rates)} of trials{of}, "
         f"with noise σ₁ = {number(noise.sigma)}{fitted}."
     )
     return [sentence, *(_threshold_sentence(found, side) for side in main.curves)]

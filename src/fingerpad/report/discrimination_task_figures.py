@@ -24,15 +24,15 @@ from fingerpad.report.style import (
     say_nothing_to_draw,
 )
 
-CHANCE = 0.5
+_CHANCE = 0.5
 MOST_MAPS = 4
 """Stimuli in the figure of responses: the standard, and comparisons from the first to the last."""
 
 MARGIN_MM = 0.6
 """About the outermost afferents of a map. [mm]"""
 
-CODES = {"gradient_sum": "Gradient Sum", "euclidean": "Euclidean Distance", "ideal": "ideal observer"}
-MEASURES = {
+CODE_LABELS = {"gradient_sum": "Gradient Sum", "euclidean": "Euclidean Distance", "ideal": "ideal observer"}
+MEASURE_LABELS = {
     "static": ("static rate", "spikes/s"),
     "dynamic": ("dynamic rate", "spikes/s"),
     "latency": ("first-spike latency", "ms"),
@@ -58,7 +58,7 @@ def draw_task_responses(found: TaskResult) -> Figure:
     Figure
     """
     measure = main_decoding(found).measure
-    what, unit = MEASURES[measure]
+    what, unit = MEASURE_LABELS[measure]
     responses, places = found.responses[measure], found.population.positions_mm
     shown = _shown(len(responses))
     low, high = places[:, [-1, 0]].min(axis=0) - MARGIN_MM, places[:, [-1, 0]].max(axis=0) + MARGIN_MM
@@ -145,7 +145,7 @@ def draw_task_statistics(found: TaskResult) -> Figure:
         axes.axhspan(mean[0] - spread[0], mean[0] + spread[0], color=GREY, alpha=0.25, linewidth=0.0)
         axes.errorbar(where, mean, spread, fmt="o", color=BLUE, markersize=4.5, capsize=3.0, elinewidth=1.2)
         axes.plot(where[0], mean[0], "D", color=BLACK, markersize=6.5, zorder=4)
-        axes.set_ylabel(f"{CODES[decoding.code]} [{MEASURES[decoding.measure][1]}]")
+        axes.set_ylabel(f"{CODE_LABELS[decoding.code]} [{MEASURE_LABELS[decoding.measure][1]}]")
         _name_axis(axes, found)
     return figure
 
@@ -167,8 +167,8 @@ def draw_task_curves(found: TaskResult) -> Figure:
     grid = figure.subplots(1, len(measures), sharey=True, squeeze=False)
     for axes, measure in zip(grid[0], measures, strict=True):
         of_measure = [decoding for decoding in found.decodings if decoding.measure == measure]
-        axes.set_title(MEASURES[measure][0])
-        axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)))
+        axes.set_title(MEASURE_LABELS[measure][0])
+        axes.axhline(_CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)))
         if all(decoding.hit_rate is None for decoding in of_measure):
             say_nothing_to_draw(axes, why_silent(of_measure[0]))
             continue
@@ -200,7 +200,7 @@ def _curve(axes: Axes, found: TaskResult, decoding: Decoding, style: Any) -> Non
         markersize=5.0,
         capsize=3.0,
         elinewidth=1.0,
-        label=CODES[decoding.code],
+        label=CODE_LABELS[decoding.code],
     )
     for side in decoding.curves:
         if side.fit is None:
@@ -245,7 +245,7 @@ def caption_task_responses(found: TaskResult) -> str:
     main, n_stimuli = main_decoding(found), len(found.stimulus)
     left_out = n_stimuli - len(_shown(n_stimuli))
     return (
-        f"{MEASURES[main.measure][0].capitalize()} of {found.population.n_receptors} afferents "
+        f"{MEASURE_LABELS[main.measure][0].capitalize()} of {found.population.n_receptors} afferents "
         "without noise, the distal end above; below, the difference from the standard, "
         "by the area of triangles."
         + (f" {left_out} of the comparisons are left out here." if left_out else "")
@@ -285,7 +285,7 @@ def main_decoding(found: TaskResult) -> Decoding:
 
 def titled(decoding: Decoding) -> str:
     """Name a decoding by its code and measure."""
-    return f"{CODES[decoding.code]}, {MEASURES[decoding.measure][0]}"
+    return f"{CODE_LABELS[decoding.code]}, {MEASURE_LABELS[decoding.measure][0]}"
 
 
 def why_silent(decoding: Decoding) -> str:

@@ -14,7 +14,7 @@ from fingerpad.report.parts import Row, Table
 from fingerpad.report.rate_uncertainty import draw_indices, draw_profile, profile_ends, sensitivity_table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure
 
-Part = TypeVar("Part")
+_Part = TypeVar("_Part")
 
 
 def draw_profiles(found: FitResult) -> Figure:
@@ -180,7 +180,7 @@ def offset_tables(found: FitResult) -> list[Table]:
     return [Table("Offset of the receptor", columns, rows, note)]
 
 
-def _present(part: Part | None) -> Part:
+def _present(part: _Part | None) -> _Part:
     """Return a part of a fit; a chapter is only drawn where its part is there."""
     assert part is not None
     return part

@@ -38,7 +38,7 @@ from fingerpad.report.recording_extras import (
 )
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure
 
-PAGE = "fit.html"
+_PAGE = "fit.html"
 IDENTIFIABLE = IDENTIFIABLE_SYMBOLS | {"time_constant_ms": "time constant τ"}
 LONGEST_LABEL = 12
 """Names of stimuli are cut to so many letters at an axis."""
@@ -227,7 +227,7 @@ def write_fit_page(results: FitFile, folder: Path) -> Path:
         fit_summary(results.fit),
         [*_chapters(results.fit), manifest_chapter(results.manifest)],
     )
-    return write_html(page, Path(folder) / PAGE)
+    return write_html(page, Path(folder) / _PAGE)
 
 
 def fit_summary(found: FitResult) -> list[str]:

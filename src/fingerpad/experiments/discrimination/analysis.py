@@ -16,8 +16,8 @@ from fingerpad.core.signals import ResponseMap, Skin
 from fingerpad.experiments.discrimination.decoding import (
     SideCurve,
     TaskStatistic,
-    fitted_noise,
-    hit_rates,
+    code_hit_rates,
+    fit_task_noise,
     response_table,
     side_curves,
     silent_stimuli,
@@ -400,7 +400,7 @@ def _noise(
             f"noise cannot be fitted: by the measure {measure} the population is silent under "
             f"{_named(prepared.stimuli, silent[measure])}; give a number, or another measure first."
         )
-    fit = fitted_noise(
+    fit = fit_task_noise(
         code,
         *encoded[measure],
         [row - 1 for row in points],
@@ -453,7 +453,7 @@ def _decoding(
             d_prime=ideal.d_prime,
         )
     else:
-        rates = hit_rates(code, table, neighbours, sigma, settings.seed, prepared.plan)
+        rates = code_hit_rates(code, table, neighbours, sigma, settings.seed, prepared.plan)
         decoding = Decoding(
             code=code,
             measure=measure,

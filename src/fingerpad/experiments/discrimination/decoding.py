@@ -199,7 +199,7 @@ def taking_part(table: FloatArray, neighbours: np.ndarray) -> tuple[FloatArray, 
     return np.where(np.isnan(table).any(axis=0), 0.0, table), answering_neighbours(table, neighbours)
 
 
-def hit_rates(
+def code_hit_rates(
     code: str, table: FloatArray, neighbours: np.ndarray, noise_sigma: float, seed: int, plan: Experiment
 ) -> HitRates:
     """Hit rates of every comparison by a code.
@@ -228,7 +228,7 @@ def hit_rates(
     return discriminate_gradient_sum(table, neighbours, noise_sigma, seed, plan, session=SESSION)
 
 
-def fitted_noise(
+def fit_task_noise(
     code: str,
     table: FloatArray,
     neighbours: np.ndarray,
@@ -242,7 +242,7 @@ def fitted_noise(
     Parameters
     ----------
     code, table, neighbours, seed, plan
-        As in `hit_rates`.
+        As in `code_hit_rates`.
     comparisons : sequence of int
         Which comparisons were observed, from 0.
     observed : sequence of float
@@ -260,7 +260,7 @@ def fitted_noise(
     chosen = list(comparisons)
 
     def by_distance(sigma: float) -> FloatArray:
-        return hit_rates(code, table, neighbours, sigma, seed, plan).hit_rate[chosen]
+        return code_hit_rates(code, table, neighbours, sigma, seed, plan).hit_rate[chosen]
 
     draws = normals(seed, 1, table.shape[1], Purpose.RESPONSE, NOISE_DRAWS)[0].T
 
@@ -278,7 +278,7 @@ def task_statistic(
     Parameters
     ----------
     code, table, neighbours, noise_sigma, seed
-        As in `hit_rates`.
+        As in `code_hit_rates`.
 
     Returns
     -------

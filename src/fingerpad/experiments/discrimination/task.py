@@ -14,19 +14,19 @@ from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.discrimination.task_types import (
     Count,
+    FiniteNumber,
+    LevelOrName,
     NotNegative,
-    Number,
     Pair,
-    Part,
-    Place,
     Positive,
     Seed,
     Several,
     Share,
+    TaskPart,
     Text,
     as_list,
-    expected,
-    one_of,
+    choice_of,
+    with_message,
 )
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.geometry.names import INDENTERS, MOTION_UNITS, SIZE_UNITS
@@ -47,7 +47,7 @@ FITTED = "fitted"
 
 GRID = "grid"
 NAIL_ROWS = "nail rows"
-LAYOUTS = (GRID, *PATTERNS, NAIL_ROWS)
+LAYOUT_NAMES = (GRID, *PATTERNS, NAIL_ROWS)
 PAD = "pad"
 SHAPES = ("rectangle", "ellipse", "polygon", PAD)
 
@@ -60,7 +60,7 @@ UNITS = SIZE_UNITS | MOTION_UNITS | {"spin_deg": "degrees", "tilt_deg": "degrees
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
 
 
-class SkinSettings(Part):
+class SkinSettings(TaskPart):
     """The finger that is pressed.
 
     Parameters
@@ -74,12 +74,12 @@ class SkinSettings(Part):
         it, as far as the indenters need. [mm]
     """
 
-    materials: Annotated[str, one_of(TISSUES)] = "trial3"
-    resolution: Annotated[str, one_of(RESOLUTIONS)] = "standard"
+    materials: Annotated[str, choice_of(TISSUES)] = "trial3"
+    resolution: Annotated[str, choice_of(RESOLUTIONS)] = "standard"
     reach_mm: Positive | None = None
 
 
-class StimulusSettings(Part):
+class StimulusSettings(TaskPart):
     """One stimulus, or what all have in common. What is absent is the paper's.
 
     Parameters
@@ -108,8 +108,8 @@ class StimulusSettings(Part):
     """
 
     name: Text | None = None
-    level: Number | None = None
-    indenter: Annotated[str, one_of(INDENTERS)] | None = None
+    level: FiniteNumber | None = None
+    indenter: Annotated[str, choice_of(INDENTERS)] | None = None
     curvature_per_m: Positive | None = None
     diameter_mm: Positive | None = None
     width_mm: Positive | None = None
@@ -118,8 +118,8 @@ class StimulusSettings(Part):
     groove_mm: Positive | None = None
     fillet_mm: NotNegative | None = None
     lip_mm: NotNegative | None = None
-    spin_deg: Number | None = None
-    tilt_deg: Number | None = None
+    spin_deg: FiniteNumber | None = None
+    tilt_deg: FiniteNumber | None = None
     offset_mm: Pair | None = None
     depth_mm: Positive | None = None
     force_mn: Positive | None = None
@@ -132,7 +132,7 @@ VARIABLE = tuple(name for name in StimulusSettings.model_fields if name in UNITS
 """What may differ from stimulus to stimulus by a number."""
 
 
-class VariedStimuli(Part):
+class VariedStimuli(TaskPart):
     """Stimuli that differ in one number.
 
     Parameters
@@ -143,11 +143,11 @@ class VariedStimuli(Part):
         One per stimulus. [unit of what varies]
     """
 
-    vary: Annotated[str, one_of(VARIABLE)]
-    values: Annotated[tuple[Number, ...], Strict(False)]
+    vary: Annotated[str, choice_of(VARIABLE)]
+    values: Annotated[tuple[FiniteNumber, ...], Strict(False)]
 
 
-class RegionSettings(Part):
+class RegionSettings(TaskPart):
     """Part of the skin that afferents lie in, unrolled; an area there is the same area of skin.
 
     Parameters
@@ -160,13 +160,13 @@ class RegionSettings(Part):
         Of a polygon: along the finger, distal positive, and across, from the middle of the pad. [mm]
     """
 
-    shape: Annotated[str, one_of(SHAPES)]
+    shape: Annotated[str, choice_of(SHAPES)]
     length_mm: Positive | None = None
     width_mm: Positive | None = None
     corners_mm: Annotated[tuple[Pair, ...], Strict(False)] | None = None
 
 
-class PopulationSettings(Part):
+class PopulationSettings(TaskPart):
     """The afferents.
 
     Parameters
@@ -192,7 +192,7 @@ class PopulationSettings(Part):
         How much afferents differ in their gains, as of `fingerpad.neuron.population.sensitivities`.
     """
 
-    layout: Annotated[str, one_of(LAYOUTS)] = GRID
+    layout: Annotated[str, choice_of(LAYOUT_NAMES)] = GRID
     density_per_cm2: Positive = psychophysics.RECEPTOR_DENSITY.value
     rows: Count | None = None
     columns: Count | None = None
@@ -204,7 +204,7 @@ class PopulationSettings(Part):
     sensitivity_spread: NotNegative = 0.0
 
 
-class AfferentSettings(Part):
+class AfferentSettings(TaskPart):
     """The afferent by its numbers; what is absent is as in `fingerpad.Afferent`.
 
     Parameters
@@ -217,17 +217,17 @@ class AfferentSettings(Part):
         What the dynamic term follows.
     """
 
-    intercept_ma: Number | None = None
-    dynamic_gain: Number | None = None
-    static_gain: Number | None = None
+    intercept_ma: FiniteNumber | None = None
+    dynamic_gain: FiniteNumber | None = None
+    static_gain: FiniteNumber | None = None
     time_constant_ms: Positive | None = None
     capacitance_mf: Positive | None = None
     threshold_mv: Positive | None = None
     refractory_ms: NotNegative | None = None
-    dynamic_quantity: Annotated[str, one_of(sampled_fields())] = STORED_ENERGY
+    dynamic_quantity: Annotated[str, choice_of(sampled_fields())] = STORED_ENERGY
 
 
-class WindowSettings(Part):
+class WindowSettings(TaskPart):
     """Windows in which spikes count.
 
     Parameters
@@ -244,7 +244,7 @@ class WindowSettings(Part):
     latency: Positive | None = None
 
 
-class ExperimentSettings(Part):
+class ExperimentSettings(TaskPart):
     """Repetitions, decision criterion and seed.
 
     Parameters
@@ -269,7 +269,7 @@ class ExperimentSettings(Part):
     seed: Seed = 0
     criterion: Share = psychophysics.DECISION_CRITERION.value
     criterion_sigma: NotNegative = 0.0
-    criterion_moves: Annotated[str, one_of(WAVERING)] = WAVERING[0]
+    criterion_moves: Annotated[str, choice_of(WAVERING)] = WAVERING[0]
     presentations: Several = _REPETITIONS
     distributions: Several = _REPETITIONS
     pairs: Several = _REPETITIONS
@@ -278,7 +278,7 @@ class ExperimentSettings(Part):
     trials: Count = _REPETITIONS
 
 
-class CurveSettings(Part):
+class CurveSettings(TaskPart):
     """The psychometric curve through the hit rates.
 
     Parameters
@@ -291,15 +291,15 @@ class CurveSettings(Part):
         Where the threshold is read. [0-1]
     """
 
-    sigmoid: Annotated[str, one_of(SIGMOIDS)] = "weibull"
+    sigmoid: Annotated[str, choice_of(SIGMOIDS)] = "weibull"
     lapse: Annotated[
-        Annotated[float, Field(ge=0, lt=0.5)] | Annotated[str, one_of((FREE,))],
-        expected(f"a number within 0 ... 0.5, or {FREE}"),
+        Annotated[float, Field(ge=0, lt=0.5)] | Annotated[str, choice_of((FREE,))],
+        with_message(f"a number within 0 ... 0.5, or {FREE}"),
     ] = 0.0
-    proportion: Annotated[float, Field(gt=0.5, lt=1.0), expected("a number between 0.5 and 1")] = 0.75
+    proportion: Annotated[float, Field(gt=0.5, lt=1.0), with_message("a number between 0.5 and 1")] = 0.75
 
 
-class ObservedPoint(Part):
+class ObservedPoint(TaskPart):
     """How often people discriminated one stimulus from the standard.
 
     Parameters
@@ -312,12 +312,12 @@ class ObservedPoint(Part):
         How many there were, for the interval.
     """
 
-    at: Place
+    at: LevelOrName
     hit_rate: Share
     trials: Count | None = None
 
 
-class ObservedSettings(Part):
+class ObservedSettings(TaskPart):
     """Observations in people.
 
     Parameters
@@ -332,7 +332,7 @@ class ObservedSettings(Part):
     source: Text = "people"
 
 
-class DiscriminationTask(Part):
+class DiscriminationTask(TaskPart):
     """All that a file of a task holds.
 
     Parameters
@@ -380,27 +380,27 @@ class DiscriminationTask(Part):
         | Annotated[VariedStimuli, Tag(VARIED)],
         Discriminator(lambda value: LISTED if isinstance(value, list | tuple) else VARIED),
     ]
-    standard: Place
+    standard: LevelOrName
     population: PopulationSettings = PopulationSettings()
     afferent: Annotated[
         Annotated[Text, Tag(NAMED)] | Annotated[AfferentSettings, Tag(SPELLED)],
         Discriminator(lambda value: NAMED if isinstance(value, str) else SPELLED),
     ] = DEFAULT
     code: Annotated[
-        tuple[Annotated[str, one_of(CODES)], ...],
+        tuple[Annotated[str, choice_of(CODES)], ...],
         Strict(False),
         Field(min_length=1),
         BeforeValidator(as_list),
     ] = ("gradient_sum",)
     measure: Annotated[
-        tuple[Annotated[str, one_of(MEASURES)], ...],
+        tuple[Annotated[str, choice_of(MEASURES)], ...],
         Strict(False),
         Field(min_length=1),
         BeforeValidator(as_list),
     ] = ("static",)
     windows_ms: WindowSettings = WindowSettings()
     noise: Annotated[
-        NotNegative | Annotated[str, one_of((FITTED,))], expected(f"a number not below 0, or {FITTED}")
+        NotNegative | Annotated[str, choice_of((FITTED,))], with_message(f"a number not below 0, or {FITTED}")
     ]
     experiment: ExperimentSettings = ExperimentSettings()
     curve: CurveSettings = CurveSettings()

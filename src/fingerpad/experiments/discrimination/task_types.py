@@ -18,7 +18,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 
-def expected(words: str, allowed: Collection[Any] | None = None) -> WrapValidator:
+def with_message(words: str, allowed: Collection[Any] | None = None) -> WrapValidator:
     """Give a value one message for any error: what it must be.
 
     Parameters
@@ -55,30 +55,33 @@ def expected(words: str, allowed: Collection[Any] | None = None) -> WrapValidato
     return WrapValidator(checked)
 
 
-def one_of(allowed: Collection[str]) -> WrapValidator:
+def choice_of(allowed: Collection[str]) -> WrapValidator:
     """Restrict a value to one of several names.
 
     Examples
     --------
     >>> from pydantic import TypeAdapter
-    >>> TypeAdapter(Annotated[str, one_of(("mean", "sum"))]).validate_python("sum")
+    >>> TypeAdapter(Annotated[str, choice_of(("mean", "sum"))]).validate_python("sum")
     'sum'
     """
-    return expected(f"one of {', '.join(allowed)}", allowed)
+    return with_message(f"one of {', '.join(allowed)}", allowed)
 
 
-Text = Annotated[str, Field(min_length=1), expected("a text")]
-Number = Annotated[float, Field(allow_inf_nan=False), expected("a finite number")]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), expected("a number greater than 0")]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), expected("a number not below 0")]
-Share = Annotated[float, Field(ge=0, le=1), expected("a number within 0 ... 1")]
-Seed = Annotated[int, Field(ge=0), expected("a whole number of at least 0")]
-Count = Annotated[int, Field(ge=1), expected("a whole number of at least 1")]
-Several = Annotated[int, Field(ge=2), expected("a whole number of at least 2")]
+Text = Annotated[str, Field(min_length=1), with_message("a text")]
+FiniteNumber = Annotated[float, Field(allow_inf_nan=False), with_message("a finite number")]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), with_message("a number greater than 0")]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), with_message("a number not below 0")]
+Share = Annotated[float, Field(ge=0, le=1), with_message("a number within 0 ... 1")]
+Seed = Annotated[int, Field(ge=0), with_message("a whole number of at least 0")]
+Count = Annotated[int, Field(ge=1), with_message("a whole number of at least 1")]
+Several = Annotated[int, Field(ge=2), with_message("a whole number of at least 2")]
 Pair = Annotated[
-    tuple[Number, ...], Strict(False), Field(min_length=2, max_length=2), expected("a pair of numbers")
+    tuple[FiniteNumber, ...],
+    Strict(False),
+    Field(min_length=2, max_length=2),
+    with_message("a pair of numbers"),
 ]
-Place = Annotated[float | str, Field(union_mode="left_to_right"), expected("a number or a name")]
+LevelOrName = Annotated[float | str, Field(union_mode="left_to_right"), with_message("a number or a name")]
 
 
 def as_list(value: Any) -> Any:
@@ -86,7 +89,7 @@ def as_list(value: Any) -> Any:
     return [value] if isinstance(value, str) else value
 
 
-class Part(BaseModel):
+class TaskPart(BaseModel):
     """Base of all parts: unknown keys are refused, nothing is converted, values are frozen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)

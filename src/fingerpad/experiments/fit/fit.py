@@ -15,7 +15,7 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
 from fingerpad.experiments.fit.methods import METHODS, Prepared, SpikeFitSummary, four_number_problem
 from fingerpad.experiments.fit.offset import Beside, OffsetFit, check_beside, fit_offset
-from fingerpad.experiments.fit.posterior import RatePosterior, posterior, profiled
+from fingerpad.experiments.fit.posterior import RatePosterior, profiled, rate_posterior
 from fingerpad.experiments.fit.rate_uncertainty import sensitivity
 from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.inference.fitting import (
@@ -264,7 +264,7 @@ def fit_recordings(
         phases=_phases(prepared.problem, rates, best.parameters, validation),
         folds=_folds(prepared, rates, validation),
         spikes=prepared.spikes(best, validation),
-        posterior=posterior(model, rates, four, seed, positions_mm) if with_posterior else None,
+        posterior=rate_posterior(model, rates, four, seed, positions_mm) if with_posterior else None,
         profiles=tuple(plain(profiled(model, rates, four, positions_mm))) if with_profiles else None,
         sensitivity=(
             plain(sensitivity(four_number_problem(model, rates), four, seed)) if with_sensitivity else None

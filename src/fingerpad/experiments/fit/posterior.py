@@ -70,7 +70,7 @@ class RatePosterior:
     bands: dict[str, PhaseBands]
 
 
-def posterior(
+def rate_posterior(
     model: AfferentModel,
     rates: RateRecordings,
     four: ArrayLike,
@@ -132,7 +132,7 @@ def profiled(
     Parameters
     ----------
     model, rates, four, positions_mm
-        As of `posterior`.
+        As of `rate_posterior`.
 
     Returns
     -------
