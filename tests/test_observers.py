@@ -243,7 +243,7 @@ def test_efficiency_of_looking_at_one_of_four_equal_receptors_is_a_quarter():
     share, error = efficiency(shown.of(lambda responses: responses[:, 0]), shown.ideal())
     assert share == pytest.approx(0.25, abs=4.0 * error)
     assert error < 0.02
-    with pytest.raises(InputError, match="ideal observer is right"):
+    with pytest.raises(InputError, match="ideal observer is correct"):
         efficiency(shown.ideal(), discriminability([1.0, 2.0], [3.0, 4.0]))
 
 

@@ -1,4 +1,4 @@
-"""From responses and judgements to thresholds: psychometric functions, observers and the ideal one."""
+"""From responses and judgements to thresholds: codes, observers, ideal observer, psychometric functions."""
 
 from fingerpad.psychophysics.counts import JudgementCounts
 from fingerpad.psychophysics.functions import PsychometricFunction

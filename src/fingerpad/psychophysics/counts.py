@@ -1,10 +1,10 @@
-"""Judgements counted at each level of a stimulus, and how probable a psychometric function makes them.
+"""Counts of judgements at each level of a stimulus, and their probability under a psychometric function.
 
     P(k | n, p)      = C(n, k) p^k (1 - p)^(n - k)                      binomial
     P(k | n, p, rho) = C(n, k) B(k + p v, n - k + (1 - p) v) / B(p v, (1 - p) v),    v = (1 - rho) / rho
 
-The second, beta-binomial, is for judgements that hang together: a run of them shares a mood. Any two of one
-level correlate by rho, and their count varies by a factor of 1 + (n - 1) rho more.
+The beta-binomial distribution is for correlated judgements. Any two judgements of one level have the
+correlation rho, and the variance of their count is larger by the factor 1 + (n - 1) rho.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from fingerpad.core.checks import FloatArray, float_array
 from fingerpad.core.errors import InputError
 
 SMALLEST_OVERDISPERSION = 1e-5
-"""Below it the beta-binomial formula loses precision; the binomial one takes over."""
+"""Below it the beta-binomial formula loses precision and the binomial one is used."""
 
 
 @dataclass(frozen=True)
 class JudgementCounts:
-    """How many judgements at each level were right, or "yes".
+    """Numbers of judgements at each level that were correct, or "yes".
 
     Parameters
     ----------
@@ -94,11 +94,11 @@ def log_probability(
     Returns
     -------
     array
-        -inf where p is 0 or 1 and k says otherwise.
+        -inf where p is 0 or 1 and k contradicts it.
 
     Examples
     --------
-    Two judgements that always agree are both right as often as one:
+    Two judgements that always agree are both correct as often as one:
 
     >>> np.exp(log_probability(2, 2, 0.5, [0.0, 0.999999])).round(3).tolist()
     [0.25, 0.5]
@@ -109,7 +109,7 @@ def log_probability(
     if not (rho >= SMALLEST_OVERDISPERSION).any():
         return ways + xlogy(k, p) + xlog1py(n - k, -p)
     v = (1.0 - rho) / np.maximum(rho, SMALLEST_OVERDISPERSION)
-    # Both shapes of the beta function must be positive: a certainty is taken as a near one.
+    # Both arguments of the beta function must be positive, so 0 and 1 are replaced by close values.
     inside = np.clip(p, _NEARLY_NEVER, 1.0 - _NEARLY_NEVER)
     return ways + betaln(k + inside * v, n - k + (1.0 - inside) * v) - betaln(inside * v, (1.0 - inside) * v)
 
@@ -129,7 +129,7 @@ def binomial_interval(
     trials : int
         Trials behind each of them.
     confidence : float, optional
-        Least probability that such an interval contains the true one. [0-1]
+        Least probability that such an interval contains the true probability. [0-1]
 
     Returns
     -------

@@ -1,16 +1,16 @@
-"""Noise, decision, hit rate: how often one sphere is told from another (paper, section 2.2.3, Figure 3).
+"""Noise, decision and hit rate in the discrimination of spheres (paper, section 2.2.3, Figure 3).
 
-Letters in brackets are the steps of Figure 3. Readings where the paper is silent:
+Letters in brackets are the steps of Figure 3. Choices where the paper gives no detail:
 
-- Noise multiplies every response by Normal(1, sigma_1), anew for each receptor and presentation.
-- The observer decides at the point a fraction beta of the way from the standard's mean to the
-  comparison's; a hit is an answer beyond it, on the comparison's side.
-- Which side that is, is the observer's lasting knowledge: the sign of the difference of the means over
-  all repetitions. Measures that fall with curvature (latencies) are read like those that rise, and equal
-  spheres are told apart in half of the trials, not more.
+- Noise multiplies every response by Normal(1, sigma_1), independent for each receptor and presentation.
+- The decision point divides the distance from the standard's mean to the comparison's by the fraction
+  beta; a hit is a value beyond it, on the comparison's side.
+- The comparison's side is the sign of the difference of the means over all repetitions. Measures that
+  decrease with curvature (latencies) are treated like those that increase, and the hit rate of two equal
+  spheres is one half.
 
 Every random number has a key: seed, trial, receptor and purpose. Trials are numbered within a session, so
-that sessions of one seed are experiments with nothing in common but what was touched.
+sessions of one seed share no random number.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, noisy_r
 from fingerpad.psychophysics.signal_detection import decision_point, hit_probability, moments, side
 
 END_OF_STIMULUS_MS = protocol.RAMP.value + protocol.HOLD.value
-"""A usual stand-in for the latency of a receptor that stays silent. [ms]"""
+"""A usual value for the latency of a silent receptor. [ms]"""
 
 WAVERING = ("point", "fraction")
-"""What a varied criterion multiplies: the decision point, or the fraction beta that places it."""
+"""Quantity multiplied by a varied criterion: the decision point, or the fraction beta."""
 
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
 _REPETITIONS_VARIED = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
@@ -41,13 +41,13 @@ _REPETITIONS_VARIED = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
 
 @dataclass(frozen=True)
 class Experiment:
-    """How often everything is repeated, and where the observer decides.
+    """Numbers of repetitions, and decision criterion.
 
     Parameters
     ----------
     presentations : int
         Noisy presentations of each sphere: gradient sums behind one mean and standard deviation (d), or
-        sets of responses from which pairs are picked (c*).
+        sets of responses from which pairs are sampled (c*).
     distributions : int
         Pairs of mean and standard deviation per sphere, Gradient Sum only (f).
     pairs : int
@@ -55,20 +55,20 @@ class Experiment:
     hit_rates : int
         Hit rates per comparison, of which mean and standard deviation are reported (i, h*).
     criterion : float
-        Decision point beta, as a fraction of the way from the standard's mean to the comparison's.
+        Decision point beta, as a fraction of the distance from the standard's mean to the comparison's.
     criterion_sigma : float
         Spread of the decision point: for each hit rate it is multiplied by Normal(1, criterion_sigma).
         Above 0 this is the paper's derivative of Gradient Sum: one mean and standard deviation per
-        sphere, from `presentations_varied` sums; steps (f) and (g) fall away.
+        sphere, from `presentations_varied` sums; steps (f) and (g) are omitted.
     presentations_varied : int
         Presentations of each sphere when the criterion varies.
     criterion_moves : {"point", "fraction"}
-        What the varied criterion multiplies: the decision point itself, or beta.
+        Quantity multiplied by the varied criterion: the decision point itself, or beta.
 
     Raises
     ------
     InputError
-        If a count is below 2, the criterion not finite, its spread negative, or what it moves unknown.
+        If a count is below 2, the criterion not finite, its spread negative, or `criterion_moves` unknown.
 
     Examples
     --------
@@ -109,7 +109,7 @@ def discriminate_gradient_sum(
     silent_value: float | None = None,
     session: int = 0,
 ) -> HitRates:
-    """Tell spheres apart by their Gradient Sum, steps (a) to (k).
+    """Discriminate spheres by their Gradient Sum, steps (a) to (k).
 
     Parameters
     ----------
@@ -120,14 +120,14 @@ def discriminate_gradient_sum(
     noise_sigma : float
         Standard deviation sigma_1 of the multiplicative noise.
     seed : int
-        Of the whole run; same seed and session, same answer.
+        Of the whole run; the same seed and session give the same result.
     experiment : Experiment, optional
         Repetitions and criterion; default: the paper's.
     silent_value : float, optional
-        What a response of NaN, the latency of a silent receptor, stands for, before noise:
-        `END_OF_STIMULUS_MS` is usual. Without it NaN is refused.
+        Value that replaces NaN, the latency of a silent receptor, before noise: `END_OF_STIMULUS_MS` is
+        usual. Without it NaN is refused.
     session : int, optional
-        Which session of this seed: another one draws other numbers.
+        Session of this seed; sessions have different random numbers.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def discriminate_gradient_sum(
     Raises
     ------
     InputError
-        If there are fewer than two spheres, no receptor answers, neighbours are not receptors, the noise,
+        If there are fewer than two spheres, no receptor responds, neighbours are not receptors, the noise,
         the seed or the session is negative, or a response is not finite and no `silent_value` is given.
 
     Examples
@@ -161,7 +161,7 @@ def discriminate_gradient_sum(
 def hit_rates_of_sums(
     sums: FloatArray, seed: int, experiment: Experiment | None = None, session: int = 0
 ) -> HitRates:
-    """Decide between spheres whose Gradient Sums are known, steps (e) and (g) to (k).
+    """Discriminate spheres with given Gradient Sums, steps (e) and (g) to (k).
 
     Parameters
     ----------
@@ -170,9 +170,9 @@ def hit_rates_of_sums(
     seed : int
         Of the whole run.
     experiment : Experiment, optional
-        Hit rates and criterion; how many sums there are is seen from them.
+        Hit rates and criterion; the numbers of sums are those of `sums`.
     session : int, optional
-        That of the sums.
+        Session of the sums.
 
     Returns
     -------
@@ -201,11 +201,11 @@ def discriminate_euclidean(
     norm: str = "city-block",
     session: int = 0,
 ) -> HitRates:
-    """Tell spheres apart by their Euclidean Distance from the standard, steps (a) and (b*) to (h*).
+    """Discriminate spheres by their Euclidean Distance from the standard, steps (a) and (b*) to (h*).
 
-    For every hit rate all is repeated: noisy sets (a)-(d*), random pairs of them (e*)-(g*) and the
-    decision (h*). Were the sets drawn only once, chance in them would shift the mean hit rate however
-    often it is repeated, whereas the paper finds it stable with 100 hit rates. The standard's own
+    Every hit rate repeats the whole procedure: noisy sets (a)-(d*), random pairs of them (e*)-(g*) and the
+    decision (h*). If the sets were sampled once, their sampling error would shift the mean hit rate
+    regardless of the repetitions, but the paper finds it stable with 100 hit rates. The standard's own
     distances are between two different sets of it.
 
     Parameters
@@ -215,15 +215,15 @@ def discriminate_euclidean(
     noise_sigma : float
         Standard deviation sigma_1 of the multiplicative noise.
     seed : int
-        Of the whole run; same seed and session, same answer.
+        Of the whole run; the same seed and session give the same result.
     experiment : Experiment, optional
         Repetitions and criterion; default: the paper's. Its criterion does not vary here.
     silent_value : float, optional
-        What a response of NaN stands for; without it NaN is refused.
+        Value that replaces a response of NaN; without it NaN is refused.
     norm : {"city-block", "euclidean"}, optional
         Sum of absolute differences, as printed, or root of the sum of squares, as named.
     session : int, optional
-        Which session of this seed: another one draws other numbers.
+        Session of this seed; sessions have different random numbers.
 
     Returns
     -------
@@ -233,7 +233,7 @@ def discriminate_euclidean(
     Raises
     ------
     InputError
-        If there are fewer than two spheres, no receptor answers, the noise, the seed or the session is
+        If there are fewer than two spheres, no receptor responds, the noise, the seed or the session is
         negative, the norm unknown, the criterion is to vary, or a response is not finite and no
         `silent_value` is given.
 
@@ -261,14 +261,14 @@ def discriminate_euclidean(
 
 
 def checked_responses(responses: ArrayLike, silent_value: float | None = None) -> FloatArray:
-    """Return responses as a table if spheres can be told apart by them, else raise `InputError`.
+    """Return responses as a table if they are valid for a discrimination, else raise `InputError`.
 
     Parameters
     ----------
     responses : array_like (n_spheres, n_receptors)
         One measure of every receptor; the standard in the first row. [any unit]
     silent_value : float, optional
-        What a response of NaN stands for; without it NaN is refused.
+        Value that replaces a response of NaN; without it NaN is refused.
 
     Returns
     -------
@@ -277,8 +277,8 @@ def checked_responses(responses: ArrayLike, silent_value: float | None = None) -
     Raises
     ------
     InputError
-        If there are fewer than two spheres or no receptor, a response is no finite number, or no receptor
-        answers any sphere.
+        If there are fewer than two spheres or no receptor, a response is not finite, or no receptor responds
+        to any sphere.
 
     Examples
     --------
@@ -292,14 +292,14 @@ def checked_responses(responses: ArrayLike, silent_value: float | None = None) -
     silent = np.isnan(table)
     if table.size and (silent | (table == 0.0)).all():
         raise InputError(
-            "responses must come from a population that answers: it stays silent under every sphere, and "
-            "there is no hit rate from zeros; press deeper or take more sensitive afferents."
+            "responses must not all be silent: the population stays silent under every sphere, so there is "
+            "no hit rate; increase the depth or use more sensitive afferents."
         )
     if silent.any():
         if silent_value is None:
             raise InputError(
                 f"responses must be finite: {np.count_nonzero(silent)} are NaN, as of silent receptors; "
-                "give silent_value to say what those stand for."
+                "give silent_value to replace them."
             )
         table[silent] = finite("silent_value", silent_value)
     table = float_array("responses", table, 2)
@@ -313,7 +313,7 @@ def checked_responses(responses: ArrayLike, silent_value: float | None = None) -
 def _picked_pairs(
     means: FloatArray, spreads: FloatArray, seed: int, plan: Experiment, session: int
 ) -> FloatArray:
-    """Return hit rates (hit_rates, n_comparisons) of randomly picked distributions (g)-(j)."""
+    """Return hit rates (hit_rates, n_comparisons) of randomly sampled distributions (g)-(j)."""
     n_distributions, n_spheres = means.shape
     comparison = np.arange(1, n_spheres)
     trials = session_trials(session, n_spheres - 1)
@@ -327,7 +327,7 @@ def _picked_pairs(
 def _varied_criterion(
     means: FloatArray, spreads: FloatArray, seed: int, plan: Experiment, session: int
 ) -> FloatArray:
-    """Return hit rates (hit_rates, n_comparisons) of one distribution per sphere, criterion wavering."""
+    """Return hit rates (hit_rates, n_comparisons) of one distribution per sphere, with a varied criterion."""
     trials = session_trials(session, means.shape[1] - 1)
     draws = normals(seed, trials, 1, Purpose.CRITERION, plan.hit_rates)[:, 0].T
     wavering = 1.0 + plan.criterion_sigma * draws
@@ -346,14 +346,14 @@ def _distances(
     sets = noisy_responses(values, sigma, seed, trials, plan.presentations)
     n_spheres, n_sets, _ = sets.shape
     of_standard, of_sphere = _picks(seed, trials, (plan.pairs, 2), n_sets).transpose(2, 0, 1)
-    # A set at distance 0 from itself would tell nothing about noise: the standard meets its other sets.
+    # The distance of a set from itself is 0 and has no noise: the standard is compared with its other sets.
     other = _picks(seed, trials[:1], (plan.pairs, 2), n_sets - 1)[0, :, 1]
     of_sphere[0] = other + (other >= of_standard[0])
     return distance(sets[0, of_standard], sets[np.arange(n_spheres)[:, np.newaxis], of_sphere], norm)
 
 
 def _picks(seed: int, trials: IntArray, shape: tuple[int, int], choices: int) -> IntArray:
-    """Pick among 0 ... choices - 1, `shape` times in each trial; (n_trials, *shape)."""
+    """Sample from 0 ... choices - 1, `shape` times in each trial; (n_trials, *shape)."""
     numbers = uniforms(seed, trials, 1, Purpose.PICK, shape[0] * shape[1])
     return (numbers * choices).astype(np.int64).reshape(-1, *shape)
 

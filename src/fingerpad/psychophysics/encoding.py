@@ -1,7 +1,7 @@
-"""Two ways to read a population of afferents: Gradient Sum and Euclidean Distance (paper, section 2.2.3).
+"""Codes of a population of afferents: Gradient Sum and Euclidean Distance (paper, section 2.2.3).
 
-Both work on any response measure (a rate, a latency) and along the last axis, so that thousands of noisy
-populations are read at once.
+Both apply to any response measure (a rate, a latency) and along the last axis, so thousands of noisy
+populations are evaluated at once.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ _LATTICE_NEIGHBOURS = {"rectangular": 8, "hexagonal": 6}
 
 
 def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: float, count: int = 8) -> np.ndarray:
-    """Find who is whose neighbour in a lattice.
+    """Find the pairs of neighbours in a lattice.
 
     Receptors are neighbours when they lie less than 1.5 pitches apart: in x and z each (8 neighbours,
     diagonals included), or in the sum of both (4 neighbours). On a square lattice these are exactly the
-    surrounding ones, and a layout that strays a little from the lattice keeps them. The 6 neighbours of a
+    surrounding ones, also with small deviations from the lattice. The 6 neighbours of a
     hexagonal lattice lie less than 1.37 pitches away, half way from the first to the second nearest.
 
     Parameters
     ----------
     positions_mm : array_like (n_receptors, 2)
-        Places of the receptors, such as `Population.places_mm`. [mm]
+        Positions of the receptors, such as `Population.places_mm`. [mm]
     pitch_mm : float
         Distance between neighbours of the layout. [mm]
     count : {8, 4, 6}, optional
@@ -57,7 +57,7 @@ def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: float, count: int = 8) ->
     Raises
     ------
     InputError
-        If the positions are not pairs, the pitch is not positive or the count is none of 8, 4 and 6.
+        If the positions are not pairs, the pitch is not positive or the count is not 8, 4 or 6.
 
     Examples
     --------
@@ -77,15 +77,15 @@ def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: float, count: int = 8) ->
 
 
 def delaunay_pairs(positions_mm: ArrayLike, pitch_mm: float) -> np.ndarray:
-    """Find who is whose neighbour where receptors lie at random.
+    """Find the pairs of neighbours in a random layout.
 
-    Neighbours are joined by an edge of the Delaunay triangulation: their Voronoi cells, what lies nearest to
-    each, touch. Edges longer than 3 pitches are left out: they bridge the rim of a region or a hole in it.
+    Neighbours are joined by an edge of the Delaunay triangulation: their Voronoi cells are adjacent. Edges
+    longer than 3 pitches are left out, because they cross a hole or a concave border of the region.
 
     Parameters
     ----------
     positions_mm : array_like (n_receptors, 2)
-        Places of the receptors, such as `Population.places_mm`. [mm]
+        Positions of the receptors, such as `Population.places_mm`. [mm]
     pitch_mm : float
         1/sqrt(density) of the layout. [mm]
 
@@ -119,7 +119,7 @@ def delaunay_pairs(positions_mm: ArrayLike, pitch_mm: float) -> np.ndarray:
 
 
 def neighbours_of(places_mm: ArrayLike, pitch_mm: float, pattern: str) -> np.ndarray:
-    """Find who is whose neighbour in a layout of any pattern of `fingerpad.core.layouts`.
+    """Find the pairs of neighbours in a layout of any pattern of `fingerpad.core.layouts`.
 
     Parameters
     ----------
@@ -170,15 +170,15 @@ def _in_order(pairs: np.ndarray) -> np.ndarray:
 
 
 def answering_neighbours(responses: ArrayLike, neighbours: np.ndarray) -> np.ndarray:
-    """Return the pairs of neighbours of which both answer every stimulus.
+    """Return the pairs of neighbours that both respond to every stimulus.
 
-    A receptor that is silent under one stimulus has no latency to compare with its neighbours'. Left out
-    under all of them, it cannot make two stimuli differ by falling silent.
+    A receptor that is silent under one stimulus has no latency to compare with its neighbours'. It is left
+    out under every stimulus, so that silence itself does not discriminate two stimuli.
 
     Parameters
     ----------
     responses : array_like (..., n_receptors)
-        Response measure of every receptor to each stimulus; NaN where it has none. [any unit]
+        Response measure of every receptor to each stimulus; NaN without a response. [any unit]
     neighbours : int array (n_pairs, 2)
         From `neighbour_pairs`.
 
@@ -189,7 +189,7 @@ def answering_neighbours(responses: ArrayLike, neighbours: np.ndarray) -> np.nda
     Raises
     ------
     InputError
-        If the pairs name receptors that are not there.
+        If a pair contains an index outside the population.
 
     Examples
     --------
@@ -204,7 +204,7 @@ def answering_neighbours(responses: ArrayLike, neighbours: np.ndarray) -> np.nda
 
 
 def gradient_sum(values: ArrayLike, neighbours: np.ndarray) -> FloatArray:
-    """Gradient Sum: how much a response differs from place to place, steps (b) and (c) of Figure 3.
+    """Gradient Sum: sum of the differences between neighbours, steps (b) and (c) of Figure 3.
 
     Each element's gradient is the sum of absolute differences to its neighbours (b); the gradients of all
     elements are summed (c). Each pair of neighbours therefore counts twice.
@@ -224,7 +224,7 @@ def gradient_sum(values: ArrayLike, neighbours: np.ndarray) -> FloatArray:
     Raises
     ------
     InputError
-        If the pairs name receptors that are not there.
+        If a pair contains an index outside the population.
 
     Examples
     --------
@@ -241,9 +241,9 @@ def gradient_sum(values: ArrayLike, neighbours: np.ndarray) -> FloatArray:
 
 
 def distance(values_a: ArrayLike, values_b: ArrayLike, norm: str = "city-block") -> FloatArray:
-    """Euclidean Distance: how much two populations differ, receptor by receptor, step (e*) of Figure 3.
+    """Euclidean Distance: difference between two populations, receptor by receptor, step (e*) of Figure 3.
 
-    The paper gives it that name and sums absolute differences, which is the city-block distance.
+    The paper uses this name for a sum of absolute differences, which is the city-block distance.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
-"""The psychometric function: how often a judgement is right, or "yes", as the stimulus grows.
+"""The psychometric function: proportion of correct, or "yes", judgements against the level of the stimulus.
 
     psi(x) = gamma + (1 - gamma - lambda) F(x; m, w)
     F(x; m, w) = S(s_50 + (s_95 - s_05) (c(x) - c(m)) / w),    s_q = S^-1(q)
 
-gamma is the rate of guessing, lambda that of lapses, m the threshold, at which F is one half, and w the
-width, over which F rises from 5 to 95 %. Every shape S has the same two numbers, so that shapes can be
-exchanged. The coordinate c(x) is x itself, and ln x for Weibull's function: its width is that of ln x.
+gamma is the guess rate, lambda the lapse rate, m the threshold, at which F is one half, and w the width, over
+which F increases from 5 to 95 %. Every shape S has these two parameters, so shapes can be compared. The
+coordinate c(x) is x itself, and ln x for Weibull's function: its width is that of ln x.
 
 Source: Wichmann & Hill 2001, Perception & Psychophysics 63; threshold and width as in Schuett, Harmeling,
 Macke & Wichmann 2016, Vision Research 122.
@@ -66,7 +66,7 @@ class Sigmoid:
         return float(upper - lower)
 
     def argument(self, coordinate: FloatArray, middle: ArrayLike, width: ArrayLike) -> FloatArray:
-        """Return what S is taken of: s_50 + (s_95 - s_05) (c(x) - c(m)) / w."""
+        """Return the argument of S: s_50 + (s_95 - s_05) (c(x) - c(m)) / w."""
         return self.half + self.stretch * (coordinate - np.asarray(middle)) / np.asarray(width)
 
 
@@ -92,7 +92,7 @@ def _gumbel_quantile(share: FloatArray) -> FloatArray:
 
 
 _LARGEST_EXPONENT = 50.0
-"""Beyond it the function is one to the last bit, and exp would overflow."""
+"""Above it the function is 1 in double precision, and exp would overflow."""
 
 SIGMOIDS = {
     "normal": Sigmoid(ndtr, _normal_density, ndtri),
@@ -100,7 +100,7 @@ SIGMOIDS = {
     "gumbel": Sigmoid(_gumbel, _gumbel_density, _gumbel_quantile),
     "weibull": Sigmoid(_gumbel, _gumbel_density, _gumbel_quantile, logarithmic=True),
 }
-"""Shapes by name. Gumbel's is the one of smallest extremes, 1 - exp(-exp t); Weibull's is it over ln x."""
+"""Shapes by name. Gumbel is that of smallest extremes, 1 - exp(-exp t); Weibull is the same over ln x."""
 
 
 def proportion(
@@ -126,7 +126,7 @@ def level_at(
     guess: ArrayLike,
     lapse: ArrayLike,
 ) -> FloatArray:
-    """Inverse of `proportion`: where psi takes a value; -inf or inf where it never falls or rises to it.
+    """Inverse of `proportion`: level at which psi has a value; -inf or inf if psi does not reach it.
 
     All arguments broadcast.
     """
@@ -150,22 +150,22 @@ class PsychometricFunction:
     guess : float
         Rate gamma at levels far below the threshold. [0-1]
     lapse : float
-        What lambda is missing to 1 far above the threshold. [0-1]
+        Difference lambda of psi to 1 far above the threshold. [0-1]
     sigmoid : {"normal", "logistic", "weibull", "gumbel"}
         Shape of F.
 
     Raises
     ------
     InputError
-        If a number is not finite, the width (or Weibull's threshold) is not positive, or guess and lapse are
-        no rates that leave room for F.
+        If a number is not finite, the width (or the threshold of "weibull") is not positive, or guess and
+        lapse are negative or sum to 1 or more.
 
     Examples
     --------
-    >>> told_apart = PsychometricFunction(threshold=319.0, width=80.0, guess=0.5, lapse=0.02)
-    >>> told_apart.predict([287.0, 319.0, 400.0]).round(2).tolist()
+    >>> judged = PsychometricFunction(threshold=319.0, width=80.0, guess=0.5, lapse=0.02)
+    >>> judged.predict([287.0, 319.0, 400.0]).round(2).tolist()
     [0.55, 0.74, 0.98]
-    >>> round(told_apart.level_at(0.75), 1)
+    >>> round(judged.level_at(0.75), 1)
     320.3
     """
 
@@ -220,7 +220,7 @@ class PsychometricFunction:
         )
 
     def level_at(self, proportion_correct: float = 0.75) -> float:
-        """Level at which psi takes a value.
+        """Level at which psi has a value.
 
         Parameters
         ----------
@@ -235,7 +235,7 @@ class PsychometricFunction:
         Raises
         ------
         InputError
-            If psi never takes that value.
+            If psi does not reach that value.
         """
         wanted = finite("proportion_correct", proportion_correct)
         if not self.guess < wanted < 1.0 - self.lapse:
@@ -246,7 +246,7 @@ class PsychometricFunction:
         return float(level_at(self.shape, wanted, self.threshold, self.width, self.guess, self.lapse))
 
     def slope(self, proportion_correct: float = 0.75) -> float:
-        """Rise of psi per unit of the level, where psi takes a value.
+        """Slope of psi, its derivative by the level, where psi has a value.
 
         Parameters
         ----------
@@ -261,7 +261,7 @@ class PsychometricFunction:
         Raises
         ------
         InputError
-            If psi never takes that value.
+            If psi does not reach that value.
 
         Examples
         --------
@@ -277,7 +277,7 @@ class PsychometricFunction:
 
 
 def checked_levels(levels: ArrayLike, sigmoid: str) -> FloatArray:
-    """Return levels as an array if `sigmoid` can be taken of them, else raise `InputError`.
+    """Return levels as an array if they are in the domain of `sigmoid`, else raise `InputError`.
 
     Examples
     --------

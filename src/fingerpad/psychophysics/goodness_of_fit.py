@@ -1,9 +1,9 @@
-"""Whether a psychometric function is good enough: its deviance beside those of data that it made itself.
+"""Goodness of fit of a psychometric function: its deviance compared with data simulated from it.
 
     D = 2 sum_i [ln P(k_i | k_i / n_i) - ln P(k_i | psi(x_i))]
 
-With many trials D follows chi square; with the few of an experiment it does not, so that its distribution is
-drawn: counts from the fit, fitted again (Wichmann & Hill 2001).
+With many trials D has a chi-square distribution; with the trials of an experiment it has not. Its
+distribution is therefore simulated: counts from the fit are fitted again (Wichmann & Hill 2001).
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from fingerpad.psychophysics.uncertainty import drawn_counts
 
 @dataclass(frozen=True)
 class GoodnessOfFit:
-    """Deviance of a fit, and how often data from the fit itself deviate as much.
+    """Deviance of a fit, and its p-value from simulated data.
 
     Parameters
     ----------
     deviance : float
-        D of the observed counts; about the number of levels less the fitted parameters where all is well.
+        D of the observed counts; about the number of levels minus the fitted parameters for a good fit.
     p_value : float
-        Share of the drawn data sets with at least that deviance; small ones speak against the function. [0-1]
+        Share of the simulated data sets with at least that deviance; a small one rejects the function. [0-1]
     residuals : array (n_levels,)
-        Root of each level's share of D, with the sign of observed less predicted.
+        Root of each level's share of D, with the sign of observed minus predicted.
     drawn_deviances : array (n_replicates,)
-        Of the drawn data sets.
+        Of the simulated data sets.
     seed : int
         Of the random numbers.
     """
@@ -45,16 +45,16 @@ class GoodnessOfFit:
 
 
 def goodness_of_fit(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> GoodnessOfFit:
-    """Compare the deviance of a fit with those of data drawn from it.
+    """Compare the deviance of a fit with those of data simulated from it.
 
     Parameters
     ----------
     fit : PsychometricFit
-        What to judge.
+        The fit to test.
     seed : int
         Of the random numbers; keyed by replicate and level.
     n_replicates : int, optional
-        How many data sets to draw.
+        Number of simulated data sets.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def goodness_of_fit(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -
     rho = points[:, OVERDISPERSION, None] if fit.overdispersion > 0.0 else 0.0
     perfect = log_probability(drawn, fit.counts.n_trials, drawn / fit.counts.n_trials, rho).sum(axis=1)
     deviances = 2.0 * (perfect - heights)
-    # The observed set is one of those that the fit could have made: p is never 0.
+    # The observed set counts as one of the sets, so p is never 0.
     p_value = (1.0 + np.count_nonzero(deviances >= fit.deviance)) / (1.0 + n_replicates)
     return GoodnessOfFit(fit.deviance, float(p_value), _residuals(fit), deviances, seed)
 

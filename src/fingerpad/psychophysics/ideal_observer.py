@@ -1,15 +1,15 @@
-"""The ideal observer, whom no way of reading the same responses can beat, and how near to it a code comes.
+"""The ideal observer, the upper bound of every code of the same responses, and the efficiency of a code.
 
     ln R(r) = ln p(r | comparison) - ln p(r | standard)
 
-By the lemma of Neyman and Pearson the ratio R is the best of all statistics of the responses. Every observer
-is measured by the same yardstick, the proportion correct of two alternatives: how often its statistic is
-greater for the comparison than for the standard (the area under its curve of hits against false alarms), and
+By the Neyman-Pearson lemma the ratio R is the best statistic of the responses. Every observer is measured by
+the proportion correct of two alternatives: the probability that its statistic is greater for the comparison
+than for the standard (the area under the ROC curve), and
 
     d' = sqrt 2 z(proportion),    efficiency = (d'_code / d'_ideal)^2,
 
-the share of trials that the ideal observer would need to judge as well (Barlow 1962). For stimuli that differ
-little both have a limit in closed form, Fisher's information.
+the share of trials that the ideal observer would need for the same performance (Barlow 1962). For small
+differences both have a limit in closed form, the Fisher information.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from fingerpad.psychophysics.noisy_responses import session_trials
 from fingerpad.psychophysics.response_models import ResponseModel
 
 Statistic = Callable[[FloatArray], FloatArray]
-"""From responses (n_trials, n_receptors) to what an observer makes of them (n_trials,)."""
+"""From responses (n_trials, n_receptors) to the statistic of an observer (n_trials,)."""
 
 
 @dataclass(frozen=True)
 class Discriminability:
-    """How well two stimuli are told apart, in trials of two alternatives.
+    """Discriminability of two stimuli, in trials of two alternatives.
 
     Parameters
     ----------
     proportion_correct : float
-        Area under the curve of hits against false alarms. [0-1]
+        Area under the ROC curve. [0-1]
     standard_error : float
         Of that, from the number of trials.
     d_prime : float
-        sqrt 2 z(proportion); inf where no trial was failed. [standard deviations]
+        sqrt 2 z(proportion); inf if every trial is correct. [standard deviations]
     d_prime_error : float
         Its standard error.
     """
@@ -55,12 +55,12 @@ class Discriminability:
 
 
 def discriminability(standard: ArrayLike, comparison: ArrayLike) -> Discriminability:
-    """Compare an observer's answers to two stimuli, each with each.
+    """Compare the values of an observer's statistic for two stimuli, all pairs.
 
     Parameters
     ----------
     standard, comparison : array_like (n_trials,)
-        What a statistic says to either; larger ones speak for the comparison, equal ones count half.
+        Values of the statistic; larger ones favour the comparison, ties count half.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def discriminability(standard: ArrayLike, comparison: ArrayLike) -> Discriminabi
     Raises
     ------
     InputError
-        If there are fewer than two answers to a stimulus.
+        If there are fewer than two values for a stimulus.
 
     Examples
     --------
@@ -82,7 +82,7 @@ def discriminability(standard: ArrayLike, comparison: ArrayLike) -> Discriminabi
     if min(n, m) < 2 or np.isnan(first).any() or np.isnan(second).any():
         raise InputError(f"Two numbers or more are needed for each stimulus, none NaN: got {n} and {m}.")
     ranks = rankdata(np.concatenate([first, second]))
-    # Share of the other stimulus's answers that each one exceeds.
+    # Share of the other stimulus's values that each value exceeds.
     above = (ranks[n:] - rankdata(second)) / n
     below = 1.0 - (ranks[:n] - rankdata(first)) / m
     area = float(above.mean())
@@ -94,14 +94,14 @@ def discriminability(standard: ArrayLike, comparison: ArrayLike) -> Discriminabi
 
 @dataclass(frozen=True)
 class Presentation:
-    """Responses of a population to two stimuli, trial by trial: what all observers of a comparison share.
+    """Responses of a population to two stimuli, trial by trial, shared by all observers of a comparison.
 
     Parameters
     ----------
     standard, comparison : array (n_trials, n_receptors)
         Responses. [any unit]
     log_ratio_standard, log_ratio_comparison : array (n_trials,)
-        The ideal observer's ln R of them.
+        ln R of these responses.
     seed : int
         Of the random numbers.
     """
@@ -113,18 +113,18 @@ class Presentation:
     seed: int
 
     def ideal(self) -> Discriminability:
-        """How well the ideal observer does."""
+        """Discriminability by the ideal observer."""
         return discriminability(self.log_ratio_standard, self.log_ratio_comparison)
 
     def ideal_hit_rate(self) -> float:
-        """How often the ideal observer knows the comparison for what it is, from one look. [0-1]
+        """Probability that the ideal observer identifies a single presentation of the comparison. [0-1]
 
-        Right by more than chance where ln R > 0; a tie is decided by a coin.
+        It identifies the comparison where ln R > 0; ties count half.
         """
         return float(np.heaviside(self.log_ratio_comparison, 0.5).mean())
 
     def of(self, statistic: Statistic) -> Discriminability:
-        """How well an observer does who looks at a statistic, and knows on which side the comparison lies."""
+        """Discriminability by an observer who uses a statistic and knows its sign."""
         first, second = statistic(self.standard), statistic(self.comparison)
         sign = -1.0 if second.mean() < first.mean() else 1.0
         return discriminability(sign * first, sign * second)
@@ -133,18 +133,18 @@ class Presentation:
 def present(
     standard: ResponseModel, comparison: ResponseModel, seed: int, n_trials: int = 4000, session: int = 0
 ) -> Presentation:
-    """Draw responses to two stimuli, and what the ideal observer makes of them.
+    """Simulate responses to two stimuli, with the log likelihood ratio of the ideal observer.
 
     Parameters
     ----------
     standard, comparison : ResponseModel
-        How responses to either are distributed: `GaussianResponses`, `PoissonResponses`, or one's own.
+        Distributions of the responses: `GaussianResponses`, `PoissonResponses`, or another model.
     seed : int
         Of the random numbers, keyed by trial and receptor.
     n_trials : int, optional
         Presentations of each stimulus.
     session : int, optional
-        Sessions of one seed have no number in common.
+        Sessions of one seed share no random number.
 
     Returns
     -------
@@ -153,7 +153,7 @@ def present(
     Raises
     ------
     InputError
-        If the stimuli have not the same receptors, or fewer than two trials are wanted.
+        If the numbers of receptors differ, or there are fewer than two trials.
 
     Examples
     --------
@@ -175,7 +175,7 @@ def present(
 
 
 def _log_ratio(standard: ResponseModel, comparison: ResponseModel, responses: FloatArray) -> FloatArray:
-    # Either may be impossible, -inf, but not both: one of them drew the responses.
+    # One likelihood may be -inf, but not both: the responses come from one of the models.
     return comparison.log_likelihood(responses) - standard.log_likelihood(responses)
 
 
@@ -190,12 +190,12 @@ def efficiency(code: Discriminability, ideal: Discriminability) -> tuple[float, 
     Returns
     -------
     (float, float)
-        The error takes the two as independent, which is more than it is where they saw the same trials.
+        The error assumes independence; with the same trials it is an upper bound.
 
     Raises
     ------
     InputError
-        If the ideal observer guesses or never fails: stimuli must differ, and not too much.
+        If the ideal observer is at chance or always correct.
 
     Examples
     --------
@@ -205,8 +205,8 @@ def efficiency(code: Discriminability, ideal: Discriminability) -> tuple[float, 
     """
     if not 0.0 < ideal.d_prime < math.inf:
         raise InputError(
-            f"The ideal observer is right in {ideal.proportion_correct:.4f} of the trials, which tells no "
-            "efficiency: choose stimuli that differ, and not too much."
+            f"The ideal observer is correct in {ideal.proportion_correct:.4f} of the trials, so the "
+            "efficiency is undefined: choose stimuli with a smaller or larger difference."
         )
     share = (code.d_prime / ideal.d_prime) ** 2
     relative = math.hypot(
@@ -216,11 +216,11 @@ def efficiency(code: Discriminability, ideal: Discriminability) -> tuple[float, 
 
 
 def gaussian_information(responses: ArrayLike, slopes: ArrayLike, noise_sigma: float) -> float:
-    """Fisher's information of responses under the paper's noise: the ideal observer's limit.
+    """Fisher information of responses with the paper's noise, the limit of the ideal observer.
 
         J = sum_i (mu_i' / mu_i)^2 (1 / sigma_1^2 + 2),    d' -> |dx| sqrt J
 
-    The 2 is what the spread tells, which follows the mean.
+    The 2 is the information in the standard deviation, which is proportional to the mean.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ def gaussian_information(responses: ArrayLike, slopes: ArrayLike, noise_sigma: f
 
 
 def poisson_information(mean_counts: ArrayLike, slopes: ArrayLike) -> float:
-    """Fisher's information of Poisson spike counts: J = sum_i lambda_i'^2 / lambda_i.
+    """Fisher information of Poisson spike counts: J = sum_i lambda_i'^2 / lambda_i.
 
     Parameters
     ----------

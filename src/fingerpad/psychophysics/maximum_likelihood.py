@@ -1,15 +1,14 @@
-"""Psychometric functions of greatest likelihood, for many sets of counts at once.
+"""Maximum-likelihood psychometric functions, for many sets of counts at once.
 
 Newton's method with Levenberg's damping, within bounds:
 
     (A + mu diag A) delta = g,    g = d ln P / d theta,    A = |-dg / d theta|
 
-The absolute value is that of a symmetric matrix: all its curvatures, taken as falling. Where the likelihood
-curves up, as it may between a lapse rate of 0 and one that explains a single wrong judgement, such a step
-still climbs. A parameter at a bound that the likelihood would push out of it is held, and one that would pass
-a bound stops there. Every set of counts has its own damping and is finished by itself, so that a set ends
-with the same numbers in whatever company it is fitted; a bootstrap of a thousand sets takes tenths of a
-second.
+The absolute value is that of a symmetric matrix: the absolute values of its eigenvalues. Where the likelihood
+is convex, as it may be between a lapse rate of 0 and one that explains a single wrong judgement, such a step
+still ascends. A parameter is held at a bound if the gradient points outwards, and a step ends at a bound.
+Every set of counts has its own damping and convergence, so its result does not depend on the other sets; a
+bootstrap of a thousand sets takes tenths of a second.
 """
 
 from __future__ import annotations
@@ -30,11 +29,11 @@ PARAMETERS = ("threshold", "width", "guess", "lapse", "overdispersion")
 THRESHOLD, WIDTH, GUESS, LAPSE, OVERDISPERSION = range(len(PARAMETERS))
 MOST_STEPS = 200
 LEAST_GAIN = 1e-10
-"""A step that promises less in the logarithm of the likelihood is the last."""
+"""The iteration ends with a predicted gain in the log likelihood below this."""
 
 SMALLEST_DAMPING, LARGEST_DAMPING = 1e-6, 1e12
 _SCALES = (1.0, 1.0, 0.1, 0.01, 1.0)
-"""By how much parameters change something; for the threshold times the width, for rho times itself."""
+"""Scales of the parameters; times the width for the threshold, times itself for rho."""
 
 _DIFFERENCE = 1e-4
 _FLATTEST = 1e-8
@@ -46,7 +45,7 @@ _START_POINTS = {THRESHOLD: 15, WIDTH: 9, GUESS: 4, LAPSE: 3, OVERDISPERSION: 4}
 
 @dataclass(frozen=True)
 class Model:
-    """Which psychometric functions are looked for.
+    """Family of psychometric functions to be fitted.
 
     Working coordinates are c(m), ln w, gamma, lambda and rho, in the order of `PARAMETERS`.
 
@@ -70,7 +69,7 @@ class Model:
 
     @property
     def free(self) -> np.ndarray:
-        """Which parameters are looked for (5,)."""
+        """Free parameters (5,)."""
         return self.upper > self.lower
 
     def proportions(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -89,7 +88,7 @@ class Model:
 
 
 def maximise(model: Model, n_correct: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Find the most likely function of each set of counts.
+    """Find the maximum-likelihood function of each set of counts.
 
     Parameters
     ----------
@@ -107,7 +106,7 @@ def maximise(model: Model, n_correct: FloatArray) -> tuple[FloatArray, FloatArra
     Raises
     ------
     ConvergenceError
-        If a set is not finished after `MOST_STEPS`.
+        If a set has not converged after `MOST_STEPS`.
     """
     points = _starts(model, n_correct)
     heights = model.log_likelihood(n_correct, points)
@@ -127,25 +126,25 @@ def maximise(model: Model, n_correct: FloatArray) -> tuple[FloatArray, FloatArra
         better = made >= 0.0
         improved = running[better]
         points[improved], heights[improved] = tried[better], reached[better]
-        # Damped until a step keeps what it promises.
+        # The damping depends on the ratio of actual to predicted gain.
         kept = made / np.maximum(promised, LEAST_GAIN)
         damping[running] *= np.where(kept > 0.75, 0.1, np.where(kept < 0.25, 10.0, 1.0))
         damping = np.maximum(damping, SMALLEST_DAMPING)
-        # Damping so large that steps vanish means that the top is reached to round-off.
+        # With very large damping the maximum is reached to round-off.
         finished = (np.abs(promised) < LEAST_GAIN) | (damping[running] > LARGEST_DAMPING)
         running = running[~finished]
         if not running.size:
             return points, heights
-        history.append(f"step {step + 1}: {running.size} of {len(points)} sets of counts not finished")
+        history.append(f"step {step + 1}: {running.size} of {len(points)} sets of counts not converged")
     raise ConvergenceError(
-        f"No most likely psychometric function after {MOST_STEPS} steps: give lapse or guess a value, or "
-        "measure more levels.",
+        f"No maximum-likelihood psychometric function after {MOST_STEPS} steps: give lapse or guess a "
+        "value, or measure more levels.",
         tuple(history[-10:]),
     )
 
 
 def _starts(model: Model, n_correct: FloatArray) -> FloatArray:
-    """Most likely point of a coarse grid for each set of counts."""
+    """Point of a coarse grid with the largest likelihood, for each set of counts."""
     axes = [
         _inner_points(model.lower[index], model.upper[index], count) for index, count in _START_POINTS.items()
     ]
@@ -158,7 +157,7 @@ def _starts(model: Model, n_correct: FloatArray) -> FloatArray:
 
 
 def _inner_points(lower: float, upper: float, count: int) -> FloatArray:
-    """Points between the bounds, not on them: there derivatives may vanish."""
+    """Points between the bounds, not on them, where derivatives may vanish."""
     if lower == upper:
         return np.array([lower])
     return lower + (upper - lower) * (np.arange(count) + 0.5) / count
@@ -197,7 +196,7 @@ def _curvature(model: Model, n_correct: FloatArray, points: FloatArray, held: np
         rise = _gradient(model, n_correct, points + step) - _gradient(model, n_correct, points - step)
         fall[:, index] = -rise / (2.0 * _DIFFERENCE) * scales
     fall[held[:, :, None] | held[:, None, :]] = 0.0
-    # In units of the scales, or the absolute value would depend on the unit of the levels.
+    # In units of the scales, so that the absolute value does not depend on the unit of the levels.
     curvatures, directions = np.linalg.eigh(0.5 * (fall + np.swapaxes(fall, 1, 2)))
     absolute = np.maximum(np.abs(curvatures), _FLATTEST)
     return np.einsum("spc,sc,sqc->spq", directions, absolute, directions) / (
@@ -224,7 +223,7 @@ def _damped_step(
     held: np.ndarray,
     damping: FloatArray,
 ) -> FloatArray:
-    """Solve (A + mu diag A) delta = g; what would pass a bound stops there, and the rest is solved again."""
+    """Solve (A + mu diag A) delta = g; parameters beyond a bound are set to it, the rest is solved again."""
     index = np.arange(len(PARAMETERS))
     damped = curvature.copy()
     damped[:, index, index] = damped[:, index, index] * (1.0 + damping[:, None])

@@ -1,4 +1,4 @@
-"""How much noise the observer has: the hit rates that a noise predicts, and the noise that fits people."""
+"""Noise of the observer: expected hit rates, and the noise that fits observed hit rates."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from fingerpad.psychophysics.noisy_responses import shared_noise_gradient_sums
 from fingerpad.psychophysics.signal_detection import decision_point, hit_probability, moments, side
 
 NOISE_DRAWS = 4000
-"""Common random presentations behind the fit of the noise, which they leave uncertain by one percent."""
+"""Common random presentations in the fit of the noise; its sampling error is one per cent."""
 
 _NOISE_SCAN = 33
 
 
 @dataclass(frozen=True)
 class NoiseFit:
-    """Noise that brings predicted hit rates closest to observed ones.
+    """Noise for which predicted hit rates are closest to observed ones.
 
     Parameters
     ----------
@@ -53,16 +53,16 @@ def expected_hit_rates(
 ) -> FloatArray:
     """Predict the mean hit rates of `discriminate_gradient_sum` without repeating the experiment.
 
-    The same standard normal draws serve every sphere and every noise, so the result is a smooth function
-    of `noise_sigma`, made for `fit_noise_sigma`.
+    The same standard normal samples are used for every sphere and every noise, so the result is a smooth
+    function of `noise_sigma`, as `fit_noise_sigma` needs.
 
     Parameters
     ----------
     responses, neighbours, noise_sigma, silent_value
         As in `discriminate_gradient_sum`.
     standard_normals : array_like (n_draws, n_receptors)
-        Draws from Normal(0, 1), several thousand; from `fingerpad.core.random_streams.normals`, they have
-        keys.
+        Samples of Normal(0, 1), several thousand, for example from
+        `fingerpad.core.random_streams.normals`.
     criterion : float, optional
         Decision point beta.
 
@@ -104,7 +104,7 @@ def expected_euclidean_hit_rates(
 ) -> FloatArray:
     """Predict the mean hit rates of `discriminate_euclidean`, city-block, in closed form.
 
-    Of one receptor the difference of two noisy responses a and b is normal, and its size has
+    For one receptor the difference of two noisy responses a and b is normal, and its absolute value has
 
         m = s sqrt(2/pi) exp(-d^2 / 2 s^2) + d (1 - 2 Phi(-d/s)),    v = d^2 + s^2 - m^2,
         d = b - a,    s = sigma_1 sqrt(a^2 + b^2)
@@ -144,10 +144,10 @@ def fit_noise_sigma(
     target_hit_rates: ArrayLike = psychophysics.GOODWIN_HIT_RATES.value,
     bounds: tuple[float, float] = (1e-3, 1.0),
 ) -> NoiseFit:
-    """Choose the noise so that predicted hit rates come closest to observed ones, in least squares.
+    """Fit the noise so that predicted hit rates are closest to observed ones, in least squares.
 
-    The bounds are scanned on a logarithmic grid and the best cell is refined, so that the flat stretches
-    at very small and very large noise do no harm. No random number is drawn here.
+    The interval between the bounds is scanned on a logarithmic grid and the best cell is refined. This is
+    robust at very small and very large noise, where hit rates are constant. It uses no random number.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def fit_noise_sigma(
     InputError
         If the bounds are not positive and in order, or predictions and targets differ in number.
     ConvergenceError
-        If the best noise lies on a bound: the targets then cannot be met by noise.
+        If the best noise lies on a bound.
 
     Examples
     --------
@@ -197,7 +197,7 @@ def fit_noise_sigma(
     if best in (0, _NOISE_SCAN - 1):
         raise ConvergenceError(
             f"No noise within {smallest:g} ... {largest:g} meets the hit rates {targets.tolist()}: "
-            f"the best lies on the bound {np.exp(grid[best]):g}; widen the bounds or look at the responses."
+            f"the best lies on the bound {np.exp(grid[best]):g}; widen the bounds or check the responses."
         )
     refined = minimize_scalar(
         misfit, bounds=(grid[best - 1], grid[best + 1]), method="bounded", options={"xatol": 1e-9}

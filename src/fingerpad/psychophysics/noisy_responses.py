@@ -1,11 +1,11 @@
-"""Noise on finished responses, by key, and the Gradient Sums of noisy populations (Figure 3, (a) to (d)).
+"""Multiplicative noise with keys, and Gradient Sums of noisy populations (Figure 3, (a) to (d)).
 
     r' = r n,    n ~ Normal(1, sigma_1)                 (a)
     S  = sum over receptors and their neighbours of |r'_i - r'_j|    (b), (c)
 
-Each n has the key (seed, trial, receptor, RESPONSE) and a place in that stream: the number of the
-presentation. Sums are made in compiled blocks that store neither all noise nor all noisy responses; threads
-share the trials, and since no number depends on another the sums are the same on any number of them.
+Each n has the key (seed, trial, receptor, RESPONSE) and a position in that stream, the number of the
+presentation. Sums are computed in compiled blocks that do not store all noise or all responses. Threads
+divide the trials; the sums are the same on any number of threads.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from fingerpad.core.random_streams import LARGEST_SEED, IntArray, Purpose, norma
 from fingerpad.core.threads import in_blocks
 
 SESSION = 2**32
-"""Trials of one session. Sessions of one seed have no random number in common."""
+"""Trials of one session. Sessions of one seed share no random number."""
 
 LARGEST_SESSION = LARGEST_SEED // SESSION - 1
 
@@ -31,19 +31,19 @@ _PRESENTATIONS_AT_ONCE = 128
 
 
 def session_trials(session: int, *shape: int) -> IntArray:
-    """Give the trials of a session their numbers.
+    """Return the numbers of the trials of a session.
 
     Parameters
     ----------
     session : int
-        Which session of the same seed, from 0.
+        Session of the same seed, from 0.
     *shape : int
-        How many stimuli, and how often each of them.
+        Number of stimuli, and repetitions of each.
 
     Returns
     -------
     int array of that shape
-        Numbers that no other session has.
+        Different from those of every other session.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def session_trials(session: int, *shape: int) -> IntArray:
 def noisy_responses(
     responses: FloatArray, noise_sigma: float, seed: int, trials: IntArray, presentations: int
 ) -> FloatArray:
-    """Draw noisy presentations of every stimulus, step (a).
+    """Sample noisy presentations of every stimulus, step (a).
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def noisy_responses(
     trials : int array (n_stimuli,)
         One trial per stimulus, from `session_trials`.
     presentations : int
-        How often each stimulus is presented.
+        Presentations of each stimulus.
 
     Returns
     -------
@@ -193,7 +193,7 @@ def _fill_sums(measures, stimuli, pairs, sigmas, seed, trials, sums):  # type: i
             for receptor in range(n_receptors):
                 for start in range(first, last, 4):
                     four = four_normals(seed, trials[trial], receptor, _RESPONSE, start // 4 + 1)
-                    for k in range(4):  # up to three too many at the end, which nobody reads
+                    for k in range(4):  # up to three too many at the end, not used
                         draws[receptor, start - first + k] = four[k]
             for measure in range(measures.shape[0]):
                 _multiply(measures[measure, stimuli[trial]], sigmas[measure], draws, noisy)

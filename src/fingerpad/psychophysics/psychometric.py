@@ -22,12 +22,12 @@ from fingerpad.psychophysics.maximum_likelihood import (
 )
 
 LARGEST_LAPSE = 0.1
-"""Bound of a lapse rate that is looked for: lapses are rare, or the task was not understood."""
+"""Upper bound of a fitted lapse rate."""
 
 LARGEST_GUESS = 0.5
 LARGEST_OVERDISPERSION = 0.5
 NARROWEST, WIDEST = 0.5, 5.0
-"""Bounds of the width: in the smallest distance between levels, and in the distance of the outermost."""
+"""Bounds of the width: times the smallest distance between levels, and times their span."""
 
 
 @dataclass(frozen=True)
@@ -37,15 +37,15 @@ class PsychometricFit:
     Parameters
     ----------
     counts : JudgementCounts
-        What was judged.
+        The counts.
     function : PsychometricFunction
-        The most likely one.
+        The maximum-likelihood function.
     overdispersion : float
         Correlation rho of judgements of one level; 0 for independent ones. [0-1]
     log_likelihood : float
         Natural logarithm of the probability of the counts.
     model : Model
-        What was looked for, within which bounds.
+        Free parameters and bounds.
     """
 
     counts: JudgementCounts
@@ -68,8 +68,8 @@ class PsychometricFit:
     def at_bounds(self) -> tuple[str, ...]:
         """Names of the fitted parameters that lie on a bound.
 
-        A width there says that data are too steep or too flat to tell it. No lapse rate and no overdispersion
-        at all are nothing to warn of.
+        A width there means that the data do not determine it. A lapse rate or an overdispersion of 0 is not
+        reported.
         """
         on = np.isclose(self.point, self.model.upper, rtol=0.0, atol=1e-9)
         on[:LAPSE] |= np.isclose(self.point, self.model.lower, rtol=0.0, atol=1e-9)[:LAPSE]
@@ -77,7 +77,7 @@ class PsychometricFit:
 
     @property
     def deviance(self) -> float:
-        """Twice the log likelihood that is missing to a model that meets every proportion exactly."""
+        """Twice the difference in log likelihood to a model that fits every proportion exactly."""
         perfect = log_probability(
             self.counts.n_correct, self.counts.n_trials, self.counts.proportion, self.overdispersion
         )
@@ -88,11 +88,11 @@ class PsychometricFit:
         return self.function.predict(levels)
 
     def threshold(self, proportion_correct: float = 0.75) -> float:
-        """Level at which a proportion is judged correctly; see `PsychometricFunction.level_at`."""
+        """Level at which a proportion of judgements is correct; see `PsychometricFunction.level_at`."""
         return self.function.level_at(proportion_correct)
 
     def slope(self, proportion_correct: float = 0.75) -> float:
-        """Rise of the proportion per unit of the level there; see `PsychometricFunction.slope`."""
+        """Slope of the proportion there, per unit of the level; see `PsychometricFunction.slope`."""
         return self.function.slope(proportion_correct)
 
 
@@ -108,28 +108,28 @@ def fit_psychometric(
     width: float | None = None,
     overdispersion: float | None = 0.0,
 ) -> PsychometricFit:
-    """Find the psychometric function that makes counted judgements most probable.
+    """Fit a psychometric function to counted judgements by maximum likelihood.
 
     Parameters
     ----------
     levels : array_like (n_levels,)
         Levels of the stimulus, increasing. [any unit]
     n_correct, n_trials : array_like (n_levels,)
-        Judgements that were correct, or "yes", of how many.
+        Correct, or "yes", judgements, and all judgements.
     sigmoid : {"normal", "logistic", "weibull", "gumbel"}, optional
         Shape.
     guess : float or None, optional
         Rate far below the threshold: 0.5 for two alternatives, 1/m for m of them, 0 for "which is more
-        curved"; None to look for it within 0 ... 0.5. [0-1]
+        curved"; None to fit it within 0 ... 0.5. [0-1]
     lapse : float or None, optional
-        What is missing to 1 far above the threshold; None to look for it within 0 ... 0.1. [0-1]
+        Difference to 1 far above the threshold; None to fit it within 0 ... 0.1. [0-1]
     threshold : float or None, optional
-        Level at which F is one half; None to look for it up to half the span of the levels beyond them.
+        Level at which F is one half; None to fit it up to half the span of the levels beyond them.
     width : float or None, optional
-        Distance of 5 and 95 % of F; None to look for it from half the smallest distance of levels to five
+        Distance of 5 and 95 % of F; None to fit it between half the smallest distance of levels and five
         times their span.
     overdispersion : float or None, optional
-        Correlation of judgements of one level; 0 for the binomial likelihood, None to look for it within
+        Correlation of judgements of one level; 0 for the binomial likelihood, None to fit it within
         0 ... 0.5. [0-1]
 
     Returns
@@ -139,11 +139,11 @@ def fit_psychometric(
     Raises
     ------
     InputError
-        If counts are not possible, a given parameter is not, or there are fewer levels than parameters of
-        position and slope to find.
+        If counts or a given parameter are not possible, or there are fewer levels than fitted parameters of
+        position and slope.
     ConvergenceError
-        If the most likely threshold lies on its bound, or one proportion explains all counts as well: the
-        levels do not tell a threshold.
+        If the maximum-likelihood threshold lies on its bound, or one proportion explains all counts as well:
+        the levels do not determine a threshold.
 
     Examples
     --------
@@ -174,7 +174,7 @@ def fit_psychometric(
 
 
 def _refuse_what_tells_no_threshold(fit: PsychometricFit, n_shaping: int) -> None:
-    """Raise `ConvergenceError` if levels miss the threshold, or one proportion explains all as well."""
+    """Raise `ConvergenceError` if the threshold is on its bound, or one proportion explains all as well."""
     counts = fit.counts
     where = (
         f"the levels {counts.levels[0]:g} ... {counts.levels[-1]:g} with proportions "
@@ -182,16 +182,16 @@ def _refuse_what_tells_no_threshold(fit: PsychometricFit, n_shaping: int) -> Non
     )
     if "threshold" in fit.at_bounds:
         raise ConvergenceError(
-            f"The most likely threshold lies at {fit.function.threshold:g}, on the bound of where it was "
-            f"looked for, outside of {where}: choose levels about the threshold."
+            f"The maximum-likelihood threshold, {fit.function.threshold:g}, lies on its bound, outside of "
+            f"{where}: choose levels about the threshold."
         )
     overall = counts.n_correct.sum() / counts.n_trials.sum()
     same = log_probability(counts.n_correct, counts.n_trials, overall, fit.overdispersion).sum()
-    # Akaike's rule: every parameter more has to gain 1. One proportion is a parameter as well.
+    # Akaike's criterion: every further parameter must gain 1. One proportion is a parameter as well.
     if n_shaping and fit.log_likelihood - same <= n_shaping - 1.0:
         raise ConvergenceError(
-            f"One proportion, {overall:.3f}, explains {where} as well as a psychometric function: there is "
-            "no threshold in them; choose levels about it, or more trials."
+            f"One proportion, {overall:.3f}, explains {where} as well as a psychometric function: they "
+            "do not determine a threshold; choose levels about it, or more trials."
         )
 
 
@@ -225,7 +225,7 @@ def _given(
     overdispersion: float | None,
 ) -> list[float | None]:
     """Check the parameters that are given and return their working coordinates, None for the others."""
-    # The function itself knows which values make sense; stand-ins take the places of those to find.
+    # The function checks the values; free parameters have valid dummy values.
     PsychometricFunction(
         1.0 if threshold is None else threshold,
         1.0 if width is None else width,
@@ -240,7 +240,7 @@ def _given(
 
 
 def _model(counts: JudgementCounts, sigmoid: str, given: list[float | None]) -> Model:
-    """Bounds of what is looked for, and the given values as bounds without room between."""
+    """Bounds of the free parameters; for given ones both bounds are the value."""
     coordinates = SIGMOIDS[sigmoid].coordinate(counts.levels)
     span = float(np.ptp(coordinates)) or abs(float(coordinates[0])) or 1.0
     gap = float(np.diff(coordinates).min(initial=span))

@@ -1,10 +1,10 @@
-"""How responses of a population vary from trial to trial: what the ideal observer knows.
+"""Distributions of the responses of a population, which the ideal observer knows.
 
     Gaussian    ln p(r) = -1/2 |L^-1 (r - mu)|^2 - sum ln L_ii - n/2 ln 2 pi,    S = L L^T
     Poisson     ln p(r) = sum_i (r_i ln lambda_i - lambda_i - ln r_i!)
 
 The paper's noise multiplies each response by Normal(1, sigma_1): a Gaussian with the standard deviation
-sigma_1 mu_i, so that its spread tells of the stimulus as well.
+sigma_1 mu_i, which depends on the stimulus as well.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from fingerpad.psychophysics.sensitivity import cholesky, whitened
 
 
 class ResponseModel(Protocol):
-    """What responses of a population to one stimulus are likely to be."""
+    """Distribution of the responses of a population to one stimulus."""
 
     @property
     def n_receptors(self) -> int:
-        """How many receptors there are."""
+        """Number of receptors."""
         ...
 
     def log_likelihood(self, responses: FloatArray) -> FloatArray:
@@ -37,7 +37,7 @@ class ResponseModel(Protocol):
         ...
 
     def draw(self, seed: int, trials: IntArray) -> FloatArray:
-        """Draw responses (n_trials, n_receptors) with the random numbers of these trials."""
+        """Sample responses (n_trials, n_receptors) with the random numbers of these trials."""
         ...
 
 
@@ -85,7 +85,7 @@ class GaussianResponses:
 
     @property
     def n_receptors(self) -> int:
-        """How many receptors there are."""
+        """Number of receptors."""
         return self.mean.size
 
     def log_likelihood(self, responses: FloatArray) -> FloatArray:
@@ -95,7 +95,7 @@ class GaussianResponses:
         return -0.5 * distance - volume
 
     def draw(self, seed: int, trials: IntArray) -> FloatArray:
-        """Draw responses (n_trials, n_receptors) with the random numbers of these trials."""
+        """Sample responses (n_trials, n_receptors) with the random numbers of these trials."""
         draws = normals(seed, trials, self.n_receptors, Purpose.RESPONSE, 1)[..., 0]
         return self.mean + draws @ self.factor.T
 
@@ -121,8 +121,8 @@ def multiplied_responses(
     Raises
     ------
     InputError
-        If a receptor is silent and no further noise is given: whoever fires nothing without fail tells a
-        stimulus from any that makes it fire with certainty.
+        If a receptor is silent and no further noise is given: it would discriminate the stimulus with
+        certainty from any that makes it fire.
 
     Examples
     --------
@@ -134,8 +134,8 @@ def multiplied_responses(
     floor = not_negative("smallest_spread", smallest_spread)
     if floor == 0.0 and (values == 0.0).any():
         raise InputError(
-            f"{np.count_nonzero(values == 0.0)} of {values.size} receptors are silent, and noise that "
-            "multiplies nothing is none: leave out those that no stimulus makes fire, or give "
+            f"{np.count_nonzero(values == 0.0)} of {values.size} receptors are silent, so multiplicative "
+            "noise has no effect on them: leave out receptors that no stimulus excites, or give "
             "smallest_spread."
         )
     return GaussianResponses(values, np.diag(np.square(sigma * values) + floor**2))
@@ -172,7 +172,7 @@ class PoissonResponses:
 
     @property
     def n_receptors(self) -> int:
-        """How many receptors there are."""
+        """Number of receptors."""
         return self.mean_counts.size
 
     def log_likelihood(self, responses: FloatArray) -> FloatArray:
@@ -181,7 +181,7 @@ class PoissonResponses:
         return each.sum(axis=-1)
 
     def draw(self, seed: int, trials: IntArray) -> FloatArray:
-        """Draw counts (n_trials, n_receptors) with the random numbers of these trials."""
+        """Sample counts (n_trials, n_receptors) with the random numbers of these trials."""
         shares = uniforms(seed, trials, self.n_receptors, Purpose.SPIKE_COUNT, 1)[..., 0]
         # A share of exactly 0 would be a count of -1.
         return np.maximum(poisson.ppf(shares, self.mean_counts), 0.0)

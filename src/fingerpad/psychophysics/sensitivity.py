@@ -1,8 +1,8 @@
-"""d': by how many standard deviations two stimuli differ for an observer, whatever it prefers to say.
+"""d': difference between two stimuli in standard deviations, independent of response bias.
 
     d' = z(H) - z(F)                            equal spread
     d_a = sqrt(2 / (1 + s^2)) (z(H) - s z(F))   spread of no signal over that of signal, s
-    c  = -(z(H) + z(F)) / 2                     where the observer decides, from midway
+    c  = -(z(H) + z(F)) / 2                     criterion, from midway
 
 H and F are the rates of hits and false alarms, z the inverse of the normal distribution. Source: Macmillan &
 Creelman 2005, Detection Theory, chapters 1 and 3.
@@ -25,14 +25,14 @@ CORRECTIONS = ("log-linear", "half", "none")
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """How well a signal is told from none, and where the observer decides.
+    """Detectability of a signal, and criterion of the observer.
 
     Parameters
     ----------
     d_prime : float
         d', or d_a where the spreads differ. [standard deviations]
     criterion : float
-        c; positive for an observer who rarely says yes. [standard deviations]
+        c; positive for a conservative observer. [standard deviations]
     hit_rate, false_alarm_rate : float
         As corrected. [0-1]
     """
@@ -52,17 +52,17 @@ def sensitivity(
     correction: str = "log-linear",
     spread_ratio: float = 1.0,
 ) -> Sensitivity:
-    """Return d' from answers to "was it there?".
+    """Return d' from hits and false alarms of a detection task.
 
     Parameters
     ----------
     n_hits, n_signals : int
-        Answers "yes" to how many presentations of the signal, or of the comparison.
+        Responses "yes", and presentations, of the signal or the comparison.
     n_false_alarms, n_others : int
-        Answers "yes" to how many presentations of no signal, or of the standard.
+        Responses "yes", and presentations, without the signal or of the standard.
     correction : {"log-linear", "half", "none"}, optional
-        What keeps rates of 0 and 1 from an infinite d': (k + 1/2) / (n + 1) for every rate (Hautus 1995),
-        1/2 in place of a count of 0 and n - 1/2 in place of n, or nothing: then such rates are refused.
+        Correction of rates of 0 and 1, for which d' is infinite: (k + 1/2) / (n + 1) for every rate (Hautus
+        1995), 1/2 in place of a count of 0 and n - 1/2 in place of n, or none: then such rates are refused.
     spread_ratio : float, optional
         s, standard deviation without the signal over that with it: 1 gives d', others d_a.
 
@@ -77,8 +77,8 @@ def sensitivity(
 
     Examples
     --------
-    >>> told = sensitivity(84, 100, 16, 100, correction="none")
-    >>> round(told.d_prime, 2), abs(round(told.criterion, 2))
+    >>> found = sensitivity(84, 100, 16, 100, correction="none")
+    >>> round(found.d_prime, 2), abs(round(found.criterion, 2))
     (1.99, 0.0)
     """
     one_of("correction", correction, CORRECTIONS)
@@ -110,23 +110,23 @@ def _rate(of: str, count: int, among: str, total: int, correction: str) -> float
 
 
 def d_prime_of_answers(standard: ArrayLike, comparison: ArrayLike) -> float:
-    """Return d' of an observer's answers to two stimuli, any numbers such as Gradient Sums.
+    """Return d' of an observer's statistic for two stimuli, such as Gradient Sums.
 
     Parameters
     ----------
     standard, comparison : array_like (n_trials,)
-        Answers to either. [any unit]
+        Values of the statistic. [any unit]
 
     Returns
     -------
     float
-        Difference of the means over the root of the mean variance, d_a; negative where answers to the
-        comparison are the smaller.
+        Difference of the means over the root of the mean variance, d_a; negative if the mean of the
+        comparison is smaller.
 
     Raises
     ------
     InputError
-        If there are fewer than two answers, or none of them varies.
+        If there are fewer than two values, or all are equal.
 
     Examples
     --------
@@ -135,10 +135,10 @@ def d_prime_of_answers(standard: ArrayLike, comparison: ArrayLike) -> float:
     """
     first, second = float_array("standard", standard, 1), float_array("comparison", comparison, 1)
     if min(first.size, second.size) < 2:
-        raise InputError(f"d' needs two answers to each stimulus: got {first.size} and {second.size}.")
+        raise InputError(f"d' needs two values for each stimulus: got {first.size} and {second.size}.")
     variance = 0.5 * (first.var(ddof=1) + second.var(ddof=1))
     if variance == 0.0:
-        raise InputError("d' needs answers that vary: these are the same in every trial; add noise.")
+        raise InputError("d' needs values that vary: these are equal in every trial; add noise.")
     return float((second.mean() - first.mean()) / math.sqrt(variance))
 
 
@@ -150,7 +150,7 @@ def d_prime_of_populations(difference: ArrayLike, covariance: ArrayLike) -> floa
     Parameters
     ----------
     difference : array_like (n_receptors,)
-        dmu, mean responses to the comparison less those to the standard. [any unit]
+        dmu, mean responses to the comparison minus those to the standard. [any unit]
     covariance : array_like (n_receptors, n_receptors)
         S, of the responses; the mean of both where they differ. [unit squared]
 
@@ -194,7 +194,7 @@ def cholesky(name: str, matrix: FloatArray) -> FloatArray:
 
 
 def whitened(vectors: FloatArray, factor: FloatArray) -> FloatArray:
-    """Return L^-1 x of vectors (..., n), whose noise then is that of independent standard normal numbers.
+    """Return L^-1 x of vectors (..., n): their noise then is independent and standard normal.
 
     Examples
     --------

@@ -1,11 +1,11 @@
-"""Two normal distributions and a decision point: how often an answer lies on the right side of it.
+"""Two normal distributions and a decision point: probability of a value on the correct side.
 
-    mu_2, sigma_2 = mean and standard deviation of many noisy answers to one stimulus        (e)
+    mu_2, sigma_2 = mean and standard deviation of many noisy values of one stimulus         (e)
     point         = mu_standard + beta (mu_comparison - mu_standard)                        (h)
     hit rate      = P(Normal(mu_comparison, sigma_comparison) lies beyond the point)        (h)
 
-Letters are the steps of Figure 3. Which side of the point is the comparison's, is the observer's lasting
-knowledge and not the chance of one block of trials: see `side`.
+Letters are the steps of Figure 3. The comparison's side is determined from all repetitions, not from one
+block of trials: see `side`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def moments(answers: FloatArray) -> tuple[FloatArray, FloatArray]:
     Parameters
     ----------
     answers : array (..., n)
-        Noisy answers to one stimulus.
+        Noisy values of one stimulus.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def moments(answers: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def decision_point(standard: FloatArray, comparison: FloatArray, criterion: float | FloatArray) -> FloatArray:
-    """Return the point a fraction beta of the way from the standard's mean to the comparison's.
+    """Return the point at the fraction beta of the distance from the standard's mean to the comparison's.
 
     Examples
     --------
@@ -50,17 +50,17 @@ def decision_point(standard: FloatArray, comparison: FloatArray, criterion: floa
 
 
 def side(means: FloatArray) -> FloatArray:
-    """Return on which side of the standard each comparison lies on the whole.
+    """Return the side of the standard on which each comparison lies.
 
     Parameters
     ----------
     means : array (n_repetitions, n_stimuli)
-        Mean answers, the standard in the first column.
+        Mean values, the standard in the first column.
 
     Returns
     -------
     array (n_stimuli - 1,)
-        +1 for a larger mean over all repetitions, else -1: latencies fall where rates rise.
+        +1 for a larger mean over all repetitions, else -1, as for latencies.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""From d' to the proportion of correct judgements in a task, for an observer without preference, and back.
+"""From d' to the proportion correct in a task, for an observer without bias, and back.
 
     yes-no                                 Phi(d'/2)
     one of two (2AFC)                      Phi(d'/sqrt 2)
@@ -25,14 +25,14 @@ from fingerpad.core.checks import finite, not_negative, whole
 from fingerpad.core.errors import InputError
 
 LARGEST_D_PRIME = 20.0
-"""Beyond it no task is ever failed."""
+"""Above it the proportion correct is 1 in double precision."""
 
 _REACH, _POINTS = 9.0, 361
-"""Of the integral: the trapezium rule on a normal density errs less than round-off."""
+"""Of the integral: the error of the trapezium rule on a normal density is below round-off."""
 
 
 def yes_no(d_prime: float) -> float:
-    """Return the proportion correct where one look is judged, "standard" or "comparison".
+    """Return the proportion correct in yes-no: one look is judged "standard" or "comparison".
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def yes_no(d_prime: float) -> float:
 
 
 def forced_choice(d_prime: float, alternatives: int = 2) -> float:
-    """Return the proportion correct where one of several looks is the comparison, and is to be found.
+    """Return the proportion correct in forced choice: one of several looks is the comparison.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def same_different_by_difference(d_prime: float, criterion: float | None = None)
     d_prime : float
         Not negative. [standard deviations]
     criterion : float, optional
-        k. Default: the best, at which the difference is as likely for either answer. [standard deviations]
+        k. Default: the optimum, at which both responses are equally likely. [standard deviations]
 
     Returns
     -------
@@ -128,7 +128,7 @@ def same_different_by_difference(d_prime: float, criterion: float | None = None)
 
 
 def best_difference(d_prime: float) -> float:
-    """Return the difference k from which on "different" is the likelier answer.
+    """Return the difference k above which "different" is more likely.
 
         exp(-d'^2 / 4) cosh(d' k / 2) = 1,    k = (2 / d') arcosh(exp(d'^2 / 4))
 
@@ -161,7 +161,7 @@ _SMALL = 1e-12
 def same_different_by_looks(d_prime: float) -> float:
     """Return the proportion correct in "same or different?" where each look is judged by itself.
 
-    The likeliest answer there is, if the two stimuli stay the same from trial to trial.
+    This is optimal if the two stimuli are the same in every trial.
 
     Parameters
     ----------
@@ -197,14 +197,14 @@ TASKS: dict[str, Callable[[float], float]] = {
 
 
 def d_prime_of_proportion(proportion_correct: float, task: Callable[[float], float] = forced_choice) -> float:
-    """Return the d' with which a task is judged correctly in a proportion of trials.
+    """Return the d' for which a task has a proportion correct.
 
     Parameters
     ----------
     proportion_correct : float
-        At least that of guessing, below 1. [0-1]
+        At least the chance level, below 1. [0-1]
     task : callable, optional
-        One of `TASKS`, or any rising function of d'.
+        One of `TASKS`, or any increasing function of d'.
 
     Returns
     -------
@@ -214,7 +214,7 @@ def d_prime_of_proportion(proportion_correct: float, task: Callable[[float], flo
     Raises
     ------
     InputError
-        If the proportion is below that of guessing, or so near 1 that d' is beyond all bounds.
+        If the proportion is below chance, or so near 1 that d' exceeds `LARGEST_D_PRIME`.
 
     Examples
     --------
@@ -225,7 +225,7 @@ def d_prime_of_proportion(proportion_correct: float, task: Callable[[float], flo
     guessing, never_failed = task(0.0), task(LARGEST_D_PRIME)
     if not guessing - _SMALL <= wanted < never_failed:
         raise InputError(
-            f"proportion_correct must lie between that of guessing, {guessing:g}, and 1: got {wanted:g}."
+            f"proportion_correct must lie between the chance level, {guessing:g}, and 1: got {wanted:g}."
         )
     if wanted <= guessing:
         return 0.0

@@ -1,12 +1,12 @@
-"""How far a fitted psychometric function can be trusted: parametric bootstrap, and posterior.
+"""Uncertainty of a fitted psychometric function: parametric bootstrap, and posterior.
 
-Both are a cloud of functions with weights, asked the same questions: where a parameter, a threshold or the
-curve itself lies with a given probability.
+Both are a weighted sample of functions, from which intervals of a parameter, a threshold or the curve are
+computed.
 
-- Bootstrap: counts are drawn from the fitted function again and again, and fitted in the same way.
-- Posterior: Bayes's rule on a grid over the parameters that were fitted, flat in the threshold, in the
-  logarithm of the width, and in guess, lapse and overdispersion, within the bounds of the fit. The grid is
-  first coarse, then laid finely over where the posterior is; nothing is drawn.
+- Bootstrap: counts are sampled from the fitted function repeatedly, and fitted in the same way.
+- Posterior: Bayes' rule on a grid over the fitted parameters, with a prior flat in the threshold, the
+  logarithm of the width, guess, lapse and overdispersion, within the bounds of the fit. A coarse grid finds
+  the region of the posterior, a fine grid covers it; no random numbers are used.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ from fingerpad.psychophysics.psychometric import PsychometricFit
 
 COARSE_POINTS = 21
 FINE_POINTS = {1: (401,), 2: (81, 81), 3: (41, 35, 13), 4: (31, 27, 13, 13), 5: (21, 19, 9, 9, 9)}
-"""Points of the fine grid along each fitted parameter, by how many there are."""
+"""Points of the fine grid along each fitted parameter, by the number of parameters."""
 
 NEGLIGIBLE = 1e-5
-"""Share of its greatest value at which a posterior counts as none."""
+"""Share of its maximum below which a posterior is neglected."""
 
 REFINEMENTS = 2
 
 
 @dataclass(frozen=True)
 class FunctionCloud:
-    """Psychometric functions with weights: what the true one may be.
+    """Weighted sample of psychometric functions.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class FunctionCloud:
     values : array (n_functions, 5)
         threshold, width, guess, lapse and overdispersion of each.
     weights : array (n_functions,)
-        How much each counts; they sum to 1.
+        Weights, with sum 1.
     """
 
     sigmoid: str
@@ -74,7 +74,7 @@ class FunctionCloud:
         parameter : {"threshold", "width", "guess", "lapse", "overdispersion"}
             "threshold" is where F is one half.
         probability : float, optional
-            That it holds the true value. [0-1]
+            Coverage of the true value. [0-1]
 
         Returns
         -------
@@ -91,19 +91,19 @@ class FunctionCloud:
     def threshold_interval(
         self, proportion_correct: float = 0.75, probability: float = 0.95
     ) -> tuple[float, float]:
-        """Central interval of the level at which a proportion is judged correctly.
+        """Central interval of the level at which a proportion of judgements is correct.
 
         Parameters
         ----------
         proportion_correct : float, optional
             [0-1]
         probability : float, optional
-            That it holds the true value. [0-1]
+            Coverage of the true value. [0-1]
 
         Returns
         -------
         (float, float)
-            An end may be infinite: then so many of the functions never take that value.
+            An end is infinite if too many of the functions do not reach that value.
 
         Raises
         ------
@@ -113,7 +113,7 @@ class FunctionCloud:
         return self._central(self.thresholds(proportion_correct), probability)
 
     def thresholds(self, proportion_correct: float = 0.75) -> FloatArray:
-        """Level (n_functions,) at which each function takes a value; infinite where it never does."""
+        """Level (n_functions,) at which each function has a value; infinite if it does not reach it."""
         wanted = _share("proportion_correct", proportion_correct)
         threshold, width, guess, lapse, _ = self.values.T
         return level_at(self.shape, wanted, threshold, width, guess, lapse)
@@ -126,7 +126,7 @@ class FunctionCloud:
         levels : array_like (n_levels,)
             [unit of the levels]
         probability : float, optional
-            That it holds the true proportion, level by level. [0-1]
+            Coverage of the true proportion, level by level. [0-1]
 
         Returns
         -------
@@ -153,9 +153,9 @@ class FunctionCloud:
 
 
 def weighted_quantiles(values: ArrayLike, weights: ArrayLike, shares: ArrayLike) -> FloatArray:
-    """Quantiles of values of which some count more than others.
+    """Weighted quantiles.
 
-    Each value stands in the middle of its own weight; between values it is interpolated.
+    Each value is at the middle of its own weight; quantiles between values are interpolated.
 
     Parameters
     ----------
@@ -175,11 +175,11 @@ def weighted_quantiles(values: ArrayLike, weights: ArrayLike, shares: ArrayLike)
     >>> weighted_quantiles([1.0, 2.0, 3.0], [1.0, 2.0, 1.0], [0.5, 0.9]).tolist()
     [2.0, 3.0]
     """
-    # What stands several times, as on a grid, stands once with the whole of its weight.
+    # Equal values, as on a grid, are merged with the sum of their weights.
     quantity, which = np.unique(np.asarray(values, dtype=np.float64), return_inverse=True)
     mass = np.bincount(which, np.asarray(weights, dtype=np.float64))
     middles = (np.cumsum(mass) - 0.5 * mass) / mass.sum()
-    # Infinite values stand for themselves, as no number lies between them and others.
+    # Infinite values are not interpolated.
     finite_part = np.isfinite(quantity)
     wanted = np.asarray(shares, dtype=np.float64)
     if finite_part.all():
@@ -193,16 +193,16 @@ def weighted_quantiles(values: ArrayLike, weights: ArrayLike, shares: ArrayLike)
 
 
 def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> FunctionCloud:
-    """Draw counts from a fit and fit them again, many times.
+    """Sample counts from a fit and fit them again, many times.
 
     Parameters
     ----------
     fit : PsychometricFit
-        What to draw from.
+        The fit to sample from.
     seed : int
         Of the random numbers; keyed by replicate and level.
     n_replicates : int, optional
-        How many times.
+        Number of repetitions.
 
     Returns
     -------
@@ -229,7 +229,7 @@ def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> Func
 
 
 def drawn_counts(fit: PsychometricFit, seed: int, n_replicates: int) -> FloatArray:
-    """Draw the counts (n_replicates, n_levels) of a judge who follows a fit.
+    """Sample counts (n_replicates, n_levels) from a fit.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def drawn_counts(fit: PsychometricFit, seed: int, n_replicates: int) -> FloatArr
     seed : int
         Of the random numbers; keyed by replicate and level.
     n_replicates : int
-        How many times all levels are judged.
+        Number of data sets.
 
     Returns
     -------
@@ -257,18 +257,18 @@ def drawn_counts(fit: PsychometricFit, seed: int, n_replicates: int) -> FloatArr
     counts = np.empty(shares.shape)
     for level, (n, p) in enumerate(zip(fit.counts.n_trials, expected, strict=True)):
         probabilities = np.exp(log_probability(np.arange(n + 1.0), n, p, fit.overdispersion))
-        # The last count takes what rounding left over.
+        # The last count has the remaining probability, including round-off.
         counts[:, level] = np.searchsorted(np.cumsum(probabilities[:-1]), shares[:, level], side="right")
     return counts
 
 
 def posterior(fit: PsychometricFit) -> FunctionCloud:
-    """Bayes's rule on a grid: what the counts say about the parameters that were fitted.
+    """Posterior of the fitted parameters, by Bayes' rule on a grid.
 
     Parameters
     ----------
     fit : PsychometricFit
-        Counts, and the bounds that are the ends of the flat priors.
+        Counts, and the bounds of the flat priors.
 
     Returns
     -------
@@ -287,7 +287,7 @@ def posterior(fit: PsychometricFit) -> FunctionCloud:
     if n_free == 0:
         return _cloud(fit, fit.point[np.newaxis], np.ones(1))
     lower, upper = model.lower[model.free], model.upper[model.free]
-    # The last grid but one shows where the posterior is; narrow ones need a second look.
+    # A grid finds the region of the posterior; a narrow posterior needs a second one.
     for _ in range(REFINEMENTS):
         axes, weights = _grid_posterior(
             fit, lower, upper, (COARSE_POINTS,) * min(n_free, 3) + (9,) * (n_free - 3)
@@ -310,7 +310,7 @@ def _grid_points(model: Model, axes: list[FloatArray]) -> FloatArray:
 def _grid_posterior(
     fit: PsychometricFit, lower: FloatArray, upper: FloatArray, sizes: tuple[int, ...]
 ) -> tuple[list[FloatArray], FloatArray]:
-    """Middles of the cells of a grid, and the posterior probability of each cell (by the midpoint rule)."""
+    """Centres of the cells of a grid, and the posterior probability of each cell (midpoint rule)."""
     axes = [
         low + (high - low) * (np.arange(size) + 0.5) / size
         for low, high, size in zip(lower, upper, sizes, strict=True)
@@ -323,7 +323,7 @@ def _grid_posterior(
 def _where_it_is(
     axes: list[FloatArray], weights: FloatArray, lower: FloatArray, upper: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Bounds of the cells that matter along each axis, one cell more on each side."""
+    """Bounds of the cells above `NEGLIGIBLE` along each axis, and one cell more on each side."""
     ends = []
     for index, axis in enumerate(axes):
         others = tuple(other for other in range(len(axes)) if other != index)
