@@ -564,7 +564,7 @@ def test_explanations_are_drawn_by_what_they_predict_and_gain(section):
     assert [label.get_text() for label in scores.get_yticklabels()][1] == "power law of the dynamic term (5)"
     (intervals,) = gains.collections
     assert [path[:, 0].tolist() for path in intervals.get_segments()] == [[0.0, 0.0], [0.01, 0.2]]
-    assert "Least AIC has: power law of the dynamic term; 0 more" in drives_report.caption_explanations(
+    assert "Smallest AIC: power law of the dynamic term; 0 more" in drives_report.caption_explanations(
         results
     )
 

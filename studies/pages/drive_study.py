@@ -26,8 +26,8 @@ FIGURES = {
 _OUT_OF_SAMPLE = tuple(f"fss_out_of_sample{phase}" for phase in ("", "_dynamic", "_static"))
 _EXPLANATION_COLUMNS = (
     "explanation",
-    "free numbers",
-    "those added",
+    "free parameters",
+    "added parameters",
     "FSS in sample",
     "out of sample",
     "dynamic",
@@ -74,7 +74,7 @@ def draw_explanations(section: Mapping[str, Any]) -> Figure:
     scores.set_yticks(height, [f"{row['name']} ({row['free_numbers']})" for row in rows])
     scores.invert_yaxis()
     scores.set_xlabel("FSS out of sample [1]")
-    scores.set_title("(a) what is predicted")
+    scores.set_title("(a) out-of-sample fit")
     ends = numbers([row["gain_interval"] for row in rows])
     total = numbers([row["fss_out_of_sample"] for row in rows])
     gains.axvline(0.0, color=GREY, linewidth=1.0)
@@ -82,27 +82,27 @@ def draw_explanations(section: Mapping[str, Any]) -> Figure:
     gains.plot(total - total[0], height, "o", color=BLACK)
     gains.locator_params(axis="x", nbins=5)
     gains.set_xlabel("gain in FSS out of sample over the first row [1]")
-    gains.set_title("(b) what is gained, 95 % by bootstrap")
+    gains.set_title("(b) gain, 95 % interval by bootstrap")
     figure.legend(*scores.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
 
 
 def caption_explanations(section: Mapping[str, Any]) -> str:
-    """Say what is compared, and how many explanations are as good as the best one."""
+    """Describe the comparison, and count the explanations that are as good as the best one."""
     rows = section["explanations"]
     known = [row for row in rows if row["aic_difference"] is not None]
     best = min(known, key=lambda row: row["aic_difference"], default=None)
     near = [row for row in known if best and row["aic_difference"] - best["aic_difference"] <= NEAR_AIC]
     said = (
-        f" Least AIC has: {best['name']}; {len(near) - 1} more lie within {NEAR_AIC:g} of it, which no such "
-        "recording tells apart."
+        f" Smallest AIC: {best['name']}; {len(near) - 1} more lie within {NEAR_AIC:g} of it and cannot be "
+        "discriminated by this recording."
         if best
         else ""
     )
     return (
-        "Explanations of what the dynamic rates lack, each with the numbers that it leaves free (in "
-        "brackets). (a) Mean FSS of the folds on positions that were not fitted to. (b) What that gains over "
-        f"the paper's model, with an interval from a bootstrap over blocks of three positions.{said}"
+        "Explanations of the dynamic rates, each with its number of free parameters (in brackets). (a) Mean "
+        "FSS of the folds at positions that were not fitted. (b) Its gain over the paper's model, with an "
+        f"interval from a bootstrap over blocks of three positions.{said}"
     )
 
 
@@ -111,7 +111,7 @@ NEAR_AIC = 4.0
 
 
 def draw_depths(section: Mapping[str, Any]) -> Figure:
-    """Draw how well the paper's model predicts when its energy density is read at other depths.
+    """Draw the out-of-sample fit of the paper's model with energy density sampled at other depths.
 
     Parameters
     ----------
@@ -154,13 +154,13 @@ def draw_depths(section: Mapping[str, Any]) -> Figure:
 
 
 def caption_depths(section: Mapping[str, Any]) -> str:
-    """Say at which depth the paper's model predicts best."""
+    """Describe the figure, with the depth of the best fit."""
     layers = section["depths"]["layers"]
     own = layers[section["depths"]["own_layer"]]
     best = max(layers, key=lambda layer: layer["fss_out_of_sample"] or 0.0)
     return (
-        "The paper's model with its energy density read in each layer of elements below the receptor; the "
-        "shaded one is the living epidermis, where the paper puts the end organs, dotted lines part tissues. "
+        "The paper's model with energy density sampled in each layer of elements below the receptor. Shaded: "
+        "the living epidermis, where the paper places the end organs. Dotted lines: borders of tissues. "
         f"There FSS out of sample is {fixed(own['fss_out_of_sample'], 3)}; it is largest, "
         f"{fixed(best['fss_out_of_sample'], 3)}, between {fixed(best['from_mm'], 2)} and "
         f"{fixed(best['to_mm'], 2)} mm, in the {best['tissue']}."
@@ -172,15 +172,15 @@ def tables(section: Mapping[str, Any]) -> list[Table]:
     made = drive_quantities.table(section)
     if section.get("explanations"):
         rows = [_explanation_row(row) for row in section["explanations"]]
-        note = "ΔAIC, ΔBIC: against the first row, smaller is better. Gain: as above."
-        made.append(Table("What explains the dynamic rates", _EXPLANATION_COLUMNS, rows, note))
+        note = "ΔAIC, ΔBIC: difference from the first row; smaller is better. Gain: as above."
+        made.append(Table("Explanations of the dynamic rates", _EXPLANATION_COLUMNS, rows, note))
     if section.get("depths"):
         rows = [_depth_row(layer) for layer in section["depths"]["layers"]]
         note = (
-            "Stored energy density in both terms, four free numbers, least squares. Outside the living "
-            "epidermis no other quantity is kept. Gain: over the living epidermis."
+            "Stored energy density in both terms, four free parameters, least squares. Other quantities are "
+            "stored in the living epidermis only. Gain: over the living epidermis."
         )
-        made.append(Table("By depth", _DEPTH_COLUMNS, rows, note))
+        made.append(Table("Sampling depth", _DEPTH_COLUMNS, rows, note))
     return made
 
 
@@ -230,7 +230,7 @@ def page(results: Mapping[str, Any], command: str = "python -m studies drives") 
     results : dict
         What `studies.drive_study.study_drives` returns.
     command : str, optional
-        The command that made them, to be told to the reader.
+        The command that computed them, for the page.
 
     Returns
     -------
@@ -241,14 +241,14 @@ def page(results: Mapping[str, Any], command: str = "python -m studies drives") 
     parts = [
         "# Which quantity drives the afferent",
         f"Written by `{command}` on {manifest['date']}: {manifest['resolution']} resolution, seed "
-        f"{manifest['seed']}, mechanical code {manifest['code_hash']}. What is concluded from it stands in "
-        "[what the dynamic term follows](decisions/dynamic-term-quantity.md) and "
+        f"{manifest['seed']}, mechanical code {manifest['code_hash']}. Conclusions are on "
+        "[quantity that drives the dynamic term](decisions/dynamic-term-quantity.md) and "
         "[one afferent, fitted](single-unit.md).",
         f"![Rates by quantity](images/{FIGURES['quantities']})",
         drive_quantities.caption(results),
-        f"![What explains the dynamic rates](images/{FIGURES['explanations']})",
+        f"![Explanations of the dynamic rates](images/{FIGURES['explanations']})",
         caption_explanations(results),
-        f"![By depth](images/{FIGURES['depths']})",
+        f"![Sampling depth](images/{FIGURES['depths']})",
         caption_depths(results),
     ]
     for one in tables(results):

@@ -203,7 +203,7 @@ def markdown(results: Mapping[str, Any]) -> str:
     parts = [
         "The preset, both halves of the finger; edges over an oval of 11 by 9 mm of the pad:",
         _preset(results["preset"]),
-        "Nodes of the meshes that are pressed here, half of the finger:",
+        "Nodes of the meshes used here, half of the finger:",
         table(
             ("mesh", *next(iter(results["meshes"].values()))),
             [

@@ -128,7 +128,7 @@ def test_the_figure_and_the_words_say_where(found):
     assert png(report.draw_depths, section).startswith(b"\x89PNG")
     assert "between 1.00 and 1.62 mm, in the dermis" in report.caption_depths(section)
     *_, table = report.tables({"candidates": [], "method": "least squares", **section})
-    assert table.title == "By depth"
+    assert table.title == "Sampling depth"
     assert [row.cells[0] for row in table.rows] == [LAYERS[tissue] for tissue in TISSUE]
     assert table.rows[TRUE_LAYER].cells[5] == f"{found['layers'][TRUE_LAYER]['fss_out_of_sample']:.3f}"
     assert all(len(row.cells) == len(table.columns) for row in table.rows)

@@ -62,7 +62,7 @@ def ordinary(name):
 @case(
     THEME,
     "Contact force and reaction of the supports",
-    "Newton's third law; our own bound, 1e-4, which every press checks",
+    "Newton's third law; our own bound, 1e-4, checked in every indentation",
 )
 def force_balance() -> list[Row]:
     """A relaxing layered block under every indenter, ramp and hold, default settings: largest difference at
