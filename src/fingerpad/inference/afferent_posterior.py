@@ -1,9 +1,10 @@
-"""What recorded rates leave uncertain of an afferent's four identifiable numbers.
+"""Posterior of an afferent's four identifiable parameters, given recorded rates.
 
-Draws are told in coordinates in which the numbers depend least on each other: the potential at rest over the
-threshold, beta tau/(C v), and the logarithms of both gains and of tau. Walkers see the logarithm of what the
-potential at rest lacks instead, where it must lack something: then no coordinate has a border, and recordings
-leave straight ridges. An afferent that fires from an energy density U on fixes k_s tau U/(C v) to what lacks.
+The draws are in coordinates in which the parameters correlate least: the potential at rest over the
+threshold, u = beta tau/(C v), and the logarithms of both gains and of tau. If the afferent must be silent at
+rest, u < 1, then ln(1 - u) is sampled instead of u. That coordinate is unbounded, and the posterior has
+straight ridges in it: an afferent that fires from an energy density U on determines k_s tau U/(C v) relative
+to 1 - u.
 """
 
 from __future__ import annotations
@@ -22,17 +23,17 @@ from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, s
 from fingerpad.inference.rate_likelihood import RateLikelihood, ResidualDraws
 
 COORDINATE_NAMES = ("resting_share", "log_dynamic_gain", "log_static_gain", "log_time_constant")
-"""beta tau/(C v) [1], and the logarithms of k_d/(C v), k_s/(C v) and tau in the units of the four numbers."""
+"""beta tau/(C v) [1], and the logarithms of k_d/(C v), k_s/(C v) and tau in the units of the parameters."""
 
 START_SPREAD = (0.8, 0.8, 0.4, 0.8)
-"""How far the walkers start from the fit, in their coordinates: no less than the width of posteriors seen, so
-that ensembles which have not forgotten their start disagree."""
+"""Standard deviation of the walkers' starts about the fit, in the sampled coordinates. It is no smaller than
+that of the posteriors seen so far, so that ensembles which still depend on their start disagree."""
 
-SMALLEST_LACK = 0.01
-"""A fit at rest nearer to the threshold than this share of it, or beyond, is no start; walkers start here."""
+SMALLEST_MARGIN = 0.01
+"""Smallest 1 - u of a start: walkers of a fit that is closer to the threshold at rest start here. [1]"""
 
 N_PREDICTED = 1000
-"""Draws that bands are made of."""
+"""Draws from which the bands of the rates are computed."""
 
 _START = identifiable(
     [
@@ -47,7 +48,7 @@ _START = identifiable(
 
 
 def to_coordinates(four: ArrayLike) -> FloatArray:
-    """Turn the four identifiable numbers (..., 4) into the coordinates (..., 4).
+    """Transform the four identifiable parameters (..., 4) to the coordinates (..., 4).
 
     Examples
     --------
@@ -65,7 +66,7 @@ def to_coordinates(four: ArrayLike) -> FloatArray:
 
 
 def from_coordinates(points: ArrayLike) -> FloatArray:
-    """Turn the coordinates (..., 4) into the four identifiable numbers (..., 4).
+    """Transform the coordinates (..., 4) to the four identifiable parameters (..., 4).
 
     Examples
     --------
@@ -79,7 +80,7 @@ def from_coordinates(points: ArrayLike) -> FloatArray:
 
 @dataclass(frozen=True)
 class AfferentPrior:
-    """What is believed of an afferent before it is recorded, weak enough for the recordings to decide.
+    """Weakly informative prior of an afferent's parameters.
 
     The potential at rest is normal about 0; gains and time constant are log-normal about the start point of
     fits, the paper's first one with its gains rescaled. See docs/decisions/priors.md.
@@ -91,9 +92,9 @@ class AfferentPrior:
     dynamic_gain_per_kpa, static_gain_per_kpa_ms, time_constant_ms : float
         Medians of k_d/(C v), k_s/(C v) and tau. [1/kPa, 1/(kPa ms), ms]
     gain_factor, time_constant_factor : float
-        Two thirds of the prior lie within the median divided and multiplied by this factor. [1]
+        Two thirds of the prior lie between the median divided and multiplied by this factor. [1]
     silent_at_rest : bool
-        Whether the potential at rest stays below the threshold, so that untouched skin elicits no spike.
+        Whether the potential at rest stays below the threshold, so that no spike occurs without a stimulus.
     """
 
     resting_share_sd: float = 1.0
@@ -131,16 +132,16 @@ class AfferentPrior:
 
 @dataclass(frozen=True)
 class AfferentPosterior:
-    """Draws of the four identifiable numbers, and what they predict.
+    """Posterior draws of the four identifiable parameters and of the rates that they predict.
 
     Parameters
     ----------
     chains : Chains
-        Draws in the coordinates, with their convergence.
+        Draws in the coordinates, with their measures of convergence.
     four : array (n_draws, 4)
-        The same draws as the four identifiable numbers.
+        The same draws as the four identifiable parameters.
     rates : dict of str to ResidualDraws
-        By phase: predicted rates of some of the draws, new recordings, sigma and length.
+        By phase, for some of the draws: predicted rates, new recordings, sigma and length.
     """
 
     chains: Chains
@@ -148,7 +149,7 @@ class AfferentPosterior:
     rates: dict[str, ResidualDraws]
 
     def six(self, capacitance_mf: float, threshold_mv: float) -> FloatArray:
-        """Return the draws as six parameters (n_draws, 6) with this C [mF] and this v [mV]."""
+        """Return the draws as six parameters (n_draws, 6) with the given C [mF] and v [mV]."""
         return six_parameters(self.four, capacitance_mf, threshold_mv)
 
 
@@ -158,9 +159,9 @@ def log_posterior(likelihood: RateLikelihood, prior: AfferentPrior) -> LogDensit
     Parameters
     ----------
     likelihood : RateLikelihood
-        Of a model of the four numbers, from `four_number_model`.
+        Of a model of the four parameters, from `fingerpad.inference.rate_model.four_number_model`.
     prior : AfferentPrior
-        Weak beliefs.
+        Prior of the parameters.
 
     Returns
     -------
@@ -190,20 +191,20 @@ def afferent_posterior(
     prior: AfferentPrior | None = None,
     **settings: Any,
 ) -> AfferentPosterior:
-    """Draw the four identifiable numbers from their posterior.
+    """Sample the posterior of the four identifiable parameters.
 
     Parameters
     ----------
     likelihood : RateLikelihood
-        Of a model of the four numbers, from `four_number_model`.
+        Of a model of the four parameters, from `fingerpad.inference.rate_model.four_number_model`.
     start : array_like (4,)
-        Four numbers near which the walkers start: a fit.
+        A fit, about which the walkers start.
     seed : int
         Seed of the random numbers; the same one gives the same bits on any number of threads.
     prior : AfferentPrior, optional
-        Weak beliefs by default.
+        Default: `AfferentPrior()`.
     **settings
-        Those of `fingerpad.inference.fitting.posterior.sample`.
+        Settings of `fingerpad.inference.fitting.posterior.sample`.
 
     Returns
     -------
@@ -212,17 +213,22 @@ def afferent_posterior(
     Raises
     ------
     InputError
-        If the model has other parameters, or the start is no set of four numbers.
+        If the model has other parameters, or the start is not a valid set of them.
     ConvergenceError
         If the draws have not converged.
     """
-    believed = prior or AfferentPrior()
-    density, centre = log_posterior(likelihood, believed), to_coordinates(start)
-    if believed.silent_at_rest:
-        centre[0] = min(centre[0], 1.0 - SMALLEST_LACK)
-        chains = _told(
+    weak = prior or AfferentPrior()
+    density, centre = log_posterior(likelihood, weak), to_coordinates(start)
+    if weak.silent_at_rest:
+        centre[0] = min(centre[0], 1.0 - SMALLEST_MARGIN)
+        chains = _constrained_chains(
             sample(
-                _of_walkers(density), _walked(centre), START_SPREAD, COORDINATE_NAMES, seed=seed, **settings
+                _unconstrained_density(density),
+                _unconstrained(centre),
+                START_SPREAD,
+                COORDINATE_NAMES,
+                seed=seed,
+                **settings,
             )
         )
     else:
@@ -232,25 +238,25 @@ def afferent_posterior(
     return AfferentPosterior(chains, from_coordinates(chains.flat), likelihood.residual_draws(some, random))
 
 
-def _walked(coordinates: FloatArray) -> FloatArray:
+def _unconstrained(coordinates: FloatArray) -> FloatArray:
     """Replace the potential at rest u by ln(1 - u)."""
     return np.concatenate([np.log(1.0 - coordinates[..., :1]), coordinates[..., 1:]], axis=-1)
 
 
-def _coordinates(walked: FloatArray) -> FloatArray:
-    """Replace ln(1 - u) by u: the inverse of `_walked`."""
-    return np.concatenate([1.0 - np.exp(walked[..., :1]), walked[..., 1:]], axis=-1)
+def _constrained(points: FloatArray) -> FloatArray:
+    """Replace ln(1 - u) by u: the inverse of `_unconstrained`."""
+    return np.concatenate([1.0 - np.exp(points[..., :1]), points[..., 1:]], axis=-1)
 
 
-def _of_walkers(log_density: LogDensity) -> LogDensity:
-    """Turn a log density in u into one in ln(1 - u), of which du takes the share 1 - u."""
-    return lambda walked: log_density(_coordinates(walked)) + walked[:, 0]
+def _unconstrained_density(log_density: LogDensity) -> LogDensity:
+    """Transform a log density in u to one in ln(1 - u); the logarithm of the Jacobian is ln(1 - u)."""
+    return lambda points: log_density(_constrained(points)) + points[:, 0]
 
 
-def _told(chains: Chains) -> Chains:
-    """Turn draws of what walkers see into coordinates; how ranks agree is the same in both."""
+def _constrained_chains(chains: Chains) -> Chains:
+    """Transform draws to u; R-hat and effective sizes depend on ranks only and stay."""
     return replace(
         chains,
-        draws=_coordinates(chains.draws),
+        draws=_constrained(chains.draws),
         log_densities=chains.log_densities - chains.draws[..., 0],
     )

@@ -29,7 +29,7 @@ those with 32, and an evaluation takes two thirds of the time."""
 THOROUGH: dict[str, Any] = {"smallest_effective_size": 200.0}
 """Settings of the sampler: the ends of a 95 % interval err by a seventh of a standard deviation."""
 
-QUICK: dict[str, Any] = {"n_walkers": 40, "smallest_effective_size": 100.0, "largest_r_hat": 1.02}
+QUICK: dict[str, Any] = {"n_walkers": 100, "smallest_effective_size": 100.0, "largest_r_hat": 1.02}
 """Settings for a look: the ends err by a fifth of a standard deviation."""
 
 

@@ -1,16 +1,16 @@
-"""Draw from any density of a few parameters, and stop only when the draws can be trusted.
+"""MCMC sampling of any density of a few parameters; draws are returned only once they have converged.
 
-Several ensembles of walkers start from scattered points and never hear of each other. An ensemble moves by
-turns in one of two ways:
+Several independent ensembles of walkers are sampled with emcee (Foreman-Mackey et al. 2013) from scattered
+starts. Each step of an ensemble moves one half of its walkers, then the other, by one of two proposals, drawn
+at random:
 
-- stretch: one half of the walkers, each along the line to a walker of the other half (Goodman & Weare 2010),
-- leap: from wherever a walker is to the neighbourhood of any place where its ensemble was during steps that
-  are discarded. These places are a sketch of the density, so that many leaps succeed, a walker soon forgets
-  where it started, and walkers exchange places that no path joins.
+- `StretchMove`: along the line to a walker of the other half (Goodman & Weare 2010),
+- `KDEMove`: to a draw from a kernel density estimate of the other half, so that a walker forgets its start
+  soon and moves between modes that no path of high density joins.
 
-Both leave the density as it is, whatever its shape: what proposes a stretch knows nothing of the half that
-moves, and a sketch stays as it is through all the steps that are kept. Both look the same in any units of the
-parameters. Steps of a density are no obstacle: nothing is differentiated.
+Both are invariant under linear transformations of the parameters and need no derivatives. The first half of
+all steps is discarded. Convergence is judged by split R-hat over the ensembles and by effective sample sizes
+(`fingerpad.inference.fitting.convergence`).
 """
 
 from __future__ import annotations
@@ -18,56 +18,51 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import emcee
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.distance import cdist
+from threadpoolctl import threadpool_limits
 
 from fingerpad.core.checks import FloatArray, finite, float_array, positive, whole
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.inference.fitting.convergence import bulk_effective_size, split_r_hat, tail_effective_size
 
 LogDensity = Callable[[FloatArray], FloatArray]
-"""Called with points (n_points, n_parameters); returns their log densities up to a constant, -inf outside."""
+"""From points (n_points, n_parameters) to their log densities up to a constant, -inf outside."""
 
-LONGEST_STRETCH = 2.0
-DEGREES_OF_FREEDOM = 5.0
-"""Of the Student distributions: tails heavy enough for walkers that lag behind."""
+BANDWIDTH = 0.5
+"""Bandwidth of the kernel density estimate, in standard deviations of the walkers. [1]"""
 
-LUMPINESS = 0.6
-"""Bandwidth of the sketch over the one that suits a normal density; those of rates have many lumps. [1]"""
-
-PLACES = 400
-"""Places that the sketch of one ensemble is made of."""
-
-TRIES = 200
+MOST_TRIES = 200
+"""Times that a start at an impossible point is drawn again."""
 
 
 @dataclass(frozen=True)
 class Chains:
-    """Draws from a density, converged, and how we know.
+    """Converged draws from a density, and the measures of convergence.
 
     Parameters
     ----------
     names : tuple of str
         Names of the parameters.
     draws : array (n_ensembles, n_steps, n_walkers, n_parameters)
-        The second half of all steps, from which results are taken.
+        The second half of all steps.
     log_densities : array (n_ensembles, n_steps, n_walkers)
         Up to a constant.
     r_hat : array (n_parameters,)
         Split R-hat over the ensembles. [1]
     effective_sizes, tail_effective_sizes : array (n_parameters,)
-        Independent draws that would tell the middle, and the ends of a 95 % interval, as well. [1]
+        Effective sample sizes for the middle and for the ends of a 95 % interval. [1]
     autocorrelation_steps : array (n_parameters,)
         Draws made per effective one. [1]
     acceptance : float
-        Share of the moves that were taken. [0-1]
+        Accepted share of the proposals. [0-1]
     n_evaluations : int
         Evaluations of the density, those of the discarded first half included.
     seed : int
-        Of the random numbers; the same one gives the same bits.
+        Of the random numbers; the same seed gives the same bits.
     history : tuple of str
-        One line per look at convergence.
+        One line per check of convergence.
     """
 
     names: tuple[str, ...]
@@ -108,7 +103,7 @@ class Chains:
         return credible_band(self.flat, level)
 
     def spread_out(self, n_draws: int) -> FloatArray:
-        """Return some of the draws (n_draws, n_parameters), as far apart along the chains as can be.
+        """Return some of the draws (n_draws, n_parameters), evenly spaced along the chains.
 
         Parameters
         ----------
@@ -120,7 +115,7 @@ class Chains:
 
 
 def credible_band(draws: FloatArray, level: float = 0.95) -> FloatArray:
-    """Return the central interval that holds a share `level` of the draws, for each column.
+    """Return the central interval that contains a share `level` of the draws, for each column.
 
     Parameters
     ----------
@@ -157,13 +152,13 @@ def sample(
     *,
     seed: int,
     n_ensembles: int = 4,
-    n_walkers: int = 80,
-    n_steps: int = 40,
+    n_walkers: int = 200,
+    n_steps: int = 80,
     most_steps: int = 1280,
     largest_r_hat: float = 1.01,
     smallest_effective_size: float = 400.0,
 ) -> Chains:
-    """Draw from a density until the ensembles agree and enough draws are effective.
+    """Sample a density until the ensembles agree and the effective sample sizes suffice.
 
     Parameters
     ----------
@@ -171,8 +166,8 @@ def sample(
         `log_density(points)` for points (n_points, n_parameters): their log densities up to a constant,
         -inf where a point is impossible.
     centre, spread : array (n_parameters,)
-        Walkers start at normal points about the centre; make the spread wider than the density, or walkers
-        that agree on where they started pass for converged.
+        Walkers start at normally distributed points about the centre. The spread must be wider than the
+        density: walkers that share a start too close to each other pass for converged.
     names : sequence of str
         Names of the parameters.
     seed : int
@@ -181,11 +176,11 @@ def sample(
         Independent ensembles, at least two, and walkers of each, an even number of at least four per
         parameter.
     n_steps, most_steps : int, optional
-        Steps before the first look at convergence; they double until `most_steps`. The first half of the
-        steps is discarded at every look.
+        Steps before the first check of convergence; the number doubles until `most_steps`. The first half of
+        the steps is discarded at every check.
     largest_r_hat, smallest_effective_size : float, optional
-        Converged is what stays below the first and reaches the second, in the middle and in the tails of all
-        parameters.
+        Limits of convergence: R-hat at most the first, effective sample sizes at least the second, for the
+        middle and the tails of all parameters.
 
     Returns
     -------
@@ -196,7 +191,7 @@ def sample(
     InputError
         If sizes disagree, the density is impossible at the start, or it returns NaN.
     ConvergenceError
-        If it has not converged after `most_steps`; the looks are its history.
+        If it has not converged after `most_steps`; its history has one line per check.
 
     Examples
     --------
@@ -216,81 +211,109 @@ def sample(
     whole("n_steps", n_steps, at_least=8)
     whole("most_steps", most_steps, at_least=n_steps)
     positive("smallest_effective_size", smallest_effective_size)
-    random = np.random.Generator(np.random.Philox(whole("seed", seed, at_least=0)))
-    density = _Counted(log_density)
-
-    walkers, heights = _start(density, middle, scale, (n_ensembles, n_walkers), random)
-    places: list[FloatArray] = []
-    levels: list[FloatArray] = []
-    taken: list[float] = []
+    density = _Checked(log_density)
+    seeds = np.random.SeedSequence(whole("seed", seed, at_least=0)).spawn(n_ensembles)
+    ensembles = [_ensemble(density, middle, scale, n_walkers, one) for one in seeds]
     history: list[str] = []
-    wanted = n_steps
-    sketch: _Sketch | None = None
+    done, wanted = 0, n_steps
     while True:
-        while len(places) < wanted:
-            if sketch is None and len(places) >= wanted // 2:
-                sketch = _Sketch(_spread_out(places[len(places) // 2 :]))
-            if sketch is None or len(places) % 2:
-                walkers, heights, share = _stretch(density, walkers, heights, random)
-            else:
-                walkers, heights, share = _leap(density, walkers, heights, sketch, random)
-            places.append(walkers)
-            levels.append(heights)
-            taken.append(share)
-        # (n_steps, n_ensembles, n_walkers, ...) as they came; ensembles first as they are told.
-        kept = np.swapaxes(np.array(places[wanted // 2 :]), 0, 1)
-        r_hat = _per_parameter(split_r_hat, kept)
-        bulk, tail = _per_parameter(bulk_effective_size, kept), _per_parameter(tail_effective_size, kept)
+        # On several threads, BLAS takes a hundred times as long for the small systems of KDEMove.
+        with threadpool_limits(limits=1):
+            for ensemble in ensembles:
+                ensemble.run(wanted - done)
+        done = wanted
+        draws = np.array([ensemble.sampler.get_chain(discard=done // 2) for ensemble in ensembles])
+        r_hat, bulk, tail = (
+            np.array([measure(draws[..., index]) for index in range(len(labels))])
+            for measure in (split_r_hat, bulk_effective_size, tail_effective_size)
+        )
         history.append(
-            f"{wanted} steps: R-hat at most {r_hat.max():.4f}, effective draws at least {bulk.min():.0f} in "
-            f"the middle and {tail.min():.0f} in the tails, of {kept[..., 0].size}"
+            f"{done} steps: R-hat at most {r_hat.max():.4f}, effective sample size at least {bulk.min():.0f} "
+            f"in the middle and {tail.min():.0f} in the tails, of {draws[..., 0].size} draws"
         )
         if r_hat.max() <= largest_r_hat and min(bulk.min(), tail.min()) >= smallest_effective_size:
             return Chains(
                 names=labels,
-                draws=kept,
-                log_densities=np.swapaxes(np.array(levels[wanted // 2 :]), 0, 1),
+                draws=draws,
+                log_densities=np.array(
+                    [ensemble.sampler.get_log_prob(discard=done // 2) for ensemble in ensembles]
+                ),
                 r_hat=r_hat,
                 effective_sizes=bulk,
                 tail_effective_sizes=tail,
-                autocorrelation_steps=kept[..., 0].size / bulk,
-                acceptance=float(np.mean(taken[wanted // 2 :])),
+                autocorrelation_steps=draws[..., 0].size / bulk,
+                # A walker is proposed one move per step, and an accepted one changes its position.
+                acceptance=float(np.any(np.diff(draws, axis=1) != 0.0, axis=-1).mean()),
                 n_evaluations=density.count,
                 seed=seed,
                 history=tuple(history),
             )
-        if wanted == most_steps:
-            slowest = np.minimum(bulk, tail)
+        if done == most_steps:
+            smaller = np.minimum(bulk, tail)
             raise ConvergenceError(
                 f"The draws have not converged after {most_steps} steps: {labels[int(r_hat.argmax())]} has "
-                f"R-hat {r_hat.max():.3f} (wanted: at most {largest_r_hat:g}), and of "
-                f"{labels[int(slowest.argmin())]} only {slowest.min():.0f} draws are effective (wanted: "
-                f"{smallest_effective_size:g}). Raise most_steps, or look whether the data tell these "
-                "parameters at all.",
+                f"R-hat {r_hat.max():.3f} (wanted: at most {largest_r_hat:g}), and the effective sample size "
+                f"of {labels[int(smaller.argmin())]} is only {smaller.min():.0f} (wanted: "
+                f"{smallest_effective_size:g}). Raise most_steps, or check whether the data determine these "
+                "parameters.",
                 tuple(history),
             )
-        # What is kept from now on begins here, or was discarded before: time for a better sketch.
-        wanted, sketch = min(2 * wanted, most_steps), None
+        wanted = min(2 * done, most_steps)
 
 
-class _Counted:
-    """A density that counts its evaluations and refuses NaN."""
+@dataclass
+class _Ensemble:
+    """A sampler and its present state."""
+
+    sampler: emcee.EnsembleSampler
+    state: emcee.State
+
+    def run(self, n_steps: int) -> None:
+        self.state = self.sampler.run_mcmc(self.state, n_steps)
+
+
+def _ensemble(
+    density: _Checked,
+    centre: FloatArray,
+    spread: FloatArray,
+    n_walkers: int,
+    seed: np.random.SeedSequence,
+) -> _Ensemble:
+    """Start an ensemble at scattered points, with random numbers of its own."""
+    start, moves = seed.spawn(2)
+    walkers, heights = _start(
+        density, centre, spread, n_walkers, np.random.Generator(np.random.Philox(start))
+    )
+    sampler = emcee.EnsembleSampler(
+        n_walkers,
+        centre.size,
+        density,
+        moves=[(emcee.moves.StretchMove(), 0.5), (emcee.moves.KDEMove(bw_method=BANDWIDTH), 0.5)],
+        vectorize=True,
+    )
+    sampler.random_state = np.random.RandomState(np.random.MT19937(moves)).get_state()
+    return _Ensemble(sampler, emcee.State(walkers, log_prob=heights, random_state=sampler.random_state))
+
+
+class _Checked:
+    """A density that counts its evaluations and rejects what is no log density."""
 
     def __init__(self, log_density: LogDensity):
         self.log_density = log_density
         self.count = 0
 
     def __call__(self, points: FloatArray) -> FloatArray:
-        flat = points.reshape(-1, points.shape[-1])
-        heights = np.asarray(self.log_density(flat), dtype=np.float64)
-        if heights.shape != flat.shape[:1]:
+        heights = np.asarray(self.log_density(points), dtype=np.float64)
+        if heights.shape != points.shape[:1]:
             raise InputError(f"log_density must return one number per point: got {heights.shape}.")
-        # +inf would hold a walker for ever.
-        if np.isnan(heights).any() or (heights == np.inf).any():
-            wrong = flat[np.isnan(heights) | (heights == np.inf)][0]
-            raise InputError(f"log_density must be a number or -inf: it is not at {wrong.tolist()}.")
-        self.count += len(flat)
-        return heights.reshape(points.shape[:-1])
+        # A walker at +inf would never move again.
+        wrong = np.isnan(heights) | (heights == np.inf)
+        if wrong.any():
+            raise InputError(
+                f"log_density must be a number or -inf: it is not at {points[wrong][0].tolist()}."
+            )
+        self.count += len(points)
+        return heights
 
 
 def _check_sizes(centre: FloatArray, spread: FloatArray, names: tuple[str, ...]) -> None:
@@ -304,120 +327,22 @@ def _check_sizes(centre: FloatArray, spread: FloatArray, names: tuple[str, ...])
 
 
 def _start(
-    density: _Counted,
+    density: _Checked,
     centre: FloatArray,
     spread: FloatArray,
-    shape: tuple[int, int],
+    n_walkers: int,
     random: np.random.Generator,
 ) -> tuple[FloatArray, FloatArray]:
-    """Scatter the walkers; those at impossible points are scattered again."""
-    walkers = centre + spread * random.normal(size=(*shape, centre.size))
+    """Draw normally distributed starts; those at impossible points are drawn again."""
+    walkers = centre + spread * random.normal(size=(n_walkers, centre.size))
     heights = density(walkers)
-    for _ in range(TRIES):
+    for _ in range(MOST_TRIES):
         lost = ~np.isfinite(heights)
         if not lost.any():
             return walkers, heights
         walkers[lost] = centre + spread * random.normal(size=(int(lost.sum()), centre.size))
         heights[lost] = density(walkers[lost])
     raise InputError(
-        f"log_density must be finite near the centre: of {TRIES} points about {centre.tolist()} none was. "
-        "Move the centre, or make the spread smaller."
+        f"log_density must be finite near the centre: of {MOST_TRIES} points about {centre.tolist()} none "
+        "was. Move the centre, or make the spread smaller."
     )
-
-
-def _stretch(
-    density: _Counted, walkers: FloatArray, heights: FloatArray, random: np.random.Generator
-) -> tuple[FloatArray, FloatArray, float]:
-    """Move either half once; also return the share of walkers that moved.
-
-    Proposed is y = g + z (x - g), with g any walker of the other half, and z of density 1/sqrt(z) between 1/a
-    and a.
-    """
-    walkers, heights = walkers.copy(), heights.copy()
-    n_ensembles, n_walkers, n_parameters = walkers.shape
-    half, a = n_walkers // 2, LONGEST_STRETCH
-    shares = []
-    for moving, guiding in ((slice(0, half), slice(half, None)), (slice(half, None), slice(0, half))):
-        which = random.integers(half, size=(n_ensembles, half, 1))
-        x, g = walkers[:, moving], np.take_along_axis(walkers[:, guiding], which, axis=1)
-        z = ((a - 1.0) * random.uniform(size=(n_ensembles, half)) + 1.0) ** 2 / a
-        y, log_ratio = g + z[..., None] * (x - g), (n_parameters - 1.0) * np.log(z)
-        walkers[:, moving], heights[:, moving], share = _moved(
-            density, x, heights[:, moving], y, log_ratio, random
-        )
-        shares.append(share)
-    return walkers, heights, float(np.mean(shares))
-
-
-def _leap(
-    density: _Counted, walkers: FloatArray, heights: FloatArray, sketch: _Sketch, random: np.random.Generator
-) -> tuple[FloatArray, FloatArray, float]:
-    """Let every walker leap to anywhere in the sketch; also return the share of those that did."""
-    proposed = sketch.draw(walkers.shape[1], random)
-    log_ratio = sketch.log_density(walkers) - sketch.log_density(proposed)
-    return _moved(density, walkers, heights, proposed, log_ratio, random)
-
-
-def _moved(
-    density: _Counted,
-    walkers: FloatArray,
-    heights: FloatArray,
-    proposed: FloatArray,
-    log_ratio: FloatArray,
-    random: np.random.Generator,
-) -> tuple[FloatArray, FloatArray, float]:
-    """Take what is proposed as often as Metropolis and Hastings say; also return the share that was taken.
-
-    `log_ratio` is the logarithm of how much rather the way back is proposed than the way there.
-    """
-    there = density(proposed)
-    taken = np.log(random.uniform(size=there.shape)) < there - heights + log_ratio
-    return np.where(taken[..., None], proposed, walkers), np.where(taken, there, heights), float(taken.mean())
-
-
-class _Sketch:
-    """A density of each ensemble's own: a mixture of Student distributions, one about each of its places.
-
-    Their scale is the covariance of the places, shrunk as for an estimate of a density from so many.
-
-    Parameters
-    ----------
-    places : array (n_ensembles, n_places, n_parameters)
-        Where walkers were.
-    """
-
-    def __init__(self, places: FloatArray):
-        self.places = places
-        n_places, n_parameters = places.shape[1:]
-        bandwidth = LUMPINESS * (4.0 / (n_places * (n_parameters + 2.0))) ** (1.0 / (n_parameters + 4.0))
-        deviations = places - places.mean(axis=1, keepdims=True)
-        covariance = np.swapaxes(deviations, 1, 2) @ deviations / (n_places - 1)
-        self.factor = bandwidth * np.swapaxes(np.linalg.cholesky(covariance), 1, 2)
-        self.inverse = np.linalg.inv(self.factor)
-
-    def draw(self, n_draws: int, random: np.random.Generator) -> FloatArray:
-        """So many draws for each ensemble, (n_ensembles, n_draws, n_parameters)."""
-        n_ensembles, n_places, n_parameters = self.places.shape
-        chosen = random.integers(n_places, size=(n_ensembles, n_draws, 1))
-        chi_square = random.chisquare(DEGREES_OF_FREEDOM, size=chosen.shape)
-        normal = random.normal(size=(n_ensembles, n_draws, n_parameters))
-        student = normal / np.sqrt(chi_square / DEGREES_OF_FREEDOM)
-        return np.take_along_axis(self.places, chosen, axis=1) + student @ self.factor
-
-    def log_density(self, points: FloatArray) -> FloatArray:
-        """Logarithm up to a constant, (n_ensembles, n_points)."""
-        white, centres = points @ self.inverse, self.places @ self.inverse
-        squares = np.array([cdist(*pair, "sqeuclidean") for pair in zip(white, centres, strict=True)])
-        power = -0.5 * (DEGREES_OF_FREEDOM + points.shape[-1])
-        return np.log(((1.0 + squares / DEGREES_OF_FREEDOM) ** power).sum(axis=-1))
-
-
-def _spread_out(steps: list[FloatArray]) -> FloatArray:
-    """Return `PLACES` of each ensemble, (n_ensembles, n_places, n_parameters), out of all steps alike."""
-    places = np.concatenate(steps, axis=1)
-    count = min(PLACES, places.shape[1])
-    return places[:, np.linspace(0, places.shape[1] - 1, count).round().astype(np.int64)]
-
-
-def _per_parameter(measure: Callable[[FloatArray], float], draws: FloatArray) -> FloatArray:
-    return np.array([measure(draws[..., index]) for index in range(draws.shape[-1])])
