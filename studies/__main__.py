@@ -1,20 +1,56 @@
-"""The studies, each a command of its name."""
+"""The studies: each is a command of its name, which writes a page in Markdown and its numbers as JSON."""
 
 from __future__ import annotations
 
 import typer
 
 from fingerpad.cli import run
+from studies import code_efficiency, fit_methods, mesh_noise, spike_fit
 from studies.commands.drives import drives_command
 from studies.commands.materials import materials_command
 from studies.commands.refine import refine_command
 from studies.commands.results import results_command
+from studies.pages.code_efficiency import code_efficiency_page
+from studies.pages.fit_methods import methods_page
+from studies.pages.mesh_noise import mesh_noise_page
+from studies.pages.spike_fit import spike_fit_page
+from studies.study import Study, command_of
+
+STUDIES = (
+    Study(
+        "methods",
+        "Compare start points, methods of fitting and models on the rates under the bar.",
+        fit_methods.run,
+        methods_page,
+    ),
+    Study(
+        "spike-fit",
+        "Recover the fitted afferent from its spikes, and measure the variability of intervals.",
+        spike_fit.run,
+        spike_fit_page,
+    ),
+    Study(
+        "mesh-noise",
+        "Press the two nearest spheres on meshes with shifted element boundaries.",
+        mesh_noise.run,
+        mesh_noise_page,
+    ),
+    Study(
+        "code-efficiency",
+        "Compare the codes of a population with the ideal observer of its responses.",
+        code_efficiency.run,
+        code_efficiency_page,
+    ),
+)
+"""Studies of the afferent and the spheres of the reproduction."""
 
 app = typer.Typer(help="Research on the model itself.", add_completion=False, pretty_exceptions_enable=False)
 app.command("drives")(drives_command)
 app.command("materials")(materials_command)
 app.command("refine")(refine_command)
 app.command("results")(results_command)
+for study in STUDIES:
+    app.command(study.name)(command_of(study))
 
 
 def main() -> None:

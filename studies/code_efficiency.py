@@ -1,4 +1,4 @@
-"""Beyond the paper: the efficiency of each code, relative to the ideal observer of the same responses."""
+"""The efficiency of each code, relative to the ideal observer of the same responses."""
 
 from __future__ import annotations
 
@@ -12,6 +12,11 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.results import Number, result_class
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data import protocol
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.gerling2014 import sphere_discrimination
+from fingerpad.experiments.manifest import Manifest
+from fingerpad.experiments.runner import Runner
+from fingerpad.neuron.population import Population
 from fingerpad.psychophysics import (
     PoissonResponses,
     Presentation,
@@ -21,7 +26,8 @@ from fingerpad.psychophysics import (
     multiplied_responses,
     present,
 )
-from fingerpad.psychophysics.encoding import distance, gradient_sum
+from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, distance, gradient_sum, neighbour_pairs
+from studies.fitted_bars import fit_bars
 
 PAIR_PER_M = (287.0, 316.0)
 """Two spheres near the threshold of people, at which efficiency is measured. [1/m]"""
@@ -63,6 +69,51 @@ class CodeEfficiency:
     ideal_d_prime_error: Number
     efficiency: Number
     efficiency_error: Number
+
+
+@result_class
+class CodeEfficiencyStudy:
+    """Result of `python -m studies code-efficiency`.
+
+    Parameters
+    ----------
+    efficiency : tuple of CodeEfficiency
+        A row per code, measure and kind of noise.
+    manifest : Manifest
+        What ran.
+    """
+
+    efficiency: tuple[CodeEfficiency, ...]
+    manifest: Manifest
+
+
+def run(runner: Runner, conditions: Conditions) -> CodeEfficiencyStudy:
+    """Press the bar and the paper's spheres, and measure the codes of a population of the fitted afferent.
+
+    Parameters
+    ----------
+    runner : Runner
+        Where indentations are stored.
+    conditions : Conditions
+        Finger, tissues, accuracy and seed.
+
+    Returns
+    -------
+    CodeEfficiencyStudy
+    """
+    fitted = fit_bars(runner, conditions, {"spheres": sphere_discrimination.touches(conditions)})
+    spheres = fitted.others["spheres"]
+    with runner.stage("efficiency", 1) as advance:
+        noise_sigma = sphere_discrimination.result(spheres, fitted.afferent, conditions.seed).noise_sigma
+        population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0), afferent=fitted.afferent)
+        answers = [population.respond(spheres[0.0, curvature]) for curvature in PAIR_PER_M]
+        tables = {
+            name: np.array([read(answer) for answer in answers]) for name, read in RESPONSE_MEASURES.items()
+        }
+        neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
+        found = code_efficiencies(np.array(PAIR_PER_M), tables, neighbours, noise_sigma, conditions.seed)
+        advance()
+    return CodeEfficiencyStudy(efficiency=found, manifest=runner.manifest(conditions))
 
 
 def code_efficiencies(

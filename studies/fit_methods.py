@@ -7,15 +7,19 @@ own fits its six. Then the model itself is let loose piece by piece, to see whic
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from scipy.optimize import isotonic_regression
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
-from fingerpad.experiments.conditions import RECEPTOR_X_MM
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.gerling2014 import single_unit
+from fingerpad.experiments.gerling2014.drive_quantities import EXTENDED
+from fingerpad.experiments.manifest import Manifest
+from fingerpad.experiments.runner import Runner
 from fingerpad.inference.afferent_methods import (
     OFFSETS_MM,
     along_slopes,
@@ -43,6 +47,8 @@ from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import PHASES, RateRecordings
 from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.skin.sampling import SkinResponse
+from studies import fit_starts
+from studies.fitted_bars import fit_bars
 
 
 def traces_beside(responses: Sequence[SkinResponse]) -> dict[float, SedTraces]:
@@ -57,6 +63,93 @@ def traces_beside(responses: Sequence[SkinResponse]) -> dict[float, SedTraces]:
         )
         for number, offset in enumerate(OFFSETS_MM)
     }
+
+
+@result_class
+class MethodRow:
+    """One method on all shifts and on the folds.
+
+    Parameters
+    ----------
+    method : str
+        Its name.
+    free_numbers : int
+        How many numbers it fits.
+    fss_in_sample, fss_training_mean, fss_out_of_sample : float
+        Over all shifts, and means of the folds. [1]
+    fss_train, fss_test : array (n_folds,)
+        Of each fold. [1]
+    runs : int
+        Runs of the model in all folds.
+    """
+
+    method: str
+    free_numbers: int
+    fss_in_sample: Number
+    fss_training_mean: Number
+    fss_out_of_sample: Number
+    fss_train: Vector
+    fss_test: Vector
+    runs: int
+
+
+@result_class
+class ModelRow:
+    """One model, fitted by the same method as the others.
+
+    Parameters
+    ----------
+    model : str
+        Its name.
+    fss_in_sample, fss_in_sample_dynamic, fss_in_sample_static, fss_out_of_sample : float
+        Over all shifts, of each phase, and mean of the folds. [1]
+    fss_test : array (n_folds,)
+        Of each fold. [1]
+    residual_share : dict of str to float
+        Of `residual_shares`. [1]
+    parameters : dict of str to float
+        By name.
+    """
+
+    model: str
+    fss_in_sample: Number
+    fss_in_sample_dynamic: Number
+    fss_in_sample_static: Number
+    fss_out_of_sample: Number
+    fss_test: Vector
+    residual_share: dict[str, Number]
+    parameters: dict[str, Number]
+
+
+@result_class
+class Ceiling:
+    """Best FSS in sample that a family of models could reach, by phase and weighted. [1]"""
+
+    dynamic: Number
+    static: Number
+    weighted: Number
+
+
+@result_class
+class FitMethods:
+    """Methods on the same folds, models on the same method, and what any model could reach.
+
+    Parameters
+    ----------
+    methods : tuple of MethodRow
+        The paper's first.
+    models : tuple of ModelRow
+        The paper's first.
+    models_fitted_by : str
+        Name of the method.
+    ceilings : dict of str to Ceiling
+        By family of models, see `ceilings`.
+    """
+
+    methods: tuple[MethodRow, ...]
+    models: tuple[ModelRow, ...]
+    models_fitted_by: str
+    ceilings: dict[str, Ceiling]
 
 
 def methods(problem: RateProblem, driven: Drive) -> tuple[Method, ...]:
@@ -105,7 +198,7 @@ def result(
     extended: SedTraces,
     recordings: RateRecordings,
     surface: tuple[Fit, CrossValidation],
-) -> dict[str, Any]:
+) -> FitMethods:
     """Methods on the same folds, models on the same method, and what any model could reach.
 
     Parameters
@@ -121,8 +214,7 @@ def result(
 
     Returns
     -------
-    dict
-        `methods`, `models` and `ceilings`: FSS in and out of sample, and what belongs to it.
+    FitMethods
     """
     driven, otherwise = drive(traces[0.0]), drive(extended)
     problem = four_number_problem(AfferentModel.of_drive(driven), recordings)
@@ -138,12 +230,12 @@ def result(
             _fitted(other, evolution(other, otherwise)),
         ),
     }
-    return {
-        "methods": [_method(name, *fit) for name, fit in {"response surface": surface, **fits}.items()],
-        "models": [_model(name, problem, *fit) for name, (problem, fit) in models.items()],
-        "models_fitted_by": searched,
-        "ceilings": ceilings(traces[0.0], recordings),
-    }
+    return FitMethods(
+        methods=tuple(_method(name, *fit) for name, fit in {"response surface": surface, **fits}.items()),
+        models=tuple(_model(name, problem, *fit) for name, (problem, fit) in models.items()),
+        models_fitted_by=searched,
+        ceilings=ceilings(traces[0.0], recordings),
+    )
 
 
 def _fitted(problem: RateProblem, method: Method) -> tuple[Fit, CrossValidation]:
@@ -153,30 +245,31 @@ def _fitted(problem: RateProblem, method: Method) -> tuple[Fit, CrossValidation]
     return method.fit(problem, everything), cross_validate(problem, method, folds)
 
 
-def _method(name: str, best: Fit, crossed: CrossValidation) -> dict[str, Any]:
-    return {
-        "method": name,
-        "free_numbers": best.parameters.size,
-        "fss_in_sample": best.score,
-        "fss_training_mean": crossed.score_train,
-        "fss_out_of_sample": crossed.score_test,
-        "fss_train": [fold.score_train for fold in crossed.folds],
-        "fss_test": [fold.score_test for fold in crossed.folds],
-        "runs": sum(fold.fit.n_evaluations for fold in crossed.folds),
-    }
+def _method(name: str, best: Fit, crossed: CrossValidation) -> MethodRow:
+    return MethodRow(
+        method=name,
+        free_numbers=best.parameters.size,
+        fss_in_sample=best.score,
+        fss_training_mean=crossed.score_train,
+        fss_out_of_sample=crossed.score_test,
+        fss_train=np.array([fold.score_train for fold in crossed.folds]),
+        fss_test=np.array([fold.score_test for fold in crossed.folds]),
+        runs=sum(fold.fit.n_evaluations for fold in crossed.folds),
+    )
 
 
-def _model(name: str, problem: RateProblem, best: Fit, crossed: CrossValidation) -> dict[str, Any]:
+def _model(name: str, problem: RateProblem, best: Fit, crossed: CrossValidation) -> ModelRow:
     by_phase = problem.score_by_phase(best.parameters, np.arange(problem.n_observations))
-    return {
-        "model": name,
-        "fss_in_sample": best.score,
-        **{f"fss_in_sample_{phase}": by_phase[phase] for phase in PHASES},
-        "fss_out_of_sample": crossed.score_test,
-        "fss_test": [fold.score_test for fold in crossed.folds],
-        "residual_share": residual_shares(problem, best.parameters),
-        "parameters": dict(zip(problem.names, best.parameters.tolist(), strict=True)),
-    }
+    return ModelRow(
+        model=name,
+        fss_in_sample=best.score,
+        fss_in_sample_dynamic=by_phase["dynamic"],
+        fss_in_sample_static=by_phase["static"],
+        fss_out_of_sample=crossed.score_test,
+        fss_test=np.array([fold.score_test for fold in crossed.folds]),
+        residual_share=residual_shares(problem, best.parameters),
+        parameters=dict(zip(problem.names, best.parameters.tolist(), strict=True)),
+    )
 
 
 def residual_shares(problem: RateProblem, parameters: FloatArray) -> dict[str, float]:
@@ -197,15 +290,14 @@ def residual_shares(problem: RateProblem, parameters: FloatArray) -> dict[str, f
     }
 
 
-def ceilings(traces: SedTraces, recordings: RateRecordings) -> dict[str, dict[str, float]]:
+def ceilings(traces: SedTraces, recordings: RateRecordings) -> dict[str, Ceiling]:
     """Best FSS in sample that whole families of models could reach.
 
     Returns
     -------
-    dict
+    dict of str to Ceiling
         `symmetric`: any prediction that is the same on both sides; `rising`: any rate that rises with strain
-        energy density, in each phase with that of its own window. Each has `dynamic`, `static` and
-        `weighted`.
+        energy density, in each phase with that of its own window.
     """
     felt = {
         phase: np.array([np.interp(np.mean(window), traces.times_ms, site) for site in traces.sed_kpa.T])
@@ -223,6 +315,55 @@ def ceilings(traces: SedTraces, recordings: RateRecordings) -> dict[str, dict[st
         found["symmetric"][phase] = fractional_sum_of_squares(observed, mirrored)
         found["rising"][phase] = fractional_sum_of_squares(observed, risen)
     weights = protocol.DYNAMIC_WEIGHT.value, protocol.STATIC_WEIGHT.value
-    for family in found.values():
-        family["weighted"] = sum(w * family[phase] for w, phase in zip(weights, PHASES, strict=True))
-    return found
+    return {
+        family: Ceiling(
+            **by_phase,
+            weighted=sum(weight * by_phase[phase] for weight, phase in zip(weights, PHASES, strict=True)),
+        )
+        for family, by_phase in found.items()
+    }
+
+
+@result_class
+class MethodsStudy:
+    """Result of `python -m studies methods`.
+
+    Parameters
+    ----------
+    starts : FitStarts
+        Where the fit starts.
+    methods : FitMethods
+        How it is done, and what limits it.
+    manifest : Manifest
+        What ran.
+    """
+
+    starts: fit_starts.FitStarts
+    methods: FitMethods
+    manifest: Manifest
+
+
+def run(runner: Runner, conditions: Conditions) -> MethodsStudy:
+    """Press the bar at all shifts, and compare starts, methods and models.
+
+    Parameters
+    ----------
+    runner : Runner
+        Where indentations are stored.
+    conditions : Conditions
+        Finger, tissues, accuracy and seed.
+
+    Returns
+    -------
+    MethodsStudy
+    """
+    fitted = fit_bars(runner, conditions)
+    with runner.stage("starts and methods", 2) as advance:
+        von_mises = single_unit.receptor_traces(fitted.bars, "von_mises")
+        starts = fit_starts.result(fitted.problem, von_mises)
+        advance()
+        extended = single_unit.receptor_sed(fitted.bars, EXTENDED.dynamic)
+        surface = fitted.best, fitted.folds
+        methods = result(traces_beside(fitted.bars), extended, fitted.problem.recordings, surface)
+        advance()
+    return MethodsStudy(starts=starts, methods=methods, manifest=runner.manifest(conditions))

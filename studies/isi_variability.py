@@ -1,4 +1,4 @@
-"""How irregular each source of noise makes an afferent, and how much of it the observed irregularity takes.
+"""Variability of interspike intervals by source of noise, and the amount that matches observed intervals.
 
 The afferent is held: its current is the one at the end of the bar's hold, under the position that makes it
 fire fastest, and stays for 10 s. Noise also changes how fast it fires; the current is therefore rescaled
@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.random_streams import Presentations
+from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.units import MS_PER_S
@@ -49,6 +49,9 @@ THRESHOLD_AMOUNTS = (0.1, 0.2, 0.3, 0.4, 0.5)
 """Beyond, some thresholds are out of reach of the current, and an interval never ends."""
 
 GAIN_AMOUNTS = (0.1, 0.3)
+
+CURVES = ("amount", "current_factor", "coefficient_of_variation", "local_variation")
+"""What a `NoiseCurve` holds by amount."""
 
 _MOST_TRIALS = 9
 _LARGEST_STEP, _LEAST_ELASTICITY, _SLOWEST_HZ = 0.7, 0.05, 0.1
@@ -226,7 +229,64 @@ def largest_held_current_ma(driven: Drive, afferent: Afferent) -> float:
     return float(afferent.transduction.current(driven).current_ma[-1].max())
 
 
-def result(driven: Drive, afferent: Afferent, seed: int) -> dict[str, Any]:
+@result_class
+class NoiseAtObserved:
+    """Amount of noise at which intervals are as irregular as observed; fields as of `NoiseCurve`. [1]"""
+
+    amount: Number
+    current_factor: Number
+    coefficient_of_variation: Number
+    local_variation: Number
+
+
+@result_class
+class NoiseCurve:
+    """Irregularity of the intervals against the amount of noise from one source.
+
+    Parameters
+    ----------
+    name, amount_is : str
+        Of the `NoiseSource`.
+    amount : array (n_amounts,)
+        Those at which the rate could be kept. [1]
+    current_factor : array (n_amounts,)
+        On the current, to keep the rate. [1]
+    coefficient_of_variation, local_variation : array (n_amounts,)
+        Of the intervals. [1]
+    at_observed : NoiseAtObserved or None
+        Interpolated; None where no amount is as irregular as observed.
+    """
+
+    name: str
+    amount_is: str
+    amount: Vector
+    current_factor: Vector
+    coefficient_of_variation: Vector
+    local_variation: Vector
+    at_observed: NoiseAtObserved | None
+
+
+@result_class
+class IsiVariability:
+    """Variability of the interspike intervals of a held afferent.
+
+    Parameters
+    ----------
+    observed, observed_spread : float
+        Coefficient of variation observed in mice: mean and standard deviation. [1]
+    rate_hz : float
+        Of the held afferent. [spikes/s]
+    sources : tuple of NoiseCurve
+        Empty for an afferent that is silent.
+    """
+
+    observed: float
+    observed_spread: float
+    rate_hz: float
+    sources: tuple[NoiseCurve, ...]
+
+
+def result(driven: Drive, afferent: Afferent, seed: int) -> IsiVariability:
     """Irregularity against noise, source by source.
 
     Parameters
@@ -240,21 +300,19 @@ def result(driven: Drive, afferent: Afferent, seed: int) -> dict[str, Any]:
 
     Returns
     -------
-    dict
-        `observed` and its `observed_spread`, `rate_hz` of the held afferent, and for each of `sources` its
-        curves and `at_observed`, the amount of noise that makes the observed irregularity, None if none does.
+    IsiVariability
     """
     membrane, current_ma = afferent.membrane, largest_held_current_ma(driven, afferent)
     rate_hz = _rate_hz(membrane.spikes(_held(current_ma)))
-    return {
-        "observed": neuron.INTERVAL_VARIATION.value,
-        "observed_spread": neuron.INTERVAL_VARIATION_SPREAD.value,
-        "rate_hz": rate_hz,
-        "sources": _curves(membrane, current_ma, seed) if rate_hz else [],
-    }
+    return IsiVariability(
+        observed=neuron.INTERVAL_VARIATION.value,
+        observed_spread=neuron.INTERVAL_VARIATION_SPREAD.value,
+        rate_hz=rate_hz,
+        sources=_curves(membrane, current_ma, seed) if rate_hz else (),
+    )
 
 
-def _curves(membrane: LeakyIntegrateAndFire, current_ma: float, seed: int) -> list[dict[str, Any]]:
+def _curves(membrane: LeakyIntegrateAndFire, current_ma: float, seed: int) -> tuple[NoiseCurve, ...]:
     """One curve per source; every amount of every source is a run of its own, which threads share."""
     runs = [(source, amount) for source in SOURCES for amount in source.amounts]
 
@@ -263,34 +321,33 @@ def _curves(membrane: LeakyIntegrateAndFire, current_ma: float, seed: int) -> li
         return held_at_its_rate(source, membrane, current_ma, amount, seed)
 
     tried = iter(in_blocks(held, len(runs), block=1))
-    return [_curve(source, [next(tried) for _ in source.amounts]) for source in SOURCES]
+    return tuple(_curve(source, [next(tried) for _ in source.amounts]) for source in SOURCES)
 
 
-def _curve(source: NoiseSource, tried: list[HeldNoise]) -> dict[str, Any]:
+def _curve(source: NoiseSource, tried: list[HeldNoise]) -> NoiseCurve:
     kept = [held for held in tried if held.rate_kept]
-    curves = {
-        name: [getattr(held, name) for held in kept]
-        for name in ("amount", "current_factor", "coefficient_of_variation", "local_variation")
-    }
-    return {
-        "name": source.name,
-        "amount_is": source.amount_is,
+    curves = {name: np.array([getattr(held, name) for held in kept]) for name in CURVES}
+    return NoiseCurve(
+        name=source.name,
+        amount_is=source.amount_is,
         **curves,
-        "at_observed": _at(neuron.INTERVAL_VARIATION.value, curves),
-    }
+        at_observed=_at(neuron.INTERVAL_VARIATION.value, curves),
+    )
 
 
-def _at(wanted: float, curves: dict[str, list[float]]) -> dict[str, float] | None:
+def _at(wanted: float, curves: dict[str, FloatArray]) -> NoiseAtObserved | None:
     """Interpolate at the first place where the coefficient of variation passes the wanted one."""
     variation = curves["coefficient_of_variation"]
     for after in range(1, len(variation)):
         low, high = variation[after - 1 : after + 1]
         if low < wanted <= high:
             share = (wanted - low) / (high - low)
-            return {
-                name: values[after - 1] + share * (values[after] - values[after - 1])
-                for name, values in curves.items()
-            }
+            return NoiseAtObserved(
+                **{
+                    name: values[after - 1] + share * (values[after] - values[after - 1])
+                    for name, values in curves.items()
+                }
+            )
     return None
 
 

@@ -1,12 +1,13 @@
-"""Efficiency of the codes of a population, as a table."""
+"""The page of `python -m studies code-efficiency`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from fingerpad.report.formatting import number, with_error
-from fingerpad.report.parts import Row, Table
-from studies.code_efficiency import CodeEfficiency
+from fingerpad.report.manifest import edition, manifest_chapter
+from fingerpad.report.parts import Chapter, Page, Row, Table
+from studies.code_efficiency import CodeEfficiency, CodeEfficiencyStudy
 
 
 def tables(rows: Sequence[CodeEfficiency]) -> list[Table]:
@@ -36,3 +37,13 @@ def tables(rows: Sequence[CodeEfficiency]) -> list[Table]:
             "Poisson processes, without other noise.",
         ),
     ]
+
+
+def code_efficiency_page(result: CodeEfficiencyStudy) -> Page:
+    """Return the page of `python -m studies code-efficiency`."""
+    return Page(
+        "Efficiency of the codes",
+        f"Gradient Sum and Euclidean Distance against the ideal observer. {edition(result.manifest)}.",
+        [],
+        [Chapter("", tables(result.efficiency)), manifest_chapter(result.manifest)],
+    )

@@ -1,17 +1,20 @@
-"""Level 2, beyond the paper: starts and units, methods of fitting, and what limits them."""
+"""The page of `python -m studies methods`: start points and units, methods of fitting, and their limits."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from fingerpad.data import paper
-from fingerpad.report.formatting import ABSENT, fixed, number, plain, whole_percent
-from fingerpad.report.parts import Row, Table
+from fingerpad.report.formatting import fixed, number, plain, whole_percent
+from fingerpad.report.manifest import edition, manifest_chapter
+from fingerpad.report.parts import Chapter, Drawing, Page, Row, Table
 from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure, numbers
+from studies.fit_methods import Ceiling, FitMethods, MethodRow, MethodsStudy, ModelRow
+from studies.fit_starts import FitStarts, ScaledStarts, Session, UnitOfDrive
 
 PLACES = {
     "dynamic_flat": "ramp, flat face over the receptor",
@@ -25,19 +28,19 @@ CEILINGS = {
 }
 
 
-def draw(section: Mapping[str, Any]) -> Figure:
+def draw(section: FitMethods) -> Figure:
     """Draw how well each method fits and predicts, fold by fold, and what it takes.
 
     Parameters
     ----------
-    section : mapping
-        `results["single_unit"]["methods"]`.
+    section : FitMethods
+        From `studies.fit_methods.result`.
 
     Returns
     -------
     Figure
     """
-    rows = section["methods"]
+    rows = section.methods
     figure = new_figure(10.0, 1.8 + 0.62 * len(rows))
     scores, effort = figure.subplots(1, 2, sharey=True, width_ratios=(2.2, 1.0))
     kinds = {
@@ -46,7 +49,7 @@ def draw(section: Mapping[str, Any]) -> Figure:
     }
     for label, (folds, mean, marker, edge, face, side) in kinds.items():
         for height, row in enumerate(rows):
-            values = numbers(row[folds])
+            values = numbers(getattr(row, folds))
             scores.plot(
                 values,
                 np.full(values.size, height + side),
@@ -58,19 +61,19 @@ def draw(section: Mapping[str, Any]) -> Figure:
                 label=f"positions {label}, one mark per fold" if height == 0 else None,
             )
             scores.vlines(
-                numbers(row[mean]),
+                numbers(getattr(row, mean)),
                 height + side - 0.12,
                 height + side + 0.12,
                 color=edge,
                 linewidth=2.4,
                 label=f"positions {label}, mean" if height == 0 else None,
             )
-    names = [f"{row['method']}\n({plain(row['free_numbers'])} numbers)" for row in rows]
+    names = [f"{row.method}\n({plain(row.free_numbers)} numbers)" for row in rows]
     scores.set_yticks(range(len(rows)), names)
     scores.set_ylim(len(rows) - 0.5, -0.5)
     scores.set_xlabel("FSS [1]")
     scores.set_title("(a) score")
-    effort.barh(range(len(rows)), numbers([row["runs"] for row in rows]), 0.5, color=BLUE)
+    effort.barh(range(len(rows)), numbers([row.runs for row in rows]), 0.5, color=BLUE)
     effort.locator_params(axis="x", nbins=4)
     effort.set_xlabel("runs of the model, all folds [1]")
     effort.set_title("(b) effort")
@@ -78,18 +81,14 @@ def draw(section: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def caption(section: Mapping[str, Any]) -> str:
+def caption(section: FitMethods) -> str:
     """Say how far the methods lie apart."""
-    rows = section["methods"]
-    means = [row["fss_out_of_sample"] for row in rows]
-    known = [mean for mean in means if mean is not None]
-    apart = max(known) - min(known) if known else None
-    folds = [fold for row in rows for fold in row["fss_test"] if fold is not None]
-    spread = max(folds) - min(folds) if folds else None
+    rows = section.methods
+    means = [row.fss_out_of_sample for row in rows]
+    folds = [fold for row in rows for fold in row.fss_test]
+    apart, spread = max(means) - min(means), max(folds) - min(folds)
     more = (
-        ": which positions are left out matters more than how the others are fitted"
-        if apart is not None and spread is not None and spread > apart
-        else ""
+        ": which positions are left out matters more than how the others are fitted" if spread > apart else ""
     )
     return (
         "Methods of fitting one afferent on the same folds. (a) Fractional sum of squares (FSS) on the "
@@ -99,41 +98,43 @@ def caption(section: Mapping[str, Any]) -> str:
     )
 
 
-def tables(section: Mapping[str, Any]) -> list[Table]:
-    """Return the tables of the starts, the methods and the limits, as far as the results have them.
-
-    Parameters
-    ----------
-    section : mapping
-        `results["single_unit"]`.
-
-    Returns
-    -------
-    list of Table
-    """
-    made: list[Table] = []
-    if section.get("starts"):
-        starts = section["starts"]
-        made += [_units(starts["units"]), _scales(starts["scales"]), _sessions(starts["sessions"])]
-    if section.get("methods"):
-        found = section["methods"]
-        made += [_methods(found["methods"]), _models(found), _ceilings(found["ceilings"])]
-        made.append(_residuals(found["models"]))
-    return made
+def start_tables(starts: FitStarts) -> list[Table]:
+    """Return the printed gains in each unit, the first start rescaled, and the paper's session."""
+    return [_units(starts.units), _scales(starts.scales), _sessions(starts.sessions)]
 
 
-def _units(rows: Sequence[Mapping[str, Any]]) -> Table:
+def method_tables(found: FitMethods) -> list[Table]:
+    """Return methods, models and what limits them."""
+    return [_methods(found.methods), _models(found), _ceilings(found.ceilings), _residuals(found.models)]
+
+
+def methods_page(result: MethodsStudy) -> Page:
+    """Return the page of `python -m studies methods`."""
+    drawing = Drawing("methods", "Methods of fitting", partial(draw, result.methods), caption(result.methods))
+    return Page(
+        "Methods of fitting one afferent",
+        f"Start points, methods and models on the rates under the bar. {edition(result.manifest)}.",
+        [],
+        [
+            Chapter("Start points", start_tables(result.starts)),
+            Chapter("Methods and models", [drawing, *method_tables(result.methods)]),
+            manifest_chapter(result.manifest),
+        ],
+    )
+
+
+def _units(rows: Sequence[UnitOfDrive]) -> Table:
     cells = [
         Row(
             (
-                f"{row['quantity']} in {row['unit']}",
+                f"{row.quantity} in {row.unit}",
                 *(
                     text
-                    for start in ("start_1", "start_2")
+                    for start in (row.start_1, row.start_2)
                     for text in (
-                        fixed(row[start]["fss"], 2),
-                        number(row[start]["largest_dynamic_hz"]),
-                        number(row[start]["largest_static_hz"]),
+                        fixed(start.fss, 2),
+                        number(start.largest_dynamic_hz),
+                        number(start.largest_static_hz),
                     )
                 ),
             )
@@ -146,29 +147,29 @@ def _units(rows: Sequence[Mapping[str, Any]]) -> Table:
     return Table("The printed gains, read in several units", columns, cells, note)
 
 
-def _scales(found: Mapping[str, Any]) -> Table:
+def _scales(found: ScaledStarts) -> Table:
     rows = [
         Row((number(scale), *(fixed(fss, 2) for fss in row)))
-        for scale, row in zip(found["energy_scale"], found["fss_start_1"], strict=True)
+        for scale, row in zip(found.energy_scale, found.fss_start_1, strict=True)
     ]
     columns = (
         "factor on energy density",
-        *(f"k_d times {number(ratio)}" for ratio in found["dynamic_ratio"]),
+        *(f"k_d times {number(ratio)}" for ratio in found.dynamic_ratio),
     )
     note = "FSS over all positions, without any fit."
     return Table("The first start, its gains rescaled", columns, rows, note)
 
 
-def _sessions(rows: Sequence[Mapping[str, Any]]) -> Table:
+def _sessions(rows: Sequence[Session]) -> Table:
     keys = ("fss_start", "fss_train", "fss_test")
     cells = [
         Row(
             (
-                row["start"],
-                number(row["static_scale"]),
-                number(row["dynamic_scale"]),
-                *(fixed(row[key], 3) for key in keys),
-                plain(row["iterations"]),
+                row.start,
+                number(row.static_scale),
+                number(row.dynamic_scale),
+                *(fixed(getattr(row, key), 3) for key in keys),
+                plain(row.iterations),
             )
         )
         for row in rows
@@ -186,16 +187,16 @@ def _sessions(rows: Sequence[Mapping[str, Any]]) -> Table:
     return Table("The paper's session: fold 3, start 2", columns, cells)
 
 
-def _methods(rows: Sequence[Mapping[str, Any]]) -> Table:
+def _methods(rows: Sequence[MethodRow]) -> Table:
     keys = ("fss_in_sample", "fss_training_mean", "fss_out_of_sample")
     cells = [
         Row(
             (
-                row["method"],
-                plain(row["free_numbers"]),
-                *(fixed(row[key], 3) for key in keys),
-                " ".join(fixed(fold, 2) for fold in row["fss_test"]),
-                plain(row["runs"]),
+                row.method,
+                plain(row.free_numbers),
+                *(fixed(getattr(row, key), 3) for key in keys),
+                " ".join(fixed(fold, 2) for fold in row.fss_test),
+                plain(row.runs),
             )
         )
         for row in rows
@@ -208,34 +209,41 @@ def _methods(rows: Sequence[Mapping[str, Any]]) -> Table:
     return Table("Methods of fitting on the same folds", columns, cells, note)
 
 
-def _models(found: Mapping[str, Any]) -> Table:
+def _models(found: FitMethods) -> Table:
     keys = ("fss_in_sample_dynamic", "fss_in_sample_static", "fss_in_sample", "fss_out_of_sample")
     cells = [
-        Row((row["model"], *(fixed(row[key], 3) for key in keys), number(row["parameters"].get("offset_mm"))))
-        for row in found["models"]
+        Row(
+            (
+                row.model,
+                *(fixed(getattr(row, key), 3) for key in keys),
+                number(row.parameters.get("offset_mm")),
+            )
+        )
+        for row in found.models
     ]
     columns = (
         "model", "FSS dynamic", "FSS static", "FSS, all positions", "FSS, testing", "receptor's offset [mm]",
     )  # fmt: skip
-    note = f"All fitted by {found['models_fitted_by']}. The last is an extension of the paper's model."
+    note = f"All fitted by {found.models_fitted_by}. The last is an extension of the paper's model."
     return Table("What the model lacks", columns, cells, note)
 
 
-def _ceilings(found: Mapping[str, Mapping[str, float]]) -> Table:
+def _ceilings(found: Mapping[str, Ceiling]) -> Table:
     keys = ("dynamic", "static", "weighted")
     rows = [
-        Row((words, *(fixed(found[family][key], 3) for key in keys))) for family, words in CEILINGS.items()
+        Row((words, *(fixed(getattr(found[family], key), 3) for key in keys)))
+        for family, words in CEILINGS.items()
     ]
     return Table("What could be reached", ("best FSS of", "dynamic", "static", "weighted 1:3"), rows)
 
 
-def _residuals(rows: Sequence[Mapping[str, Any]]) -> Table:
+def _residuals(rows: Sequence[ModelRow]) -> Table:
     cells = [
         Row(
             (
-                row["model"],
-                ABSENT if row["fss_in_sample"] is None else fixed(1.0 - row["fss_in_sample"], 3),
-                *(whole_percent(row["residual_share"][place]) for place in PLACES),
+                row.model,
+                fixed(1.0 - row.fss_in_sample, 3),
+                *(whole_percent(row.residual_share[place]) for place in PLACES),
             )
         )
         for row in rows

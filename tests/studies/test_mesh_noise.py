@@ -1,6 +1,7 @@
 """Noise of the mesh: the step between the nearest spheres on meshes whose lines lie elsewhere."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -53,30 +54,35 @@ def test_mesh_noise_is_the_largest_difference_of_a_step():
     scales = {(first, 287.0): 1.0, (first, 296.0): 1.0, (second, 287.0): 1.0, (second, 296.0): 1.004}
     responses = {key: Skin(key[1], scale) for key, scale in scales.items()}
     found = mesh_noise.result(responses, spheres, GRID.afferent)
-    assert found["meshes"] == [mesh_noise.USUAL, first, second]
-    steps = found["step"]
-    assert_allclose(steps, np.diff(found["static_sum"]).ravel())
+    assert found.meshes == (mesh_noise.USUAL, first, second)
+    steps = found.step
+    assert_allclose(steps, np.diff(found.static_sum).ravel())
     assert steps[0] == steps[1] < steps[2]
-    assert found["largest_difference"] == pytest.approx(steps[2] / steps[0] - 1.0)
-    assert_allclose(found["sed_kpa"][0, 0], 0.85 * 2.5 * math.exp(-0.25 / 4.0), rtol=1e-9)
+    assert found.largest_difference == pytest.approx(steps[2] / steps[0] - 1.0)
+    assert_allclose(found.sed_kpa[0, 0], 0.85 * 2.5 * math.exp(-0.25 / 4.0), rtol=1e-9)
     population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0), afferent=GRID.afferent)
     rates = population.respond(spheres[0.0, 287.0]).static_rate_hz
-    assert found["static_sum"][0, 0] == gradient_sum(rates, PAIRS)
+    assert found.static_sum[0, 0] == gradient_sum(rates, PAIRS)
 
 
-def _mesh_noise() -> dict:
-    return {
-        "curvature_per_m": [287.0, 296.0],
-        "meshes": ["as in the study", "another"],
-        "static_sum": [[1400.0, 1460.0], [1410.0, 1467.0]],
-        "sed_kpa": [[1.4, 1.5], [1.4, 1.5]],
-        "step": [60.0, 57.0],
-        "difference": [0.0, -0.05],
-        "largest_difference": 0.05,
-        "limit": 0.1,
-    }
+def five_percent_apart() -> mesh_noise.MeshNoise:
+    return mesh_noise.MeshNoise(
+        curvature_per_m=[287.0, 296.0],
+        meshes=("as in the study", "another"),
+        static_sum=[[1400.0, 1460.0], [1410.0, 1467.0]],
+        sed_kpa=[[1.4, 1.5], [1.4, 1.5]],
+        step=[60.0, 57.0],
+        difference=[0.0, -0.05],
+        largest_difference=0.05,
+        limit=0.1,
+    )
 
 
 def test_steps_on_other_meshes_are_shares_of_the_first():
-    (table,) = page.tables(_mesh_noise())
+    (table,) = page.tables(five_percent_apart())
     assert [row.cells[-1] for row in table.rows] == ["0.000", "−0.050"]
+
+
+@pytest.mark.parametrize(("difference", "verdict"), [(0.099, "10 % is met"), (0.101, "10 % is exceeded")])
+def test_the_page_says_whether_the_steps_agree(difference, verdict):
+    assert verdict in page.verdict(replace(five_percent_apart(), largest_difference=difference))

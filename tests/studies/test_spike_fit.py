@@ -1,14 +1,14 @@
 """The study of spike trains: noise and irregularity, and the afferent found again in its spikes."""
 
-import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fingerpad.core.random_streams import Presentations
+from fingerpad.core.results import to_json
 from fingerpad.core.signals import SedTraces
-from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.inference.soft_afferent import soft_spikes
 from fingerpad.inference.spike_parameters import (
     SPIKE_PARAMETER_NAMES,
@@ -51,7 +51,7 @@ def test_the_held_afferent_keeps_its_rate_whatever_the_noise(found):
         -membrane.threshold_mv * membrane.capacitance_mf / (current_ma * membrane.time_constant_ms)
     )
     wanted_hz = 1000.0 / (charging + membrane.refractory_ms)
-    assert found["variability"]["rate_hz"] == pytest.approx(wanted_hz, rel=0.01)
+    assert found.variability.rate_hz == pytest.approx(wanted_hz, rel=0.01)
     for source in SOURCES[:4]:
         held = held_at_its_rate(source, membrane, current_ma, source.amounts[2], SEED)
         trains = source.spikes(membrane, current_ma, held.current_factor, source.amounts[2], SEED)
@@ -64,41 +64,41 @@ def test_the_held_afferent_keeps_its_rate_whatever_the_noise(found):
 
 
 def test_irregularity_rises_with_every_noise_but_that_of_the_gain(found):
-    *others, gain = found["variability"]["sources"]
+    *others, gain = found.variability.sources
     for source in others:
-        assert len(source["amount"]) >= 4
-        assert np.all(np.diff(source["coefficient_of_variation"]) > 0.0)
-        assert np.all(np.diff(source["local_variation"]) > 0.0)
-    assert gain["name"].startswith("gain")
-    assert max(gain["coefficient_of_variation"]) < 1e-6
-    assert gain["at_observed"] is None
+        assert len(source.amount) >= 4
+        assert np.all(np.diff(source.coefficient_of_variation) > 0.0)
+        assert np.all(np.diff(source.local_variation) > 0.0)
+    assert gain.name.startswith("gain")
+    assert max(gain.coefficient_of_variation) < 1e-6
+    assert gain.at_observed is None
 
 
 def test_the_amount_at_the_observed_irregularity_lies_between_the_amounts_around_it(found):
-    reached = [source for source in found["variability"]["sources"] if source["at_observed"]]
+    reached = [source for source in found.variability.sources if source.at_observed]
     assert len(reached) >= 3
     for source in reached:
-        at = source["at_observed"]
-        assert at["coefficient_of_variation"] == pytest.approx(0.78, rel=1e-12)
-        above = next(n for n, cv in enumerate(source["coefficient_of_variation"]) if cv >= 0.78)
-        assert source["amount"][above - 1] < at["amount"] <= source["amount"][above]
+        at = source.at_observed
+        assert at.coefficient_of_variation == pytest.approx(0.78, rel=1e-12)
+        above = next(n for n, cv in enumerate(source.coefficient_of_variation) if cv >= 0.78)
+        assert source.amount[above - 1] < at.amount <= source.amount[above]
 
 
 # Recovery
 
 
 def test_the_afferent_is_found_again_in_its_spikes(found):
-    recovery = found["recovery"]
-    assert recovery["n_spikes"] > 700
-    assert recovery["n_held"] >= 4  # five intervals of 95 %: one miss in four experiments
-    assert np.all(np.abs(recovery["estimate"] - recovery["truth"]) < 3.5 * recovery["standard_error"])
-    assert recovery["log_likelihood"] > recovery["log_likelihood_of_truth"]
-    assert recovery["rescaled"]["distance"] < recovery["rescaled"]["limit"]
-    assert np.all(np.diff(recovery["rescaled"]["quantile"]) > 0.0)
+    recovery = found.recovery
+    assert recovery.n_spikes > 700
+    assert recovery.n_held >= 4  # five intervals of 95 %: one miss in four experiments
+    assert np.all(np.abs(recovery.estimate - recovery.truth) < 3.5 * recovery.standard_error)
+    assert recovery.log_likelihood > recovery.log_likelihood_of_truth
+    assert recovery.rescaled.distance < recovery.rescaled.limit
+    assert np.all(np.diff(recovery.rescaled.quantile) > 0.0)
 
 
 def test_the_truth_is_the_afferent_with_its_gains_rescaled(found):
-    true = found["recovery"]["truth"]
+    true = found.recovery.truth
     scale = AFFERENT.capacitance_mf * AFFERENT.threshold_mv
     factors = true[:3] * scale / AFFERENT.parameters[:3]
     np.testing.assert_allclose(factors, factors[0], rtol=1e-12)
@@ -107,31 +107,31 @@ def test_the_truth_is_the_afferent_with_its_gains_rescaled(found):
 
 
 def test_spikes_of_other_noise_are_told_from_those_of_a_soft_threshold(found):
-    assert len(found["other_noise"]) == 3
-    for row in found["other_noise"]:
-        assert row["distance"] > row["limit"]
-        assert 0.5 < row["over_truth"][1] < 1.5
-        assert row["static_rate_error_hz"] < 10.0
+    assert len(found.other_noise) == 3
+    for row in found.other_noise:
+        assert row.distance > row.limit
+        assert 0.5 < row.over_truth[1] < 1.5
+        assert row.static_rate_error_hz < 10.0
 
 
 def test_the_raster_shows_the_first_presentation_of_each_position(found):
-    raster = found["raster"]
-    driven, true = drive(bar(), pieces=8), found["recovery"]["truth"]
+    raster = found.raster
+    driven, true = drive(bar(), pieces=8), found.recovery.truth
     once = soft_spikes(driven, true, Presentations.of_one_afferent(SHIFT_MM.size), SEED)
-    for number, train in enumerate(raster["spikes_ms"]):
+    for number, train in enumerate(raster.spikes_ms):
         np.testing.assert_array_equal(train, once[number])
-    counts = [len(train) for train in raster["spikes_ms"]]
+    counts = [len(train) for train in raster.spikes_ms]
     assert len(counts) == SHIFT_MM.size
-    assert raster["shown"] == int(np.argmax(counts))
-    assert raster["shift_mm"] is SHIFT_MM
-    for intensity in raster["intensity_hz"].values():
-        assert intensity.shape == raster["times_ms"].shape
+    assert raster.shown == int(np.argmax(counts))
+    np.testing.assert_array_equal(raster.shift_mm, SHIFT_MM)
+    for intensity in raster.intensity_hz.values():
+        assert intensity.shape == raster.times_ms.shape
         assert (intensity >= 0.0).all()
 
 
 def test_the_same_seed_gives_the_same_numbers(found):
     again = spike_fit.result(bar(), AFFERENT, SHIFT_MM, SEED)
-    assert json.dumps(plain(again)) == json.dumps(plain(found))
+    assert to_json(again) == to_json(found)
 
 
 # An afferent that never fires, and spikes that cannot be fitted
@@ -139,9 +139,9 @@ def test_the_same_seed_gives_the_same_numbers(found):
 
 def test_a_silent_afferent_makes_an_empty_section_that_can_be_drawn():
     silent = Afferent(intercept_ma=-1e-3)
-    section = plain(spike_fit.result(bar(), silent, SHIFT_MM, SEED))
-    assert (section["recovery"], section["raster"], section["other_noise"]) == (None, None, [])
-    assert section["variability"]["sources"] == []
+    section = spike_fit.result(bar(), silent, SHIFT_MM, SEED)
+    assert (section.recovery, section.raster, section.other_noise) == (None, None, ())
+    assert section.variability.sources == ()
     assert png(report.draw, section).startswith(b"\x89PNG")
     assert report.table(section) == []
     assert "could not be fitted" in report.caption(section)
@@ -151,35 +151,33 @@ def test_a_silent_afferent_makes_an_empty_section_that_can_be_drawn():
 
 
 def test_spikes_that_cannot_be_fitted_have_a_row_without_an_estimate(found):
-    section = plain(found)
-    section["other_noise"].append({"name": "white noise of the current", "amount": 0.3, "n_spikes": 3})
+    unfitted = spike_fit.OtherNoise(name="white noise of the current", amount=0.3, n_spikes=3)
+    section = replace(found, other_noise=(*found.other_noise, unfitted))
     _, others, _ = report.table(section)
     assert {len(row.cells) for row in others.rows} == {len(others.columns)}
     assert others.rows[-1].cells[3:8] == ("–",) * 5
 
 
 def test_the_figure_and_the_tables_say_what_was_found(found):
-    section = plain(found)
+    section = found
     assert png(report.draw, section).startswith(b"\x89PNG")
     recovery, others, sources = report.table(section)
     assert len(recovery.rows) == len(SPIKE_PARAMETER_NAMES)
     assert recovery.rows[3].cells[0] == "τ"
     assert recovery.rows[3].cells[2] == "71.8"
-    assert [row.cells[0] for row in others.rows] == [row["name"] for row in section["other_noise"]]
+    assert [row.cells[0] for row in others.rows] == [row.name for row in section.other_noise]
     assert [row.cells[0] for row in sources.rows] == [source.name for source in SOURCES]
     assert sources.rows[-1].cells[2:] == ("–", "–", "–")
-    assert f"{section['recovery']['n_held']} of 5 intervals of 95 % hold the truth" in report.caption(section)
+    assert f"{section.recovery.n_held} of 5 intervals of 95 % hold the truth" in report.caption(section)
 
 
 def test_panels_show_the_numbers_of_the_section(found):
-    section = plain(found)
+    section = found
     raster, intensity, rescaled, variability = report.draw(section).axes
     drawn = sum(len(collection.get_segments()) for collection in raster.collections)
-    assert drawn == sum(len(train) for train in section["raster"]["spikes_ms"])
-    np.testing.assert_array_equal(intensity.lines[1].get_ydata(), section["raster"]["intensity_hz"]["fitted"])
-    test = section["recovery"]["rescaled"]
-    np.testing.assert_allclose(
-        rescaled.lines[0].get_ydata(), np.array(test["quantile"]) - np.array(test["share"])
-    )
-    for line, source in zip(variability.lines, section["variability"]["sources"], strict=True):
-        np.testing.assert_array_equal(line.get_ydata(), source["coefficient_of_variation"])
+    assert drawn == sum(len(train) for train in section.raster.spikes_ms)
+    np.testing.assert_array_equal(intensity.lines[1].get_ydata(), section.raster.intensity_hz["fitted"])
+    test = section.recovery.rescaled
+    np.testing.assert_allclose(rescaled.lines[0].get_ydata(), np.array(test.quantile) - np.array(test.share))
+    for line, source in zip(variability.lines, section.variability.sources, strict=True):
+        np.testing.assert_array_equal(line.get_ydata(), source.coefficient_of_variation)

@@ -1,0 +1,99 @@
+"""A study and the command that runs it: press what is missing, compute, write numbers and a page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from fingerpad.cli.options import Jobs, Resolution, whole_number
+from fingerpad.cli.running import Bars, interruptible, make_writable, processes
+from fingerpad.core.files import write_atomically
+from fingerpad.core.results import to_json
+from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.runner import Runner
+from fingerpad.report.page import write_markdown
+from fingerpad.report.parts import Page
+
+Seed = Annotated[
+    int, typer.Option(parser=whole_number, metavar="INTEGER", help="Seed of all random numbers.")
+]
+Out = Annotated[Path, typer.Option(help="Folder for page, figures, numbers and stored indentations.")]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study: what it computes and how its page looks.
+
+    Parameters
+    ----------
+    name : str
+        Of the command and of the files.
+    help : str
+        What it does, in one line.
+    run : callable
+        From a runner and conditions to a result, an instance of a `result_class`.
+    page : callable
+        From that result to its page.
+    """
+
+    name: str
+    help: str
+    run: Callable[[Runner, Conditions], Any]
+    page: Callable[[Any], Page]
+
+
+def run_study(study: Study, runner: Runner, conditions: Conditions) -> tuple[Path, Path]:
+    """Run a study, and write its numbers and its page.
+
+    Parameters
+    ----------
+    study : Study
+        Which.
+    runner : Runner
+        Files are written into its folder.
+    conditions : Conditions
+        Finger, tissues, accuracy and seed.
+
+    Returns
+    -------
+    (Path, Path)
+        `NAME.md` and `NAME.json`.
+
+    Raises
+    ------
+    ConvergenceError
+        If an indentation cannot be solved; finished ones stay stored.
+    StoreError
+        If a stored indentation is damaged or the folder cannot be written.
+    """
+    result = study.run(runner, conditions)
+    numbers = runner.folder / f"{study.name}.json"
+    write_atomically(numbers, to_json(result) + b"\n")
+    return write_markdown(study.page(result), runner.folder / f"{study.name}.md"), numbers
+
+
+def command_of(study: Study) -> Callable[..., None]:
+    """Return the command line of a study: resolution, folder, processes and seed."""
+
+    def command(
+        resolution: Resolution = "quick", out: Out = Path(study.name), jobs: Jobs = None, seed: Seed = 0
+    ) -> None:
+        execute(study, Conditions(resolution=resolution, seed=seed), out, jobs)
+
+    command.__doc__ = study.help
+    return command
+
+
+def execute(study: Study, conditions: Conditions, out: Path, jobs: int | None) -> None:
+    """Run a study from the command line, with bars on a terminal, and say where its files are."""
+    from rich.console import Console
+
+    make_writable(out)
+    with interruptible():
+        runner = Runner(out, processes(jobs), Bars(Console(stderr=True)))
+        page, numbers = run_study(study, runner, conditions)
+    typer.echo(f"Page: {page}\nResults: {numbers}")
