@@ -68,7 +68,7 @@ def fit_bars(
     FittedBars
     """
     group = "bar, 36 shifts"
-    pressed = {group: dict(enumerate(single_unit.touches(conditions))), **(others or {})}
+    pressed = {group: dict(enumerate(single_unit.bar_touches(conditions))), **(others or {})}
     responses = runner.responses(pressed)
     bars = list(responses.pop(group).values())
     with runner.stage("fit", 1) as advance:

@@ -151,7 +151,7 @@ def read_excerpt(path: Path, methods: Path | None = None, before: Excerpt | None
     path : Path
         Its results.json.
     methods : Path, optional
-        Numbers of the study that compares methods of fitting, as `studies.fit_methods.result` returns them.
+        `methods.json` of `python -m studies methods`.
     before : Excerpt, optional
         What the pages show now; without `methods` they keep its methods and models.
 
@@ -162,7 +162,7 @@ def read_excerpt(path: Path, methods: Path | None = None, before: Excerpt | None
     """
     try:
         results = json.loads(path.read_text(encoding="utf-8"))
-        compared = None if methods is None else json.loads(methods.read_text(encoding="utf-8"))
+        compared = None if methods is None else json.loads(methods.read_text(encoding="utf-8"))["methods"]
         shown = excerpt(results, compared)
     except (OSError, ValueError) as error:
         raise StoreError(f"{path} cannot be read as JSON ({error}): run `make reproduce` first.") from error
