@@ -101,10 +101,14 @@ def run(runner: Runner, conditions: Conditions) -> CodeEfficiencyStudy:
     -------
     CodeEfficiencyStudy
     """
-    fitted = fit_bars(runner, conditions, {"spheres": sphere_discrimination.touches(conditions)})
+    fitted = fit_bars(
+        runner, conditions, {"spheres": sphere_discrimination.discrimination_touches(conditions)}
+    )
     spheres = fitted.others["spheres"]
     with runner.stage("efficiency", 1) as advance:
-        noise_sigma = sphere_discrimination.result(spheres, fitted.afferent, conditions.seed).noise_sigma
+        noise_sigma = sphere_discrimination.discriminate_spheres(
+            spheres, fitted.afferent, conditions.seed
+        ).noise_sigma
         population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0), afferent=fitted.afferent)
         answers = [population.respond(spheres[0.0, curvature]) for curvature in PAIR_PER_M]
         tables = {

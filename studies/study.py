@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from fingerpad.cli.options import Jobs, Resolution, whole_number
+from fingerpad.cli.options import Jobs, Resolution, to_whole
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.core.files import write_atomically
 from fingerpad.core.results import to_json
@@ -18,9 +18,7 @@ from fingerpad.experiments.runner import Runner
 from fingerpad.report.page import write_markdown
 from fingerpad.report.parts import Page
 
-Seed = Annotated[
-    int, typer.Option(parser=whole_number, metavar="INTEGER", help="Seed of all random numbers.")
-]
+Seed = Annotated[int, typer.Option(parser=to_whole, metavar="INTEGER", help="Seed of all random numbers.")]
 Out = Annotated[Path, typer.Option(help="Folder for page, figures, numbers and stored indentations.")]
 
 
