@@ -18,10 +18,10 @@ from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.gerling2014.drive_fits import (
+    drive_fit,
     judge,
     quick_method,
     relative_model,
-    row,
     scaled_starts,
 )
 from fingerpad.geometry.mesh import LAYERS, Mesh
@@ -98,7 +98,7 @@ def result(
     -------
     dict
         `method` and `layers`: per layer of elements its tissue, `from_mm` and `to_mm`, the largest energy
-        density that the receptor meets, and what `drive_fits.row` says; gains are those over the living
+        density at the receptor, and the fields of `drive_fits.DriveFit`; gains are those over the living
         epidermis, `own_layer`.
     """
     method = method or quick_method()
@@ -128,7 +128,7 @@ def result(
                 "from_mm": borders[layer],
                 "to_mm": borders[layer + 1],
                 "largest_sed_kpa": driven.sed_kpa.max(),
-                **row(one, judged[own], recordings, generator),
+                **vars(drive_fit(one, judged[own], recordings, generator)),
             }
             for layer, (driven, one) in enumerate(zip(drives, judged, strict=True))
         ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -12,10 +13,10 @@ import numpy as np
 
 from fingerpad import __version__
 from fingerpad.core.checks import FloatArray, whole
+from fingerpad.core.results import to_json
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.gerling2014 import drive_fits, drive_quantities, single_unit
 from fingerpad.experiments.gerling2014.drive_fits import RELATIVE_NAMES, Judged
-from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
@@ -24,6 +25,7 @@ from fingerpad.skin.store import Store, solve_missing
 from studies import drive_depths, dynamic_response
 from studies.drive_fits import information, thorough_method
 from studies.dynamic_response import EXPLANATIONS, ExplainedModel, Explanation, Patch
+from studies.plain_values import plain
 
 
 @dataclass(frozen=True)
@@ -66,8 +68,8 @@ def study_drives(study: DriveStudy, on_finished: Callable[[str], None] | None = 
     Returns
     -------
     dict
-        Plain numbers, strings and lists: what `drive_quantities.result` gives, `explanations`, `depths`
-        and `manifest`.
+        Plain numbers, strings and lists: the fields of `drive_quantities.DriveResult`, `explanations`,
+        `depths` and `manifest`.
 
     Raises
     ------
@@ -87,14 +89,15 @@ def study_drives(study: DriveStudy, on_finished: Callable[[str], None] | None = 
     responses = [store.load(touch) for touch in touches]
     finished("presses")
     recordings, generator = single_unit.bar_recordings(), np.random.default_rng(conditions.seed)
-    results = drive_quantities.result(
-        drive_quantities.receptor_traces(responses),
+    quantities = drive_quantities.drive_result(
+        drive_quantities.quantity_traces(responses),
         recordings,
         generator,
         (*drive_quantities.ALONE, *drive_quantities.APART),
         thorough_method(conditions.seed),
         with_response_surface=True,
     )
+    results: dict[str, Any] = json.loads(to_json(quantities))
     finished("quantities")
     patch = dynamic_response.sampled_patch(responses)
     results["explanations"] = explained(patch, recordings, conditions.seed, generator, finished)
@@ -138,7 +141,7 @@ def explained(
     Returns
     -------
     list of dict
-        Per explanation its name, numbers, what `drive_fits.row` says, "aic" and "bic", and their
+        Per explanation its name, numbers, the fields of `drive_fits.DriveFit`, "aic" and "bic", and their
         differences from the first.
     """
     rows: list[dict[str, Any]] = []
@@ -154,7 +157,7 @@ def explained(
                 "name": explanation.name,
                 "free_numbers": free,
                 "added": _added(explanation, model.numbers(judged.fit.parameters)),
-                **drive_fits.row(judged, baseline, recordings, generator),
+                **vars(drive_fits.drive_fit(judged, baseline, recordings, generator)),
                 **information(judged.in_sample["total"], recordings.n_rates, free),
             }
         )

@@ -15,7 +15,6 @@ from fingerpad.core.checks import one_of, whole
 from fingerpad.data import paper
 from fingerpad.data import tissues as published
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.skin.behaviour import code_hash
 from fingerpad.skin.store import Store, solve_missing
@@ -23,6 +22,7 @@ from studies import trial_order
 from studies.hyperfoam_fit import polynomial_of_hyperfoam
 from studies.material_candidates import candidates, deflection_candidates
 from studies.material_sets import GOODWIN, Effort, compare, deflections, pareto_front
+from studies.plain_values import plain
 
 LEAST_R2 = 0.96
 """R² under the cylinder from which the first level counts as met."""

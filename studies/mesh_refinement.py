@@ -19,7 +19,6 @@ from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, sphere_discrimination
-from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.geometry.grading import Grading
 from fingerpad.mechanics.press import PressSettings
@@ -37,6 +36,7 @@ from studies.mesh_errors import (
     observed_order,
     read,
 )
+from studies.plain_values import plain
 
 Sphere = tuple[float, float]
 """Position along the finger [mm] and curvature [1/m]."""

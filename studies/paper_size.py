@@ -19,7 +19,6 @@ from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.data import psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, skin_deflection, sphere_discrimination
-from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import LAYERS, Mesh, finger_mesh
@@ -39,6 +38,7 @@ from studies.mesh_errors import (
     read,
 )
 from studies.mesh_refinement import PEAK_SHIFT, SHIFTS_MM, Sphere
+from studies.plain_values import plain
 
 MESHES = ("quick", "standard", "paper")
 REFERENCE = "paper"

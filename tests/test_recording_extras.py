@@ -12,7 +12,7 @@ from fingerpad.experiments.fit import rate_uncertainty
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.experiments.fit.offset import check_offset, fit_offset
 from fingerpad.experiments.fit.posterior import RatePosterior, profiled
-from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.experiments.fit.rate_uncertainty import ParameterProfile
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_likelihood import RateLikelihood
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
@@ -52,8 +52,7 @@ IN_PLACE = RateRecordings(NAMES, *MODEL.evaluate(KNOWN))
 @pytest.fixture(scope="module")
 def fitted():
     """The fit to rates of a receptor that lies beside its place."""
-    found = fit_recordings(BESIDE[0.0], ASIDE, FOLDS, beside=BESIDE, with_sensitivity=True)
-    return plain(found)
+    return fit_recordings(BESIDE[0.0], ASIDE, FOLDS, beside=BESIDE, with_sensitivity=True)
 
 
 # The place of the receptor
@@ -139,15 +138,15 @@ def test_profiles_hold_the_known_afferent_and_rise_to_both_sides():
     noise = np.random.default_rng(2).normal(0.0, 1.0, (2, 9))
     noisy = RateRecordings(NAMES, *np.maximum(MODEL.evaluate(KNOWN) + noise, 0.0))
     found = profiled(MODEL, noisy, identifiable(KNOWN))
-    assert [profile["name"] for profile in found] == list(IDENTIFIABLE_NAMES)
+    assert [profile.name for profile in found] == list(IDENTIFIABLE_NAMES)
     for profile, known in zip(found, identifiable(KNOWN), strict=True):
-        low, high = (profile[end] for end in ("low", "high"))
-        middle = profile["values"][np.argmin(profile["losses"])]
+        low, high = profile.low, profile.high
+        middle = profile.values[np.argmin(profile.losses)]
         # Wider by half than 95 % asks for: this is one data set, and all four shall pass.
         assert low is None or 1.5 * low - 0.5 * middle < known
         assert high is None or known < 1.5 * high - 0.5 * middle
-        assert min(profile["losses"]) >= 0.0
-        assert max(profile["losses"]) > ALLOWED_LOSS
+        assert min(profile.losses) >= 0.0
+        assert max(profile.losses) > ALLOWED_LOSS
     _, dynamic, static, _ = found
     assert dynamic["high"] < 1.3 * identifiable(KNOWN)[1]
     assert static["high"] - static["low"] < 0.5 * identifiable(KNOWN)[2]
@@ -166,10 +165,10 @@ def test_likely_points_are_likely_and_find_a_better_place_than_a_poor_fit():
 
 
 def test_a_search_begins_where_no_afferent_fires_untouched():
-    begun = rate_uncertainty.possible([0.5, 0.0, 0.03, 40.0])
+    begun = rate_uncertainty.admissible([0.5, 0.0, 0.03, 40.0])
     assert begun[0] * begun[3] == pytest.approx(0.9)
     assert begun[1] > 0.0
-    assert_array_equal(rate_uncertainty.possible([-0.1, 2.0, 0.03, 40.0]), [-0.1, 2.0, 0.03, 40.0])
+    assert_array_equal(rate_uncertainty.admissible([-0.1, 2.0, 0.03, 40.0]), [-0.1, 2.0, 0.03, 40.0])
 
 
 # Sensitivity
@@ -187,13 +186,13 @@ def test_scores_of_rows_are_those_of_the_problem_for_one_phase_as_well():
 def test_ranges_are_shares_of_the_fit_and_a_gain_of_nothing_has_one_too(fitted):
     found = fitted.sensitivity
     four = np.array(list(fitted.identifiable.values()))
-    assert_allclose(found["lower"], np.minimum(0.75 * four, 1.25 * four), rtol=1e-12)
+    assert_allclose(found.lower, np.minimum(0.75 * four, 1.25 * four), rtol=1e-12)
     problem = RateProblem(four_number_model(MODEL), IN_PLACE)
-    nothing = rate_uncertainty.sensitivity(problem, [0.0, 0.0, 0.018, 60.0], 1)
+    nothing = rate_uncertainty.fss_sensitivity(problem, [0.0, 0.0, 0.018, 60.0], 1)
     assert_allclose(nothing["lower"][:2], [-0.25 / 68.0, 0.0], rtol=1e-12)
     assert (nothing["upper"] > nothing["lower"]).all()
     # Without a dynamic gain to speak of, rates hang on the static one.
-    assert nothing["total"][2] == max(nothing["total"])
+    assert nothing.total[2] == max(nothing.total)
 
 
 # The page
@@ -202,7 +201,8 @@ def test_ranges_are_shares_of_the_fit_and_a_gain_of_nothing_has_one_too(fitted):
 @pytest.fixture(scope="module")
 def section(fitted):
     profile = {"values": [1.0, 2.0, 3.0], "losses": [3.0, 0.0, 2.5], "low": None, "high": 2.8}
-    return replace(fitted, profiles=tuple(profile | {"name": name} for name in IDENTIFIABLE_NAMES))
+    profiles = tuple(ParameterProfile(name=name, **profile) for name in IDENTIFIABLE_NAMES)
+    return replace(fitted, profiles=profiles)
 
 
 def test_figures_draw_what_was_found(section):
@@ -211,7 +211,7 @@ def test_figures_draw_what_was_found(section):
     assert panels[3].get_xlabel() == "τ [ms]"
     (bars,) = report.draw_sensitivity(section).axes
     heights = [patch.get_height() for patch in bars.patches]
-    assert heights == section.sensitivity["total"] + section.sensitivity["first"]
+    assert heights == [*section.sensitivity.total, *section.sensitivity.first]
     (axes,) = report.draw_offset(section).axes
     lines = {line.get_label(): line for line in axes.lines}
     assert lines["held there"].get_ydata().tolist() == section.offset.held.fss_in_sample.tolist()
@@ -249,6 +249,6 @@ def test_words_and_tables_hold_the_numbers(section):
     assert table.rows[0].cells[6] == f"{section.fss_out_of_sample:.3f}"
     assert all(len(row.cells) == len(table.columns) for row in table.rows)
     assert report.profile_tables(section)[0].rows[0].cells[-1] == "open … 2.8"
-    most = max(zip(section.sensitivity["total"], ("β", "k_d", "k_s", "τ"), strict=True))[1]
+    most = max(zip(section.sensitivity.total, ("β", "k_d", "k_s", "τ"), strict=True))[1]
     assert f"Most depends on {most}" in report.caption_sensitivity(section)
     assert len(report.sensitivity_tables(section)[0].rows) == 4

@@ -28,6 +28,7 @@ from fingerpad.experiments.fit import rate_posterior as recording_posterior
 from fingerpad.experiments.fit import session
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
 from fingerpad.experiments.fit.posterior import PhaseBands, RateBand, RatePosterior, rate_posterior
+from fingerpad.experiments.fit.rate_uncertainty import ParameterProfile
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.manifest import sha256
 from fingerpad.experiments.recording_files import read_recordings
@@ -456,7 +457,8 @@ def test_what_is_asked_for_beside_the_fit_is_on_its_page(call, tmp_path, monkeyp
     (tmp_path / "mine.csv").write_text(ROWS)
     profile = {"values": [1.0, 2.0, 3.0], "losses": [3.0, 0.0, 3.0], "low": 1.2, "high": None}
     four = [profile | {"name": name} for name in IDENTIFIABLE_NAMES]
-    monkeypatch.setattr(study, "profiled", lambda *given: four)
+    typed = tuple(ParameterProfile(**each) for each in four)
+    monkeypatch.setattr(study, "profiled", lambda *given: typed)
     options = ("--profiles", "--sensitivity", "--offset", "--folds", "2")
     status, _, errors = call("mine.csv", "--stimulus", "bar", *options)
     assert (status, errors) == (0, "")
@@ -467,7 +469,7 @@ def test_what_is_asked_for_beside_the_fit_is_on_its_page(call, tmp_path, monkeyp
     figures = {path.stem for path in (tmp_path / "fit" / "figures").iterdir()}
     assert figures == {"fit", "residuals", "profiles", "sensitivity", "offset"}
     page = (tmp_path / "fit" / "fit.html").read_text()
-    for words in ("<td>1.2 … open</td>", "What the fit is sensitive to (Sobol)", "Offset of the receptor"):
+    for words in ("<td>1.2 … open</td>", "Sensitivity of FSS (Sobol)", "Offset of the receptor"):
         assert words in page
 
 

@@ -246,11 +246,17 @@ def _single_unit_uncertainty() -> dict:
     profile = {"values": [0.5, 1.0, 1.5], "losses": [2.5, 0.0, 2.5], "low": 0.6, "high": None}
     return {
         "level": 0.95,
+        "seed": 0,
+        "names": names,
         "units": dict(zip(names, ("1/ms", "1/kPa", "1/(kPa ms)", "ms"), strict=True)),
         "fit": dict.fromkeys(names, 1.0),
         "capacitance_mf": 6e-7,
         "threshold_mv": 30.0,
-        "identifiability": {"rank": 4, "relative_singular_values": [1.0, 0.3, 0.2, 0.01, 1e-10, 1e-10]},
+        "identifiability": {
+            "rank": 4,
+            "relative_singular_values": [1.0, 0.3, 0.2, 0.01, 1e-10, 1e-10],
+            "silent_directions": [],
+        },
         "posterior": dict.fromkeys(
             (*names, "intercept_ma", "dynamic_gain", "static_gain", "resting_share"), interval
         ),

@@ -1,5 +1,7 @@
 """The study of what rates determine, on synthetic traces, and the report that shows it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments.fit import rate_uncertainty
 from fingerpad.experiments.gerling2014 import single_unit, single_unit_uncertainty
-from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.experiments.gerling2014.single_unit_uncertainty import UncertaintyResult
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
@@ -24,7 +26,7 @@ TRUTH = Afferent().parameters
 
 
 @pytest.fixture(scope="module")
-def section() -> dict:
+def section() -> UncertaintyResult:
     """Recordings simulated from a known afferent stand in for the observed ones."""
     random = np.random.default_rng(8)
     rates = [
@@ -34,68 +36,70 @@ def section() -> dict:
     recordings = RateRecordings(single_unit.bar_recordings().stimuli, *rates)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(single_unit, "bar_recordings", lambda: recordings)
-        return plain(single_unit_uncertainty.result(SED, TRUTH, 1, quick=True))
+        return single_unit_uncertainty.uncertainty_result(SED, TRUTH, 1, quick=True)
 
 
-def test_the_truth_lies_within_its_intervals(section: dict) -> None:
+def test_the_truth_lies_within_its_intervals(section: UncertaintyResult) -> None:
     four = identifiable(TRUTH)
-    profiles = {profile["name"]: profile for profile in section["profiles"]}
+    profiles = {profile.name: profile for profile in section.profiles}
     assert tuple(profiles) == IDENTIFIABLE_NAMES
     for name, truth in zip(IDENTIFIABLE_NAMES, four, strict=True):
-        found = section["posterior"][name]
+        found = section.posterior[name]
         # Wider by half than 95 % asks for: this is one data set, and all four shall pass.
-        low, high = 1.5 * found["low"] - 0.5 * found["median"], 1.5 * found["high"] - 0.5 * found["median"]
+        low, high = 1.5 * found.low - 0.5 * found.median, 1.5 * found.high - 0.5 * found.median
         assert low < truth < high
-        assert found["low"] < found["median"] < found["high"] < 6.0 * abs(truth)
-        assert min(profiles[name]["losses"]) >= 0.0
-        assert profiles[name]["low"] is None or profiles[name]["low"] < found["median"]
-    assert section["fit"] == pytest.approx(dict(zip(IDENTIFIABLE_NAMES, four, strict=True)))
+        assert found.low < found.median < found.high < 6.0 * abs(truth)
+        assert min(profiles[name].losses) >= 0.0
+        assert profiles[name].low is None or profiles[name].low < found.median
+    assert section.fit == pytest.approx(dict(zip(IDENTIFIABLE_NAMES, four, strict=True)))
 
 
-def test_both_forms_are_the_same_draws(section: dict) -> None:
-    scale = section["capacitance_mf"] * section["threshold_mv"]
+def test_both_forms_are_the_same_draws(section: UncertaintyResult) -> None:
+    scale = section.capacitance_mf * section.threshold_mv
     for six, four in zip(("intercept_ma", "dynamic_gain", "static_gain"), IDENTIFIABLE_NAMES, strict=False):
         for end in ("low", "median", "high"):
-            assert section["posterior"][six][end] == pytest.approx(scale * section["posterior"][four][end])
-    assert section["posterior"]["resting_share"]["high"] < 1.0
+            assert getattr(section.posterior[six], end) == pytest.approx(
+                scale * getattr(section.posterior[four], end)
+            )
+    assert section.posterior["resting_share"].high < 1.0
 
 
-def test_four_of_six_directions_are_seen(section: dict) -> None:
-    found = section["identifiability"]
-    assert found["rank"] == 4
-    assert len(found["silent_directions"]) == 2
-    assert max(found["relative_singular_values"][4:]) < 1e-6
+def test_four_of_six_directions_are_seen(section: UncertaintyResult) -> None:
+    found = section.identifiability
+    assert found.rank == 4
+    assert len(found.silent_directions) == 2
+    assert max(found.relative_singular_values[4:]) < 1e-6
 
 
-def test_bands_hold_most_of_what_was_observed(section: dict) -> None:
-    for rates in section["rates"].values():
-        assert 0.85 <= rates["share_within_new"] <= 1.0
+def test_bands_hold_most_of_what_was_observed(section: UncertaintyResult) -> None:
+    for rates in section.rates.values():
+        assert 0.85 <= rates.share_within_new <= 1.0
         for low, middle, high, new_high in zip(
-            *(rates[key] for key in ("low_hz", "median_hz", "high_hz", "new_high_hz")), strict=True
+            rates.low_hz, rates.median_hz, rates.high_hz, rates.new_high_hz, strict=True
         ):
             assert 0.0 <= low <= middle <= high
             assert new_high >= middle
     # Residuals were drawn independently, with 12 and 2 spikes/s.
-    assert section["rates"]["dynamic"]["residual_deviation_hz"]["low"] < 12.0 < 25.0
-    assert section["evidence_for_alike_residuals"] < 3.0
+    assert section.rates["dynamic"].residual_deviation_hz.low < 12.0 < 25.0
+    assert section.evidence_for_alike_residuals < 3.0
 
 
-def test_convergence_and_sensitivity_are_told(section: dict) -> None:
-    assert section["convergence"]["r_hat"] <= 1.02
-    assert section["convergence"]["effective_draws"] >= 100.0
-    found = section["sensitivity"]
-    np.testing.assert_allclose(found["lower"], 0.75 * identifiable(TRUTH), rtol=1e-12)
+def test_convergence_and_sensitivity_are_told(section: UncertaintyResult) -> None:
+    assert section.convergence.r_hat <= 1.02
+    assert section.convergence.effective_draws >= 100.0
+    found = section.sensitivity
+    np.testing.assert_allclose(found.lower, 0.75 * identifiable(TRUTH), rtol=1e-12)
     # What a number does alone is part of what it does with others.
-    assert (np.array(found["total"]) >= np.array(found["first"]) - 0.15).all()
-    assert found["evaluations"] == 6 * rate_uncertainty.SENSITIVITY_POINTS
+    assert (np.array(found.total) >= np.array(found.first) - 0.15).all()
+    assert found.evaluations == 6 * rate_uncertainty.SENSITIVITY_POINTS
 
 
-def test_the_figure_shows_bands_over_points_and_a_profile_of_each_number(section: dict) -> None:
-    figure = report.draw(section)
+def test_the_figure_shows_bands_over_points_and_a_profile_of_each_number(section: UncertaintyResult) -> None:
+    figure = report.draw_uncertainty(section)
     dynamic, static, *profiles = figure.axes
     for axes, phase in ((dynamic, "dynamic"), (static, "static")):
         observed = next(line for line in axes.lines if line.get_label() == "observed")
-        np.testing.assert_array_equal(observed.get_ydata(), section["rates"][phase]["observed_hz"])
+        np.testing.assert_array_equal(observed.get_ydata(), section.rates[phase].observed_hz)
         assert len(axes.collections) == 2
         assert axes.get_ylim()[0] == 0.0
     assert [axes.get_xlabel().split(" [")[1] for axes in profiles] == [
@@ -104,19 +108,23 @@ def test_the_figure_shows_bands_over_points_and_a_profile_of_each_number(section
         "1/(kPa ms)]",
         "ms]",
     ]
-    for axes, profile in zip(profiles, section["profiles"], strict=True):
-        np.testing.assert_array_equal(axes.lines[0].get_ydata(), profile["losses"])
-    assert png(report.draw, section).startswith(b"\x89PNG")
+    for axes, profile in zip(profiles, section.profiles, strict=True):
+        np.testing.assert_array_equal(axes.lines[0].get_ydata(), profile.losses)
+    assert png(report.draw_uncertainty, section).startswith(b"\x89PNG")
 
 
-def test_the_words_hold_the_numbers(section: dict) -> None:
-    caption = report.caption(section)
+def test_the_words_hold_the_numbers(section: UncertaintyResult) -> None:
+    caption = report.caption_uncertainty(section)
     assert "95 % bands" in caption
-    assert f"{100.0 * section['rates']['static']['share_within_new']:.0f} % of the static ones" in caption
-    determined, residuals, sensitivity, convergence = report.tables(section)
+    assert f"{100.0 * section.rates['static'].share_within_new:.0f} % of the static ones" in caption
+    determined, residuals, sensitivity, convergence = report.uncertainty_tables(section)
     assert [len(table.rows) for table in (determined, residuals, sensitivity, convergence)] == [8, 2, 4, 9]
-    assert all(len(row.cells) == len(table.columns) for table in report.tables(section) for row in table.rows)
+    assert all(
+        len(row.cells) == len(table.columns)
+        for table in report.uncertainty_tables(section)
+        for row in table.rows
+    )
     assert "known only up to a common scale" in determined.note
     assert "4 are not zero" in determined.note
-    opened = section | {"profiles": [profile | {"low": None} for profile in section["profiles"]]}
-    assert report.tables(opened)[0].rows[0].cells[-1].startswith("open … ")
+    opened = replace(section, profiles=tuple(replace(profile, low=None) for profile in section.profiles))
+    assert report.uncertainty_tables(opened)[0].rows[0].cells[-1].startswith("open … ")

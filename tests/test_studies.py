@@ -21,7 +21,6 @@ from fingerpad.experiments.gerling2014 import (
     skin_deflection,
     sphere_discrimination,
 )
-from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
@@ -35,6 +34,7 @@ from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SurfaceProfile
 from sections import discrimination_section, nail_section, typed
+from studies.plain_values import plain
 
 RESOLUTIONS = ["quick", "standard", "paper"]
 CURVATURES = [287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0]

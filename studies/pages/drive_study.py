@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -11,8 +12,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from fingerpad.core.files import write_atomically
-from fingerpad.report import drive_quantities
-from fingerpad.report.drive_quantities import gain
+from fingerpad.core.results import from_json
+from fingerpad.experiments.gerling2014.drive_quantities import DriveResult
+from fingerpad.report.drive_quantities import (
+    caption_drive_quantities,
+    draw_drive_quantities,
+    drive_tables,
+    gain,
+)
 from fingerpad.report.formatting import ABSENT, fixed
 from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, numbers, png
@@ -47,6 +54,12 @@ _DEPTH_COLUMNS = (
     "static",
     "gain, 95 %",
 )
+
+
+def quantities(results: Mapping[str, Any]) -> DriveResult:
+    """Return the part of the results that compares quantities."""
+    fields = {name: results[name] for name in DriveResult.__dataclass_fields__}
+    return from_json(DriveResult, json.dumps(fields).encode())
 
 
 def draw_explanations(section: Mapping[str, Any]) -> Figure:
@@ -169,7 +182,7 @@ def caption_depths(section: Mapping[str, Any]) -> str:
 
 def tables(section: Mapping[str, Any]) -> list[Table]:
     """Return the tables of quantities, explanations and depths, as far as the results have them."""
-    made = drive_quantities.table(section)
+    made = drive_tables(quantities(section))
     if section.get("explanations"):
         rows = [_explanation_row(row) for row in section["explanations"]]
         note = "ΔAIC, ΔBIC: difference from the first row; smaller is better. Gain: as above."
@@ -245,7 +258,7 @@ def page(results: Mapping[str, Any], command: str = "python -m studies drives") 
         "[quantity that drives the dynamic term](decisions/dynamic-term-quantity.md) and "
         "[one afferent, fitted](single-unit.md).",
         f"![Rates by quantity](images/{FIGURES['quantities']})",
-        drive_quantities.caption(results),
+        caption_drive_quantities(quantities(results)),
         f"![Explanations of the dynamic rates](images/{FIGURES['explanations']})",
         caption_explanations(results),
         f"![Sampling depth](images/{FIGURES['depths']})",
@@ -288,4 +301,8 @@ def write_drive_page(
     return path
 
 
-DRAWN = {"quantities": drive_quantities.draw, "explanations": draw_explanations, "depths": draw_depths}
+DRAWN = {
+    "quantities": lambda section: draw_drive_quantities(quantities(section)),
+    "explanations": draw_explanations,
+    "depths": draw_depths,
+}

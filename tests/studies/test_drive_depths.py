@@ -10,7 +10,6 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.gerling2014.drive_fits import quick_method
-from fingerpad.experiments.gerling2014.reproduction import plain
 from fingerpad.geometry.mesh import LAYERS, block_mesh
 from fingerpad.inference.identifiable import six_parameters
 from fingerpad.inference.rate_model import AfferentModel
@@ -19,6 +18,7 @@ from fingerpad.report.style import png
 from fingerpad.skin.sampling import SkinResponse
 from studies import drive_depths
 from studies.pages import drive_study as report
+from studies.plain_values import plain
 
 DEPTHS_MM = np.array([0.0, 0.2, 0.371, 0.471, 1.0, 1.624, 5.0])
 TISSUE = [0, 0, 1, 2, 2, 3]
@@ -81,6 +81,9 @@ def found():
     return plain(drive_depths.result(SKINS, recordings(), np.random.default_rng(0), method))
 
 
+RATES = ("observed_dynamic_rate_hz", "observed_static_rate_hz")
+
+
 def test_borders_are_those_of_the_mesh_below_the_receptor():
     assert_allclose(drive_depths.borders_mm(MESH), DEPTHS_MM, rtol=1e-12)
 
@@ -127,7 +130,9 @@ def test_the_figure_and_the_words_say_where(found):
     assert "[mm]" in axes.get_xlabel()
     assert png(report.draw_depths, section).startswith(b"\x89PNG")
     assert "between 1.00 and 1.62 mm, in the dermis" in report.caption_depths(section)
-    *_, table = report.tables({"candidates": [], "method": "least squares", **section})
+    *_, table = report.tables(
+        {"candidates": [], "method": "least squares", "shift_mm": [], **{key: [] for key in RATES}, **section}
+    )
     assert table.title == "Sampling depth"
     assert [row.cells[0] for row in table.rows] == [LAYERS[tissue] for tissue in TISSUE]
     assert table.rows[TRUE_LAYER].cells[5] == f"{found['layers'][TRUE_LAYER]['fss_out_of_sample']:.3f}"

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from matplotlib.axes import Axes
 
+from fingerpad.experiments.fit.rate_uncertainty import FssSensitivity, ParameterProfile
 from fingerpad.report.formatting import IDENTIFIABLE_SYMBOLS, fixed, number
 from fingerpad.report.parts import Row, Table
-from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, numbers
+from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE
 
 LARGEST_LOSS = 5.0
 """Losses of log likelihood that are drawn."""
@@ -20,10 +20,10 @@ ALLOWED_LOSS = 1.92
 
 def draw_profile(
     axes: Axes,
-    profile: Mapping[str, Any],
+    profile: ParameterProfile,
     unit: str,
     fitted: float | None,
-    credible: tuple[float | None, float | None] | None = None,
+    credible: tuple[float, float] | None = None,
 ) -> None:
     """Draw one profile: its points, the level at which the interval ends, the fit, the posterior's interval.
 
@@ -31,8 +31,8 @@ def draw_profile(
     ----------
     axes : Axes
         An empty panel.
-    profile : mapping
-        `name`, `values` and `losses`.
+    profile : ParameterProfile
+        What is drawn.
     unit : str
         Of the number.
     fitted : float or None
@@ -40,44 +40,46 @@ def draw_profile(
     credible : (float, float), optional
         Ends of the credible interval, where one was drawn.
     """
-    axes.plot(numbers(profile["values"]), numbers(profile["losses"]), ".-", color=BLACK, linewidth=1.2)
+    axes.plot(profile.values, profile.losses, ".-", color=BLACK, linewidth=1.2)
     axes.axhline(ALLOWED_LOSS, color=GREY, linestyle="--", linewidth=1.0)
     if fitted is not None:
         axes.axvline(fitted, color=ORANGE, linestyle="-.", linewidth=1.4)
     if credible is not None:
-        axes.plot(numbers(credible), [-0.25, -0.25], color=BLUE, linewidth=4.0, solid_capstyle="butt")
+        axes.plot(credible, [-0.25, -0.25], color=BLUE, linewidth=4.0, solid_capstyle="butt")
     axes.set_ylim(-0.5, LARGEST_LOSS)
-    axes.set_xlabel(f"{IDENTIFIABLE_SYMBOLS[profile['name']]} [{unit}]")
+    axes.set_xlabel(f"{IDENTIFIABLE_SYMBOLS[profile.name]} [{unit}]")
 
 
-def profile_ends(profile: Mapping[str, Any]) -> str:
-    """Return the interval of a profile in words; an end that the rates do not set is open.
+def profile_ends(profile: ParameterProfile) -> str:
+    """Return the interval of a profile as text; an end that the rates do not set is open.
 
     Examples
     --------
-    >>> profile_ends({"low": 0.5, "high": None})
+    >>> profile_ends(ParameterProfile(name="time_constant_ms", values=[], losses=[], low=0.5, high=None))
     '0.5 … open'
     """
-    return " … ".join("open" if end is None else number(end) for end in (profile["low"], profile["high"]))
+    return " … ".join("open" if end is None else number(end) for end in (profile.low, profile.high))
 
 
-def draw_indices(axes: Axes, found: Mapping[str, Any]) -> None:
-    """Draw the shares that each number brings alone and with others, as bars with their confidence.
+def draw_indices(axes: Axes, found: FssSensitivity) -> None:
+    """Draw first-order and total indices of each number, as bars with their confidence intervals.
 
     Parameters
     ----------
     axes : Axes
         An empty panel.
-    found : mapping
-        `first`, `total` and their half widths, in the order of the four numbers.
+    found : FssSensitivity
+        Indices of the four numbers.
     """
-    kinds = {"total": ("with others", BLUE, -0.19, ""), "first": ("alone", "white", 0.19, "////")}
-    for key, (label, colour, side, hatch) in kinds.items():
+    for indices, half_width, label, colour, side, hatch in (
+        (found.total, found.total_half_width, "with others", BLUE, -0.19, ""),
+        (found.first, found.first_half_width, "alone", "white", 0.19, "////"),
+    ):
         axes.bar(
             [place + side for place in range(len(IDENTIFIABLE_SYMBOLS))],
-            numbers(found[key]),
+            indices,
             0.36,
-            yerr=numbers(found[f"{key}_half_width"]),
+            yerr=half_width,
             color=colour,
             edgecolor=BLACK,
             linewidth=0.8,
@@ -92,13 +94,13 @@ def draw_indices(axes: Axes, found: Mapping[str, Any]) -> None:
     axes.legend()
 
 
-def sensitivity_table(found: Mapping[str, Any], units: Mapping[str, str]) -> Table:
+def sensitivity_table(found: FssSensitivity, units: Mapping[str, str]) -> Table:
     """Return Sobol's indices of the four numbers and the ranges that they belong to.
 
     Parameters
     ----------
-    found : mapping
-        What `studies.rate_uncertainty.sensitivity` returns.
+    found : FssSensitivity
+        Indices of the four numbers.
     units : mapping of str to str
         Units of the four numbers.
 
@@ -110,17 +112,17 @@ def sensitivity_table(found: Mapping[str, Any], units: Mapping[str, str]) -> Tab
         Row(
             (
                 f"{symbol} [{units[name]}]",
-                f"{number(found['lower'][index])} … {number(found['upper'][index])}",
-                f"{fixed(found['first'][index], 2)} ± {fixed(found['first_half_width'][index], 2)}",
-                f"{fixed(found['total'][index], 2)} ± {fixed(found['total_half_width'][index], 2)}",
+                f"{number(found.lower[index])} … {number(found.upper[index])}",
+                f"{fixed(found.first[index], 2)} ± {fixed(found.first_half_width[index], 2)}",
+                f"{fixed(found.total[index], 2)} ± {fixed(found.total_half_width[index], 2)}",
             )
         )
         for index, (name, symbol) in enumerate(IDENTIFIABLE_SYMBOLS.items())
     ]
     note = (
-        "Share of the variance of the weighted FSS when each number is uniform within its range: by itself, "
-        f"and with all that it does together with others. FSS is {fixed(found['mean_fss'], 3)} ± "
-        f"{fixed(found['deviation_fss'], 3)} over the ranges; {number(found['evaluations'])} evaluations."
+        "Share of the variance of the weighted FSS when each number is uniform within its range: alone, and "
+        f"in interaction with others. FSS is {fixed(found.mean_fss, 3)} ± "
+        f"{fixed(found.deviation_fss, 3)} over the ranges; {number(found.evaluations)} evaluations."
     )
     columns = ("number", "range", "first-order index", "total index")
-    return Table("What the fit is sensitive to (Sobol)", columns, rows, note)
+    return Table("Sensitivity of FSS (Sobol)", columns, rows, note)

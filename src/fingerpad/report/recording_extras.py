@@ -33,7 +33,7 @@ def draw_profiles(found: FitResult) -> Figure:
     intervals = found.posterior.interval if found.posterior else {}
     panels = figure.subplots(1, len(_present(found.profiles)), sharey=True)
     for axes, profile in zip(panels, _present(found.profiles), strict=True):
-        name = profile["name"]
+        name = profile.name
         unit = found.identifiable_units[name]
         draw_profile(axes, profile, unit, found.identifiable[name], intervals.get(name))
     panels[0].set_ylabel("loss of log likelihood")
@@ -57,8 +57,8 @@ def profile_tables(found: FitResult) -> list[Table]:
     rows = [
         Row(
             (
-                f"{IDENTIFIABLE_SYMBOLS[profile['name']]} [{found.identifiable_units[profile['name']]}]",
-                number(found.identifiable[profile["name"]]),
+                f"{IDENTIFIABLE_SYMBOLS[profile.name]} [{found.identifiable_units[profile.name]}]",
+                number(found.identifiable[profile.name]),
                 profile_ends(profile),
             )
         )
@@ -76,8 +76,8 @@ def draw_sensitivity(found: FitResult) -> Figure:
 
 def caption_sensitivity(found: FitResult) -> str:
     """Caption of the Sobol indices."""
-    total = _present(found.sensitivity)["total"]
-    most = max(zip(total, IDENTIFIABLE_SYMBOLS.values(), strict=True), key=lambda pair: pair[0] or 0.0)[1]
+    total = _present(found.sensitivity).total
+    most = max(zip(total, IDENTIFIABLE_SYMBOLS.values(), strict=True), key=lambda pair: pair[0])[1]
     return (
         "Share of the variance of FSS that each number brings when all are uniform within a quarter of their "
         f"fitted values to either side: hatched, by itself; filled, with all that it does together with "

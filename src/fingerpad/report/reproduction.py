@@ -18,18 +18,22 @@ from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscri
 from fingerpad.report import (
     curvature_thresholds,
     discrimination,
-    drive_quantities,
     nail,
     population,
     population_rate,
     recruitment,
-    single_unit_uncertainty,
 )
+from fingerpad.report.drive_quantities import caption_drive_quantities, draw_drive_quantities, drive_tables
 from fingerpad.report.formatting import fixed, joined, number, plain, whole_percent
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.page import write_html
 from fingerpad.report.parts import Chapter, Drawing, Kind, Page, Row, Table
 from fingerpad.report.single_unit import caption_single_unit, draw_single_unit, single_unit_tables
+from fingerpad.report.single_unit_uncertainty import (
+    caption_uncertainty,
+    draw_uncertainty,
+    uncertainty_tables,
+)
 from fingerpad.report.skin_deflection import (
     caption_skin_deflection,
     draw_skin_deflection,
@@ -126,27 +130,25 @@ def _skin_and_afferent(result: ReproductionResult) -> list[Chapter]:
         drawing = _drawing(
             12,
             "uncertainty",
-            "What rates under a bar determine",
-            single_unit_uncertainty.draw,
-            single_unit_uncertainty.caption,
+            "Uncertainty of the fit to rates under a bar",
+            draw_uncertainty,
+            caption_uncertainty,
             uncertainty,
         )
         chapters.append(
-            Chapter(
-                "Level 2: uncertainty of the fit", [drawing, *single_unit_uncertainty.tables(uncertainty)]
-            )
+            Chapter("Level 2: uncertainty of the fit", [drawing, *uncertainty_tables(uncertainty)])
         )
     if (drives := result.drive_quantities) is not None:
         drawing = _drawing(
             10,
             "drive_quantities",
             "Rates by quantity",
-            drive_quantities.draw,
-            drive_quantities.caption,
+            draw_drive_quantities,
+            caption_drive_quantities,
             drives,
         )
         chapters.append(
-            Chapter("Level 2: quantity that drives the afferent", [drawing, *drive_quantities.table(drives)])
+            Chapter("Level 2: quantity that drives the afferent", [drawing, *drive_tables(drives)])
         )
     return chapters
 

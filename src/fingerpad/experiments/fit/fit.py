@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,8 +15,7 @@ from fingerpad.data import protocol
 from fingerpad.experiments.fit.methods import METHODS, Prepared, SpikeFitSummary, four_number_problem
 from fingerpad.experiments.fit.offset import Beside, OffsetFit, check_beside, fit_offset
 from fingerpad.experiments.fit.posterior import RatePosterior, profiled, rate_posterior
-from fingerpad.experiments.fit.rate_uncertainty import sensitivity
-from fingerpad.experiments.gerling2014.reproduction import plain
+from fingerpad.experiments.fit.rate_uncertainty import FssSensitivity, ParameterProfile, fss_sensitivity
 from fingerpad.inference.fitting import (
     CrossValidation,
     cross_validate,
@@ -122,9 +120,9 @@ class FitResult:
         Of the likelihood of spikes.
     posterior : RatePosterior, optional
         Credible intervals, where they were asked for.
-    profiles : tuple of dict, optional
+    profiles : tuple of ParameterProfile, optional
         Profile likelihoods, where they were asked for.
-    sensitivity : dict, optional
+    sensitivity : FssSensitivity, optional
         Sobol indices, where they were asked for.
     offset : OffsetFit, optional
         The fit with the receptor's offset as a further parameter.
@@ -155,8 +153,8 @@ class FitResult:
     folds: tuple[FittedFold, ...]
     spikes: SpikeFitSummary | None
     posterior: RatePosterior | None
-    profiles: tuple[dict[str, Any], ...] | None
-    sensitivity: dict[str, Any] | None
+    profiles: tuple[ParameterProfile, ...] | None
+    sensitivity: FssSensitivity | None
     offset: OffsetFit | None
     shift_mm: Vector | None = None
     presentations: tuple[int, ...] = ()
@@ -265,9 +263,9 @@ def fit_recordings(
         folds=_folds(prepared, rates, validation),
         spikes=prepared.spikes(best, validation),
         posterior=rate_posterior(model, rates, four, seed, positions_mm) if with_posterior else None,
-        profiles=tuple(plain(profiled(model, rates, four, positions_mm))) if with_profiles else None,
+        profiles=profiled(model, rates, four, positions_mm) if with_profiles else None,
         sensitivity=(
-            plain(sensitivity(four_number_problem(model, rates), four, seed)) if with_sensitivity else None
+            fss_sensitivity(four_number_problem(model, rates), four, seed) if with_sensitivity else None
         ),
         offset=None if beside is None else fit_offset(beside, rates, folds, method, windows_ms, seed),
     )

@@ -9,7 +9,13 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Matrix, Vector, result_class
-from fingerpad.experiments.fit.rate_uncertainty import LEVEL, likely_points, possible, profiles
+from fingerpad.experiments.fit.rate_uncertainty import (
+    LEVEL,
+    ParameterProfile,
+    admissible,
+    likely_points,
+    profiles,
+)
 from fingerpad.inference.afferent_posterior import afferent_posterior
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
@@ -105,7 +111,7 @@ def rate_posterior(
         If the draws have not converged.
     """
     likelihood = _likelihood(model, rates, positions_mm)
-    found = afferent_posterior(likelihood, possible(four), seed=seed, **settings)
+    found = afferent_posterior(likelihood, admissible(four), seed=seed, **settings)
     ends = credible_band(found.four, LEVEL).T
     return RatePosterior(
         level=LEVEL,
@@ -126,7 +132,7 @@ def rate_posterior(
 
 def profiled(
     model: AfferentModel, rates: RateRecordings, four: ArrayLike, positions_mm: ArrayLike | None = None
-) -> list[dict[str, Any]]:
+) -> tuple[ParameterProfile, ...]:
     """Profile the likelihood of each of the four identifiable numbers.
 
     Parameters
@@ -136,11 +142,10 @@ def profiled(
 
     Returns
     -------
-    list of dict
-        What `fingerpad.experiments.fit.rate_uncertainty.profiles` returns.
+    tuple of ParameterProfile
     """
     likelihood = _likelihood(model, rates, positions_mm)
-    return profiles(likelihood, likely_points(likelihood, possible(four)))
+    return profiles(likelihood, likely_points(likelihood, admissible(four)))
 
 
 def _likelihood(

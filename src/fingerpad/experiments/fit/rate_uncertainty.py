@@ -1,15 +1,13 @@
-"""What rates leave uncertain, beside draws: profile likelihoods, and what the fit is sensitive to."""
+"""Uncertainty of a fit to rates without draws: profile likelihoods, and sensitivity of FSS."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import norm, qmc
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.inference.afferent_posterior import from_coordinates, to_coordinates
 from fingerpad.inference.fitting.profile_likelihood import Profile, profile_likelihoods
 from fingerpad.inference.fitting.sensitivity import sobol_indices
@@ -40,11 +38,63 @@ MOST_RESTING_SHARE = 0.9
 """Potential at rest over the threshold, at most, where a search begins: untouched skin elicits no spike."""
 
 
-def possible(four: ArrayLike) -> FloatArray:
-    """Return the numbers of a fit, moved to where a likelihood can begin.
+@result_class
+class ParameterProfile:
+    """Profile likelihood of one of the four identifiable numbers.
 
-    A gain that ended at its bound, 0, has no logarithm; the paper's start stands in for it. A current of its
-    own that would make the afferent fire untouched is lowered.
+    Parameters
+    ----------
+    name : str
+        Of the number.
+    values : array (n_values,)
+        Where it was held.
+    losses : array (n_values,)
+        Loss of log likelihood there, the other three numbers fitted.
+    low, high : float, optional
+        Ends of the interval, None where the rates set none.
+    """
+
+    name: str
+    values: Vector
+    losses: Vector
+    low: float | None
+    high: float | None
+
+
+@result_class
+class FssSensitivity:
+    """Sobol indices of FSS for the four identifiable numbers, in their order.
+
+    Parameters
+    ----------
+    lower, upper : array (4,)
+        Range of each number.
+    first, first_half_width : array (4,)
+        First-order index and half of its confidence interval. [1]
+    total, total_half_width : array (4,)
+        Total index and half of its confidence interval. [1]
+    mean_fss, deviation_fss : float
+        Mean and standard deviation of FSS over the ranges. [1]
+    evaluations : int
+        Of FSS.
+    """
+
+    lower: Vector
+    upper: Vector
+    first: Vector
+    first_half_width: Vector
+    total: Vector
+    total_half_width: Vector
+    mean_fss: Number
+    deviation_fss: Number
+    evaluations: int
+
+
+def admissible(four: ArrayLike) -> FloatArray:
+    """Return the numbers of a fit, moved to where a search of the likelihood can begin.
+
+    A gain at its bound, 0, has no logarithm; the paper's start replaces it. An intercept that would elicit
+    spikes without touch is lowered.
 
     Parameters
     ----------
@@ -57,7 +107,7 @@ def possible(four: ArrayLike) -> FloatArray:
 
     Examples
     --------
-    >>> possible([0.05, 4.0, 0.0, 50.0]).round(3).tolist()
+    >>> admissible([0.05, 4.0, 0.0, 50.0]).round(3).tolist()
     [0.018, 4.0, 0.042, 50.0]
     """
     fitted = np.array(four, dtype=np.float64)
@@ -68,17 +118,17 @@ def possible(four: ArrayLike) -> FloatArray:
 
 
 def likely_points(likelihood: RateLikelihood, four: ArrayLike) -> FloatArray:
-    """Find points all over the region that rates leave likely, the same ones each time.
+    """Find points over the whole region that is likely given the rates; the design is not random.
 
-    A likelihood of rates has many lumps, and the fit may stand on a low one. Clouds of points are laid
-    about the best ones of all clouds before, and whatever is not much less likely than the best is kept.
+    A likelihood of rates has many local maxima, and the fit may be at a low one. Clouds of points are laid
+    about the best points of all clouds before; points that are not much less likely than the best are kept.
 
     Parameters
     ----------
     likelihood : RateLikelihood
         Of a model of the four identifiable numbers.
     four : array_like (4,)
-        A fit, about which the first cloud lies; `possible` says where it can be.
+        A fit, about which the first cloud lies; `admissible` says where it can be.
 
     Returns
     -------
@@ -99,7 +149,7 @@ def likely_points(likelihood: RateLikelihood, four: ArrayLike) -> FloatArray:
     return from_coordinates(points[heights >= heights.max() - MOST_LOSS])
 
 
-def profiles(likelihood: RateLikelihood, starts: FloatArray) -> list[dict[str, Any]]:
+def profiles(likelihood: RateLikelihood, starts: FloatArray) -> tuple[ParameterProfile, ...]:
     """Profile the likelihood of the four numbers; those that are positive in their logarithm.
 
     Parameters
@@ -111,9 +161,8 @@ def profiles(likelihood: RateLikelihood, starts: FloatArray) -> list[dict[str, A
 
     Returns
     -------
-    list of dict
-        Per number its `name`, where it was held, `values`, the `losses` of log likelihood there, and `low`
-        and `high`, the ends of the interval, None where the rates set none.
+    tuple of ParameterProfile
+        One per number.
 
     Raises
     ------
@@ -132,26 +181,23 @@ def profiles(likelihood: RateLikelihood, starts: FloatArray) -> list[dict[str, A
 
     begun = np.concatenate([starts[:, :1], np.log(starts[:, 1:])], axis=1)
     found = profile_likelihoods(log_likelihood, begun, begun.std(axis=0), IDENTIFIABLE_NAMES, level=LEVEL)
-    return [
-        _profile(profile, np.exp if index else lambda values: values)
-        for index, profile in enumerate(found.profiles)
-    ]
+    return tuple(_profile(profile, logarithm=index > 0) for index, profile in enumerate(found.profiles))
 
 
-def _profile(profile: Profile, natural: Callable[[Any], Any]) -> dict[str, Any]:
-    low, high = (float(natural(end)) for end in profile.interval)
-    return {
-        "name": profile.name,
-        "values": natural(profile.values),
-        "losses": profile.losses,
-        # An open end is None: 0 and infinity are as far as a logarithm goes.
-        "low": low if np.isfinite(profile.interval[0]) else None,
-        "high": high if np.isfinite(profile.interval[1]) else None,
-    }
+def _profile(profile: Profile, logarithm: bool) -> ParameterProfile:
+    """Return a profile in the unit of its number; an end that is not finite is open."""
+    low, high = (float(np.exp(end) if logarithm else end) for end in profile.interval)
+    return ParameterProfile(
+        name=profile.name,
+        values=np.exp(profile.values) if logarithm else profile.values,
+        losses=profile.losses,
+        low=low if np.isfinite(profile.interval[0]) else None,
+        high=high if np.isfinite(profile.interval[1]) else None,
+    )
 
 
-def sensitivity(problem: RateProblem, four: ArrayLike, seed: int) -> dict[str, Any]:
-    """Find Sobol's indices of FSS, each number between so much less and so much more than the fit.
+def fss_sensitivity(problem: RateProblem, four: ArrayLike, seed: int) -> FssSensitivity:
+    """Compute Sobol indices of FSS, each number within `SENSITIVITY_SHARE` below and above the fit.
 
     Parameters
     ----------
@@ -165,8 +211,7 @@ def sensitivity(problem: RateProblem, four: ArrayLike, seed: int) -> dict[str, A
 
     Returns
     -------
-    dict
-        Ranges, `first` and `total` indices with their half widths, and FSS over the ranges.
+    FssSensitivity
     """
     fitted, sizes = np.asarray(four, dtype=np.float64), identifiable(start_points()[0])
     sizes[0] = 1.0 / sizes[3]  # beta tau/(C v) = 1 just fires
@@ -181,14 +226,14 @@ def sensitivity(problem: RateProblem, four: ArrayLike, seed: int) -> dict[str, A
         n_base=SENSITIVITY_POINTS,
         level=LEVEL,
     )
-    return {
-        "lower": found.lower,
-        "upper": found.upper,
-        "first": found.first,
-        "first_half_width": found.first_half_width,
-        "total": found.total,
-        "total_half_width": found.total_half_width,
-        "mean_fss": found.mean,
-        "deviation_fss": found.standard_deviation,
-        "evaluations": found.n_evaluations,
-    }
+    return FssSensitivity(
+        lower=found.lower,
+        upper=found.upper,
+        first=found.first,
+        first_half_width=found.first_half_width,
+        total=found.total,
+        total_half_width=found.total_half_width,
+        mean_fss=found.mean,
+        deviation_fss=found.standard_deviation,
+        evaluations=found.n_evaluations,
+    )

@@ -1,4 +1,4 @@
-"""Fits of one afferent that are compared with each other: the same numbers, methods and folds for all.
+"""Fits of one afferent that are compared with each other: the same parameters, methods and folds for all.
 
 Whatever drives the afferent, four numbers are fitted near start points that give the same currents, to all
 shifts of the bar and to six folds, and what one drive gains over another is told with an interval.
@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, whole
+from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.data import protocol
 from fingerpad.inference.fitting import (
     Fit,
@@ -256,22 +256,60 @@ def gain_interval(
     return float(low), float(high)
 
 
-def row(
-    judged: Judged, baseline: Judged, recordings: RateRecordings, generator: np.random.Generator
-) -> dict[str, Any]:
-    """Return what a table says of one fit.
+@result_class
+class DriveFit:
+    """Fit of one drive and its cross-validation.
 
-    FSS in and out of sample, by phase and fold, the interval of what it gains over a baseline out of sample,
-    and its effort.
+    Parameters
+    ----------
+    fss_in_sample, fss_in_sample_dynamic, fss_in_sample_static : float
+        Fractional sum of squares over all shifts, weighted and by phase. [1]
+    fss_out_of_sample, fss_out_of_sample_dynamic, fss_out_of_sample_static : float
+        Mean over the folds, each on the shifts that it left out. [1]
+    fss_folds : array (n_folds,)
+        Of each fold, on the shifts that it left out. [1]
+    gain_interval : (float, float)
+        Interval of the gain out of sample over the reference, see `gain_interval`. [1]
+    evaluations : int
+        Of the model.
     """
-    return {
-        **{f"fss_in_sample{_of(key)}": value for key, value in judged.in_sample.items()},
-        **{f"fss_out_of_sample{_of(key)}": value for key, value in judged.out_of_sample.items()},
-        "fss_folds": [fold["total"] for fold in judged.folds],
-        "gain_interval": gain_interval(recordings, judged.left_out_hz, baseline.left_out_hz, generator),
-        "evaluations": judged.fit.n_evaluations,
-    }
+
+    fss_in_sample: Number
+    fss_in_sample_dynamic: Number
+    fss_in_sample_static: Number
+    fss_out_of_sample: Number
+    fss_out_of_sample_dynamic: Number
+    fss_out_of_sample_static: Number
+    fss_folds: Vector
+    gain_interval: tuple[Number, Number]
+    evaluations: int
 
 
-def _of(key: str) -> str:
-    return "" if key == "total" else f"_{key}"
+def drive_fit(
+    judged: Judged, reference: Judged, recordings: RateRecordings, generator: np.random.Generator
+) -> DriveFit:
+    """Summarise a fit.
+
+    Parameters
+    ----------
+    judged : Judged
+        The fit.
+    reference : Judged
+        What its gain is measured against.
+    recordings : RateRecordings
+        Observed rates.
+    generator : numpy.random.Generator
+        Draws the bootstrap.
+    """
+    inside, outside = judged.in_sample, judged.out_of_sample
+    return DriveFit(
+        fss_in_sample=inside["total"],
+        fss_in_sample_dynamic=inside["dynamic"],
+        fss_in_sample_static=inside["static"],
+        fss_out_of_sample=outside["total"],
+        fss_out_of_sample_dynamic=outside["dynamic"],
+        fss_out_of_sample_static=outside["static"],
+        fss_folds=np.array([fold["total"] for fold in judged.folds]),
+        gain_interval=gain_interval(recordings, judged.left_out_hz, reference.left_out_hz, generator),
+        evaluations=judged.fit.n_evaluations,
+    )

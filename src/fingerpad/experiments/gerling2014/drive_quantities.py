@@ -1,29 +1,30 @@
-"""Which quantity in the skin drives the afferent: the same fits, with each quantity in the place of SED.
+"""Quantity in the skin that drives the afferent: the same fits, with each quantity in the place of SED.
 
-The paper samples strain energy density (SED) and leaves open whether the end organ feels a stress, a strain
-or something else. Here each quantity that the skin half gives drives both terms of the current, I = beta +
+The paper samples strain energy density (SED) and leaves open whether the end organ responds to a stress, a
+strain or another quantity. Here each quantity of the skin half drives both terms of the current, I = beta +
 k_d |Q'| + k_s Q, or the dynamic term alone, I = beta + k_d |Q'| + k_s U. All are fitted by the same methods
-from start points with the same currents, on the same folds, so that a difference is the quantity's.
+from start points with the same currents, on the same folds: only the quantity differs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import one_of
 from fingerpad.core.errors import InputError
+from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import STORED_ENERGY, SedTraces
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.gerling2014.drive_fits import (
+    DriveFit,
     Judged,
+    drive_fit,
     judge,
     quick_method,
     relative_model,
-    row,
     scaled_starts,
     six_of_relative,
 )
@@ -31,7 +32,7 @@ from fingerpad.inference.fitting import Method
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
-from fingerpad.inference.recordings import PHASES, RateRecordings
+from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import response_surface
 from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.skin.sampling import SkinResponse
@@ -44,7 +45,7 @@ QUANTITIES = (
     "compressive_stress",
     "compressive_strain",
 )
-"""What the skin half gives: three definitions of the energy density, two stresses and a strain."""
+"""Quantities of the skin half: three definitions of the energy density, two stresses and a strain."""
 
 
 @dataclass(frozen=True)
@@ -81,13 +82,13 @@ APART = (EXTENDED, *(Drivers(STORED_ENERGY, quantity) for quantity in ("von_mise
 """SED for the static term, another quantity for the dynamic one."""
 
 SHOWN = (PAPER, *(Drivers(quantity, quantity) for quantity in QUANTITIES[3:]), EXTENDED)
-"""What a reproduction compares: the other energies differ from the stored one by hardly a percent."""
+"""Candidates of a reproduction: the other energies differ from the stored one by about one percent."""
 
 SHOWN_QUANTITIES = (STORED_ENERGY, *QUANTITIES[3:])
-"""What it needs to read for that."""
+"""Quantities that it reads for that."""
 
 
-def receptor_traces(
+def quantity_traces(
     responses: Sequence[SkinResponse], quantities: Sequence[str] = QUANTITIES
 ) -> dict[str, SedTraces]:
     """Read quantities at the one receptor, one column per shift of the bar.
@@ -135,26 +136,80 @@ def drive_of(traces: Mapping[str, SedTraces], drivers: Drivers) -> Drive:
     return drive(traces_of(traces, drivers))
 
 
-def result(
+@result_class
+class DriveCandidate:
+    """Fit of the afferent with one choice of quantities.
+
+    Parameters
+    ----------
+    static, dynamic : str
+        Quantities that the two terms of the current follow, see `QUANTITIES`.
+    fit : DriveFit
+        Fit of the four relative numbers.
+    response_surface : DriveFit, optional
+        Fit by the paper's method, where it was asked for.
+    parameters : dict of str to float
+        The four identifiable numbers.
+    dynamic_rate_hz, static_rate_hz : array (n_shifts,)
+        Rates by the fit to all shifts. [spikes/s]
+    left_out_dynamic_rate_hz, left_out_static_rate_hz : array (n_shifts,)
+        Rates under each shift by the fit that did not use it. [spikes/s]
+    """
+
+    static: str
+    dynamic: str
+    fit: DriveFit
+    response_surface: DriveFit | None = None
+    parameters: dict[str, Number]
+    dynamic_rate_hz: Vector
+    static_rate_hz: Vector
+    left_out_dynamic_rate_hz: Vector
+    left_out_static_rate_hz: Vector
+
+
+@result_class
+class DriveResult:
+    """Fits with several choices of quantities.
+
+    Parameters
+    ----------
+    method : str
+        Method of the fits.
+    shift_mm : array (n_shifts,)
+        Shifts of the bar. [mm]
+    observed_dynamic_rate_hz, observed_static_rate_hz : array (n_shifts,)
+        Recorded rates. [spikes/s]
+    candidates : tuple of DriveCandidate
+        The first is the reference of the gains.
+    """
+
+    method: str
+    shift_mm: Vector
+    observed_dynamic_rate_hz: Vector
+    observed_static_rate_hz: Vector
+    candidates: tuple[DriveCandidate, ...]
+
+
+def drive_result(
     traces: Mapping[str, SedTraces],
     recordings: RateRecordings,
     generator: np.random.Generator,
     candidates: Sequence[Drivers] = SHOWN,
     method: Method | None = None,
     with_response_surface: bool = False,
-) -> dict[str, Any]:
-    """Fit every candidate in the same way, ready for the report.
+) -> DriveResult:
+    """Fit every candidate in the same way.
 
     Parameters
     ----------
     traces : mapping of str to SedTraces
-        From `receptor_traces`, SED among them.
+        From `quantity_traces`, SED among them.
     recordings : RateRecordings
         Observed dynamic and static rates, one per column of the traces.
     generator : numpy.random.Generator
         Draws the bootstrap.
     candidates : sequence of Drivers, optional
-        What the two terms follow; the paper's first, with which the others are compared.
+        What the two terms follow; the first is the reference of the gains.
     method : Method, optional
         For the relative numbers; `quick_method` by default.
     with_response_surface : bool, optional
@@ -162,37 +217,44 @@ def result(
 
     Returns
     -------
-    dict
-        `shift_mm`, observed rates and `candidates`: per candidate its drivers, `fit` (see `row`),
-        `response_surface` if asked for, the four identifiable numbers and rates.
+    DriveResult
     """
     method = method or quick_method()
-    reference = drive_of(traces, PAPER)
-    judged: dict[str, list[Judged]] = {"fit": [], "response_surface": []}
-    rows: list[dict[str, Any]] = []
+    paper_drive = drive_of(traces, PAPER)
+    reference: Judged | None = None
+    surface_reference: Judged | None = None
+    found: list[DriveCandidate] = []
     for drivers in candidates:
         driven = drive_of(traces, drivers)
-        starts, model = scaled_starts(driven, reference), AfferentModel.of_drive(driven)
-        fits = {"fit": judge(RateProblem(relative_model(model, starts[0]), recordings), method)}
+        starts, model = scaled_starts(driven, paper_drive), AfferentModel.of_drive(driven)
+        judged = judge(RateProblem(relative_model(model, starts[0]), recordings), method)
+        reference = reference or judged
+        fit = drive_fit(judged, reference, recordings, generator)
+        surface: DriveFit | None = None
         if with_response_surface:
-            fits["response_surface"] = judge(RateProblem(model, recordings), response_surface(starts))
-        for key, one in fits.items():
-            judged[key].append(one)
-        best = fits["fit"]
-        four = identifiable(six_of_relative(best.fit.parameters, starts[0]))
-        rows.append(
-            {
-                "static": drivers.static,
-                "dynamic": drivers.dynamic,
-                **{key: row(one, judged[key][0], recordings, generator) for key, one in fits.items()},
-                "parameters": dict(zip(IDENTIFIABLE_NAMES, four.tolist(), strict=True)),
-                **{f"{phase}_rate_hz": best.predicted_hz[n] for n, phase in enumerate(PHASES)},
-                **{f"left_out_{phase}_rate_hz": best.left_out_hz[n] for n, phase in enumerate(PHASES)},
-            }
+            by_surface = judge(RateProblem(model, recordings), response_surface(starts))
+            surface_reference = surface_reference or by_surface
+            surface = drive_fit(by_surface, surface_reference, recordings, generator)
+        four = identifiable(six_of_relative(judged.fit.parameters, starts[0]))
+        found.append(
+            DriveCandidate(
+                static=drivers.static,
+                dynamic=drivers.dynamic,
+                fit=fit,
+                response_surface=surface,
+                parameters=dict(zip(IDENTIFIABLE_NAMES, four.tolist(), strict=True)),
+                dynamic_rate_hz=judged.predicted_hz[0],
+                static_rate_hz=judged.predicted_hz[1],
+                left_out_dynamic_rate_hz=judged.left_out_hz[0],
+                left_out_static_rate_hz=judged.left_out_hz[1],
+            )
         )
-    return {
-        "method": method.name,
-        "shift_mm": [float(name) for name in recordings.stimuli],
-        **{f"observed_{phase}_rate_hz": getattr(recordings, f"{phase}_rate_hz") for phase in PHASES},
-        "candidates": rows,
-    }
+    assert recordings.dynamic_rate_hz is not None
+    assert recordings.static_rate_hz is not None
+    return DriveResult(
+        method=method.name,
+        shift_mm=np.array([float(name) for name in recordings.stimuli]),
+        observed_dynamic_rate_hz=recordings.dynamic_rate_hz,
+        observed_static_rate_hz=recordings.static_rate_hz,
+        candidates=tuple(found),
+    )

@@ -1,8 +1,7 @@
-"""The whole paper in one run: press, fire, fit, discriminate, compare."""
+"""The whole paper in one run: indentations, fit, discrimination, comparison with the paper."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -28,9 +27,11 @@ from fingerpad.experiments.gerling2014 import (
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow
 from fingerpad.experiments.gerling2014.comparison import comparison
 from fingerpad.experiments.gerling2014.curvature_thresholds import CurvatureThresholds
+from fingerpad.experiments.gerling2014.drive_quantities import DriveResult
 from fingerpad.experiments.gerling2014.nail_border import NailBorder
 from fingerpad.experiments.gerling2014.response_maps import PopulationMaps, PopulationTiming
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
+from fingerpad.experiments.gerling2014.single_unit_uncertainty import UncertaintyResult
 from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 from fingerpad.experiments.manifest import Manifest
@@ -42,7 +43,7 @@ STANDARD_SPHERE = (sphere_discrimination.POSITIONS_MM[0], sphere_discrimination.
 
 @dataclass(frozen=True)
 class Reproduction:
-    """A run of all studies.
+    """A run of all parts of the paper.
 
     Parameters
     ----------
@@ -53,10 +54,9 @@ class Reproduction:
     jobs : int
         Processes to use; the numbers do not depend on it.
     extended : bool, optional
-        Whether to go beyond the paper: other ways to fit, what else may drive the afferent, spike trains,
-        what the rates determine, when a population fires, two spheres on other meshes, and the curvatures
-        that are told apart at other standards. Default: unless
-        the resolution is "quick", which would take half as long again.
+        Whether to go beyond the paper: other quantities that may drive the afferent, uncertainty of the fit,
+        the population over time, and thresholds at other standards. By default not at "quick" resolution,
+        where this takes half as long again.
     """
 
     conditions: Conditions
@@ -112,7 +112,7 @@ class ReproductionResult:
         Level 2.
     discrimination, population, nail : SphereDiscrimination, PopulationMaps, NailBorder
         Level 3.
-    drive_quantities, single_unit_uncertainty : dict, optional
+    drive_quantities, single_unit_uncertainty : DriveResult, UncertaintyResult, optional
     curvature_thresholds, population_timing : CurvatureThresholds, PopulationTiming, optional
         What goes beyond the paper, None where it was not asked for.
     comparison : tuple of ClaimRow
@@ -130,8 +130,8 @@ class ReproductionResult:
     discrimination: SphereDiscrimination
     population: PopulationMaps
     nail: NailBorder
-    drive_quantities: dict[str, Any] | None = None
-    single_unit_uncertainty: dict[str, Any] | None = None
+    drive_quantities: DriveResult | None = None
+    single_unit_uncertainty: UncertaintyResult | None = None
     curvature_thresholds: CurvatureThresholds | None = None
     population_timing: PopulationTiming | None = None
     comparison: tuple[ClaimRow, ...]
@@ -189,74 +189,51 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
         )
         advance()
         unit = single_unit.single_unit_result(problem, best, folds)
-        results: dict[str, Any] = {
-            "discrimination": discrimination,
-            "population": response_maps.population_maps(sphere_responses[STANDARD_SPHERE], afferent),
-            "nail": nail_border.nail_border(nail_response),
-        }
+        population = response_maps.population_maps(sphere_responses[STANDARD_SPHERE], afferent)
+        nail = nail_border.nail_border(nail_response)
         advance()
+    drives: DriveResult | None = None
+    uncertainty: UncertaintyResult | None = None
+    thresholds: CurvatureThresholds | None = None
+    timing: PopulationTiming | None = None
     if run.goes_beyond:
         with runner.stage("beyond the paper", 4) as advance:
-            traces = drive_quantities.receptor_traces(bars, drive_quantities.SHOWN_QUANTITIES)
-            results["drive_quantities"] = drive_quantities.result(
+            traces = drive_quantities.quantity_traces(bars, drive_quantities.SHOWN_QUANTITIES)
+            drives = drive_quantities.drive_result(
                 traces, problem.recordings, np.random.default_rng(conditions.seed)
             )
             advance()
-            results["single_unit_uncertainty"] = single_unit_uncertainty.result(
+            uncertainty = single_unit_uncertainty.uncertainty_result(
                 bar_sed, best.parameters, conditions.seed
             )
             advance()
             centred = {
                 curvature: skin for (position, curvature), skin in sphere_responses.items() if position == 0.0
             }
-            results["curvature_thresholds"] = curvature_thresholds.curvature_thresholds(
+            thresholds = curvature_thresholds.curvature_thresholds(
                 centred | responses["spheres, other curvatures"],
                 afferent,
                 discrimination.noise_sigma,
                 conditions.seed,
             )
             advance()
-            results["population_timing"] = response_maps.population_timing(
-                sphere_responses, afferent, conditions.finger
-            )
+            timing = response_maps.population_timing(sphere_responses, afferent, conditions.finger)
             advance()
     meshes = {"sphere": spheres[STANDARD_SPHERE].mesh, "bar": bar_responses[0].mesh} | {
         name: deflection["trial3", name].mesh for name in skin_deflection.INDENTERS
     }
-    skin, plain_results = skin_deflection.deflection_result(deflection), plain(results)
-    rows = comparison(
-        skin,
-        unit,
-        plain_results["discrimination"],
-        plain_results["nail"],
-        plain_results.get("curvature_thresholds"),
-    )
+    skin = skin_deflection.deflection_result(deflection)
     return ReproductionResult(
-        **plain_results,
         skin_deflection=skin,
         single_unit=unit,
-        comparison=tuple(rows),
+        discrimination=discrimination,
+        population=population,
+        nail=nail,
+        drive_quantities=drives,
+        single_unit_uncertainty=uncertainty,
+        curvature_thresholds=thresholds,
+        population_timing=timing,
+        comparison=tuple(comparison(skin, unit, discrimination, nail, thresholds)),
         inputs=tuple(PublishedNumber(**asdict(number)) for number in all_published()),
         manifest=runner.manifest(conditions, meshes, half_model=not spheres[STANDARD_SPHERE].grading.full),
     )
-
-
-def plain(value: Any) -> Any:
-    """Nested dicts and lists of plain numbers, with None for what is not a finite number.
-
-    Examples
-    --------
-    >>> plain({"rate": np.array([1.0, np.nan]), "n": np.int64(3)})
-    {'rate': [1.0, None], 'n': 3}
-    """
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

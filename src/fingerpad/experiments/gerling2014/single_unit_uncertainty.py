@@ -1,16 +1,24 @@
-"""Level 2: what the rates under the shifted bar determine of the afferent, and what they leave open."""
+"""Level 2: uncertainty of the afferent given the rates under the shifted bar."""
 
 from __future__ import annotations
 
-from typing import Any
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import bar_firing_rates
-from fingerpad.experiments.fit.rate_uncertainty import LEVEL, SEEDS_OF_PROFILES, profiles, sensitivity
+from fingerpad.experiments.fit.rate_uncertainty import (
+    LEVEL,
+    SEEDS_OF_PROFILES,
+    FssSensitivity,
+    ParameterProfile,
+    fss_sensitivity,
+    profiles,
+)
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.inference.afferent_posterior import AfferentPosterior, afferent_posterior
 from fingerpad.inference.fitting.identifiability import identifiability
@@ -26,33 +34,173 @@ PIECES = 8
 """Linear pieces of the drive between two given times. Rates differ by less than 0.01 spikes/s on average from
 those with 32, and an evaluation takes two thirds of the time."""
 
-THOROUGH: dict[str, Any] = {"smallest_effective_size": 200.0}
-"""Settings of the sampler: the ends of a 95 % interval err by a seventh of a standard deviation."""
+THOROUGH = partial(afferent_posterior, smallest_effective_size=200.0)
+"""Sampler of a result: the error of the ends of a 95 % interval is a seventh of a standard deviation."""
 
-QUICK: dict[str, Any] = {"n_walkers": 100, "smallest_effective_size": 100.0, "largest_r_hat": 1.02}
-"""Settings for a look: the ends err by a fifth of a standard deviation."""
+QUICK = partial(afferent_posterior, n_walkers=100, smallest_effective_size=100.0, largest_r_hat=1.02)
+"""Sampler of a quick result: the error of the ends is a fifth of a standard deviation."""
 
 
-def result(sed: SedTraces, fitted: ArrayLike, seed: int, *, quick: bool = False) -> dict[str, Any]:
-    """Find what the rates determine: identifiable numbers, posterior, profiles and sensitivity.
+@result_class
+class CredibleInterval:
+    """Posterior median and ends of the credible interval of one number, in its unit."""
+
+    median: Number
+    low: Number
+    high: Number
+
+
+@result_class
+class ParameterIdentifiability:
+    """Directions of the six parameters that the rates determine.
+
+    Parameters
+    ----------
+    rank : int
+        Singular values of the Jacobian of the rates that are not zero.
+    relative_singular_values : array (6,)
+        Over the largest. [1]
+    silent_directions : tuple of dict
+        Directions that do not change the rates, by name of the parameter.
+    """
+
+    rank: int
+    relative_singular_values: Vector
+    silent_directions: tuple[dict[str, Number], ...]
+
+
+@result_class
+class PosteriorConvergence:
+    """Size and convergence of the MCMC ensembles.
+
+    Parameters
+    ----------
+    ensembles, walkers : int
+        Independent ensembles, and walkers of each.
+    draws, evaluations : int
+        Draws kept, and evaluations of the likelihood.
+    acceptance : float
+        Share of accepted proposals. [1]
+    r_hat : float
+        Largest split R-hat. [1]
+    effective_draws, effective_draws_of_tails : float
+        Smallest effective sample sizes.
+    draws_per_effective_draw : float
+        Largest autocorrelation time, in draws.
+    """
+
+    ensembles: int
+    walkers: int
+    draws: int
+    evaluations: int
+    acceptance: Number
+    r_hat: Number
+    effective_draws: Number
+    effective_draws_of_tails: Number
+    draws_per_effective_draw: Number
+
+
+@result_class
+class PhasePrediction:
+    """Posterior prediction of the rates of one phase, shift by shift.
+
+    Parameters
+    ----------
+    observed_hz, median_hz, low_hz, high_hz : array (n_shifts,)
+        Observed rates; median and credible band of the predicted rates. [spikes/s]
+    new_low_hz, new_high_hz : array (n_shifts,)
+        Credible band of a new recording. [spikes/s]
+    share_within_new : float
+        Share of the observed rates within that band. [1]
+    residual_deviation_hz, residual_length_mm : CredibleInterval
+        Standard deviation and correlation length of the residuals. [spikes/s], [mm]
+    probability_of_independence : float
+        That residuals of neighbouring shifts are independent. [1]
+    """
+
+    observed_hz: Vector
+    median_hz: Vector
+    low_hz: Vector
+    high_hz: Vector
+    new_low_hz: Vector
+    new_high_hz: Vector
+    share_within_new: Number
+    residual_deviation_hz: CredibleInterval
+    residual_length_mm: CredibleInterval
+    probability_of_independence: Number
+
+
+@result_class
+class UncertaintyResult:
+    """Uncertainty of the fit to the rates under the bar.
+
+    Parameters
+    ----------
+    level : float
+        Probability within each interval and band.
+    seed : int
+        Of the random numbers.
+    names : tuple of str
+        The four identifiable numbers.
+    units, fit : dict
+        Their units and the fit, by name.
+    capacitance_mf, threshold_mv : float
+        Of the fit; they set the common scale of the gains in `posterior`. [mF], [mV]
+    identifiability : ParameterIdentifiability
+        Of the six parameters.
+    posterior : dict of str to CredibleInterval
+        Of the four numbers, of the gains, and of the resting potential over the threshold, `resting_share`.
+    convergence : PosteriorConvergence
+        Of the draws.
+    shift_mm : array (n_shifts,)
+        Shifts of the bar. [mm]
+    rates : dict of str to PhasePrediction
+        By phase.
+    evidence_for_alike_residuals : float
+        Gain of the largest log likelihood by correlated residuals.
+    profiles : tuple of ParameterProfile
+        Of the four numbers.
+    sensitivity : FssSensitivity
+        Of FSS to the four numbers.
+    """
+
+    level: Number
+    seed: int
+    names: tuple[str, ...]
+    units: dict[str, str]
+    fit: dict[str, Number]
+    capacitance_mf: Number
+    threshold_mv: Number
+    identifiability: ParameterIdentifiability
+    posterior: dict[str, CredibleInterval]
+    convergence: PosteriorConvergence
+    shift_mm: Vector
+    rates: dict[str, PhasePrediction]
+    evidence_for_alike_residuals: Number
+    profiles: tuple[ParameterProfile, ...]
+    sensitivity: FssSensitivity
+
+
+def uncertainty_result(
+    sed: SedTraces, fitted: ArrayLike, seed: int, *, quick: bool = False
+) -> UncertaintyResult:
+    """Compute identifiability, posterior, profile likelihoods and sensitivity.
 
     Parameters
     ----------
     sed : SedTraces
         Strain energy density at the receptor, one column per shift of the bar.
     fitted : array_like (6,)
-        A fit, in the order of `fingerpad.neuron.afferent.PARAMETER_NAMES`: where the draws begin, and about
-        which
-        sensitivity is asked for.
+        A fit, in the order of `fingerpad.neuron.afferent.PARAMETER_NAMES`: where the draws begin, and the
+        centre of the sensitivity analysis.
     seed : int
         Of the random numbers.
     quick : bool, optional
-        Whether half as many effective draws will do.
+        Whether half as many effective draws are enough.
 
     Returns
     -------
-    dict
-        Plain numbers with units in their names, ready for the report.
+    UncertaintyResult
 
     Raises
     ------
@@ -65,86 +213,85 @@ def result(sed: SedTraces, fitted: ArrayLike, seed: int, *, quick: bool = False)
     six = np.asarray(fitted, dtype=np.float64)
     four = identifiable(six)
     alike, independent = RateLikelihood(model, recordings, shift_mm), RateLikelihood(model, recordings)
-    posterior = afferent_posterior(alike, four, seed=seed, **(QUICK if quick else THOROUGH))
+    posterior = (QUICK if quick else THOROUGH)(alike, four, seed=seed)
     some = posterior.four[np.linspace(0, len(posterior.four) - 1, SEEDS_OF_PROFILES).astype(np.int64)]
-    return {
-        "level": LEVEL,
-        "seed": seed,
-        "names": list(IDENTIFIABLE_NAMES),
-        "units": dict(zip(IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, strict=True)),
-        "fit": dict(zip(IDENTIFIABLE_NAMES, four, strict=True)),
-        "capacitance_mf": six[4],
-        "threshold_mv": six[5],
-        "identifiability": _identifiability(six_model, six),
-        "posterior": _numbers(posterior, six),
-        "convergence": _convergence(posterior),
-        "shift_mm": shift_mm,
-        "rates": {
-            phase: _phase(drawn, getattr(recordings, f"{phase}_rate_hz"))
+    return UncertaintyResult(
+        level=LEVEL,
+        seed=seed,
+        names=IDENTIFIABLE_NAMES,
+        units=dict(zip(IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, strict=True)),
+        fit=dict(zip(IDENTIFIABLE_NAMES, four.tolist(), strict=True)),
+        capacitance_mf=six[4],
+        threshold_mv=six[5],
+        identifiability=_identifiability(six_model, six),
+        posterior=_intervals(posterior, six),
+        convergence=_convergence(posterior),
+        shift_mm=shift_mm,
+        rates={
+            phase: _prediction(drawn, getattr(recordings, f"{phase}_rate_hz"))
             for phase, drawn in posterior.rates.items()
         },
-        "evidence_for_alike_residuals": (
+        evidence_for_alike_residuals=(
             alike.log_likelihood(some).max() - independent.log_likelihood(some).max()
         ),
-        "profiles": profiles(alike, some),
-        "sensitivity": sensitivity(RateProblem(model, recordings), four, seed),
-    }
+        profiles=profiles(alike, some),
+        sensitivity=fss_sensitivity(RateProblem(model, recordings), four, seed),
+    )
 
 
-def _identifiability(model: AfferentModel, six: FloatArray) -> dict[str, Any]:
-    """Singular values of the rates' Jacobian in shares of the six parameters."""
+def _identifiability(model: AfferentModel, six: FloatArray) -> ParameterIdentifiability:
     found = identifiability(lambda values: np.concatenate(model.evaluate(values)), six, PARAMETER_NAMES)
-    return {
-        "rank": found.rank,
-        "relative_singular_values": found.singular_values / found.singular_values[0],
-        "silent_directions": [
-            dict(zip(PARAMETER_NAMES, direction, strict=True)) for direction in found.silent_directions
-        ],
-    }
+    return ParameterIdentifiability(
+        rank=found.rank,
+        relative_singular_values=found.singular_values / found.singular_values[0],
+        silent_directions=tuple(
+            dict(zip(PARAMETER_NAMES, direction.tolist(), strict=True))
+            for direction in found.silent_directions
+        ),
+    )
 
 
-def _numbers(posterior: AfferentPosterior, six: FloatArray) -> dict[str, Any]:
-    """Median and interval of the four numbers, and of the gains with the fit's capacitance and threshold."""
+def _intervals(posterior: AfferentPosterior, six: FloatArray) -> dict[str, CredibleInterval]:
+    """Return intervals of the four numbers, and of the gains with the fit's capacitance and threshold."""
     gains = posterior.six(float(six[4]), float(six[5]))[:, :3]
     draws = dict(zip(IDENTIFIABLE_NAMES, posterior.four.T, strict=True))
     draws |= dict(zip(PARAMETER_NAMES[:3], gains.T, strict=True))
     draws["resting_share"] = posterior.chains.flat[:, 0]
-    return {name: _summary(values) for name, values in draws.items()}
+    return {name: _interval(values) for name, values in draws.items()}
 
 
-def _summary(draws: FloatArray) -> dict[str, float]:
+def _interval(draws: FloatArray) -> CredibleInterval:
     low, high = credible_band(draws, LEVEL)
-    return {"median": float(np.median(draws)), "low": float(low), "high": float(high)}
+    return CredibleInterval(median=float(np.median(draws)), low=float(low), high=float(high))
 
 
-def _convergence(posterior: AfferentPosterior) -> dict[str, Any]:
+def _convergence(posterior: AfferentPosterior) -> PosteriorConvergence:
     chains = posterior.chains
-    return {
-        "ensembles": chains.draws.shape[0],
-        "walkers": chains.draws.shape[2],
-        "draws": len(posterior.four),
-        "evaluations": chains.n_evaluations,
-        "acceptance": chains.acceptance,
-        "r_hat": chains.r_hat.max(),
-        "effective_draws": chains.effective_sizes.min(),
-        "effective_draws_of_tails": chains.tail_effective_sizes.min(),
-        "draws_per_effective_draw": chains.autocorrelation_steps.max(),
-    }
+    return PosteriorConvergence(
+        ensembles=chains.draws.shape[0],
+        walkers=chains.draws.shape[2],
+        draws=len(posterior.four),
+        evaluations=chains.n_evaluations,
+        acceptance=chains.acceptance,
+        r_hat=chains.r_hat.max(),
+        effective_draws=chains.effective_sizes.min(),
+        effective_draws_of_tails=chains.tail_effective_sizes.min(),
+        draws_per_effective_draw=chains.autocorrelation_steps.max(),
+    )
 
 
-def _phase(drawn: ResidualDraws, observed_hz: FloatArray) -> dict[str, Any]:
-    """Bands of one phase, and how far the observed rates lie within them."""
+def _prediction(drawn: ResidualDraws, observed_hz: FloatArray) -> PhasePrediction:
     low, high = credible_band(drawn.predicted_hz, LEVEL)
     new_low, new_high = credible_band(drawn.new_hz, LEVEL)
-    return {
-        "observed_hz": observed_hz,
-        "median_hz": np.median(drawn.predicted_hz, axis=0),
-        "low_hz": low,
-        "high_hz": high,
-        "new_low_hz": new_low,
-        "new_high_hz": new_high,
-        "share_within_new": ((new_low <= observed_hz) & (observed_hz <= new_high)).mean(),
-        "residual_deviation_hz": _summary(drawn.deviation_hz),
-        "residual_length_mm": _summary(drawn.length_mm),
-        "probability_of_independence": (drawn.length_mm == INDEPENDENT).mean(),
-    }
+    return PhasePrediction(
+        observed_hz=observed_hz,
+        median_hz=np.median(drawn.predicted_hz, axis=0),
+        low_hz=low,
+        high_hz=high,
+        new_low_hz=new_low,
+        new_high_hz=new_high,
+        share_within_new=((new_low <= observed_hz) & (observed_hz <= new_high)).mean(),
+        residual_deviation_hz=_interval(drawn.deviation_hz),
+        residual_length_mm=_interval(drawn.length_mm),
+        probability_of_independence=(drawn.length_mm == INDEPENDENT).mean(),
+    )
