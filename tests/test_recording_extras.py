@@ -148,8 +148,8 @@ def test_profiles_hold_the_known_afferent_and_rise_to_both_sides():
         assert min(profile.losses) >= 0.0
         assert max(profile.losses) > ALLOWED_LOSS
     _, dynamic, static, _ = found
-    assert dynamic["high"] < 1.3 * identifiable(KNOWN)[1]
-    assert static["high"] - static["low"] < 0.5 * identifiable(KNOWN)[2]
+    assert dynamic.high < 1.3 * identifiable(KNOWN)[1]
+    assert static.high - static.low < 0.5 * identifiable(KNOWN)[2]
 
 
 def test_likely_points_are_likely_and_find_a_better_place_than_a_poor_fit():
@@ -189,8 +189,8 @@ def test_ranges_are_shares_of_the_fit_and_a_gain_of_nothing_has_one_too(fitted):
     assert_allclose(found.lower, np.minimum(0.75 * four, 1.25 * four), rtol=1e-12)
     problem = RateProblem(four_number_model(MODEL), IN_PLACE)
     nothing = rate_uncertainty.fss_sensitivity(problem, [0.0, 0.0, 0.018, 60.0], 1)
-    assert_allclose(nothing["lower"][:2], [-0.25 / 68.0, 0.0], rtol=1e-12)
-    assert (nothing["upper"] > nothing["lower"]).all()
+    assert_allclose(nothing.lower[:2], [-0.25 / 68.0, 0.0], rtol=1e-12)
+    assert (nothing.upper > nothing.lower).all()
     # Without a dynamic gain to speak of, rates hang on the static one.
     assert nothing.total[2] == max(nothing.total)
 

@@ -24,7 +24,7 @@ from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.fit import fit as study
-from fingerpad.experiments.fit import rate_posterior as recording_posterior
+from fingerpad.experiments.fit import posterior as recording_posterior
 from fingerpad.experiments.fit import session
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
 from fingerpad.experiments.fit.posterior import PhaseBands, RateBand, RatePosterior, rate_posterior

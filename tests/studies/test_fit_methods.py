@@ -18,7 +18,6 @@ from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import start_points
 from studies import fit_methods, fit_starts
 from studies.pages import fit_methods as report
-from studies.plain_values import plain
 
 SHIFT_MM = np.array(protocol.BAR_SHIFTS.value)
 TIMES_MS = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 100.0, 300.0, 1000.0])

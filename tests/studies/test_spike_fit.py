@@ -20,7 +20,6 @@ from fingerpad.report.style import png
 from studies import isi_variability, spike_fit
 from studies.isi_variability import SETTLED_MS, SOURCES, held_at_its_rate
 from studies.pages import spike_fit as report
-from studies.plain_values import plain
 
 SHIFT_MM = np.linspace(-3.5, 3.5, 8)
 AFFERENT = Afferent()
