@@ -1,5 +1,7 @@
 # make reproduce     run the studies of the paper      (ARGS="..." goes to `fingerpad reproduce`)
 # make test          check style, types, imports, behaviour and the wheel; stops at the first failure
+# make checks        only style, types and imports
+# make pages         only the examples and links of README and docs
 # make wheel         build the wheel, install it into an empty environment and run the README's ten lines there
 # make results       reproduce at standard resolution, and write the numbers and the picture of README and docs
 # make verification  run every verification case, slow ones too, and write docs/verification.md
@@ -12,25 +14,33 @@ PYTHON ?= python3
 ARGS ?=
 # One file per process: the tests of a file may share one long run.
 PYTEST_ARGS ?= -n 2 --dist loadfile
+# Tests of all that README and docs show.
+PAGES := tests/test_readme.py
 
 bin := .venv/bin
 # Nothing but the environment's own packages may answer an import.
 export PYTHONNOUSERSITE := 1
 unexport PYTHONPATH
 
-.PHONY: reproduce test wheel results verification benchmarks clean
+.PHONY: reproduce test checks pages wheel results verification benchmarks clean
 .DEFAULT_GOAL := test
 
 reproduce: .venv/installed
 	$(bin)/fingerpad reproduce $(ARGS)
 
+# Each of the first three keeps about one core busy; the pages compile the kernels for the tests that follow.
 test: .venv/installed-for-tests
+	$(MAKE) --jobs 2 wheel checks pages
+	$(bin)/pytest $(PYTEST_ARGS) --ignore $(PAGES)
+
+checks: .venv/installed-for-tests
 	$(bin)/ruff check
 	$(bin)/ruff format --check
 	$(bin)/mypy
 	$(bin)/lint-imports
-	$(bin)/pytest $(PYTEST_ARGS)
-	$(bin)/python -m tests.installed_wheel
+
+pages: .venv/installed-for-tests
+	$(bin)/pytest $(PAGES)
 
 wheel: .venv/installed-for-tests
 	$(bin)/python -m tests.installed_wheel

@@ -27,6 +27,7 @@ from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.report.reproduction import reproduction_page
 from fingerpad.skin.store import Store
+from studies.results_page import README_ROWS, excerpt, readme_table
 
 COMMAND = (sys.executable, "-W", "error", "-m", "fingerpad", "reproduce")
 MEASURES = ("static", "dynamic", "latency")
@@ -124,6 +125,13 @@ def extended(first, tmp_path_factory):
 
 
 # From nothing
+
+
+def test_a_run_has_the_numbers_that_the_pages_show(first):
+    shown = excerpt(first.results)
+    assert sum(shown.indentations.values()) == INDENTATIONS
+    assert len(readme_table(shown).splitlines()) == 2 + len(README_ROWS)
+    assert shown.percept.codes[0].hit_rate.size == shown.percept.curvature_per_m.size == 6
 
 
 def test_it_ends_well_and_says_where_the_results_are_and_what_was_missed(first):
