@@ -224,8 +224,8 @@ def result(
     other = four_number_problem(AfferentModel.of_drive(otherwise), recordings)
     models = {
         "the paper's model": (problem, fits[searched]),
-        "receptor beside its place": (offset, _fitted(offset, evolution(problem, driven, offset=True))),
-        f"dynamic term follows {extended.dynamic_quantity}": (
+        "offset of the receptor": (offset, _fitted(offset, evolution(problem, driven, offset=True))),
+        f"dynamic term: {extended.dynamic_quantity.replace('_', ' ')}": (
             other,
             _fitted(other, evolution(other, otherwise)),
         ),

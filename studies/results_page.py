@@ -30,7 +30,7 @@ README_ROWS = (
     ("percept", "Hit rate at 296 /m, static Gradient Sum at 0.0 mm, noise fitted"),
     ("percept", "Hit rate at 365 /m, static Gradient Sum at 0.0 mm, noise fitted"),
     ("percept", "Noise sigma_1 that fits Goodwin's two points"),
-    ("percept", "Static hit rates do not mind the 0.2 mm shift, largest change"),
+    ("percept", "Static hit rates with the 0.2 mm shift, largest change"),
 )
 """Rows of the README's table: the level, and the quantity as the comparison names it."""
 
@@ -237,7 +237,7 @@ def results_page(shown: Excerpt) -> str:
         _indentations(shown.indentations),
         "## This run and the paper",
         f"{sum(judged)} of {len(judged)} criteria are met (✓), {len(judged) - sum(judged)} are missed (✗). "
-        "○: the paper gives no criterion. The report of a run also says what each row rests on.",
+        "○: the paper gives no criterion. The report of a run also gives the status of each row.",
         table(
             ("quantity", "paper", "this run", "", "note"),
             [
@@ -248,8 +248,8 @@ def results_page(shown: Excerpt) -> str:
         "## FSS by method of fitting",
         "Fractional sum of squares (FSS, Eqs. 12-14) of one afferent under the bar. "
         "Out of sample: mean of six folds. From the study `studies.fit_methods`, on the same recordings. "
-        "[How the methods are set](decisions/methods-of-fitting.md), "
-        "[what limits them](single-unit.md#what-limits-the-fit).",
+        "[Settings of the methods](decisions/methods-of-fitting.md), "
+        "[limits of the fit](single-unit.md#what-limits-the-fit).",
         _methods(shown.methods),
         "## FSS by variant of the model, and the offset of the receptor",
         "All fitted by CMA-ES. The offset is the distance of the receptor from its nominal position "
@@ -259,8 +259,8 @@ def results_page(shown: Excerpt) -> str:
         "All fitted by least squares ([discussion](single-unit.md#quantities-that-drive-the-afferent)).",
         _drives(shown.drives),
         "## Hit rates",
-        f"Share of trials in which a sphere is told from one of {number(shown.percept.standard_per_m)} /m. "
-        f"The noise, {fixed(shown.percept.noise_sigma, 3)}, is fitted to people's two hit rates "
+        f"Hit rate of each sphere against one of {number(shown.percept.standard_per_m)} /m. "
+        f"The noise, {fixed(shown.percept.noise_sigma, 3)}, is fitted to the two observed hit rates "
         "with the static Gradient Sum ([decision](decisions/noise-fitted.md)); all codes use it.",
         _hit_rates(shown.percept),
     ]
@@ -274,7 +274,7 @@ def _linked(note: str) -> str:
 
 def _indentations(counts: Mapping[str, int]) -> str:
     rows = [(name, str(count)) for name, count in counts.items()]
-    return table(("part of the run", "indentations"), [*rows, ("together", f"**{sum(counts.values())}**")])
+    return table(("part of the run", "indentations"), [*rows, ("total", f"**{sum(counts.values())}**")])
 
 
 def _methods(rows: Sequence[Method]) -> str:
@@ -339,7 +339,7 @@ def _hit_rates(percept: Percept) -> str:
     ]
     people = dict(zip(percept.people_curvature_per_m, percept.people, strict=True))
     observed = (fixed(people.get(each), 2) for each in percept.curvature_per_m)
-    return table(columns, [*rows, ("people (Goodwin et al.)", "", *observed)])
+    return table(columns, [*rows, ("observed (Goodwin et al.)", "", *observed)])
 
 
 def readme_table(shown: Excerpt) -> str:

@@ -826,16 +826,16 @@ NOISE = "Noise sigma_1 that fits Goodwin's two points"
 MODULATION = ("single_unit", "modulation", "dynamic", "ours")
 RISES = "Hit rate rises with curvature, {} Gradient Sum at {}"
 HIT_RATE = "Hit rate at {} /m, static Gradient Sum at {}, noise fitted"
-BEST = "Static rates fit people best, by root mean square distance to Goodwin's points"
-ROBUST = "Static hit rates do not mind the 0.2 mm shift, largest change"
+BEST = "Static rates fit best, by root mean square distance to Goodwin's points"
+ROBUST = "Static hit rates with the 0.2 mm shift, largest change"
 DIVERGE = "Hit rates diverge with the 0.2 mm shift, {}, largest change"
 LOWERS = "More noise lowers the curve, smallest fall of the mean hit rate from one noise to the next"
 MATRICES = "10 noise matrices instead of 100 widen the error bars"
 WIDER = "A criterion that varies by 0.02 instead of 0.01 widens the error bars"
-LEAVES = "A criterion that varies by 0.02 instead of 0.01 leaves the means, largest change"
+LEAVES = "A criterion that varies by 0.02 instead of 0.01 does not change the means, largest change"
 STABLE = "The mean of 10 hit rates is not stable, that of 100 is: standard deviation of the means"
 EUCLIDEAN = "Euclidean Distance of static rates fits too, by root mean square distance to Goodwin's points"
-LINE = "Static hit rates between Goodwin's points, farthest from their line in z, at {}"
+LINE = "Static hit rates between Goodwin's points, largest distance from their line in z, at {}"
 STATISTICS = ("discrimination", "statistics")
 
 

@@ -58,7 +58,7 @@ def _deflection(found: SkinDeflectionResult) -> list[ClaimRow]:
             f"{r2 - later.value:+.3f}",
             MATERIALS,
             r2 >= LEAST_R2,
-            f"with the observations' direction read the other way {found.trial3.cylinder.r2_mirrored:.3f}",
+            f"with the opposite direction of the observations {found.trial3.cylinder.r2_mirrored:.3f}",
         )
     ]
     third = found.trial3
@@ -79,7 +79,7 @@ def _deflection(found: SkinDeflectionResult) -> list[ClaimRow]:
                     "",
                     MATERIALS,
                     sign * excess > 0,
-                    "on an axis that points down, as skin that yields does, this is the paper's order: "
+                    "on a deflection axis that points down this is the paper's order: "
                     "docs/decisions/order-of-the-trials.md",
                 )
             )

@@ -322,7 +322,7 @@ def _first_line(error: Exception) -> str:
 
 
 def weber_claims(found: CurvatureThresholds | None) -> list[ClaimRow]:
-    """Compare Weber fractions with people's, one row per population.
+    """Compare Weber fractions with observed ones, one row per population.
 
     Parameters
     ----------
@@ -343,11 +343,11 @@ def weber_claims(found: CurvatureThresholds | None) -> list[ClaimRow]:
         missed = [missing.why_not for missing in population.without_threshold]
         rows.append(
             claim_row(
-                f"Curvature told apart in 75 %, {population.rows} by {population.columns} receptors",
-                f"people: {low:.0%} to {high:.0%} of the standard",
+                f"Curvature threshold at 75 %, {population.rows} by {population.columns} receptors",
+                f"observed: {low:.0%} to {high:.0%} of the standard",
                 ", ".join(f"{fraction:.1%}" for fraction in fractions),
                 "",
-                MATERIALS + "; people's fractions recalled",
+                MATERIALS + "; observed fractions recalled",
                 bool(fractions) and not missed and all(low <= round(share, 2) <= high for share in fractions),
                 "; ".join([f"static Gradient Sum, standards {at} /m; judged in whole per cent", *missed]),
             )

@@ -52,14 +52,14 @@ def discrimination_claims(found: SphereDiscrimination) -> list[ClaimRow]:
 
 def _noise(found: SphereDiscrimination) -> ClaimRow:
     rises, needed = (rise["static"] for rise in (found.reasons.rise, found.reasons.rise_for_paper_noise))
-    told = " and ".join(f"{rise:.0%}" if rise == rise else "none" for rise in needed)
+    expected = " and ".join(f"{rise:.0%}" if rise == rise else "none" for rise in needed)
     return measured_row(
         "Noise sigma_1 that fits Goodwin's two points",
         psychophysics.NOISE_SIGMA,
         found.noise_sigma,
         STATUS,
-        note=f"our static sum rises by {' and '.join(f'{rise:.0%}' for rise in rises)} from 287 to 365 /m at "
-        f"the two positions; with the paper's noise people would need {told}",
+        note=f"our static sum increases by {' and '.join(f'{rise:.0%}' for rise in rises)} from 287 to "
+        f"365 /m at the two positions; the paper's noise would need {expected}",
     )
 
 
@@ -82,13 +82,13 @@ def _targets(found: SphereDiscrimination) -> list[ClaimRow]:
             )
     return rows + [
         claim_row(
-            f"Static hit rates between Goodwin's points, farthest from their line in z, at {place}",
+            f"Static hit rates between Goodwin's points, largest distance from their line in z, at {place}",
             "on the line (two points)",
             _text(target.largest_from_line),
             "",
             STATUS,
             target.largest_from_line.value <= FROM_LINE,
-            f"judged: within {FROM_LINE:g}; only 296 and 365 /m have been told, the line is ours",
+            f"judged: within {FROM_LINE:g}; only 296 and 365 /m were observed, the line is interpolated",
         )
         for place, target in zip(PLACES, targets, strict=True)
     ]
@@ -97,7 +97,7 @@ def _targets(found: SphereDiscrimination) -> list[ClaimRow]:
 def _fits_best(statistics: DiscriminationStatistics) -> ClaimRow:
     misfit, above = statistics.misfit, statistics.misfit_above_static
     return claim_row(
-        "Static rates fit people best, by root mean square distance to Goodwin's points",
+        "Static rates fit best, by root mean square distance to Goodwin's points",
         "static best of three",
         ", ".join(f"{name} {_text(misfit[name])}" for name in MEASURES if name in misfit),
         "",
@@ -111,12 +111,12 @@ def _shift(statistics: DiscriminationStatistics) -> list[ClaimRow]:
     shift, above = statistics.shift, statistics.shift_above_static
     reasons = {
         "dynamic": "",
-        "latency": "; the gradients are those between early receptors and late ones far from the sphere, and "
-        "a shift along the finger moves both alike",
+        "latency": "; the sum consists of differences between early receptors and late ones far from the "
+        "sphere, and a shift along the finger changes both in the same way",
     }
     return [
         claim_row(
-            "Static hit rates do not mind the 0.2 mm shift, largest change",
+            "Static hit rates with the 0.2 mm shift, largest change",
             "robust",
             _text(shift["static"]),
             "",
@@ -192,11 +192,10 @@ def _variants(statistics: DiscriminationStatistics) -> list[ClaimRow]:
             "",
             STATUS,
             _more(wide.ratio, 1.0),
-            "the decision point varies; were it the fraction beta, bars would stay below "
-            "a tenth of these (reasons)",
+            "the decision point varies; if beta varied, the bars would be below a tenth of these (reasons)",
         ),
         claim_row(
-            "A criterion that varies by 0.02 instead of 0.01 leaves the means, largest change",
+            "A criterion that varies by 0.02 instead of 0.01 does not change the means, largest change",
             "unchanged",
             _text(wide.change),
             "",
@@ -221,9 +220,9 @@ def _euclidean(statistics: DiscriminationStatistics, own: EuclideanFit) -> Claim
     others = [misfit[name].value for name in MEASURES[1:] if name in misfit]
     ours = misfit["euclidean"].value
     alone = (
-        f"with a noise of its own, {own.noise_sigma:.3f}, {own.misfit:.3f}"
+        f"with a separate noise of {own.noise_sigma:.3f}: {own.misfit:.3f}"
         if own.hit_rate is not None
-        else "no noise of its own meets the points"
+        else "no separate noise fits the points"
     )
     return claim_row(
         "Euclidean Distance of static rates fits too, by root mean square distance to Goodwin's points",
