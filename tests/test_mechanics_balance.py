@@ -108,9 +108,9 @@ def spent(material, times_ms, displacements, mesh=CUBE):
     for time, displacement in zip(times_ms, displacements, strict=True):
         step = StepCoefficients.of(table, time - before)
         state = mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table
-        instantaneous, energies, _ = instantaneous_state(*state)
-        total += dissipated_energy(*state, time - before, history, instantaneous, energies)
-        history, before = history.advanced(step, mesh.layer, instantaneous), time
+        now = instantaneous_state(*state)
+        total += dissipated_energy(*state, time - before, history, now)
+        history, before = history.advanced(step, mesh.layer, now.stress_kpa), time
         sums.append(total)
     return np.array(sums)
 
@@ -154,8 +154,9 @@ def test_spent_energy_is_that_of_a_slow_look_at_every_point():
         table = MaterialTable.of([material])
         history = StressHistory(rng.normal(size=(2, 8, 6)), 0.2 * rng.normal(size=(2, 2, 8, 6)))
         state = mesh.nodes_mm, mesh.elements, moved, mesh.layer, table
-        instantaneous, energies, _ = instantaneous_state(*state)
-        found = dissipated_energy(*state, 25.0, history, instantaneous, energies)
+        now = instantaneous_state(*state)
+        instantaneous, energies = now.stress_kpa, now.energies
+        found = dissipated_energy(*state, 25.0, history, now)
         coefficients = DissipationCoefficients.of(table, 25.0)
         expected = 0.0
         for e in range(2):

@@ -65,10 +65,10 @@ def marched(material, displacements, times_ms, mesh=MESH):
             history.carried(step, mesh.layer), sparsity, False, force, blocks,
         )  # fmt: skip
         state = mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table
-        instantaneous, energies, volumetric = instantaneous_state(*state)
-        history = history.advanced(step, mesh.layer, instantaneous)
-        stored = stored_energy_density(*state, history, energies, volumetric)
-        moment = watched.after(moment, displacement, history, energies, volumetric, stored)
+        now = instantaneous_state(*state)
+        history = history.advanced(step, mesh.layer, now.stress_kpa)
+        stored = stored_energy_density(*state, history, now)
+        moment = watched.after(moment, displacement, history, now, stored)
         felt.append(moment.felt)
     return fields_over_time(everything, felt), force, cauchy_stress(mesh, table, displacement, history)
 

@@ -96,7 +96,7 @@ def test_product_is_that_of_the_blocks(mesh):
 def test_neighbouring_columns_differ_in_colour_and_columns_are_sorted_by_it(mesh):
     hierarchy = made(mesh)[0]
     for level in hierarchy._levels:
-        colour = np.searchsorted(level.colour_start, np.arange(level.own.size), side="right")
+        colour = np.searchsorted([last for _, last in level.colours], np.arange(level.own.size), side="right")
         differs = colour[level.graph.column] != colour[level.graph.neighbour]
         assert (differs | (level.graph.column == level.graph.neighbour)).all()
         np.testing.assert_array_equal(level.graph.column[level.own], np.arange(level.own.size))

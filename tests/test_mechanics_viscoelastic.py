@@ -40,13 +40,10 @@ def march(times_ms, displacements, table=TABLE):
             CUBE.nodes_mm, CUBE.elements, displacement, CUBE.layer, table.law, step.s,
             history.carried(step, CUBE.layer), sparsity, False, force, blocks,
         )  # fmt: skip
-        stress, points, volumetric = instantaneous_state(
-            CUBE.nodes_mm, CUBE.elements, displacement, CUBE.layer, table
-        )
-        history = history.advanced(step, CUBE.layer, stress)
-        energy = stored_energy_density(
-            CUBE.nodes_mm, CUBE.elements, displacement, CUBE.layer, table, history, points, volumetric
-        )
+        where = CUBE.nodes_mm, CUBE.elements, displacement, CUBE.layer, table
+        now = instantaneous_state(*where)
+        history = history.advanced(step, CUBE.layer, now.stress_kpa)
+        energy = stored_energy_density(*where, history, now)
         forces.append(force)
         energies.append(energy[0])
         before = time

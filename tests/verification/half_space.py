@@ -163,8 +163,8 @@ def pressed_slice(mesh, indenter, depth_mm, poisson) -> Pressed:
         np.zeros(contact.nodes.size), TIGHT,
     )  # fmt: skip
     where = mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, solid.table
-    stress, energies, volumetric = instantaneous_state(*where)
-    history = replace(history, instantaneous=stress)
+    now = instantaneous_state(*where)
+    history = replace(history, instantaneous=now.stress_kpa)
     on_skin = np.zeros((1, len(skin)))
     on_skin[0, chosen] = found.contact.pressed_mn
     return Pressed(
@@ -172,7 +172,7 @@ def pressed_slice(mesh, indenter, depth_mm, poisson) -> Pressed:
         displacement_mm=found.displacement_mm,
         depth_mm=depth_mm,
         force_mn=found.contact.pressed_mn.sum(),
-        sed_kpa=stored_energy_density(*where, history, energies, volumetric),
+        sed_kpa=stored_energy_density(*where, history, now),
         stress_kpa=cauchy_stress(mesh, solid.table, found.displacement_mm, history),
         pressure_kpa=skin_contact(mesh, found.displacement_mm[None], on_skin).pressure_kpa[0],
     )

@@ -138,9 +138,9 @@ def errors(n, poisson):
 def at_rest_from(solid, displacement):
     """History of a body that was brought to its place at once and has not relaxed."""
     mesh = solid.mesh
-    stress, _, _ = instantaneous_state(mesh.nodes_mm, mesh.elements, displacement, mesh.layer, solid.table)
+    now = instantaneous_state(mesh.nodes_mm, mesh.elements, displacement, mesh.layer, solid.table)
     return replace(
-        StressHistory.unloaded(len(mesh.elements), solid.table.shares.shape[1]), instantaneous=stress
+        StressHistory.unloaded(len(mesh.elements), solid.table.shares.shape[1]), instantaneous=now.stress_kpa
     )
 
 

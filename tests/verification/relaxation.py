@@ -50,9 +50,9 @@ def march(material, times_ms, displacements):
         step = StepCoefficients.of(solid.table, time - before)
         forces.append(solid.evaluate(displacement, step=step, history=history)[1])
         place_of = CUBE.nodes_mm, CUBE.elements, displacement, CUBE.layer, solid.table
-        stress, points, volumetric = instantaneous_state(*place_of)
-        history, before = history.advanced(step, CUBE.layer, stress), time
-        energies.append(stored_energy_density(*place_of, history, points, volumetric)[0])
+        now = instantaneous_state(*place_of)
+        history, before = history.advanced(step, CUBE.layer, now.stress_kpa), time
+        energies.append(stored_energy_density(*place_of, history, now)[0])
     return np.array(forces), np.array(energies)
 
 

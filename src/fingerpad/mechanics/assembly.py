@@ -15,8 +15,10 @@ from numba import njit
 from scipy import sparse
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import Chunk, even_chunks, in_chunks
-from fingerpad.mechanics.element import N_NODES, element_system
+from fingerpad.mechanics.element import N_NODES, element_system, take_nodes
+from fingerpad.mechanics.materials import has_formulas
 
 
 @dataclass(frozen=True)
@@ -170,9 +172,10 @@ def assemble(
     def add(first: int, last: int) -> float:
         return _add_chunk(
             nodes, elements, displacement, layer, law, s, history, sparsity.position, with_tangent,
-            force, blocks, first, last,
+            force, blocks, formulas, first, last,
         )  # fmt: skip
 
+    formulas = has_formulas(law)
     force[:] = 0.0
     if with_tangent:
         in_chunks(clear, even_chunks(len(blocks)))
@@ -182,29 +185,27 @@ def assemble(
 @njit(cache=True, nogil=True)
 def _add_chunk(  # type: ignore[no-untyped-def]
     nodes, elements, displacement, layer, law, s, history, position, with_tangent,
-    force, blocks, first, last,
+    force, blocks, formulas, first, last,
 ):  # fmt: skip
     """Add elements from `first` up to `last` and return their potential; stop at one that is inside out."""
-    element_force, element_tangent = np.empty((8, 3)), np.empty((8, 8, 3, 3))
-    reference, moved = np.empty((8, 3)), np.empty((8, 3))
+    element_force, element_tangent = small_array((N_NODES, 3)), small_array((N_NODES, N_NODES, 3, 3))
+    reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3))
     potential = 0.0
     for e in range(first, last):
-        for a in range(8):
-            for i in range(3):
-                reference[a, i] = nodes[elements[e, a], i]
-                moved[a, i] = displacement[elements[e, a], i]
+        take_nodes(nodes, elements[e], reference)
+        take_nodes(displacement, elements[e], moved)
         material = layer[e]
         potential += element_system(
             reference, moved, law[material], s[material], history[e], with_tangent,
-            element_force, element_tangent,
+            element_force, element_tangent, formulas,
         )  # fmt: skip
         if np.isnan(potential):
             return potential
-        for a in range(8):
+        for a in range(N_NODES):
             for i in range(3):
                 force[elements[e, a], i] += element_force[a, i]
             if with_tangent:
-                for b in range(8):
+                for b in range(N_NODES):
                     target = position[e, a, b]
                     for i in range(3):
                         for j in range(3):

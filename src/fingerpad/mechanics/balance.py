@@ -24,10 +24,10 @@ from scipy.interpolate import CubicSpline
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import even_chunks, in_chunks
-from fingerpad.mechanics.element import N_NODES, N_POINTS, frame_scale, gradients_at_points
+from fingerpad.mechanics.element import N_NODES, N_POINTS, frame_scale, gradients_at_points, take_nodes
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
 from fingerpad.mechanics.tensors import invert, push_forward
-from fingerpad.mechanics.viscoelastic import StressHistory
+from fingerpad.mechanics.viscoelastic import InstantaneousState, StressHistory
 
 FEW_STEPS = 3
 """Points of a phase below which a cubic cannot be drawn and straight lines take its place."""
@@ -246,12 +246,13 @@ def _dissipated(  # type: ignore[no-untyped-def]
     weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
     gradients, inverse = small_array((N_POINTS, 3, 3)), small_array((3, 3))
     jacobians, spatial = small_array((N_POINTS,)), np.empty((n_terms + 2, 6))
+    reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3))
     total = 0.0
     for e in range(first, last):
         material = layer[e]
-        volume = gradients_at_points(
-            nodes[elements[e]], displacement[elements[e]], weights, slopes, gradients
-        )
+        take_nodes(nodes, elements[e], reference)
+        take_nodes(displacement, elements[e], moved)
+        volume = gradients_at_points(reference, moved, weights, slopes, gradients)
         present_volume = 0.0
         for q in range(N_POINTS):
             jacobians[q] = invert(gradients[q], inverse)
@@ -295,8 +296,7 @@ def dissipated_energy(
     table: MaterialTable,
     step_ms: float,
     before: StressHistory,
-    instantaneous: FloatArray,
-    energies: FloatArray,
+    now: InstantaneousState,
 ) -> float:
     """Energy that relaxation turns into heat in one step, all elements together.
 
@@ -317,8 +317,8 @@ def dissipated_energy(
         Length of the step. [ms]
     before : StressHistory
         State at its start.
-    instantaneous, energies : array (n_elements, 8, 6), (n_elements, 8, 2)
-        S0, and weights and energies W0, at its end. [kPa; mm³, kPa]
+    now : InstantaneousState
+        State at its end.
 
     Returns
     -------
@@ -330,7 +330,7 @@ def dissipated_energy(
     def find(first: int, last: int) -> float:
         return _dissipated(
             nodes, elements, displacement, layer, table.law, table.shares, c.before, c.mixed, c.increment,
-            before.instantaneous, before.relaxed, instantaneous, energies, first, last,
+            before.instantaneous, before.relaxed, now.stress_kpa, now.energies, first, last,
         )  # fmt: skip
 
     return sum(in_chunks(find, even_chunks(len(elements))))

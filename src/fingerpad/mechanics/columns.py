@@ -289,9 +289,9 @@ def round_matrix(first, last, start, neighbour, matrix, shrink, rounded):  # typ
     for c in range(first, last):
         for pair in range(start[c], start[c + 1]):
             d = neighbour[pair]
-            for s in range(3):
-                for a in range(3):
-                    for b in range(3):
+            for s in range(matrix.shape[1]):  # not range(3): the compiler would unroll these loops
+                for a in range(matrix.shape[2]):
+                    for b in range(matrix.shape[3]):
                         for k in range(matrix.shape[4]):
                             both = shrink[c, a, k + 1] * shrink[d, b, k + s]
                             entry = np.floor(matrix[pair, s, a, b, k] * both + np.float32(0.5))
@@ -356,39 +356,45 @@ def multiply(first, last, start, neighbour, matrix, x, product):  # type: ignore
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def sweep_forward(first, last, start, own, neighbour, matrix, depth, lower, inverse, right, x):  # type: ignore[no-untyped-def]
-    """Gauss-Seidel on columns of one colour, colours before it done and those after it still zero.
+def sweep(first, last, begin, end, neighbour, matrix, depth, lower, inverse, right, x, keeps):  # type: ignore[no-untyped-def]
+    """Gauss-Seidel on the columns of one colour; columns of one colour may be done in any order.
 
-    Over all colours, with A = L + T + L' by the order of the columns, (T + L) x = right.
+    A forward sweep takes the colours in order, takes the pairs with columns before its own into account, and
+    overwrites x: over all colours, with A = L + T + L' by the order of the columns, (T + L) x = right. A
+    backward sweep takes the last colour first and all pairs into account, and adds to x.
 
     Parameters
     ----------
     first, last : int
         Columns.
-    start, own, neighbour, matrix, depth
+    begin, end : int array (n_columns,)
+        First pair of every column, and the one after the last, that the sweep takes into account.
+    neighbour, matrix, depth
         The matrix.
     lower, inverse : array (n_columns, depth, 9)
         From `factor_columns`.
     right : array (n_columns, 3, lanes + 2)
         Right-hand side.
     x : array (n_columns, 3, lanes + 2)
-        Overwritten.
+        Improved.
+    keeps : bool
+        Whether x is added to instead of overwritten.
     """
     r = small_single_array((3, MOST_LANES))
     for c in range(first, last):
         for a in range(3):
             for k in range(matrix.shape[4]):
                 r[a, k] = right[c, a, k + 1]
-        _subtract_product(start[c], own[c], neighbour, matrix, x, r)
+        _subtract_product(begin[c], end[c], neighbour, matrix, x, r)
         _solve_column(depth, lower, inverse, c, r)
         for a in range(3):
             for k in range(depth):
-                x[c, a, k + 1] = r[a, k]
+                x[c, a, k + 1] = x[c, a, k + 1] + r[a, k] if keeps else r[a, k]
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
 def residual_after_forward(first, last, start, own, neighbour, matrix, x, scale, residual):  # type: ignore[no-untyped-def]
-    """Write right - A x after a forward sweep, which is -L' x, times `scale`; else as in `sweep_forward`."""
+    """Write right - A x after a forward sweep, which is -L' x, times `scale`; else as in `sweep`."""
     r = small_single_array((3, MOST_LANES))
     for c in range(first, last):
         for a in range(3):
@@ -398,29 +404,3 @@ def residual_after_forward(first, last, start, own, neighbour, matrix, x, scale,
         for a in range(3):
             for k in range(matrix.shape[4]):
                 residual[c, a, k + 1] = scale[c, a, k + 1] * r[a, k]
-
-
-@njit(cache=True, nogil=True, fastmath={"contract"})
-def sweep_backward(first, last, start, neighbour, matrix, depth, lower, inverse, right, x):  # type: ignore[no-untyped-def]
-    """Gauss-Seidel on columns of one colour, the last colour first; parameters as in `sweep_forward`."""
-    r = small_single_array((3, MOST_LANES))
-    for c in range(first, last):
-        for a in range(3):
-            for k in range(matrix.shape[4]):
-                r[a, k] = right[c, a, k + 1]
-        _subtract_product(start[c], start[c + 1], neighbour, matrix, x, r)
-        _solve_column(depth, lower, inverse, c, r)
-        for a in range(3):
-            for k in range(depth):
-                x[c, a, k + 1] += r[a, k]
-
-
-@njit(cache=True, nogil=True)
-def sweep_all_backward(colour_start, start, neighbour, matrix, depth, lower, inverse, right, x):  # type: ignore[no-untyped-def]
-    """Gauss-Seidel on all columns, the last colour first: what `sweep_backward` does, in one call.
-
-    The forward sweep needs no such function: in the order of the columns, colours follow each other.
-    """
-    for n in range(colour_start.size - 2, -1, -1):
-        first, last = colour_start[n], colour_start[n + 1]
-        sweep_backward(first, last, start, neighbour, matrix, depth, lower, inverse, right, x)

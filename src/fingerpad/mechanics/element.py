@@ -47,6 +47,8 @@ N_COLUMNS = 6 * N_NODES
 """Numbers of a row of the packed tangent, six pairs of directions times eight nodes."""
 ONE = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 WITH_VOLUME = SECOND[:3, 3].copy()
+_0, _1, _2, _3, _4, _5 = (np.int64(number) for number in range(6))
+"""Typed numbers: Numba would compile a called function once more for each literal number."""
 
 
 def _shape_derivatives() -> FloatArray:
@@ -114,12 +116,12 @@ def _add_second_derivatives(d1, d2, d3, d4, first, b, b2, moduli):  # type: igno
     db, db2, product = small_array((6,)), small_array((6,)), small_array((6, 6))
     for k in range(6):
         db[k], db2[k] = b[k] - third * ONE[k], b2[k] - third_b2 * ONE[k]
-    _product_row(0, 0, 0, b, product)
-    _product_row(1, 1, 1, b, product)
-    _product_row(2, 2, 2, b, product)
-    _product_row(3, 0, 1, b, product)
-    _product_row(4, 1, 2, b, product)
-    _product_row(5, 0, 2, b, product)
+    _product_row(_0, _0, _0, b, product)
+    _product_row(_1, _1, _1, b, product)
+    _product_row(_2, _2, _2, b, product)
+    _product_row(_3, _0, _1, b, product)
+    _product_row(_4, _1, _2, b, product)
+    _product_row(_5, _0, _2, b, product)
     for m in range(6):
         with_db, with_db2 = d1 * db[m] + d2 * db2[m], d2 * db[m] + d3 * db2[m]
         with_one, with_b2 = d4 * (third_b2 * ONE[m] - b2[m]) / 3.0, -d4 * ONE[m] / 3.0
@@ -145,12 +147,12 @@ def _tangent_at_point(weight, moduli, tau, slopes, products):  # type: ignore[no
     pairs ij in the order of a tensor's components and the eight nodes of a pair side by side. Every pair is
     spelt out: in a loop over pairs the compiler would look up its indices and scatter what it writes.
     """
-    _pair_at_point(0, 0, 0, weight, moduli, tau, slopes, products)
-    _pair_at_point(1, 1, 1, weight, moduli, tau, slopes, products)
-    _pair_at_point(2, 2, 2, weight, moduli, tau, slopes, products)
-    _pair_at_point(3, 0, 1, weight, moduli, tau, slopes, products)
-    _pair_at_point(4, 1, 2, weight, moduli, tau, slopes, products)
-    _pair_at_point(5, 0, 2, weight, moduli, tau, slopes, products)
+    _pair_at_point(_0, _0, _0, weight, moduli, tau, slopes, products)
+    _pair_at_point(_1, _1, _1, weight, moduli, tau, slopes, products)
+    _pair_at_point(_2, _2, _2, weight, moduli, tau, slopes, products)
+    _pair_at_point(_3, _0, _1, weight, moduli, tau, slopes, products)
+    _pair_at_point(_4, _1, _2, weight, moduli, tau, slopes, products)
+    _pair_at_point(_5, _0, _2, weight, moduli, tau, slopes, products)
 
 
 @njit(cache=True, forceinline=True)
@@ -202,7 +204,8 @@ def _formula_points(law, gradients, jacobians, dilatation, logs, axes, derivativ
         principal_axes(b, logs[q], axes[q])
         logs[q, 3] = np.log(dilatation)
         differentiate(law[N_COEFFICIENTS:], count, logs[q], results)
-        derivatives[q] = factor * results[count - 1]
+        for k in range(CARRIED):
+            derivatives[q, k] = factor * results[count - 1, k]
         if law[8] != COUPLED:
             derivatives[q, 0] -= factor * volumetric
             derivatives[q, 4], derivatives[q, 14] = results[count - 1, 4], results[count - 1, 14]
@@ -264,6 +267,14 @@ def frame_scale(law, jacobian, dilatation):  # type: ignore[no-untyped-def]
     return jacobian ** (-2.0 / 3.0)
 
 
+@njit(cache=True, inline="always")
+def take_nodes(values, corners, taken):  # type: ignore[no-untyped-def]
+    """Write the values (n_nodes, 3) of the nodes of one element, (8, 3)."""
+    for a in range(N_NODES):
+        for i in range(3):
+            taken[a, i] = values[corners[a], i]
+
+
 @njit(cache=True)
 def gradients_at_points(reference, displacement, weights, slopes, gradient):  # type: ignore[no-untyped-def]
     """Write gradients of the shape functions and of the deformation at all points of one element.
@@ -295,7 +306,9 @@ def gradients_at_points(reference, displacement, weights, slopes, gradient):  # 
 
 
 @njit(cache=True)
-def element_system(reference, displacement, law, s, history, with_tangent, force, tangent):  # type: ignore[no-untyped-def]
+def element_system(  # type: ignore[no-untyped-def]
+    reference, displacement, law, s, history, with_tangent, force, tangent, formulas=True
+):
     """Energy, internal force and tangent of one element.
 
     Parameters
@@ -314,6 +327,8 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
         Overwritten with the internal force. [mN]
     tangent : array (8, 8, 3, 3)
         Overwritten with the tangent if wanted. [mN/mm]
+    formulas : bool or None
+        None if the law is a polynomial, see `has_formulas`.
 
     Returns
     -------
@@ -345,10 +360,10 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
                 dilatation[i, a] += weights[q] * jacobians[q] * slope
     mean_jacobian = present_volume / volume
     is_formula, is_coupled = law[8] != POLYNOMIAL, law[8] == COUPLED
-    if is_formula:
+    if formulas is not None and is_formula:
         logs, axes = small_array((N_POINTS, 4)), small_array((N_POINTS, 3, 3))
         derivatives = small_array((N_POINTS, CARRIED))
-        coupling, mixed = small_array((3, N_NODES)), small_array((6,))
+        coupling, mixed, with_volume = small_array((3, N_NODES)), small_array((6,)), small_array((3,))
         coupling[:] = 0.0
         volumetric = _formula_points(law, gradients, jacobians, mean_jacobian, logs, axes, derivatives)
         pressure, stiffness = 0.0, 0.0  # first the sums of dW/d(ln Jbar) and of its own slope
@@ -373,11 +388,11 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
         w = weights[q]
         frame = frame_scale(law, jacobians[q], mean_jacobian)
         push_forward(gradients[q], frame, history[q], relaxed)
-        if is_formula:
+        if formulas is not None and is_formula:
             energy = derivatives[q, 0]
             for k in range(6):
                 stress[k] = -relaxed[k]
-            add_in_axes(s * derivatives[q, 1:4], axes[q], stress)
+            add_in_axes(s, derivatives[q, 1:4], axes[q], stress)
         else:
             first, second = left_cauchy_green(gradients[q], frame, b, b2)
             energy, w1, w2 = _energy(law, first, second)
@@ -398,7 +413,7 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
             force[node, 2] += tau[5] * x + tau[4] * y + tau[2] * z
         if with_tangent:
             _elasticity(stress, deviator, spherical, moduli)
-            if is_formula:
+            if formulas is not None and is_formula:
                 _add_principal(s, derivatives[q], logs[q], axes[q], moduli)
                 for m in range(6):
                     for n in range(m):
@@ -406,10 +421,14 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
             else:
                 _add_polynomial(law, s, first, b, b2, moduli)
             _tangent_at_point(w, moduli, tau, present[q], products[q])
-            if is_coupled:  # d²W / dx d(ln Jbar) acts like a stress, whose forces are the coupling
+            if (
+                formulas is not None and is_coupled
+            ):  # d²W / dx d(ln Jbar) acts like a stress, whose forces are the coupling
                 for k in range(6):
                     mixed[k] = -2.0 / 3.0 * relaxed[k]
-                add_in_axes(s * derivatives[q][WITH_VOLUME], axes[q], mixed)
+                for a in range(3):
+                    with_volume[a] = derivatives[q, WITH_VOLUME[a]]
+                add_in_axes(s, with_volume, axes[q], mixed)
                 mean = (mixed[0] + mixed[1] + mixed[2]) / 3.0
                 for i in range(3):
                     for node in range(N_NODES):
@@ -426,7 +445,7 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
                         packed[node, N_NODES * m + other]
                         + stiffness * dilatation[i, node] * dilatation[j, other]
                     )
-                    if is_coupled:
+                    if formulas is not None and is_coupled:
                         value += coupling[i, node] * dilatation[j, other]
                         value += dilatation[i, node] * coupling[j, other]
                     tangent[node, other, i, j] = value
@@ -435,7 +454,7 @@ def element_system(reference, displacement, law, s, history, with_tangent, force
 
 
 @njit(cache=True)
-def element_state(reference, displacement, law, instantaneous, energies):  # type: ignore[no-untyped-def]
+def element_state(reference, displacement, law, instantaneous, energies, formulas=True):  # type: ignore[no-untyped-def]
     """Instantaneous relaxing stress and energies at the points of one element.
 
     Parameters
@@ -448,6 +467,8 @@ def element_state(reference, displacement, law, instantaneous, energies):  # typ
         Overwritten with S0 = F~^-1 dev(tau0) F~^-T at each point (see `frame_scale`). [kPa]
     energies : array (8, 2)
         Overwritten with the integration weight and the instantaneous energy W0 that may relax. [mm³, kPa]
+    formulas : bool or None
+        None if the law is a polynomial, see `has_formulas`.
 
     Returns
     -------
@@ -472,17 +493,17 @@ def element_state(reference, displacement, law, instantaneous, energies):  # typ
     change = mean_jacobian - 1.0
     volumetric = law[5] * change**2 + law[6] * change**4
     pressure = 2.0 * law[5] * change + 4.0 * law[6] * change**3
-    if is_formula:
+    if formulas is not None and is_formula:
         logs, axes = small_array((N_POINTS, 4)), small_array((N_POINTS, 3, 3))
         derivatives = small_array((N_POINTS, CARRIED))
         volumetric = _formula_points(law, gradients, jacobians, mean_jacobian, logs, axes, derivatives)
         pressure = 0.0 if is_coupled else derivatives[0, 4] / mean_jacobian
     for q in range(N_POINTS):
         invert(gradients[q], inverse)
-        if is_formula:
+        if formulas is not None and is_formula:
             energy = derivatives[q, 0]
             deviator[:] = 0.0
-            add_in_axes(derivatives[q, 1:4], axes[q], deviator)
+            add_in_axes(1.0, derivatives[q, 1:4], axes[q], deviator)
         else:
             first, second = left_cauchy_green(gradients[q], jacobians[q] ** (-2.0 / 3.0), b, b2)
             energy, w1, w2 = _energy(law, first, second)
@@ -491,7 +512,7 @@ def element_state(reference, displacement, law, instantaneous, energies):  # typ
         mean = (deviator[0] + deviator[1] + deviator[2]) / 3.0
         for k in range(3):
             deviator[k] -= mean
-            if is_coupled:  # not a deviator then
+            if formulas is not None and is_coupled:  # not a deviator then
                 deviator[k] += derivatives[q, 4]
         scale = 1.0 / frame_scale(law, jacobians[q], mean_jacobian)
         push_forward(inverse, scale, deviator, instantaneous[q])

@@ -254,6 +254,9 @@ def _product(left, right, result):  # type: ignore[no-untyped-def]
 def differentiate(operations, count, x, results):  # type: ignore[no-untyped-def]
     """Energy with gradient and Hessian with respect to x.
 
+    Numbers are copied one by one: for an assignment between arrays Numba compiles code that words an error
+    about their shapes, which takes seconds.
+
     Parameters
     ----------
     operations : array (4 n_operations,)
@@ -275,9 +278,11 @@ def differentiate(operations, count, x, results):  # type: ignore[no-untyped-def
         if code == VARIABLE:
             _start(int(operations[start + 1]), x, result)
         elif code == ADD:
-            result[:] = left + right
+            for k in range(CARRIED):
+                result[k] = left[k] + right[k]
         elif code == SUBTRACT:
-            result[:] = left - right
+            for k in range(CARRIED):
+                result[k] = left[k] - right[k]
         elif code == MULTIPLY:
             _product(left, right, result)
         elif code == DIVIDE:
@@ -285,9 +290,11 @@ def differentiate(operations, count, x, results):  # type: ignore[no-untyped-def
             _chain(right, inverse, -(inverse**2), 2.0 * inverse**3, spare)
             _product(left, spare, result)
         elif code == SCALE:
-            result[:] = constant * left
+            for k in range(CARRIED):
+                result[k] = constant * left[k]
         elif code == SHIFT:
-            result[:] = left
+            for k in range(CARRIED):
+                result[k] = left[k]
             result[0] += constant
         elif code == POWER:
             power = left[0] ** constant

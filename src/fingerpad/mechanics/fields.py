@@ -24,12 +24,13 @@ import numpy as np
 from numba import njit
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import even_chunks, in_chunks
 from fingerpad.geometry.mesh import Mesh
-from fingerpad.mechanics.element import N_NODES, N_POINTS, element_state, frame_scale, gradients_at_points
+from fingerpad.mechanics.element import N_NODES, N_POINTS, frame_scale, gradients_at_points, take_nodes
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
 from fingerpad.mechanics.tensors import COLUMN, INDEX, ROW, invert, push_forward
-from fingerpad.mechanics.viscoelastic import StressHistory
+from fingerpad.mechanics.viscoelastic import InstantaneousState, StressHistory, instantaneous_state
 
 
 @dataclass(frozen=True)
@@ -199,8 +200,7 @@ class Watched:
         before: FieldState,
         displacement_mm: FloatArray,
         history: StressHistory,
-        energies: FloatArray,
-        volumetric_kpa: FloatArray,
+        now: InstantaneousState,
         stored_kpa: FloatArray,
     ) -> FieldState:
         """State at the end of a step.
@@ -211,9 +211,9 @@ class Watched:
             State at its start.
         displacement_mm : array (n_nodes, 3)
             Displacements at its end. [mm]
-        history, energies, volumetric_kpa, stored_kpa
-            State, weights and energies W0, energy U and stored energy density of all elements of the mesh at
-            its end, as `viscoelastic` gives them.
+        history, now, stored_kpa
+            Relaxation, instantaneous state and stored energy density of all elements of the mesh at its end,
+            as `viscoelastic` gives them.
 
         Returns
         -------
@@ -222,7 +222,7 @@ class Watched:
         chosen, n = self.elements, len(self.elements)
         convected = history.instantaneous[chosen] - history.relaxed[:, chosen].sum(axis=0)
         gradient, stress = np.empty((n, 3, 3)), np.empty((n, 6))
-        pressure, dilatation, work = np.empty(n), np.empty(n), np.empty(n)
+        pressure, dilatation, work = now.pressure_kpa[chosen], now.dilatation[chosen], np.empty(n)
 
         def find(first: int, last: int) -> None:
             _mean_fields(
@@ -237,8 +237,8 @@ class Watched:
 
         in_chunks(find, even_chunks(n))
         work += 0.5 * (before.pressure_kpa + pressure) * (dilatation - before.dilatation)
-        weights, isochoric = energies[chosen, :, 0], energies[chosen, :, 1]
-        instantaneous = (weights * isochoric).sum(axis=1) / weights.sum(axis=1) + volumetric_kpa[chosen]
+        weights, isochoric = now.energies[chosen, :, 0], now.energies[chosen, :, 1]
+        instantaneous = (weights * isochoric).sum(axis=1) / weights.sum(axis=1) + now.volumetric_kpa[chosen]
         felt = Felt(gradient, stress, stored_kpa[chosen], instantaneous, before.felt.work_kpa + work)
         return FieldState(felt, displacement_mm, convected, pressure, dilatation)
 
@@ -265,15 +265,16 @@ def cauchy_stress(
         [kPa]
     """
     n = len(mesh.elements)
-    stress, gradient, pressure, dilatation = np.empty((n, 6)), np.empty((n, 3, 3)), np.empty(n), np.empty(n)
+    stress, gradient = np.empty((n, 6)), np.empty((n, 3, 3))
     # Copies can be written to, as those of `Watched` can: Numba compiles once for both.
     corners, layer = mesh.elements.copy(), mesh.layer.copy()
     convected = history.instantaneous - history.relaxed.sum(axis=0)
+    now = instantaneous_state(mesh.nodes_mm, mesh.elements, displacement_mm, mesh.layer, table)
 
     def find(first: int, last: int) -> None:
         _mean_fields(
             mesh.nodes_mm, corners, displacement_mm, layer, table.law, convected,
-            pressure, dilatation, gradient, stress, first, last,
+            now.pressure_kpa, now.dilatation, gradient, stress, first, last,
         )  # fmt: skip
 
     in_chunks(find, even_chunks(n))
@@ -285,16 +286,15 @@ def _mean_fields(  # type: ignore[no-untyped-def]
     nodes, corners, displacement, layer, law, convected, pressure, dilatation, mean_gradient, stress,
     first, last,
 ):  # fmt: skip
-    """Write pressure U'(Jbar), Jbar, the scaled mean gradient and the mean Cauchy stress of all elements."""
-    weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
-    gradients, inverse, spatial = np.empty((N_POINTS, 3, 3)), np.empty((3, 3)), np.empty(6)
-    unused, unused_energies = np.empty((N_POINTS, 6)), np.empty((N_POINTS, 2))
+    """Write the scaled mean gradient and the mean Cauchy stress of elements, given U'(Jbar) and Jbar."""
+    weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
+    gradients, inverse, spatial = small_array((N_POINTS, 3, 3)), small_array((3, 3)), small_array((6,))
+    reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3))
     for e in range(first, last):
-        material, moved = law[layer[e]], displacement[corners[e]]
-        volume = gradients_at_points(nodes[corners[e]], moved, weights, slopes, gradients)
-        _, pressure[e], dilatation[e] = element_state(
-            nodes[corners[e]], moved, material, unused, unused_energies
-        )
+        material = law[layer[e]]
+        take_nodes(nodes, corners[e], reference)
+        take_nodes(displacement, corners[e], moved)
+        volume = gradients_at_points(reference, moved, weights, slopes, gradients)
         mean_gradient[e], stress[e], spherical = 0.0, 0.0, 0.0
         for q in range(N_POINTS):
             scale = frame_scale(material, invert(gradients[q], inverse), dilatation[e])
@@ -311,7 +311,10 @@ def _mean_fields(  # type: ignore[no-untyped-def]
         hydrostatic = pressure[e] + (spherical / present_volume if material[8] == COUPLED else 0.0)
         for k in range(6):
             stress[e, k] = stress[e, k] / present_volume + (hydrostatic if k < 3 else 0.0)
-        mean_gradient[e] *= (dilatation[e] / invert(mean_gradient[e], inverse)) ** (1.0 / 3.0)
+        scale = (dilatation[e] / invert(mean_gradient[e], inverse)) ** (1.0 / 3.0)
+        for i in range(3):
+            for j in range(3):
+                mean_gradient[e, i, j] *= scale
 
 
 @njit(cache=True, nogil=True)
@@ -323,12 +326,16 @@ def _isochoric_work(  # type: ignore[no-untyped-def]
 
     By the trapezium over strain, not over time: for stress linear in strain it is exact in any step.
     """
-    weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
-    old, new, inverse = np.empty((N_POINTS, 3, 3)), np.empty((N_POINTS, 3, 3)), np.empty((3, 3))
+    weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
+    old, new, inverse = small_array((N_POINTS, 3, 3)), small_array((N_POINTS, 3, 3)), small_array((3, 3))
+    reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3))
     for e in range(first, last):
         material = law[layer[e]]
-        gradients_at_points(nodes[corners[e]], before[corners[e]], weights, slopes, old)
-        volume = gradients_at_points(nodes[corners[e]], now[corners[e]], weights, slopes, new)
+        take_nodes(nodes, corners[e], reference)
+        take_nodes(before, corners[e], moved)
+        gradients_at_points(reference, moved, weights, slopes, old)
+        take_nodes(now, corners[e], moved)
+        volume = gradients_at_points(reference, moved, weights, slopes, new)
         total = 0.0
         for q in range(N_POINTS):
             scale_old = frame_scale(material, invert(old[q], inverse), dilatation_before[e])

@@ -29,6 +29,15 @@ N_COEFFICIENTS = 11
 """Columns of `MaterialTable.law` before the operations of a formula."""
 
 
+def has_formulas(law: FloatArray) -> bool | None:
+    """Whether a `MaterialTable.law` has formulas: True, or None, for which kernels are compiled without them.
+
+    Numba leaves out a branch that depends on whether an argument is None. A press in which all laws are
+    polynomials does not compile what evaluates formulas.
+    """
+    return True if law.shape[1] > N_COEFFICIENTS else None
+
+
 @dataclass(frozen=True)
 class Prony:
     """Relaxation of the deviatoric stress: g(t) = 1 - sum g_i (1 - exp(-t / tau_i)).

@@ -25,9 +25,10 @@ import numpy as np
 from numba import njit
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import even_chunks, in_chunks
 from fingerpad.mechanics.assembly import Sparsity
-from fingerpad.mechanics.element import N_NODES, N_POINTS, gradients_at_points
+from fingerpad.mechanics.element import N_NODES, N_POINTS, gradients_at_points, take_nodes
 from fingerpad.mechanics.energy import CARRIED, differentiate
 from fingerpad.mechanics.materials import COUPLED, N_COEFFICIENTS, POLYNOMIAL
 from fingerpad.mechanics.tensors import invert
@@ -103,21 +104,28 @@ def _present_gradients(slopes, inverse, present):  # type: ignore[no-untyped-def
 
 @njit(cache=True, nogil=True)
 def _pressures(nodes, elements, displacement, layer, law, pressure, slope, first, last):  # type: ignore[no-untyped-def]
-    weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
-    gradients, inverse, present = np.empty((N_POINTS, 3, 3)), np.empty((3, 3)), np.empty((N_NODES, 3))
+    weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
+    gradients, inverse = small_array((N_POINTS, 3, 3)), small_array((3, 3))
+    present, reference, moved = (
+        small_array((N_NODES, 3)), small_array((N_NODES, 3)), small_array((N_NODES, 3)),
+    )  # fmt: skip
     for e in range(first, last):
-        volume = gradients_at_points(
-            nodes[elements[e]], displacement[elements[e]], weights, slopes, gradients
-        )
+        take_nodes(nodes, elements[e], reference)
+        take_nodes(displacement, elements[e], moved)
+        volume = gradients_at_points(reference, moved, weights, slopes, gradients)
         present_volume = 0.0
         slope[e] = 0.0
         for q in range(N_POINTS):
             jacobian = invert(gradients[q], inverse)
             present_volume += weights[q] * jacobian
             _present_gradients(slopes[q], inverse, present)
-            slope[e] += weights[q] * jacobian * present  # dv, first
+            for a in range(N_NODES):
+                for i in range(3):
+                    slope[e, a, i] += weights[q] * jacobian * present[a, i]  # dv, first
         pressure[e], stiffness = _volumetric_slopes(law[layer[e]], present_volume / volume)
-        slope[e] *= stiffness / volume
+        for a in range(N_NODES):
+            for i in range(3):
+                slope[e, a, i] *= stiffness / volume
 
 
 def exchange_pressure(
@@ -156,13 +164,16 @@ def exchange_pressure(
 @njit(cache=True, nogil=True)
 def _exchange_chunk(nodes, elements, displacement, change, position, blocks, first, last):  # type: ignore[no-untyped-def]
     """Add the elements from `first` up to `last`; each block is written once per element."""
-    weights, slopes = np.empty(N_POINTS), np.empty((N_POINTS, N_NODES, 3))
-    gradients, inverse, g = np.empty((N_POINTS, 3, 3)), np.empty((3, 3)), np.empty((N_NODES, 3))
-    sums = np.empty((N_NODES, N_NODES, 3))
+    weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
+    gradients, inverse = small_array((N_POINTS, 3, 3)), small_array((3, 3))
+    g, reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3)), small_array((N_NODES, 3))
+    sums = small_array((N_NODES, N_NODES, 3))
     for e in range(first, last):
         if change[e] == 0.0:
             continue
-        gradients_at_points(nodes[elements[e]], displacement[elements[e]], weights, slopes, gradients)
+        take_nodes(nodes, elements[e], reference)
+        take_nodes(displacement, elements[e], moved)
+        gradients_at_points(reference, moved, weights, slopes, gradients)
         sums[:] = 0.0
         for q in range(N_POINTS):
             factor = change[e] * weights[q] * invert(gradients[q], inverse)

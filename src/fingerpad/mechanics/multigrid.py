@@ -22,7 +22,7 @@ import numpy as np
 from numba import njit
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.core.threads import current_threads, in_chunks
+from fingerpad.core.threads import Chunk, current_threads, in_chunks
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.columns import (
     ColumnGraph,
@@ -33,9 +33,7 @@ from fingerpad.mechanics.columns import (
     multiply,
     residual_after_forward,
     round_matrix,
-    sweep_all_backward,
-    sweep_backward,
-    sweep_forward,
+    sweep,
     take_blocks,
     to_columns,
     to_nodes,
@@ -222,14 +220,14 @@ class ColumnGrid:
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def _galerkin(first, last, part_start, part, part_weight, fine, coarse):  # type: ignore[no-untyped-def]
-    """Write every coarse pair as the weighted sum of its fine ones; matrices (n_pairs, numbers of a pair)."""
-    for pair in range(first, last):
-        coarse[pair] = 0.0
-        for n in range(part_start[pair], part_start[pair + 1]):
-            weight, source = part_weight[n], part[n]
+def _restrict(first, last, start, member, weights, fine, coarse):  # type: ignore[no-untyped-def]
+    """Write every coarse row as the weighted sum of its fine rows; vectors, or matrices pair by pair."""
+    for row in range(first, last):
+        coarse[row] = 0.0
+        for n in range(start[row], start[row + 1]):
+            weight, source = weights[n], member[n]
             for k in range(fine.shape[1]):
-                coarse[pair, k] += weight * fine[source, k]
+                coarse[row, k] += weight * fine[source, k]
 
 
 @njit(cache=True, nogil=True)
@@ -237,24 +235,11 @@ def _hold(first, last, start, neighbour, free, matrix):  # type: ignore[no-untyp
     """Set rows and columns of held unknowns to zero."""
     for c in range(first, last):
         for pair in range(start[c], start[c + 1]):
-            for s in range(3):
-                for a in range(3):
-                    for b in range(3):
+            for s in range(matrix.shape[1]):  # not range(3): the compiler would unroll these loops
+                for a in range(matrix.shape[2]):
+                    for b in range(matrix.shape[3]):
                         for k in range(matrix.shape[4]):
                             matrix[pair, s, a, b, k] *= free[c, a, k + 1] * free[neighbour[pair], b, k + s]
-
-
-@njit(cache=True, nogil=True, fastmath={"contract"})
-def _restrict(first, last, child_start, child, child_weight, fine, shrink, coarse):  # type: ignore[no-untyped-def]
-    """Set coarse to P' fine, then scale it; vectors (n_columns, numbers of a column)."""
-    for c in range(first, last):
-        coarse[c] = 0.0
-        for n in range(child_start[c], child_start[c + 1]):
-            weight, source = child_weight[n], child[n]
-            for k in range(fine.shape[1]):
-                coarse[c, k] += weight * fine[source, k]
-        for k in range(fine.shape[1]):
-            coarse[c, k] *= shrink[c, k]
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
@@ -292,8 +277,8 @@ class _Level:
     """
 
     def __init__(self, graph: ColumnGraph, colour_start: np.ndarray, free: SingleArray, depth: int):
-        self.graph, self.colour_start, self.free, self.depth = graph, colour_start, free, depth
-        self.most_of_a_colour = int(np.diff(colour_start).max())
+        self.graph, self.free, self.depth = graph, free, depth
+        self.colours: list[Chunk] = list(pairwise(colour_start.tolist()))
         self.own = graph.own.astype(np.int32)
         self.matrix = self.swept = graph.zeros(depth)
         self.scale = self.shrink = free
@@ -320,31 +305,24 @@ class _Level:
             _share(round_matrix, 0, self.n_columns, *pairs, self.matrix, self.shrink, self.swept)
         _share(factor_columns, 0, self.n_columns, self.own, self.swept, self.depth, self.lower, self.inverse)
 
-    @property
-    def is_shared(self) -> bool:
-        """Whether a sweep is worth more than one thread, colour by colour."""
-        return _parts(self.most_of_a_colour) > 1
-
     def sweep_forward(self) -> None:
         """Write `x` for `right`, and the `residual`, not scaled."""
-        pattern = self.graph.start, self.own, self.graph.neighbour, self.swept
-        rest = *pattern, self.depth, self.lower, self.inverse, self.right, self.x
-        if self.is_shared:
-            for colour in pairwise(self.colour_start.tolist()):
-                _share(sweep_forward, *colour, *rest)
-        else:
-            sweep_forward(0, self.n_columns, *rest)
-        _share(residual_after_forward, 0, self.n_columns, *pattern, self.x, self.scale, self.residual)
+        self._sweep(self.colours, self.graph.start[:-1], self.own, keeps=False)
+        _share(
+            residual_after_forward, 0, self.n_columns, self.graph.start, self.own, self.graph.neighbour,
+            self.swept, self.x, self.scale, self.residual,
+        )  # fmt: skip
 
     def sweep_backward(self) -> None:
         """Improve `x`."""
-        pattern = self.graph.start, self.graph.neighbour, self.swept
-        rest = *pattern, self.depth, self.lower, self.inverse, self.right, self.x
-        if self.is_shared:
-            for colour in reversed(list(pairwise(self.colour_start.tolist()))):
-                _share(sweep_backward, *colour, *rest)
-        else:
-            sweep_all_backward(self.colour_start, *rest)
+        self._sweep(self.colours[::-1], self.graph.start[:-1], self.graph.start[1:], keeps=True)
+
+    def _sweep(self, colours: list[Chunk], begin: np.ndarray, end: np.ndarray, keeps: bool) -> None:
+        for colour in colours:
+            _share(
+                sweep, *colour, begin, end, self.graph.neighbour, self.swept, self.depth, self.lower,
+                self.inverse, self.right, self.x, keeps,
+            )  # fmt: skip
 
 
 def _by_colour(graph: ColumnGraph) -> tuple[np.ndarray, np.ndarray]:
@@ -439,7 +417,7 @@ class Multigrid:
         for n, transfer in enumerate(self._transfers):
             fine, coarse = self._levels[n], self._levels[n + 1]
             _share(
-                _galerkin, 0, len(coarse.matrix), transfer.part_start, transfer.part, transfer.part_weight,
+                _restrict, 0, len(coarse.matrix), transfer.part_start, transfer.part, transfer.part_weight,
                 _rows(fine.matrix), _rows(coarse.matrix),
             )  # fmt: skip
             _share(
@@ -501,8 +479,9 @@ class Multigrid:
         level.sweep_forward()
         _share(
             _restrict, 0, coarse.n_columns, transfer.child_start, transfer.child, transfer.child_weight,
-            _rows(level.residual), _rows(coarse.shrink), _rows(coarse.right),
+            _rows(level.residual), _rows(coarse.right),
         )  # fmt: skip
+        coarse.right *= coarse.shrink
         self._cycle(n + 1)
         coarse.x *= coarse.shrink
         _share(

@@ -198,24 +198,15 @@ class _Press:
         guess = start.found.displacement_mm + (step_ms * start.velocity_mm_per_ms if ramps else 0.0)
         found = find_equilibrium(self.body, load, self.solver, guess, start.found.multipliers_mn, self.newton)
         self.newton_steps += found.iterations
-        instantaneous, energies, volumetric = instantaneous_state(
-            mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, table
-        )
-        spent = dissipated_energy(
-            mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, table, step_ms,
-            start.history, instantaneous, energies,
-        )  # fmt: skip
-        history = start.history.advanced(load.step, mesh.layer, instantaneous)
-        sed_kpa = stored_energy_density(
-            mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, table,
-            history, energies, volumetric,
-        )  # fmt: skip
+        where = mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, table
+        now = instantaneous_state(*where)
+        spent = dissipated_energy(*where, step_ms, start.history, now)
+        history = start.history.advanced(load.step, mesh.layer, now.stress_kpa)
+        sed_kpa = stored_energy_density(*where, history, now)
         velocity = (found.displacement_mm - start.found.displacement_mm) / step_ms
         depth_rate = (found.depth_mm - start.found.depth_mm) / step_ms
-        fields = self.watched.after(
-            start.fields, found.displacement_mm, history, energies, volumetric, sed_kpa
-        )  # fmt: skip
-        stored = float(energies[:, :, 0].sum(axis=1) @ sed_kpa)
+        fields = self.watched.after(start.fields, found.displacement_mm, history, now, sed_kpa)
+        stored = float(now.energies[:, :, 0].sum(axis=1) @ sed_kpa)
         ledger = (*start.ledger, self.entry(start, target_ms, found, stored, spent))
         return _Moment(target_ms, found, velocity, depth_rate, history, sed_kpa, fields, ledger)
 

@@ -19,7 +19,7 @@ SWEEPS = 12
 """Sweeps of Jacobi's method; four or five reach round-off."""
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def invert(matrix, inverse):  # type: ignore[no-untyped-def]
     """Write the inverse of a 3x3 matrix and return its determinant."""
     a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
@@ -54,7 +54,7 @@ def left_cauchy_green(gradient, scale, b, b2):  # type: ignore[no-untyped-def]
     return first, second
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def push_forward(gradient, scale, reference, spatial):  # type: ignore[no-untyped-def]
     """Write scale F T F' of a symmetric reference tensor T."""
     product = small_array((3, 3))  # F T
@@ -107,8 +107,9 @@ def principal_axes(b, logs, axes):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, inline="always")
-def add_in_axes(values, axes, tensor):  # type: ignore[no-untyped-def]
-    """Add sum_a values_a n_a x n_a."""
+def add_in_axes(factor, values, axes, tensor):  # type: ignore[no-untyped-def]
+    """Add sum_a factor values_a n_a x n_a."""
     for a in range(3):
+        value = factor * values[a]
         for k in range(6):
-            tensor[k] += values[a] * axes[a, ROW[k]] * axes[a, COLUMN[k]]
+            tensor[k] += value * axes[a, ROW[k]] * axes[a, COLUMN[k]]

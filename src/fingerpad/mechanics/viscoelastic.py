@@ -13,14 +13,16 @@ H is known before the step, so the step has a potential, and its tangent is exac
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import even_chunks, in_chunks
-from fingerpad.mechanics.element import N_POINTS, element_state, relaxing_norms
-from fingerpad.mechanics.materials import MaterialTable
+from fingerpad.mechanics.element import N_NODES, N_POINTS, element_state, relaxing_norms, take_nodes
+from fingerpad.mechanics.materials import MaterialTable, has_formulas
 
 
 @dataclass(frozen=True)
@@ -122,11 +124,15 @@ def _relax(new, old, decay, layer, now, before, relaxed_before, relaxed, first, 
 
 @njit(cache=True, nogil=True)
 def _states(  # type: ignore[no-untyped-def]
-    nodes, elements, displacement, layer, law, instantaneous, energies, volumetric, first, last
-):
+    nodes, elements, displacement, layer, law, formulas, stress, energies, volumetric, pressure, dilatation,
+    first, last,
+):  # fmt: skip
+    reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3))
     for e in range(first, last):
-        volumetric[e], _, _ = element_state(
-            nodes[elements[e]], displacement[elements[e]], law[layer[e]], instantaneous[e], energies[e]
+        take_nodes(nodes, elements[e], reference)
+        take_nodes(displacement, elements[e], moved)
+        volumetric[e], pressure[e], dilatation[e] = element_state(
+            reference, moved, law[layer[e]], stress[e], energies[e], formulas
         )
 
 
@@ -137,6 +143,7 @@ def _stored_energy(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     n_terms = relaxed.shape[0]
     tensors, norms = np.empty((n_terms + 1, N_POINTS, 6)), np.empty((n_terms + 1, N_POINTS))
+    reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3))
     for e in range(first, last):
         for q in range(N_POINTS):
             for k in range(6):
@@ -144,7 +151,9 @@ def _stored_energy(  # type: ignore[no-untyped-def]
                 for term in range(n_terms):
                     whole = shares[layer[e], term] * instantaneous[e, q, k]
                     tensors[term + 1, q, k] = whole - relaxed[term, e, q, k]
-        relaxing_norms(nodes[elements[e]], displacement[elements[e]], law[layer[e]], tensors, norms)
+        take_nodes(nodes, elements[e], reference)
+        take_nodes(displacement, elements[e], moved)
+        relaxing_norms(reference, moved, law[layer[e]], tensors, norms)
         total, volume = 0.0, 0.0
         for q in range(N_POINTS):
             share = law[layer[e], 7]
@@ -156,20 +165,43 @@ def _stored_energy(  # type: ignore[no-untyped-def]
         stored[e] = total / volume + volumetric[e]
 
 
+class InstantaneousState(NamedTuple):
+    """What the deformation alone determines, without relaxation.
+
+    Parameters
+    ----------
+    stress_kpa : array (n_elements, 8, 6)
+        S0, the instantaneous stress that may relax, at each Gauss point. [kPa]
+    energies : array (n_elements, 8, 2)
+        Integration weight and instantaneous energy W0 that may relax. [mm³, kPa]
+    volumetric_kpa, pressure_kpa : array (n_elements,)
+        U(Jbar) and U'(Jbar); 0 for laws that couple shape and volume, whose whole stress is in S0. [kPa]
+    dilatation : array (n_elements,)
+        Jbar.
+    """
+
+    stress_kpa: FloatArray
+    energies: FloatArray
+    volumetric_kpa: FloatArray
+    pressure_kpa: FloatArray
+    dilatation: FloatArray
+
+
 def instantaneous_state(
     nodes: FloatArray, elements: np.ndarray, displacement: FloatArray, layer: np.ndarray, table: MaterialTable
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """S0 (n_elements, 8, 6), weights and energies W0 (n_elements, 8, 2), volumetric energy (n_elements,)."""
+) -> InstantaneousState:
+    """State of all elements at given displacements (n_nodes, 3). [mm]"""
     n = len(elements)
-    instantaneous, energies, volumetric = np.empty((n, N_POINTS, 6)), np.empty((n, N_POINTS, 2)), np.empty(n)
+    state = InstantaneousState(
+        np.empty((n, N_POINTS, 6)), np.empty((n, N_POINTS, 2)), np.empty(n), np.empty(n), np.empty(n)
+    )
+    formulas = has_formulas(table.law)
 
     def find(first: int, last: int) -> None:
-        _states(
-            nodes, elements, displacement, layer, table.law, instantaneous, energies, volumetric, first, last
-        )
+        _states(nodes, elements, displacement, layer, table.law, formulas, *state, first, last)
 
     in_chunks(find, even_chunks(n))
-    return instantaneous, energies, volumetric
+    return state
 
 
 def stored_energy_density(
@@ -179,8 +211,7 @@ def stored_energy_density(
     layer: np.ndarray,
     table: MaterialTable,
     history: StressHistory,
-    energies: FloatArray,
-    volumetric: FloatArray,
+    now: InstantaneousState,
 ) -> FloatArray:
     """Strain energy density that the springs hold now, mean over each element. [kPa]
 
@@ -201,7 +232,7 @@ def stored_energy_density(
     def find(first: int, last: int) -> None:
         _stored_energy(
             nodes, elements, displacement, layer, table.law, table.shares,
-            history.instantaneous, history.relaxed, energies, volumetric, stored, first, last,
+            history.instantaneous, history.relaxed, now.energies, now.volumetric_kpa, stored, first, last,
         )  # fmt: skip
 
     in_chunks(find, even_chunks(len(elements)))

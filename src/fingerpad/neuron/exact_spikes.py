@@ -299,7 +299,8 @@ def _by_neuron(found: FloatArray, finder: np.ndarray, n_neurons: int) -> tuple[F
     offsets = np.zeros(n_neurons + 1, dtype=np.int64)
     for neuron in finder:
         offsets[neuron + 1] += 1
-    offsets = np.cumsum(offsets)
+    for neuron in range(n_neurons):
+        offsets[neuron + 1] += offsets[neuron]
     place = offsets[:-1].copy()
     trains = np.empty(found.size)
     for spike in range(found.size):
