@@ -23,7 +23,7 @@ from fingerpad.psychophysics.encoding import distance, gradient_sum, neighbour_p
 from fingerpad.psychophysics.noise_fit import expected_hit_rates, fit_noise_sigma
 from fingerpad.psychophysics.noisy_responses import (
     LARGEST_SESSION,
-    SESSION,
+    TRIALS_PER_SESSION,
     noisy_gradient_sums,
     noisy_responses,
     session_trials,
@@ -76,7 +76,7 @@ def normal_beyond(point, mean, sd, side):
 @pytest.mark.parametrize("session", [0, 3])
 def test_gradient_sum_follows_the_printed_steps(session):
     values, sigma, plan, seed = bumps([287.0, 310.0, 260.0]), 0.05, SMALL, 5
-    begin = session * SESSION
+    begin = session * TRIALS_PER_SESSION
     fitted = []
     for distribution in range(plan.distributions):  # (f)
         sums = [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.inference.fitting import Fit, Step, best_of
+from fingerpad.inference.fitting import Fit, FitStep, best_of
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.least_squares import LeastSquares
 
@@ -127,7 +127,7 @@ def test_only_the_chosen_observations_are_fitted() -> None:
 
 def test_the_first_of_equal_attempts_is_taken() -> None:
     attempts = tuple(
-        Fit(np.array([value]), 0.5, 7, 0.25, (Step(np.array([value]), 0.5),)) for value in (1.0, 2.0)
+        Fit(np.array([value]), 0.5, 7, 0.25, (FitStep(np.array([value]), 0.5),)) for value in (1.0, 2.0)
     )
     best = best_of(attempts)
     assert (best.start, best.parameters.tolist(), best.n_evaluations, best.seconds) == (0, [1.0], 14, 0.5)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.inference.fitting.profile_likelihood import Profiles, profile_likelihoods
+from fingerpad.inference.fitting.profile_likelihood import ProfileLikelihoods, profile_likelihoods
 
 COVARIANCE = np.array([[1.0, 1.2], [1.2, 4.0]])
 CENTRE = np.array([2.0, -3.0])
@@ -17,11 +17,11 @@ def normal(points: np.ndarray) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def found() -> Profiles:
+def found() -> ProfileLikelihoods:
     return profile_likelihoods(normal, [2.5, -2.0], [1.0, 2.0], NAMES)
 
 
-def test_a_normal_likelihood_has_its_marginal_intervals(found: Profiles) -> None:
+def test_a_normal_likelihood_has_its_marginal_intervals(found: ProfileLikelihoods) -> None:
     np.testing.assert_allclose(found.best, CENTRE, atol=0.1)
     assert found.log_likelihood == pytest.approx(5.0, abs=0.01)
     for index, profile in enumerate(found.profiles):
@@ -39,7 +39,7 @@ def test_a_normal_likelihood_has_its_marginal_intervals(found: Profiles) -> None
         assert (np.diff(profile.values) > 0.0).all()
 
 
-def test_the_level_sets_the_width(found: Profiles) -> None:
+def test_the_level_sets_the_width(found: ProfileLikelihoods) -> None:
     narrow = profile_likelihoods(normal, [2.5, -2.0], [1.0, 2.0], NAMES, level=0.68)
     widths = [np.diff(profiles.profiles[0].interval)[0] for profiles in (narrow, found)]
     assert widths[0] / widths[1] == pytest.approx(0.9945 / 1.96, rel=0.05)
@@ -92,7 +92,7 @@ def test_several_starts_find_what_a_neighbour_does_not() -> None:
     np.testing.assert_allclose(many.interval, [-0.5 - 1.96, 1.5 + 1.96], atol=0.1)
 
 
-def test_threads_and_repetition_change_nothing(found: Profiles) -> None:
+def test_threads_and_repetition_change_nothing(found: ProfileLikelihoods) -> None:
     again = profile_likelihoods(normal, [2.5, -2.0], [1.0, 2.0], NAMES)
     assert again.n_evaluations == found.n_evaluations
     for first, second in zip(found.profiles, again.profiles, strict=True):

@@ -21,7 +21,7 @@ from fingerpad.psychophysics import (
 )
 from fingerpad.psychophysics.counts import log_probability
 from fingerpad.psychophysics.functions import SIGMOIDS
-from fingerpad.psychophysics.maximum_likelihood import _gradient, maximise
+from fingerpad.psychophysics.maximum_likelihood import _gradient, maximise_likelihood
 from fingerpad.psychophysics.psychometric import working_point
 from fingerpad.psychophysics.uncertainty import weighted_quantiles
 
@@ -161,8 +161,8 @@ def test_given_parameters_stay_as_given():
 def test_sets_are_fitted_alike_alone_and_together():
     counts = judged(TRUTH, 6)
     model = fit_psychometric(LEVELS, counts[0], [TRIALS] * 7).model
-    together, _ = maximise(model, counts)
-    alone = np.concatenate([maximise(model, one[np.newaxis])[0] for one in counts])
+    together, _ = maximise_likelihood(model, counts)
+    alone = np.concatenate([maximise_likelihood(model, one[np.newaxis])[0] for one in counts])
     assert (together == alone).all()
 
 

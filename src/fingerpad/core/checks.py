@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from fingerpad.core.errors import InputError
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 _Kind = TypeVar("_Kind")
 
 

@@ -18,13 +18,11 @@ from enum import IntEnum
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from fingerpad.core.checks import FloatArray, instance, whole
+from fingerpad.core.checks import FloatArray, IntArray, instance, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.philox import WORDS, four_normals, four_uniforms
 
-IntArray = NDArray[np.int64]
 Numbers = int | Sequence[int] | np.ndarray
 """Trials or receptors: their numbers, or their count, numbered from 0."""
 

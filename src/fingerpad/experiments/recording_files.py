@@ -17,7 +17,7 @@ from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.units import MS_PER_S
 from fingerpad.experiments.stimuli import Stimuli, TactileStimulus
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
-from fingerpad.inference.tables import Line, read_csv
+from fingerpad.inference.tables import TableRow, read_csv
 
 RATES = tuple(f"{phase}_rate_hz" for phase in PHASES)
 SPIKES = "spike_times_ms"
@@ -107,7 +107,7 @@ def read_recordings(path: Path, stimuli: Stimuli, unit: int | None = None) -> Re
     return Recorded(spikes, found, memberships, presentations, after)
 
 
-def _check_columns(path: Path, column: str, first: Line) -> None:
+def _check_columns(path: Path, column: str, first: TableRow) -> None:
     given = first.entries
     if column not in given:
         raise InputError(f"{path} must have the column {column}: it has {', '.join(given)}.")
@@ -120,13 +120,13 @@ def _check_columns(path: Path, column: str, first: Line) -> None:
         raise InputError(f"{path} has {DURATION}, which belongs to {SPIKES}: leave it out.")
 
 
-def _presented(line: Line, stimuli: Stimuli) -> tuple[str, TactileStimulus]:
+def _presented(line: TableRow, stimuli: Stimuli) -> tuple[str, TactileStimulus]:
     entry = line.text(stimuli.column)
     with line.placed():
         return stimuli.named(entry)
 
 
-def _mean_rates(lines: Sequence[Line], names: Sequence[str], source: str) -> RateRecordings:
+def _mean_rates(lines: Sequence[TableRow], names: Sequence[str], source: str) -> RateRecordings:
     unique = tuple(dict.fromkeys(names))
     means: dict[str, FloatArray | None] = dict.fromkeys(RATES)
     for column in RATES:
@@ -138,7 +138,7 @@ def _mean_rates(lines: Sequence[Line], names: Sequence[str], source: str) -> Rat
 
 
 def _spikes(
-    lines: Sequence[Line], presented: Sequence[tuple[str, TactileStimulus]], source: str
+    lines: Sequence[TableRow], presented: Sequence[tuple[str, TactileStimulus]], source: str
 ) -> tuple[SpikeRecordings, int]:
     """Trains until the motion or the recording ends, and the number of spikes after the motion."""
     trains, durations, after = [], [], 0
@@ -159,7 +159,7 @@ def _spikes(
     return recordings, after
 
 
-def _spike_times(line: Line) -> FloatArray:
+def _spike_times(line: TableRow) -> FloatArray:
     """Spike times of a presentation, none if the entry is empty; checked for their order."""
     entry = line.entries[SPIKES]
     with line.placed():
@@ -173,9 +173,9 @@ def _spike_times(line: Line) -> FloatArray:
     return times
 
 
-def _memberships(path: Path, lines: Sequence[Line], names: Sequence[str]) -> NDArray[np.int64]:
+def _memberships(path: Path, lines: Sequence[TableRow], names: Sequence[str]) -> NDArray[np.int64]:
     """Fold of each stimulus from 0; every fold is a set of stimuli, so that none is fitted and judged."""
-    first: dict[str, tuple[int, Line]] = {}
+    first: dict[str, tuple[int, TableRow]] = {}
     for line, name in zip(lines, names, strict=True):
         fold = line.number(FOLD)
         if fold != int(fold) or fold < 1:
@@ -197,7 +197,7 @@ def _memberships(path: Path, lines: Sequence[Line], names: Sequence[str]) -> NDA
     return folds - 1
 
 
-def _nwb_lines(path: Path, column: str, unit: int | None) -> list[Line]:
+def _nwb_lines(path: Path, column: str, unit: int | None) -> list[TableRow]:
     """Trials of an NWB file as lines of a table, with the spikes of one unit."""
     if not path.is_file():
         raise InputError(f"{path} must be a file that can be read: there is none.")
@@ -219,7 +219,7 @@ def _nwb_lines(path: Path, column: str, unit: int | None) -> list[Line]:
         raise InputError(f"{path} cannot be read as NWB ({said}): check it with nwbinspector.") from error
 
 
-def _trials(path: Path, trials: Any, units: Any, column: str, unit: int | None) -> list[Line]:
+def _trials(path: Path, trials: Any, units: Any, column: str, unit: int | None) -> list[TableRow]:
     if trials is None or not len(trials):
         raise InputError(f"{path} must have a table of trials with start_time and {column}: it has none.")
     if column not in trials.colnames:
@@ -236,7 +236,7 @@ def _trials(path: Path, trials: Any, units: Any, column: str, unit: int | None) 
         }
         if FOLD in trials.colnames:
             entries[FOLD] = trials[FOLD][trial]
-        lines.append(Line(f"{path}, trial {trials.id[trial]}", entries))
+        lines.append(TableRow(f"{path}, trial {trials.id[trial]}", entries))
     return lines
 
 

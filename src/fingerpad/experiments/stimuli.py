@@ -14,7 +14,7 @@ from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.geometry.indenters import Bar, Indenter
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Stimulus
 from fingerpad.geometry.names import INDENTERS, MOTION_UNITS, SIZE_UNITS
-from fingerpad.inference.tables import Line, read_csv
+from fingerpad.inference.tables import TableRow, read_csv
 
 PLACE = {"x_mm": "mm", "z_mm": "mm", "tilt_deg": "degrees", "spin_deg": "degrees"}
 COLUMNS = ("stimulus", "indenter", *SIZE_UNITS, *MOTION_UNITS, *PLACE)
@@ -161,7 +161,7 @@ def read_stimuli(path: Path) -> ListedStimuli:
     return ListedStimuli(stimuli, str(path))
 
 
-def _stimulus(line: Line) -> TactileStimulus:
+def _stimulus(line: TableRow) -> TactileStimulus:
     """Build the stimulus that a line describes."""
     kind = line.text("indenter")
     with line.placed():
@@ -179,12 +179,12 @@ def _stimulus(line: Line) -> TactileStimulus:
         )
 
 
-def _given(line: Line, columns: Mapping[str, str]) -> dict[str, Any]:
+def _given(line: TableRow, columns: Mapping[str, str]) -> dict[str, Any]:
     """Numbers of those columns that are not empty."""
     return {column: line.number(column, unit) for column, unit in columns.items() if line.has(column)}
 
 
-def _yaml_lines(path: Path) -> list[Line]:
+def _yaml_lines(path: Path) -> list[TableRow]:
     """Entries of a YAML list as lines of a table."""
     content = read_yaml(read_text(path), str(path))
     if not isinstance(content, list) or not content:
@@ -197,5 +197,5 @@ def _yaml_lines(path: Path) -> list[Line]:
         for key in entry:
             if key not in COLUMNS:
                 raise InputError(f"{place}: {key!r} is unknown, only {', '.join(COLUMNS)} can be.")
-        lines.append(Line(place, entry))
+        lines.append(TableRow(place, entry))
     return lines

@@ -13,13 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, one_of
+from fingerpad.core.checks import FloatArray, IntArray, one_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
 from fingerpad.export import cards
 from fingerpad.export.cards import INDENTER, SKIN
 from fingerpad.export.job import CONTACT_KPA_PER_MM, Job, Phase
-from fingerpad.geometry.mesh import IntArray
 from fingerpad.mechanics.laws import Hyperfoam, Law
 from fingerpad.mechanics.materials import Material
 

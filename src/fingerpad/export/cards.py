@@ -6,10 +6,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
 from fingerpad.export.job import Job
-from fingerpad.geometry.mesh import IntArray
 from fingerpad.mechanics.laws import Hyperfoam, Ogden, Polynomial
 from fingerpad.mechanics.materials import Material
 

@@ -13,12 +13,11 @@ from xml.etree import ElementTree as xml
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
 from fingerpad.export.cards import FIXED, GRIPPED, INDENTER, SKIN, SYMMETRY, digits
 from fingerpad.export.job import CONTACT_KPA_PER_MM, Job
-from fingerpad.geometry.mesh import IntArray
 from fingerpad.mechanics.laws import Ogden, Polynomial
 from fingerpad.mechanics.materials import Material
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad import __version__
-from fingerpad.core.checks import FloatArray, float_array, increasing, instance
+from fingerpad.core.checks import FloatArray, IntArray, float_array, increasing, instance
 from fingerpad.core.errors import InputError
 from fingerpad.export.outline import Outline, RigidMesh, outline_of, rigid_mesh
 from fingerpad.geometry.indenters import Indenter
-from fingerpad.geometry.mesh import LAYERS, IntArray, Mesh
+from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import Placement, check_friction
 from fingerpad.mechanics.materials import Material

@@ -13,11 +13,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, positive
+from fingerpad.core.checks import FloatArray, IntArray, positive
 from fingerpad.core.errors import InputError
 from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
-from fingerpad.geometry.mesh import IntArray
 
 Point = tuple[float, float]
 

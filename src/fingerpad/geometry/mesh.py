@@ -12,15 +12,13 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from fingerpad.core.checks import FloatArray, float_array, increasing, whole
+from fingerpad.core.checks import FloatArray, IntArray, float_array, increasing, whole
 from fingerpad.core.errors import InputError
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading, graded_lines, lines_along
-
-IntArray = NDArray[np.int64]
 
 LAYERS = ("stratum corneum", "living epidermis", "dermis", "subcutis")
 _LIVING_EPIDERMIS = 1

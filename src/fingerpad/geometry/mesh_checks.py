@@ -11,8 +11,9 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fingerpad.core.checks import IntArray
 from fingerpad.core.errors import InputError
-from fingerpad.geometry.mesh import CORNERS, LAYERS, IntArray, Mesh
+from fingerpad.geometry.mesh import CORNERS, LAYERS, Mesh
 from fingerpad.geometry.mesh_quality import element_place, jacobian_at_gauss, rigid_motions
 
 PLANE_TOLERANCE = 1e-6

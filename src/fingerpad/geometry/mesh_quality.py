@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
-from fingerpad.geometry.mesh import CORNERS, LAYERS, IntArray, Mesh
+from fingerpad.core.checks import FloatArray, IntArray
+from fingerpad.geometry.mesh import CORNERS, LAYERS, Mesh
 
 
 def _jacobians(mesh: Mesh, elements: IntArray, points: FloatArray) -> FloatArray:

@@ -13,12 +13,11 @@ from typing import Protocol
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, not_negative
+from fingerpad.core.checks import FloatArray, IntArray, not_negative
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.core.threads import in_blocks
 from fingerpad.data import neuron, protocol
-from fingerpad.inference.fitting.problem import IntArray
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.exact_spikes import exact_trains

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, not_negative
+from fingerpad.core.checks import FloatArray, IntArray, not_negative
 from fingerpad.core.errors import InputError
 from fingerpad.data import protocol
 from fingerpad.inference.fitting import fractional_sum_of_squares
-from fingerpad.inference.fitting.problem import IntArray
 from fingerpad.inference.rate_model import RateModel, Rates, SmoothRateModel
 from fingerpad.inference.recordings import RateRecordings
 

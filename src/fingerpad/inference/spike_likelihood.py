@@ -42,7 +42,7 @@ from fingerpad.inference.spike_sweeps import cut, operational_times, sweep
 from fingerpad.neuron.escape_rate import ESCAPE_TIME_MS
 from fingerpad.neuron.transduction import Drive
 
-TRAINS_PER_BLOCK = 8
+_TRAINS_PER_BLOCK = 8
 """Trains that one thread goes through at a time; sums are taken block by block, on any number of threads."""
 
 
@@ -186,7 +186,7 @@ class SpikeLikelihood:
             value = sweep(*self._part(trains), numbers, float(self.escape_ms), gradient, information)
             return value, gradient, information
 
-        blocks = in_blocks(block, len(self.trains), TRAINS_PER_BLOCK)
+        blocks = in_blocks(block, len(self.trains), _TRAINS_PER_BLOCK)
         value = math.fsum(part[0] for part in blocks) - self.n_spikes * math.log(self.escape_ms)
         gradient = np.sum([part[1] for part in blocks], axis=0)
         half = np.sum([part[2] for part in blocks], axis=0)

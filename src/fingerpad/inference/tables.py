@@ -18,7 +18,7 @@ Check = Callable[[str, Any, str], float]
 
 
 @dataclass(frozen=True)
-class Line:
+class TableRow:
     """One row of a table and where it stands.
 
     Parameters
@@ -30,7 +30,7 @@ class Line:
 
     Examples
     --------
-    >>> line = Line("rates.csv, line 2", {"static_rate_hz": "61"})
+    >>> line = TableRow("rates.csv, line 2", {"static_rate_hz": "61"})
     >>> line.number("static_rate_hz", "spikes/s"), line.has("fold")
     (61.0, False)
     """
@@ -72,7 +72,7 @@ class Line:
             raise InputError(f"{self.place}: {error}") from error
 
 
-def read_csv(path: Path, known: Sequence[str]) -> list[Line]:
+def read_csv(path: Path, known: Sequence[str]) -> list[TableRow]:
     r"""Rows of a CSV file: comments begin with #, then a header, then one row per line.
 
     Parameters
@@ -84,7 +84,7 @@ def read_csv(path: Path, known: Sequence[str]) -> list[Line]:
 
     Returns
     -------
-    list of Line
+    list of TableRow
         At least one.
 
     Raises
@@ -124,7 +124,7 @@ def read_csv(path: Path, known: Sequence[str]) -> list[Line]:
             raise InputError(
                 f"{path}, line {number}: must have {len(columns)} entries, one per column: got {len(row)}."
             )
-        lines.append(Line(f"{path}, line {number}", dict(zip(columns, row, strict=True))))
+        lines.append(TableRow(f"{path}, line {number}", dict(zip(columns, row, strict=True))))
     return lines
 
 

@@ -36,7 +36,7 @@ from fingerpad.neuron.lif import LeakyIntegrateAndFire
 ESCAPE_TIME_MS = 1.0
 """Mean time to a spike while the potential is held at the threshold, tau_e: a convention. [ms]"""
 
-TRAINS_PER_BLOCK = 32
+_TRAINS_PER_BLOCK = 32
 """Trains that one thread makes at a time."""
 
 _ESCAPE = int(Purpose.ESCAPE)
@@ -147,7 +147,7 @@ class EscapeRate:
             keys = part.sites, part.trials, part.receptors
             return SpikeTrains(*_escape_trains(current.times_ms, drives, *keys, seed, *numbers))
 
-        return SpikeTrains.joined(in_blocks(trains, len(everyone), TRAINS_PER_BLOCK))
+        return SpikeTrains.joined(in_blocks(trains, len(everyone), _TRAINS_PER_BLOCK))
 
     def intensity_per_ms(
         self, current: CurrentTraces, spikes: SpikeTrains, sites: ArrayLike, times_ms: ArrayLike

@@ -34,7 +34,7 @@ from fingerpad.neuron.membrane_noise import (
     log_spread,
 )
 
-TRAINS_PER_BLOCK = 32
+_TRAINS_PER_BLOCK = 32
 """Trains that one thread makes at a time: each takes about a millisecond."""
 
 _CURRENT, _THRESHOLD = int(Purpose.CURRENT), int(Purpose.THRESHOLD)
@@ -109,7 +109,7 @@ def noisy_spikes(
             )
         )
 
-    return SpikeTrains.joined(in_blocks(trains, len(everyone), TRAINS_PER_BLOCK))
+    return SpikeTrains.joined(in_blocks(trains, len(everyone), _TRAINS_PER_BLOCK))
 
 
 def _current_numbers(

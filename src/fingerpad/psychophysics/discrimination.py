@@ -20,9 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, one_of, whole
+from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, not_negative, one_of, whole
 from fingerpad.core.errors import InputError
-from fingerpad.core.random_streams import IntArray, Purpose, normals, uniforms
+from fingerpad.core.random_streams import Purpose, normals, uniforms
 from fingerpad.core.signals import HitRates
 from fingerpad.data import protocol, psychophysics
 from fingerpad.psychophysics.encoding import NORMS, check_neighbours, distance

@@ -14,7 +14,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.psychophysics.counts import log_probability
-from fingerpad.psychophysics.maximum_likelihood import OVERDISPERSION, maximise
+from fingerpad.psychophysics.maximum_likelihood import OVERDISPERSION, maximise_likelihood
 from fingerpad.psychophysics.psychometric import PsychometricFit
 from fingerpad.psychophysics.uncertainty import drawn_counts
 
@@ -76,7 +76,7 @@ def goodness_of_fit(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -
     True
     """
     drawn = drawn_counts(fit, seed, n_replicates)
-    points, heights = maximise(fit.model, drawn)
+    points, heights = maximise_likelihood(fit.model, drawn)
     rho = points[:, OVERDISPERSION, None] if fit.overdispersion > 0.0 else 0.0
     perfect = log_probability(drawn, fit.counts.n_trials, drawn / fit.counts.n_trials, rho).sum(axis=1)
     deviances = 2.0 * (perfect - heights)

@@ -87,7 +87,7 @@ class Model:
         return each.sum(axis=-1)
 
 
-def maximise(model: Model, n_correct: FloatArray) -> tuple[FloatArray, FloatArray]:
+def maximise_likelihood(model: Model, n_correct: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Find the maximum-likelihood function of each set of counts.
 
     Parameters

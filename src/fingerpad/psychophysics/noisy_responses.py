@@ -13,16 +13,16 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray, whole
+from fingerpad.core.checks import FloatArray, IntArray, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.philox import four_normals
-from fingerpad.core.random_streams import LARGEST_SEED, IntArray, Purpose, normals
+from fingerpad.core.random_streams import LARGEST_SEED, Purpose, normals
 from fingerpad.core.threads import in_blocks
 
-SESSION = 2**32
+TRIALS_PER_SESSION = 2**32
 """Trials of one session. Sessions of one seed share no random number."""
 
-LARGEST_SESSION = LARGEST_SEED // SESSION - 1
+LARGEST_SESSION = LARGEST_SEED // TRIALS_PER_SESSION - 1
 
 _RESPONSE = int(Purpose.RESPONSE)
 _TRIALS_AT_ONCE = 64
@@ -54,12 +54,12 @@ def session_trials(session: int, *shape: int) -> IntArray:
     --------
     >>> session_trials(0, 2, 3).tolist()
     [[0, 1, 2], [3, 4, 5]]
-    >>> int(session_trials(1, 2, 3)[0, 0]) == SESSION
+    >>> int(session_trials(1, 2, 3)[0, 0]) == TRIALS_PER_SESSION
     True
     """
     if whole("session", session, 0) > LARGEST_SESSION:
         raise InputError(f"session must not exceed {LARGEST_SESSION}: got {session}.")
-    return session * SESSION + np.arange(int(np.prod(shape)), dtype=np.int64).reshape(shape)
+    return session * TRIALS_PER_SESSION + np.arange(int(np.prod(shape)), dtype=np.int64).reshape(shape)
 
 
 def noisy_responses(

@@ -18,7 +18,7 @@ from fingerpad.psychophysics.maximum_likelihood import (
     THRESHOLD,
     WIDTH,
     Model,
-    maximise,
+    maximise_likelihood,
 )
 
 LARGEST_LAPSE = 0.1
@@ -167,7 +167,7 @@ def fit_psychometric(
             f"levels must be at least {n_shaping}, one for each of threshold and width that is not given: "
             f"got {counts.levels.size}; measure more levels, or give one of the two."
         )
-    points, heights = maximise(model, counts.n_correct[np.newaxis])
+    points, heights = maximise_likelihood(model, counts.n_correct[np.newaxis])
     fit = fit_at(counts, sigmoid, model, points[0], float(heights[0]))
     _refuse_what_tells_no_threshold(fit, n_shaping)
     return fit

@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 from scipy.special import gammaln, xlogy
 from scipy.stats import poisson
 
-from fingerpad.core.checks import FloatArray, float_array, not_negative, positive
+from fingerpad.core.checks import FloatArray, IntArray, float_array, not_negative, positive
 from fingerpad.core.errors import InputError
-from fingerpad.core.random_streams import IntArray, Purpose, normals, uniforms
+from fingerpad.core.random_streams import Purpose, normals, uniforms
 from fingerpad.psychophysics.sensitivity import cholesky, whitened
 
 

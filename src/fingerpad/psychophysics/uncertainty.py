@@ -29,7 +29,7 @@ from fingerpad.psychophysics.maximum_likelihood import (
     THRESHOLD,
     WIDTH,
     Model,
-    maximise,
+    maximise_likelihood,
 )
 from fingerpad.psychophysics.psychometric import PsychometricFit
 
@@ -224,7 +224,7 @@ def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> Func
     >>> bool(lower < fit.threshold(0.75) < upper)
     True
     """
-    points, _ = maximise(fit.model, drawn_counts(fit, seed, n_replicates))
+    points, _ = maximise_likelihood(fit.model, drawn_counts(fit, seed, n_replicates))
     return _cloud(fit, points, np.full(len(points), 1.0 / len(points)))
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
-from fingerpad.geometry.mesh import IntArray, Mesh
+from fingerpad.geometry.mesh import Mesh
 
 _FACES = ((0, 1, 5, 4), (3, 2, 6, 7))
 """Corners of the two faces of an element that look across the finger."""

@@ -8,9 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
-from fingerpad.core.random_streams import IntArray
 from fingerpad.core.results import Matrix, Vector, result_class
 from fingerpad.core.signals import ResponseMap, Skin
 from fingerpad.experiments.discrimination.decoding import (

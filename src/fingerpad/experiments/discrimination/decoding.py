@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.random_streams import IntArray, Purpose, normals
+from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import HitRates, ResponseMap
 from fingerpad.experiments.discrimination.task import CurveSettings

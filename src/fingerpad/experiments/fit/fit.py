@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, one_of, whole
+from fingerpad.core.checks import FloatArray, IntArray, one_of, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_class
 from fingerpad.core.signals import SedTraces
@@ -22,7 +22,6 @@ from fingerpad.inference.fitting import (
     fractional_sum_of_squares,
     interleaved_folds,
 )
-from fingerpad.inference.fitting.problem import IntArray
 from fingerpad.inference.identifiable import (
     IDENTIFIABLE_NAMES,
     IDENTIFIABLE_UNITS,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.results import Number, result_class
 from fingerpad.core.signals import SpikeTrains
@@ -25,7 +25,7 @@ from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.fitting import CrossValidation, Fit, Method
 from fingerpad.inference.fitting.covariance import jackknife_covariance
 from fingerpad.inference.fitting.methods import Continued
-from fingerpad.inference.fitting.problem import IntArray, Problem
+from fingerpad.inference.fitting.problem import Problem
 from fingerpad.inference.identifiable import identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem

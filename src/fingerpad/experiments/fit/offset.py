@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, one_of
+from fingerpad.core.checks import FloatArray, IntArray, one_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import SedTraces
@@ -30,7 +30,6 @@ from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.fitting import Continued, Method, cross_validate
 from fingerpad.inference.fitting.covariance import jackknife_covariance
 from fingerpad.inference.fitting.least_squares import LeastSquares
-from fingerpad.inference.fitting.problem import IntArray
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.rate_model import Windows
 from fingerpad.inference.receptor_offset import ReceptorOffset

@@ -9,7 +9,7 @@ from scipy.stats import norm, qmc
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.inference.afferent_posterior import from_coordinates, to_coordinates
-from fingerpad.inference.fitting.profile_likelihood import Profile, profile_likelihoods
+from fingerpad.inference.fitting.profile_likelihood import ProfileLikelihood, profile_likelihoods
 from fingerpad.inference.fitting.sensitivity import sobol_indices
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_likelihood import RateLikelihood
@@ -184,7 +184,7 @@ def profiles(likelihood: RateLikelihood, starts: FloatArray) -> tuple[ParameterP
     return tuple(_profile(profile, logarithm=index > 0) for index, profile in enumerate(found.profiles))
 
 
-def _profile(profile: Profile, logarithm: bool) -> ParameterProfile:
+def _profile(profile: ProfileLikelihood, logarithm: bool) -> ParameterProfile:
     """Return a profile in the unit of its number; an end that is not finite is open."""
     low, high = (float(np.exp(end) if logarithm else end) for end in profile.interval)
     return ParameterProfile(

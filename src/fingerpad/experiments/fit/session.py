@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from fingerpad.core.checks import one_of, whole
+from fingerpad.core.checks import IntArray, one_of, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
@@ -28,7 +28,6 @@ from fingerpad.geometry.grading import Grading, covering
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Bar, FlatPunch, Line, Sphere
 from fingerpad.inference.afferent_methods import OFFSETS_MM
-from fingerpad.inference.fitting.problem import IntArray
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.rate_model import WINDOWS_MS, Windows
 from fingerpad.inference.recordings import RateRecordings

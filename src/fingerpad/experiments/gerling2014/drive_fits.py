@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, whole
+from fingerpad.core.checks import FloatArray, IntArray, whole
 from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.data import protocol
 from fingerpad.inference.fitting import (
@@ -21,7 +21,6 @@ from fingerpad.inference.fitting import (
     interleaved_folds,
 )
 from fingerpad.inference.fitting.least_squares import LeastSquares
-from fingerpad.inference.fitting.problem import IntArray
 from fingerpad.inference.identifiable import identifiable, six_parameters
 from fingerpad.inference.rate_model import RateModel, Reparametrised
 from fingerpad.inference.rate_problem import RateProblem

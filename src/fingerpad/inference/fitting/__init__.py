@@ -15,7 +15,7 @@ from fingerpad.inference.fitting.fractional_sum_of_squares import (
     fractional_sum_of_squares,
     weighted_fractional_sum_of_squares,
 )
-from fingerpad.inference.fitting.methods import Continued, Fit, Method, ResponseSurface, Step, best_of
+from fingerpad.inference.fitting.methods import Continued, Fit, FitStep, Method, ResponseSurface, best_of
 from fingerpad.inference.fitting.problem import Problem
 from fingerpad.inference.fitting.response_surface import (
     Iteration,
@@ -30,13 +30,13 @@ __all__ = [
     "Continued",
     "CrossValidation",
     "Fit",
+    "FitStep",
     "FoldFit",
     "Iteration",
     "Method",
     "Problem",
     "ResponseSurface",
     "ResponseSurfaceFit",
-    "Step",
     "best_of",
     "coding_increments",
     "cross_validate",

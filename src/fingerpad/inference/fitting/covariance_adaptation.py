@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import float_array, positive, whole
+from fingerpad.core.checks import IntArray, float_array, positive, whole
 from fingerpad.core.errors import InputError
-from fingerpad.inference.fitting.methods import Fit, Step
-from fingerpad.inference.fitting.problem import IntArray, Problem
+from fingerpad.inference.fitting.methods import Fit, FitStep
+from fingerpad.inference.fitting.problem import Problem
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class CovarianceAdaptation:
                 "verbose": -9,
             },
         )
-        best = Step(np.asarray(self.start), problem.score(np.asarray(self.start), chosen))
+        best = FitStep(np.asarray(self.start), problem.score(np.asarray(self.start), chosen))
         steps = [best]
         while not search.stop():
             places = search.ask()
@@ -105,7 +105,7 @@ class CovarianceAdaptation:
             search.tell(places, [-score for score in scores])
             top = int(np.argmax(scores))
             if scores[top] > best.score:
-                best = Step(places[top] * scales, float(scores[top]))
+                best = FitStep(places[top] * scales, float(scores[top]))
                 steps.append(best)
         seconds = time.perf_counter() - clock
         return Fit(best.parameters, best.score, search.countevals + 1, seconds, tuple(steps))

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import float_array, whole
+from fingerpad.core.checks import IntArray, float_array, whole
 from fingerpad.core.errors import InputError
 from fingerpad.data import protocol
 from fingerpad.inference.fitting.methods import Fit, Method
-from fingerpad.inference.fitting.problem import IntArray, Problem
+from fingerpad.inference.fitting.problem import Problem
 
 
 @dataclass(frozen=True)

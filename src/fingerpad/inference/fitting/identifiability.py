@@ -18,7 +18,7 @@ from fingerpad.core.errors import InputError
 Answer = Callable[[FloatArray], FloatArray]
 """Called with parameters (n_parameters,); returns what is observed, (n_answers,)."""
 
-STEP = 1e-6
+JACOBIAN_STEP = 1e-6
 """Step over the scale of a parameter: small enough that hardly any answer jumps within it. [1]"""
 
 ZERO = 1e-5
@@ -52,7 +52,9 @@ class Identifiability:
         return self.directions[self.rank :]
 
 
-def jacobian(answer: Answer, parameters: ArrayLike, scales: ArrayLike, step: float = STEP) -> FloatArray:
+def jacobian(
+    answer: Answer, parameters: ArrayLike, scales: ArrayLike, step: float = JACOBIAN_STEP
+) -> FloatArray:
     """Change of every answer per scale of every parameter, by central differences.
 
     Parameters
@@ -98,7 +100,7 @@ def identifiability(
     names: Sequence[str],
     scales: ArrayLike | None = None,
     *,
-    step: float = STEP,
+    step: float = JACOBIAN_STEP,
     zero: float = ZERO,
 ) -> Identifiability:
     """Find the combinations of parameters that answers depend on, and those that they do not.

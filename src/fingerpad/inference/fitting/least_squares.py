@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
-from fingerpad.core.checks import FloatArray, float_array, positive, whole
+from fingerpad.core.checks import FloatArray, IntArray, float_array, positive, whole
 from fingerpad.core.errors import InputError
-from fingerpad.inference.fitting.methods import Fit, Step, best_of
-from fingerpad.inference.fitting.problem import IntArray, Problem
+from fingerpad.inference.fitting.methods import Fit, FitStep, best_of
+from fingerpad.inference.fitting.problem import Problem
 
 Jacobian = Callable[[FloatArray, IntArray], FloatArray]
 
@@ -155,7 +155,7 @@ class _Visited:
     def __init__(self, problem: Problem, chosen: IntArray, scales: FloatArray):
         self.problem, self.chosen, self.scales = problem, chosen, scales
         self.n_evaluations = 0
-        self.best = Step(np.full(scales.size, np.nan), -np.inf)
+        self.best = FitStep(np.full(scales.size, np.nan), -np.inf)
 
     def residuals(self, place: FloatArray) -> FloatArray:
         parameters = place * self.scales
@@ -163,5 +163,5 @@ class _Visited:
         self.n_evaluations += 1
         score = 1.0 - float(residuals @ residuals)
         if score > self.best.score:
-            self.best = Step(parameters, score)
+            self.best = FitStep(parameters, score)
         return residuals

@@ -10,14 +10,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array
+from fingerpad.core.checks import FloatArray, IntArray, float_array
 from fingerpad.core.errors import InputError
-from fingerpad.inference.fitting.problem import IntArray, Problem
+from fingerpad.inference.fitting.problem import Problem
 from fingerpad.inference.fitting.response_surface import maximise
 
 
 @dataclass(frozen=True)
-class Step:
+class FitStep:
     """A place where a fit stood, one row of the table of its steps.
 
     Parameters
@@ -46,7 +46,7 @@ class Fit:
         How often the model was run, over all starts.
     seconds : float
         Time on the clock, over all starts. [s]
-    history : tuple of Step
+    history : tuple of FitStep
         The steps from the start that led there; the first is the start, the last the result.
     start : int
         Number of that start, from 0; the first one of equals.
@@ -58,7 +58,7 @@ class Fit:
     score: float
     n_evaluations: int
     seconds: float
-    history: tuple[Step, ...]
+    history: tuple[FitStep, ...]
     start: int = 0
     attempts: tuple[Fit, ...] = ()
 
@@ -166,7 +166,7 @@ class ResponseSurface:
                 self.smallest_gain,
                 self.most_iterations,
             )
-            steps = tuple(Step(row.parameters, row.objective) for row in found.history)
+            steps = tuple(FitStep(row.parameters, row.objective) for row in found.history)
             return Fit(found.parameters, found.objective, found.n_runs, time.perf_counter() - clock, steps)
 
         starts, increments = np.asarray(self.starts), np.asarray(self.increments)

@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-from fingerpad.core.checks import FloatArray
-
-IntArray = NDArray[np.int64]
+from fingerpad.core.checks import FloatArray, IntArray
 
 
 class Problem(Protocol):

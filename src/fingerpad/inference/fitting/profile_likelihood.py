@@ -22,10 +22,10 @@ from fingerpad.core.threads import in_blocks
 LogLikelihood = Callable[[FloatArray], FloatArray]
 """Called with points (n_points, n_parameters); returns their log likelihoods, -inf where impossible."""
 
-STEP = 0.5
+PROFILE_STEP = 0.5
 """Step of the parameter that is held, over its scale. [1]"""
 
-CLOSE = 0.02
+LIKELIHOOD_TOLERANCE = 0.02
 """Fits of the others end when they differ by this much: in log likelihood, and over the scales. [1]"""
 
 NEAREST = 20
@@ -36,7 +36,7 @@ RESTARTS = 5
 
 
 @dataclass(frozen=True)
-class Profile:
+class ProfileLikelihood:
     """Profile likelihood of one parameter.
 
     Parameters
@@ -64,7 +64,7 @@ class Profile:
 
 
 @dataclass(frozen=True)
-class Profiles:
+class ProfileLikelihoods:
     """Profile likelihoods of all parameters.
 
     Parameters
@@ -73,7 +73,7 @@ class Profiles:
         The most likely parameters that were met.
     log_likelihood : float
         Theirs.
-    profiles : tuple of Profile
+    profiles : tuple of ProfileLikelihood
         One per parameter.
     n_evaluations : int
         Evaluations of the likelihood.
@@ -81,7 +81,7 @@ class Profiles:
 
     best: FloatArray
     log_likelihood: float
-    profiles: tuple[Profile, ...]
+    profiles: tuple[ProfileLikelihood, ...]
     n_evaluations: int
 
 
@@ -93,7 +93,7 @@ def profile_likelihoods(
     *,
     level: float = 0.95,
     most_steps: int = 12,
-) -> Profiles:
+) -> ProfileLikelihoods:
     """Profile the likelihood of every parameter.
 
     Each profile is swept outwards from the best fit. A fit starts from its neighbour's and, where several
@@ -117,7 +117,7 @@ def profile_likelihoods(
 
     Returns
     -------
-    Profiles
+    ProfileLikelihoods
 
     Raises
     ------
@@ -154,7 +154,7 @@ def profile_likelihoods(
     for _ in range(RESTARTS):
         point = search.climb(best)
         gain, best = search.height(point) - search.height(best), point
-        if gain <= CLOSE:
+        if gain <= LIKELIHOOD_TOLERANCE:
             break
     allowed = 0.5 * float(chi2.ppf(level, 1))
 
@@ -170,7 +170,9 @@ def profile_likelihoods(
         _profile(labels[index], index, fits, highest, level, allowed)
         for index, (_, fits) in enumerate(sweeps)
     )
-    return Profiles(most_likely, highest, profiles, search.count + sum(own.count for own, _ in sweeps))
+    return ProfileLikelihoods(
+        most_likely, highest, profiles, search.count + sum(own.count for own, _ in sweeps)
+    )
 
 
 class _Search:
@@ -215,9 +217,9 @@ class _Search:
             np.zeros(free.size),
             method="Nelder-Mead",
             options={
-                "initial_simplex": np.vstack([np.zeros(free.size), STEP * np.eye(free.size)]),
-                "xatol": CLOSE,
-                "fatol": CLOSE,
+                "initial_simplex": np.vstack([np.zeros(free.size), PROFILE_STEP * np.eye(free.size)]),
+                "xatol": LIKELIHOOD_TOLERANCE,
+                "fatol": LIKELIHOOD_TOLERANCE,
                 "maxfev": MOST_EVALUATIONS,
             },
         )
@@ -238,7 +240,7 @@ class _Search:
         for side in (-1.0, 1.0):
             line = [(best, top)]
             while len(line) <= most_steps and not all(top - height > allowed for _, height in line[-2:]):
-                value = best[index] + side * STEP * len(line) * self.scales[index]
+                value = best[index] + side * PROFILE_STEP * len(line) * self.scales[index]
                 line.append(self._fit(line[-1][0], index, value))
             fits += line[1:]
         return fits
@@ -262,12 +264,12 @@ def _profile(
     highest: float,
     level: float,
     allowed: float,
-) -> Profile:
+) -> ProfileLikelihood:
     points = np.array([point for point, _ in fits])
     order = np.argsort(points[:, index])
     values = points[order, index]
     losses = highest - np.array([height for _, height in fits])[order]
-    return Profile(name, values, losses, points[order], _interval(values, losses, allowed), level)
+    return ProfileLikelihood(name, values, losses, points[order], _interval(values, losses, allowed), level)
 
 
 def _interval(values: FloatArray, losses: FloatArray, allowed: float) -> tuple[float, float]:

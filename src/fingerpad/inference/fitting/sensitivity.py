@@ -10,14 +10,13 @@ from numpy.typing import ArrayLike
 from scipy import stats
 from scipy.special import ndtri
 
-from fingerpad.core.checks import FloatArray, finite, float_array, whole
+from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, whole
 from fingerpad.core.errors import InputError
-from fingerpad.inference.fitting.problem import IntArray
 
-Objective = Callable[[FloatArray], FloatArray]
+BatchObjective = Callable[[FloatArray], FloatArray]
 """Called with points (n_points, n_parameters); returns one number for each."""
 
-RESAMPLES = 200
+SOBOL_RESAMPLES = 200
 """Bootstrap resamples behind the confidence intervals of the indices."""
 
 
@@ -58,7 +57,7 @@ class SobolIndices:
 
 
 def sobol_indices(
-    objective: Objective,
+    objective: BatchObjective,
     lower: ArrayLike,
     upper: ArrayLike,
     names: Sequence[str],
@@ -144,7 +143,7 @@ def sobol_indices(
         (np.arange(n_base),),
         resampled,
         vectorized=False,
-        n_resamples=RESAMPLES,
+        n_resamples=SOBOL_RESAMPLES,
         method="percentile",
         rng=random,
     ).standard_error
