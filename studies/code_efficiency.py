@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.core.errors import InputError
 from fingerpad.core.results import Number, result_class
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data import protocol
@@ -17,30 +15,23 @@ from fingerpad.experiments.gerling2014 import sphere_discrimination
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.neuron.population import Population
-from fingerpad.psychophysics import (
-    PoissonResponses,
-    Presentation,
-    ResponseModel,
-    Statistic,
-    efficiency,
-    multiplied_responses,
-    present,
-)
-from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, distance, gradient_sum, neighbour_pairs
+from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD, TRIALS, code_efficiency, code_statistic
+from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, neighbour_pairs, taking_part
+from fingerpad.psychophysics.ideal_observer import present
+from fingerpad.psychophysics.response_models import PoissonResponses, ResponseModel, multiplied_responses
 from studies.fitted_bars import fit_bars
 
 PAIR_PER_M = (287.0, 316.0)
 """Two spheres near the threshold of people, at which efficiency is measured. [1/m]"""
 
-TRIALS = 4000
-"""Presentations of each sphere to the observers whose efficiency is measured."""
+SESSION = 11
+"""Session of the random numbers; other studies have others."""
 
-SESSION, REFERENCE_SESSION = 11, 12
-"""Sessions of the random numbers; other studies have others."""
+CODE_NAMES = {"gradient_sum": "Gradient Sum", "euclidean": "Euclidean Distance"}
 
 
 @result_class
-class CodeEfficiency:
+class EfficiencyRow:
     """Efficiency of a code for one measure and kind of noise.
 
     Parameters
@@ -48,13 +39,13 @@ class CodeEfficiency:
     code, measure, noise : str
         Which.
     receptors : int
-        Receptors that take part.
+        Receptors that respond to either sphere.
     proportion_correct, ideal_proportion_correct : float
         Of the code and of the ideal observer. [0-1]
     d_prime, d_prime_error, ideal_d_prime, ideal_d_prime_error : float
         Sensitivities and standard errors; inf where no trial is wrong.
     efficiency, efficiency_error : float
-        Squared ratio of the sensitivities; NaN where the ideal observer is always right, or only guesses.
+        As in `fingerpad.psychophysics.CodeEfficiency`.
     """
 
     code: str
@@ -77,13 +68,13 @@ class CodeEfficiencyStudy:
 
     Parameters
     ----------
-    efficiency : tuple of CodeEfficiency
+    efficiency : tuple of EfficiencyRow
         A row per code, measure and kind of noise.
     manifest : Manifest
         What ran.
     """
 
-    efficiency: tuple[CodeEfficiency, ...]
+    efficiency: tuple[EfficiencyRow, ...]
     manifest: Manifest
 
 
@@ -126,7 +117,7 @@ def code_efficiencies(
     neighbours: np.ndarray,
     noise_sigma: float,
     seed: int,
-) -> tuple[CodeEfficiency, ...]:
+) -> tuple[EfficiencyRow, ...]:
     """Measure codes against the ideal observer of the same responses, on two spheres near people's threshold.
 
     Parameters
@@ -144,77 +135,52 @@ def code_efficiencies(
 
     Returns
     -------
-    tuple of CodeEfficiency
-        One row per code, measure and kind of noise. A receptor that is silent under one of the spheres has no
-        noise that multiplies, and would tell them apart for certain: it is left out, for all observers.
+    tuple of EfficiencyRow
+        One row per code, measure and kind of noise.
     """
     rows = [int(np.flatnonzero(curvature_per_m == curvature)[0]) for curvature in PAIR_PER_M]
-    found: list[CodeEfficiency] = []
+    found: list[EfficiencyRow] = []
     for measure, table in tables.items():
-        standard, comparison = table[rows]
-        # A latency of NaN, as of a silent receptor, is not above 0 either.
-        heard = (standard > 0.0) & (comparison > 0.0)
-        # No rate is a rate; no latency is none, and has no difference to others.
-        pairs = neighbours[heard[neighbours].all(axis=1)] if measure == "latency" else neighbours
-        if heard.any() and len(pairs):
-            models = [multiplied_responses(rates[heard], noise_sigma) for rates in (standard, comparison)]
-            found += _observed(measure, "multiplied", (models[0], models[1]), heard, pairs, seed)
+        pair, pairs = taking_part(table[rows], neighbours)
+        if pair.any() and len(pairs):
+            models = [multiplied_responses(responses, noise_sigma, SMALLEST_SPREAD) for responses in pair]
+            responding = int(pair.any(axis=0).sum())
+            found += _compared(measure, "multiplied", models, responding, pairs, seed)
     window_ms = protocol.STATIC_WINDOW.value
     seconds = (window_ms[1] - window_ms[0]) / MS_PER_S
-    counts = [PoissonResponses(tables["static"][row] * seconds) for row in rows]
-    everyone = np.ones(tables["static"].shape[1], dtype=bool)
-    return (*found, *_observed("static", "Poisson", (counts[0], counts[1]), everyone, neighbours, seed))
+    static = tables["static"][rows]
+    counts = [PoissonResponses(responses * seconds) for responses in static]
+    return (*found, *_compared("static", "Poisson", counts, static.shape[1], neighbours, seed))
 
 
-def _observed(
+def _compared(
     measure: str,
     noise: str,
-    models: tuple[ResponseModel, ResponseModel],
-    heard: np.ndarray,
+    models: Sequence[ResponseModel],
+    receptors: int,
     neighbours: np.ndarray,
     seed: int,
-) -> list[CodeEfficiency]:
-    """Measure both codes on responses with one kind of noise."""
+) -> list[EfficiencyRow]:
+    """Compare both codes with the ideal observer, for one kind of noise."""
     standard, comparison = models
     shown = present(standard, comparison, seed, TRIALS, SESSION)
-    # The standard again, which Euclidean Distance compares every look with.
-    reference = present(standard, standard, seed, TRIALS, REFERENCE_SESSION).standard
-    codes: dict[str, Statistic] = {
-        "Gradient Sum": lambda responses: gradient_sum(_placed(responses, heard), neighbours),
-        "Euclidean Distance": lambda responses: distance(responses, reference),
-    }
-    return [
-        _judged(code, measure, noise, int(heard.sum()), shown, statistic) for code, statistic in codes.items()
-    ]
-
-
-def _placed(responses: FloatArray, heard: np.ndarray) -> FloatArray:
-    """Responses (n_trials, n_receptors) of all receptors, 0 for those that are left out."""
-    everyone = np.zeros((len(responses), heard.size))
-    everyone[:, heard] = responses
-    return everyone
-
-
-def _judged(
-    code: str, measure: str, noise: str, receptors: int, shown: Presentation, statistic: Statistic
-) -> CodeEfficiency:
-    """Compare a code with the ideal observer; no efficiency where that one never fails, or only guesses."""
-    judged, ideal = shown.of(statistic), shown.ideal()
-    try:
-        share, error = efficiency(judged, ideal)
-    except InputError:
-        share, error = math.nan, math.nan
-    return CodeEfficiency(
-        code=code,
-        measure=measure,
-        noise=noise,
-        receptors=receptors,
-        proportion_correct=judged.proportion_correct,
-        d_prime=judged.d_prime,
-        d_prime_error=judged.d_prime_error,
-        ideal_proportion_correct=ideal.proportion_correct,
-        ideal_d_prime=ideal.d_prime,
-        ideal_d_prime_error=ideal.d_prime_error,
-        efficiency=share,
-        efficiency_error=error,
-    )
+    found = []
+    for code, name in CODE_NAMES.items():
+        of_code = code_efficiency(shown, code_statistic(code, standard, neighbours, seed, SESSION))
+        found.append(
+            EfficiencyRow(
+                code=name,
+                measure=measure,
+                noise=noise,
+                receptors=receptors,
+                proportion_correct=of_code.code.proportion_correct,
+                d_prime=of_code.code.d_prime,
+                d_prime_error=of_code.code.d_prime_error,
+                ideal_proportion_correct=of_code.ideal.proportion_correct,
+                ideal_d_prime=of_code.ideal.d_prime,
+                ideal_d_prime_error=of_code.ideal.d_prime_error,
+                efficiency=of_code.efficiency,
+                efficiency_error=of_code.efficiency_error,
+            )
+        )
+    return found

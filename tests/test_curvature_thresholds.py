@@ -15,6 +15,7 @@ from fingerpad.geometry.grading import Grading
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics import yes_no
+from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.noise_fit import expected_hit_rates
 from fingerpad.report import curvature_thresholds as page
@@ -106,7 +107,12 @@ def test_ideal_threshold_is_fishers(found):
     entry = study.threshold_at(observer, 287.0)
     step = entry.ideal_weber_fraction
     rates = [observer.responses(287.0 * (1.0 + side * step)) for side in (-0.5, 0.5)]
-    d = np.sqrt(np.square((rates[1] - rates[0]) / observer.responses(287.0)).sum() * (0.03**-2 + 2.0))
+    middle = observer.responses(287.0)
+    variance = np.square(0.03 * middle) + SMALLEST_SPREAD**2
+    difference = rates[1] - rates[0]
+    d = np.sqrt(
+        (np.square(difference) / variance + 2.0 * np.square(0.03**2 * middle * difference / variance)).sum()
+    )
     assert yes_no(float(d)) == pytest.approx(0.75, abs=1e-3)
 
 

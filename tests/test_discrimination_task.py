@@ -22,22 +22,17 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.discrimination import run as task_run
 from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse
 from fingerpad.experiments.discrimination.decoding import SESSION, side_curves
-from fingerpad.experiments.discrimination.efficiencies import (
-    SMALLEST_SPREAD,
-    efficiencies,
-    ideal_observer,
-    presentations,
-)
 from fingerpad.experiments.discrimination.task import CurveSettings
 from fingerpad.experiments.discrimination.task_files import example_tasks, parse_task
 from fingerpad.experiments.discrimination.task_population import task_population
 from fingerpad.experiments.discrimination.task_stimuli import task_stimuli, task_touches
+from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD, code_efficiency, noisy_presentations
 from fingerpad.psychophysics.discrimination import (
     Experiment,
     discriminate_euclidean,
     discriminate_gradient_sum,
 )
-from fingerpad.psychophysics.encoding import neighbour_pairs
+from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
 from fingerpad.report import discrimination_task as report
 from fingerpad.report import discrimination_task_figures as figures
 
@@ -308,18 +303,18 @@ def test_no_code_beats_the_ideal_observer_and_what_it_makes_use_of_is_a_share():
 def test_the_ideal_observer_of_one_afferent_is_known_in_closed_form():
     # Two normal distributions of nearly one spread: d' = |mu_1 - mu_0| / sigma.
     table = np.array([[50.0], [52.0]])
-    (shown,) = presentations(table, 0.05, seed=3)
+    (shown,) = noisy_presentations(table, 0.05, seed=3)
     expected = 2.0 / np.hypot(0.05 * 51.0, SMALLEST_SPREAD)
-    told = ideal_observer([shown])
-    assert told.d_prime[0] == pytest.approx(expected, abs=4.0 * shown.ideal().d_prime_error)
-    assert told.hit_rate[0] == pytest.approx(ndtr(expected / 2.0), abs=0.03)
+    ideal = shown.ideal()
+    assert ideal.d_prime == pytest.approx(expected, abs=4.0 * ideal.d_prime_error)
+    assert shown.ideal_hit_rate() == pytest.approx(ndtr(expected / 2.0), abs=0.03)
 
 
 def test_where_the_ideal_observer_never_fails_there_is_no_efficiency():
     table = np.array([[50.0, 60.0], [150.0, 10.0]])
-    shown = presentations(table, 0.01, seed=3)
-    found = efficiencies("gradient_sum", shown, table, np.array([[0, 1]]), 0.01, seed=3)
-    assert np.isnan([*found.efficiency, *found.efficiency_error]).all()
+    (shown,) = noisy_presentations(table, 0.01, seed=3)
+    found = code_efficiency(shown, lambda responses: gradient_sum(responses, np.array([[0, 1]])))
+    assert np.isnan([found.efficiency, found.efficiency_error]).all()
 
 
 # Silence

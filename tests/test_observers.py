@@ -29,6 +29,12 @@ from fingerpad.psychophysics import (
     sensitivity,
     yes_no,
 )
+from fingerpad.psychophysics.code_efficiency import (
+    SMALLEST_SPREAD,
+    code_efficiency,
+    code_statistic,
+    noisy_presentations,
+)
 from fingerpad.psychophysics.encoding import distance, gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.tasks import best_difference
 
@@ -194,12 +200,12 @@ def test_ideal_observer_hears_a_change_of_spread_alone():
     assert shown.of(lambda responses: responses[:, 0]).proportion_correct < 0.51
 
 
-@pytest.mark.parametrize("noise_sigma", [0.05, 0.15])
-def test_ideal_observers_of_small_differences_reach_fishers_information(noise_sigma):
+@pytest.mark.parametrize(("noise_sigma", "floor"), [(0.05, 0.0), (0.15, 0.0), (0.15, 4.0)])
+def test_ideal_observers_of_small_differences_reach_fishers_information(noise_sigma, floor):
     rates, slopes = np.array([20.0, 35.0, 50.0, 60.0]), np.array([0.01, 0.03, -0.02, 0.05])
-    j = gaussian_information(rates, slopes, noise_sigma)
+    j = gaussian_information(rates, slopes, noise_sigma, floor)
     step = 1.0 / math.sqrt(j)  # where d' is 1 by Fisher's information
-    models = [multiplied_responses(rates + side * step * slopes, noise_sigma) for side in (-0.5, 0.5)]
+    models = [multiplied_responses(rates + side * step * slopes, noise_sigma, floor) for side in (-0.5, 0.5)]
     ideal = present(models[0], models[1], seed=5, n_trials=40_000).ideal()
     assert ideal.d_prime == pytest.approx(1.0, abs=4.0 * ideal.d_prime_error)
     counts = 3.0 * rates
@@ -247,7 +253,25 @@ def test_efficiency_of_looking_at_one_of_four_equal_receptors_is_a_quarter():
         efficiency(shown.ideal(), discriminability([1.0, 2.0], [3.0, 4.0]))
 
 
+def test_no_efficiency_is_reported_where_the_ideal_observer_guesses_or_a_floor_bounds_it():
+    table = np.array([[30.0, 20.0, 0.0], [30.0, 20.0, 0.0], [33.0, 21.0, 1.0]])
+    pairs = np.array([[0, 1], [1, 2]])
+    standard = multiplied_responses(table[0], 0.1, SMALLEST_SPREAD)
+    by_gradient = code_statistic("gradient_sum", standard, pairs, seed=4)
+    same, other = (code_efficiency(shown, by_gradient) for shown in noisy_presentations(table, 0.1, seed=4))
+    assert math.isnan(same.efficiency)
+    assert other.efficiency == efficiency(other.code, other.ideal)[0]
+    # The third receptor begins to fire: its information is that of one spike/s over the floor.
+    slopes = (table[2] - table[0], 0.1, SMALLEST_SPREAD)
+    expected = math.sqrt(gaussian_information(0.5 * (table[2] + table[0]), *slopes))
+    assert other.ideal.d_prime == pytest.approx(expected, abs=4.0 * other.ideal.d_prime_error)
+
+
 def test_bad_models_are_refused():
+    with pytest.raises(InputError, match="1 of them zero"):
+        gaussian_information([0.0, 1.0], [0.1, 0.1], 0.5)
+    with pytest.raises(InputError, match="code must be one of"):
+        code_statistic("sum", GaussianResponses([1.0], np.eye(1)), np.array([[0, 0]]), seed=1)
     with pytest.raises(InputError, match="1 of 2 receptors are silent"):
         multiplied_responses([0.0, 10.0], 0.1)
     assert multiplied_responses([0.0, 10.0], 0.1, smallest_spread=1.0).covariance[0, 0] == 1.0

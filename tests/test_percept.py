@@ -247,7 +247,7 @@ def test_receptors_that_are_silent_once_take_no_part_in_latencies():
     assert_allclose(
         gradient_sum(measured.responses, measured.neighbours), gradient_sum(latency_ms[:, without], fewer)
     )
-    with pytest.raises(InputError, match="no hit rate from zeros"):
+    with pytest.raises(InputError, match="so there is no hit rate"):
         answering_latencies(np.full((7, 18), np.nan), PAIRS)
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD
 from fingerpad.report.formatting import number, with_error
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.parts import Chapter, Page, Row, Table
-from studies.code_efficiency import CodeEfficiency, CodeEfficiencyStudy
+from studies.code_efficiency import CodeEfficiencyStudy, EfficiencyRow
 
 
-def tables(rows: Sequence[CodeEfficiency]) -> list[Table]:
+def tables(rows: Sequence[EfficiencyRow]) -> list[Table]:
     """Return efficiencies by code."""
     codes = [
         Row(
@@ -31,10 +32,10 @@ def tables(rows: Sequence[CodeEfficiency]) -> list[Table]:
             "Efficiency of codes",
             ("code", "measure", "noise", "receptors", "d-prime", "that of the ideal observer", "efficiency"),
             codes,
-            "Spheres of 287 and 316 1/m. Efficiency is the squared ratio of the two: the share of trials in "
-            "which the ideal observer, who knows how responses vary, would judge as well. Receptors that are "
-            "silent under one of the spheres are left out. The last rows take the spikes of the hold for "
-            "Poisson processes, without other noise.",
+            "Spheres of 287 and 316 1/m. Efficiency is the squared ratio of the two: the share of the trials "
+            "with which the ideal observer would reach the same d-prime. Multiplicative noise has a floor of "
+            f"{number(SMALLEST_SPREAD)} spikes/s or ms. The last rows have Poisson spike counts of the hold "
+            "without other noise.",
         ),
     ]
 

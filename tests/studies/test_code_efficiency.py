@@ -51,7 +51,7 @@ def test_no_code_is_more_efficient_than_the_ideal_observer(found):
         assert row.proportion_correct <= row.ideal_proportion_correct + 0.01
 
 
-def test_silent_receptors_are_left_out_of_efficiencies():
+def test_receptors_without_a_latency_under_one_sphere_are_left_out_and_silent_rates_are_not():
     curvatures = np.array(code_efficiency.PAIR_PER_M)
     static = np.array([[30.0, 0.0, 20.0, 10.0], [33.0, 0.0, 21.0, 9.0]])
     latency = np.array([[10.0, np.nan, 12.0, 30.0], [10.0, 70.0, 11.0, 33.0]])
@@ -66,6 +66,18 @@ def test_silent_receptors_are_left_out_of_efficiencies():
     # Of the pairs of latencies only that of receptors 0 and 3 has both.
     assert alone[2].code == rows[2].code == "Gradient Sum"
     assert rows[2].d_prime == pytest.approx(alone[2].d_prime, abs=0.1)
+
+
+def test_a_receptor_that_begins_to_respond_has_the_information_of_the_noise_floor():
+    """One of two afferents starts to fire: d' grows with its rate over the floor and is not infinite."""
+    curvatures = np.array(code_efficiency.PAIR_PER_M)
+    for rate_hz in (1.0, 2.0):
+        static = np.array([[30.0, 0.0], [30.0, rate_hz]])
+        row, *_ = code_efficiency.code_efficiencies(
+            curvatures, {"static": static}, np.array([[0, 1]]), 0.1, seed=0
+        )
+        expected = rate_hz / np.sqrt(1.0 + 0.5 * (0.1 * rate_hz) ** 2)
+        assert row.ideal_d_prime == pytest.approx(expected, abs=4.0 * row.ideal_d_prime_error)
 
 
 def test_the_table_has_a_row_per_code_measure_and_noise(found):

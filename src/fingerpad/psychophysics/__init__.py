@@ -1,5 +1,11 @@
 """From responses and judgements to thresholds: codes, observers, ideal observer, psychometric functions."""
 
+from fingerpad.psychophysics.code_efficiency import (
+    CodeEfficiency,
+    code_efficiency,
+    code_statistic,
+    noisy_presentations,
+)
 from fingerpad.psychophysics.counts import JudgementCounts
 from fingerpad.psychophysics.functions import PsychometricFunction
 from fingerpad.psychophysics.goodness_of_fit import GoodnessOfFit, goodness_of_fit
@@ -38,6 +44,7 @@ from fingerpad.psychophysics.uncertainty import FunctionCloud, bootstrap, poster
 
 __all__ = [
     "TASKS",
+    "CodeEfficiency",
     "Discriminability",
     "FunctionCloud",
     "GaussianResponses",
@@ -51,6 +58,8 @@ __all__ = [
     "Sensitivity",
     "Statistic",
     "bootstrap",
+    "code_efficiency",
+    "code_statistic",
     "d_prime_of_answers",
     "d_prime_of_populations",
     "d_prime_of_proportion",
@@ -61,6 +70,7 @@ __all__ = [
     "gaussian_information",
     "goodness_of_fit",
     "multiplied_responses",
+    "noisy_presentations",
     "poisson_information",
     "posterior",
     "present",

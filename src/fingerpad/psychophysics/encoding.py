@@ -203,6 +203,31 @@ def answering_neighbours(responses: ArrayLike, neighbours: np.ndarray) -> np.nda
     return pairs[~np.isin(pairs, silent).any(axis=1)]
 
 
+def taking_part(responses: ArrayLike, neighbours: np.ndarray) -> tuple[FloatArray, np.ndarray]:
+    """Leave out the receptors that are silent under one stimulus (docs/decisions/silent-receptors.md).
+
+    Parameters
+    ----------
+    responses : array_like (n_stimuli, n_receptors)
+        Response measure of every receptor; NaN without a response. [any unit]
+    neighbours : int array (n_pairs, 2)
+        From `neighbour_pairs`.
+
+    Returns
+    -------
+    (array (n_stimuli, n_receptors), int array (n_pairs, 2))
+        Responses with zeros for receptors that are left out, and the pairs without them.
+
+    Examples
+    --------
+    >>> table, pairs = taking_part([[20.0, 25.0, np.nan], [20.0, 24.0, 90.0]], np.array([[0, 1], [1, 2]]))
+    >>> table.tolist(), pairs.tolist()
+    ([[20.0, 25.0, 0.0], [20.0, 24.0, 0.0]], [[0, 1]])
+    """
+    table = np.asarray(responses, dtype=np.float64)
+    return np.where(np.isnan(table).any(axis=0), 0.0, table), answering_neighbours(table, neighbours)
+
+
 def gradient_sum(values: ArrayLike, neighbours: np.ndarray) -> FloatArray:
     """Gradient Sum: sum of the differences between neighbours, steps (b) and (c) of Figure 3.
 

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from scipy.special import ndtri
 from scipy.stats import rankdata
 
-from fingerpad.core.checks import FloatArray, float_array, positive, whole
+from fingerpad.core.checks import FloatArray, float_array, not_negative, positive, whole
 from fingerpad.core.errors import InputError
 from fingerpad.psychophysics.noisy_responses import session_trials
 from fingerpad.psychophysics.response_models import ResponseModel
@@ -215,21 +215,27 @@ def efficiency(code: Discriminability, ideal: Discriminability) -> tuple[float, 
     return share, 2.0 * share * relative
 
 
-def gaussian_information(responses: ArrayLike, slopes: ArrayLike, noise_sigma: float) -> float:
+def gaussian_information(
+    responses: ArrayLike, slopes: ArrayLike, noise_sigma: float, smallest_spread: float = 0.0
+) -> float:
     """Fisher information of responses with the paper's noise, the limit of the ideal observer.
 
-        J = sum_i (mu_i' / mu_i)^2 (1 / sigma_1^2 + 2),    d' -> |dx| sqrt J
+        V_i = (sigma_1 mu_i)^2 + s^2
+        J = sum_i mu_i'^2 / V_i + 2 (sigma_1^2 mu_i mu_i' / V_i)^2,    d' -> |dx| sqrt J
 
-    The 2 is the information in the standard deviation, which is proportional to the mean.
+    The second term is the information in the variance, which depends on the mean. Without a noise floor s,
+    J = sum_i (mu_i' / mu_i)^2 (1 / sigma_1^2 + 2).
 
     Parameters
     ----------
     responses : array_like (n_receptors,)
-        mu, not zero. [any unit]
+        mu, not zero unless there is a noise floor. [any unit]
     slopes : array_like (n_receptors,)
         mu', their derivatives by the stimulus x. [that unit per unit of x]
     noise_sigma : float
         Standard deviation sigma_1 of the multiplicative noise.
+    smallest_spread : float, optional
+        Noise floor s. [unit of `responses`]
 
     Returns
     -------
@@ -239,20 +245,25 @@ def gaussian_information(responses: ArrayLike, slopes: ArrayLike, noise_sigma: f
     Raises
     ------
     InputError
-        If sizes differ, a response is zero or the noise is not positive.
+        If sizes differ, the noise is not positive, the floor negative, or a response zero without a floor.
 
     Examples
     --------
     >>> round(gaussian_information([10.0], [1.0], 0.1), 6)
     1.02
+    >>> gaussian_information([0.0], [1.0], 0.1, smallest_spread=2.0)
+    0.25
     """
     values, rises = float_array("responses", responses, 1), float_array("slopes", slopes, 1)
-    if values.size != rises.size or (values == 0.0).any():
+    sigma, floor = positive("noise_sigma", noise_sigma), not_negative("smallest_spread", smallest_spread)
+    zeros = np.count_nonzero(values == 0.0) if floor == 0.0 else 0
+    if values.size != rises.size or zeros:
         raise InputError(
             f"responses must not be zero, and slopes be as many: got {rises.size} slopes for {values.size} "
-            f"responses, {np.count_nonzero(values == 0.0)} of them zero."
+            f"responses, {zeros} of them zero; leave those out or give smallest_spread."
         )
-    return float(np.square(rises / values).sum() * (positive("noise_sigma", noise_sigma) ** -2 + 2.0))
+    variance = np.square(sigma * values) + floor**2
+    return float((np.square(rises) / variance + 2.0 * np.square(sigma**2 * values * rises / variance)).sum())
 
 
 def poisson_information(mean_counts: ArrayLike, slopes: ArrayLike) -> float:

@@ -20,10 +20,8 @@ from fingerpad.experiments.discrimination.decoding import (
     response_table,
     side_curves,
     silent_stimuli,
-    taking_part,
     task_statistic,
 )
-from fingerpad.experiments.discrimination.efficiencies import efficiencies, ideal_observer, presentations
 from fingerpad.experiments.discrimination.task import (
     FITTED,
     GRID,
@@ -36,10 +34,21 @@ from fingerpad.experiments.discrimination.task import (
 )
 from fingerpad.experiments.discrimination.task_stimuli import TaskStimulus, stimulus_index
 from fingerpad.neuron.population import Population
+from fingerpad.psychophysics.code_efficiency import (
+    SMALLEST_SPREAD,
+    TRIALS,
+    code_efficiency,
+    code_statistic,
+    noisy_presentations,
+)
 from fingerpad.psychophysics.counts import binomial_interval
 from fingerpad.psychophysics.discrimination import Experiment
-from fingerpad.psychophysics.encoding import neighbours_of
+from fingerpad.psychophysics.encoding import neighbours_of, taking_part
 from fingerpad.psychophysics.ideal_observer import Presentation
+from fingerpad.psychophysics.response_models import multiplied_responses
+
+SESSION = 2
+"""Session of the random numbers of efficiencies; that of the hit rates is another."""
 
 Encoded = tuple[FloatArray, np.ndarray]
 """A measure of all receptors under every stimulus, and the pairs of neighbours that take part."""
@@ -428,7 +437,7 @@ def _decodings(
     if silent.size:
         names = tuple(prepared.stimuli[row].name for row in silent)
         return [Decoding(code=code, measure=measure, silent=names) for code in codes]
-    shown = presentations(encoded[0], sigma, seed) if sigma > 0.0 else []
+    shown = noisy_presentations(encoded[0], sigma, seed, SESSION) if sigma > 0.0 else []
     return [_decoding(prepared, code, measure, encoded, sigma, shown) for code in codes]
 
 
@@ -443,13 +452,13 @@ def _decoding(
     """Hit rates of one code, their statistic, efficiency and psychometric curves."""
     settings, (table, neighbours) = prepared.task.experiment, encoded
     if code == IDEAL:
-        ideal = ideal_observer(shown)
+        best = np.array([presentation.ideal_hit_rate() for presentation in shown])
         decoding = Decoding(
             code=code,
             measure=measure,
-            hit_rate=ideal.hit_rate,
-            hit_rate_sd=ideal.hit_rate_sd,
-            d_prime=ideal.d_prime,
+            hit_rate=best,
+            hit_rate_sd=np.sqrt(best * (1.0 - best) / TRIALS),
+            d_prime=np.array([presentation.ideal().d_prime for presentation in shown]),
         )
     else:
         rates = code_hit_rates(code, table, neighbours, sigma, settings.seed, prepared.plan)
@@ -461,12 +470,14 @@ def _decoding(
             statistic=task_statistic(code, table, neighbours, sigma, settings.seed),
         )
         if shown:
-            of_code = efficiencies(code, shown, table, neighbours, sigma, settings.seed)
+            standard = multiplied_responses(table[0], sigma, SMALLEST_SPREAD)
+            statistic = code_statistic(code, standard, neighbours, settings.seed, SESSION)
+            compared = [code_efficiency(presentation, statistic) for presentation in shown]
             decoding = replace(
                 decoding,
-                d_prime=of_code.d_prime,
-                efficiency=of_code.efficiency,
-                efficiency_error=of_code.efficiency_error,
+                d_prime=np.array([one.code.d_prime for one in compared]),
+                efficiency=np.array([one.efficiency for one in compared]),
+                efficiency_error=np.array([one.efficiency_error for one in compared]),
             )
     levels = [stimulus.level for stimulus in prepared.stimuli if stimulus.level is not None]
     if not levels or decoding.hit_rate is None:

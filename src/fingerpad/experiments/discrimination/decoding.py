@@ -17,7 +17,7 @@ from fingerpad.psychophysics.discrimination import (
     discriminate_euclidean,
     discriminate_gradient_sum,
 )
-from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, answering_neighbours, distance
+from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, distance
 from fingerpad.psychophysics.noise_fit import NOISE_DRAWS, NoiseFit, expected_hit_rates, fit_noise_sigma
 from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, noisy_responses, session_trials
 from fingerpad.psychophysics.psychometric import fit_psychometric
@@ -171,32 +171,6 @@ def silent_stimuli(table: FloatArray, measure: str, latest_ms: float | None = No
     if not missing.any(axis=0).all():
         return np.empty(0, dtype=np.int64)
     return np.flatnonzero(missing.sum(axis=1) == missing.sum(axis=1).max())
-
-
-def taking_part(table: FloatArray, neighbours: np.ndarray) -> tuple[FloatArray, np.ndarray]:
-    """Leave out receptors that are silent under one stimulus, as in the reproduction.
-
-    See docs/decisions/silent-receptors.md.
-
-    Parameters
-    ----------
-    table : array (n_stimuli, n_receptors)
-        From `response_table`, NaN for silence.
-    neighbours : int array (n_pairs, 2)
-        Who is whose neighbour.
-
-    Returns
-    -------
-    (array (n_stimuli, n_receptors), int array (n_pairs, 2))
-        Zeros for those that take no part, and the pairs without them.
-
-    Examples
-    --------
-    >>> table, pairs = taking_part(np.array([[20.0, 25.0, np.nan], [20.0, 24.0, 90.0]]), [[0, 1], [1, 2]])
-    >>> table.tolist(), pairs.tolist()
-    ([[20.0, 25.0, 0.0], [20.0, 24.0, 0.0]], [[0, 1]])
-    """
-    return np.where(np.isnan(table).any(axis=0), 0.0, table), answering_neighbours(table, neighbours)
 
 
 def code_hit_rates(

@@ -32,6 +32,7 @@ from fingerpad.psychophysics import (
     posterior,
     yes_no,
 )
+from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.noise_fit import NOISE_DRAWS, expected_hit_rates, fit_noise_sigma
 from fingerpad.skin.sampling import SkinResponse
@@ -431,8 +432,7 @@ def threshold_at(observer: Observer, standard_per_m: float) -> CurvatureThreshol
     fit = fit_psychometric(steps, counts, np.full(steps.size, JUDGEMENTS), sigmoid="weibull", lapse=0.0)
     at = np.linspace(0.0, 1.05 * steps[-1], 61)[1:]
     rates, slopes = observer.responses(standard_per_m), observer.slopes(standard_per_m)
-    heard = rates > 0.0  # noise that multiplies silence is none: docs/decisions/ideal-observer.md
-    information = gaussian_information(rates[heard], slopes[heard], observer.noise_sigma)
+    information = gaussian_information(rates, slopes, observer.noise_sigma, SMALLEST_SPREAD)
     ideal_jnd_per_m = d_prime_of_proportion(PROPORTION, yes_no) / np.sqrt(information)
     return CurvatureThreshold(
         standard_per_m=standard_per_m,

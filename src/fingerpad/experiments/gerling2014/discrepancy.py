@@ -20,7 +20,7 @@ from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.gerling2014 import goodwin
 from fingerpad.experiments.gerling2014.discrimination_sessions import CRITERION_SIGMAS, Measured
 from fingerpad.psychophysics.discrimination import END_OF_STIMULUS_MS, Experiment, discriminate_gradient_sum
-from fingerpad.psychophysics.encoding import answering_neighbours, gradient_sum, neighbour_pairs
+from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
 
 PATIENCE_MS = protocol.RAMP.value
@@ -185,9 +185,7 @@ def answering_latencies(latency_ms: FloatArray, neighbours: np.ndarray) -> Measu
     InputError
         If no receptor ever fires.
     """
-    pairs = answering_neighbours(latency_ms, neighbours)
-    silent = np.isnan(latency_ms).any(axis=0)
-    return Measured(np.where(silent, 0.0, latency_ms), pairs)
+    return Measured(*taking_part(latency_ms, neighbours))
 
 
 def discrepancy_analysis(
