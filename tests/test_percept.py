@@ -87,7 +87,7 @@ def test_the_line_is_straight_in_z_and_goes_through_both_points():
 
 
 def test_what_is_known_of_people_has_intervals_around_the_points():
-    known = goodwin.goodwin_hit_rates(CURVATURES[1:])
+    known = goodwin.goodwin_hit_rates_at(CURVATURES[1:])
     assert (known.low < known.hit_rate).all()
     assert (known.hit_rate < known.high).all()
     assert known.line.shape == (6,)

@@ -7,18 +7,18 @@ import pytest
 
 from fingerpad.core.results import file_format
 from fingerpad.experiments.schemas import file_name, schema
-from fingerpad.experiments.schemas.__main__ import RESULT_FILES, main
+from fingerpad.experiments.schemas.__main__ import RESULT_FILES, write_schemas
 
 
 @pytest.mark.parametrize("results", RESULT_FILES)
 def test_the_schema_in_the_package_is_the_one_that_the_types_give(results, tmp_path):
-    main(tmp_path)
+    write_schemas(tmp_path)
     name = file_format(results)[0]
     assert json.loads((tmp_path / file_name(name)).read_text(encoding="utf-8")) == schema(name)
 
 
 def test_every_file_of_results_has_its_own_format(tmp_path):
-    main(tmp_path)
+    write_schemas(tmp_path)
     assert len(list(tmp_path.iterdir())) == len(RESULT_FILES)
 
 

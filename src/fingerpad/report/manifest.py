@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any
 
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.report.formatting import plain, spelled
 from fingerpad.report.parts import Chapter, Row, Table
 
 
-def manifest_chapter(manifest: Manifest | Mapping[str, Any]) -> Chapter:
+def manifest_chapter(manifest: Manifest) -> Chapter:
     """Return the chapter: facts about the run, its stages, and versions of packages.
 
     Parameters
@@ -23,8 +22,8 @@ def manifest_chapter(manifest: Manifest | Mapping[str, Any]) -> Chapter:
     -------
     Chapter
     """
-    facts = dict(manifest) if isinstance(manifest, Mapping) else asdict(manifest)
-    stages, packages = facts.pop("stages", ()), facts.pop("packages", {})
+    facts = asdict(manifest)
+    stages, packages = facts.pop("stages"), facts.pop("packages")
     tables = [facts_table("The run", facts)]
     if stages:
         names = [name for name in stages[0] if any(stage[name] for stage in stages)]
@@ -38,7 +37,7 @@ def edition(manifest: Manifest) -> str:
     return f"fingerpad {manifest.version}, {manifest.resolution} resolution, seed {manifest.seed}"
 
 
-def facts_table(title: str, facts: Mapping[str, Any]) -> Table:
+def facts_table(title: str, facts: Mapping[str, object]) -> Table:
     """Return names and values as a table; what is None or empty is left out.
 
     Examples

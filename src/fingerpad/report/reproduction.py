@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 from matplotlib.figure import Figure
 
@@ -39,6 +39,9 @@ from fingerpad.report.skin_deflection import (
     draw_skin_deflection,
     skin_deflection_tables,
 )
+
+Section = TypeVar("Section")
+"""Part of the results that a figure draws."""
 
 VERDICTS: dict[bool | None, tuple[Kind, str]] = {
     True: ("met", "✓ met"),
@@ -93,9 +96,9 @@ def _drawing(
     figure: int,
     name: str,
     title: str,
-    draw: Callable[[Any], Figure],
-    caption: Callable[[Any], str],
-    section: Any,
+    draw: Callable[[Section], Figure],
+    caption: Callable[[Section], str],
+    section: Section,
 ) -> Drawing:
     return Drawing(f"figure_{figure}_{name}", title, partial(draw, section), caption(section), figure)
 

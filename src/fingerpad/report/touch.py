@@ -32,7 +32,7 @@ BONE = "#9a9488"
 """Colour of bone and nail."""
 
 
-class Section(Protocol):
+class FingerSection(Protocol):
     """What a `skin.section.Section` knows."""
 
     @property
@@ -56,7 +56,7 @@ class Section(Protocol):
         """Edges on the bone, (n_edges, 2, 2). [mm]"""
 
 
-class Mesh(Protocol):
+class FingerMesh(Protocol):
     """What a `geometry.mesh.Mesh` knows."""
 
     @property
@@ -68,11 +68,11 @@ class Mesh(Protocol):
         """Nodes of the volar skin at z = 0, x increasing."""
 
 
-class Skin(Protocol):
+class PressedSkin(Protocol):
     """What a `SkinResponse` knows."""
 
     @property
-    def mesh(self) -> Mesh:
+    def mesh(self) -> FingerMesh:
         """The undeformed finger."""
 
     @property
@@ -95,7 +95,7 @@ class Skin(Protocol):
     def direction(self) -> FloatArray:
         """Unit direction of pressing, (3,)."""
 
-    def section(self) -> Section:
+    def section(self) -> FingerSection:
         """Return the deformed middle plane."""
 
 
@@ -118,14 +118,16 @@ class Response(Protocol):
         """One train per receptor."""
 
 
-class Indenter(Protocol):
+class PressedBody(Protocol):
     """A rigid body that knows its face."""
 
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
 
 
-def save_figure(path: str | Path, skin: Skin, response: Response, indenter: Indenter | None = None) -> Path:
+def save_figure(
+    path: str | Path, skin: PressedSkin, response: Response, indenter: PressedBody | None = None
+) -> Path:
     """Draw a touch and save the picture: the pressed finger with its energy density, and the spikes.
 
     Parameters
@@ -136,7 +138,7 @@ def save_figure(path: str | Path, skin: Skin, response: Response, indenter: Inde
         From `indent`.
     response : ResponseMap
         What a population answers to it.
-    indenter : Indenter, optional
+    indenter : PressedBody, optional
         The body that pressed, to be drawn as well; as it stands when it is not spun.
 
     Returns
@@ -163,7 +165,7 @@ def save_figure(path: str | Path, skin: Skin, response: Response, indenter: Inde
     return write_png(lambda parts: draw(*parts), (skin, response, indenter), Path(path))
 
 
-def draw(skin: Skin, response: Response, indenter: Indenter | None = None) -> Figure:
+def draw(skin: PressedSkin, response: Response, indenter: PressedBody | None = None) -> Figure:
     """Draw a touch as `save_figure` saves it."""
     figure = new_figure(9.5, 4.0)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0), height_ratios=(1.0, 4.0))
@@ -174,7 +176,7 @@ def draw(skin: Skin, response: Response, indenter: Indenter | None = None) -> Fi
     return figure
 
 
-def draw_section(axes: Axes, skin: Skin, indenter: Indenter | None = None) -> None:
+def draw_section(axes: Axes, skin: PressedSkin, indenter: PressedBody | None = None) -> None:
     """Draw the middle plane of the pressed finger at the end of the touch, coloured by energy density.
 
     Parameters
@@ -183,7 +185,7 @@ def draw_section(axes: Axes, skin: Skin, indenter: Indenter | None = None) -> No
         An empty panel.
     skin : SkinResponse
         What is drawn.
-    indenter : Indenter, optional
+    indenter : PressedBody, optional
         The body that pressed.
     """
     section = skin.section()
@@ -221,7 +223,7 @@ def draw_section(axes: Axes, skin: Skin, indenter: Indenter | None = None) -> No
     bar.ax.yaxis.set_major_formatter("{x:g}")
 
 
-def _draw_indenter(axes: Axes, skin: Skin, section: Section, indenter: Indenter) -> None:
+def _draw_indenter(axes: Axes, skin: PressedSkin, section: FingerSection, indenter: PressedBody) -> None:
     """Draw the body where its face meets the deformed skin."""
     towards = numbers(skin.direction)[:2]
     along = np.array([towards[1], -towards[0]])
@@ -243,7 +245,7 @@ def _draw_indenter(axes: Axes, skin: Skin, section: Section, indenter: Indenter)
     axes.fill(*outline.T, facecolor="#c9d1d8", edgecolor=BLACK, linewidth=1.0)
 
 
-def draw_motion(axes: Axes, skin: Skin) -> None:
+def draw_motion(axes: Axes, skin: PressedSkin) -> None:
     """Draw the depth of the indenter over time."""
     axes.plot(skin.times_ms, skin.depth_mm, color=BLUE)
     axes.set(ylabel="depth\n[mm]", ylim=(0.0, 1.15 * float(skin.depth_mm.max())))
@@ -251,7 +253,7 @@ def draw_motion(axes: Axes, skin: Skin) -> None:
     axes.grid(visible=False)
 
 
-def draw_spikes(axes: Axes, skin: Skin, response: Response) -> None:
+def draw_spikes(axes: Axes, skin: PressedSkin, response: Response) -> None:
     """Draw the spike trains of the afferents that fire, the nearest to the indenter's axis at the bottom."""
     plane = numbers(response.positions_mm)[:, [0, -1]] - [skin.axis_x_mm, 0.0]
     trains = [response.spikes[afferent] for afferent in np.argsort(np.hypot(*plane.T), kind="stable")]

@@ -69,7 +69,7 @@ def line_in_z(curvature_per_m: ArrayLike) -> FloatArray:
     return ndtr(z_near + slope_m * (np.asarray(curvature_per_m, dtype=np.float64) - near))
 
 
-def goodwin_hit_rates(curvature_per_m: ArrayLike) -> GoodwinHitRates:
+def goodwin_hit_rates_at(curvature_per_m: ArrayLike) -> GoodwinHitRates:
     """Observed hit rates of people, and the line at the comparison spheres.
 
     Parameters

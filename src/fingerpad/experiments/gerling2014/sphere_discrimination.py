@@ -25,7 +25,7 @@ from fingerpad.experiments.gerling2014.discrimination_statistics import (
 from fingerpad.experiments.gerling2014.goodwin import (
     GoodwinHitRates,
     fit_noise_to_goodwin,
-    goodwin_hit_rates,
+    goodwin_hit_rates_at,
 )
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
@@ -167,7 +167,7 @@ def discriminate_spheres(
         noise_sigma=noise.noise_sigma,
         noise_fit_error=noise.root_mean_square_error,
         noise_sigma_paper=psychophysics.NOISE_SIGMA.value,
-        goodwin=goodwin_hit_rates(CURVATURES[1:]),
+        goodwin=goodwin_hit_rates_at(CURVATURES[1:]),
         gradient_sums={
             name: np.array([gradient_sum(one.responses, one.neighbours) for one in both])
             for name, both in measures.items()

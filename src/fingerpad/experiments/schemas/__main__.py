@@ -15,11 +15,11 @@ RESULT_FILES: tuple[type, ...] = (ReproductionResult, FitFile, DiscriminationFil
 """Classes of results that are written to a file of their own."""
 
 
-def main(folder: Path = Path(__file__).parent) -> None:
+def write_schemas(folder: Path = Path(__file__).parent) -> None:
     """Write the schemas into a folder, that of the package by default."""
     for results in RESULT_FILES:
         write_json(folder / file_name(file_format(results)[0]), schema_of(results))
 
 
 if __name__ == "__main__":
-    main()
+    write_schemas()
