@@ -5,16 +5,16 @@ A number that stands on several pages stands in these tables, and the other page
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from fingerpad.core.errors import InputError, StoreError
-from fingerpad.core.results import Number, Vector, result_class
+from fingerpad.core.results import Number, Vector, from_json, read_results, result_class
+from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.report.formatting import ABSENT, fixed, number
+from studies.fit_methods import FitMethods, MethodsStudy
 from studies.pages.markdown import table
 
 COMMAND = "python -m studies results"
@@ -151,76 +151,94 @@ def read_excerpt(path: Path, methods: Path | None = None, before: Excerpt | None
     path : Path
         Its results.json.
     methods : Path, optional
-        `methods.json` of `python -m studies methods`.
+        The methods.json of `python -m studies methods`.
     before : Excerpt, optional
         What the pages show now; without `methods` they keep its methods and models.
 
     Raises
     ------
     StoreError
-        If a file cannot be read, or a section that a page shows is missing.
+        If a file cannot be read, or has no section on the quantities that drive the afferent.
     """
-    try:
-        results = json.loads(path.read_text(encoding="utf-8"))
-        compared = None if methods is None else json.loads(methods.read_text(encoding="utf-8"))["methods"]
-        shown = excerpt(results, compared)
-    except (OSError, ValueError) as error:
-        raise StoreError(f"{path} cannot be read as JSON ({error}): run `make reproduce` first.") from error
-    except (KeyError, TypeError) as error:
+    results = read_results(path, ReproductionResult)
+    if results.drive_quantities is None:
         raise StoreError(
-            f"{path} must hold all that `fingerpad reproduce --extended` writes: {error} is missing."
-        ) from error
-    if not shown.drives:
-        raise StoreError(f"{path} must come from `fingerpad reproduce --extended`: the drives are missing.")
-    if compared is None and before is not None:
-        return replace(shown, methods=before.methods, models=before.models)
-    return shown
+            f"{path} must come from `fingerpad reproduce --extended`: it lacks drive_quantities."
+        )
+    if methods is None:
+        shown = excerpt(results)
+        return shown if before is None else replace(shown, methods=before.methods, models=before.models)
+    try:
+        return excerpt(results, from_json(MethodsStudy, methods.read_bytes()).methods)
+    except (OSError, InputError) as error:
+        raise StoreError(f"{methods} must come from `python -m studies methods`: {error}") from error
 
 
-def excerpt(results: Mapping[str, Any], methods: Mapping[str, Any] | None = None) -> Excerpt:
-    """Pick from whole results what the pages show; a missing section is a `KeyError`."""
-    manifest, found = results["manifest"], results["discrimination"]
-    compared = methods or {"methods": (), "models": ()}
-    # Absent from a run that does not go beyond the paper.
-    drives = results.get("drive_quantities") or {"candidates": ()}
-    people, codes = found["goodwin"], dict(found["gradient_sum"])
+def excerpt(results: ReproductionResult, compared: FitMethods | None = None) -> Excerpt:
+    """Pick from whole results what the pages show; what a run did not compute stays empty."""
+    found, manifest, drives = results.discrimination, results.manifest, results.drive_quantities
+    codes = {
+        f"Gradient Sum, {phase}": found.gradient_sum[phase] for phase in ("static", "dynamic", "latency")
+    }
+    codes["Euclidean Distance, static"] = found.euclidean["static"]
     return Excerpt(
-        **{key: manifest[key] for key in ("version", "resolution", "materials", "seed")},
-        indentations={
-            stage["name"]: stage["indentations"] for stage in manifest["stages"] if stage.get("indentations")
-        },
-        comparison=tuple(_picked(Compared, row) for row in results["comparison"]),
-        methods=tuple(_picked(Method, row) for row in compared["methods"]),
+        version=manifest.version,
+        resolution=manifest.resolution,
+        materials=manifest.materials,
+        seed=manifest.seed,
+        indentations={stage.name: stage.indentations for stage in manifest.stages if stage.indentations},
+        comparison=tuple(
+            Compared(quantity=row.quantity, paper=row.paper, ours=row.ours, met=row.met, note=row.note)
+            for row in results.comparison
+        ),
+        methods=tuple(
+            Method(
+                method=row.method,
+                free_numbers=row.free_numbers,
+                fss_in_sample=row.fss_in_sample,
+                fss_training_mean=row.fss_training_mean,
+                fss_out_of_sample=row.fss_out_of_sample,
+                fss_test=row.fss_test,
+                runs=row.runs,
+            )
+            for row in (compared.methods if compared else ())
+        ),
         models=tuple(
-            _picked(Model, row | {"offset_mm": row["parameters"].get("offset_mm") or 0.0})
-            for row in compared["models"]
+            Model(
+                model=row.model,
+                fss_in_sample_dynamic=row.fss_in_sample_dynamic,
+                fss_in_sample_static=row.fss_in_sample_static,
+                fss_in_sample=row.fss_in_sample,
+                fss_out_of_sample=row.fss_out_of_sample,
+                offset_mm=row.parameters.get("offset_mm", 0.0),
+            )
+            for row in (compared.models if compared else ())
         ),
         drives=tuple(
-            _picked(Drive, candidate["fit"] | {term: candidate[term] for term in ("static", "dynamic")})
-            for candidate in drives["candidates"]
+            Drive(
+                static=candidate.static,
+                dynamic=candidate.dynamic,
+                fss_in_sample=candidate.fit.fss_in_sample,
+                fss_out_of_sample=candidate.fit.fss_out_of_sample,
+                fss_out_of_sample_dynamic=candidate.fit.fss_out_of_sample_dynamic,
+                fss_out_of_sample_static=candidate.fit.fss_out_of_sample_static,
+            )
+            for candidate in (drives.candidates if drives else ())
         ),
         percept=Percept(
-            standard_per_m=found["curvature_per_m"][0],
-            curvature_per_m=found["curvature_per_m"][1:],
+            standard_per_m=found.curvature_per_m[0],
+            curvature_per_m=found.curvature_per_m[1:],
             codes=tuple(
-                _picked(HitRates, rates | {"code": name})
-                for name, rates in [
-                    *((f"Gradient Sum, {phase}", codes[phase]) for phase in ("static", "dynamic", "latency")),
-                    ("Euclidean Distance, static", found["euclidean"]["static"]),
-                ]
+                HitRates(code=name, hit_rate=rates.hit_rate, hit_rate_shifted=rates.hit_rate_shifted)
+                for name, rates in codes.items()
             ),
-            noise_sigma=found["noise_sigma"],
-            people_curvature_per_m=people["curvature_per_m"],
-            people=people["hit_rate"],
-            people_low=people["low"],
-            people_high=people["high"],
+            noise_sigma=found.noise_sigma,
+            people_curvature_per_m=found.goodwin.curvature_per_m,
+            people=found.goodwin.hit_rate,
+            people_low=found.goodwin.low,
+            people_high=found.goodwin.high,
         ),
     )
-
-
-def _picked(cls: Any, values: Mapping[str, Any]) -> Any:
-    """Make an instance of a class of results from those values that are its fields."""
-    return cls(**{name: values[name] for name in cls.__dataclass_fields__})
 
 
 def results_page(shown: Excerpt) -> str:
@@ -247,7 +265,7 @@ def results_page(shown: Excerpt) -> str:
         ),
         "## FSS by method of fitting",
         "Fractional sum of squares (FSS, Eqs. 12-14) of one afferent under the bar. "
-        "Out of sample: mean of six folds. From the study `studies.fit_methods`, on the same recordings. "
+        "Out of sample: mean of six folds. From `python -m studies methods`, on the same recordings. "
         "[Settings of the methods](decisions/methods-of-fitting.md), "
         "[limits of the fit](single-unit.md#what-limits-the-fit).",
         _methods(shown.methods),

@@ -128,7 +128,7 @@ def extended(first, tmp_path_factory):
 
 
 def test_a_run_has_the_numbers_that_the_pages_show(first):
-    shown = excerpt(first.results)
+    shown = excerpt(read_results(first.folder / "results.json", ReproductionResult))
     assert sum(shown.indentations.values()) == INDENTATIONS
     assert len(readme_table(shown).splitlines()) == 2 + len(README_ROWS)
     assert shown.percept.codes[0].hit_rate.size == shown.percept.curvature_per_m.size == 6

@@ -65,13 +65,12 @@ def test_a_readme_without_its_marks_and_a_comparison_without_its_rows_are_refuse
         readme_table(replace(shown, comparison=()))
 
 
-def test_results_that_lack_a_section_are_refused_by_its_name(tmp_path):
-    file = tmp_path / "results.json"
-    with pytest.raises(StoreError, match="run `make reproduce` first"):
-        read_excerpt(file)
-    file.write_text(json.dumps({"manifest": {}, "discrimination": {}}))
-    with pytest.raises(StoreError, match="'goodwin' is missing"):
-        read_excerpt(file)
+def test_files_that_are_missing_or_of_another_kind_are_refused(tmp_path):
+    with pytest.raises(StoreError, match=r"none\.json cannot be read"):
+        read_excerpt(tmp_path / "none.json")
+    (tmp_path / "other.json").write_text(json.dumps({"format": "fingerpad fit", "format_version": 1}))
+    with pytest.raises(StoreError, match="must have the format fingerpad reproduction"):
+        read_excerpt(tmp_path / "other.json")
 
 
 def test_the_picture_shows_the_hit_rates_of_the_run_and_all_axes_have_names(shown):

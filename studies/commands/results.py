@@ -17,12 +17,13 @@ COMMANDS = DOCS / "command-line.md"
 
 
 def results_command(
-    results: Annotated[Path, typer.Argument(help="results.json of `fingerpad reproduce --extended`.")] = Path(
-        "reproduction/results.json"
-    ),
+    results: Annotated[
+        Path | None,
+        typer.Argument(help="results.json of `fingerpad reproduce --extended`. Default: docs/results.json."),
+    ] = None,
     methods: Annotated[
         Path | None,
-        typer.Option(help="JSON file of the study on methods of fitting. Default: keep the rows shown now."),
+        typer.Option(help="methods.json of `python -m studies methods`. Default: keep the rows shown now."),
     ] = None,
     picture: Annotated[
         bool, typer.Option(help="Also press the standard sphere and draw the README's picture.")
@@ -32,8 +33,9 @@ def results_command(
     from fingerpad.report.style import write_png
     from studies import chain_picture, command_line_page, results_page
 
-    before = from_json(results_page.Excerpt, NUMBERS.read_bytes()) if NUMBERS.exists() else None
-    shown = results_page.read_excerpt(results, methods, before)
+    shown = from_json(results_page.Excerpt, NUMBERS.read_bytes())
+    if results is not None:
+        shown = results_page.read_excerpt(results, methods, shown)
     readme = results_page.with_table(README.read_text(encoding="utf-8"), shown)
     write_atomically(NUMBERS, to_json(shown) + b"\n")
     write_atomically(PAGE, results_page.results_page(shown).encode())
