@@ -167,17 +167,17 @@ def test_page_shows_and_names_what_was_found(found):
     fractions, curves = figure.axes
     labels = fractions.get_legend_handles_labels()[1]
     assert set(labels) == {
-        "people, as reported: 10-14 %",
+        "observed, as reported: 10-14 %",
         "Gradient Sum, 3 by 6 receptors",
         "Gradient Sum, 6 by 6 receptors",
         "ideal observer, 3 by 6 receptors",
-        "people (Goodwin et al. 1991)",
+        "observed (Goodwin et al. 1991)",
     }
     assert "1/m" in fractions.get_xlabel()
     assert "%" in curves.get_xlabel()
     (thresholds,) = page.threshold_tables(found)
     assert len(thresholds.rows) == 8
-    assert "15 pressed spheres" in page.caption_thresholds(found)
+    assert "15 spheres" in page.caption_thresholds(found)
 
 
 class Coarse(Conditions):

@@ -260,7 +260,7 @@ def test_curves_show_every_code_people_with_their_intervals_and_thresholds():
     found = analyse(question, bumps(question))
     figure = figures.draw_task_curves(found)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert sorted(labels) == ["Gradient Sum", "ideal observer", "people (two people)"]
+    assert sorted(labels) == ["Gradient Sum", "ideal observer", "observed (two people)"]
     (axes,) = figure.axes
     drawn = {tuple(np.round(line.get_xdata(), 6)) for line in axes.lines}
     assert (220.0, 220.0) in drawn  # the interval of the first point

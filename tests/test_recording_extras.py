@@ -250,5 +250,5 @@ def test_words_and_tables_hold_the_numbers(section):
     assert all(len(row.cells) == len(table.columns) for row in table.rows)
     assert report.profile_tables(section)[0].rows[0].cells[-1] == "open … 2.8"
     most = max(zip(section.sensitivity.total, ("β", "k_d", "k_s", "τ"), strict=True))[1]
-    assert f"Most depends on {most}" in report.caption_sensitivity(section)
+    assert f"The largest total index is that of {most}" in report.caption_sensitivity(section)
     assert len(report.sensitivity_tables(section)[0].rows) == 4

@@ -624,7 +624,7 @@ def test_the_summary_counts_and_names_what_was_missed():
     found, verdicts = reproduction_summary(typed(ReproductionResult, synthetic_results()))
     assert "Trial 3 is closest" in found
     assert "0.84" in found
-    assert "296 1/m in 63 % of trials (people: 58 %)" in found
+    assert "296 1/m in 63 % of trials (observed: 58 %)" in found
     assert verdicts == (
         "Of 2 judged comparisons with the paper, 1 is met and 1 is missed. "
         "Missed: hit rate at 296 /m (0.71, the paper 0.58). 1 more is shown without a verdict."
@@ -761,11 +761,11 @@ def test_figure_6_colours_the_finger_where_afferents_fire_and_mirrors_half_of_it
 
 def test_captions_say_what_afferents_do_without_a_touch():
     section, timing = typed(PopulationMaps, _population()), typed(PopulationTiming, _population_timing())
-    assert "without any touch too, 4 spikes/s from 251 ms on" in population.caption_population(section)
+    assert "also fires without touch, 4 spikes/s from 251 ms on" in population.caption_population(section)
     silent = replace(section, at_rest=replace(section.at_rest, first_spike_latency_ms=np.nan))
-    assert "without any touch" not in population.caption_population(silent)
+    assert "without touch" not in population.caption_population(silent)
     assert "first fire at 251 ms. All start" in population_rate.caption_population_rate(timing.rates)
-    assert "Without any touch" not in recruitment.caption_recruitment(timing.recruitment)
+    assert "Without touch" not in recruitment.caption_recruitment(timing.recruitment)
     firing = replace(timing.recruitment, resting_latency_ms=251.0)
     assert "first fire at 251 ms. They count as recruited" in recruitment.caption_recruitment(firing)
 
@@ -791,8 +791,9 @@ def test_figure_13_ranks_every_afferent_that_fires_and_counts_skin():
 
 def test_figure_13_and_its_table_say_how_much_the_order_changes():
     section = typed(PopulationTiming, _population_timing()).recruitment
-    assert "365 /m: rank correlation 0.987, 3.1 % of the pairs swap" in recruitment.caption_recruitment(
-        section
+    assert (
+        "365 /m: rank correlation 0.987, 3.1 % of the pairs in reversed order"
+        in recruitment.caption_recruitment(section)
     )
     table = recruitment.recruitment_tables(section)[0]
     assert list(table.rows[1].cells) == ["365 /m", "22.5", "16.8", "6.0", "20.0", "0.987", "3.1 %"]
@@ -831,7 +832,7 @@ def test_figure_7_keeps_the_papers_letters_and_shows_people_in_every_panel():
         "(g) Gradient Sum, static σ₁ = 0.12, 10 matrices",
     ]
     for axes in panels:
-        (people,) = [bars for bars in axes.containers if bars.get_label().startswith("people")]
+        (people,) = [bars for bars in axes.containers if bars.get_label().startswith("observed")]
         points, _, (intervals,) = people.lines
         assert points.get_xydata().tolist() == [[296.0, 0.58], [365.0, 0.95]]
         ends = [sorted(bar[:, 1].round(9).tolist()) for bar in intervals.get_segments()]

@@ -46,7 +46,7 @@ def draw_thresholds(section: CurvatureThresholds) -> Figure:
 def _fractions(axes: Axes, section: CurvatureThresholds) -> None:
     people, paper = section.literature, section.populations[0]
     low, high = PER_CENT * people.weber_fractions
-    axes.axhspan(low, high, color=PALE, label=f"people, as reported: {number(low, 2)}-{number(high, 2)} %")
+    axes.axhspan(low, high, color=PALE, label=f"observed, as reported: {number(low, 2)}-{number(high, 2)} %")
     for population, style in zip(section.populations, STYLES[1:], strict=False):
         axes.plot(
             [entry.standard_per_m for entry in population.standards],
@@ -71,9 +71,9 @@ def _fractions(axes: Axes, section: CurvatureThresholds) -> None:
         markeredgewidth=1.6,
         markersize=7.5,
         zorder=5,
-        label="people (Goodwin et al. 1991)",
+        label="observed (Goodwin et al. 1991)",
     )
-    axes.set_title("(a) least difference told apart")
+    axes.set_title("(a) difference threshold")
     axes.set_xlabel("curvature of the standard [1/m]")
     axes.set_ylabel("Weber fraction at 75 % [%]")
     axes.set_ylim(0.0, _TOP)
@@ -107,7 +107,7 @@ def _curves(axes: Axes, section: CurvatureThresholds) -> None:
         axes.plot([], [], label=f"{number(entry.standard_per_m)} 1/m", markersize=5.0, **style)
     axes.set_title("(b) hit rates of the Gradient Sum and Weibull functions")
     axes.set_xlabel("comparison above the standard [%]")
-    axes.set_ylabel("told from the standard [% of trials]")
+    axes.set_ylabel("hit rate [% of trials]")
     axes.set_ylim(45.0, 102.0)
     axes.legend(title="standard", loc="upper left")
 
@@ -119,21 +119,20 @@ def _cycled(count: int) -> list[LineStyle]:
 def caption_thresholds(section: CurvatureThresholds) -> str:
     """Caption of the figure, with the error of interpolation."""
     errors = np.abs([entry.error_per_m for entry in section.interpolation])
-    foretold = (
-        " Spheres of the paper, left out and foretold from the others, are met within "
+    predicted = (
+        " The interpolation predicts the paper's spheres, each left out, within "
         f"{number(float(errors.max()), 2)} 1/m."
         if errors.size
         else ""
     )
     return (
-        "(a) How much more curved a sphere must be to be told from a standard in 75 % of trials, as a share "
-        "of the standard: by the Gradient Sum of static rates of two populations, each with the noise that "
-        "fits people at 287 1/m; by the ideal observer of the same rates (dashed); by people "
-        "(diamonds; recalled, not read in the original). Bars: the 95 % interval of an experiment with "
-        f"{number(section.judgements)} judgements of each comparison. (b) The hit rates of that "
-        "experiment and the psychometric functions through them, first population. Rates are interpolated "
-        "between "
-        f"{len(section.pressed_per_m)} pressed spheres.{foretold}"
+        "(a) Difference in curvature that is discriminated from a standard in 75 % of trials, as a share of "
+        "the standard: Gradient Sum of static rates of two populations, each with the noise fitted to the "
+        "observed hit rates at 287 1/m; ideal observer of the same rates (dashed); participants (diamonds; "
+        "recalled, not read in the original). Bars: 95 % interval of an experiment with "
+        f"{number(section.judgements)} judgements of each comparison. (b) Hit rates of that experiment and "
+        "fitted psychometric functions, first population. Rates are interpolated between "
+        f"{len(section.pressed_per_m)} spheres.{predicted}"
     )
 
 

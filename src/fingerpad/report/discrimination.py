@@ -81,7 +81,7 @@ def draw_noise(section: SphereDiscrimination) -> Figure:
             axes.axvline(sigma, color=GREY, linewidth=1.4, linestyle=(0, dashes), label=label)
         axes.set_xlabel("noise σ₁ [fraction of the response]")
         axes.set_ylim(bottom=0.0)
-    codes.set_ylabel("distance to people's hit rates, rms [fraction]")
+    codes.set_ylabel("distance to observed hit rates, rms [fraction]")
     sweep.set_xlim(left=0.0)
     codes.legend(loc="upper right")
     sweep.legend()
@@ -93,15 +93,15 @@ def caption_noise(section: SphereDiscrimination) -> str:
     reasons = section.reasons
     rise, needed = (rises["static"][0] for rises in (reasons.rise, reasons.rise_for_paper_noise))
     people = (
-        f"; with σ₁ = {number(section.noise_sigma_paper)}, {whole_percent(needed)} would do for people's 0.95"
+        f"; σ₁ = {number(section.noise_sigma_paper)} with {whole_percent(needed)} gives the observed 0.95"
         if np.isfinite(needed)
         else ""
     )
     return (
-        "Root mean square distance of predicted hit rates to people's at 296 and 365 1/m over the noise. "
-        "(a) Every code has a noise of its own that fits people best. (b) The range that the paper tried, in "
-        f"{number(section.sessions)} sessions of the whole protocol; bars are Monte-Carlo errors. The "
-        "best noise makes up for how steeply a code rises with curvature: our static Gradient Sum rises by "
+        "Root mean square distance of predicted from observed hit rates at 296 and 365 1/m, against the "
+        "noise. (a) Each code has its own best noise. (b) The range of the paper, in "
+        f"{number(section.sessions)} sessions of the whole protocol; bars are Monte-Carlo errors. The best "
+        "noise compensates for the slope of a code: our static Gradient Sum increases by "
         f"{whole_percent(rise)} from 287 to 365 1/m{people}."
     )
 
@@ -189,13 +189,13 @@ def _people(axes: Axes, observed: GoodwinHitRates) -> None:
         markerfacecolor="none",
         markeredgewidth=1.6,
         zorder=5,
-        label="people (Goodwin et al. 1991)",
+        label="observed (Goodwin et al. 1991)",
     )
 
 
 def _interval(observed: GoodwinHitRates) -> str:
-    """Explain the error bars of people."""
-    return f"binomial 95 % intervals as of {number(observed.trials)} trials, a number that is assumed"
+    """Explain the error bars of the observed hit rates."""
+    return f"binomial 95 % intervals of {number(observed.trials)} trials, an assumed number"
 
 
 def _label(figure: Figure, grid: np.ndarray, n_panels: int) -> None:
@@ -218,26 +218,26 @@ def _label(figure: Figure, grid: np.ndarray, n_panels: int) -> None:
 def caption_observers(section: SphereDiscrimination) -> str:
     """Caption of Figure 7."""
     return (
-        "Fraction of trials in which a sphere is told from the standard of "
+        "Fraction of trials in which a sphere is discriminated from the standard of "
         f"{number(section.curvature_per_m[0])} 1/m; bars are one standard deviation. Solid: sphere over "
-        "the middle of the receptors; dotted: 0.2 mm away. Diamonds: people, with "
+        "the middle of the receptors; dotted: 0.2 mm away. Diamonds: observed, with "
         f"{_interval(section.goodwin)}. (a-c) Gradient Sum of static "
         "rates, dynamic rates and first-spike latencies, (d) Euclidean Distance of static rates, all with "
         f"noise σ₁ = {number(section.noise_sigma)}; the paper's best noise is "
         f"{number(section.noise_sigma_paper)}. The following panels vary "
-        "the noise or the number of noise matrices, as their titles say. The paper found that the static "
-        "Gradient Sum fits people best and hardly minds the shift, that dynamic rates and latencies do mind "
-        "it, that more noise lowers the curve, and that fewer matrices widen the bars."
+        "the noise or the number of noise matrices, as their titles say. In the paper the static "
+        "Gradient Sum fits best and hardly depends on the shift, dynamic rates and latencies depend on it, "
+        "more noise lowers the curve, and fewer matrices widen the bars."
     )
 
 
 def caption_criterion(section: SphereDiscrimination) -> str:
     """Caption of Figure 8."""
     return (
-        "Gradient Sum of static rates once more, but for each hit rate the decision point is multiplied by "
-        "a new normal variable with mean 1 and the standard deviation in the title. The paper found that "
-        "the wider distribution lengthens the error bars and leaves the means alone. Noise σ₁ = "
-        f"{number(section.noise_sigma)}. Diamonds: people, with {_interval(section.goodwin)}."
+        "Gradient Sum of static rates with a varied criterion: for each hit rate the decision point is "
+        "multiplied by a new normal variable with mean 1 and the standard deviation in the title. In the "
+        "paper the wider distribution increases the error bars and does not change the means. Noise σ₁ = "
+        f"{number(section.noise_sigma)}. Diamonds: observed, with {_interval(section.goodwin)}."
     )
 
 
@@ -277,14 +277,14 @@ def _interpretations(section: SphereDiscrimination) -> Table:
     columns = (
         "interpretation",
         "receptors",
-        "rise of the sum, 287 to 365 1/m",
+        "increase of the sum, 287 to 365 1/m",
         "largest change by the shift",
-        "noise of its own",
-        "rms distance to people with it",
+        "separately fitted noise",
+        "rms distance to observed with it",
         "largest change by the shift with it",
     )
     note = (
         "Two numbers are for the spheres at 0.0 and at 0.2 mm. The noise is fitted to both positions "
-        "together; hit rates are expected values, without the chance of a session."
+        "together; hit rates are expected values, without sampling error."
     )
     return Table("Interpretations of steps that the paper leaves open", columns, rows, note)

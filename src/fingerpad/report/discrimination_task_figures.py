@@ -236,7 +236,7 @@ def _people(axes: Axes, found: TaskResult) -> None:
         markersize=8.0,
         markeredgewidth=1.5,
         zorder=5,
-        label=f"people ({observed.source})",
+        label=f"observed ({observed.source})",
     )
 
 

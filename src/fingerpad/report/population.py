@@ -187,19 +187,19 @@ def caption_population(section: PopulationMaps) -> str:
     """Caption of Figure 6."""
     return (
         f"Response of afferents all over the pad to a sphere of {number(section.curvature_per_m)} 1/m, "
-        f"{protocol.DEPTH.value} mm deep. Left: the quantity as a height, as the paper draws it, but "
-        "latencies to a logarithmic scale. Middle: the same on the skin as it lies under the sphere at the "
-        "end of the hold, seen from below, the tip to the right; grey skin does not answer. Right: seen from "
-        "above; circles are the receptors that the observers of Figures 7 and 8 read, hatched places never "
-        f"fire.{_resting(section.at_rest)}"
+        f"at a depth of {protocol.DEPTH.value} mm. Left: the quantity as a height, as in the paper, but "
+        "latencies on a logarithmic scale. Middle: the same on the deformed skin at the end of the hold, "
+        "seen from below, the tip to the right; afferents in grey skin do not respond. Right: seen from "
+        "above; circles are the receptors of Figures 7 and 8, hatched skin is silent."
+        f"{_resting(section.at_rest)}"
     )
 
 
 def _resting(rest: RestingResponse) -> str:
-    """Describe the response of afferents without any touch, if there is one."""
+    """Describe the response of afferents without touch, if there is one."""
     if np.isnan(rest.first_spike_latency_ms):
         return ""
     return (
-        f" This afferent fires without any touch too, {number(rest.static_rate_hz)} spikes/s from "
-        f"{number(rest.first_spike_latency_ms)} ms on: grey is skin that makes it less than twice as fast."
+        f" This afferent also fires without touch, {number(rest.static_rate_hz)} spikes/s from "
+        f"{number(rest.first_spike_latency_ms)} ms on; in grey skin its latency is more than half of that."
     )

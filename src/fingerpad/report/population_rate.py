@@ -71,15 +71,15 @@ def caption_population_rate(section: PopulationRates) -> str:
     inner, outer = section.radii_mm[0], section.radii_mm[-1]
     return (
         "Population rate over time: all spikes of the afferents at a distance from the middle of the "
-        f"contact, per bin, smoothed by a normal density of {number(section.smoothing_ms)} ms that keeps "
-        "their number; left the ramp and what follows, right the rest of the hold. (a) Per afferent, silent "
+        f"contact, per bin, smoothed by a normal density of {number(section.smoothing_ms)} ms that preserves "
+        "their number. Left: ramp and start of the hold; right: rest of the hold. (a) Per afferent, silent "
         f"ones included, and per area of skin at {number(section.density_per_cm2)} afferents per cm². (b) "
         "Share of the afferents that fire at least once in a bin. (c) All afferents from "
         f"{number(inner)} to {number(outer)} mm together, under "
         + " and ".join(touch.name for touch in section.touches)
-        + ". The model has no noise here, so that neighbours fire almost together: ripples are theirs. "
+        + ". The model has no noise here, so neighbours fire almost synchronously, which causes ripples. "
         + resting_note(
             section.resting_latency_ms,
-            "All start at onset: bumps shortly before its multiples are not the touch's.",
+            "All start at onset: peaks shortly before its multiples are not caused by the touch.",
         )
     )

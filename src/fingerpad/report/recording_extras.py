@@ -42,13 +42,13 @@ def draw_profiles(found: FitResult) -> Figure:
 
 def caption_profiles(found: FitResult) -> str:
     """Caption of the profiles."""
-    beneath = ", the bar beneath is the credible interval" if found.posterior else ""
+    beneath = ", the bar below it the credible interval" if found.posterior else ""
     return (
-        "Loss of log likelihood with one number held and the others fitted anew. Values below the dashed "
-        "line are within the 95 % interval; a side that never crosses it is open: the rates do not bound the "
-        f"number there. The orange line is the fit{beneath}. The fit maximises FSS, which weighs phases and "
-        "neighbours otherwise than the likelihood does, and may lie beside the least loss. Profiles have "
-        "lumps since rates jump where a spike enters a window."
+        "Loss of log likelihood with one parameter held and the others fitted again. Values below the dashed "
+        "line are within the 95 % interval; where the profile does not cross it the rates do not bound the "
+        f"parameter. The orange line is the fit{beneath}. The fit maximises FSS, which has other weights of "
+        "phases and neighbours than the likelihood, and may differ from the minimum. Profiles have local "
+        "minima, because rates are discontinuous where a spike enters a window."
     )
 
 
@@ -79,9 +79,9 @@ def caption_sensitivity(found: FitResult) -> str:
     total = _present(found.sensitivity).total
     most = max(zip(total, IDENTIFIABLE_SYMBOLS.values(), strict=True), key=lambda pair: pair[0])[1]
     return (
-        "Share of the variance of FSS that each number brings when all are uniform within a quarter of their "
-        f"fitted values to either side: hatched, by itself; filled, with all that it does together with "
-        f"others. Whiskers are 95 % intervals of the estimate. Most depends on {most}."
+        "Share of the variance of FSS due to each parameter if all are uniform within a quarter of their "
+        f"fitted values: hatched, alone (first-order index); filled, with all interactions (total index). "
+        f"Whiskers are 95 % intervals of the estimate. The largest total index is that of {most}."
     )
 
 
@@ -143,7 +143,7 @@ def caption_offset(found: FitResult) -> str:
         f"the receptor held at each offset. The fitted offset is {number(offset.offset_mm)} mm; it explains "
         f"{fixed(100.0 * taken, 0)} % of the residual in sample. Out of sample FSS is "
         f"{fixed(offset.fss_out_of_sample, 3)} instead of {fixed(found.fss_out_of_sample, 3)}. A gain in "
-        "sample alone is no evidence that the receptor lies there."
+        "sample alone is no evidence for an offset."
     )
 
 

@@ -149,8 +149,8 @@ def caption_fit_residuals(found: FitResult) -> str:
         row = int(np.argmax(np.abs(residual)))
         worst.append(f"{PHASES[phase]}: {found.stimulus[row]}, {number(residual[row])}")
     return (
-        "Residuals. Where residuals of neighbours have one sign, the model lacks something that noise does "
-        f"not explain. Largest residuals out of sample [spikes/s]: {'; '.join(worst)}."
+        "Residuals. Where adjacent residuals have the same sign, the misfit is systematic and not noise. "
+        f"Largest residuals out of sample [spikes/s]: {'; '.join(worst)}."
     )
 
 

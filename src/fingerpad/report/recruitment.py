@@ -81,7 +81,7 @@ def _ranks(axes: Axes, positions: FloatArray, touch: AfferentRecruitment, window
         axes.text(0.5, 0.5, "no afferent fires", ha="center", color=GREY, transform=axes.transAxes)
         return
     dots = axes.scatter(x[fires], z[fires], s=size, c=rank[fires], cmap="viridis_r", linewidths=0.0, vmin=1.0)
-    axes.figure.colorbar(dots, ax=axes, label="place in the order", shrink=0.85)
+    axes.figure.colorbar(dots, ax=axes, label="rank in the order", shrink=0.85)
     levels = [level for level in CONTOURS_MS if latency[fires].min() < level < latency[fires].max()]
     if levels and fires.sum() >= LEAST_FOR_CONTOURS:
         lines = axes.tricontour(x[fires], z[fires], latency[fires], levels, colors=BLACK, linewidths=0.8)
@@ -137,19 +137,19 @@ def caption_recruitment(section: Recruitment) -> str:
     first, *others = section.touches
     changes = "; ".join(
         f"{touch.name}: rank correlation {fixed(touch.rank_correlation, 3)}, "
-        f"{percent(touch.swapped)} of the pairs swap"
+        f"{percent(touch.swapped)} of the pairs in reversed order"
         for touch in others
         if touch.name in {shown.name for shown in section.afferents}
     )
     return (
-        "Recruitment by first spikes; one dot per afferent of a dense sheet. (a, b) Place in the order, the "
+        "Recruitment by first spikes; one dot per afferent of a dense layout. (a, b) Rank in the order, the "
         "first in yellow, with lines through afferents that fire at the same time; pale ones are not "
-        "recruited. (c) Skin whose afferents have fired. (d) Latency of each afferent under one touch and "
-        "another: on the line nothing changes, and an order changes only where dots scatter about a rising "
-        "curve. "
+        "recruited. (c) Skin whose afferents have fired. (d) Latency of each afferent under two touches: "
+        "equal on the line; the order differs only where the dots scatter about an increasing curve. "
         + (f"Against {first.name}: {changes}. " if changes else "")
         + resting_note(
-            section.resting_latency_ms, "They count as recruited if touch halves that time at least. "
+            section.resting_latency_ms,
+            "They count as recruited if their latency under touch is at most half of that. ",
         )
         + "The paper (section 4.2) names the order of first spikes as a code and does not use it."
     )
@@ -182,7 +182,7 @@ def recruitment_tables(section: Recruitment) -> list[Table]:
                 "first spike, ms",
                 "median first spike, ms",
                 f"rank correlation with {first}",
-                "pairs in another order",
+                "pairs in reversed order",
             ),
             rows,
             "With 100 afferents per cm², mm² of skin are numbers of afferents. Order is compared over those "
@@ -192,18 +192,18 @@ def recruitment_tables(section: Recruitment) -> list[Table]:
 
 
 def resting_note(latency_ms: float, then: str) -> str:
-    """Return when afferents fire without a touch, and what follows from it; nothing if they do not.
+    """Return a sentence on the latency without touch and a second one; nothing if afferents are silent.
 
     Examples
     --------
     >>> resting_note(258.3, "So they do.")
-    'Without any touch these afferents first fire at 258 ms. So they do.'
+    'Without touch these afferents first fire at 258 ms. So they do.'
     >>> resting_note(np.nan, "So they do.")
     ''
     """
     if not np.isfinite(latency_ms):
         return ""
-    return f"Without any touch these afferents first fire at {number(latency_ms)} ms. {then}"
+    return f"Without touch these afferents first fire at {number(latency_ms)} ms. {then}"
 
 
 def percent(share: float | None) -> str:

@@ -286,7 +286,7 @@ def _percept(section: SphereDiscrimination) -> str:
     rates = section.gradient_sum["static"].hit_rate
     told = [
         f"{number(curvature)} 1/m in {whole_percent(rates[comparison.index(curvature)])} of trials "
-        f"(people: {whole_percent(observed)})"
+        f"(observed: {whole_percent(observed)})"
         for curvature, observed in zip(people.curvature_per_m.tolist(), people.hit_rate, strict=True)
     ]
     return (

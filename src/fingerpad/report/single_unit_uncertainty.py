@@ -23,7 +23,7 @@ GAINS = {
 
 
 def draw_uncertainty(section: UncertaintyResult) -> Figure:
-    """Draw the bands of predicted rates and of new recordings, and the profile of each number."""
+    """Draw the bands of predicted rates and of new recordings, and the profile of each parameter."""
     figure = new_figure(10.0, 7.5)
     grid = figure.add_gridspec(2, 4)
     for column, (phase, rates) in enumerate(section.rates.items()):
@@ -71,11 +71,11 @@ def caption_uncertainty(section: UncertaintyResult) -> str:
     return (
         f"Uncertainty of one afferent given its rates under a bar {protocol.BAR_WIDTH.value} mm wide at "
         f"{section.shift_mm.size} positions. (a, b) {level} bands: blue, of the rates that the posterior "
-        "predicts; pale, of a new recording, whose residuals are those of the observed one. Of the observed "
-        f"rates {within} lie within. (c-f) Loss of log likelihood with one number held and the others fitted "
-        f"anew; points below the dashed line are within the {level} interval, the bar beneath is that of the "
-        "posterior, and the orange line is the response-surface fit, which weighs phases differently. "
-        "Profiles are not smooth, since rates jump where a spike enters a window."
+        "predicts; pale, of a new recording with residuals like those observed. Of the observed "
+        f"rates {within} lie within. (c-f) Loss of log likelihood with one parameter held and the others "
+        f"fitted again; points below the dashed line are within the {level} interval, the bar below is that "
+        "of the posterior, and the orange line is the response-surface fit, which weights phases differently. "
+        "Profiles are not smooth, because rates are discontinuous where a spike enters a window."
     )
 
 
@@ -111,8 +111,8 @@ def _determined(section: UncertaintyResult) -> Table:
     rank = section.identifiability.rank
     smallest = section.identifiability.relative_singular_values
     note = (
-        "Spikes determine four numbers. β, k_d, k_s, C and v are known only up to a common scale; the gains "
-        f"are given for C = {number(section.capacitance_mf)} mF and v = {number(section.threshold_mv)} "
+        "Spikes determine four parameters. β, k_d, k_s, C and v are known only up to a common scale; the "
+        f"gains are given for C = {number(section.capacitance_mf)} mF and v = {number(section.threshold_mv)} "
         f"mV, as fitted. Of the six singular values of the rates' Jacobian {rank} are not zero; relative to "
         f"the largest they are {', '.join(number(value, 2) for value in smallest[:rank])}, and the others at "
         f"most {number(float(smallest[rank:].max()), 1) if rank < smallest.size else ABSENT}."
