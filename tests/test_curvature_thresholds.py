@@ -118,7 +118,7 @@ def test_ideal_threshold_is_fishers(found):
 
 def test_a_threshold_out_of_reach_is_said_and_costs_only_its_own_row(found):
     noisy = study.Observer(proportional(0.1).rates, PAIRS, 0.5, DRAWS)
-    with pytest.raises(ConvergenceError, match="No sphere up to 700 /m is told from 287 /m in 75%"):
+    with pytest.raises(ConvergenceError, match="No sphere up to 700 /m is discriminated from 287 /m in 75%"):
         study.threshold_at(noisy, 287.0)
     loud = study.curvature_thresholds(SKINS, AFFERENT, 3.0, seed=0)
     reached, missed = (getattr(loud.populations[0], name) for name in ("standards", "without_threshold"))

@@ -19,7 +19,7 @@ def test_chosen_rows_keep_names_rates_and_a_phase_that_was_not_recorded():
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ((("a", "a"), [1.0, 2.0], None), "'a' stands twice"),
+        ((("a", "a"), [1.0, 2.0], None), "'a' is repeated"),
         ((("a", "b"), [1.0], None), "dynamic_rate_hz needs one rate per stimulus: got 1 for 2"),
         ((("a", "b"), None, [1.0, -2.0]), "static_rate_hz must not be negative: the smallest is -2"),
         ((("a", "b"), [1.0, np.nan], None), "dynamic_rate_hz must hold finite numbers only"),

@@ -345,10 +345,10 @@ def test_stimuli_are_pressed_where_and_how_they_say():
     [
         (
             TactileStimulus(Bar(), RampAndHold(9.0)),
-            "Stimulus deep cannot be pressed: depth_mm must stay below",
+            "Stimulus deep cannot be used: depth_mm must stay below",
         ),
-        (TactileStimulus(Bar(), x_mm=80.0), "Stimulus deep cannot be pressed: "),
-        (TactileStimulus(Line(), tilt_deg=5.0), "cannot be pressed: tilt_deg must be 0 for Line"),
+        (TactileStimulus(Bar(), x_mm=80.0), "Stimulus deep cannot be used: "),
+        (TactileStimulus(Line(), tilt_deg=5.0), "cannot be used: tilt_deg must be 0 for Line"),
     ],
     ids=["depth", "place", "tilt"],
 )
@@ -510,8 +510,8 @@ def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_pa
         (["mine.csv", "--stimulus", "bar"], ROWS + "2,-1,3\n", "mine.csv, line 8: dynamic_rate_hz must not"),
         (["mine.csv", "--stimulus", "bar"], ROWS + "2,1,nan\n", "mine.csv, line 8: static_rate_hz must be a"),
         (["mine.csv", "--stimulus", "bar"], "shift_mm,static_rate_hz\n0,1\n1,2\n", "at least 4 rates"),
-        (["mine.csv", "--stimulus", "bar"], ROWS + "90,1,3\n", "Stimulus 90 cannot be pressed"),
-        (["mine.csv", "--stimulus", "bar", "--depth", "9"], ROWS, "Stimulus -2 cannot be pressed: depth_mm"),
+        (["mine.csv", "--stimulus", "bar"], ROWS + "90,1,3\n", "Stimulus 90 cannot be used"),
+        (["mine.csv", "--stimulus", "bar", "--depth", "9"], ROWS, "Stimulus -2 cannot be used: depth_mm"),
         (["mine.csv", "--stimulus", "bar", "--width", "0"], ROWS, "width_mm must be greater than 0"),
         (["mine.csv", "--stimulus", "bar", "--fillet", "2"], ROWS, "fillet_mm must not exceed half"),
         (["mine.csv", "--stimulus", "bar", "--folds", "7"], ROWS, "n_observations must be a whole number of"),

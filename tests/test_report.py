@@ -314,7 +314,7 @@ def _curvature_thresholds() -> dict:
                 "noise_sigma": 0.14,
                 "gradient_sum": [600.0, 1400.0, 2300.0],
                 "standards": [at(144.0), at(287.0)],
-                "without_threshold": [{"standard_per_m": 400.0, "why_not": "No sphere is told from 400 /m."}],
+                "without_threshold": [{"standard_per_m": 400.0, "why_not": "No sphere reaches 75 %."}],
             }
         ],
         "literature": {

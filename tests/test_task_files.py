@@ -271,7 +271,7 @@ stimuli: []
 stimuli: {vary: curvature_per_m, values: [287]}
     stimuli must be two or more
 stimuli: {vary: curvature_per_m, values: [287, 287]}
-    '287' stands twice
+    '287' is repeated
 stimuli: {vary: curvature_per_m, values: [287, x]}
     stimuli.values[2] must be a finite
 stimuli: {vary: curvature_per_m, values: [287, 0]}
@@ -283,7 +283,7 @@ stimuli: {vary: colour, values: [1, 2]}
 stimuli: {vary: width_mm, values: [1, 2]}
     stimuli.values[1].width_mm must not be given: a sphere has curvature_per_m.
 {stimuli: {vary: depth_mm, values: [1, 50]}, standard: 1}
-    stimulus '50' cannot be pressed: depth_mm must stay below
+    stimulus '50' cannot be used: depth_mm must stay below
 stimuli: {vary: curvature_per_m}
     stimuli.values must be given
 stimuli: spheres
@@ -291,7 +291,7 @@ stimuli: spheres
 stimuli: [{curvature_per_m: 300}]
     stimuli[1].name must be given
 stimuli: [{name: a}, {name: a}]
-    'a' stands twice
+    'a' is repeated
 {stimuli: [{name: a, level: 1}, {name: b}], standard: a}
     level must be given for all stimuli or for none: 'b' has none.
 stimuli: [{name: a, widht_mm: 3}, {name: b}]
@@ -317,7 +317,7 @@ common: {indenter: sphere, depth_mm: 0}
 common: {indenter: sphere, offset_mm: 1}
     common.offset_mm must be a pair of numbers: got 1.
 common: {indenter: sphere, offset_mm: [90, 0]}
-    stimulus '287' cannot be pressed
+    stimulus '287' cannot be used
 common: {indenter: sphere, tilt_deg: 80}
     tilt_deg must lie within 45 degrees
 skin: {materials: wood}
@@ -416,7 +416,7 @@ def test_what_cannot_be_is_refused_in_one_sentence_that_says_where(parts, said):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("question: a\nquestion: b\n", "mine.yaml, line 1: question stands twice, keep one."),
+        ("question: a\nquestion: b\n", "mine.yaml, line 1: question is repeated, keep one."),
         ("question: [a\n", "mine.yaml cannot be read as YAML"),
         ("- 1\n- 2\n", "mine.yaml, a task must be a mapping of keys to values: got [1, 2]."),
         ("", "mine.yaml, a task must be a mapping of keys to values: got None."),

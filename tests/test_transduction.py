@@ -177,7 +177,7 @@ def test_the_fast_evaluation_is_that_of_the_interpolants_themselves():
     fast = drive(sed)
     for first, last in ((0, 3), (3, 6)):
         plain = PchipInterpolator(times[first : last + 1], sed.sed_kpa[first : last + 1], axis=0)
-        # The first knot of all stands twice, before and after the onset; the kink ends one phase, begins one.
+        # The first knot of all is repeated, before and after the onset; the kink ends one phase, begins one.
         at = np.flatnonzero((fast.times_ms >= times[first]) & (fast.times_ms <= times[last]))
         at = at[1:-1] if first == 0 else at[1:]
         assert_allclose(fast.sed_kpa[at], plain(fast.times_ms[at]), rtol=1e-14)

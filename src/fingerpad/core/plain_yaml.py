@@ -54,7 +54,7 @@ class _Loader(yaml.SafeLoader):
         keys = [key.value for key, _ in node.value]
         for key in keys:
             if keys.count(key) > 1:
-                raise InputError(f"line {node.start_mark.line + 1}: {key} stands twice, keep one.")
+                raise InputError(f"line {node.start_mark.line + 1}: {key} is repeated, keep one.")
         return super().construct_mapping(node, deep)
 
 

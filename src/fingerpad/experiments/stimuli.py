@@ -139,7 +139,7 @@ def read_stimuli(path: Path) -> ListedStimuli:
     Raises
     ------
     InputError
-        If the file cannot be read, an indenter is unknown, a name stands twice, or a value cannot be; with
+        If the file cannot be read, an indenter is unknown, a name is repeated, or a value cannot be; with
         the line and the column.
 
     Examples
@@ -156,7 +156,7 @@ def read_stimuli(path: Path) -> ListedStimuli:
     for line in lines:
         name = line.text("stimulus")
         if name in stimuli:
-            raise InputError(f"{line.place}: stimulus {name!r} stands twice, give each its own name.")
+            raise InputError(f"{line.place}: stimulus {name!r} is repeated, give each its own name.")
         stimuli[name] = _stimulus(line)
     return ListedStimuli(stimuli, str(path))
 

@@ -34,7 +34,7 @@ class RateRecordings:
     Raises
     ------
     InputError
-        If a stimulus stands twice, a rate is negative or not finite, sizes disagree or no phase was recorded.
+        If a stimulus is repeated, a rate is negative or not finite, sizes disagree or no phase was recorded.
 
     Examples
     --------
@@ -52,7 +52,7 @@ class RateRecordings:
         object.__setattr__(self, "stimuli", tuple(self.stimuli))
         twice = sorted({name for name in self.stimuli if self.stimuli.count(name) > 1})
         if twice:
-            raise InputError(f"stimuli must be named once each: {twice[0]!r} stands twice, take its mean.")
+            raise InputError(f"stimuli must be named once each: {twice[0]!r} is repeated, take its mean.")
         if not self.phases:
             raise InputError("RateRecordings needs dynamic_rate_hz, static_rate_hz or both: got neither.")
         for phase in self.phases:

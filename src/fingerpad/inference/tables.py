@@ -90,7 +90,7 @@ def read_csv(path: Path, known: Sequence[str]) -> list[TableRow]:
     Raises
     ------
     InputError
-        If the file cannot be read, is empty, has a column that is unknown or stands twice, or a row with
+        If the file cannot be read, is empty, has a column that is unknown or is repeated, or a row with
         too few or too many entries.
 
     Examples
@@ -117,7 +117,7 @@ def read_csv(path: Path, known: Sequence[str]) -> list[TableRow]:
                 f"{path}, line {header_line}: column {column!r} is unknown, only {', '.join(known)} can be."
             )
         if columns.count(column) > 1:
-            raise InputError(f"{path}, line {header_line}: column {column} stands twice, keep one.")
+            raise InputError(f"{path}, line {header_line}: column {column} is repeated, keep one.")
     lines = []
     for number, row in body:
         if len(row) != len(columns):

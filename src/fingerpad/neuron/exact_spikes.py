@@ -148,7 +148,7 @@ def exact_trains(
     Parameters
     ----------
     times : array (n_knots,)
-        Knots, in order; one that stands twice is a jump. [ms]
+        Knots, in order; a repeated one is a discontinuity. [ms]
     currents : array (n_knots, n_neurons)
         Current at the knots, a straight line between them. [mA]
     tau, capacitance, threshold, refractory : float

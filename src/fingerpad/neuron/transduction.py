@@ -39,7 +39,7 @@ class Drive:
     Parameters
     ----------
     times_ms : array (n_knots,)
-        Knots; one that stands twice is a jump of the rate. [ms]
+        Knots; a repeated one is a discontinuity of the rate. [ms]
     sed_kpa : array (n_knots, n_sites)
         Strain energy density. [kPa]
     rate_kpa_per_ms : array (n_knots, n_sites)

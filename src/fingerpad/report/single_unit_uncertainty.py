@@ -74,7 +74,7 @@ def caption_uncertainty(section: UncertaintyResult) -> str:
         "predicts; pale, of a new recording with residuals like those observed. Of the observed "
         f"rates {within} lie within. (c-f) Loss of log likelihood with one parameter held and the others "
         f"fitted again; points below the dashed line are within the {level} interval, the bar below is that "
-        "of the posterior, and the orange line is the response-surface fit, which weights phases differently. "
+        "of the posterior, and the orange line is the response-surface fit, with other weights of phases. "
         "Profiles are not smooth, because rates are discontinuous where a spike enters a window."
     )
 

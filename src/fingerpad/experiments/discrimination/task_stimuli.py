@@ -104,7 +104,7 @@ def task_stimuli(task: DiscriminationTask) -> tuple[TaskStimulus, ...]:
         raise InputError(f"stimuli must be two or more to be discriminated: got {len(found)}.")
     for number, stimulus in enumerate(found):
         if stimulus.name in [other.name for other in found[:number]]:
-            raise InputError(f"stimuli must differ: {stimulus.name!r} stands twice, keep one.")
+            raise InputError(f"stimuli must differ: {stimulus.name!r} is repeated, keep one.")
     with_level = [stimulus.level is not None for stimulus in found]
     if any(with_level) and not all(with_level):
         raise InputError(
@@ -215,7 +215,7 @@ def task_touches(task: DiscriminationTask) -> dict[str, Touch]:
     Raises
     ------
     InputError
-        As `task_stimuli`, or if one cannot be pressed, with its name.
+        As `task_stimuli`, or if one cannot be used, with its name.
     """
     stimuli = task_stimuli(task)
     conditions = Conditions(task.skin.resolution, task.experiment.seed, task.skin.materials)
@@ -237,7 +237,7 @@ def task_touches(task: DiscriminationTask) -> dict[str, Touch]:
                 spin_deg=stimulus.spin_deg,
             )
         except InputError as error:
-            raise InputError(f"stimulus {stimulus.name!r} cannot be pressed: {error}") from error
+            raise InputError(f"stimulus {stimulus.name!r} cannot be used: {error}") from error
     return found
 
 

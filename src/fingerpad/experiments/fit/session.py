@@ -178,7 +178,7 @@ def stimulus_touches(stimuli: Mapping[str, TactileStimulus], conditions: Conditi
     Raises
     ------
     InputError
-        If one cannot be pressed, with its name.
+        If one cannot be used, with its name.
     """
     along = float(np.cos(np.deg2rad(conditions.skin_tilt_deg)))
 
@@ -201,7 +201,7 @@ def stimulus_touches(stimuli: Mapping[str, TactileStimulus], conditions: Conditi
         try:
             found[name] = touch(stimulus)
         except InputError as error:
-            raise InputError(f"Stimulus {name} cannot be pressed: {error}") from error
+            raise InputError(f"Stimulus {name} cannot be used: {error}") from error
     return found
 
 

@@ -1,6 +1,6 @@
 """Beyond the paper: curvature thresholds from standard to standard.
 
-    JND(s) = c - s,    where the comparison c is told from the standard s in 75 % of trials
+    JND(s) = c - s,    where the comparison c is discriminated from the standard s in 75 % of trials
     Weber fraction = JND / s
 
 A few spheres are pressed. Between them the rates of every receptor are interpolated in the logarithm of the
@@ -412,7 +412,7 @@ def threshold_at(observer: Observer, standard_per_m: float) -> CurvatureThreshol
     Raises
     ------
     ConvergenceError
-        If no pressed sphere is told from the standard often enough.
+        If no sphere is discriminated from the standard often enough.
     """
     farthest = float(np.exp(observer.rates.x[-1]))
 
@@ -421,8 +421,8 @@ def threshold_at(observer: Observer, standard_per_m: float) -> CurvatureThreshol
 
     if missing(farthest) <= 0.0:
         raise ConvergenceError(
-            f"No sphere up to {farthest:g} /m is told from {standard_per_m:g} /m in {PROPORTION:.0%} of "
-            "trials: press spheres that are more curved, or lower the noise."
+            f"No sphere up to {farthest:g} /m is discriminated from {standard_per_m:g} /m in "
+            f"{PROPORTION:.0%} of trials: use spheres of larger curvature, or lower the noise."
         )
     jnd_per_m = float(brentq(missing, standard_per_m, farthest, xtol=1e-3)) - standard_per_m
 
