@@ -7,7 +7,9 @@ import textwrap
 
 import pytest
 
-from fingerpad.core.compilation import NOTICE, announce_compilation
+import fingerpad as fp
+from fingerpad.core.compilation import NOTICE, SUBJECT, announce_compilation
+from fingerpad.mechanics.kernels import KERNELS
 
 KERNEL = """
 from numba import njit
@@ -15,6 +17,10 @@ from numba import njit
 @njit(cache=True)
 def twice(x):
     return 2 * x
+
+@njit(cache=True)
+def thrice(x):
+    return 3 * x
 """
 
 
@@ -96,8 +102,35 @@ def test_a_compiled_kernel_is_not_announced(caplog):
     class Compiled:
         signatures = ((),)
 
-    announce_compilation(Compiled())
+    with announce_compilation([Compiled()]):
+        pass
     assert caplog.text == ""
+
+
+def test_messages_count_the_kernels_that_are_done(say):
+    code = """
+        import time
+        from fingerpad.core import compilation
+        from kernels import thrice, twice
+
+        compilation.INTERVAL_S = 0.05
+        for _ in range(2):  # only the first block logs
+            with compilation.announce_compilation([twice, thrice]):
+                time.sleep(0.2)
+                thrice(1)
+                time.sleep(0.2)
+                twice(1)
+                time.sleep(0.2)
+    """
+    _, said = say(code)
+    assert said.splitlines()[0] == NOTICE
+    counts = [line.removeprefix(f"{SUBJECT}: ").split(" after")[0] for line in said.splitlines()[1:]]
+    assert counts == ["0 of 2 done", "1 of 2 done", "2 of 2 done"]
+
+
+def test_a_press_calls_every_kernel_that_is_counted():
+    fp.touch_of(fp.Fingertip(), fp.Sphere(), settings=fp.PressSettings(1, 1)).solve()
+    assert [kernel for kernel in KERNELS if not kernel.signatures] == []
 
 
 def test_workers_leave_it_to_their_parent(say):
@@ -107,6 +140,7 @@ def test_workers_leave_it_to_their_parent(say):
         from fingerpad.core.compilation import announce_compilation
         from kernels import twice
         store._begin(os.getppid())
-        announce_compilation(twice)
+        with announce_compilation([twice]):
+            pass
     """
     assert say(code) == ([], "")

@@ -1,34 +1,69 @@
-"""A message before the first indentation compiles its kernels, which takes about a minute."""
+"""Messages while the first indentation compiles its kernels, which takes about half a minute."""
 
 from __future__ import annotations
 
 import logging
-from functools import cache
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from threading import Event, Thread
+from time import monotonic
 from typing import Any
 
 from fingerpad.core.numba_internals import is_compiled
 
-NOTICE = "fingerpad compiles its kernels, once: about a minute."
+SUBJECT = "fingerpad compiles its kernels"
+NOTICE = f"{SUBJECT}, once: about half a minute."
 
 LOGGER = logging.getLogger("fingerpad")
-"""Logger of the message: standard error, unless logging is configured otherwise."""
+"""Logger of the messages: standard error, unless logging is configured otherwise."""
+
+INTERVAL_S = 5.0
+"""Time between two messages. [s]"""
+
+_announced = False
 
 
-def announce_compilation(kernel: Any) -> None:
-    """Log one line, once per process, if a kernel is about to be compiled.
+@contextmanager
+def announce_compilation(kernels: Sequence[Any]) -> Iterator[None]:
+    """Log that kernels are compiled, and every few seconds how many, while the `with` block runs.
 
-    Its level is WARNING: without configuration Python writes WARNING to standard error and drops INFO.
-    `logging.getLogger("fingerpad").setLevel("ERROR")` turns it off.
+    Nothing is logged if the first kernel is compiled already, and in one process only one block logs. The
+    level is WARNING: without configuration Python writes WARNING to standard error and drops INFO.
+    `logging.getLogger("fingerpad").setLevel("ERROR")` turns the messages off.
 
     Parameters
     ----------
-    kernel : Numba dispatcher
-        The kernel with the longest compilation.
+    kernels : sequence of Numba dispatchers
+        The kernels that the block calls, here or in other processes, the slowest to compile first.
+
+    Examples
+    --------
+    >>> with announce_compilation([len]):  # not compiled by Numba, so there is nothing to log
+    ...     pass
     """
-    if not is_compiled(kernel):
-        _say_once()
-
-
-@cache
-def _say_once() -> None:
+    global _announced
+    if _announced or is_compiled(kernels[0]):
+        yield
+        return
+    _announced = True
     LOGGER.warning(NOTICE)
+    finished = Event()
+    reporter = Thread(target=_report, args=(kernels, finished), daemon=True)
+    reporter.start()
+    try:
+        yield
+    finally:
+        finished.set()
+        reporter.join()
+
+
+def _report(kernels: Sequence[Any], finished: Event) -> None:
+    started, last = monotonic(), -1
+    while not finished.wait(INTERVAL_S):
+        done = sum(is_compiled(kernel) for kernel in kernels)
+        if done > last:
+            seconds = monotonic() - started
+            LOGGER.warning("%s: %d of %d done after %.0f s.", SUBJECT, done, len(kernels), seconds)
+        last = done
+        if done == len(kernels):
+            return

@@ -22,8 +22,8 @@ from fingerpad.geometry.indenter_grading import FEWEST_ACROSS_GROOVE, grading_ab
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh, finger_mesh
 from fingerpad.geometry.motion import Motion, RampAndHold, Stimulus
-from fingerpad.mechanics import assembly
 from fingerpad.mechanics.contact import Placement, check_friction, place
+from fingerpad.mechanics.kernels import KERNELS
 from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.press import Deformation, PressSettings, press
 from fingerpad.mechanics.tissues import named_tissues
@@ -33,9 +33,6 @@ from fingerpad.skin.sampling import SkinResponse
 CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
 STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
 """Steps in ramp and hold of each resolution."""
-
-SLOWEST_KERNEL = assembly._add_chunk
-"""Of all that a press compiles, most of a minute is spent on this."""
 
 LARGEST_TILT_DEG = 45.0
 _CLEARANCE_TO_BONE = 0.8
@@ -202,9 +199,8 @@ class Touch:
         return self._press(np.arange(len(self.mesh.elements)), threads)
 
     def _press(self, watched: np.ndarray, threads: int | None) -> Deformation:
-        announce_compilation(SLOWEST_KERNEL)
         # Libraries get one thread, since their sums depend on the number of threads; our loops' do not.
-        with compiled_threads(threads), threadpool_limits(limits=1):
+        with announce_compilation(KERNELS), compiled_threads(threads), threadpool_limits(limits=1):
             return press(
                 self.mesh,
                 self.tissues.layers,

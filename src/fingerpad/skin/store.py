@@ -30,9 +30,10 @@ from fingerpad.core.compilation import LOGGER, announce_compilation
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import write_atomically
 from fingerpad.core.threads import available_threads
+from fingerpad.mechanics.kernels import KERNELS
 from fingerpad.skin.behaviour import class_tag, code_hash
 from fingerpad.skin.fields import Place, stored_fields
-from fingerpad.skin.indentation import SLOWEST_KERNEL, Touch
+from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
 
 _SOLUTION = {
@@ -205,10 +206,10 @@ def _in_turn(touches: Mapping[Path, Touch]) -> Iterator[float]:
 
 
 def _in_processes(touches: Mapping[Path, Touch], jobs: int) -> Iterator[float]:
-    announce_compilation(SLOWEST_KERNEL)
     processes = min(jobs, len(touches))
     threads = max(1, available_threads() // processes)
     with (
+        announce_compilation(KERNELS),
         _environment(_ONE_THREAD),
         ProcessPoolExecutor(processes, get_context("spawn"), _begin, (os.getpid(),)) as pool,
     ):
@@ -245,7 +246,7 @@ def _environment(variables: dict[str, str]) -> Iterator[None]:
 
 
 def _begin(parent: int) -> None:
-    """Set up a worker, which has nothing to say: its parent has told already what is compiled."""
+    """Set up a worker, which logs nothing: its parent logs the compilation."""
     LOGGER.disabled = True
     _end_with_parent(parent)
 
