@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from fingerpad.core.errors import InputError
 from fingerpad.geometry.fingertip import Fingertip
@@ -110,7 +110,7 @@ def test_every_element_is_read_exactly_at_its_middle():
     sheet = SHEETS["full"]
     values = np.random.default_rng(7).random((3, FULL.living_epidermis.size))
     middles = np.argwhere(np.ones(FULL.living_epidermis.shape, dtype=bool)).astype(float)
-    assert_array_equal(sheet.read(middles, values), values)
+    assert_allclose(sheet.read(middles, values), values, rtol=0, atol=1e-13)
 
 
 def test_the_way_to_the_tip_has_no_gap():
@@ -167,18 +167,21 @@ def test_straight_down_is_not_along_the_normal(z, proximal, inwards):
 
 @pytest.mark.parametrize("name", ["full", "half", "coarse"])
 def test_columns_agree_at_the_pole(name):
-    """All around it, however wildly their last elements differ, on the mean of these."""
+    """On the mean of their last elements, however much these differ; skin around the pole lies above it."""
     sheet = SHEETS.get(name) or ReceptorSheet(finger_mesh(FINGER, resolution_grading("quick", 17.37)))
+    n_along, n_around = sheet.mesh.living_epidermis.shape
+    values = np.random.default_rng(8).random((1, sheet.mesh.living_epidermis.size))
+    last = values.reshape(n_along, n_around)[-1]
+    assert last.std() > 0.2
+    columns = np.linspace(0.0, n_around - 1.0, 101)
+    read = sheet.read(np.stack([np.full(101, n_along - 0.5), columns], axis=1), values)
+    assert_allclose(read[0], last.mean(), rtol=0, atol=1e-9)
     pole = sheet.mesh.nodes_mm[sheet.mesh.skin_grid[-1, 0]]
     angles = np.linspace(-np.pi, np.pi, 101)
     sideways = np.array([0.0, 0.0, 1.0])
     around = np.outer(np.cos(angles), np.cross(FINGER.skin_normal(pole), sideways))
     ring = pole + 0.003 * (around + np.outer(np.sin(angles), sideways))
-    values = np.random.default_rng(8).random((1, sheet.mesh.living_epidermis.size))
-    read = sheet.read(sheet.below(ring), values)[0]
-    last = values.reshape(sheet.mesh.living_epidermis.shape)[-1]
-    assert last.std() > 0.2
-    assert_allclose(read, last.mean(), rtol=0, atol=0.02)
+    assert_allclose(sheet.below(ring)[:, 0], n_along - 0.5, rtol=0, atol=0.03)
 
 
 def test_the_tip_itself_is_skin():

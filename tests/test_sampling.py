@@ -1,12 +1,16 @@
 """What is read from the skin: exact for linear fields, mirrored in z, refused beside the finger."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.interpolate import CloughTocher2DInterpolator
 
 from fingerpad.core.errors import InputError
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import LAYERS, block_mesh, finger_mesh
+from fingerpad.skin.receptor_sheet import ReceptorSheet
 from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
 
 TIMES_MS = np.array([0.0, 50.0, 1000.0])
@@ -120,13 +124,17 @@ def test_quantity_that_the_skin_does_not_know_is_refused(quantity):
 
 
 def test_finger_is_read_on_its_volar_side_only():
-    skin = response(QUICK, lambda centre: np.where(centre[:, 1] < 0.0, centre[:, 0], 1e3))
     sites = np.random.default_rng(1).uniform([10.0, -7.0], [26.0, 7.0], (80, 2))
-    np.testing.assert_allclose(skin.sed(sites).sed_kpa[-1], sites[:, 0], rtol=0, atol=1e-5)
+    along = response(QUICK, lambda centre: centre[:, 0]).sed(sites).sed_kpa[-1]
+    np.testing.assert_allclose(along, sites[:, 0], rtol=0, atol=1e-8)
+    height = response(QUICK, lambda centre: 50.0 + centre[:, 1]).sed(sites).sed_kpa[-1] - 50.0
+    depth = Fingertip().skin_point(*sites.T)[:, 1]
+    assert (height < -2.0).all()
+    assert (np.abs(height - depth) < 0.8).all()
 
 
 def test_a_point_of_the_skin_is_read_where_its_end_organ_lies():
-    """Two ways through the sheet: triangles over x and z, and the mesh's rows and columns."""
+    """Given by its own x and z or by the point of the skin above it, an end organ reads the same."""
     finger = Fingertip()
 
     def bump(centre):
@@ -151,6 +159,77 @@ def test_every_quantity_is_read_below_points_of_the_skin():
     np.testing.assert_array_equal(skin.sample("von_mises", points), traces.dynamic_kpa)
     with pytest.raises(InputError, match="must lie on the skin of the mesh"):
         skin.sed(points - [0.0, 3.0, 0.0])
+
+
+FIELDS_IN_SPACE = {
+    "as below a sphere": lambda x, z: 2.0 * np.exp(-0.3 * ((x - 17.37) ** 2 + z**2)),
+    "as below a small sphere": lambda x, z: 2.0 * np.exp(-((x - 17.37) ** 2) - z**2),
+    "as below edges": lambda x, z: np.exp(-(((np.abs(x - 17.37) - 1.5) / 0.4) ** 2) - 0.05 * z**2),
+    "waves": lambda x, z: np.cos(1.3 * x) * np.cos(0.9 * z),
+}
+
+
+def by_triangles(mesh, values, organs):
+    """Another cubic for the same purpose: Clough-Tocher on triangles over x and z, by SciPy."""
+    corners = mesh.nodes_mm[mesh.elements[mesh.living_epidermis.ravel()]]
+    volar = np.cross(corners[:, 6] - corners[:, 4], corners[:, 7] - corners[:, 5])[:, 1] < 0.0
+    plane, known = corners.mean(axis=1)[volar][:, [0, 2]], values[volar]
+    both = np.vstack([plane, plane * [1.0, -1.0]])
+    return CloughTocher2DInterpolator(both, np.tile(known, 2))(organs[:, 0], np.abs(organs[:, 1]))
+
+
+@pytest.mark.parametrize("resolution", ["quick", "standard"])
+@pytest.mark.parametrize(
+    ("field", "quick", "standard"),
+    [
+        ("as below a sphere", 0.0008, 0.0003),
+        ("as below a small sphere", 0.007, 0.0006),
+        ("as below edges", 0.09, 0.01),
+        ("waves", 0.0008, 0.0004),
+    ],
+)
+def test_smooth_fields_are_read_better_than_by_triangles(resolution, field, quick, standard):
+    """The errors of docs/decisions/sampling-between-elements.md."""
+    mesh = finger_mesh(Fingertip(), resolution_grading(resolution, 17.37))
+    sites = np.random.default_rng(1).uniform([14.0, -3.0], [20.5, 3.0], (1000, 2))
+    sheet, truth = ReceptorSheet(mesh), FIELDS_IN_SPACE[field]
+    x, _, z = mesh.nodes_mm[mesh.elements[mesh.living_epidermis.ravel()]].mean(axis=1).T
+    read = sheet.read(sheet.under(sites), truth(x, z)[None])[0]
+    off = np.abs(read - truth(*sites.T))
+    beside = np.abs(by_triangles(mesh, truth(x, z), sites) - truth(*sites.T))
+    assert off.max() < (quick if resolution == "quick" else standard)
+    assert off.max() < beside.max()
+    assert np.mean(off**2) < np.mean(beside**2)
+
+
+def test_the_error_falls_with_the_fourth_power_of_the_size_of_the_elements():
+    errors = []
+    for size in (0.3, 0.15, 0.075):
+        lines = np.arange(-2.4, 2.4 + 0.5 * size, size)
+        mesh = block_mesh(lines, DEPTHS_MM, lines, LAYER_OF_INTERVAL, symmetric=False)
+        sheet = ReceptorSheet(mesh)
+        x, _, z = mesh.nodes_mm[mesh.elements[mesh.living_epidermis.ravel()]].mean(axis=1).T
+        sites = np.random.default_rng(4).uniform(-0.8, 0.8, (400, 2))
+        read = sheet.read(sheet.under(sites), (np.sin(2.0 * x) * np.cos(1.5 * z))[None])[0]
+        errors.append(np.abs(read - np.sin(2.0 * sites[:, 0]) * np.cos(1.5 * sites[:, 1])).max())
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert (orders > 3.7).all()
+    assert (orders < 4.5).all()
+
+
+@pytest.mark.parametrize("full", [False, True])
+def test_every_place_of_the_volar_side_is_found(full):
+    """From the cut to the tip and to where the flank turns up, where x and z follow from a unique (u, v)."""
+    finger = Fingertip()
+    mesh = finger_mesh(finger, replace(resolution_grading("quick", 17.37), full=full))
+    rng = np.random.default_rng(3)
+    x = rng.uniform(0.5, 29.0, 2000)
+    organs = np.stack([x, 0.9 * rng.uniform(-1.0, 1.0, 2000) * finger.section(x)[2]], axis=1)
+    sheet = ReceptorSheet(mesh)
+    found = sheet.under(organs)
+    inside = organs if mesh.full else np.abs(organs)
+    np.testing.assert_allclose(sheet._centre(found)[0][:, [0, 2]], inside, rtol=0, atol=1e-8)
+    assert (sheet._centre(found)[0][:, 1] < 0.0).mean() > 0.99
 
 
 @pytest.mark.parametrize("site", [(17.37, 12.0), (40.0, 0.0), (-1.0, 0.0), (31.0, 8.0)])

@@ -1,18 +1,20 @@
-"""The cubic that carries what is known on a regular grid to any place between.
+"""Cubic spline between the points of a regular grid.
 
 With whole numbers u and v at the grid's points,
 
-    f(u, v) = sum over i and j of w_i(u) w_j(v) f_ij,
+    f(u, v) = sum over i and j of b(u - i) b(v - j) c_ij,
 
-where on a row, from the points -1, 0, 1 and 2 about t within 0 ... 1,
+where b is the cubic B-spline: for t within 0 ... 1 past a point, the coefficients at -1, 0, 1 and 2 have the
+weights
 
-    w = (-t + 2 t^2 - t^3,  2 - 5 t^2 + 3 t^3,  t + 4 t^2 - 3 t^3,  -t^2 + t^3)/2.
+    ((1 - t)^3,  4 - 6 t^2 + 3 t^3,  1 + 3 t + 3 t^2 - 3 t^3,  t^3)/6.
 
-It passes through all values, has continuous slopes and follows parabolas exactly.
+The coefficients c follow from the values f_ij (`coefficients`): the spline passes through all of them. It has
+continuous slopes and curvatures, is exact for cubics and of fourth order.
 
 Notes
 -----
-Catmull & Rom 1974.
+De Boor 1978; Unser 1999.
 """
 
 from __future__ import annotations
@@ -21,32 +23,46 @@ import math
 
 import numpy as np
 from numba import njit
+from scipy.ndimage import spline_filter1d
 
 from fingerpad.core.checks import FloatArray
 
 Four = tuple[float, float, float, float]
 
 
+def coefficients(values: FloatArray) -> FloatArray:
+    """Coefficients of the spline through values on a grid.
+
+    The influence of a value falls to 27 % from one point to the next. At the ends the slope is 0, so a grid
+    is continued by some 20 points beyond the range of interest first.
+
+    Parameters
+    ----------
+    values : array (n_rows, n_columns, n_quantities)
+        On the grid.
+
+    Returns
+    -------
+    array (n_rows, n_columns, n_quantities)
+    """
+    return spline_filter1d(spline_filter1d(values, axis=0, mode="mirror"), axis=1, mode="mirror")
+
+
 @njit(cache=True, nogil=True)
 def _weights(t: float) -> Four:
-    square, cube = t * t, t * t * t
+    square, cube, rest = t * t, t * t * t, (1.0 - t) ** 3
     return (
-        0.5 * (-t + 2.0 * square - cube),
-        0.5 * (2.0 - 5.0 * square + 3.0 * cube),
-        0.5 * (t + 4.0 * square - 3.0 * cube),
-        0.5 * (cube - square),
+        rest / 6.0,
+        (4.0 - 6.0 * square + 3.0 * cube) / 6.0,
+        (1.0 + 3.0 * (t + square - cube)) / 6.0,
+        cube / 6.0,
     )
 
 
 @njit(cache=True, nogil=True)
 def _slopes(t: float) -> Four:
     square = t * t
-    return (
-        0.5 * (-1.0 + 4.0 * t - 3.0 * square),
-        0.5 * (-10.0 * t + 9.0 * square),
-        0.5 * (1.0 + 8.0 * t - 9.0 * square),
-        0.5 * (-2.0 * t + 3.0 * square),
-    )
+    return (-0.5 * (1.0 - t) ** 2, 1.5 * square - 2.0 * t, 0.5 + t - 1.5 * square, 0.5 * square)
 
 
 @njit(cache=True, nogil=True)
@@ -56,7 +72,7 @@ def values_at(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
     Parameters
     ----------
     known : array (n_rows, n_columns, n_quantities)
-        On the grid, which begins `padding` rows and columns before u = 0 and v = 0.
+        `coefficients` on the grid, which begins `padding` rows and columns before u = 0 and v = 0.
     uv : array (n_places, 2)
         Where; at least one row and column from the first, and two from the last.
     padding : int
@@ -68,8 +84,9 @@ def values_at(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
 
     Examples
     --------
-    >>> u, v = np.indices((5, 5), dtype=float)
-    >>> values_at((u * u * v)[:, :, None], np.array([[1.5, 2.0]]), 0).tolist()
+    >>> u, v = np.indices((41, 41)) - 20.0
+    >>> known = coefficients((u * u * v)[:, :, None])
+    >>> values_at(known, np.array([[1.5, 2.0]]), 20).round(6).tolist()
     [[4.5]]
     """
     found = np.zeros((len(uv), known.shape[2]))
@@ -101,8 +118,9 @@ def values_and_slopes_at(known: FloatArray, uv: FloatArray, padding: int) -> Flo
 
     Examples
     --------
-    >>> u, v = np.indices((5, 5), dtype=float)
-    >>> values_and_slopes_at((u * u * v)[:, :, None], np.array([[1.5, 2.0]]), 0).ravel().tolist()
+    >>> u, v = np.indices((41, 41)) - 20.0
+    >>> known = coefficients((u * u * v)[:, :, None])
+    >>> values_and_slopes_at(known, np.array([[1.5, 2.0]]), 20).ravel().round(6).tolist()
     [4.5, 6.0, 2.25]
     """
     found = np.zeros((3, len(uv), known.shape[2]))

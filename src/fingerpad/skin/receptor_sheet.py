@@ -1,18 +1,19 @@
-"""Where end organs lie: from points of the skin to the living epidermis below, on any side of the finger.
+"""End organs in the living epidermis, below points of the skin or by their own x and z.
 
-The sheet of living epidermis is one element thick and as regular as the mesh: rows along the finger, columns
-around it. Let (u, v) count them, whole numbers at the elements' middles. One cubic,
-`fingerpad.skin.grid_cubic`,
-carries all that is known there: the elements' values f, the points S of the skin above their middles, and the
-points B of the epidermal-dermal border below. A site is where S(u, v) meets it. The end organ lies where the
-normal n of the skin meets the border,
+The sheet of living epidermis is one element thick and has rows along the finger and columns around it. The
+coordinates (u, v) count them and are whole numbers at the middles of the elements. One cubic spline
+(`fingerpad.skin.grid_cubic`) interpolates all quantities over (u, v): the values f of the elements, their
+middles M, the points S of the skin above them, and the points B of the epidermal-dermal border below. Because
+one spline serves all, values that are linear in space are interpolated exactly.
 
-    S(u, v) - t n = B(u', v'),
+- An end organ given by its x and z lies where M(u, v) has this x and z, on the volar side.
+- A point of the skin has the (u, v) at which S(u, v) meets it. The end organ below lies where the normal n of
+  the skin meets the border, S(u, v) - t n = B(u', v').
 
-and reads f(u', v'). As one cubic serves all, values that are linear in space are read exactly.
+Its value is f(u, v) or f(u', v').
 
-Beyond the rim of the sheet rows and columns go on as the body does: mirrored where it is halved, on around
-where it is closed, through the pole at the tip, else straight.
+Beyond the rim of the sheet the spline is continued: by mirroring where the body is halved, around it where it
+is closed, through the pole at the tip, and otherwise along a straight line.
 """
 
 from __future__ import annotations
@@ -27,9 +28,11 @@ from scipy.spatial import cKDTree
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
 from fingerpad.geometry.mesh import Mesh
-from fingerpad.skin.grid_cubic import values_and_slopes_at, values_at
+from fingerpad.skin.grid_cubic import coefficients, values_and_slopes_at, values_at
 
-_PADDING = 2  # rows and columns beyond the rim: what the cubic needs half an element past the last middle
+_PADDING = 24
+"""Rows and columns beyond the rim. The end of a spline acts 0.27 as strongly one element further on."""
+
 _MOST_STEPS = 60
 _LONGEST_STEP = 2.0  # elements
 _EXACT_MM = 1e-9
@@ -41,12 +44,12 @@ _MIRROR = np.array([1.0, 1.0, -1.0])
 """What the plane of symmetry, z = 0, does to a point."""
 
 Equations = Callable[[FloatArray, np.ndarray], tuple[FloatArray, FloatArray]]
-"""From (u, v) of some sites (n, 2) and their numbers to what is to vanish (n, 2) and its Jacobian."""
+"""From (u, v) of some sites (n, 2) and their numbers to the residual (n, 2) and its Jacobian."""
 
 
 @dataclass(frozen=True)
 class ReceptorSheet:
-    """The elements just above the epidermal-dermal border, and the way from the skin to them.
+    """The elements just above the epidermal-dermal border, and coordinates on them.
 
     Parameters
     ----------
@@ -102,13 +105,44 @@ class ReceptorSheet:
             )
         return self._below(uv)
 
+    def under(self, organs_mm: FloatArray) -> FloatArray:
+        """Find end organs by their own x and z, on the volar side.
+
+        Parameters
+        ----------
+        organs_mm : array (n_sites, 2)
+            x and z. [mm]
+
+        Returns
+        -------
+        array (n_sites, 2)
+            u and v, for `read`.
+
+        Raises
+        ------
+        InputError
+            If no point of the volar side has this x and z.
+        """
+        target = self._in_mesh(organs_mm)
+        volar = self._middles[self._volar.ravel()]
+        start = volar[cKDTree(self._centre(volar)[0][:, [0, 2]]).query(target)[1]]
+        uv, missed = self._solve(lambda uv, which: _projected(self._centre(uv), target[which]), start)
+        missed |= self._turn(uv) * self._volar_sign <= 0.0
+        missed |= self._past_the_rim(target)
+        if missed.any():
+            x, z = organs_mm[np.argmax(missed)]
+            raise InputError(
+                f"sites must lie on the volar skin of the mesh: (x, z) = ({x:g}, {z:g}) mm does not."
+            )
+        return uv
+
     def read(self, uv: FloatArray, values: FloatArray) -> FloatArray:
         """Interpolate values of the sheet's elements.
 
         Parameters
         ----------
         uv : array (n_sites, 2)
-            From `below`.
+            From `below` or `under`.
         values : array (n_times, n_sheet)
             Of the elements `mesh.living_epidermis`, flattened.
 
@@ -118,7 +152,7 @@ class ReceptorSheet:
         """
         known = np.asarray(values, dtype=np.float64).T.reshape(*self.mesh.living_epidermis.shape, -1)
         # At the pole, where all columns meet, they agree on their mean.
-        return values_at(self._padded(known, 1.0, known[-1].mean(axis=0)), uv, _PADDING).T
+        return values_at(self._control(known, 1.0, known[-1].mean(axis=0)), uv, _PADDING).T
 
     def _below(self, uv: FloatArray) -> FloatArray:
         """Where the normal of the skin at (u, v) meets the border, S - t n = B(u', v')."""
@@ -128,7 +162,7 @@ class ReceptorSheet:
         return self._solve(lambda uv, which: _tangential(self._border(uv), target[which]), uv)[0]
 
     def _solve(self, equations: Equations, start: FloatArray) -> tuple[FloatArray, np.ndarray]:
-        """Solve for (u, v) of every site by Newton's method, and tell whom it missed."""
+        """(u, v) of every site by Newton's method, and whether it did not converge, bool (n,)."""
         uv = start.copy()
         open_sites = np.arange(len(uv))
         for _ in range(_MOST_STEPS):
@@ -148,7 +182,7 @@ class ReceptorSheet:
         return uv, missed
 
     def _kept(self, uv: FloatArray) -> FloatArray:
-        """(u, v) on the sheet: back to its rim, on around, or through the pole to the other side."""
+        """(u, v) moved onto the sheet: to its rim, around the finger, or through the pole."""
         (first_u, last_u), (first_v, last_v) = self._limits
         u, v = uv.T
         if self._ends_in_pole:
@@ -179,7 +213,7 @@ class ReceptorSheet:
         if not self._ends_in_pole:
             beyond = np.maximum(beyond, sites_mm[:, 0] - skin[:, 0].max())
         if not (self._closed or all(self._mirrors)):
-            z = sites_mm[:, 2]
+            z = sites_mm[:, -1]
             beyond = np.maximum(beyond, np.maximum(skin[:, 2].min() - z, z - skin[:, 2].max()))
         return beyond > _EXACT_MM
 
@@ -224,6 +258,34 @@ class ReceptorSheet:
         return self._padded_points(self._through_border)
 
     @cached_property
+    def _centres(self) -> FloatArray:
+        """Middles of the elements, (n_along, n_around, 3). [mm]"""
+        return self.mesh.nodes_mm[self.mesh.elements[self.mesh.living_epidermis]].mean(axis=2)
+
+    @cached_property
+    def _centre_control(self) -> FloatArray:
+        pole = self._centres[-1].mean(axis=0)
+        return self._control(self._centres, _MIRROR, pole if self.mesh.full else pole * [1.0, 1.0, 0.0])
+
+    @cached_property
+    def _volar(self) -> np.ndarray:
+        """Whether an element lies on the volar side: its upper face looks towards y < 0, bool (n, m)."""
+        corners = self.mesh.nodes_mm[self.mesh.elements[self.mesh.living_epidermis]]
+        normal = np.cross(corners[:, :, 6] - corners[:, :, 4], corners[:, :, 7] - corners[:, :, 5])
+        return normal[..., 1] < 0.0
+
+    @cached_property
+    def _volar_sign(self) -> float:
+        """Sign of the determinant of (x, z) by (u, v) on the volar side."""
+        middles = self._middles[self._volar.ravel()]
+        return float(np.sign(np.median(self._turn(middles))))
+
+    def _turn(self, uv: FloatArray) -> FloatArray:
+        """Return the determinant of (x, z) by (u, v), (n,); its sign differs between volar and dorsal side."""
+        _, by_u, by_v = self._centre(uv)
+        return by_u[:, 0] * by_v[:, 2] - by_u[:, 2] * by_v[:, 0]
+
+    @cached_property
     def _through_border(self) -> int:
         """Level of the grid that is the epidermal-dermal border, where the sheet's elements begin."""
         lower = self.mesh.elements[self.mesh.living_epidermis[0, 0], 0]
@@ -232,8 +294,8 @@ class ReceptorSheet:
     def _padded_points(self, through: int) -> FloatArray:
         """Middles of the faces of one level of the grid, lifted onto the surface of its nodes, padded.
 
-        The middle of a face's corners lies below that surface by what its chords cut off. Cubics through four
-        nodes tell how much, along and around the finger.
+        The middle of a face's corners lies below that surface. Cubics through four nodes, along and around
+        the finger, give the distance.
         """
         nodes = self.mesh.nodes_mm[self.mesh.grid[:, :, through]]
         middles = 0.25 * (nodes[:-1, :-1] + nodes[1:, :-1] + nodes[1:, 1:] + nodes[:-1, 1:])
@@ -244,9 +306,9 @@ class ReceptorSheet:
         bulge += 0.5 * _bulge(tall, 0)[:, :-1] + 0.5 * _bulge(tall, 0)[:, 1:]
         normal = np.cross(nodes[1:, 1:] - nodes[:-1, :-1], nodes[:-1, 1:] - nodes[1:, :-1])
         normal /= np.linalg.norm(normal, axis=2, keepdims=True)
-        # Along the skin the middle of an element stays where it is.
+        # The middle moves along the normal only.
         middles += (bulge * normal).sum(axis=2, keepdims=True) * normal
-        return self._padded(middles, _MIRROR, nodes[-1, 0])
+        return self._control(middles, _MIRROR, nodes[-1, 0])
 
     def _wider(self, nodes: FloatArray) -> FloatArray:
         """Nodes with one more column at either end."""
@@ -264,6 +326,10 @@ class ReceptorSheet:
         """Points S of the skin and their derivatives by u and by v, (3, n, 3)."""
         return values_and_slopes_at(self._skin_control, uv, _PADDING)
 
+    def _centre(self, uv: FloatArray) -> FloatArray:
+        """Points of the surface through the elements' middles, and their derivatives, (3, n, 3)."""
+        return values_and_slopes_at(self._centre_control, uv, _PADDING)
+
     def _border(self, uv: FloatArray) -> FloatArray:
         """Points B of the border and their derivatives by u and by v, (3, n, 3)."""
         return values_and_slopes_at(self._border_control, uv, _PADDING)
@@ -275,8 +341,8 @@ class ReceptorSheet:
         inside_out = ((point - self._border(uv)[0]) * normal).sum(axis=1, keepdims=True) < 0.0
         return np.where(inside_out, -1.0, 1.0) * normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
-    def _padded(self, known: FloatArray, mirror: float | FloatArray, pole: FloatArray) -> FloatArray:
-        """Two more rows and columns at either end of (n_along, n_around, k), as the body goes on.
+    def _control(self, known: FloatArray, mirror: float | FloatArray, pole: FloatArray) -> FloatArray:
+        """Coefficients of the spline through (n_along, n_around, k), continued beyond its rim as the body is.
 
         Parameters
         ----------
@@ -287,23 +353,25 @@ class ReceptorSheet:
         pole : array (k,)
             What all columns meet at, if the rows end in a pole.
         """
-        if self._closed:
-            around = np.concatenate([known[:, -2:], known, known[:, :2]], axis=1)
+        first, last = (True, True) if self._closed else self._mirrors
+        around = known
+        if not first:
+            around = np.concatenate([_straight_on(around[:, 1::-1])[:, ::-1], around], axis=1)
+        if not last:
+            around = np.concatenate([around, _straight_on(around[:, -2:])], axis=1)
+        n_around = around.shape[1]
+        steps = np.arange(-_PADDING if first else 0, n_around + (_PADDING if last else 0))
+        turns, steps = np.divmod(steps, n_around)
+        odd = (turns % 2 == 1) & (not self._closed)
+        around = np.where(odd[:, None], mirror, 1.0) * around[:, np.where(odd, n_around - 1 - steps, steps)]
+        rows = np.moveaxis(around, 0, 1)
+        start = _straight_on(rows[:, 1::-1])[:, ::-1]
+        if self._ends_in_pole:
+            back = np.maximum(len(known) - 1 - np.arange(_PADDING), 0)
+            end = 2.0 * pole - rows[:, back]
         else:
-            first, last = self._mirrors
-            ends = [
-                mirror * end if mirrored else _straight_on(end)
-                for end, mirrored in ((known[:, :2], first), (known[:, :-3:-1], last))
-            ]
-            around = np.concatenate([ends[0][:, ::-1], known, ends[1]], axis=1)
-        start = np.moveaxis(_straight_on(np.moveaxis(around[:2], 0, 1)), 1, 0)
-        tip = around[:-3:-1]
-        end = (
-            2.0 * pole - tip
-            if self._ends_in_pole
-            else np.moveaxis(_straight_on(np.moveaxis(tip, 0, 1)), 1, 0)
-        )
-        return np.concatenate([start[::-1], around, end])
+            end = _straight_on(rows[:, -2:])
+        return coefficients(np.moveaxis(np.concatenate([start, rows, end], axis=1), 0, 1))
 
 
 def _bulge(nodes: FloatArray, axis: int) -> FloatArray:
@@ -312,16 +380,21 @@ def _bulge(nodes: FloatArray, axis: int) -> FloatArray:
     return np.moveaxis((second + third - first - fourth) / 16.0, 0, axis)
 
 
-def _straight_on(end: FloatArray) -> FloatArray:
-    """Next two of a row, given its last two, the very last first: (n, 2, k) -> (n, 2, k)."""
-    step = end[:, 0] - end[:, 1]
-    return np.stack([end[:, 0] + step, end[:, 0] + 2.0 * step], axis=1)
+def _straight_on(ends: FloatArray) -> FloatArray:
+    """Continue rows along a line through their last two: (n, 2, k) -> (n, _PADDING, k)."""
+    return ends[:, 1:] + np.arange(1.0, _PADDING + 1)[:, None] * (ends[:, 1:] - ends[:, :1])
 
 
 def _tangential(surface: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Distance from a target along both tangents of a surface, and its Jacobian without their turning."""
+    """Distance from a target along both tangents of a surface, and its Jacobian at fixed tangents."""
     point, *slopes = surface
     slope = np.stack(slopes, axis=1)
     tangent = slope / np.linalg.norm(slope, axis=2, keepdims=True)
     excess = (tangent * (point - target)[:, None]).sum(axis=2)
     return excess, np.einsum("nik,njk->nij", tangent, slope)
+
+
+def _projected(surface: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Distance from a target (n, 2) in x and z, and its Jacobian."""
+    point, *slopes = surface[..., [0, 2]]
+    return point - target, np.stack(slopes, axis=2)

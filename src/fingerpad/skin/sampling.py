@@ -8,9 +8,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CloughTocher2DInterpolator
-from scipy.spatial import Delaunay
-from threadpoolctl import threadpool_limits
 
 from fingerpad.core.checks import FloatArray, float_array, one_of
 from fingerpad.core.errors import InputError
@@ -162,8 +159,8 @@ class SkinResponse:
 
         End organs lie on the epidermal-dermal border and move with the tissue. A pair gives an organ's own x
         and z, a triple the point of the skin from which it lies 0.471 mm deep along the normal. The means of
-        the elements just above the border (0.371 to 0.471 mm deep) are interpolated along it by a cubic of
-        class C1, and never across it, where SED jumps.
+        the elements just above the border (0.371 to 0.471 mm deep) are interpolated along it by a cubic
+        spline, and never across it, where SED jumps.
 
         Parameters
         ----------
@@ -223,30 +220,11 @@ class SkinResponse:
         """Several quantities at the same sites, (n_times, n_sites) each."""
         known = [self._of_sheet(quantity) for quantity in quantities]
         points = float_array("sites", sites, 2)
-        if points.shape[1] == 2:
-            read = [self._read_volar(values, points) for values in known]
-        elif points.shape[1] == 3:
-            organs = self._receptors.below(points)
-            read = [self._receptors.read(organs, values) for values in known]
-        else:
+        if points.shape[1] not in (2, 3):
             raise InputError(f"sites needs columns x and z, or x, y and z, in mm: got shape {points.shape}.")
-        # A cubic may dip below zero beside a steep front; none of the quantities can.
-        return [np.maximum(values, 0.0) for values in read]
-
-    def _read_volar(self, known: FloatArray, organs: FloatArray) -> FloatArray:
-        """Values of the sheet at end organs by their x and z."""
-        triangulation, rows = self._volar_sheet
-        outside = np.flatnonzero(triangulation.find_simplex(organs) < 0)
-        if outside.size:
-            x, z = organs[outside[0]]
-            raise InputError(
-                f"sites must lie on the volar skin of the mesh: (x, z) = ({x:g}, {z:g}) mm does not."
-            )
-        interpolate = CloughTocher2DInterpolator(triangulation, known[:, rows].T.astype(np.float64))
-        if self.mesh.symmetry_nodes.size:
-            # Diagonals of the triangles are not mirrored: without this, a site and its mirror image differ.
-            organs = np.column_stack([organs[:, 0], np.abs(organs[:, 1])])
-        return interpolate(organs).T
+        places = self._receptors.under(points) if points.shape[1] == 2 else self._receptors.below(points)
+        # A spline may dip below zero beside a steep front; none of the quantities can.
+        return [np.maximum(self._receptors.read(places, values), 0.0) for values in known]
 
     def _of_sheet(self, quantity: str) -> FloatArray:
         """One quantity in the elements `mesh.living_epidermis`, (n_times, n_sheet)."""
@@ -254,28 +232,6 @@ class SkinResponse:
         field = held[one_of("quantity", quantity, tuple(held))]
         values = self.fields[field.name]
         return values if field.place is Place.WATCHED else values[:, self.mesh.living_epidermis.ravel()]
-
-    @cached_property
-    def _volar_sheet(self) -> tuple[Delaunay, np.ndarray]:
-        """Triangulated (x, z) of the volar sheet of living epidermis, and its rows; both halves."""
-        mesh = self.mesh
-        elements = mesh.living_epidermis.ravel()
-        if not elements.size:
-            raise InputError("This mesh has no living epidermis: SED is sampled only in a layered finger.")
-        corners = mesh.nodes_mm[mesh.elements[elements]]
-        centre = corners.mean(axis=1)
-        # The upper face (last four nodes) looks towards the skin: volar where its normal has y < 0.
-        normal = np.cross(corners[:, 6] - corners[:, 4], corners[:, 7] - corners[:, 5])
-        volar = normal[:, 1] < 0.0
-        plane, rows = centre[volar][:, [0, 2]], np.flatnonzero(volar)
-        if mesh.symmetry_nodes.size:
-            plane, rows = np.vstack([plane, plane * [1.0, -1.0]]), np.tile(rows, 2)
-        triangulation = Delaunay(plane)
-        # Its first search solves one 2x2 system per triangle, for each of which OpenBLAS would wake its
-        # threads: on busy processors 8 ms a triangle, half a minute in all.
-        with threadpool_limits(limits=1):
-            triangulation.find_simplex(plane[:1])
-        return triangulation, rows
 
     @cached_property
     def _receptors(self) -> ReceptorSheet:
