@@ -1,4 +1,4 @@
-"""One SAI afferent: strain energy density -> current -> spikes -> rates, the three stages chained."""
+"""One SAI afferent: strain energy density -> current -> spikes -> rates."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Afferent:
     """A slowly adapting type I (SAI) afferent.
 
     The defaults are our fit to the recordings under the shifted bar (`fingerpad.data.neuron`, names
-    ending in FITTED); they belong to the finger and tissues they were fitted with.
+    ending in FITTED), and hold for the finger and tissues of that fit.
 
     Parameters
     ----------
@@ -51,10 +51,10 @@ class Afferent:
     threshold_mv : float
         Potential that elicits a spike, v. [mV]
     refractory_ms : float
-        Rest after each spike. [ms]
+        Refractory period after each spike. [ms]
     dynamic_quantity : str
-        What the dynamic term follows, by the names of `SkinResponse.sample`. Any but SED, "stored", is an
-        extension of the paper's model; k_d belongs to its quantity.
+        Quantity that drives the dynamic term, a name of `SkinResponse.sample`. Any but SED, "stored", is an
+        extension of the paper's model; the unit of k_d depends on it.
 
     Raises
     ------
@@ -81,7 +81,7 @@ class Afferent:
     dynamic_quantity: str = STORED_ENERGY
 
     def __post_init__(self) -> None:
-        # Both stages check what they are made of; building them once here checks at the boundary.
+        # Both stages check their parameters; they are made here once to check at the boundary.
         self.transduction, self.membrane  # noqa: B018
 
     @classmethod
@@ -99,9 +99,9 @@ class Afferent:
             beta [mA], k_d [mA ms/kPa], k_s [mA/kPa], tau [ms], C [mF], v [mV]: the order of
             `PARAMETER_NAMES`.
         refractory_ms : float, optional
-            Rest after each spike, which is not fitted. [ms]
+            Refractory period after each spike, which is not fitted. [ms]
         dynamic_quantity : str, optional
-            What the dynamic term follows.
+            Quantity that drives the dynamic term.
 
         Returns
         -------
@@ -141,12 +141,12 @@ class Afferent:
         )
 
     def spikes(self, sed: SedTraces | Drive) -> SpikeTrains:
-        """Answer every site as if this afferent ended there.
+        """Spike trains of this afferent with its end organ at each site.
 
         Parameters
         ----------
         sed : SedTraces or Drive
-            Strain energy density; `fingerpad.neuron.transduction.drive` of it where many afferents meet the
+            Strain energy density, or its `fingerpad.neuron.transduction.drive` where many afferents have the
             same traces, as in a fit.
 
         Returns
@@ -157,11 +157,11 @@ class Afferent:
         Raises
         ------
         InputError
-            If the dynamic term is to follow another quantity than the one that `sed` brings.
+            If the quantity of the dynamic term is not that of `sed`.
         """
         if sed.dynamic_quantity != self.dynamic_quantity:
             raise InputError(
-                f"This afferent's dynamic term follows {self.dynamic_quantity!r}: got traces for "
+                f"The dynamic term of this afferent is driven by {self.dynamic_quantity!r}: got traces of "
                 f"{sed.dynamic_quantity!r}, sample the skin with dynamic_quantity={self.dynamic_quantity!r}."
             )
 
@@ -176,7 +176,7 @@ class Afferent:
         dynamic_window_ms: tuple[float, ...] = protocol.DYNAMIC_WINDOW.value,
         static_window_ms: tuple[float, ...] = protocol.STATIC_WINDOW.value,
     ) -> tuple[FloatArray, FloatArray]:
-        """Answer every site with its firing rates in the ramp and in the hold, Eqs. 6-10.
+        """Return the firing rates at every site in the ramp and in the hold, Eqs. 6-10.
 
         Parameters
         ----------

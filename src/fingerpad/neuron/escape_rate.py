@@ -1,18 +1,17 @@
-"""Membrane current -> spike times of a leaky integrate-and-fire neuron whose threshold is soft.
+"""Membrane current -> spike times of a leaky integrate-and-fire neuron with a soft threshold.
 
-The potential V follows Eq. 5 as ever and returns to 0 after a spike. It does not have to reach the
-threshold v: at any time the neuron fires with the hazard (escape rate)
+The potential V follows Eq. 5 and returns to 0 after a spike. It need not reach the threshold v: at any
+time the neuron fires with the hazard (escape rate)
 
     h(V) = 1/tau_e exp((V - v)/delta),
 
-which is small below the threshold and grows without bound above it (Gerstner & Kistler 2002, section
-5.3). With u = V/v and the width delta/v it needs no unit of potential. As the width shrinks the threshold
-hardens into that of `fingerpad.neuron.lif`.
+which is small below the threshold and unbounded above it (Gerstner & Kistler 2002, section
+5.3). With u = V/v and the width delta/v it needs no unit of potential. In the limit of width 0 the threshold
+is that of `fingerpad.neuron.lif`.
 
-Between two knots of the current u is known in closed form (`fingerpad.neuron.exact_spikes`), and the
-integral of h
-is done by Gauss's formula on short panels. Spikes follow from it by rescaling time:
-measured in the integral of h, the intervals between spikes are exponential with mean 1.
+Between two knots of the current u has a closed form (`fingerpad.neuron.exact_spikes`), and the integral of h
+is computed by Gauss quadrature on short panels. Spikes are sampled by time rescaling: measured in the
+integral of h, interspike intervals are exponential with mean 1.
 """
 
 from __future__ import annotations
@@ -37,19 +36,19 @@ ESCAPE_TIME_MS = 1.0
 """Mean time to a spike while the potential is held at the threshold, tau_e: a convention. [ms]"""
 
 _TRAINS_PER_BLOCK = 32
-"""Trains that one thread makes at a time."""
+"""Trains per block of one thread."""
 
 _ESCAPE = int(Purpose.ESCAPE)
 _NODES = tuple(0.5 + 0.5 * np.polynomial.legendre.leggauss(5)[0])
 _WEIGHTS = tuple(0.5 * np.polynomial.legendre.leggauss(5)[1])
 _LONGEST_PANEL = 0.5
-"""Time over tau that one panel spans, at most: over longer ones the potential bends."""
+"""Largest length of a panel over tau, because of the curvature of the potential."""
 
 _HIGHEST_STEP = 1.0
-"""Change of the logarithm of the hazard over one panel, at most: Gauss's formula then errs by 1e-9."""
+"""Largest change of the log hazard over a panel: the error of the quadrature is then 1e-9."""
 
 _NEGLIGIBLE = -60.0
-"""A hazard of exp(-60)/tau_e never fires: panels below it are passed over."""
+"""Panels with a hazard below exp(-60)/tau_e are skipped."""
 
 _MOST_PANELS = 1.0e6
 _ROUND_OFF = 1.0e-14
@@ -63,11 +62,11 @@ class EscapeRate:
     Parameters
     ----------
     membrane : LeakyIntegrateAndFire
-        Its numbers; the threshold is where the hazard is 1/tau_e.
+        Its parameters; at the threshold the hazard is 1/tau_e.
     width : float
-        Softness of the threshold over the threshold itself, delta/v. [1]
+        Width of the threshold over the threshold, delta/v. [1]
     escape_ms : float, optional
-        tau_e. Another value moves the threshold and changes no answer: docs/decisions/escape-rate.md. [ms]
+        tau_e. Another value is equivalent to another threshold: docs/decisions/escape-rate.md. [ms]
 
     Raises
     ------
@@ -93,7 +92,7 @@ class EscapeRate:
         positive("escape_ms", self.escape_ms, "ms")
 
     def hazard_per_ms(self, potential_mv: ArrayLike) -> FloatArray:
-        """Chance to fire per time at a potential, h(V).
+        """Hazard at a potential, h(V).
 
         Parameters
         ----------
@@ -111,7 +110,7 @@ class EscapeRate:
     def spikes(
         self, current: CurrentTraces, seed: int, presentations: Presentations | None = None
     ) -> SpikeTrains:
-        """Spike times by time rescaling: the integral of h from spike to spike is exponential with mean 1.
+        """Sample spike times by time rescaling: the integral of h between spikes is exponential with mean 1.
 
         Parameters
         ----------
@@ -130,7 +129,7 @@ class EscapeRate:
         Raises
         ------
         InputError
-            If a presentation names a site that is not there.
+            If a presentation names a site outside the current.
         """
         everyone = presentations or Presentations.of_population(current.n_sites)
         checked_sites(everyone.sites, current.n_sites)
@@ -161,7 +160,7 @@ class EscapeRate:
         spikes : SpikeTrains
             One train per presentation.
         sites : int array_like (n_trains,)
-            Column of `current` that each train answers.
+            Column of `current` of each train.
         times_ms : array_like (n_times,)
             Increasing, within the times of the current. [ms]
 
@@ -203,9 +202,9 @@ class EscapeRate:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def panels(length: float, start: float, steady: float, drift: float, width: float) -> int:
-    """Into how many panels to cut a stretch, for Gauss's formula with five nodes to err by 1e-9 or less.
+    """Return the number of panels for an error of at most 1e-9 of Gauss quadrature with five nodes.
 
-    The slope of u is monotone, so that it is steepest at one of the ends.
+    The slope of u is monotone, so it is steepest at one of the ends.
     """
     rise = steady - start
     steepest = max(abs(rise), abs(drift + (rise - drift) * math.exp(-length)))
@@ -258,7 +257,7 @@ def _escape_trains(
     width: float,
     escape: float,
 ) -> tuple[FloatArray, np.ndarray]:
-    """Spike times of all trains, one after the other, and where each one's begin."""
+    """Spike times of all trains, one after the other, and the index of the first of each."""
     found = np.empty(64 * (sites.size + 1))
     offsets = np.zeros(sites.size + 1, dtype=np.int64)
     count = 0

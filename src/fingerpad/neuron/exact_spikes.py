@@ -1,7 +1,7 @@
-"""When many membranes cross their threshold, exactly: the kernels behind `fingerpad.neuron.lif`.
+"""Exact threshold crossings of many membranes: the kernels of `fingerpad.neuron.lif`.
 
-Eq. 5 says that the potential u follows w = R I, the potential that the present current would hold: in the
-time x = s/tau, with R = tau/C, du/dx = w - u. Between two knots the current is a straight line, w = w0 + c x,
+By Eq. 5 the potential u relaxes to w = R I, the steady potential of the present current: in the time
+x = s/tau, with R = tau/C, du/dx = w - u. Between two knots the current is a straight line, w = w0 + c x,
 and the potential has the closed form
 
     u(x) = u0 + (w0 - u0) g + c (x - g),    g = 1 - e^-x,
@@ -37,11 +37,11 @@ def potential_at(x: float, start: float, steady: float, drift: float) -> float:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _first_guess(missing: float, rise: float, drift: float) -> float:
-    """Time in which the potential gains what is `missing`, roughly, from r = `rise` and c = `drift`.
+    """Approximate time in which the potential increases by `missing`, from r = `rise` and c = `drift`.
 
-    Halley's formula gives a first time, h = 2 missing r/q. Were the current steady, its mean until h, then
+    Halley's formula gives a first time, h = 2 missing r/q. For a constant current, its mean until h,
     x = -ln(1 - s) with s = missing/(r + c h/2), here by its Padé approximant s (6 - 3 s)/(6 - 6 s + s^2).
-    Put together it is one fraction: divisions are as dear as all else.
+    Both are combined to one fraction, because divisions are expensive.
     """
     q = 2.0 * rise * rise + (drift - rise) * missing
     a = missing * q
@@ -53,12 +53,12 @@ def _first_guess(missing: float, rise: float, drift: float) -> float:
 def _next_guess(guess: float, missing: float, rise: float, drift: float, high: float) -> tuple[float, bool]:
     """Better guess of the crossing, and whether it is exact to the round-off of times up to `high`.
 
-    Each guess is the origin of the same law: from there the potential gains
+    From each guess the potential increases by
 
         r y + b (y^2/2 - y^3/6 + y^4/24 - ...)    in the time y,    r = w - u,    b = c - r.
 
-    Halley's formula finds the y that gains what is `missing`, and one step of Newton on the series up to y^5
-    improves it. What the series leaves out and the error of Newton's step are known.
+    Halley's formula solves for the y of the increase `missing`, and one Newton step on the series up to y^5
+    improves it. The remainder of the series and the error of the Newton step are known.
     """
     bend = drift - rise
     y = 2.0 * missing * rise / (2.0 * rise * rise + bend * missing)
@@ -100,7 +100,7 @@ def _refine(
 def first_crossing(
     length: float, start: float, steady: float, later: float, threshold: float
 ) -> tuple[bool, float, float]:
-    """Let one potential run between two knots, for kernels that treat neurons one by one.
+    """Advance one potential between two knots, for kernels that treat neurons one by one.
 
     Parameters
     ----------
@@ -118,9 +118,9 @@ def first_crossing(
     crosses : bool
         Whether the potential reaches the threshold by the second knot.
     x : float
-        When it first does; the length if it does not. [1]
+        Time of the first crossing; the length without one. [1]
     reached : float
-        Potential at the second knot if the threshold were not there. [mV]
+        Potential at the second knot without a threshold. [mV]
     """
     drift = (later - steady) / length
     at_knot = reached = potential_at(length, start, steady, drift)
@@ -143,7 +143,7 @@ def exact_trains(
     threshold: float,
     refractory: float,
 ) -> tuple[FloatArray, np.ndarray]:
-    """Spike times of all neurons, one after the other, and where each one's begin.
+    """Spike times of all neurons, one after the other, and the index of the first of each.
 
     Parameters
     ----------
@@ -152,20 +152,20 @@ def exact_trains(
     currents : array (n_knots, n_neurons)
         Current at the knots, a straight line between them. [mA]
     tau, capacitance, threshold, refractory : float
-        The membrane's numbers, in the units of `fingerpad.neuron.lif.LeakyIntegrateAndFire`.
+        Parameters of the membrane, in the units of `fingerpad.neuron.lif.LeakyIntegrateAndFire`.
 
     Returns
     -------
     array (n_spikes,)
         Spike times, neuron by neuron. [ms]
     array (n_neurons + 1,)
-        Where each neuron's begin.
+        Index of the first spike of each neuron.
 
     Notes
     -----
-    All neurons pass an interval before any passes the next: they share its exponential, rows of `currents`
-    lie in memory as they are read, and no neuron's arithmetic waits for another's. For
-    the same reason those that fire do so in rounds of one spike each, stage by stage in short loops.
+    All neurons are advanced over an interval before the next one: they share its exponential, rows of
+    `currents` are contiguous in memory, and the arithmetic of neurons is independent. For the same reason
+    neurons that fire are advanced in rounds of one spike each, in short loops.
     """
     n_neurons = currents.shape[1]
     resistance = tau / capacitance
@@ -211,10 +211,10 @@ def _pass(
     ready: FloatArray,
     busy: np.ndarray,
 ) -> int:
-    """Take all neurons that neither rest nor may fire to the next knot; list the others, return their number.
+    """Advance neurons that are not refractory and cannot fire to the next knot; list and count the others.
 
-    A potential equals w where it peaks. Between knots that both lie below the threshold it reaches the
-    threshold only if w falls past it: there is nothing else to rule out.
+    A potential equals w at its maximum. If it is below the threshold at both knots, it reaches the threshold
+    between them only if w decreases past it.
     """
     gone = -math.expm1(-length)
     # The closed form sorted by u, w now and w later.
@@ -247,8 +247,8 @@ def _bracket(
 ) -> int:
     """Keep those of the `busy` that fire before the next knot, and return their number.
 
-    Each of them gets a column of `searches`: where it begins [ms] and until when at most it crosses, the
-    potential at both, steady potential and drift. The others go to the next knot.
+    Each of them has a column of `searches`: start [ms] and end of the bracket of the crossing, the potential
+    at both, steady potential and drift. The others are advanced to the next knot.
     """
     n_firing = 0
     for neuron in busy:
@@ -277,7 +277,7 @@ def _bracket(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _cross(searches: FloatArray, threshold: float, crossings: FloatArray) -> None:
-    """Find the crossing of every search: nearly always, one guess and one improvement are exact."""
+    """Find the crossing of every search; one guess and one improvement nearly always suffice."""
     _, highs, starts, reached, steady, drift = searches
     guesses, gone = np.empty((2, highs.size))
     for n in range(highs.size):
@@ -295,7 +295,7 @@ def _cross(searches: FloatArray, threshold: float, crossings: FloatArray) -> Non
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _by_neuron(found: FloatArray, finder: np.ndarray, n_neurons: int) -> tuple[FloatArray, np.ndarray]:
-    """Sort spikes by the neuron that fired them, each neuron's in the order they were found."""
+    """Sort spikes by neuron, those of each neuron in the order of their times."""
     offsets = np.zeros(n_neurons + 1, dtype=np.int64)
     for neuron in finder:
         offsets[neuron + 1] += 1

@@ -1,9 +1,8 @@
 """Membrane current -> spike times: the leaky integrate-and-fire neuron (paper, Eqs. 3-5).
 
 Between two knots the current is a straight line, and the potential has a closed form: a crossing of the
-threshold is bracketed with certainty and refined to round-off (`fingerpad.neuron.exact_spikes`). No time
-step is
-involved. The paper's own scheme, Runge-Kutta with a fixed step, is there for comparison.
+threshold is bracketed with certainty and refined to round-off (`fingerpad.neuron.exact_spikes`), without a
+time step. The paper's own scheme, Runge-Kutta with a fixed step, is available for comparison.
 """
 
 from __future__ import annotations
@@ -21,10 +20,10 @@ from fingerpad.neuron.exact_spikes import exact_trains
 
 @dataclass(frozen=True)
 class LeakyIntegrateAndFire:
-    """A membrane that charges, leaks, fires at a threshold and rests.
+    """A leaky integrate-and-fire membrane with a refractory period.
 
-    The potential starts at 0. When it reaches the threshold a spike is noted, the potential returns to 0
-    and stays there for the refractory period.
+    The potential starts at 0. When it reaches the threshold there is a spike, and the potential is 0 during
+    the refractory period.
 
     Parameters
     ----------
@@ -35,7 +34,7 @@ class LeakyIntegrateAndFire:
     threshold_mv : float
         Potential that elicits a spike, v. [mV]
     refractory_ms : float
-        Rest after each spike. [ms]
+        Refractory period after each spike. [ms]
 
     Raises
     ------
@@ -44,7 +43,7 @@ class LeakyIntegrateAndFire:
 
     Examples
     --------
-    A steady current of 2 µA charges at 2 mV/ms less the leak: 50 mV are reached every 32 ms.
+    A constant current of 2 µA charges at 2 mV/ms minus the leak: 50 mV are reached every 32 ms.
 
     >>> neuron = LeakyIntegrateAndFire(68.0, 1e-6, 50.0, 1.0)
     >>> spikes = neuron.spikes(CurrentTraces([0.0, 100.0], [[2e-6], [2e-6]]))
@@ -74,7 +73,7 @@ class LeakyIntegrateAndFire:
         Returns
         -------
         SpikeTrains
-            One train per site; nothing is added after the last knot.
+            One train per site, until the last knot.
         """
 
         def trains(neurons: slice) -> SpikeTrains:
@@ -86,8 +85,8 @@ class LeakyIntegrateAndFire:
     def spikes_runge_kutta(self, current: CurrentTraces, step_ms: float = 0.001) -> SpikeTrains:
         """Spike times by the paper's scheme: fourth-order Runge-Kutta with a fixed step.
 
-        A spike is noted at the end of the step that reaches the threshold, so each is late by less than a
-        step and hands its delay on to the next.
+        A spike is recorded at the end of the step that reaches the threshold. Each spike is late by less than
+        a step, and delays accumulate.
 
         Parameters
         ----------
@@ -108,7 +107,7 @@ class LeakyIntegrateAndFire:
         """
         step = positive("step_ms", step_ms, "ms")
         return SpikeTrains(
-            # A neuron runs through its own row: neighbours in time must be neighbours in memory.
+            # One row per neuron: values adjacent in time are adjacent in memory.
             *_runge_kutta_trains(
                 current.times_ms, np.ascontiguousarray(current.current_ma.T), *self._constants(), step
             )
@@ -148,7 +147,7 @@ def _runge_kutta_trains(
     refractory: float,
     step: float,
 ) -> tuple[FloatArray, np.ndarray]:
-    """Integrate Eq. 5 with the classical Runge-Kutta scheme; same answer as `exact_trains`."""
+    """Integrate Eq. 5 with the classical Runge-Kutta scheme; returns as `exact_trains`."""
     n_neurons = currents.shape[0]
     n_steps = int((times[-1] - times[0]) / step + 1e-9)
     found = np.empty(64 * (n_neurons + 1))
@@ -162,7 +161,7 @@ def _runge_kutta_trains(
             time = times[0] + index * step
             middle, knot = _current_at(time + 0.5 * step, knot, times, currents[neuron])
             following, knot = _current_at(time + step, knot, times, currents[neuron])
-            # Half a step of slack: the end of the rest falls on a step, give or take round-off.
+            # A tolerance of half a step: the refractory period ends on a step, except for round-off.
             if time > ready - 0.5 * step:
                 first = _growth(potential, now, tau, capacitance)
                 second = _growth(potential + 0.5 * step * first, middle, tau, capacitance)

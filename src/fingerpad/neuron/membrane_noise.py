@@ -1,7 +1,6 @@
-"""What may be noisy about a membrane and its input: the current, the threshold, the gain of the end organ.
+"""Sources of noise of a membrane and its input: the current, the threshold, the gain of the end organ.
 
-Each kind says how much and how its numbers are drawn; `fingerpad.neuron.noisy_lif` lets a membrane fire with
-them.
+Each class holds the amount of noise and samples its numbers; `fingerpad.neuron.noisy_lif` computes spikes.
 """
 
 from __future__ import annotations
@@ -21,11 +20,11 @@ STEP_MS = 0.1
 
 @dataclass(frozen=True)
 class WhiteCurrentNoise:
-    """Noise of the current without memory.
+    """White noise of the current.
 
-    Over a time T the charge that it brings is normal with variance D² T. It is constant within each step,
-    so large that the free potential at the ends of steps has exactly the law that white noise gives it;
-    what is left out are excursions within a step.
+    Over a time T its charge is normal with variance D² T. It is constant within each step, with a variance
+    for which the free potential at the ends of steps has exactly the distribution that white noise causes;
+    excursions within a step are neglected.
 
     Parameters
     ----------
@@ -76,16 +75,16 @@ class WhiteCurrentNoise:
 
 @dataclass(frozen=True)
 class CorrelatedCurrentNoise:
-    """Noise of the current with a memory: an Ornstein-Uhlenbeck process in its steady state.
+    """Correlated noise of the current: a stationary Ornstein-Uhlenbeck process.
 
-    Its values at the ends of steps have exactly the law of the process, and a straight line joins them.
+    Its values at the ends of steps have exactly the distribution of the process; it is linear between them.
 
     Parameters
     ----------
     standard_deviation_ma : float
         At any one time. [mA]
     correlation_ms : float
-        Time in which its correlation falls to 1/e. [ms]
+        Time in which its correlation decreases to 1/e. [ms]
     step_ms : float, optional
         Step in time, no longer than the correlation. [ms]
 
@@ -117,7 +116,7 @@ class CorrelatedCurrentNoise:
 
 @dataclass(frozen=True)
 class ThresholdNoise:
-    """A new threshold for each interval between spikes: log-normal, so that none is negative.
+    """A new threshold for each interspike interval: log-normal, so it is never negative.
 
     Parameters
     ----------
@@ -133,14 +132,14 @@ class ThresholdNoise:
 
 @dataclass(frozen=True)
 class GainNoise:
-    """How strongly an end organ answers differs: a log-normal factor on the current that touch causes.
+    """Variation of the gain of an end organ: a log-normal factor on the current caused by touch.
 
     Parameters
     ----------
     relative_standard_deviation : float
         Of the factor, whose mean is 1. [1]
     new_for : {"presentation", "receptor"}, optional
-        Whether each presentation has a factor of its own, or each receptor one for all its presentations.
+        A new factor for each presentation, or one factor for all presentations of a receptor.
     """
 
     relative_standard_deviation: float
@@ -158,7 +157,7 @@ class GainNoise:
         seed : int
             Of the run.
         presentations : Presentations
-            Whose random numbers to draw.
+            Trials and receptors of the trains.
 
         Returns
         -------
@@ -204,7 +203,7 @@ def log_spread(relative_standard_deviation: float) -> float:
 
 @dataclass(frozen=True)
 class MembraneNoise:
-    """All that is noisy about a membrane and its input; what is None is not.
+    """Noise of a membrane and its input; None for a source without noise.
 
     Parameters
     ----------

@@ -1,16 +1,15 @@
 """Membrane current -> spike times of a noisy leaky integrate-and-fire neuron.
 
-Three sources of noise, alone or together, each named by what it disturbs:
+Three sources of noise, alone or together:
 
-- the current through the membrane, white or with a memory (Ornstein-Uhlenbeck process),
-- the threshold, anew for each interval between spikes,
-- the gain of the end organ, anew for each presentation or for each receptor.
+- the current through the membrane, white or correlated (Ornstein-Uhlenbeck process),
+- the threshold, new for each interspike interval,
+- the gain of the end organ, new for each presentation or for each receptor.
 
-Noise of the current is drawn at steps of time whose law is exact, and is a straight line within a step. The
-current as a whole is then piecewise linear, and spikes are found to round-off as without noise
-(`fingerpad.neuron.exact_spikes`). The membrane itself is that of `fingerpad.neuron.lif`, to which all of
-this returns as
-noise vanishes. All random numbers have keys: docs/decisions/random-numbers.md.
+Noise of the current is sampled at time steps, with its exact distribution, and is linear within a step. The
+current is then piecewise linear, and spikes are found to round-off as without noise
+(`fingerpad.neuron.exact_spikes`). Without noise the spikes are those of `fingerpad.neuron.lif`. All random
+numbers have keys: docs/decisions/random-numbers.md.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ from fingerpad.neuron.membrane_noise import (
 )
 
 _TRAINS_PER_BLOCK = 32
-"""Trains that one thread makes at a time: each takes about a millisecond."""
+"""Trains per block of one thread; each takes about a millisecond."""
 
 _CURRENT, _THRESHOLD = int(Purpose.CURRENT), int(Purpose.THRESHOLD)
 
@@ -53,17 +52,17 @@ def noisy_spikes(
     Parameters
     ----------
     membrane : LeakyIntegrateAndFire
-        What it is without noise.
+        The membrane without noise.
     current : CurrentTraces
         Current without noise, one column per site. [mA]
     noise : MembraneNoise
-        What is noisy.
+        Sources of noise.
     seed : int
         Of the run; the same seed gives the same spikes on any number of threads.
     presentations : Presentations, optional
         Site, trial and receptor of each train. Default: each site is a receptor, touched once.
     intercept_ma : float, optional
-        The part of the current that flows without touch, beta; noise of the gain leaves it alone. [mA]
+        Current without touch, beta; noise of the gain does not multiply it. [mA]
 
     Returns
     -------
@@ -73,7 +72,7 @@ def noisy_spikes(
     Raises
     ------
     InputError
-        If a presentation names a site that is not there.
+        If a presentation names a site outside the current.
 
     Examples
     --------
@@ -89,7 +88,7 @@ def noisy_spikes(
     checked_sites(everyone.sites, current.n_sites)
     resting = finite("intercept_ma", intercept_ma, "mA")
     gains = noise.gain.factors(seed, everyone) if noise.gain else np.ones(len(everyone))
-    # A train runs through its own row: neighbours in time must be neighbours in memory.
+    # One row per train: values adjacent in time are adjacent in memory.
     rows = np.ascontiguousarray(current.current_ma.T)
     numbers = (
         float(membrane.time_constant_ms),
@@ -115,7 +114,7 @@ def noisy_spikes(
 def _current_numbers(
     noise: WhiteCurrentNoise | CorrelatedCurrentNoise | None, time_constant_ms: float
 ) -> tuple[float, float, float]:
-    """Step (0: no noise), standard deviation of a level, and correlation of one with the next."""
+    """Step (0: no noise), standard deviation of a level, and correlation of successive levels."""
     if noise is None:
         return 0.0, 0.0, 0.0
     if isinstance(noise, WhiteCurrentNoise):
@@ -142,13 +141,13 @@ def _noisy_trains(
     memory: float,
     spread: float,
 ) -> tuple[FloatArray, np.ndarray]:
-    """Spike times of all trains, one after the other, and where each one's begin.
+    """Spike times of all trains, one after the other, and the index of the first of each.
 
-    A stretch reaches from one event to the next: a knot of the current, the end of a step of its noise, or
-    a spike. `memory` > 0 joins the levels of noise by straight lines; without memory each lasts for a step.
+    A segment lies between two events: a knot of the current, the end of a step of its noise, or a spike. With
+    `memory` > 0 the noise is linear between its levels; otherwise each level lasts for a step.
     """
     resistance = tau / capacitance
-    fresh = math.sqrt(1.0 - memory * memory)  # share of a new level that the one before does not explain
+    fresh = math.sqrt(1.0 - memory * memory)  # independent share of a new level
     found = np.empty(64 * (sites.size + 1))
     offsets = np.zeros(sites.size + 1, dtype=np.int64)
     count = 0

@@ -1,4 +1,4 @@
-"""Many afferents side by side: where they end in the skin, and what they answer to one touch."""
+"""Populations of afferents: their positions in the skin, and their response to one touch."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CENTRE_MM = (fingertip.CONTACT_POINT.value[0], 0.0)
 
 
 def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
-    """Draw how much more or less sensitive each afferent is than the mean: factors of both gains.
+    """Sample the sensitivity of each afferent: factors of both gains.
 
     They are log-normal with mean 1: exp(spread n - spread^2/2), n from Normal(0, 1).
 
@@ -32,8 +32,8 @@ def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
     count : int
         Number of afferents.
     spread : float
-        Standard deviation of the logarithm; 0 makes all alike. What is known of it:
-        `parameters.psychophysics.SENSITIVITY_SPREAD`.
+        Standard deviation of the logarithm; 0 for equal sensitivity. See
+        `fingerpad.data.psychophysics.SENSITIVITY_SPREAD`.
     seed : int
         Of the random numbers; each afferent has its own, by its number.
 
@@ -61,7 +61,7 @@ def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class Population:
-    """Afferents at different places of the skin, equal but for their sensitivity.
+    """Afferents at different positions of the skin, equal except for their sensitivity.
 
     Parameters
     ----------
@@ -71,11 +71,11 @@ class Population:
     pitch_mm : float
         Distance between neighbours of the layout. [mm]
     afferent : Afferent, optional
-        What every one of them is.
+        Parameters of all afferents.
     sensitivity : array (n_receptors,), optional
         Factor of each afferent's gains k_d and k_s, as from `sensitivities`; default: 1. [1]
     places_mm : array (n_receptors, 2), optional
-        Places in the plane of the layout, in which neighbours are sought; default: x and z. [mm]
+        Positions in the plane of the layout, which define neighbours; default: x and z. [mm]
 
     Raises
     ------
@@ -124,15 +124,15 @@ class Population:
         afferent: Afferent | None = None,
         sensitivity: ArrayLike | None = None,
     ) -> Population:
-        """Let an afferent end at each place of a layout.
+        """Make a population with an afferent at each position of a layout.
 
         Parameters
         ----------
         layout : Layout
             From `fingerpad.core.layouts`.
         place : callable, optional
-            Points of the skin (n, 3) at places of the layout's plane (n, 2), such as `UnrolledSkin.points`;
-            by default that plane is x and z, the skin seen from its volar side.
+            Points of the skin (n, 3) at positions in the plane of the layout (n, 2), such as
+            `UnrolledSkin.points`; by default the plane is x and z, the skin seen from its volar side.
         afferent : Afferent, optional
             Default: `Afferent()`.
         sensitivity : array_like (n_receptors,), optional
@@ -163,7 +163,7 @@ class Population:
         centre_mm: tuple[float, float] = CENTRE_MM,
         afferent: Afferent | None = None,
     ) -> Population:
-        """Lay a square lattice around a point, symmetric about it.
+        """Make a population on a square lattice, symmetric about a point.
 
         The paper's 18 receptors, of which 9 are drawn for reasons of symmetry, are 3 along the finger by
         6 across.
@@ -208,12 +208,12 @@ class Population:
         dynamic_window_ms: tuple[float, ...] = protocol.DYNAMIC_WINDOW.value,
         static_window_ms: tuple[float, ...] = protocol.STATIC_WINDOW.value,
     ) -> ResponseMap:
-        """Sample the skin at every receptor and let each afferent answer.
+        """Compute the response of every afferent to the skin at its receptor.
 
         Parameters
         ----------
         skin : Skin
-            Anything with `sed(sites)`, such as a solved indentation.
+            Any object with `sed(sites)`, such as a solved indentation.
         dynamic_window_ms, static_window_ms : (float, float), optional
             Windows of the two firing rates. [ms]
 
@@ -225,17 +225,17 @@ class Population:
         Raises
         ------
         InputError
-            If the skin does not answer with one trace per receptor.
+            If the skin does not return one trace per receptor.
         """
         dynamic_quantity = self.afferent.dynamic_quantity
-        # Skins that know nothing but their energy need not know the extension either.
+        # Skins with SED only need not accept the argument of the extension.
         further = () if dynamic_quantity == STORED_ENERGY else (dynamic_quantity,)
         sed = skin.sed(self.positions_mm, *further)
         if sed.n_sites != len(self.positions_mm):
             raise InputError(
                 f"skin.sed must give one trace per receptor: got {sed.n_sites} for {len(self.positions_mm)}."
             )
-        # Both terms of the current are proportional to energy density: so scaled, they are with their gains.
+        # Both terms are proportional to the traces, so scaling these is equivalent to scaling the gains.
         spikes = self.afferent.spikes(sed if self.sensitivity is None else sed.scaled(self.sensitivity))
         return ResponseMap(
             positions_mm=self.positions_mm,

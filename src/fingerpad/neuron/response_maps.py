@@ -1,8 +1,7 @@
-"""Who of a population fires first, and how many spikes it sends at a time.
+"""Recruitment order and population rate of a population of afferents.
 
-First spikes recruit afferents one by one; their order is a code that needs no rates (Johansson & Birznieks
-2004). The population rate is the histogram of all spikes over time, of everybody or ring by ring about the
-contact. Everything here is counted, nothing is fitted.
+The order of first spikes is a code that needs no rates (Johansson & Birznieks 2004). The population rate is
+the histogram of all spikes over time, of all afferents or in rings about the contact.
 """
 
 from __future__ import annotations
@@ -20,14 +19,14 @@ from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.units import MS_PER_S
 
 NO_GROUP = -1
-"""Group of an afferent that belongs to none."""
+"""Group number of an afferent without a group."""
 
 _LEAST_SMOOTHING = 1e-6
 _PAIRS_AT_A_TIME = 4_000_000
 
 
 def recruitment_rank(latency_ms: ArrayLike) -> FloatArray:
-    """Place of every afferent in the order of first spikes.
+    """Rank of every afferent in the order of first spikes.
 
     Parameters
     ----------
@@ -37,7 +36,7 @@ def recruitment_rank(latency_ms: ArrayLike) -> FloatArray:
     Returns
     -------
     array (n_afferents,)
-        1 for the first; equal latencies share the mean of their places; NaN for the silent. [1]
+        1 for the first; equal latencies have the mean of their ranks; NaN for silent afferents. [1]
 
     Raises
     ------
@@ -64,7 +63,7 @@ def recruited(latency_ms: ArrayLike, times_ms: ArrayLike) -> np.ndarray:
     latency_ms : array_like (n_afferents,)
         First-spike latencies; NaN for an afferent that stays silent. [ms]
     times_ms : array_like (...)
-        When to count. [ms]
+        Times of the counts. [ms]
 
     Returns
     -------
@@ -87,17 +86,16 @@ def recruited(latency_ms: ArrayLike, times_ms: ArrayLike) -> np.ndarray:
 
 
 def evoked_latency_ms(latency_ms: ArrayLike, resting_latency_ms: float) -> FloatArray:
-    """Keep the first spikes that a touch brings about, of afferents that also fire at rest.
+    """Select the first spikes that are evoked by a touch, for afferents that also fire at rest.
 
-    A spike counts as evoked if the touch brings it to half of the time that it takes by itself, or less: the
-    afferent then fires twice as fast as at rest.
+    A spike counts as evoked if its latency under touch is at most half of that at rest.
 
     Parameters
     ----------
     latency_ms : array_like (n_afferents,)
         First-spike latencies; NaN for an afferent that stays silent. [ms]
     resting_latency_ms : float
-        When the afferent would first fire without any touch; infinity, or NaN, if never. [ms]
+        Latency without touch; infinity or NaN for a silent afferent. [ms]
 
     Returns
     -------
@@ -123,7 +121,7 @@ def evoked_latency_ms(latency_ms: ArrayLike, resting_latency_ms: float) -> Float
 
 @dataclass(frozen=True)
 class OrderChange:
-    """How the order of first spikes differs between two touches.
+    """Difference in the order of first spikes between two touches.
 
     Parameters
     ----------
@@ -131,10 +129,10 @@ class OrderChange:
         Afferents that fire in both touches, and in one or both.
     rank_correlation : float
         Spearman's coefficient of the two orders, over those that fire in both: 1 for the same order, -1 for
-        the reverse. NaN if there are no two of them or all of them tie in one touch. [1]
+        the reverse. NaN with fewer than two of them or if all tie in one touch. [1]
     swapped : float
-        Share of their pairs whose order is reversed; a pair that ties in a touch is not. NaN without a
-        pair. [0-1]
+        Share of their pairs with reversed order; a pair that ties in a touch does not count as reversed. NaN
+        without a pair. [0-1]
     """
 
     both: int
@@ -144,9 +142,9 @@ class OrderChange:
 
 
 def order_change(latency_ms: ArrayLike, other_latency_ms: ArrayLike) -> OrderChange:
-    """Compare the recruitment by two touches: is it a different order, or the same at other times?
+    """Compare the recruitment orders of two touches.
 
-    With the ranks r and s of those that fire in both touches:
+    With the ranks r and s of the afferents that fire in both touches:
 
         rank correlation = sum (r_i - mean r) (s_i - mean s) / sqrt(sum (r_i - mean r)^2 sum (s_i - mean s)^2)
         swapped = share of pairs i < j with (r_i - r_j) (s_i - s_j) < 0
@@ -167,7 +165,7 @@ def order_change(latency_ms: ArrayLike, other_latency_ms: ArrayLike) -> OrderCha
 
     Examples
     --------
-    The first two of four swap their places, which is one pair of six:
+    The first two of four exchange their ranks, one pair of six:
 
     >>> change = order_change([5.0, 6.0, 7.0, 8.0, np.nan], [6.0, 5.0, 7.0, 8.0, 9.0])
     >>> change.both, change.either, round(change.rank_correlation, 3), round(change.swapped, 3)
@@ -231,7 +229,7 @@ class PopulationRate:
     active : int array (n_groups, n_bins)
         Afferents of each group with at least one spike in the bin.
     n_afferents : int array (n_groups,)
-        Size of each group, the silent included.
+        Size of each group, including silent afferents.
     """
 
     edges_ms: FloatArray
@@ -246,16 +244,16 @@ class PopulationRate:
 
     @property
     def rate_hz(self) -> FloatArray:
-        """Rate per afferent, (n_groups, n_bins); NaN for a group of nobody. [spikes/s]"""
+        """Rate per afferent, (n_groups, n_bins); NaN for an empty group. [spikes/s]"""
         return MS_PER_S * self._per_afferent(self.spikes) / np.diff(self.edges_ms)
 
     @property
     def active_fraction(self) -> FloatArray:
-        """Share of the afferents that fire in each bin, (n_groups, n_bins); NaN for nobody. [0-1]"""
+        """Share of the afferents that fire in each bin, (n_groups, n_bins); NaN for an empty group. [0-1]"""
         return self._per_afferent(self.active)
 
     def rate_per_area(self, density_per_cm2: float) -> FloatArray:
-        """Rate of a patch of skin, the rate per afferent times their density.
+        """Rate per area of skin, the rate per afferent times the density.
 
         Parameters
         ----------
@@ -282,15 +280,15 @@ class PopulationRate:
 def population_rate(
     spikes: SpikeTrains, edges_ms: ArrayLike, groups: ArrayLike | None = None, smoothing_ms: float = 0.0
 ) -> PopulationRate:
-    """Count the spikes of a population bin by bin: its peristimulus histogram.
+    """Count the spikes of a population per time bin (peristimulus histogram).
 
-    A bin excludes its start and includes its end, as the windows of `firing_rate_hz` do. Smoothing spreads
-    the n_j spikes of bin j, evenly over the bin, by a normal density phi, of which every bin gets its share:
+    A bin excludes its start and includes its end, as the windows of `firing_rate_hz` do. Smoothing
+    distributes the n_j spikes of bin j, uniform within the bin, by a normal density phi:
 
         n_i <- sum_j K_ij n_j,    K_ij ~ integral over t in bin i, s in bin j of phi(t - s),    sum_i K_ij = 1
 
-    The shares of each spike add up to 1, so that smoothing neither makes nor loses spikes, at the ends of the
-    histogram neither. Who is active is never smoothed.
+    The weights of each spike sum to 1, so smoothing preserves the number of spikes, also at the ends of the
+    histogram. The number of active afferents is not smoothed.
 
     Parameters
     ----------
@@ -299,8 +297,7 @@ def population_rate(
     edges_ms : array_like (n_bins + 1,)
         Borders of the bins, increasing. [ms]
     groups : int array_like (n_afferents,), optional
-        Number of the group that each afferent belongs to, from 0, or `NO_GROUP`; such as those of `rings`.
-        Default: all in one.
+        Group number of each afferent, from 0, or `NO_GROUP`; for example from `rings`. Default: one group.
     smoothing_ms : float, optional
         Standard deviation of phi; 0 does not smooth. [ms]
 
@@ -333,7 +330,7 @@ def population_rate(
     counted = (place >= 0) & (place < n_bins) & (group[owner] != NO_GROUP)
     owner, place = owner[counted], place[counted]
 
-    # Trains are in order, and so are the places within each: an afferent's spikes of one bin are neighbours.
+    # Times within a train increase, so the spikes of an afferent in one bin are adjacent.
     again = np.zeros(owner.size, dtype=bool)
     again[1:] = (owner[1:] == owner[:-1]) & (place[1:] == place[:-1])
     cell = group[owner] * n_bins + place
@@ -364,11 +361,11 @@ def _groups(groups: ArrayLike | None, n_afferents: int) -> np.ndarray:
 
 
 def _kernel(edges: FloatArray, smoothing_ms: float) -> FloatArray:
-    """K_ij: what bin i gets of bin j, (n_bins, n_bins).
+    """K_ij: share of bin j in bin i, (n_bins, n_bins).
 
     The double integral of phi is G(x) = x Phi(x) + phi(x), with signs, at the four pairs of borders.
     """
-    # Far below the bins' width a density moves nothing, and its square overflows.
+    # A density much narrower than the bins has no effect, and its square overflows.
     scale_ms = max(smoothing_ms, _LEAST_SMOOTHING * np.diff(edges).min())
     x = (edges[:, np.newaxis] - edges) / scale_ms
     integral = x * ndtr(x) + np.exp(-0.5 * x**2) / np.sqrt(2.0 * np.pi)
@@ -377,12 +374,12 @@ def _kernel(edges: FloatArray, smoothing_ms: float) -> FloatArray:
 
 
 def rings(positions_mm: ArrayLike, centre_mm: ArrayLike, radii_mm: ArrayLike) -> np.ndarray:
-    """Sort receptors into rings about a point, such as the middle of the contact.
+    """Assign receptors to rings about a point, such as the middle of the contact.
 
     Parameters
     ----------
     positions_mm : array_like (n_receptors, 2 or 3)
-        Places of the receptors. [mm]
+        Positions of the receptors. [mm]
     centre_mm : array_like (2 or 3,)
         The point, in the same coordinates. [mm]
     radii_mm : array_like (n_rings + 1,)
@@ -397,7 +394,7 @@ def rings(positions_mm: ArrayLike, centre_mm: ArrayLike, radii_mm: ArrayLike) ->
     Raises
     ------
     InputError
-        If the centre has not the coordinates of the positions, a radius is negative, or they do not increase.
+        If centre and positions differ in dimension, a radius is negative, or radii do not increase.
 
     Examples
     --------

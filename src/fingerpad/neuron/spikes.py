@@ -15,10 +15,10 @@ from fingerpad.core.units import MS_PER_S
 
 
 def firing_rate_hz(spikes: SpikeTrains, window_ms: tuple[float, ...]) -> FloatArray:
-    """Rate at which every afferent fires in a window, one over its mean interspike interval, Eqs. 6-10.
+    """Rate of every afferent in a window, one over its mean interspike interval, Eqs. 6-10.
 
-    An interval belongs to the window that holds its closing spike; the window excludes its start and
-    includes its end, so that windows side by side share no interval.
+    An interval belongs to the window that contains its closing spike. The window excludes its start and
+    includes its end, so adjacent windows share no interval.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def _intervals(
 
 @dataclass(frozen=True)
 class IntervalStatistics:
-    """How long the intervals between spikes are, and how regular; NaN where there are too few.
+    """Mean and regularity of interspike intervals; NaN where there are too few.
 
     Parameters
     ----------
@@ -110,10 +110,10 @@ class IntervalStatistics:
     mean_ms : array (n_afferents,)
         Mean interval; NaN without any. [ms]
     coefficient_of_variation : array (n_afferents,)
-        Standard deviation over mean, 0 for a clock and 1 for a Poisson process; NaN below two intervals. [1]
+        Standard deviation over mean, 0 if regular and 1 for a Poisson process; NaN below two intervals. [1]
     local_variation : array (n_afferents,)
-        The same from neighbouring intervals alone, 0 and 1 likewise, which slow changes of the rate hardly
-        touch; NaN below two intervals. [1]
+        The same from adjacent intervals only, also 0 and 1, with little influence of slow changes of the
+        rate; NaN below two intervals. [1]
     """
 
     count: np.ndarray
@@ -123,9 +123,9 @@ class IntervalStatistics:
 
 
 def interval_statistics(spikes: SpikeTrains, window_ms: tuple[float, ...]) -> IntervalStatistics:
-    """Describe the intervals of every afferent in a window.
+    """Compute the interval statistics of every afferent in a window.
 
-    An interval belongs to the window that holds its closing spike, as in `firing_rate_hz`.
+    An interval belongs to the window that contains its closing spike, as in `firing_rate_hz`.
 
         CV = s/m,    s² = sum (I_i - m)² / (n - 1)
         LV = 3/(n - 1) sum ((I_i - I_i+1)/(I_i + I_i+1))²
@@ -165,7 +165,7 @@ def interval_statistics(spikes: SpikeTrains, window_ms: tuple[float, ...]) -> In
     mean_ms = _ratio(np.bincount(owners, weights=intervals_ms, minlength=n), count)
     squares = np.bincount(owners, weights=(intervals_ms - mean_ms[owners]) ** 2, minlength=n)
     variation = np.sqrt(_ratio(squares, count - 1)) / mean_ms
-    # Two intervals are neighbours when their closing spikes are; both are then of one train.
+    # Two intervals are adjacent if their closing spikes are; both are then of one train.
     beside = np.diff(closing) == 1
     earlier, later = intervals_ms[:-1][beside], intervals_ms[1:][beside]
     contrasts = ((earlier - later) / (earlier + later)) ** 2
@@ -227,7 +227,7 @@ def modulation_index(largest_hz: ArrayLike, smallest_hz: ArrayLike) -> FloatArra
 
 
 def modulation_difference(largest_hz: ArrayLike, smallest_hz: ArrayLike) -> FloatArray:
-    """Difference R_max - R_min, which the paper's text quotes under the name of modulation index.
+    """Difference R_max - R_min, which the paper's text calls modulation index.
 
     Parameters
     ----------

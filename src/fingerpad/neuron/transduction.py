@@ -1,14 +1,14 @@
 """Strain energy density at the end organ -> membrane current (paper, Eqs. 1-2).
 
-The current needs the rate of change of strain energy density (SED), but mechanics knows SED only at some
-times. Between them SED is taken as monotone cubic (PCHIP), one interpolant per phase of the motion, so
-that the rate may jump where ramp meets hold. Its derivative is exact and never changes sign between two
-given times, which makes the absolute value in Eq. 2 harmless.
+The current needs the rate of change of strain energy density (SED), but SED is computed at some times only.
+Between them it is interpolated by a monotone cubic (PCHIP), one interpolant per phase of the motion, so the
+rate may be discontinuous between ramp and hold. Its derivative is exact and does not change sign between two
+given times, so the absolute value of Eq. 2 adds no kink there.
 
-What does not depend on the gains, SED and its rate on fine knots, is a `Drive`. Resample once, then try
-many gains: each costs a linear combination.
+A `Drive` holds SED and its rate on fine knots, which do not depend on the gains. It is computed once for many
+gains; each then costs a linear combination.
 
-In the paper both terms follow SED. As an extension, traces may bring another quantity for the dynamic term:
+In the paper SED drives both terms. As an extension, traces may contain another quantity for the dynamic term:
 I = beta + k_d |Q'| + k_s U (docs/decisions/dynamic-term-quantity.md).
 """
 
@@ -26,10 +26,10 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import STORED_ENERGY, CurrentTraces, SedTraces
 
 PIECES_PER_INTERVAL = 32
-"""Linear pieces that stand for the cubic between two given times, at most."""
+"""Largest number of linear pieces that approximate the cubic between two given times."""
 
 SHORTEST_PIECE_MS = 0.25
-"""Times given closer than a few of these are cut into fewer pieces. [ms]"""
+"""Smallest length of a piece; short intervals have fewer pieces. [ms]"""
 
 
 @dataclass(frozen=True)
@@ -43,10 +43,10 @@ class Drive:
     sed_kpa : array (n_knots, n_sites)
         Strain energy density. [kPa]
     rate_kpa_per_ms : array (n_knots, n_sites)
-        Absolute rate of change of SED, U' of Eq. 2, or of what the dynamic term follows instead; 0 at the
+        Absolute rate of change of SED, U' of Eq. 2, or of the other quantity of the dynamic term; 0 at the
         onset. [kPa/ms, of a strain 1/ms]
     dynamic_quantity : str, optional
-        Whose rate that is, by the names of `SkinResponse.sample`; "stored" is SED itself.
+        Name of that quantity, see `SkinResponse.sample`; "stored" is SED.
     """
 
     times_ms: FloatArray
@@ -93,7 +93,7 @@ class Transduction:
 
     Examples
     --------
-    SED rises by 2 kPa in 50 ms and stays: the current steps up, grows, drops and stays.
+    SED increases by 2 kPa in 50 ms and is then constant:
 
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
     >>> current = Transduction(0.0, dynamic_gain=1e-4, static_gain=1e-6).current(sed)
@@ -121,7 +121,7 @@ class Transduction:
         Returns
         -------
         CurrentTraces
-            With a jump wherever the rate jumps.
+            Discontinuous where the rate is.
         """
         driven = sed if isinstance(sed, Drive) else drive(sed)
         current_ma = (
@@ -141,16 +141,16 @@ def drive(
 
     Each interval between two given times is cut into `pieces` equal pieces (fewer where they would be
     shorter than `shortest_piece_ms`), on which the cubic and its derivative are replaced by straight
-    lines. The error falls with the square of the number of pieces and scales with the change of SED in
-    the interval, so that long smooth intervals need no more knots than short steep ones. Twice the
-    default number moves no spike of a ramp and hold given at 8 + 12 steps by more than 0.1 ms, which
-    is a spike that only grazes the threshold, and half of the spikes by less than 0.005 ms.
+    lines. The error decreases with the square of the number of pieces and is proportional to the change of
+    SED in the interval, so long smooth intervals need no more knots than short steep ones. Twice the default
+    number moves no spike of a ramp and hold given at 8 + 12 steps by more than 0.1 ms (a spike that just
+    reaches the threshold), and half of the spikes by less than 0.005 ms.
 
     Parameters
     ----------
     sed : SedTraces
-        Its `kinks_ms` part the phases that are interpolated on their own. Where it brings `dynamic_kpa`, the
-        rate is that of this quantity.
+        Its `kinks_ms` separate the phases that are interpolated separately. With `dynamic_kpa`, the rate is
+        that of this quantity.
     difference_step_ms : float, optional
         Step h of the backward difference printed as Eq. 2 (the paper: 0.001 ms). Before the onset SED is
         that of the onset. Default: the limit h -> 0, the derivative of the interpolant. [ms]
@@ -162,8 +162,8 @@ def drive(
     Returns
     -------
     Drive
-        The rate is 0 at the onset and jumps there and at each kink; a difference takes `difference_step_ms`
-        to make the jump.
+        The rate is 0 at the onset and discontinuous there and at each kink; a difference changes over
+        `difference_step_ms` instead.
 
     Raises
     ------
@@ -213,14 +213,14 @@ def drive(
 def _evaluate(coefficients, breaks, times, values, rates):  # type: ignore[no-untyped-def]
     """Write a piecewise cubic and the absolute value of its derivative at increasing times within `breaks`.
 
-    As SciPy does it, to the last bit, but both at once and on all sites side by side.
+    Equal to SciPy to the last bit, but both at once and for all sites.
 
     Parameters
     ----------
     coefficients : array (4, n_breaks - 1, n_sites)
         Of the third to the zeroth power of the time since the break before.
     breaks, times : array (n_breaks,), (n_times,)
-        Where the pieces meet, and where values are wanted. [ms]
+        Borders of the pieces, and times of the values. [ms]
     values, rates : array (n_times, n_sites)
         Overwritten.
     """
@@ -248,7 +248,7 @@ def _phases(sed: SedTraces) -> list[PPoly]:
 
 
 def _knots(times_ms: FloatArray, pieces: int, shortest_piece_ms: float) -> FloatArray:
-    """Cut every interval of `times_ms` into equal pieces; the given times stay knots, to the last bit."""
+    """Divide every interval of `times_ms` into equal pieces; the given times remain knots exactly."""
     lengths = np.diff(times_ms)
     counts = np.clip(np.floor(lengths / shortest_piece_ms).astype(np.int64), 1, pieces)
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -261,7 +261,7 @@ def _difference(phases: list[PPoly], knots: list[FloatArray], step_ms: float) ->
     given = np.concatenate([phases[0].x[:1], *(phase.x[1:] for phase in phases)])
     sed = PPoly(np.concatenate([phase.c for phase in phases], axis=1), given)
     onset, end = given[0], given[-1]
-    # One step after a kink the difference has left the old phase behind: a knot there keeps the jump short.
+    # One step after a kink the difference is within the new phase; a knot there limits the transition.
     settled = np.array([phase.x[0] + step_ms for phase in phases])
     times = np.unique(np.concatenate([*knots, settled[settled < end]]))
     before = np.maximum(times - step_ms, onset)
