@@ -281,7 +281,7 @@ class ReceptorSheet:
         return float(np.sign(np.median(self._turn(middles))))
 
     def _turn(self, uv: FloatArray) -> FloatArray:
-        """Return the determinant of (x, z) by (u, v), (n,); its sign differs between volar and dorsal side."""
+        """Return the determinant of (x, z) by (u, v), (n,); its sign differs on the volar and dorsal side."""
         _, by_u, by_v = self._centre(uv)
         return by_u[:, 0] * by_v[:, 2] - by_u[:, 2] * by_v[:, 0]
 
