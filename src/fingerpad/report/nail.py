@@ -133,11 +133,10 @@ def caption_nail(section: NailBorder) -> str:
     low, high = section.ratio_range
     return (
         "Von Mises stress under the standard sphere at the end of the hold, on the deformed finger: (a, b) "
-        "in the outermost elements of the skin and (c) in the middle section, logarithmic over "
+        "in the outermost elements of the skin and (c) in the middle section, on a logarithmic scale of "
         f"{number(DECADES)} decades; (d) the back of the finger and (e) the section with the highest ratio, "
-        "on a linear scale that ends at the highest stress at the border of the nail (its outline in white); "
-        "(f) median and middle 80 % of all sections that cross that border. One half is computed and drawn "
-        "with its mirror image. The paper shows high stresses at the border of the nail. "
-        f"Ratio of the border to the skin 2 to 3 mm away: {number(section.ratio)} "
-        f"({number(low)} to {number(high)}). {section.text}"
+        "on a linear scale up to the highest stress at the border of the nail (its outline in white); (f) "
+        "median and middle 80 % of all sections that cross that border. One half is computed; the other is "
+        "its mirror image. The paper shows high stresses at the border of the nail. Ratio of the border to "
+        f"the skin 2 to 3 mm away: {number(section.ratio)} ({number(low)} to {number(high)}). {section.text}"
     )

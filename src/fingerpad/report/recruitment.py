@@ -151,7 +151,7 @@ def caption_recruitment(section: Recruitment) -> str:
             section.resting_latency_ms,
             "They count as recruited if their latency under touch is at most half of that. ",
         )
-        + "The paper (section 4.2) names the order of first spikes as a code and does not use it."
+        + "The paper mentions the order of first spikes as a code (section 4.2) and does not use it."
     )
 
 
@@ -185,8 +185,8 @@ def recruitment_tables(section: Recruitment) -> list[Table]:
                 "pairs in reversed order",
             ),
             rows,
-            "With 100 afferents per cm², mm² of skin are numbers of afferents. Order is compared over those "
-            "that both touches recruit.",
+            "At 100 afferents per cm², 1 mm² of skin has one afferent. Orders are compared over the "
+            "afferents that both touches recruit.",
         )
     ]
 

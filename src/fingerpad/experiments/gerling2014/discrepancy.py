@@ -24,7 +24,7 @@ from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taki
 from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
 
 PATIENCE_MS = protocol.RAMP.value
-"""How long an observer waits who waits for first spikes until the ramp ends. [ms]"""
+"""Time that an observer waits for first spikes: until the ramp ends. [ms]"""
 
 DRAWS = 1000
 """Common random presentations behind each interpretation."""

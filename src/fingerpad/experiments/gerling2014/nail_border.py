@@ -277,7 +277,7 @@ def concentration(mesh: Mesh, stress_kpa: FloatArray, distance_mm: FloatArray) -
     station = np.flatnonzero(crosses & away.any(axis=1))
     if not station.size:
         raise InputError(
-            "The mesh has no nail, or is too coarse about it to tell its border from the skin "
+            "The mesh has no nail, or is too coarse about it to separate its border from the skin "
             f"{FAR_MM[0]:g} to {FAR_MM[1]:g} mm away: make largest_mm of its grading smaller."
         )
     border = [stress_kpa[n][near[n]].max() for n in station]

@@ -298,15 +298,15 @@ def population_maps(standard: SkinResponse, afferent: Afferent) -> PopulationMap
     -------
     PopulationMaps
     """
-    maps = response_sheet(sheet(afferent).respond(standard))
+    sheet_maps = response_sheet(sheet(afferent).respond(standard))
     return PopulationMaps(
         curvature_per_m=protocol.STANDARD_CURVATURE.value,
         at_rest=resting_response(afferent),
-        x_mm=maps.x_mm,
-        z_mm=maps.z_mm,
-        dynamic_rate_hz=maps.dynamic_rate_hz,
-        static_rate_hz=maps.static_rate_hz,
-        first_spike_latency_ms=maps.first_spike_latency_ms,
+        x_mm=sheet_maps.x_mm,
+        z_mm=sheet_maps.z_mm,
+        dynamic_rate_hz=sheet_maps.dynamic_rate_hz,
+        static_rate_hz=sheet_maps.static_rate_hz,
+        first_spike_latency_ms=sheet_maps.first_spike_latency_ms,
         receptors_mm=Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0)).positions_mm,
         finger=finger_map(standard, afferent),
     )
@@ -336,23 +336,23 @@ def population_timing(
     standard = protocol.STANDARD_CURVATURE.value
     here, shifted = protocol.SPHERE_POSITIONS.value
     population, resting_ms = disc(finger, afferent), resting_response(afferent).first_spike_latency_ms
-    answers = {
+    maps = {
         touch_name(curvature): population.respond(responses[here, curvature])
         for position, curvature in sorted(responses)
         if position == here
     }
     moved = f"{touch_name(standard)}, {shifted - here:g} mm away"
-    answers[moved] = population.respond(responses[shifted, standard])
+    maps[moved] = population.respond(responses[shifted, standard])
     names = touch_name(standard), touch_name(max(curvature for _, curvature in responses))
     return PopulationTiming(
         recruitment=recruitment(
-            answers,
+            maps,
             MM2_PER_CM2 / DISC_DENSITY_PER_CM2,
             resting_latency_ms=resting_ms,
             shown=(*names, moved),
         ),
         rates=population_rates(
-            {name: answers[name] for name in names},
+            {name: maps[name] for name in names},
             finger.skin_point(RECEPTOR_X_MM + here, 0.0),
             density_per_cm2=psychophysics.RECEPTOR_DENSITY.value,
             resting_latency_ms=resting_ms,
@@ -419,26 +419,26 @@ def sheet(afferent: Afferent, reach_mm: float = REACH_MM, step_mm: float = STEP_
     return Population(positions_mm=sites, pitch_mm=step_mm, afferent=afferent)
 
 
-def response_sheet(answer: ResponseMap) -> ResponseSheet:
+def response_sheet(response: ResponseMap) -> ResponseSheet:
     """Arrange the responses of a `sheet` as tables.
 
     Parameters
     ----------
-    answer : ResponseMap
+    response : ResponseMap
         Of its afferents.
 
     Returns
     -------
     ResponseSheet
     """
-    x, z = (np.unique(coordinate) for coordinate in answer.positions_mm.T)
+    x, z = (np.unique(coordinate) for coordinate in response.positions_mm.T)
     shape = (x.size, z.size)
     return ResponseSheet(
         x_mm=x,
         z_mm=z,
-        dynamic_rate_hz=answer.dynamic_rate_hz.reshape(shape),
-        static_rate_hz=answer.static_rate_hz.reshape(shape),
-        first_spike_latency_ms=answer.first_spike_latency_ms.reshape(shape),
+        dynamic_rate_hz=response.dynamic_rate_hz.reshape(shape),
+        static_rate_hz=response.static_rate_hz.reshape(shape),
+        first_spike_latency_ms=response.first_spike_latency_ms.reshape(shape),
     )
 
 
@@ -459,26 +459,26 @@ def finger_map(skin: SkinResponse, afferent: Afferent) -> FingerMap:
     rest, mesh = resting_response(afferent), skin.mesh
     still, pressed = mesh.nodes_mm[mesh.skin_grid], (mesh.nodes_mm + skin.displacement_mm)[mesh.skin_grid]
     middle = 0.25 * (still[:-1, :-1] + still[1:, :-1] + still[1:, 1:] + still[:-1, 1:])
-    answer = Population(middle.reshape(-1, 3), STEP_MM, afferent).respond(skin)
+    response = Population(middle.reshape(-1, 3), STEP_MM, afferent).respond(skin)
 
     def evoked(rate_hz: FloatArray, resting_hz: float) -> FloatArray:
         kept = np.where((rate_hz > 0.0) & (rate_hz >= 2.0 * resting_hz), rate_hz, np.nan)
         return kept.reshape(middle.shape[:2])
 
-    latency_ms = evoked_latency_ms(answer.first_spike_latency_ms, rest.first_spike_latency_ms)
+    latency_ms = evoked_latency_ms(response.first_spike_latency_ms, rest.first_spike_latency_ms)
     return FingerMap(
         x_mm=pressed[..., 0],
         y_mm=pressed[..., 1],
         z_mm=pressed[..., 2],
-        dynamic_rate_hz=evoked(answer.dynamic_rate_hz, rest.dynamic_rate_hz),
-        static_rate_hz=evoked(answer.static_rate_hz, rest.static_rate_hz),
+        dynamic_rate_hz=evoked(response.dynamic_rate_hz, rest.dynamic_rate_hz),
+        static_rate_hz=evoked(response.static_rate_hz, rest.static_rate_hz),
         first_spike_latency_ms=latency_ms.reshape(middle.shape[:2]),
         half=bool(mesh.symmetry_nodes.size),
     )
 
 
 def recruitment(
-    answers: Mapping[str, ResponseMap],
+    maps: Mapping[str, ResponseMap],
     area_per_afferent_mm2: float,
     resting_latency_ms: float = np.inf,
     shown: Sequence[str] | None = None,
@@ -487,7 +487,7 @@ def recruitment(
 
     Parameters
     ----------
-    answers : mapping of str to ResponseMap
+    maps : mapping of str to ResponseMap
         Responses of the same afferents by the names of the touches; the others are compared with the first.
     area_per_afferent_mm2 : float
         Skin per afferent, one over their density. [mm2]
@@ -507,10 +507,10 @@ def recruitment(
         If there is no touch, a touch has other afferents than the first, or the area is not positive.
     """
     area_mm2 = positive("area_per_afferent_mm2", area_per_afferent_mm2, "mm2")
-    positions_mm = _same_afferents(answers).positions_mm
+    positions_mm = _same_afferents(maps).positions_mm
     latencies_ms = {
-        name: evoked_latency_ms(answer.first_spike_latency_ms, resting_latency_ms)
-        for name, answer in answers.items()
+        name: evoked_latency_ms(response.first_spike_latency_ms, resting_latency_ms)
+        for name, response in maps.items()
     }
     first_ms = next(iter(latencies_ms.values()))
     touches = []
@@ -537,13 +537,13 @@ def recruitment(
                 first_spike_latency_ms=latencies_ms[name],
                 recruitment_rank=recruitment_rank(latencies_ms[name]),
             )
-            for name in shown or answers
+            for name in shown or maps
         ),
     )
 
 
 def population_rates(
-    answers: Mapping[str, ResponseMap],
+    maps: Mapping[str, ResponseMap],
     centre_mm: ArrayLike,
     density_per_cm2: float,
     radii_mm: Sequence[float] = RINGS_MM,
@@ -553,7 +553,7 @@ def population_rates(
 
     Parameters
     ----------
-    answers : mapping of str to ResponseMap
+    maps : mapping of str to ResponseMap
         Responses of the same afferents by the names of the touches.
     centre_mm : array_like
         Middle of the rings, in the coordinates of the positions. [mm]
@@ -573,19 +573,19 @@ def population_rates(
     InputError
         If there is no touch, a touch has other afferents than the first, or `rings` refuses the radii.
     """
-    first = _same_afferents(answers)
+    first = _same_afferents(maps)
     ring = rings(first.positions_mm, centre_mm, radii_mm)
     inside = np.where(ring == NO_GROUP, NO_GROUP, 0)
     active_edges_ms = np.arange(0.0, RATE_EDGES_MS[-1] + ACTIVE_BIN_MS / 2, ACTIVE_BIN_MS)
     touches = []
-    for name, answer in answers.items():
-        by_ring = population_rate(answer.spikes, RATE_EDGES_MS, ring, SMOOTHING_MS)
-        together = population_rate(answer.spikes, RATE_EDGES_MS, inside, SMOOTHING_MS)
+    for name, response in maps.items():
+        by_ring = population_rate(response.spikes, RATE_EDGES_MS, ring, SMOOTHING_MS)
+        together = population_rate(response.spikes, RATE_EDGES_MS, inside, SMOOTHING_MS)
         touches.append(
             TouchRates(
                 name=name,
                 rate_hz=by_ring.rate_hz,
-                active_fraction=population_rate(answer.spikes, active_edges_ms, ring).active_fraction,
+                active_fraction=population_rate(response.spikes, active_edges_ms, ring).active_fraction,
                 together_per_cm2_hz=together.rate_per_area(density_per_cm2)[0],
             )
         )
@@ -601,15 +601,15 @@ def population_rates(
     )
 
 
-def _same_afferents(answers: Mapping[str, ResponseMap]) -> ResponseMap:
+def _same_afferents(maps: Mapping[str, ResponseMap]) -> ResponseMap:
     """Return the responses to the first touch, after a check that all touches have the same afferents."""
-    if not answers:
-        raise InputError("answers must hold at least one touch: it is empty.")
-    first = next(iter(answers.values()))
-    for name, answer in answers.items():
-        if not np.array_equal(answer.positions_mm, first.positions_mm):
+    if not maps:
+        raise InputError("maps must hold at least one touch: it is empty.")
+    first = next(iter(maps.values()))
+    for name, response in maps.items():
+        if not np.array_equal(response.positions_mm, first.positions_mm):
             raise InputError(
-                f"answers must come from the same afferents: those of {name!r} are at other positions than "
-                f"those of {next(iter(answers))!r}."
+                f"maps must come from the same afferents: those of {name!r} are at other positions than "
+                f"those of {next(iter(maps))!r}."
             )
     return first

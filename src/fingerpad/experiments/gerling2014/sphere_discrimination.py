@@ -140,10 +140,10 @@ def discriminate_spheres(
     """
     population = Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0))
     neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
-    answers = {key: population.respond(skin) for key, skin in responses.items()}
+    maps = {key: population.respond(skin) for key, skin in responses.items()}
     tables = {
         name: [
-            np.array([read(answers[position, curvature]) for curvature in CURVATURES])
+            np.array([read(maps[position, curvature]) for curvature in CURVATURES])
             for position in POSITIONS_MM
         ]
         for name, read in RESPONSE_MEASURES.items()
@@ -151,7 +151,7 @@ def discriminate_spheres(
     measures = {
         name: _measured(name, both, neighbours)
         for name, both in tables.items()
-        if name == "static" or _answers(name, both, neighbours)
+        if name == "static" or _responds(name, both, neighbours)
     }
     draws = normals(seed, 1, len(population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
     noise = fit_noise_to_goodwin(
@@ -190,8 +190,8 @@ def discriminate_spheres(
     )
 
 
-def _answers(name: str, tables: Sequence[FloatArray], neighbours: np.ndarray) -> bool:
-    """Whether receptors respond: otherwise the measure is left out, for zeros give no hit rate."""
+def _responds(name: str, tables: Sequence[FloatArray], neighbours: np.ndarray) -> bool:
+    """Whether receptors respond. A measure without responses has no hit rate and is left out."""
     if name == "latency":
         return all(len(answering_neighbours(table, neighbours)) > 0 for table in tables)
     return all(table.any() for table in tables)
