@@ -12,9 +12,9 @@ import pytest
 
 import fingerpad as fp
 from fingerpad.core.errors import InputError
-from fingerpad.export.abaqus import abaqus_deck, write_abaqus
-from fingerpad.export.calculix import calculix_deck, write_calculix
-from fingerpad.export.febio import febio_deck, write_febio
+from fingerpad.export.abaqus import abaqus_deck
+from fingerpad.export.calculix import calculix_deck
+from fingerpad.export.febio import febio_deck
 from fingerpad.export.formats import export_touch
 from fingerpad.export.job import Job, job_of
 from fingerpad.export.outline import outline_of, rigid_mesh
@@ -736,7 +736,7 @@ def test_nothing_else_is_written_instead(write):
         write(
             block_job(material=Material.from_energy("a / 2 * (I1 - 3) + k / 2 * (J - 1)**2", a=5.0, k=90.0))
         )
-    with pytest.raises(InputError, match="Wedge cannot be exported, since only its gap is known"):
+    with pytest.raises(InputError, match="Wedge cannot be exported, because only its gap is known"):
         write(block_job(Wedge()))
 
 
@@ -746,15 +746,15 @@ def test_febio_refuses_what_it_would_change():
     with pytest.raises(InputError, match="Hyperfoam"):
         febio_deck(block_job(material=LAWS[-1]))
     many = Prony((0.1,) * 7, (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0))
-    with pytest.raises(InputError, match="FEBio holds 6 Prony terms: layer dermis has 7"):
+    with pytest.raises(InputError, match="FEBio takes 6 Prony terms: layer dermis has 7"):
         febio_deck(block_job(material=NEO_HOOKE.with_prony(many)))
 
 
 def test_a_job_says_what_is_wrong_with_it():
     job = block_job()
-    with pytest.raises(InputError, match="must begin with 0 and go on together"):
+    with pytest.raises(InputError, match="must begin with 0 and have one length"):
         replace(job, depths_mm=DEPTHS[:-1])
-    with pytest.raises(InputError, match="must press somewhere"):
+    with pytest.raises(InputError, match="must exceed 0 at some time"):
         replace(job, depths_mm=np.zeros(5))
     with pytest.raises(InputError, match="materials needs one per layer: got 3 for layer 3"):
         replace(job, materials=job.materials[:3])
@@ -775,11 +775,11 @@ def test_a_touch_is_exported_by_name(tmp_path, format_name, moduli, suffix):
     decks = {"abaqus": abaqus_deck, "febio": febio_deck, "calculix": lambda job: calculix_deck(job, moduli)}
     assert path.read_text() == decks[format_name](job_of(touch))
     if format_name != "calculix":
-        with pytest.raises(InputError, match=f"elastic_moduli is for calculix, and {format_name} relaxes"):
+        with pytest.raises(InputError, match=f"elastic_moduli is for calculix, .* not for {format_name}"):
             export_touch(touch, tmp_path, format_name, "long_term")
 
 
-def test_a_touch_becomes_a_job_and_files(tmp_path):
+def test_a_touch_becomes_a_job_and_decks():
     touch = fp.touch_of(
         Fingertip(),
         BALL,
@@ -793,16 +793,9 @@ def test_a_touch_becomes_a_job_and_files(tmp_path):
     np.testing.assert_allclose(job.depths_mm, touch.stimulus.depth_at(job.times_ms))
     np.testing.assert_allclose(job.placement.origin_mm, touch.placement.origin_mm)
     assert job.materials == touch.tissues.layers
-    for write, text in (
-        (write_abaqus, abaqus_deck(job)),
-        (write_febio, febio_deck(job)),
-        (lambda path, job: write_calculix(path, job, "long_term"), calculix_deck(job, "long_term")),
-    ):
-        path = write(tmp_path / "new" / "deck", job)
-        assert path.read_text() == text
+    for text in (abaqus_deck(job), febio_deck(job), calculix_deck(job, "long_term")):
         assert "fingerpad" in text[:400]
         assert "mm, ms, kPa, mN" in text[:400]
-    assert [path.name for path in (tmp_path / "new").iterdir()] == ["deck"]
     assert job.friction == 0.0
     assert job_of(replace(touch, friction=0.3)).friction == 0.3
     by_force = replace(touch, stimulus=fp.ForceRampAndHold(force_mn=100.0))

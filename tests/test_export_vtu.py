@@ -127,7 +127,7 @@ def test_fields_come_back_at_every_time(done, files):
 
 def test_only_a_deformation_of_all_elements_is_written(done, tmp_path):
     block = block_mesh([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], layers=[0])
-    with pytest.raises(InputError, match=r"all 1 elements of the mesh: it tells of .* Touch.deform"):
+    with pytest.raises(InputError, match=r"all 1 elements of the mesh: it holds those of .* Touch.deform"):
         write_vtu_series(tmp_path / "other.pvd", done, block)
     assert list(tmp_path.iterdir()) == []
 

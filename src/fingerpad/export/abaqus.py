@@ -1,12 +1,9 @@
-"""A job as an Abaqus input file: hybrid elements, Prony series, an analytical rigid surface."""
+"""Abaqus input file of an indentation: hybrid elements, Prony series, an analytical rigid surface."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
-from fingerpad.core.files import write_atomically
 from fingerpad.export import cards
 from fingerpad.export.cards import INDENTER, SKIN, data
 from fingerpad.export.job import CONTACT_KPA_PER_MM, Job, Phase
@@ -16,46 +13,21 @@ from fingerpad.mechanics.materials import Material
 CONTACT, REFERENCE = "CONTACT", "REFERENCE"
 
 UPPER_FACE = 2
-"""Face of a brick's last four, or a wedge's last three nodes: the skin's side of our elements."""
-
-
-def write_abaqus(path: Path, job: Job) -> Path:
-    """Write a job as an Abaqus input file.
-
-    Parameters
-    ----------
-    path : Path
-        File to write, by custom ending in .inp; replaced at once or not at all.
-    job : Job
-        What to press.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        If Abaqus has no card for a law or indenter.
-    StoreError
-        If the file cannot be written.
-    """
-    write_atomically(Path(path), abaqus_deck(job).encode())
-    return Path(path)
+"""Face of a brick's last four or a wedge's last three nodes, which is the side of the skin."""
 
 
 def abaqus_deck(job: Job) -> str:
     """Text of an Abaqus/Standard input file.
 
-    Bricks are C3D8H and wedges C3D6H, constant pressure as in our own element; in layers of foam, whose shape
-    and volume are not separate, C3D8 and C3D6. The indenter is an exact rigid surface that is moved by its
-    reference node. Steps are *VISCO with our own increments, or *STATIC when nothing relaxes.
+    Bricks are C3D8H and wedges C3D6H, with constant pressure as in the elements of fingerpad. Layers of foam,
+    in which shape and volume are coupled, have C3D8 and C3D6. The indenter is an exact rigid surface that is
+    moved by its reference node. Steps are *VISCO with the increments of the indentation, or *STATIC when
+    nothing relaxes.
 
     Parameters
     ----------
     job : Job
-        What to press.
+        The indentation.
 
     Raises
     ------
@@ -103,7 +75,7 @@ def _material(material: Material) -> list[str]:
     if not shares:
         return cards.law(material, 1.0)
     moduli = "LONG TERM" if material.moduli == "long_term" else "INSTANTANEOUS"
-    # A foam relaxes as a whole, and Abaqus then wants the same shares for shape and volume.
+    # In a foam shape and volume relax together: Abaqus then requires the same shares for both.
     bulk = shares if isinstance(material.law, Hyperfoam) else (0.0,) * len(shares)
     rows = [", ".join(map(cards.digits, row)) for row in zip(shares, bulk, times, strict=True)]
     return [*cards.law(material, 1.0, f", MODULI={moduli}"), "*VISCOELASTIC, TIME=PRONY", *rows]
@@ -119,7 +91,7 @@ def _skin(job: Job) -> list[str]:
 
 
 def _rigid_surface(job: Job, reference: int) -> list[str]:
-    """Cards of the indenter: its outline in local axes, tied to a reference node at its tip."""
+    """Cards of the indenter: its outline in local axes, attached to a reference node at its tip."""
     origin, outline = job.placement.origin_mm, job.outline
     x, y, z = job.placement.rotation.T
     lines = cards.nodes(origin[None], reference, REFERENCE)
@@ -137,11 +109,11 @@ def _rigid_surface(job: Job, reference: int) -> list[str]:
 
 
 def _step(job: Job, phase: Phase, relaxes: bool) -> list[str]:
-    """Cards of one step: our own increments, ramped motion, and what to write."""
+    """Cards of one step: increments of the indentation, ramped motion, and output."""
     length = phase.end_ms - phase.start_ms
     step = cards.digits(length / phase.steps)
     time = f"{step}, {cards.digits(length)}"
-    # *VISCO without CETOL keeps to its first increment; *STATIC is held to ours, and may take smaller ones.
+    # *VISCO without CETOL keeps its first increment; *STATIC takes ours at most, and smaller ones if needed.
     procedure = ["*VISCO", time] if relaxes else ["*STATIC", f"{time}, {cards.digits(length * 1e-6)}, {step}"]
     moves = (
         f"{REFERENCE}, {axis}, {axis}, {cards.digits(phase.depth_mm * component)}"

@@ -1,21 +1,19 @@
-"""A job as a CalculiX input file: elastic, with the indenter divided into rigid facets.
+"""CalculiX input file of an indentation: elastic, with the indenter divided into rigid facets.
 
-CalculiX has no analytical rigid surface, no Prony series for hyperelastic materials, and no element with a
-pressure of its own. Its plain C3D8 is several percent too stiff for skin on a coarse mesh; C3D8I, whose
-incompatible modes leave the volume free, agrees with our constant-pressure brick on the same nodes
-(tests/verification/test_oracles.py measures how closely).
+CalculiX has no analytical rigid surface, no Prony series for hyperelastic materials, and no element with an
+independent pressure. On a coarse mesh its C3D8 is several per cent too stiff for skin. C3D8I has incompatible
+modes and agrees with the constant-pressure brick of fingerpad on the same nodes. The difference is measured
+in tests/verification/test_oracles.py.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray, one_of
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import write_atomically
 from fingerpad.export import cards
 from fingerpad.export.cards import INDENTER, SKIN
 from fingerpad.export.job import CONTACT_KPA_PER_MM, Job, Phase
@@ -23,14 +21,14 @@ from fingerpad.mechanics.laws import Hyperfoam, Law
 from fingerpad.mechanics.materials import Material
 
 UPPER_FACE, OUTER_FACE = 2, 1
-"""Faces that touch: the skin's side of our elements, and the outer side of the indenter's."""
+"""Faces in contact: the side of the skin, and the outer side of the elements of the indenter."""
 
 ELEMENTS = {"C3D8": "C3D6", "C3D8I": "C3D6", "C3D20R": "C3D15"}
-"""Bricks that can be asked for, and the wedges that go with them."""
+"""Available bricks, each with its wedge."""
 
 MODULI = ("long_term", "instantaneous")
 SLOWEST_SHARE = 1.0 / 64
-"""Smallest increment that CalculiX may cut to, as a share of ours."""
+"""Smallest increment that CalculiX may choose, as a share of the increment of the indentation."""
 
 _BRICK_EDGES = (
     (0, 1),
@@ -49,43 +47,19 @@ _BRICK_EDGES = (
 _WEDGE_EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
 
 
-def write_calculix(path: Path, job: Job, elastic_moduli: str | None = None, element: str = "C3D8I") -> Path:
-    """Write a job as a CalculiX input file; arguments as in `calculix_deck`.
-
-    Parameters
-    ----------
-    path : Path
-        File to write, by custom ending in .inp; replaced at once or not at all.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        If CalculiX has no card for a law or indenter.
-    StoreError
-        If the file cannot be written.
-    """
-    write_atomically(Path(path), calculix_deck(job, elastic_moduli, element).encode())
-    return Path(path)
-
-
 def calculix_deck(job: Job, elastic_moduli: str | None = None, element: str = "C3D8I") -> str:
     """Text of a CalculiX input file.
 
     Parameters
     ----------
     job : Job
-        What to press.
+        The indentation.
     elastic_moduli : {"long_term", "instantaneous"}, optional
-        Which moduli to press with where a material relaxes, which CalculiX cannot do. Nothing then changes
-        during a hold, so steps without motion are left out.
+        Moduli of materials that relax, because CalculiX has no relaxation. Nothing then changes during a
+        hold, so steps without motion are left out.
     element : {"C3D8I", "C3D8", "C3D20R"}
-        Which brick. The incompatible modes of C3D8I may keep a deep press from converging: C3D20R, with nodes
-        added in the middle of edges, goes on; its faces, not its nodes, then touch.
+        Kind of brick. With the incompatible modes of C3D8I a deep indentation may fail to converge. C3D20R,
+        which has nodes in the middle of edges, converges then; its faces are in contact, not its nodes.
 
     Raises
     ------
@@ -121,7 +95,7 @@ elastic_moduli ("long_term" or "instantaneous"), or export for Abaqus or FEBio.
     else:
         lines += cards.surface(SKIN, job.touching_elements + 1, UPPER_FACE)
     lines += _rigid_body(job, first)
-    # Nodes touch in our own contact; where nodes stand in the middle of edges, they share load unevenly.
+    # Contact is at nodes, as in fingerpad, but nodes in the middle of edges take uneven shares of the load.
     by_nodes = job.indenter.grips or element != "C3D20R"
     kind = "NODE TO SURFACE" if by_nodes else "SURFACE TO SURFACE"
     lines += ["*SURFACE INTERACTION, NAME=CONTACT", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"]
@@ -202,7 +176,7 @@ def _held(job: Job, points: FloatArray, bricks: IntArray, wedges: IntArray) -> t
 
 
 def _rigid_body(job: Job, first: int) -> list[str]:
-    """Cards of the indenter, thin elements whose nodes all move alike; its material is never strained."""
+    """Cards of the indenter: thin elements whose nodes all have one displacement, so no strain."""
     rigid = job.rigid
     number = len(job.mesh.elements) + 1
     quads, triangles = rigid.solids(rigid.quads), rigid.solids(rigid.triangles)
@@ -217,7 +191,7 @@ def _rigid_body(job: Job, first: int) -> list[str]:
 
 
 def _step(job: Job, phase: Phase) -> list[str]:
-    """Cards of one step: increments at most as long as ours, ramped motion, results of every increment."""
+    """Cards of one step: increments at most as long as those of the indentation, ramped motion, output."""
     length = phase.end_ms - phase.start_ms
     step = length / phase.steps
     moves = (
@@ -232,6 +206,6 @@ def _step(job: Job, phase: Phase) -> list[str]:
         f"*NODE PRINT, NSET={INDENTER}, TOTALS=ONLY, FREQUENCY=1", "RF",
     ]  # fmt: skip
     for name in job.layer_names.values():
-        # Energies are summed up from one printed increment to the next: FREQUENCY above 1 makes them wrong.
+        # CalculiX adds energies from one printed increment to the next: FREQUENCY above 1 makes them wrong.
         lines += [f"*EL PRINT, ELSET={name}, FREQUENCY=1", "ENER"]
     return [*lines, "*NODE FILE, FREQUENCY=1", "U, RF", "*EL FILE, FREQUENCY=1", "S, ENER", "*END STEP"]

@@ -1,10 +1,8 @@
-"""Keyword cards that Abaqus and CalculiX read alike: nodes, elements, sets, hyperelastic laws."""
+"""Keyword cards with the same meaning in Abaqus and CalculiX: nodes, elements, sets, hyperelastic laws."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-
-import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
@@ -13,21 +11,21 @@ from fingerpad.mechanics.laws import Hyperfoam, Ogden, Polynomial
 from fingerpad.mechanics.materials import Material
 
 PER_LINE, PER_LINE_OF_ELEMENT = 8, 16
-"""Values on a data line, after which both programs want a new one."""
+"""Most values on a data line of both programs."""
 
 NO_TERM = 1e20
-"""D of a volumetric term that is absent: at 0 CalculiX puts in a stiffness of its own without a word."""
+"""D of a volumetric term that is absent: CalculiX silently replaces 0 by a stiffness of its own."""
 
-FIXED, SYMMETRY, GRIPPED, SKIN, INDENTER = "FIXED", "SYMMETRY", "GRIPPED", "SKIN", "INDENTER"
-"""Names of sets and surfaces in a deck."""
+SKIN, INDENTER = "SKIN", "INDENTER"
+"""Names of surfaces in a deck."""
 
 
 def digits(value: float) -> str:
-    """Write a number in at most 20 characters, all that CalculiX reads, with 12 digits.
+    """Write a number with 12 digits, in at most 20 characters, which is the limit of CalculiX.
 
     Examples
     --------
-    >>> digits(-1 / 3), number(2.0)
+    >>> digits(-1 / 3), digits(2.0)
     ('-0.333333333333', '2')
     """
     return f"{value:.12g}"
@@ -51,7 +49,7 @@ def nodes(points_mm: FloatArray, first: int, name: str) -> list[str]:
 
 
 def elements(kind: str, name: str, numbers: IntArray, corners: IntArray) -> list[str]:
-    """Cards of elements; `corners` holds node numbers. A line that goes on ends in a comma."""
+    """Cards of elements; `corners` holds node numbers. A line that is continued ends in a comma."""
     lines = [f"*ELEMENT, TYPE={kind}, ELSET={name}"]
     for n, row in zip(numbers, corners, strict=True):
         texts = data([str(n), *map(str, row)], PER_LINE_OF_ELEMENT)
@@ -70,27 +68,16 @@ def surface(name: str, numbers: IntArray, face: int) -> list[str]:
 
 
 def supports(job: Job) -> list[str]:
-    """Cards that hold the bone and nail, the plane of symmetry, and skin that a line grips."""
-    lines = ["*BOUNDARY", f"{FIXED}, 1, 3"]
-    if job.mesh.symmetry_nodes.size:
-        lines.append(f"{SYMMETRY}, 3, 3")
-    if job.gripped_nodes.size:
-        lines.append(f"{GRIPPED}, 1, 1")
-    return lines
+    """Cards that hold the bone and nail, the plane of symmetry, and skin that a wire grips."""
+    return [
+        "*BOUNDARY",
+        *(f"{support.name}, {support.axes[0]}, {support.axes[1]}" for support in job.supports()),
+    ]
 
 
 def support_sets(job: Job, fixed: IntArray | None = None, symmetric: IntArray | None = None) -> list[str]:
     """Cards of the sets that `supports` names; those of the mesh unless nodes are given."""
-    fixed = job.mesh.fixed_nodes if fixed is None else fixed
-    symmetric = job.mesh.symmetry_nodes if symmetric is None else symmetric
-    lines = node_set(FIXED, fixed + 1)
-    # No node is held twice: Abaqus would call that an overconstraint.
-    symmetric = np.setdiff1d(symmetric, fixed)
-    if symmetric.size:
-        lines += node_set(SYMMETRY, symmetric + 1)
-    if job.gripped_nodes.size:
-        lines += node_set(GRIPPED, job.gripped_nodes + 1)
-    return lines
+    return [line for each in job.supports(fixed, symmetric) for line in node_set(each.name, each.nodes + 1)]
 
 
 def body_elements(
@@ -100,13 +87,14 @@ def body_elements(
 
     `corners` are nodes of bricks and wedges, one row per element of the mesh, if not those of the mesh.
     """
-    lines: list[str] = []
-    bricks, wedges = corners or (job.mesh.elements, job.wedges)
-    for kind, nodes_of, chosen in ((brick, bricks, ~job.is_wedge), (wedge, wedges, job.is_wedge)):
-        numbers = np.flatnonzero(chosen & (job.mesh.layer == layer))
-        if numbers.size:
-            lines += elements(kind, job.layer_names[layer], numbers + 1, nodes_of[numbers] + 1)
-    return lines
+    kinds, all_corners = (brick, wedge), corners or (job.mesh.elements, job.wedges)
+    return [
+        line
+        for wedges, numbers in job.parts(layer)
+        for line in elements(
+            kinds[wedges], job.layer_names[layer], numbers + 1, all_corners[wedges][numbers] + 1
+        )
+    ]
 
 
 def law(material: Material, factor: float, moduli: str = "") -> list[str]:
@@ -117,9 +105,9 @@ def law(material: Material, factor: float, moduli: str = "") -> list[str]:
     material : Material
         Its law must be Polynomial, Ogden or Hyperfoam.
     factor : float
-        By which its coefficients of shape (of a foam: all) are multiplied.
+        Factor of its coefficients of shape; of all coefficients of a foam.
     moduli : str
-        What follows the keyword, for example ", MODULI=LONG TERM".
+        Parameter after the keyword, for example ", MODULI=LONG TERM".
 
     Raises
     ------
@@ -141,8 +129,8 @@ def law(material: Material, factor: float, moduli: str = "") -> list[str]:
         volume = [2.0 / energy.bulk_kpa] + [NO_TERM] * (count - 1)
         return [f"*HYPERELASTIC, OGDEN, N={count}{moduli}", *data([*terms, *volume])]
     raise InputError(
-        f"The law {type(energy).__name__} has no card in Abaqus or CalculiX, whose *ELASTIC is another at "
-        "large strain: export a Polynomial, Ogden or Hyperfoam material, or write a user subroutine."
+        f"The law {type(energy).__name__} has no card in Abaqus or CalculiX: their *ELASTIC differs at large "
+        "strain. Export a Polynomial, Ogden or Hyperfoam material, or write a user subroutine."
     )
 
 

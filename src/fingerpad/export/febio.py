@@ -1,28 +1,26 @@
-"""A job as an FEBio 4 input file: three-field elements, viscoelastic layers, a rigid body that slides.
+"""FEBio 4 input file of an indentation: three-field elements, viscoelastic layers, sliding contact.
 
-FEBio's uncoupled materials are ours: energies of the isochoric invariants and, with `pressure_model` 2, the
-volumetric energy K/2 (J-1)². Its viscoelastic wrapper convects the stress with the whole deformation where we
-take its isochoric part, which differs by the order of J - 1.
+FEBio's uncoupled materials equal those of fingerpad: energies of the isochoric invariants and, with
+`pressure_model` 2, the volumetric energy K/2 (J-1)². Its viscoelastic material convects the stress with the
+whole deformation, fingerpad with the isochoric part; the difference is of the order of J - 1.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from xml.etree import ElementTree as xml
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import write_atomically
-from fingerpad.export.cards import FIXED, GRIPPED, INDENTER, SKIN, SYMMETRY, digits
+from fingerpad.export.cards import INDENTER, SKIN, digits
 from fingerpad.export.job import CONTACT_KPA_PER_MM, Job
 from fingerpad.mechanics.laws import Ogden, Polynomial
 from fingerpad.mechanics.materials import Material
 
 MOST_PRONY_TERMS = 6
-"""What FEBio's viscoelastic material holds."""
+"""Most Prony terms of FEBio's viscoelastic material."""
 
 ABAQUS_VOLUME = 2
 """Number of FEBio's volumetric energy K/2 (J-1)²."""
@@ -34,30 +32,8 @@ DISPLACEMENT_TOLERANCE, ENERGY_TOLERANCE = 1e-3, 1e-4
 """FEBio's convergence criteria; its default for energy, 0.01, leaves forces 1 % wrong."""
 
 
-def write_febio(path: Path, job: Job) -> Path:
-    """Write a job as an FEBio input file.
-
-    Parameters
-    ----------
-    path : Path
-        File to write, by custom ending in .feb; replaced at once or not at all.
-    job : Job
-        What to press.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        If FEBio cannot express a law or indenter.
-    StoreError
-        If the file cannot be written.
-    """
-    write_atomically(Path(path), febio_deck(job).encode())
-    return Path(path)
+KINDS = ("hex8", "penta6")
+"""FEBio's names of bricks and wedges."""
 
 
 def febio_deck(job: Job) -> str:
@@ -66,7 +42,7 @@ def febio_deck(job: Job) -> str:
     Parameters
     ----------
     job : Job
-        What to press.
+        The indentation.
 
     Raises
     ------
@@ -119,10 +95,10 @@ STEPS_CURVE, DEPTH_CURVE = 1, 2
 
 
 def _control(root: xml.Element, job: Job) -> None:
-    """Take our steps: FEBio stops at each point of the curve behind `dtmax`, whose value is the next step."""
+    """Take the steps of the indentation: FEBio stops at each point of the curve of `dtmax`, the next step."""
     control = _add(root, "Control")
     steps = np.diff(job.times_ms)
-    # -1 steps: as many as lead to the end, since one that fails is cut.
+    # -1: any number of steps up to the end, since a step that fails is divided.
     _add_all(control, {"analysis": "STATIC", "time_steps": -1, "final_time": float(job.times_ms[-1])})
     _add_all(control, {"step_size": float(steps[0])})
     _add_all(control, {"plot_level": "PLOT_MUST_POINTS", "output_level": "OUTPUT_MUST_POINTS"})
@@ -164,7 +140,7 @@ def _material(section: xml.Element, n: int, name: str, material: Material) -> No
         return
     if len(shares) > MOST_PRONY_TERMS:
         raise InputError(
-            f"FEBio holds {MOST_PRONY_TERMS} Prony terms: layer {name} has {len(shares)}; fit fewer of them."
+            f"FEBio takes {MOST_PRONY_TERMS} Prony terms: layer {name} has {len(shares)}; fit fewer terms."
         )
     # FEBio's modulus is g0 + sum g_i exp(-t/tau_i) times the elastic one, be that long-term or instantaneous.
     final = 1.0 if material.moduli == "long_term" else material.prony.long_term_share
@@ -196,7 +172,7 @@ def _law(material: Material, name: str) -> tuple[str, dict[str, float | int | st
     what = "a polynomial with D2" if isinstance(law, Polynomial) else type(law).__name__
     raise InputError(
         f"FEBio has no three-field material for {what} (layer {name}): export a polynomial without D2 or an "
-        "Ogden material, or take Abaqus for a foam."
+        "Ogden material, or use Abaqus for a foam."
     )
 
 
@@ -208,16 +184,13 @@ def _mesh(root: xml.Element, job: Job) -> None:
     for layer, kind, numbers, corners in _parts(job):
         _elements(mesh, f"{job.layer_names[layer]}_{kind}", kind, numbers + 1, corners + 1)
     first = len(job.mesh.elements) + 1
-    for kind, faces in (("hex8", job.rigid.quads), ("penta6", job.rigid.triangles)):
+    for kind, faces in zip(KINDS, (job.rigid.quads, job.rigid.triangles), strict=True):
         if len(faces):
             numbers = first + np.arange(len(faces))
             _elements(mesh, f"{INDENTER}_{kind}", kind, numbers, job.rigid.solids(faces) + body + 1)
             first += len(faces)
-    sets = {FIXED: job.mesh.fixed_nodes, GRIPPED: job.gripped_nodes}
-    sets[SYMMETRY] = np.setdiff1d(job.mesh.symmetry_nodes, job.mesh.fixed_nodes)
-    for name, nodes in sets.items():
-        if nodes.size:
-            _add(mesh, "NodeSet", ",".join(map(str, nodes + 1)), name=name)
+    for support in job.supports():
+        _add(mesh, "NodeSet", ",".join(map(str, support.nodes + 1)), name=support.name)
     upper = [
         (job.wedges[n, 3:] if job.is_wedge[n] else job.mesh.elements[n, 4:]) + 1
         for n in job.touching_elements
@@ -237,14 +210,8 @@ def _nodes(mesh: xml.Element, name: str, points_mm: FloatArray, first: int) -> N
 def _parts(job: Job) -> Iterable[tuple[int, str, IntArray, IntArray]]:
     """Layer, kind of element, element numbers and their nodes."""
     for layer in job.layer_names:
-        of_layer = job.mesh.layer == layer
-        for kind, corners, chosen in (
-            ("hex8", job.mesh.elements, ~job.is_wedge),
-            ("penta6", job.wedges, job.is_wedge),
-        ):
-            numbers = np.flatnonzero(of_layer & chosen)
-            if numbers.size:
-                yield layer, kind, numbers, corners[numbers]
+        for wedges, numbers in job.parts(layer):
+            yield layer, KINDS[wedges], numbers, (job.wedges if wedges else job.mesh.elements)[numbers]
 
 
 def _elements(mesh: xml.Element, name: str, kind: str, numbers: IntArray, corners: IntArray) -> None:
@@ -264,23 +231,21 @@ def _domains(root: xml.Element, job: Job) -> None:
     for layer, kind, _, _ in _parts(job):
         name = job.layer_names[layer]
         _add(section, "SolidDomain", name=f"{name}_{kind}", mat=name, type="three-field-solid")
-    for kind, faces in (("hex8", job.rigid.quads), ("penta6", job.rigid.triangles)):
+    for kind, faces in zip(KINDS, (job.rigid.quads, job.rigid.triangles), strict=True):
         if len(faces):
             _add(section, "SolidDomain", name=f"{INDENTER}_{kind}", mat=INDENTER, type="rigid-solid")
 
 
 def _boundary(root: xml.Element, job: Job) -> None:
     section = _add(root, "Boundary")
-    held = [(FIXED, (1, 1, 1), True), (SYMMETRY, (0, 0, 1), job.mesh.symmetry_nodes.size > 0)]
-    held.append((GRIPPED, (1, 0, 0), job.gripped_nodes.size > 0))
-    for name, axes, exists in held:
-        if exists:
-            condition = _add(section, "bc", name=name, node_set=name, type="zero displacement")
-            _add_all(condition, dict(zip(("x_dof", "y_dof", "z_dof"), axes, strict=True)))
+    for support in job.supports():
+        condition = _add(section, "bc", name=support.name, node_set=support.name, type="zero displacement")
+        first, last = support.axes
+        _add_all(condition, {f"{axis}_dof": int(first <= n <= last) for n, axis in enumerate("xyz", 1)})
 
 
 def _rigid(root: xml.Element, job: Job) -> None:
-    """Move the indenter along its axis by the curve of depths, and let it not turn."""
+    """Move the indenter along its axis by the curve of depths, without rotation."""
     section = _add(root, "Rigid")
     turning = _add(section, "rigid_bc", name="no rotation", type="rigid_fixed")
     moving = {"x": 0, "y": 0, "z": 0, "u": 1, "v": 1, "w": 1}

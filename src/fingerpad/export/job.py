@@ -1,7 +1,8 @@
-"""A press as other solvers see it: solids, sets of nodes, the faces that may touch, and steps in time."""
+"""An indentation for other solvers: elements, sets of nodes, faces that may touch, and steps in time."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,13 +22,13 @@ from fingerpad.skin.behaviour import code_hash
 from fingerpad.skin.indentation import Touch
 
 CONTACT_KPA_PER_MM = 50_000.0
-"""Penalty of the exported contact. Other solvers do not augment it as ours does: 50 kPa penetrate by 1 µm."""
+"""Penalty of the exported contact: 50 kPa penetrate by 1 µm. Other solvers do not augment it. [kPa/mm]"""
 
 BESIDE_INDENTER_MM = 2.0
 """How far beside the indenter, beyond its depth, the skin may still come to touch it. [mm]"""
 
 BESIDE_FACETS_MM = 0.1
-"""How far beyond the undeformed skin that it passes through the facets of an indenter go on. [mm]"""
+"""Extent of the facets of an indenter beyond the undeformed skin that it passes through. [mm]"""
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Phase:
     Parameters
     ----------
     start_ms, end_ms : float
-        When it begins and ends. [ms]
+        Begin and end. [ms]
     steps : int
         Its number of steps.
     depth_mm : float
@@ -51,8 +52,27 @@ class Phase:
 
 
 @dataclass(frozen=True)
+class Support:
+    """Nodes that are held.
+
+    Parameters
+    ----------
+    name : str
+        Name of their set in a deck.
+    nodes : int array (n,)
+        Their numbers, from 0.
+    axes : (int, int)
+        First and last axis along which they are held, 1 for x to 3 for z.
+    """
+
+    name: str
+    nodes: IntArray
+    axes: tuple[int, int]
+
+
+@dataclass(frozen=True)
 class Job:
-    """Everything that another solver needs to press the same body in the same way.
+    """One indentation, described for another solver.
 
     Parameters
     ----------
@@ -63,7 +83,7 @@ class Job:
     indenter : Indenter
         The rigid body.
     placement : Placement
-        Where it stands at first touch.
+        Its position at first touch.
     times_ms : array (n_times,)
         Steps, from 0. [ms]
     depths_mm : array (n_times,)
@@ -93,11 +113,11 @@ class Job:
         depths = float_array("depths_mm", self.depths_mm, 1)
         if times.size < 2 or times[0] != 0.0 or depths.shape != times.shape or depths[0] != 0.0:
             raise InputError(
-                "times_ms and depths_mm must begin with 0 and go on together: "
+                "times_ms and depths_mm must begin with 0 and have one length of at least 2: "
                 f"got {times.size} times from {times[:1]} and {depths.size} depths from {depths[:1]}."
             )
         if depths.max() <= 0.0:
-            raise InputError(f"depths_mm must press somewhere: the deepest is {depths.max():g} mm.")
+            raise InputError(f"depths_mm must exceed 0 at some time: the largest is {depths.max():g} mm.")
         if len(self.materials) <= self.mesh.layer.max():
             raise InputError(
                 f"materials needs one per layer: got {len(self.materials)} for layer {self.mesh.layer.max()}."
@@ -108,7 +128,7 @@ class Job:
 
     @property
     def phases(self) -> tuple[Phase, ...]:
-        """Steps gathered where they are equally long and fast; hold steps that grow stay alone."""
+        """Steps of equal length and speed, joined; the growing steps of the hold are single phases."""
         found: list[Phase] = []
         for n in range(1, self.times_ms.size):
             start, end = float(self.times_ms[n - 1]), float(self.times_ms[n])
@@ -222,9 +242,33 @@ class Job:
         """Nodes that the indenter does not let slide along x."""
         return self.touching_nodes if self.indenter.grips else np.empty(0, dtype=np.int64)
 
+    def supports(
+        self, fixed: IntArray | None = None, symmetric: IntArray | None = None
+    ) -> tuple[Support, ...]:
+        """List the sets of nodes that are held: bone and nail, plane of symmetry, skin that a wire grips.
+
+        `fixed` and `symmetric` replace the nodes of the mesh where a deck has more. No node is in the first
+        two sets at once: Abaqus would refuse that as an overconstraint.
+        """
+        fixed = self.mesh.fixed_nodes if fixed is None else fixed
+        symmetric = self.mesh.symmetry_nodes if symmetric is None else symmetric
+        sets = (
+            Support("FIXED", fixed, (1, 3)),
+            Support("SYMMETRY", np.setdiff1d(symmetric, fixed), (3, 3)),
+            Support("GRIPPED", self.gripped_nodes, (1, 1)),
+        )
+        return tuple(each for each in sets if each.nodes.size)
+
+    def parts(self, layer: int) -> Iterator[tuple[bool, IntArray]]:
+        """Elements of a layer by shape: whether they are wedges, and their numbers."""
+        for wedges in (False, True):
+            numbers = np.flatnonzero((self.is_wedge == wedges) & (self.mesh.layer == layer))
+            if numbers.size:
+                yield wedges, numbers
+
     @property
     def summary(self) -> tuple[str, ...]:
-        """What stands at the top of every deck."""
+        """Comments at the top of every deck."""
         mesh, half = self.mesh, " of a body symmetric about z = 0 (forces are of this half)"
         return (
             f"Written by fingerpad {__version__}, mechanics {code_hash()}.",
@@ -238,17 +282,18 @@ class Job:
 
 
 def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike | None = None) -> Job:
-    """Describe a touch for other solvers.
+    """Describe an indentation for other solvers.
 
     Parameters
     ----------
     touch : Touch
-        What to export.
+        The indentation.
     times_ms : array, optional
-        Steps to take; by default those of the touch's settings. Needed when a tolerance chooses them: a
-        response tells which it took. [ms]
+        Times of the steps; by default those of the settings. Required when a tolerance chooses them: take the
+        times of the response. [ms]
     depths_mm : array, optional
-        Depths at `times_ms`; needed when the touch is controlled by force: a response tells them too. [mm]
+        Depths at `times_ms`. Required when the indentation is controlled by force: take the depths of the
+        response. [mm]
 
     Returns
     -------

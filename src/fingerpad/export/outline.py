@@ -1,9 +1,8 @@
-"""Rigid indenters for other solvers: an exact outline of lines and arcs, and facets that follow it.
+"""Rigid indenters for other solvers: an exact outline of lines and arcs, and facets along it.
 
-An outline is drawn in the indenter's own frame (see `fingerpad.geometry.indenters`): u is the distance from
-the axis
-of pressing, y the direction of pressing, and the tip is at (0, 0). Turned about y it makes a sphere or a
-punch, swept along z a cylinder, a bar or a plate. It runs so that the skin is on its left.
+An outline lies in the indenter's own frame (see `fingerpad.geometry.indenters`): u is the distance from the
+axis of pressing, y the direction of pressing, and the tip is at (0, 0). Rotated about y it gives a sphere or
+a punch, swept along z a cylinder, a bar or a plate. The skin is on the left of its direction.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ SHELL_SHARE = 0.1
 """Thickness of the facets' solid elements, as a share of their distance from the middle of the body."""
 
 LARGEST_TURN_RAD = np.deg2rad(3.0)
-"""Largest angle that one facet spans along an arc: its middle is then 0.03 % of the radius too deep."""
+"""Largest angle of one facet along an arc: its middle is then 0.03 % of the radius too deep."""
 
 FACETS_AROUND = 96
 FACETS_ACROSS = 8
@@ -86,10 +85,9 @@ def outline_of(indenter: Indenter, reach_mm: float) -> Outline:
     Parameters
     ----------
     indenter : Indenter
-        One of the package's own; a body of your own is only known by its gap.
+        One of the package's own classes; for another class only its gap is known.
     reach_mm : float
-        Half extent of what has no edge of its own (plate), and height of straight sides and depth of grooves,
-        which a drawing has to close. [mm]
+        Half extent of a body without edges (plate), height of straight sides, and depth of grooves. [mm]
 
     Returns
     -------
@@ -98,7 +96,7 @@ def outline_of(indenter: Indenter, reach_mm: float) -> Outline:
     Raises
     ------
     InputError
-        If the indenter is none of those that can be drawn.
+        If the indenter has no outline of lines and arcs.
 
     Examples
     --------
@@ -139,7 +137,7 @@ def outline_of(indenter: Indenter, reach_mm: float) -> Outline:
         lip = indenter.lip_mm
         return _ridges(tuple(_Ridge(u - half, u + half, lip, lip) for u in middles.tolist()), reach_mm)
     raise InputError(
-        f"{type(indenter).__name__} cannot be exported, since only its gap is known: take Sphere, Cylinder, "
+        f"{type(indenter).__name__} cannot be exported, because only its gap is known: use Sphere, Cylinder, "
         "Bar, FlatPunch, Plate, Line, Edge, Gap or Grating."
     )
 
@@ -181,7 +179,7 @@ def _rounded_side(
 def _without_empty_segments(
     revolved: bool, corners: tuple[Point, ...], centres: tuple[Point | None, ...]
 ) -> Outline:
-    """Outline without the segments of no length that a fillet of 0 or of the full half-width leaves."""
+    """Outline without segments of zero length, which arise for a fillet of 0 or of the full half-width."""
     kept = [n for n, (start, end) in enumerate(pairwise(corners)) if start != end]
     return Outline(revolved, (corners[0], *(corners[n + 1] for n in kept)), tuple(centres[n] for n in kept))
 
@@ -207,7 +205,7 @@ class RigidMesh:
     def solids(self, faces: IntArray) -> IntArray:
         """Bricks or wedges behind `faces`, their first nodes those of the outer face.
 
-        The order is turned round, since a solid's first face is counter-clockwise seen from its inside.
+        The order is reversed, because a solid's first face is counter-clockwise seen from its inside.
         """
         outer = np.concatenate([faces[:, :1], faces[:, :0:-1]], axis=1)
         return np.concatenate([outer, outer + len(self.nodes_mm) // 2], axis=1)
@@ -221,7 +219,7 @@ def rigid_mesh(outline: Outline, lowest_mm: float, z_mm: tuple[float, float]) ->
     outline : Outline
         Its section.
     lowest_mm : float
-        y down to which it is needed, negative. [mm]
+        Lowest y of the facets, negative. [mm]
     z_mm : (float, float)
         Extent of a swept body. [mm]
 
@@ -252,7 +250,7 @@ def rigid_mesh(outline: Outline, lowest_mm: float, z_mm: tuple[float, float]) ->
 def _swept(line: FloatArray, z: FloatArray) -> tuple[FloatArray, IntArray]:
     outer = np.concatenate([np.column_stack([line, np.full(len(line), depth)]) for depth in z])
     ids = np.arange(outer.shape[0]).reshape(z.size, len(line))
-    # u runs to the right and z towards the reader's back: seen from the skin (+y) this order turns left.
+    # u points right and z away from the viewer: seen from the skin (+y) this order is counter-clockwise.
     quads = np.stack([ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]], axis=-1).reshape(-1, 4)
     return outer, quads
 

@@ -1,4 +1,4 @@
-"""What a population answered, as a table for other programs."""
+"""Responses of a population as a CSV table."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ ANSWERS = (
     "recruitment_rank",
     "spike_times_ms",
 )
-"""Columns of what a receptor answers."""
+"""Columns of the response of a receptor."""
 
 
 def write_response_csv(response: ResponseMap, path: Path) -> Path:
-    """Write one row per receptor: where it lies, its rates, its first spike and all others.
+    """Write one row per receptor: position, rates, latency of the first spike, and all spike times.
 
-    Spike times stand in one entry, separated by spaces, as `fingerpad fit` reads them; what does not exist,
-    such as the latency of a silent receptor, is empty. Every number has all its digits: read back, it is the
-    same to the last bit.
+    Spike times are one entry, separated by spaces, as `fingerpad fit` reads them. A value that does not
+    exist, such as the latency of a silent receptor, is an empty entry. Numbers have all their digits
+    and are read back without rounding.
 
     Parameters
     ----------
     response : ResponseMap
-        What a population answered to one touch.
+        Responses of a population to one indentation.
     path : Path
-        The file, in UTF-8; folders are made as needed, and it is there whole or not at all.
+        The file, in UTF-8, written as a whole; folders are created if needed.
 
     Returns
     -------
@@ -49,7 +49,7 @@ def write_response_csv(response: ResponseMap, path: Path) -> Path:
     Raises
     ------
     InputError
-        If `response` is none.
+        If `response` is not a `ResponseMap`.
     StoreError
         If the file cannot be written.
 

@@ -1,4 +1,4 @@
-"""What a population answered to several touches, as a session of Neurodata Without Borders (NWB)."""
+"""Responses of a population to several indentations as a session of Neurodata Without Borders (NWB)."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ def write_responses_nwb(
     pause_ms: float = 1000.0,
     started: datetime | None = None,
 ) -> Path:
-    """Write a session: one trial per touch, one unit per receptor.
+    """Write a session: one trial per indentation, one unit per receptor.
 
-    Trials follow each other, `stimulus` being the name of the touch; a unit has its place and the times of
-    all its spikes. `fingerpad fit` reads the file as it reads recordings, one unit at a time. It needs the
-    extra `fingerpad[nwb]`.
+    The column `stimulus` of the trials holds the name of the indentation; a unit has its position and all its
+    spike times. `fingerpad fit` reads the file like recordings, one unit at a time. The extra
+    `fingerpad[nwb]` is required.
 
     Parameters
     ----------
     responses : mapping of str to ResponseMap
-        Answers of the same receptors, by the names of the touches.
+        Responses of the same receptors, by the names of the indentations.
     path : Path
-        The file; folders are made as needed, and it is there whole or not at all.
+        The file, written as a whole; folders are created if needed.
     duration_ms : float, optional
-        How long each touch lasted. [ms]
+        Duration of each indentation. [ms]
     pause_ms : float, optional
-        From the end of a touch to the onset of the next. [ms]
+        From the end of an indentation to the onset of the next. [ms]
     started : datetime, optional
         Begin of the session, with its time zone. Default: now.
 
@@ -57,8 +57,8 @@ def write_responses_nwb(
     Raises
     ------
     InputError
-        If there is no touch, receptors differ between touches, a duration is wrong, a spike comes later, the
-        begin has no time zone, or pynwb is not installed.
+        If there is no indentation, receptors differ between indentations, a duration is not valid, a spike is
+        later than `duration_ms`, `started` has no time zone, or pynwb is not installed.
     StoreError
         If the file cannot be written.
 
@@ -78,7 +78,7 @@ def write_responses_nwb(
         raise InputError(f"started must have a time zone, such as datetime.UTC: got {began.isoformat()}.")
     positions_mm = _places(responses, duration_ms)
     onsets_ms = np.arange(len(responses)) * (duration_ms + pause_ms)
-    # What the library warns of is its own business: nothing of it is about what is written here.
+    # Warnings of the library do not concern the content of the file.
     with warnings.catch_warnings(), TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
         pynwb = _pynwb()

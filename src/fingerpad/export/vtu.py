@@ -1,8 +1,8 @@
-"""Deformation over time as VTU files and a PVD index, the form in which ParaView opens a time series.
+"""Deformation over time as VTU files and a PVD index, which ParaView opens as a time series.
 
-One VTU per time holds the undeformed points with the displacement as a vector (ParaView's "Warp By Vector"
-moves them), every field of the cells and the sets of nodes; the PVD names them with their times in ms. Bricks
-are VTK_HEXAHEDRON, collapsed ones VTK_WEDGE. The package `vtk` writes the files: the extra `fingerpad[vtk]`.
+One VTU per time holds the undeformed points with their displacement (shown by ParaView's "Warp By Vector"),
+the fields of the cells, and the sets of nodes. The PVD lists the files with their times in ms. Bricks are
+VTK_HEXAHEDRON, collapsed ones VTK_WEDGE. The package `vtk`, of the extra `fingerpad[vtk]`, writes the files.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ AXES = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 
 
 def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[Path, ...]:
-    """Write a press for ParaView.
+    """Write an indentation for ParaView.
 
     The exported fields are those of `skin.fields.FIELDS`. Cell data: layer; energy densities stored,
     instantaneous and work; Cauchy stress, logarithmic and Green-Lagrange strain; their principal values; von
@@ -39,9 +39,9 @@ def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[
     Parameters
     ----------
     path : Path
-        The PVD file; the VTU files stand beside it, with its name and a number.
+        The PVD file; the VTU files are in the same folder, with its name and a number.
     deformation : Deformation
-        A press in which all elements were watched, as by `Touch.deform`.
+        A deformation with the fields of all elements, as `Touch.deform` returns it.
     mesh : Mesh
         The undeformed body that was pressed.
 
@@ -55,7 +55,7 @@ def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[
     InputError
         If VTK is not installed, or the deformation is not that of all elements of this mesh.
     StoreError
-        If a file cannot be written; each is whole or absent, and the PVD comes last.
+        If a file cannot be written. Each file is written as a whole, the PVD as the last one.
 
     Examples
     --------
@@ -74,8 +74,8 @@ def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[
     path = Path(path)
     if len(deformation.fields.elements) != len(mesh.elements):
         raise InputError(
-            f"deformation must tell of all {len(mesh.elements)} elements of the mesh: it tells of "
-            f"{len(deformation.fields.elements)}; press with Touch.deform()."
+            f"deformation must hold the fields of all {len(mesh.elements)} elements of the mesh: it holds "
+            f"those of {len(deformation.fields.elements)}; use Touch.deform()."
         )
     names = [f"{path.stem}_{number:04d}.vtu" for number in range(deformation.times_ms.size)]
     grid = _grid(vtk, mesh)
@@ -92,7 +92,7 @@ def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[
 
 
 def load_vtk() -> Any:
-    """Return the few parts of VTK that writing needs; none of them draws.
+    """Return the parts of VTK that write files; none of them draws.
 
     Raises
     ------
