@@ -608,6 +608,8 @@ def test_parts_beyond_the_paper_are_left_out_where_they_were_not_run():
     ]
     assert len(titles[0]) - len(titles[1]) == len(BEYOND)
     assert [title for title in titles[0] if title in titles[1]] == titles[1]
+    assert len(reproduction_summary(typed(ReproductionResult, whole))) == 2
+    assert "`fingerpad reproduce --extended`" in reproduction_summary(typed(ReproductionResult, short))[-1]
 
 
 def test_a_miss_is_marked_in_words_and_by_its_row(report):

@@ -1,4 +1,4 @@
-"""Numbers and lists as people read them."""
+"""Numbers and lists as text."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ IDENTIFIABLE_SYMBOLS = {
     "static_gain_per_kpa_ms": "k_s/(C v)",
     "time_constant_ms": "τ",
 }
-"""The four numbers that firing can tell."""
+"""The four identifiable numbers."""
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -70,7 +70,7 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """Return a number with so many decimals, for columns that are compared by eye.
+    """Return a number with so many decimals, for columns of numbers.
 
     Examples
     --------

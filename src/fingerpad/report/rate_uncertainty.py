@@ -1,4 +1,4 @@
-"""Profile likelihoods and Sobol indices of the four numbers, wherever a fit to rates is shown."""
+"""Profile likelihoods and Sobol indices of the four numbers, for every page of a fit to rates."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def draw_profile(
     unit : str
         Of the number.
     fitted : float or None
-        Where the fit lies.
+        Value of the fit.
     credible : (float, float), optional
         Ends of the credible interval, where one was drawn.
     """

@@ -258,7 +258,13 @@ def reproduction_summary(result: ReproductionResult) -> list[str]:
     found = " ".join(
         [_skin(result.skin_deflection), _afferent(result.single_unit), _percept(result.discrimination)]
     )
-    return [found.strip(), _verdicts(result.comparison)]
+    paragraphs = [found, _verdicts(result.comparison)]
+    if result.drive_quantities is None:
+        paragraphs.append(
+            "Parts beyond the paper were not run: uncertainty of the fit, other quantities that may drive "
+            "the afferent, the population over time, curvature thresholds (`fingerpad reproduce --extended`)."
+        )
+    return paragraphs
 
 
 def _skin(section: SkinDeflectionResult) -> str:
@@ -284,14 +290,14 @@ def _afferent(section: SingleUnitResult) -> str:
 def _percept(section: SphereDiscrimination) -> str:
     people, comparison = section.goodwin, section.curvature_per_m[1:].tolist()
     rates = section.gradient_sum["static"].hit_rate
-    told = [
+    discriminated = [
         f"{number(curvature)} 1/m in {whole_percent(rates[comparison.index(curvature)])} of trials "
         f"(observed: {whole_percent(observed)})"
         for curvature, observed in zip(people.curvature_per_m.tolist(), people.hit_rate, strict=True)
     ]
     return (
         f"Percept: with noise of {number(section.noise_sigma)}, the static Gradient Sum discriminates "
-        f"spheres of {joined(told)} from the standard; the paper's noise is "
+        f"spheres of {joined(discriminated)} from the standard; the paper's noise is "
         f"{number(section.noise_sigma_paper)}."
     )
 

@@ -18,7 +18,7 @@ from fingerpad.core.files import write_atomically
 
 RESOLUTION_DPI = 150
 
-# Three hues that people with any colour vision tell apart, of three different greys.
+# Three hues that differ for any colour vision, and in grey.
 BLACK = "#1a1a1a"
 BLUE = "#0a5c99"
 ORANGE = "#d9650a"
@@ -69,7 +69,7 @@ def numbers(values: Any) -> FloatArray:
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:
-    """Return an empty figure that arranges its own margins and knows no window system. [in]"""
+    """Return an empty figure with constrained layout, drawn without a window system. [in]"""
     figure = Figure(figsize=(width_in, height_in), layout="constrained")
     FigureCanvasAgg(figure)
     return figure

@@ -128,7 +128,7 @@ def likely_points(likelihood: RateLikelihood, four: ArrayLike) -> FloatArray:
     likelihood : RateLikelihood
         Of a model of the four identifiable numbers.
     four : array_like (4,)
-        A fit, about which the first cloud lies; `admissible` says where it can be.
+        A fit, the centre of the first cloud; see `admissible`.
 
     Returns
     -------
@@ -144,7 +144,7 @@ def likely_points(likelihood: RateLikelihood, four: ArrayLike) -> FloatArray:
         points = np.vstack([points, cloud])
         heights = np.append(heights, likelihood.log_likelihood(from_coordinates(cloud)))
         best = points[np.argsort(-heights, kind="stable")[:BEST_POINTS]]
-        # Wider than the best ones lie, so that the next cloud may find better ones beside them.
+        # Wider than the best points, so that the next cloud can find better ones beside them.
         middle, reach = best.mean(axis=0), np.linalg.cholesky(2.0 * np.cov(best, rowvar=False))
     return from_coordinates(points[heights >= heights.max() - MOST_LOSS])
 

@@ -1,7 +1,7 @@
 """Fits of one afferent that are compared with each other: the same parameters, methods and folds for all.
 
-Whatever drives the afferent, four numbers are fitted near start points that give the same currents, to all
-shifts of the bar and to six folds, and what one drive gains over another is told with an interval.
+For every drive four parameters are fitted to all shifts of the bar and to six folds, from start points that
+give the same currents. The gain of one drive over another has a bootstrap interval.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ class Judged:
     predicted_hz : array (2, n_shifts)
         Dynamic and static rates by the fit to all shifts. [spikes/s]
     left_out_hz : array (2, n_shifts)
-        Rates under each shift by the fit that did not know it. [spikes/s]
+        Rates under each shift by the fit that did not use it. [spikes/s]
     """
 
     fit: Fit
@@ -212,7 +212,7 @@ def gain_interval(
 
     Blocks of `RESAMPLED_SHIFTS` neighbouring shifts are drawn with replacement, the same for both
     predictions, and FSS is taken over what was drawn (Künsch 1989; the first shift follows on the last). It
-    says how much the gain hangs on single shifts, not what another afferent would give.
+    describes how much the gain depends on single shifts, not the variation between afferents.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def gain_interval(
     >>> observed = RateRecordings(tuple("abcdef"), [9.0, 8, 7, 6, 5, 4], [3.0, 3, 2, 2, 1, 1])
     >>> truth = np.array([observed.dynamic_rate_hz, observed.static_rate_hz])
     >>> low, high = gain_interval(observed, truth, np.zeros((2, 6)), np.random.default_rng(0))
-    >>> low == high == 1.0  # from nothing to everything, whatever is drawn
+    >>> low == high == 1.0  # from a rate of 0 to the observed rates, for every draw
     True
     """
     n_shifts = len(recordings.stimuli)
@@ -248,7 +248,7 @@ def gain_interval(
     def lost(predicted_hz: FloatArray) -> FloatArray:
         squares = ((observed_hz - predicted_hz) ** 2)[:, drawn].sum(axis=-1)
         observed = (observed_hz**2)[:, drawn].sum(axis=-1)
-        # A draw of shifts under which a phase is silent says nothing of that phase.
+        # A draw of shifts without spikes in a phase does not count for that phase.
         return weights @ np.divide(squares, observed, out=np.zeros_like(squares), where=observed > 0.0)
 
     low, high = np.quantile(lost(reference_hz) - lost(better_hz), INTERVAL)

@@ -147,7 +147,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
     run : Reproduction
         What to run and where to keep finished indentations.
     progress : Progress, optional
-        Told about each finished part.
+        Shows each finished part.
 
     Returns
     -------

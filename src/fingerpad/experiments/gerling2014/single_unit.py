@@ -29,7 +29,7 @@ from fingerpad.neuron.spikes import modulation_difference, modulation_index
 from fingerpad.skin.sampling import SkinResponse
 
 RECEPTOR = ((RECEPTOR_X_MM, 0.0),)
-"""Where the end organ lies: x and z on the skin. [mm]"""
+"""Position of the end organ: x and z on the skin. [mm]"""
 
 
 def bar_touches(conditions: Conditions) -> list[Touch]:
@@ -96,7 +96,7 @@ def following(static: SedTraces, dynamic: SedTraces, quantity: str) -> SedTraces
 
 
 def rate_problem(sed: SedTraces) -> RateProblem:
-    """Observed rates at all shifts, and the paper's model of the afferent that answers `sed`."""
+    """Observed rates at all shifts, and the paper's model of the afferent driven by `sed`."""
     return RateProblem(AfferentModel.of_traces(sed), bar_recordings())
 
 

@@ -132,7 +132,7 @@ def coefficient_of_determination(observed: ArrayLike, predicted: ArrayLike) -> f
 def deflection_r2(profile: SurfaceProfile, proximal_positive: bool = True) -> float:
     """R² of a profile against the observed deflection under the cylinder, its marked artefact left out.
 
-    The source does not say which end of the finger its positive distances point to. Read as proximal they
+    The source does not state which end of the finger its positive distances point to. Read as proximal they
     fit better (docs/decisions/deflection-direction.md); `proximal_positive` False reads them as distal.
     """
     observed = cylinder_deflection()

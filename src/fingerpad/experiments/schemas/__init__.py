@@ -1,4 +1,4 @@
-"""JSON schemas of the files of results, generated from their types; every file that is written meets its own.
+"""JSON schemas of the files of results, generated from their types; a file is checked before it is written.
 
 `python -m fingerpad.experiments.schemas` writes them anew after a change of a type.
 """
@@ -16,7 +16,7 @@ from fingerpad.core.results import ResultFile, check_schema, read_format, write_
 
 @cache
 def schema(file_format: str) -> dict[str, Any]:
-    """JSON schema of a format, as it lies in the package.
+    """JSON schema of a format, as packaged.
 
     Parameters
     ----------
