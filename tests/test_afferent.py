@@ -150,7 +150,9 @@ def test_an_afferent_and_its_traces_agree_on_what_the_dynamic_term_follows():
     assert_allclose(extended.spikes(both).times_ms, Afferent().spikes(energy).times_ms, rtol=1e-12)
     assert_array_equal(extended.spikes(drive(both)).times_ms, extended.spikes(both).times_ms)
     for afferent, traces in ((Afferent(), both), (extended, energy), (extended, drive(energy))):
-        with pytest.raises(InputError, match=r"driven by '\w+': got traces of '\w+', sample"):
+        with pytest.raises(
+            InputError, match=r"dynamic term of this afferent needs '\w+': got traces of '\w+'"
+        ):
             afferent.spikes(traces)
 
 

@@ -116,7 +116,7 @@ def test_lengths_are_drawn_by_their_shares_of_the_likelihood() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"positions_mm": PLACES[:4]}, "a place of its own for each of 5 stimuli: got 4 values"),
+        ({"positions_mm": PLACES[:4]}, "a different position for each of 5 stimuli: got 4 values"),
         ({"positions_mm": np.zeros(5)}, "got 5 values, 1 of them different"),
         ({"lengths_mm": (-1.0,)}, "lengths of at least 0"),
         ({"deviation_hz": 0.0}, "deviation_hz must be greater than 0"),

@@ -276,7 +276,7 @@ def test_a_clock_has_no_width():
 def test_one_strength_without_a_ramp_tells_no_gains_apart():
     held = Drive([0.0, 1e4], [[1.0], [1.0]], [[0.0], [0.0]])
     spikes = EscapeRate(Afferent().membrane, 0.2).spikes(Afferent().transduction.current(held), 1)
-    with pytest.raises(ConvergenceError, match="do not tell all parameters apart"):
+    with pytest.raises(ConvergenceError, match="determine all parameters: these do not"):
         fit_spikes(SpikeLikelihood(held, spikes), START)
 
 
@@ -302,7 +302,6 @@ def test_recordings_that_make_no_sense_are_refused(change, said):
         "sites": [0, 1],
     }
     assert SpikeLikelihood(**sound).n_spikes == 3
-    assert SpikeLikelihood(**sound).observed_ms == 600.0
     with pytest.raises(InputError, match=said):
         SpikeLikelihood(**(sound | change))
 

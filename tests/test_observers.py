@@ -14,8 +14,6 @@ from fingerpad.psychophysics import (
     TASKS,
     GaussianResponses,
     PoissonResponses,
-    d_prime_of_answers,
-    d_prime_of_populations,
     d_prime_of_proportion,
     discriminability,
     efficiency,
@@ -121,21 +119,6 @@ def test_corrections_keep_d_prime_finite_and_are_as_stated():
         sensitivity(11, 10, 3, 10)
 
 
-def test_d_prime_of_answers_and_of_populations():
-    draw = np.random.default_rng(6)
-    standard, comparison = draw.normal(0.0, 1.0, LOOKS), draw.normal(2.0, 2.0, LOOKS)
-    assert d_prime_of_answers(standard, comparison) == pytest.approx(2.0 / math.sqrt(2.5), abs=0.01)
-    with pytest.raises(InputError, match="vary"):
-        d_prime_of_answers([1.0, 1.0], [2.0, 2.0])
-    covariance = np.array([[2.0, 0.6], [0.6, 1.0]])
-    difference = np.array([1.0, 0.5])
-    weights = np.linalg.solve(covariance, difference)
-    of_best_sum = weights @ difference / math.sqrt(weights @ covariance @ weights)
-    assert d_prime_of_populations(difference, covariance) == pytest.approx(of_best_sum)
-    with pytest.raises(InputError, match="positive definite"):
-        d_prime_of_populations([1.0, 1.0], [[1.0, 1.0], [1.0, 1.0]])
-
-
 def test_discriminability_is_the_share_of_all_pairs_and_knows_its_error():
     draw = np.random.default_rng(7)
     standard, comparison = draw.integers(0, 6, 60), draw.integers(1, 8, 50)
@@ -159,6 +142,8 @@ def test_log_likelihoods_are_those_of_the_distributions():
     counts = np.array([[0.0, 7.0], [3.0, 0.0]])
     poisson = stats.poisson(mean).logpmf(counts).sum(axis=1)
     assert PoissonResponses(mean).log_likelihood(counts) == pytest.approx(poisson)
+    with pytest.raises(InputError, match="positive definite"):
+        GaussianResponses([1.0, 1.0], [[1.0, 1.0], [1.0, 1.0]])
 
 
 def test_drawn_responses_have_the_moments_of_their_model():
@@ -180,7 +165,7 @@ def test_ideal_observer_of_equal_covariance_has_the_closed_form():
     standard = GaussianResponses([0.0, 0.0], covariance)
     comparison = GaussianResponses([1.0, 0.5], covariance)
     shown = present(standard, comparison, seed=2, n_trials=40_000)
-    d = d_prime_of_populations([1.0, 0.5], covariance)
+    d = math.sqrt(np.array([1.0, 0.5]) @ np.linalg.solve(covariance, [1.0, 0.5]))
     ideal = shown.ideal()
     assert abs(ideal.d_prime - d) < 4.0 * ideal.d_prime_error
     assert ideal.d_prime_error < 0.02

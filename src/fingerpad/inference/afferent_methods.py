@@ -1,7 +1,7 @@
-"""Methods that fit one afferent to firing rates: their bounds, scales, starts and vectors of parameters.
+"""Methods that fit one afferent to firing rates: bounds, scales, starts and parameters.
 
-All but the paper's own method (`fingerpad.inference.start_points.response_surface`) search the four
-identifiable numbers, of which a fifth may be the receptor's offset along the finger, and share their bounds.
+All but the paper's method (`fingerpad.inference.start_points.response_surface`) fit the four identifiable
+parameters, optionally with the offset of the receptor along the finger, within the same bounds.
 """
 
 from __future__ import annotations
@@ -27,42 +27,42 @@ OFFSETS_MM = (-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
 LOWEST = (-0.05, 0.0, 0.0, 3.0)
 HIGHEST = (0.05, 0.6, 0.2, 300.0)
 SCALES = (0.01, 0.05, 0.02, 20.0)
-"""Bounds and scales of a fit: the intercept [1/ms], what the dynamic and the static term reach under the
-strongest stimulus [1/ms], and tau [ms]. A drive of 0.2/ms fires at up to 200 spikes/s, three times the
-largest static rate."""
+"""Bounds and scales of a fit: the intercept [1/ms], the largest values of the dynamic and the static term
+under all stimuli [1/ms], and tau [ms]. A drive of 0.2/ms elicits up to 200 spikes/s, three times the largest
+static rate."""
 
 OFFSET_SCALE_MM = 0.1
-"""A change of the receptor's place that matters. [mm]"""
+"""Scale of the offset of the receptor. [mm]"""
 
 N_STARTS, N_REFINED = 32, 2
-"""Starts that are scored, and those from which least squares goes on."""
+"""Starts that are scored, and starts from which least squares continues."""
 
 FIRST_SPREAD, MOST_EVALUATIONS = 0.5, 600
-"""Of CMA-ES: the first generation's standard deviation in units of the scales, and its effort."""
+"""CMA-ES: standard deviation of the first generation in units of the scales, and most evaluations."""
 
 
 def four_number_problem(model: RateModel, recordings: RateRecordings) -> RateProblem:
-    """Problem of predicting recorded rates from the four identifiable numbers.
+    """Make the problem of fitting recorded rates in the four identifiable parameters.
 
     Parameters
     ----------
     model : RateModel
-        With the paper's six parameters.
+        Model of the paper's six parameters.
     recordings : RateRecordings
-        What was observed.
+        Observed rates.
     """
     return RateProblem(four_number_model(model), recordings)
 
 
 def five_number_problem(model: RateModel, recordings: RateRecordings) -> RateProblem:
-    """Problem of predicting recorded rates from the four identifiable numbers and the receptor's offset.
+    """Make the problem of fitting recorded rates in the four identifiable parameters and the offset.
 
     Parameters
     ----------
     model : RateModel
-        With the paper's six parameters and the offset behind them.
+        Model of the paper's six parameters and the offset.
     recordings : RateRecordings
-        What was observed.
+        Observed rates.
     """
 
     def seven(numbers: FloatArray) -> FloatArray:
@@ -73,12 +73,12 @@ def five_number_problem(model: RateModel, recordings: RateRecordings) -> RatePro
 
 @dataclass(frozen=True)
 class Bounds:
-    """Between which numbers a fit searches, and how far a step is.
+    """Bounds and scales of the parameters of a fit.
 
     Parameters
     ----------
     low, high, scales : array (n_parameters,)
-        Bounds, and a change that matters.
+        Bounds and scales.
     """
 
     low: FloatArray
@@ -86,24 +86,24 @@ class Bounds:
     scales: FloatArray
 
     def and_offset(self, low_mm: float = OFFSETS_MM[0], high_mm: float = OFFSETS_MM[-1]) -> Bounds:
-        """Return the bounds of the same parameters and the place of the receptor. [mm]"""
+        """Return the bounds of the same parameters and the offset of the receptor. [mm]"""
         offset = (low_mm, high_mm, OFFSET_SCALE_MM)
         sides = (self.low, self.high, self.scales)
         return Bounds(*(np.append(side, entry) for side, entry in zip(sides, offset, strict=True)))
 
     def spread(self, number: int) -> FloatArray:
-        """Spread points evenly between the bounds, (number, n_parameters), the same ones each time."""
+        """Points of a Halton sequence between the bounds, (number, n_parameters); deterministic."""
         shares = qmc.Halton(self.low.size, scramble=False).random(number + 1)[1:]  # the first is a corner
         return self.low + shares * (self.high - self.low)
 
 
 def bounds_of(*drives: Drive) -> Bounds:
-    """Bounds of the four identifiable numbers: those of `LOWEST`, `HIGHEST` and `SCALES`.
+    """Bounds of the four identifiable parameters: those of `LOWEST`, `HIGHEST` and `SCALES`.
 
     Parameters
     ----------
     *drives : Drive
-        Under all stimuli; the strongest one sets the unit of both gains.
+        Drives of all stimuli; the strongest one sets the unit of both gains.
 
     Examples
     --------
@@ -120,13 +120,13 @@ def bounds_of(*drives: Drive) -> Bounds:
 
 
 def by_differences(bounds: Bounds) -> LeastSquares:
-    """Least squares from starts all over the range."""
+    """Make the method of least squares from starts within the bounds, with differences."""
     starts = bounds.spread(N_STARTS)
     return LeastSquares(starts, bounds.scales, bounds.low, bounds.high, n_refined=N_REFINED)
 
 
 def along_slopes(smooth: SmoothRateModel, problem: RateProblem, bounds: Bounds) -> LeastSquares:
-    """Least squares in the four identifiable numbers, along the slopes of the rate in closed form.
+    """Make the method of least squares with the derivatives of a smooth model.
 
     Parameters
     ----------
@@ -135,23 +135,23 @@ def along_slopes(smooth: SmoothRateModel, problem: RateProblem, bounds: Bounds) 
     problem : RateProblem
         From `four_number_problem`.
     bounds : Bounds
-        Of the four numbers.
+        Of the four parameters.
     """
     slopes = problem.jacobian_of(smooth)
     return replace(by_differences(bounds), jacobian=slopes, name="slopes in closed form")
 
 
 def search_from(begun: FloatArray, bounds: Bounds, seed: int = 0) -> CovarianceAdaptation:
-    """CMA-ES that begins where a quicker method ended.
+    """Make CMA-ES from the result of a faster method.
 
     Parameters
     ----------
     begun : array (n_parameters,)
-        Middle of the first generation.
+        Mean of the first generation.
     bounds : Bounds
         Of the same parameters.
     seed : int, optional
-        Of the random numbers.
+        Seed of the random numbers.
     """
     return CovarianceAdaptation(
         begun,

@@ -1,14 +1,14 @@
-"""Rate of the membrane under a constant drive in closed form, with its slopes: a smooth stand-in for spikes.
+"""Rate of the membrane under a constant drive in closed form, with derivatives: a smooth approximation.
 
-In the four numbers that firing can tell (`fingerpad.inference.identifiable`) the membrane is driven by
-g = b + k_d U' + k_s U [1/ms], and its threshold is 1. A constant g brings it from 0 to the threshold in
-tau ln(x / (x - 1)), with x = tau g, the potential that the drive would hold. With the rest t_r after each
-spike the rate is
+In the four identifiable parameters (`fingerpad.inference.identifiable`) the membrane is driven by
+g = b + k_d U' + k_s U [1/ms], and its threshold is 1. Under a constant g the potential rises from 0 to the
+threshold in tau ln(x / (x - 1)), with the steady potential x = tau g. With the refractory period t_r the rate
+is
 
     f = 1 / (t_r + tau ln(x / (x - 1)))    for x > 1, else 0.
 
-Spikes enter and leave the windows of the paper one by one; f does not, and its slopes point past such jumps.
-At x = 1 its own slope is infinite, so x is bent over a width s: x - 1 is replaced by s ln(1 + e^((x - 1)/s)).
+Rates counted from spikes jump when a spike enters or leaves a window; f is smooth. At x = 1 its derivative is
+infinite, so x - 1 is replaced by s ln(1 + e^((x - 1)/s)) with a width s.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from fingerpad.inference.rate_model import AfferentModel, Rates, evaluate_rows
 from fingerpad.neuron.transduction import Drive
 
 BEND = 0.05
-"""Width over which the rate sets in, in units of the drive that just elicits spikes. [1]"""
+"""Width s over which the rate sets in, relative to the threshold. [1]"""
 
 SAMPLES = 16
-"""Moments in each window at which the drive is taken for constant."""
+"""Times in each window at which the rate under a constant drive is computed."""
 
 
 def constant_drive_rate(
@@ -38,7 +38,7 @@ def constant_drive_rate(
     refractory_ms: float = neuron.REFRACTORY.value,
     bend: float = 0.0,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rate under a constant drive, and its slopes along the drive and the time constant.
+    """Rate under a constant drive, and its derivatives along the drive and the time constant.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def constant_drive_rate(
     time_constant_ms : float
         tau. [ms]
     refractory_ms : float, optional
-        Rest after each spike, t_r. [ms]
+        Refractory period t_r. [ms]
     bend : float, optional
         Width s over which the rate sets in; 0 for the exact rate. [1]
 
@@ -61,11 +61,11 @@ def constant_drive_rate(
     Raises
     ------
     InputError
-        If the time constant is not positive, or rest or width are negative.
+        If the time constant is not positive, or refractory period or width are negative.
 
     Examples
     --------
-    2 µA over 1e-6 mF and 50 mV, as in `fingerpad.neuron.lif`: an interval takes 31.165 ms and the rest 1 ms.
+    2 µA over 1e-6 mF and 50 mV, as in `fingerpad.neuron.lif`: an interval is 31.165 ms + 1 ms.
 
     >>> rate_hz, _, _ = constant_drive_rate([0.04, 0.01], time_constant_ms=68.0)
     >>> rate_hz.round(3).tolist(), round(1000.0 / 32.165, 3)
@@ -88,7 +88,7 @@ def constant_drive_rate(
 
 
 def _bent(excess: FloatArray, bend: float) -> tuple[FloatArray, FloatArray]:
-    """Return x - 1 bent to stay above 0, and its slope."""
+    """Return the smoothed x - 1, which is above 0, and its derivative."""
     if bend == 0.0:
         return excess, np.ones_like(excess)
     return bend * np.logaddexp(0.0, excess / bend), np.exp(-np.logaddexp(0.0, -excess / bend))
@@ -164,7 +164,7 @@ class ClosedFormModel:
 
 
 def _samples(drive: Drive, window_ms: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
-    """U' and U at the middles of equal parts of a window, (SAMPLES, n_stimuli) each."""
+    """U' and U at the centres of equal parts of a window, (SAMPLES, n_stimuli) each."""
     start, end = window_ms
     times = start + (end - start) * (np.arange(SAMPLES) + 0.5) / SAMPLES
     before = np.searchsorted(drive.times_ms, times, "right") - 1

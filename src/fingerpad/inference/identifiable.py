@@ -1,12 +1,12 @@
-"""What firing can tell of an afferent: four numbers out of its six.
+"""The four identifiable parameters of an afferent with six.
 
-The membrane fires when the potential reaches the threshold, u = v. Divided by v, Eqs. 1 and 5 read
+A spike occurs when the potential reaches the threshold, u = v. Divided by v, Eqs. 1 and 5 read
 
     d(u/v)/dt = -(u/v)/tau + beta/(C v) + k_d/(C v) U' + k_s/(C v) U,
 
-and neither C nor v appears alone. beta, k_d, k_s, C and v are therefore known only up to a common scale: C or
-v may be multiplied by any number, and the three gains with it, without moving a spike. The three gains per
-C v, and tau, are what recordings determine (docs/decisions/four-identifiable-parameters.md).
+and neither C nor v appears alone. beta, k_d, k_s, C and v are therefore determined only up to a common scale:
+if C or v and the three gains are multiplied by the same number, no spike changes. Recordings determine the
+three gains over C v, and tau (docs/decisions/four-identifiable-parameters.md).
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ IDENTIFIABLE_NAMES = (
     "static_gain_per_kpa_ms",
     "time_constant_ms",
 )
-"""The four numbers in the paper's order: beta/(C v), k_d/(C v), k_s/(C v), tau."""
+"""The four parameters in the paper's order: beta/(C v), k_d/(C v), k_s/(C v), tau."""
 
 IDENTIFIABLE_UNITS = ("1/ms", "1/kPa", "1/(kPa ms)", "ms")
-"""Units of the four numbers."""
+"""Units of the four parameters."""
 
 
 def identifiable(parameters: ArrayLike) -> FloatArray:
-    """Return the four numbers that spikes determine.
+    """Return the four identifiable parameters.
 
     Parameters
     ----------
@@ -69,14 +69,14 @@ def six_parameters(
     capacitance_mf: float = neuron.CAPACITANCE.value,
     threshold_mv: float = neuron.THRESHOLD.value,
 ) -> FloatArray:
-    """Return one of the many sets of six that fire as the four numbers say: the one with this C and this v.
+    """Return the six parameters with given C and v that are equivalent to four identifiable ones.
 
     Parameters
     ----------
     four : array_like (..., 4)
         In the order of `IDENTIFIABLE_NAMES`.
     capacitance_mf, threshold_mv : float, optional
-        C [mF] and v [mV], chosen freely; the paper's start by default.
+        C [mF] and v [mV]; they can be chosen freely. Default: the paper's start.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def six_parameters(
     Raises
     ------
     InputError
-        If there are not four finite numbers, or C or v is not positive.
+        If there are not four finite numbers along the last axis, or C or v is not positive.
 
     Examples
     --------

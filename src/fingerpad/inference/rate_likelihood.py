@@ -1,16 +1,17 @@
-"""How likely observed rates are, given what a model predicts: its misfit is unknown in size and in reach.
+"""Likelihood of observed rates with correlated residuals of unknown size and correlation length.
 
-In either phase an observed rate is the predicted one plus a normal residual of unknown standard deviation
-sigma. A model that is wrong is wrong alike at neighbouring places: residuals at places d apart correlate by
-exp(-d/l), with an unknown length l; l = 0 are independent residuals. Neither sigma nor l is sampled. With
+In each phase an observed rate is the predicted one plus a normal residual of unknown standard deviation
+sigma. The error of a model is similar at neighbouring positions: residuals at a distance d have the
+correlation exp(-d/l), with an unknown length l; l = 0 means independent residuals. Sigma and l are integrated
+out. With
 
     q_l = r' R_l^-1 r,    R_l = exp(-|x_i - x_j|/l),    sigma^2 ~ scaled inverse chi-square(nu, s^2),
 
-and all lengths of a grid equally likely beforehand, both integrals have closed forms:
+and equal prior probabilities for all lengths of a grid, both integrals have closed forms:
 
     p(y | theta)  ~  sum_l |R_l|^(-1/2) (nu s^2 + q_l)^(-(n + nu)/2).
 
-See docs/decisions/likelihood-of-rates.md for the evidence that residuals are alike.
+See docs/decisions/likelihood-of-rates.md for the evidence that residuals are correlated.
 """
 
 from __future__ import annotations
@@ -30,18 +31,18 @@ INDEPENDENT = 0.0
 """Length at which residuals are independent. [mm]"""
 
 LENGTHS_MM = (INDEPENDENT, 0.2, 0.4, 0.6, 0.9, 1.3, 2.0, 3.0)
-"""Lengths over which residuals may be alike, from a step of the bar to a receptive field. [mm]"""
+"""Correlation lengths of the residuals, from a step of the bar to a receptive field. [mm]"""
 
 DEVIATION_HZ = 10.0
-"""Standard deviation s that the prior expects. [spikes/s]"""
+"""Scale s of the prior of sigma. [spikes/s]"""
 
 PRIOR_OBSERVATIONS = 1.0
-"""Number nu of observations that the prior's word is worth."""
+"""Degrees of freedom nu of the prior of sigma."""
 
 
 @dataclass(frozen=True)
 class RateLikelihood:
-    """Observed rates of one afferent, and the model whose parameters they are to tell.
+    """Likelihood of the parameters of a rate model, given the observed rates of one afferent.
 
     Parameters
     ----------
@@ -50,17 +51,16 @@ class RateLikelihood:
     recordings : RateRecordings
         Observed rates, one row per stimulus.
     positions_mm : array (n_stimuli,), optional
-        Where along a line each stimulus was, if residuals of neighbours may be alike; without, residuals are
-        independent. [mm]
+        Position of each stimulus along a line; default: independent residuals. [mm]
     lengths_mm : tuple of float, optional
-        Lengths of correlation that are tried; 0 is independence. [mm]
+        Grid of correlation lengths; 0 for independence. [mm]
     deviation_hz : float, optional
-        What the prior expects of sigma. [spikes/s]
+        Scale s of the prior of sigma. [spikes/s]
 
     Raises
     ------
     InputError
-        If numbers of stimuli differ, or two stimuli stand in one place.
+        If numbers of stimuli differ, or two stimuli have the same position.
 
     Examples
     --------
@@ -100,12 +100,12 @@ class RateLikelihood:
             places = float_array("positions_mm", self.positions_mm, 1)
             if places.size != n or np.unique(places).size != n:
                 raise InputError(
-                    f"positions_mm needs a place of its own for each of {n} stimuli: "
+                    f"positions_mm needs a different position for each of {n} stimuli: "
                     f"got {places.size} values, {np.unique(places).size} of them different."
                 )
             distances = np.abs(places[:, None] - places)
         whitening = np.array([_whitening(distances, length) for length in lengths])
-        # log |R|^(-1/2), and equal shares of the prior.
+        # log |R|^(-1/2), and equal prior probabilities.
         log_weights = np.log(np.diagonal(whitening, axis1=1, axis2=2)).sum(axis=1) - np.log(lengths.size)
         object.__setattr__(self, "lengths_mm", tuple(lengths.tolist()))
         object.__setattr__(self, "_whitening", whitening)
@@ -117,9 +117,9 @@ class RateLikelihood:
         return self.recordings.phases
 
     def log_likelihood(self, points: FloatArray) -> FloatArray:
-        """Log likelihood of parameters, sigma and length integrated out, up to a constant.
+        """Log likelihood of parameters up to a constant, with sigma and length integrated out.
 
-        The constant depends on neither model nor lengths: differences between either are evidence.
+        The constant does not depend on the model or the lengths, so differences between them are evidence.
 
         Parameters
         ----------
@@ -133,12 +133,12 @@ class RateLikelihood:
         return self.log_likelihood_of_rates(*self.model.evaluate_batch(points))
 
     def log_likelihood_of_rates(self, dynamic_hz: FloatArray, static_hz: FloatArray) -> FloatArray:
-        """Log likelihood as above, where the rates that points predict are known already.
+        """Log likelihood as above, for predicted rates.
 
         Parameters
         ----------
         dynamic_hz, static_hz : array (n_points, n_stimuli)
-            Predicted rates; those of a phase that was not recorded have no part. [spikes/s]
+            Predicted rates; those of a phase that was not recorded are not used. [spikes/s]
 
         Returns
         -------
@@ -153,7 +153,7 @@ class RateLikelihood:
         )
 
     def residual_draws(self, points: FloatArray, random: np.random.Generator) -> dict[str, ResidualDraws]:
-        """Draw sigma and length of every phase, given each row of parameters.
+        """Draw sigma and length of every phase for each row of parameters.
 
         Parameters
         ----------
@@ -172,7 +172,7 @@ class RateLikelihood:
     def residual_draws_of_rates(
         self, dynamic_hz: FloatArray, static_hz: FloatArray, random: np.random.Generator
     ) -> dict[str, ResidualDraws]:
-        """Draw as above, where the rates that points predict are known already.
+        """Draw as above, for predicted rates.
 
         Parameters
         ----------
@@ -199,7 +199,7 @@ class RateLikelihood:
         which = (random.uniform(size=(n_points, 1)) > shares[:, :-1]).sum(axis=1)
         total = PRIOR_OBSERVATIONS * self.deviation_hz**2 + squares[np.arange(n_points), which]
         deviation = np.sqrt(total / random.chisquare(PRIOR_OBSERVATIONS + n, size=n_points))
-        # A new recording departs from the prediction as far as this one, elsewhere.
+        # A new recording has residuals of the same size, independent of those observed.
         new = np.maximum(predicted + deviation[:, None] * random.normal(size=predicted.shape), 0.0)
         return ResidualDraws(predicted, new, deviation, np.array(self.lengths_mm)[which])
 
@@ -214,23 +214,23 @@ class RateLikelihood:
             yield phase, predicted[phase], (white**2).sum(axis=2).T
 
     def _log_shares(self, squares: FloatArray) -> FloatArray:
-        """Logarithm of each length's part of the likelihood, (n_points, n_lengths)."""
+        """Logarithm of the likelihood for each length, (n_points, n_lengths)."""
         exponent = 0.5 * (PRIOR_OBSERVATIONS + self.model.n_stimuli)
         return self._log_weights - exponent * np.log(PRIOR_OBSERVATIONS * self.deviation_hz**2 + squares)
 
 
 @dataclass(frozen=True)
 class ResidualDraws:
-    """Rates of one phase, predicted and as a new recording would have them.
+    """Rates of one phase, predicted and of a new recording.
 
     Parameters
     ----------
     predicted_hz, new_hz : array (n_points, n_stimuli)
-        Predicted, and with a residual of its own; not below 0. [spikes/s]
+        Predicted rates, and rates with a random residual, not below 0. [spikes/s]
     deviation_hz : array (n_points,)
         Standard deviation sigma. [spikes/s]
     length_mm : array (n_points,)
-        Length over which residuals are alike; 0 if they are independent. [mm]
+        Correlation length of the residuals; 0 if they are independent. [mm]
     """
 
     predicted_hz: FloatArray

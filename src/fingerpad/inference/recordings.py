@@ -1,4 +1,4 @@
-"""What was recorded from one afferent: rates per stimulus, or spike trains per presentation."""
+"""Recordings of one afferent: rates per stimulus, or spike trains per presentation."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class RateRecordings:
     Parameters
     ----------
     stimuli : tuple of str
-        Names of the stimuli, each once.
+        Names of the stimuli, without repetition.
     dynamic_rate_hz, static_rate_hz : array (n_stimuli,) or None
         Rates in the ramp and in the hold; None for a phase that was not recorded. [spikes/s]
     source : str
-        Where they come from.
+        Origin of the recordings.
 
     Raises
     ------
@@ -52,7 +52,7 @@ class RateRecordings:
         object.__setattr__(self, "stimuli", tuple(self.stimuli))
         twice = sorted({name for name in self.stimuli if self.stimuli.count(name) > 1})
         if twice:
-            raise InputError(f"stimuli must be named once each: {twice[0]!r} is repeated, take its mean.")
+            raise InputError(f"stimuli must be named once each: {twice[0]!r} is repeated; take its mean.")
         if not self.phases:
             raise InputError("RateRecordings needs dynamic_rate_hz, static_rate_hz or both: got neither.")
         for phase in self.phases:
@@ -68,16 +68,16 @@ class RateRecordings:
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """Which of "dynamic" and "static" were recorded."""
+        """The recorded ones of "dynamic" and "static"."""
         return tuple(phase for phase in PHASES if getattr(self, f"{phase}_rate_hz") is not None)
 
     @property
     def n_rates(self) -> int:
-        """How many rates there are, both phases together."""
+        """Number of rates in both phases."""
         return len(self.phases) * len(self.stimuli)
 
     def chosen(self, rows: ArrayLike) -> RateRecordings:
-        """Keep some of the stimuli, by their indices."""
+        """Select stimuli by their indices."""
         indices = np.asarray(rows, dtype=np.int64)
         rates = {f"{phase}_rate_hz": getattr(self, f"{phase}_rate_hz") for phase in PHASES}
         return RateRecordings(
@@ -94,18 +94,18 @@ class SpikeRecordings:
     Parameters
     ----------
     stimuli : tuple of str
-        Stimulus of each presentation; one that was presented several times stands several times.
+        Stimulus of each presentation, repeated if it was presented several times.
     trains : SpikeTrains
         One train per presentation, times from the onset of the indentation. [ms]
     duration_ms : array (n_presentations,) or float
-        For how long spikes were recorded from the onset on, each time or always. [ms]
+        Duration of each recording, or of all of them, from the onset. [ms]
     source : str
-        Where they come from.
+        Origin of the recordings.
 
     Raises
     ------
     InputError
-        If sizes disagree, or a spike lies outside of its recording.
+        If sizes disagree, or a spike is outside of its recording.
 
     Examples
     --------
@@ -152,7 +152,7 @@ class SpikeRecordings:
             protocol.STATIC_WINDOW.value,
         ),
     ) -> RateRecordings:
-        """Rates of each stimulus in the ramp and in the hold, Eqs. 6-10, mean of its presentations.
+        """Compute the rates of each stimulus in the ramp and in the hold, Eqs. 6-10, mean over presentations.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""An afferent with a soft threshold, described by the five numbers that spikes determine."""
+"""An afferent with a soft threshold in the five parameters that spikes determine."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ def soft_spikes(
     parameters : array (5,)
         In the order of `fingerpad.inference.spike_parameters.SPIKE_PARAMETER_NAMES`.
     presentations : Presentations
-        Which stimulus each train answers.
+        Stimulus of each train.
     seed : int
-        Of the random numbers.
+        Seed of the random numbers.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def soft_spikes(
 
 @dataclass(frozen=True)
 class SoftAfferent:
-    """Mean rates of an afferent with a soft threshold; a `RateModel` in the five numbers of its spikes.
+    """Mean rates of an afferent with a soft threshold; a `RateModel` in the five parameters of its spikes.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class SoftAfferent:
     windows_ms : ((float, float), (float, float))
         Windows of the dynamic and of the static rate. [ms]
     seed : int
-        Of the simulated presentations, the same for all parameters.
+        Seed of the simulated presentations, the same for all parameters.
     """
 
     drive: Drive
@@ -79,7 +79,7 @@ class SoftAfferent:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The four identifiable numbers and the width of the threshold."""
+        """The four identifiable parameters and the width of the threshold."""
         return SPIKE_PARAMETER_NAMES
 
     @property

@@ -1,8 +1,8 @@
 """Fit an afferent with a soft threshold to spike trains by maximum likelihood.
 
-Newton's method with the expected curvature (Fisher scoring), damped as Levenberg and Marquardt do, in the
-numbers (A, B, C, G, ln tau) of `fingerpad.inference.spike_parameters`: at a given tau log L is concave in
-the other four, and a start far away is no harm.
+Newton's method with the expected curvature (Fisher scoring) and Levenberg-Marquardt damping, in the
+parameters (A, B, C, G, ln tau) of `fingerpad.inference.spike_parameters`. For a given tau, log L is concave
+in the other four, so the fit converges from a distant start.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from fingerpad.inference.spike_parameters import (
 )
 
 POSITIVE = np.array([False, False, False, True, True])
-"""Parameters that cannot be negative: tau and the width."""
+"""Whether a parameter is positive: tau and the width are."""
 
 NARROWEST = 1.0e-3
-"""Width below which a threshold counts as hard, and log L as unbounded."""
+"""Width below which the threshold is considered hard and log L unbounded."""
 
 SMALLEST_GAIN = 1.0e-6
-"""A fit ends when one more step promises to raise log L by less."""
+"""A fit ends when the predicted gain of log L of a step is at most this."""
 
 _FIRST_DAMPING, _MOST_DAMPING = 1.0e-3, 1.0e12
 _LONGEST_STEP_OF_LOG_TAU = 1.0
@@ -41,14 +41,14 @@ _LONGEST_STEP_OF_LOG_TAU = 1.0
 
 @dataclass(frozen=True)
 class SpikeFit:
-    """Parameters that make the spikes most likely, and how well the spikes determine them.
+    """Maximum-likelihood parameters and their covariance.
 
     Parameters
     ----------
     parameters : array (5,)
         In the order of `fingerpad.inference.spike_parameters.SPIKE_PARAMETER_NAMES`.
     covariance : array (5, 5)
-        Inverse of the information.
+        Inverse of the Fisher information.
     log_likelihood : float
         At the parameters.
     n_spikes : int
@@ -74,12 +74,12 @@ class SpikeFit:
         return self.covariance / np.outer(self.standard_errors, self.standard_errors)
 
     def interval(self, level: float = 0.95) -> FloatArray:
-        """Confidence interval of each parameter: symmetric for the gains, by a factor for tau and the width.
+        """Confidence interval of each parameter, symmetric for the gains, in the logarithm for tau and width.
 
         Parameters
         ----------
         level : float, optional
-            How often such intervals hold the truth. [0-1]
+            Probability that such intervals contain the true value. [0-1]
 
         Returns
         -------
@@ -105,16 +105,16 @@ class SpikeFit:
 
 
 def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 100) -> SpikeFit:
-    """Find the parameters under which recorded spikes are most likely.
+    """Fit parameters to recorded spikes by maximum likelihood.
 
     Parameters
     ----------
     recorded : SpikeLikelihood
-        The spikes and what drove them.
+        The spikes and their drives.
     start : array_like (5,)
-        Where to begin, in the order of `SPIKE_PARAMETER_NAMES`; a wide threshold (0.5) is a safe one.
+        Start, in the order of `SPIKE_PARAMETER_NAMES`; a wide threshold (0.5) is robust.
     most_steps : int, optional
-        Give up after so many.
+        Largest number of steps.
 
     Returns
     -------
@@ -123,10 +123,10 @@ def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 10
     Raises
     ------
     InputError
-        If there are fewer spikes than parameters, or the start makes no sense.
+        If there are fewer spikes than parameters, or the start is invalid.
     ConvergenceError
-        If the fit does not end, or ends nowhere: spikes as regular as a clock have no width, and stimuli that
-        are all alike cannot tell the gains apart.
+        If the fit does not converge or has no maximum: perfectly regular spikes determine no width, and equal
+        stimuli do not determine all gains.
 
     Examples
     --------
@@ -142,7 +142,7 @@ def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 10
     if not np.isfinite(value):
         raise InputError(f"start must make the spikes possible: log L is {value}; take a wider threshold.")
     history = [value]
-    # Far from the maximum a step would throw tau away: first the four numbers in which log L is concave.
+    # Far from the maximum, steps of tau are unreliable: fit the four concave parameters first.
     for free in (slice(0, 4), slice(0, N_PARAMETERS)):
         here, information = _climb(recorded, here, free, history, most_steps)
     return _finished(recorded, here, information, history)
@@ -151,7 +151,7 @@ def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 10
 def _climb(
     recorded: SpikeLikelihood, start: FloatArray, free: slice, history: list[float], most_steps: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Raise log L in the free numbers until one more step promises nothing; write down each step."""
+    """Maximise log L in the free parameters; append each value to the history."""
     here = start
     value, gradient, information = recorded.canonical_derivatives(here)
     damping = _FIRST_DAMPING
@@ -170,29 +170,33 @@ def _climb(
                     break
             damping *= 10.0
             if damping > _MOST_DAMPING:
-                raise ConvergenceError("fit_spikes found no way up: try another start.", _lines(history))
+                raise ConvergenceError(
+                    "fit_spikes found no step that raises log L: try another start.", _lines(history)
+                )
         here, (value, gradient, information) = there, trial
         damping = max(0.1 * damping, 1e-12)
         history.append(value)
         if here[3] > 1.0 / NARROWEST:
             raise ConvergenceError(
                 f"fit_spikes made the threshold narrower than {NARROWEST:g}: the spikes are too regular to "
-                "tell how soft it is; fit rates instead.",
+                "determine its width; fit rates instead.",
                 _lines(history),
             )
-    raise ConvergenceError(f"fit_spikes did not end in {most_steps} steps: allow more.", _lines(history))
+    raise ConvergenceError(
+        f"fit_spikes has not converged after {most_steps} steps: allow more.", _lines(history)
+    )
 
 
 def _promised_gain(gradient: FloatArray, information: FloatArray, history: list[float]) -> float:
-    """Return what a full step would add to log L if it were a parabola, g' J^-1 g / 2."""
+    """Return the gain of log L of a full step in the quadratic approximation, g' J^-1 g / 2."""
     scale = np.sqrt(np.diag(information))
-    # Scaled, the information has ones on its diagonal, and its condition says how well it can be inverted.
+    # Scaled to a unit diagonal, the condition number shows whether the information can be inverted.
     known = bool((scale > 0.0).all()) and np.isfinite(information).all()
     scaled = information / np.outer(scale, scale) if known else information
     if not known or np.linalg.cond(scaled) > 1.0 / np.finfo(np.float64).eps:
         raise ConvergenceError(
-            "fit_spikes met spikes that do not tell all parameters apart: record more, or more different, "
-            "stimuli.",
+            "fit_spikes needs spikes that determine all parameters: these do not; record more, or more "
+            "different, stimuli.",
             _lines(history),
         )
     slopes = gradient / scale

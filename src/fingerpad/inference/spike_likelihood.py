@@ -1,21 +1,21 @@
-"""How likely spike trains are under an afferent with a soft threshold (`fingerpad.neuron.escape_rate`).
+"""Likelihood of spike trains under an afferent with a soft threshold (`fingerpad.neuron.escape_rate`).
 
-With u the potential over the threshold and w the width of the threshold, both pure numbers,
+With the potential u and the width w, both over the threshold,
 
-    log L = sum over spikes of ln h(u) - integral of h over the time not at rest,
+    log L = sum over spikes of ln h(u) - integral of h over the time outside refractory periods,
     ln h  = (u - 1)/w - ln tau_e.
 
-Given the spikes, u is a sum of three responses, to a constant 1, to U' and to U, weighted with the gains:
+Given the spikes, u is a sum of the responses to a constant 1, to U' and to U, weighted by the gains:
 
     u = a X1 + b X2 + c X3,    (a, b, c) = (beta, k_d, k_s)/(C v).
 
-In the numbers A = a/w, B = b/w, C = c/w and G = 1/w, ln h is linear and log L concave at any given tau.
-Its derivatives come from the same sweep over the data: with g the gradient of ln h,
+In the parameters A = a/w, B = b/w, C = c/w and G = 1/w, ln h is linear and log L is concave for any given
+tau. Its derivatives are computed in the same pass over the data: with the gradient g of ln h,
 
     gradient    = sum over spikes of g - integral of h g,
     information = integral of h g g',
 
-exact but for Gauss's formula. The trains are cut once into stretches, between knots of the drive and spikes.
+exact except for the quadrature. The trains are divided once into intervals between knots and spikes.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ from fingerpad.neuron.escape_rate import ESCAPE_TIME_MS
 from fingerpad.neuron.transduction import Drive
 
 _TRAINS_PER_BLOCK = 8
-"""Trains that one thread goes through at a time; sums are taken block by block, on any number of threads."""
+"""Trains that one thread evaluates at a time; sums are taken block by block on any number of threads."""
 
 
 @dataclass(frozen=True)
 class SpikeLikelihood:
-    """Spike trains of one afferent under known drives, and how likely parameters make them.
+    """Likelihood of parameters, given spike trains of one afferent under known drives.
 
     Parameters
     ----------
@@ -57,22 +57,22 @@ class SpikeLikelihood:
     trains : SpikeTrains
         One train per presentation. [ms]
     sites : int array (n_trains,), optional
-        Column of the drive that each train answers. Default: the first train the first, and so on.
+        Column of the drive of each train. Default: in order.
     duration_ms : float or array (n_trains,), optional
-        When each recording ends. Default: with the drive. [ms]
+        End of each recording. Default: the end of the drive. [ms]
     refractory_ms : float, optional
-        Rest after each spike, which is known. [ms]
+        Refractory period, which is not fitted. [ms]
     escape_ms : float, optional
         tau_e, a convention. [ms]
 
     Raises
     ------
     InputError
-        If shapes disagree, a spike lies outside of its recording, or two lie closer than the rest allows.
+        If shapes disagree, a spike is outside of its recording, or two are closer than the refractory period.
 
     Examples
     --------
-    A drive of nothing, an intercept that holds the potential at its threshold: 1 spike per tau_e.
+    Without a stimulus, with an intercept that keeps the potential at the threshold: 1 spike per tau_e.
 
     >>> nothing = Drive([0.0, 1e4], [[0.0], [0.0]], [[0.0], [0.0]])
     >>> recorded = SpikeLikelihood(nothing, SpikeTrains.from_lists([[9000.0]]))
@@ -127,11 +127,6 @@ class SpikeLikelihood:
         """Number of spikes in all trains."""
         return self.trains.times_ms.size
 
-    @property
-    def observed_ms(self) -> float:
-        """Length of all recordings together. [ms]"""
-        return float(np.sum(np.asarray(self.duration_ms) - self.drive.times_ms[0]))
-
     def log_likelihood(self, parameters: ArrayLike) -> float:
         """Logarithm of the likelihood.
 
@@ -153,7 +148,7 @@ class SpikeLikelihood:
         return self.derivatives(parameters)[0]
 
     def derivatives(self, parameters: ArrayLike) -> tuple[float, FloatArray, FloatArray]:
-        """Logarithm of the likelihood, its gradient, and the information in the data.
+        """Logarithm of the likelihood, its gradient, and the Fisher information.
 
         Parameters
         ----------
@@ -166,7 +161,7 @@ class SpikeLikelihood:
         gradient : array (5,)
             With respect to the parameters, per unit of each.
         information : array (5, 5)
-            Fisher's, given when the spikes came; its inverse estimates the covariance of a fit.
+            Fisher information given the spikes; its inverse estimates the covariance of a fit.
 
         Raises
         ------
@@ -179,7 +174,7 @@ class SpikeLikelihood:
         return value, jacobian.T @ gradient, jacobian.T @ information @ jacobian
 
     def canonical_derivatives(self, numbers: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        """Return the same in the numbers (A, B, C, G, ln tau), in which a fit is best done; unchecked."""
+        """Return the same in the parameters (A, B, C, G, ln tau) of fits, without checks."""
 
         def block(trains: slice) -> tuple[float, FloatArray, FloatArray]:
             gradient, information = np.zeros(N_PARAMETERS), np.zeros((N_PARAMETERS, N_PARAMETERS))
@@ -193,10 +188,10 @@ class SpikeLikelihood:
         return value, gradient, half + np.triu(half, 1).T
 
     def operational_times(self, parameters: ArrayLike) -> FloatArray:
-        """Integral of the hazard up to each spike, all trains laid end to end.
+        """Integral of the hazard up to each spike, over all trains in sequence.
 
         Under the true parameters these are the events of a Poisson process of rate 1: their differences are
-        independent and exponential with mean 1, and no recording's end disturbs that.
+        independent and exponential with mean 1, also across the ends of recordings.
 
         Parameters
         ----------
@@ -216,7 +211,7 @@ class SpikeLikelihood:
         return operational_times(*self._part(slice(0, len(self.trains))), numbers, float(self.escape_ms))
 
     def _part(self, trains: slice) -> tuple[FloatArray, np.ndarray]:
-        """Stretches of some trains."""
+        """Intervals of some trains."""
         values, flags, offsets = self._stretches
         stretches = slice(offsets[trains.start], offsets[trains.stop])
         return values[stretches], flags[stretches]
@@ -224,16 +219,16 @@ class SpikeLikelihood:
 
 @dataclass(frozen=True)
 class TimeRescaling:
-    """Whether a model can have made the spikes, by the time-rescaling theorem (Brown et al. 2002).
+    """Goodness-of-fit test of spikes by the time-rescaling theorem (Brown et al. 2002).
 
     Parameters
     ----------
     quantiles : array (n_spikes,)
-        1 - exp(-rescaled interval) of each interval, in order of size: uniform under the model.
+        1 - exp(-rescaled interval) of each interval, sorted: uniform under the model.
     statistic : float
-        Largest distance of their distribution from the uniform one (Kolmogorov-Smirnov).
+        Kolmogorov-Smirnov distance between their distribution and the uniform one.
     p_value : float
-        Chance of a larger one, if the parameters are true; with fitted parameters it errs to the high side.
+        Probability of a larger distance under the true parameters; for fitted ones it is too large.
     """
 
     quantiles: FloatArray
@@ -258,7 +253,7 @@ def time_rescaling(recorded: SpikeLikelihood, parameters: ArrayLike) -> TimeResc
     Raises
     ------
     InputError
-        If there is no spike, or the parameters are none.
+        If there is no spike, or the parameters are invalid.
 
     Examples
     --------

@@ -1,10 +1,10 @@
-"""The five numbers of an afferent with a soft threshold, and the form in which they are best fitted.
+"""The five parameters of an afferent with a soft threshold, and their canonical form for fits.
 
 With a, b, c = (beta, k_d, k_s)/(C v), tau and the width w of the threshold over the threshold,
 
     A = a/w,    B = b/w,    C = c/w,    G = 1/w,    ln tau
 
-are numbers in which the logarithm of the hazard is linear, but for tau.
+are parameters in which the logarithm of the hazard is linear, except for tau.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from fingerpad.core.errors import InputError
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS
 
 SPIKE_PARAMETER_NAMES = (*IDENTIFIABLE_NAMES, "escape_width")
-"""What spikes determine: the four identifiable numbers, and the width of the threshold over the threshold."""
+"""The four identifiable parameters, and the width of the threshold over the threshold."""
 
 SPIKE_PARAMETER_UNITS = (*IDENTIFIABLE_UNITS, "1")
-"""Units of the five numbers."""
+"""Units of the five parameters."""
 
 N_PARAMETERS = len(SPIKE_PARAMETER_NAMES)
 
@@ -69,7 +69,7 @@ def from_canonical(numbers: FloatArray) -> FloatArray:
 
 
 def canonical_jacobian(parameters: FloatArray) -> FloatArray:
-    """Return the derivatives of `canonical`, a row for each of its numbers.
+    """Return the Jacobian of `canonical`.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def canonical_jacobian(parameters: FloatArray) -> FloatArray:
 
 
 def checked_spike_parameters(parameters: ArrayLike) -> FloatArray:
-    """Return five finite numbers of which tau and the width are positive, else raise `InputError`.
+    """Return five finite parameters with positive tau and width, else raise `InputError`.
 
     Parameters
     ----------

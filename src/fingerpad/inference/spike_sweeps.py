@@ -1,7 +1,7 @@
-"""Sweeps over spike trains behind `fingerpad.inference.spike_likelihood`, compiled.
+"""Compiled kernels of `fingerpad.inference.spike_likelihood`.
 
-The trains are cut once into stretches, between knots of the drive and spikes; every set of parameters then
-sweeps over them.
+The trains are divided once into intervals between knots of the drive and spikes. The likelihood of a set of
+parameters is computed in one pass over the intervals.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ def cut(
     offsets: np.ndarray,
     refractory: float,
 ) -> tuple[FloatArray, np.ndarray, np.ndarray]:
-    """Cut trains into stretches without knots or spikes inside; rests are left out.
+    """Divide trains into intervals without knots or spikes inside, without refractory periods.
 
     Returns
     -------
     array (n_stretches, 5)
         Length [ms], U' at the beginning and end [kPa/ms], U at the beginning and end [kPa].
     bool array (n_stretches, 2)
-        Whether the potential begins at 0, and whether a spike ends it.
+        Whether the potential starts at 0, and whether a spike ends the interval.
     array (n_trains + 1,)
-        Where the stretches of each train begin.
+        Index of the first interval of each train.
     """
     most = sites.size * times.size + 2 * spikes.size
     values = np.empty((most, 5))
@@ -84,7 +84,7 @@ def sweep(
     gradient: FloatArray,
     information: FloatArray,
 ) -> float:
-    """Return log L, but for the constant ln tau_e of each spike; add to its gradient and information.
+    """Return log L without the constant ln tau_e of each spike; add to its gradient and information.
 
     z is the derivative of the potential with respect to ln tau. In x = s/tau it follows dz/dx = u - z, so
     that from z0, and u = p + q x + r e^-x,
@@ -127,7 +127,7 @@ def sweep(
                     gradient[i] -= weighted
                     for j in range(i, 5):
                         information[i, j] += weighted * slopes[j]
-            if value == -math.inf:  # impossible, and its many panels would take long
+            if value == -math.inf:  # impossible parameters, for which further panels are costly
                 return value
         gone = -math.expm1(-length)
         lag = length - gone
@@ -146,7 +146,7 @@ def sweep(
 def operational_times(
     stretches: FloatArray, flags: np.ndarray, numbers: FloatArray, escape: float
 ) -> FloatArray:
-    """Integral of the hazard up to the end of each stretch that a spike ends."""
+    """Integral of the hazard up to the end of each interval with a spike."""
     found = np.empty(flags[:, 1].sum())
     gradient, information = np.zeros(5), np.zeros((5, 5))
     count, first = 0, 0
@@ -155,6 +155,6 @@ def operational_times(
             sweep(stretches[first : n + 1], flags[first : n + 1], numbers, escape, gradient, information)
             first = n + 1
             count += 1
-            # d log L/dG is the integral, less one for each spike.
+            # d log L/dG is the integral minus one for each spike.
             found[count - 1] = gradient[3] + count
     return found

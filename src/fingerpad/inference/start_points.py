@@ -13,14 +13,14 @@ INCREMENT = 0.01
 """Coding increment over the start value; the paper's are "typically two orders of magnitude smaller"."""
 
 LOWEST_SHARE = 0.05
-"""Time constant, capacitance and threshold stay above this share of their start, to stay physical."""
+"""Lower bound of time constant, capacitance and threshold over their start."""
 
 START_WIDTH = 0.5
-"""Width of the threshold over the threshold where every fit to spikes starts. [1]"""
+"""Width of the threshold over the threshold at the start of fits to spikes. [1]"""
 
 
 def printed_starts() -> FloatArray:
-    """Both start points of the paper as they are printed, (2, 6), with energy density in kPa.
+    """Both start points of the paper as printed, (2, 6), with energy density in kPa.
 
     Returns
     -------
@@ -45,16 +45,16 @@ def printed_starts() -> FloatArray:
 
 
 def start_points() -> FloatArray:
-    """Both start points of the paper, (2, 6), the printed gains rescaled.
+    """Both start points of the paper, (2, 6), with rescaled gains.
 
-    See docs/decisions/dynamic-gain-rescaled.md for why one factor on k_d and one on k_s, the same in both.
+    One factor of k_d and one of k_s hold for both, see docs/decisions/dynamic-gain-rescaled.md.
     """
     scales = [1.0, neuron.DYNAMIC_GAIN_SCALE.value, neuron.STATIC_GAIN_SCALE.value, 1.0, 1.0, 1.0]
     return printed_starts() * scales
 
 
 def spike_start() -> FloatArray:
-    """Return where every fit to spikes starts: the paper's first start point with a soft threshold.
+    """Start of every fit to spikes: the paper's first start point with a soft threshold.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def increments(starts: FloatArray) -> FloatArray:
 
 
 def response_surface(starts: FloatArray | None = None) -> ResponseSurface:
-    """Return the paper's method. Gains stay positive, and the membrane stays physical.
+    """Return the paper's method, with gains and parameters of the membrane bounded below.
 
     Parameters
     ----------

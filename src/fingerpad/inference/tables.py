@@ -1,4 +1,4 @@
-"""Tables that users bring: rows with their place in the file, so that an error can name it."""
+"""Tables in user files: rows with their position in the file, for error messages."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Check = Callable[[str, Any, str], float]
 
 @dataclass(frozen=True)
 class TableRow:
-    """One row of a table and where it stands.
+    """One row of a table and its position in the file.
 
     Parameters
     ----------
     place : str
-        File and line as a person would look for them.
+        File and line, for messages.
     entries : mapping of str to Any
-        Texts, or values of a file that has types, by column; an absent or empty entry was not given.
+        Texts, or typed values, by column; an absent or empty entry was not given.
 
     Examples
     --------
@@ -56,7 +56,7 @@ class TableRow:
             return check(column, self.entries[column], unit)
 
     def refuse_others(self, known: Collection[str], kind: str) -> None:
-        """Raise `InputError` if the row gives something that a `kind` does not have."""
+        """Raise `InputError` if the row has an entry in a column that a `kind` does not have."""
         for column in self.entries:
             if self.has(column) and column not in known:
                 raise InputError(
@@ -65,7 +65,7 @@ class TableRow:
 
     @contextmanager
     def placed(self) -> Iterator[None]:
-        """Put the place in front of an `InputError` from within."""
+        """Prefix an `InputError` raised in the block with the position in the file."""
         try:
             yield
         except InputError as error:
@@ -90,8 +90,8 @@ def read_csv(path: Path, known: Sequence[str]) -> list[TableRow]:
     Raises
     ------
     InputError
-        If the file cannot be read, is empty, has a column that is unknown or is repeated, or a row with
-        too few or too many entries.
+        If the file cannot be read, is empty, has an unknown or repeated column, or a row with too few or too
+        many entries.
 
     Examples
     --------
@@ -129,6 +129,6 @@ def read_csv(path: Path, known: Sequence[str]) -> list[TableRow]:
 
 
 def _without_comments(text: str) -> Iterator[str]:
-    """Lines of a text; comments leave empty ones, so that the numbers of the others stay."""
+    """Lines of a text, with comments replaced by empty lines to keep the line numbers."""
     for line in io.StringIO(text, newline=""):
         yield "\n" if line.lstrip().startswith("#") else line

@@ -33,8 +33,8 @@ PARAMETER_UNITS = ("mA", "mA ms/kPa", "mA/kPa", "ms", "mF", "mV")
 class Afferent:
     """A slowly adapting type I (SAI) afferent.
 
-    The defaults are our fit to the recordings under the shifted bar (`fingerpad.data.neuron`, names
-    ending in FITTED), and hold for the finger and tissues of that fit.
+    The defaults are the fit to the recordings under the shifted bar (`fingerpad.data.neuron`, names
+    ending in FITTED). They hold for the finger and tissues with which they were fitted.
 
     Parameters
     ----------
@@ -53,8 +53,8 @@ class Afferent:
     refractory_ms : float
         Refractory period after each spike. [ms]
     dynamic_quantity : str
-        Quantity that drives the dynamic term, a name of `SkinResponse.sample`. Any but SED, "stored", is an
-        extension of the paper's model; the unit of k_d depends on it.
+        Quantity of the dynamic term, by the names of `SkinResponse.sample`. Any but SED, "stored", is an
+        extension of the paper's model. The unit of k_d depends on it.
 
     Raises
     ------
@@ -63,7 +63,7 @@ class Afferent:
 
     Examples
     --------
-    SED rises to 2 kPa in 50 ms and stays: the afferent fires fast in the ramp, slowly in the hold.
+    SED rises to 2 kPa in 50 ms and stays: the rate is high in the ramp and low in the hold.
 
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
     >>> dynamic_hz, static_hz = Afferent().rates(sed)
@@ -81,7 +81,7 @@ class Afferent:
     dynamic_quantity: str = STORED_ENERGY
 
     def __post_init__(self) -> None:
-        # Both stages check their parameters; they are made here once to check at the boundary.
+        # Both stages check their parameters when they are made.
         self.transduction, self.membrane  # noqa: B018
 
     @classmethod
@@ -101,7 +101,7 @@ class Afferent:
         refractory_ms : float, optional
             Refractory period after each spike, which is not fitted. [ms]
         dynamic_quantity : str, optional
-            Quantity that drives the dynamic term.
+            Quantity of the dynamic term.
 
         Returns
         -------
@@ -141,13 +141,13 @@ class Afferent:
         )
 
     def spikes(self, sed: SedTraces | Drive) -> SpikeTrains:
-        """Spike trains of this afferent with its end organ at each site.
+        """Simulate the spikes of this afferent at every site.
 
         Parameters
         ----------
         sed : SedTraces or Drive
-            Strain energy density, or its `fingerpad.neuron.transduction.drive` where many afferents have the
-            same traces, as in a fit.
+            Strain energy density. Pass `fingerpad.neuron.transduction.drive` of it if many afferents are
+            simulated under the same traces, as in a fit.
 
         Returns
         -------
@@ -157,12 +157,12 @@ class Afferent:
         Raises
         ------
         InputError
-            If the quantity of the dynamic term is not that of `sed`.
+            If the quantity of the dynamic term is not the one of `sed`.
         """
         if sed.dynamic_quantity != self.dynamic_quantity:
             raise InputError(
-                f"The dynamic term of this afferent is driven by {self.dynamic_quantity!r}: got traces of "
-                f"{sed.dynamic_quantity!r}, sample the skin with dynamic_quantity={self.dynamic_quantity!r}."
+                f"The dynamic term of this afferent needs {self.dynamic_quantity!r}: got traces of "
+                f"{sed.dynamic_quantity!r}; sample the skin with dynamic_quantity={self.dynamic_quantity!r}."
             )
 
         def trains(sites: slice) -> SpikeTrains:
@@ -176,7 +176,7 @@ class Afferent:
         dynamic_window_ms: tuple[float, ...] = protocol.DYNAMIC_WINDOW.value,
         static_window_ms: tuple[float, ...] = protocol.STATIC_WINDOW.value,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the firing rates at every site in the ramp and in the hold, Eqs. 6-10.
+        """Compute the firing rates at every site in the ramp and in the hold, Eqs. 6-10.
 
         Parameters
         ----------

@@ -1,17 +1,17 @@
 """Membrane current -> spike times of a leaky integrate-and-fire neuron with a soft threshold.
 
-The potential V follows Eq. 5 and returns to 0 after a spike. It need not reach the threshold v: at any
-time the neuron fires with the hazard (escape rate)
+The potential V follows Eq. 5 and is reset to 0 after a spike. A spike does not require that V reaches the
+threshold v: at any time the neuron fires with the hazard (escape rate)
 
     h(V) = 1/tau_e exp((V - v)/delta),
 
-which is small below the threshold and unbounded above it (Gerstner & Kistler 2002, section
-5.3). With u = V/v and the width delta/v it needs no unit of potential. In the limit of width 0 the threshold
-is that of `fingerpad.neuron.lif`.
+which is small below the threshold and grows without bound above it (Gerstner & Kistler 2002, section
+5.3). In terms of u = V/v and the width delta/v it is free of the unit of potential. In the limit of a small
+width the threshold is that of `fingerpad.neuron.lif`.
 
-Between two knots of the current u has a closed form (`fingerpad.neuron.exact_spikes`), and the integral of h
-is computed by Gauss quadrature on short panels. Spikes are sampled by time rescaling: measured in the
-integral of h, interspike intervals are exponential with mean 1.
+Between two knots of the current u has a closed form (`fingerpad.neuron.exact_spikes`), and h is integrated by
+Gauss-Legendre quadrature on short panels. Spikes follow from time rescaling: the integrals of h from spike to
+spike are exponentially distributed with mean 1.
 """
 
 from __future__ import annotations
@@ -33,22 +33,22 @@ from fingerpad.neuron.exact_spikes import potential_at
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 
 ESCAPE_TIME_MS = 1.0
-"""Mean time to a spike while the potential is held at the threshold, tau_e: a convention. [ms]"""
+"""Mean time to a spike at a potential equal to the threshold, tau_e: a convention. [ms]"""
 
 _TRAINS_PER_BLOCK = 32
-"""Trains per block of one thread."""
+"""Trains that one thread simulates at a time."""
 
 _ESCAPE = int(Purpose.ESCAPE)
 _NODES = tuple(0.5 + 0.5 * np.polynomial.legendre.leggauss(5)[0])
 _WEIGHTS = tuple(0.5 * np.polynomial.legendre.leggauss(5)[1])
 _LONGEST_PANEL = 0.5
-"""Largest length of a panel over tau, because of the curvature of the potential."""
+"""Largest length of a panel over tau: the potential is too curved over longer ones."""
 
 _HIGHEST_STEP = 1.0
-"""Largest change of the log hazard over a panel: the error of the quadrature is then 1e-9."""
+"""Largest change of the log hazard over one panel: the quadrature error is then 1e-9."""
 
 _NEGLIGIBLE = -60.0
-"""Panels with a hazard below exp(-60)/tau_e are skipped."""
+"""Log hazard below which a panel is skipped: exp(-60)/tau_e practically never elicits a spike."""
 
 _MOST_PANELS = 1.0e6
 _ROUND_OFF = 1.0e-14
@@ -62,11 +62,11 @@ class EscapeRate:
     Parameters
     ----------
     membrane : LeakyIntegrateAndFire
-        Its parameters; at the threshold the hazard is 1/tau_e.
+        Parameters of the membrane; at its threshold the hazard is 1/tau_e.
     width : float
         Width of the threshold over the threshold, delta/v. [1]
     escape_ms : float, optional
-        tau_e. Another value is equivalent to another threshold: docs/decisions/escape-rate.md. [ms]
+        tau_e. It can be absorbed in the threshold, docs/decisions/escape-rate.md. [ms]
 
     Raises
     ------
@@ -110,16 +110,16 @@ class EscapeRate:
     def spikes(
         self, current: CurrentTraces, seed: int, presentations: Presentations | None = None
     ) -> SpikeTrains:
-        """Sample spike times by time rescaling: the integral of h between spikes is exponential with mean 1.
+        """Simulate spike times by time rescaling.
 
         Parameters
         ----------
         current : CurrentTraces
             One column per site. [mA]
         seed : int
-            Of the run; the same seed gives the same spikes on any number of threads.
+            Seed of the run; the same seed gives the same spikes on any number of threads.
         presentations : Presentations, optional
-            Site, trial and receptor of each train. Default: each site is a receptor, touched once.
+            Site, trial and receptor of each train. Default: one presentation per site.
 
         Returns
         -------
@@ -129,7 +129,7 @@ class EscapeRate:
         Raises
         ------
         InputError
-            If a presentation names a site outside the current.
+            If a presentation names a site that does not exist.
         """
         everyone = presentations or Presentations.of_population(current.n_sites)
         checked_sites(everyone.sites, current.n_sites)
@@ -151,7 +151,7 @@ class EscapeRate:
     def intensity_per_ms(
         self, current: CurrentTraces, spikes: SpikeTrains, sites: ArrayLike, times_ms: ArrayLike
     ) -> FloatArray:
-        """Hazard at some times, given the spikes that came before; 0 during the refractory period.
+        """Hazard at given times, conditional on the earlier spikes; 0 during the refractory period.
 
         Parameters
         ----------
@@ -167,7 +167,7 @@ class EscapeRate:
         Returns
         -------
         array (n_times, n_trains)
-            At the time of a spike, the hazard just before it. [1/ms]
+            At the time of a spike: the hazard immediately before it. [1/ms]
 
         Raises
         ------
@@ -191,7 +191,7 @@ class EscapeRate:
             float(self.membrane.time_constant_ms),
             float(self.membrane.refractory_ms),
         )
-        # At rest the potential is -inf, whose hazard is 0.
+        # During the refractory period the potential is -inf and the hazard 0.
         return np.exp((potentials - 1.0) / self.width) / self.escape_ms
 
     def _relative_drive(self, current: CurrentTraces) -> FloatArray:
@@ -202,9 +202,9 @@ class EscapeRate:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def panels(length: float, start: float, steady: float, drift: float, width: float) -> int:
-    """Return the number of panels for an error of at most 1e-9 of Gauss quadrature with five nodes.
+    """Return the number of panels of an interval for a quadrature error of at most 1e-9 with five nodes.
 
-    The slope of u is monotone, so it is steepest at one of the ends.
+    The slope of u is monotone, so its largest magnitude is at one of the ends.
     """
     rise = steady - start
     steepest = max(abs(rise), abs(drift + (rise - drift) * math.exp(-length)))
@@ -226,7 +226,7 @@ def _integral(begin: float, end: float, start: float, steady: float, drift: floa
 def _where_reached(
     wanted: float, begin: float, end: float, start: float, steady: float, drift: float, width: float
 ) -> float:
-    """Time until which the integral from `begin` is `wanted`, before `end`. Newton's method, bracketed."""
+    """Time at which the integral from `begin` reaches `wanted`, before `end`; bracketed Newton iteration."""
     low, high = begin, end
     guess = begin + (end - begin) * wanted / _integral(begin, end, start, steady, drift, width)
     for _ in range(_MOST_REFINEMENTS):
@@ -257,7 +257,7 @@ def _escape_trains(
     width: float,
     escape: float,
 ) -> tuple[FloatArray, np.ndarray]:
-    """Spike times of all trains, one after the other, and the index of the first of each."""
+    """Spike times of all trains, train after train, and the index of the first spike of each."""
     found = np.empty(64 * (sites.size + 1))
     offsets = np.zeros(sites.size + 1, dtype=np.int64)
     count = 0
@@ -319,7 +319,7 @@ def _potentials_at(
     tau: float,
     refractory: float,
 ) -> FloatArray:
-    """Potential over threshold at the wanted times (n_times, n_trains); -inf at rest."""
+    """Potential over threshold at given times (n_times, n_trains); -inf during the refractory period."""
     found = np.full((wanted.size, sites.size), -np.inf)
     for train in range(sites.size):
         drive = drives[sites[train]]

@@ -1,13 +1,12 @@
-"""Exact threshold crossings of many membranes: the kernels of `fingerpad.neuron.lif`.
+"""Kernels of `fingerpad.neuron.lif` that compute when many membranes cross their threshold.
 
-By Eq. 5 the potential u relaxes to w = R I, the steady potential of the present current: in the time
-x = s/tau, with R = tau/C, du/dx = w - u. Between two knots the current is a straight line, w = w0 + c x,
-and the potential has the closed form
+With R = tau/C, w = R I (the steady potential of the present current) and the time x = s/tau, Eq. 5 reads
+du/dx = w - u. Between two knots the current is linear, w = w0 + c x, and the potential has the closed form
 
     u(x) = u0 + (w0 - u0) g + c (x - g),    g = 1 - e^-x,
 
 whose slope is monotone: u has at most one extremum between two knots. A crossing of the threshold can
-therefore be bracketed with certainty, and is then refined to round-off.
+therefore be bracketed, and is then refined to round-off.
 """
 
 from __future__ import annotations
@@ -37,11 +36,11 @@ def potential_at(x: float, start: float, steady: float, drift: float) -> float:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _first_guess(missing: float, rise: float, drift: float) -> float:
-    """Approximate time in which the potential increases by `missing`, from r = `rise` and c = `drift`.
+    """Estimate the time in which the potential rises by `missing`, from r = `rise` and c = `drift`.
 
-    Halley's formula gives a first time, h = 2 missing r/q. For a constant current, its mean until h,
+    Halley's formula gives a first time, h = 2 missing r/q. For a constant current, equal to its mean until h,
     x = -ln(1 - s) with s = missing/(r + c h/2), here by its Padé approximant s (6 - 3 s)/(6 - 6 s + s^2).
-    Both are combined to one fraction, because divisions are expensive.
+    Both are combined in one fraction, because divisions are the expensive operations.
     """
     q = 2.0 * rise * rise + (drift - rise) * missing
     a = missing * q
@@ -51,13 +50,13 @@ def _first_guess(missing: float, rise: float, drift: float) -> float:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _next_guess(guess: float, missing: float, rise: float, drift: float, high: float) -> tuple[float, bool]:
-    """Better guess of the crossing, and whether it is exact to the round-off of times up to `high`.
+    """Improve an estimate of the crossing; also return whether it is exact to the round-off of `high`.
 
-    From each guess the potential increases by
+    From the time of the estimate on, the potential rises by
 
         r y + b (y^2/2 - y^3/6 + y^4/24 - ...)    in the time y,    r = w - u,    b = c - r.
 
-    Halley's formula solves for the y of the increase `missing`, and one Newton step on the series up to y^5
+    Halley's formula estimates the y of the rise `missing`, and one Newton step on the series up to y^5
     improves it. The remainder of the series and the error of the Newton step are known.
     """
     bend = drift - rise
@@ -74,9 +73,9 @@ def _next_guess(guess: float, missing: float, rise: float, drift: float, high: f
 def _refine(
     high: float, reached: float, start: float, steady: float, drift: float, threshold: float
 ) -> float:
-    """Time of the only crossing within (0, high], where the potential has `reached` the threshold.
+    """Time of the only crossing within (0, high]; at `high` the potential `reached` is above the threshold.
 
-    The guesses of `_next_guess`, or bisection where they leave the bracket.
+    Iterates `_next_guess`, with bisection where it leaves the bracket.
     """
     low = 0.0
     guess = high * min(1.0, (threshold - start) / (reached - start))
@@ -100,7 +99,7 @@ def _refine(
 def first_crossing(
     length: float, start: float, steady: float, later: float, threshold: float
 ) -> tuple[bool, float, float]:
-    """Advance one potential between two knots, for kernels that treat neurons one by one.
+    """Integrate one potential between two knots, for kernels that treat neurons one by one.
 
     Parameters
     ----------
@@ -143,14 +142,14 @@ def exact_trains(
     threshold: float,
     refractory: float,
 ) -> tuple[FloatArray, np.ndarray]:
-    """Spike times of all neurons, one after the other, and the index of the first of each.
+    """Compute the spike times of all neurons, neuron after neuron.
 
     Parameters
     ----------
     times : array (n_knots,)
-        Knots, in order; a repeated one is a discontinuity. [ms]
+        Knots, in order; a repeated knot is a jump. [ms]
     currents : array (n_knots, n_neurons)
-        Current at the knots, a straight line between them. [mA]
+        Current at the knots, linear between them. [mA]
     tau, capacitance, threshold, refractory : float
         Parameters of the membrane, in the units of `fingerpad.neuron.lif.LeakyIntegrateAndFire`.
 
@@ -163,9 +162,9 @@ def exact_trains(
 
     Notes
     -----
-    All neurons are advanced over an interval before the next one: they share its exponential, rows of
-    `currents` are contiguous in memory, and the arithmetic of neurons is independent. For the same reason
-    neurons that fire are advanced in rounds of one spike each, in short loops.
+    All neurons are advanced over an interval before the next one begins: they share its exponential, rows of
+    `currents` are contiguous in memory, and the loops over neurons vectorise. For the same reason, spikes
+    within an interval are found in rounds of one spike per neuron, stage by stage in short loops.
     """
     n_neurons = currents.shape[1]
     resistance = tau / capacitance
@@ -211,10 +210,10 @@ def _pass(
     ready: FloatArray,
     busy: np.ndarray,
 ) -> int:
-    """Advance neurons that are not refractory and cannot fire to the next knot; list and count the others.
+    """Advance to the next knot all neurons that are not refractory and cannot fire; list the others.
 
-    A potential equals w at its maximum. If it is below the threshold at both knots, it reaches the threshold
-    between them only if w decreases past it.
+    A potential equals w at its maximum. If it is below the threshold at both knots, it can cross the
+    threshold in between only if w falls from above the threshold to below it. Returns the number of others.
     """
     gone = -math.expm1(-length)
     # The closed form sorted by u, w now and w later.
@@ -245,10 +244,10 @@ def _bracket(
     busy: np.ndarray,
     searches: FloatArray,
 ) -> int:
-    """Keep those of the `busy` that fire before the next knot, and return their number.
+    """Select those of the `busy` neurons that fire before the next knot, and return their number.
 
-    Each of them has a column of `searches`: start [ms] and end of the bracket of the crossing, the potential
-    at both, steady potential and drift. The others are advanced to the next knot.
+    Each of them gets a column of `searches`: start of its bracket [ms] and length of it, the potential at
+    both ends, steady potential and drift. The others are advanced to the next knot.
     """
     n_firing = 0
     for neuron in busy:
@@ -261,7 +260,7 @@ def _bracket(
         potential = potentials[neuron]
         at_knot = reached = potential_at(high, potential, steady, drift)
         if reached < threshold and steady >= threshold > later[neuron]:
-            # du/dx = c + (r - c) e^-x with r = w0 - u0 > 0 and c < 0: the potential peaks where that is 0.
+            # du/dx = c + (r - c) e^-x with r = w0 - u0 > 0 and c < 0: the maximum is where this is 0.
             high = min(high, math.log1p(-(steady - potential) / drift))
             reached = potential_at(high, potential, steady, drift)
         if reached < threshold:
@@ -277,7 +276,7 @@ def _bracket(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _cross(searches: FloatArray, threshold: float, crossings: FloatArray) -> None:
-    """Find the crossing of every search; one guess and one improvement nearly always suffice."""
+    """Find the crossing of every search; one estimate and one improvement nearly always suffice."""
     _, highs, starts, reached, steady, drift = searches
     guesses, gone = np.empty((2, highs.size))
     for n in range(highs.size):
@@ -295,7 +294,7 @@ def _cross(searches: FloatArray, threshold: float, crossings: FloatArray) -> Non
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _by_neuron(found: FloatArray, finder: np.ndarray, n_neurons: int) -> tuple[FloatArray, np.ndarray]:
-    """Sort spikes by neuron, those of each neuron in the order of their times."""
+    """Sort spikes by neuron; those of a neuron stay in order of time."""
     offsets = np.zeros(n_neurons + 1, dtype=np.int64)
     for neuron in finder:
         offsets[neuron + 1] += 1

@@ -1,8 +1,8 @@
 """Membrane current -> spike times: the leaky integrate-and-fire neuron (paper, Eqs. 3-5).
 
-Between two knots the current is a straight line, and the potential has a closed form: a crossing of the
-threshold is bracketed with certainty and refined to round-off (`fingerpad.neuron.exact_spikes`), without a
-time step. The paper's own scheme, Runge-Kutta with a fixed step, is available for comparison.
+Between two knots the current is linear in time and the potential has a closed form. A crossing of the
+threshold is bracketed and refined to round-off (`fingerpad.neuron.exact_spikes`) without a time step. The
+paper's scheme, Runge-Kutta with a fixed step, serves for comparison.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from fingerpad.neuron.exact_spikes import exact_trains
 class LeakyIntegrateAndFire:
     """A leaky integrate-and-fire membrane with a refractory period.
 
-    The potential starts at 0. When it reaches the threshold there is a spike, and the potential is 0 during
-    the refractory period.
+    The potential starts at 0. When it reaches the threshold, a spike occurs, the potential is reset to 0
+    and stays there for the refractory period.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class LeakyIntegrateAndFire:
 
     Examples
     --------
-    A constant current of 2 µA charges at 2 mV/ms minus the leak: 50 mV are reached every 32 ms.
+    A constant current of 2 µA charges at 2 mV/ms minus the leak and reaches 50 mV every 32 ms.
 
     >>> neuron = LeakyIntegrateAndFire(68.0, 1e-6, 50.0, 1.0)
     >>> spikes = neuron.spikes(CurrentTraces([0.0, 100.0], [[2e-6], [2e-6]]))
@@ -73,7 +73,7 @@ class LeakyIntegrateAndFire:
         Returns
         -------
         SpikeTrains
-            One train per site, until the last knot.
+            One train per site, up to the last knot.
         """
 
         def trains(neurons: slice) -> SpikeTrains:
@@ -85,8 +85,8 @@ class LeakyIntegrateAndFire:
     def spikes_runge_kutta(self, current: CurrentTraces, step_ms: float = 0.001) -> SpikeTrains:
         """Spike times by the paper's scheme: fourth-order Runge-Kutta with a fixed step.
 
-        A spike is recorded at the end of the step that reaches the threshold. Each spike is late by less than
-        a step, and delays accumulate.
+        A spike is placed at the end of the step in which the threshold is reached. Each spike is therefore
+        late by less than a step, and the delays add up along a train.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class LeakyIntegrateAndFire:
         """
         step = positive("step_ms", step_ms, "ms")
         return SpikeTrains(
-            # One row per neuron: values adjacent in time are adjacent in memory.
+            # The kernel reads one neuron after the other: a row per neuron is contiguous in memory.
             *_runge_kutta_trains(
                 current.times_ms, np.ascontiguousarray(current.current_ma.T), *self._constants(), step
             )
@@ -147,7 +147,7 @@ def _runge_kutta_trains(
     refractory: float,
     step: float,
 ) -> tuple[FloatArray, np.ndarray]:
-    """Integrate Eq. 5 with the classical Runge-Kutta scheme; returns as `exact_trains`."""
+    """Integrate Eq. 5 with the classical Runge-Kutta scheme; same outputs as `exact_trains`."""
     n_neurons = currents.shape[0]
     n_steps = int((times[-1] - times[0]) / step + 1e-9)
     found = np.empty(64 * (n_neurons + 1))
@@ -161,7 +161,7 @@ def _runge_kutta_trains(
             time = times[0] + index * step
             middle, knot = _current_at(time + 0.5 * step, knot, times, currents[neuron])
             following, knot = _current_at(time + step, knot, times, currents[neuron])
-            # A tolerance of half a step: the refractory period ends on a step, except for round-off.
+            # Half a step of tolerance: up to round-off, the refractory period ends with a step.
             if time > ready - 0.5 * step:
                 first = _growth(potential, now, tau, capacitance)
                 second = _growth(potential + 0.5 * step * first, middle, tau, capacitance)

@@ -1,6 +1,6 @@
-"""Sources of noise of a membrane and its input: the current, the threshold, the gain of the end organ.
+"""Models of the noise of a membrane and its input: current, threshold and gain of the end organ.
 
-Each class holds the amount of noise and samples its numbers; `fingerpad.neuron.noisy_lif` computes spikes.
+`fingerpad.neuron.noisy_lif` simulates a membrane with them.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ STEP_MS = 0.1
 class WhiteCurrentNoise:
     """White noise of the current.
 
-    Over a time T its charge is normal with variance D² T. It is constant within each step, with a variance
-    for which the free potential at the ends of steps has exactly the distribution that white noise causes;
-    excursions within a step are neglected.
+    The charge over a time T is normal with variance D² T. The noise is constant within each step, with a
+    variance for which the free potential at the ends of the steps has exactly the distribution under white
+    noise. Excursions of the potential within a step are neglected.
 
     Parameters
     ----------
@@ -49,15 +49,15 @@ class WhiteCurrentNoise:
     def level_ma(self, time_constant_ms: float) -> float:
         """Return the standard deviation of the current of one step. [mA]
 
-        With e = exp(-h/tau) a step of constant current s z adds R (1 - e) s z to the potential, and white
-        noise adds a normal number of variance D²/C² (1 - e²) tau/2. Both agree if
+        With e = exp(-h/tau), a step of constant current s z adds R (1 - e) s z to the potential, and white
+        noise adds a normal variable of variance D²/C² (1 - e²) tau/2. They are equal if
 
             s² = D²/(2 tau) (1 + e)/(1 - e).
 
         Parameters
         ----------
         time_constant_ms : float
-            Of the membrane, tau. [ms]
+            Time constant tau of the membrane. [ms]
 
         Returns
         -------
@@ -77,14 +77,14 @@ class WhiteCurrentNoise:
 class CorrelatedCurrentNoise:
     """Correlated noise of the current: a stationary Ornstein-Uhlenbeck process.
 
-    Its values at the ends of steps have exactly the distribution of the process; it is linear between them.
+    Its values at the ends of the steps have exactly the distribution of the process; in between it is linear.
 
     Parameters
     ----------
     standard_deviation_ma : float
-        At any one time. [mA]
+        Standard deviation. [mA]
     correlation_ms : float
-        Time in which its correlation decreases to 1/e. [ms]
+        Time in which the autocorrelation decays to 1/e. [ms]
     step_ms : float, optional
         Step in time, no longer than the correlation. [ms]
 
@@ -116,12 +116,12 @@ class CorrelatedCurrentNoise:
 
 @dataclass(frozen=True)
 class ThresholdNoise:
-    """A new threshold for each interspike interval: log-normal, so it is never negative.
+    """Noise of the threshold: log-normal, drawn anew for each interval between spikes.
 
     Parameters
     ----------
     relative_standard_deviation : float
-        Over the mean, which is the threshold of the membrane. [1]
+        Standard deviation over the mean, which is the threshold of the membrane. [1]
     """
 
     relative_standard_deviation: float
@@ -132,14 +132,14 @@ class ThresholdNoise:
 
 @dataclass(frozen=True)
 class GainNoise:
-    """Variation of the gain of an end organ: a log-normal factor on the current caused by touch.
+    """Noise of the gain: a log-normal factor of the stimulus-driven current.
 
     Parameters
     ----------
     relative_standard_deviation : float
-        Of the factor, whose mean is 1. [1]
+        Standard deviation of the factor, whose mean is 1. [1]
     new_for : {"presentation", "receptor"}, optional
-        A new factor for each presentation, or one factor for all presentations of a receptor.
+        Whether a factor is drawn for each presentation, or for each receptor and all its presentations.
     """
 
     relative_standard_deviation: float
@@ -155,9 +155,9 @@ class GainNoise:
         Parameters
         ----------
         seed : int
-            Of the run.
+            Seed of the run.
         presentations : Presentations
-            Trials and receptors of the trains.
+            Presentations of the trains.
 
         Returns
         -------
@@ -180,9 +180,9 @@ class GainNoise:
 
 
 def log_spread(relative_standard_deviation: float) -> float:
-    """Return the standard deviation s of the logarithm of a log-normal number: s² = ln(1 + sigma²).
+    """Return the standard deviation s of the logarithm of a log-normal variable: s² = ln(1 + sigma²).
 
-    exp(s z - s²/2) with a standard normal z then has mean 1 and standard deviation sigma.
+    exp(s z - s²/2) with a standard normal z has mean 1 and standard deviation sigma.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def log_spread(relative_standard_deviation: float) -> float:
 
 @dataclass(frozen=True)
 class MembraneNoise:
-    """Noise of a membrane and its input; None for a source without noise.
+    """Sources of noise of a membrane and its input; None for a source that is absent.
 
     Parameters
     ----------

@@ -1,13 +1,13 @@
 """Membrane current -> spike times of a noisy leaky integrate-and-fire neuron.
 
-Three sources of noise, alone or together:
+Three sources of noise can be combined:
 
-- the current through the membrane, white or correlated (Ornstein-Uhlenbeck process),
-- the threshold, new for each interspike interval,
-- the gain of the end organ, new for each presentation or for each receptor.
+- noise of the membrane current, white or correlated (Ornstein-Uhlenbeck process),
+- noise of the threshold, drawn anew for each interval between spikes,
+- noise of the gain of the end organ, drawn anew for each presentation or for each receptor.
 
-Noise of the current is sampled at time steps, with its exact distribution, and is linear within a step. The
-current is then piecewise linear, and spikes are found to round-off as without noise
+The current noise is sampled at time steps with the exact distribution and interpolated within a step. The
+total current is then piecewise linear, and spikes are computed to round-off as without noise
 (`fingerpad.neuron.exact_spikes`). Without noise the spikes are those of `fingerpad.neuron.lif`. All random
 numbers have keys: docs/decisions/random-numbers.md.
 """
@@ -34,7 +34,7 @@ from fingerpad.neuron.membrane_noise import (
 )
 
 _TRAINS_PER_BLOCK = 32
-"""Trains per block of one thread; each takes about a millisecond."""
+"""Trains that one thread simulates at a time; each takes about a millisecond."""
 
 _CURRENT, _THRESHOLD = int(Purpose.CURRENT), int(Purpose.THRESHOLD)
 
@@ -56,13 +56,13 @@ def noisy_spikes(
     current : CurrentTraces
         Current without noise, one column per site. [mA]
     noise : MembraneNoise
-        Sources of noise.
+        The sources of noise.
     seed : int
-        Of the run; the same seed gives the same spikes on any number of threads.
+        Seed of the run; the same seed gives the same spikes on any number of threads.
     presentations : Presentations, optional
-        Site, trial and receptor of each train. Default: each site is a receptor, touched once.
+        Site, trial and receptor of each train. Default: one presentation per site.
     intercept_ma : float, optional
-        Current without touch, beta; noise of the gain does not multiply it. [mA]
+        Current without a stimulus, beta; noise of the gain does not change it. [mA]
 
     Returns
     -------
@@ -72,7 +72,7 @@ def noisy_spikes(
     Raises
     ------
     InputError
-        If a presentation names a site outside the current.
+        If a presentation names a site that does not exist.
 
     Examples
     --------
@@ -88,7 +88,7 @@ def noisy_spikes(
     checked_sites(everyone.sites, current.n_sites)
     resting = finite("intercept_ma", intercept_ma, "mA")
     gains = noise.gain.factors(seed, everyone) if noise.gain else np.ones(len(everyone))
-    # One row per train: values adjacent in time are adjacent in memory.
+    # The kernel reads one train after the other: a row per site is contiguous in memory.
     rows = np.ascontiguousarray(current.current_ma.T)
     numbers = (
         float(membrane.time_constant_ms),
@@ -141,10 +141,10 @@ def _noisy_trains(
     memory: float,
     spread: float,
 ) -> tuple[FloatArray, np.ndarray]:
-    """Spike times of all trains, one after the other, and the index of the first of each.
+    """Spike times of all trains, train after train, and the index of the first spike of each.
 
-    A segment lies between two events: a knot of the current, the end of a step of its noise, or a spike. With
-    `memory` > 0 the noise is linear between its levels; otherwise each level lasts for a step.
+    The potential is integrated from event to event: knots of the current, ends of noise steps and spikes.
+    For `memory` > 0 the noise is linear within a step; otherwise it is constant.
     """
     resistance = tau / capacitance
     fresh = math.sqrt(1.0 - memory * memory)  # independent share of a new level

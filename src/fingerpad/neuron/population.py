@@ -1,4 +1,4 @@
-"""Populations of afferents: their positions in the skin, and their response to one touch."""
+"""A population of afferents: positions of the end organs and responses to one indentation."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from fingerpad.neuron.spikes import firing_rate_hz, first_spike_latency_ms
 
 MM_PER_CM = 10.0
 CENTRE_MM = (fingertip.CONTACT_POINT.value[0], 0.0)
-"""Middle of the default layout: the laboratory's contact point, on the midline. [mm]"""
+"""Centre of the default layout: the contact point, on the midline. [mm]"""
 
 
 def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
-    """Sample the sensitivity of each afferent: factors of both gains.
+    """Draw the relative sensitivity of each afferent, a factor of both gains.
 
     They are log-normal with mean 1: exp(spread n - spread^2/2), n from Normal(0, 1).
 
@@ -32,10 +32,10 @@ def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
     count : int
         Number of afferents.
     spread : float
-        Standard deviation of the logarithm; 0 for equal sensitivity. See
+        Standard deviation of the logarithm; 0 for equal afferents. A published value is
         `fingerpad.data.psychophysics.SENSITIVITY_SPREAD`.
     seed : int
-        Of the random numbers; each afferent has its own, by its number.
+        Seed of the random numbers; those of an afferent depend on its number only.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class Population:
-    """Afferents at different positions of the skin, equal except for their sensitivity.
+    """Afferents at different positions of the skin that differ in their sensitivity only.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Population:
     sensitivity : array (n_receptors,), optional
         Factor of each afferent's gains k_d and k_s, as from `sensitivities`; default: 1. [1]
     places_mm : array (n_receptors, 2), optional
-        Positions in the plane of the layout, which define neighbours; default: x and z. [mm]
+        Positions in the plane of the layout, by which neighbours are found; default: x and z. [mm]
 
     Raises
     ------
@@ -124,15 +124,15 @@ class Population:
         afferent: Afferent | None = None,
         sensitivity: ArrayLike | None = None,
     ) -> Population:
-        """Make a population with an afferent at each position of a layout.
+        """Place an afferent at each position of a layout.
 
         Parameters
         ----------
         layout : Layout
             From `fingerpad.core.layouts`.
         place : callable, optional
-            Points of the skin (n, 3) at positions in the plane of the layout (n, 2), such as
-            `UnrolledSkin.points`; by default the plane is x and z, the skin seen from its volar side.
+            From positions in the plane of the layout (n, 2) to points of the skin (n, 3), such as
+            `UnrolledSkin.points`; by default the plane is x and z, the volar view of the skin.
         afferent : Afferent, optional
             Default: `Afferent()`.
         sensitivity : array_like (n_receptors,), optional
@@ -163,19 +163,18 @@ class Population:
         centre_mm: tuple[float, float] = CENTRE_MM,
         afferent: Afferent | None = None,
     ) -> Population:
-        """Make a population on a square lattice, symmetric about a point.
+        """Place afferents on a square lattice that is symmetric about a point.
 
-        The paper's 18 receptors, of which 9 are drawn for reasons of symmetry, are 3 along the finger by
-        6 across.
+        The paper's 18 receptors are 3 along the finger by 6 across; it draws 9 of them, because of symmetry.
 
         Parameters
         ----------
         density_per_cm2 : float, optional
-            Receptors per area; the pitch is one over its square root. [1/cm2]
+            Receptors per area; the pitch is the inverse of its square root. [1/cm2]
         rows, columns : int, optional
             Receptors along x and along z.
         centre_mm : (float, float), optional
-            x and z of the middle of the lattice. [mm]
+            x and z of the centre of the lattice. [mm]
         afferent : Afferent, optional
             Default: `Afferent()`.
 
@@ -208,7 +207,7 @@ class Population:
         dynamic_window_ms: tuple[float, ...] = protocol.DYNAMIC_WINDOW.value,
         static_window_ms: tuple[float, ...] = protocol.STATIC_WINDOW.value,
     ) -> ResponseMap:
-        """Compute the response of every afferent to the skin at its receptor.
+        """Sample the skin at every receptor and simulate each afferent.
 
         Parameters
         ----------
@@ -220,7 +219,7 @@ class Population:
         Returns
         -------
         ResponseMap
-            Spikes, rates and first-spike latencies, receptor by receptor.
+            Spikes, rates and first-spike latencies of each receptor.
 
         Raises
         ------
@@ -228,14 +227,14 @@ class Population:
             If the skin does not return one trace per receptor.
         """
         dynamic_quantity = self.afferent.dynamic_quantity
-        # Skins with SED only need not accept the argument of the extension.
+        # A skin without other quantities than SED need not accept the argument of the extension.
         further = () if dynamic_quantity == STORED_ENERGY else (dynamic_quantity,)
         sed = skin.sed(self.positions_mm, *further)
         if sed.n_sites != len(self.positions_mm):
             raise InputError(
                 f"skin.sed must give one trace per receptor: got {sed.n_sites} for {len(self.positions_mm)}."
             )
-        # Both terms are proportional to the traces, so scaling these is equivalent to scaling the gains.
+        # Both terms of the current are proportional to SED: scaling SED scales both gains.
         spikes = self.afferent.spikes(sed if self.sensitivity is None else sed.scaled(self.sensitivity))
         return ResponseMap(
             positions_mm=self.positions_mm,

@@ -1,7 +1,7 @@
-"""Recruitment order and population rate of a population of afferents.
+"""Order of recruitment and population rate.
 
 The order of first spikes is a code that needs no rates (Johansson & Birznieks 2004). The population rate is
-the histogram of all spikes over time, of all afferents or in rings about the contact.
+the histogram of all spikes over time, of all afferents or by rings about the contact.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.units import MS_PER_S
 
 NO_GROUP = -1
-"""Group number of an afferent without a group."""
+"""Group number of an afferent that is in no group."""
 
 _LEAST_SMOOTHING = 1e-6
 _PAIRS_AT_A_TIME = 4_000_000
@@ -31,17 +31,17 @@ def recruitment_rank(latency_ms: ArrayLike) -> FloatArray:
     Parameters
     ----------
     latency_ms : array_like (n_afferents,)
-        First-spike latencies; NaN for an afferent that stays silent. [ms]
+        First-spike latencies; NaN for a silent afferent. [ms]
 
     Returns
     -------
     array (n_afferents,)
-        1 for the first; equal latencies have the mean of their ranks; NaN for silent afferents. [1]
+        1 for the first; equal latencies have their mean rank; NaN for a silent afferent. [1]
 
     Raises
     ------
     InputError
-        If the latencies are not one row of numbers.
+        If the latencies are not a one-dimensional array of numbers.
 
     Examples
     --------
@@ -61,19 +61,19 @@ def recruited(latency_ms: ArrayLike, times_ms: ArrayLike) -> np.ndarray:
     Parameters
     ----------
     latency_ms : array_like (n_afferents,)
-        First-spike latencies; NaN for an afferent that stays silent. [ms]
+        First-spike latencies; NaN for a silent afferent. [ms]
     times_ms : array_like (...)
-        Times of the counts. [ms]
+        Times. [ms]
 
     Returns
     -------
     int array (...)
-        Afferents with a latency of at most that time.
+        Afferents with a latency up to that time.
 
     Raises
     ------
     InputError
-        If the latencies are not one row of numbers.
+        If the latencies are not a one-dimensional array of numbers.
 
     Examples
     --------
@@ -86,26 +86,27 @@ def recruited(latency_ms: ArrayLike, times_ms: ArrayLike) -> np.ndarray:
 
 
 def evoked_latency_ms(latency_ms: ArrayLike, resting_latency_ms: float) -> FloatArray:
-    """Select the first spikes that are evoked by a touch, for afferents that also fire at rest.
+    """Select first spikes that are evoked by a stimulus, for afferents that also fire at rest.
 
-    A spike counts as evoked if its latency under touch is at most half of that at rest.
+    A first spike counts as evoked if its latency is at most half of the latency at rest, where the afferent
+    fires at least twice as fast as at rest.
 
     Parameters
     ----------
     latency_ms : array_like (n_afferents,)
-        First-spike latencies; NaN for an afferent that stays silent. [ms]
+        First-spike latencies; NaN for a silent afferent. [ms]
     resting_latency_ms : float
-        Latency without touch; infinity or NaN for a silent afferent. [ms]
+        Latency without a stimulus; infinity or NaN if the afferent is silent at rest. [ms]
 
     Returns
     -------
     array (n_afferents,)
-        Latencies; NaN where no spike is evoked. [ms]
+        Latencies; NaN for an afferent without an evoked spike. [ms]
 
     Raises
     ------
     InputError
-        If the latencies are not one row of numbers, or the one at rest is negative.
+        If the latencies are not a one-dimensional array of numbers, or the one at rest is negative.
 
     Examples
     --------
@@ -121,18 +122,17 @@ def evoked_latency_ms(latency_ms: ArrayLike, resting_latency_ms: float) -> Float
 
 @dataclass(frozen=True)
 class OrderChange:
-    """Difference in the order of first spikes between two touches.
+    """Difference of the order of first spikes between two stimuli.
 
     Parameters
     ----------
     both, either : int
-        Afferents that fire in both touches, and in one or both.
+        Afferents that fire under both stimuli, and under at least one.
     rank_correlation : float
-        Spearman's coefficient of the two orders, over those that fire in both: 1 for the same order, -1 for
-        the reverse. NaN with fewer than two of them or if all tie in one touch. [1]
+        Spearman's coefficient of the two orders, over afferents that fire under both: 1 for the same order,
+        -1 for the reverse. NaN for fewer than two of them, or if all tie under one stimulus. [1]
     swapped : float
-        Share of their pairs with reversed order; a pair that ties in a touch does not count as reversed. NaN
-        without a pair. [0-1]
+        Share of their pairs whose order is reversed; a pair with a tie is not. NaN without a pair. [0-1]
     """
 
     both: int
@@ -142,9 +142,9 @@ class OrderChange:
 
 
 def order_change(latency_ms: ArrayLike, other_latency_ms: ArrayLike) -> OrderChange:
-    """Compare the recruitment orders of two touches.
+    """Compare the order of recruitment under two stimuli.
 
-    With the ranks r and s of the afferents that fire in both touches:
+    With the ranks r and s of the afferents that fire under both stimuli:
 
         rank correlation = sum (r_i - mean r) (s_i - mean s) / sqrt(sum (r_i - mean r)^2 sum (s_i - mean s)^2)
         swapped = share of pairs i < j with (r_i - r_j) (s_i - s_j) < 0
@@ -152,7 +152,7 @@ def order_change(latency_ms: ArrayLike, other_latency_ms: ArrayLike) -> OrderCha
     Parameters
     ----------
     latency_ms, other_latency_ms : array_like (n_afferents,)
-        First-spike latencies of the same afferents; NaN for one that stays silent. [ms]
+        First-spike latencies of the same afferents; NaN for a silent one. [ms]
 
     Returns
     -------
@@ -161,11 +161,11 @@ def order_change(latency_ms: ArrayLike, other_latency_ms: ArrayLike) -> OrderCha
     Raises
     ------
     InputError
-        If they are not two rows of one length.
+        If they are not two one-dimensional arrays of the same length.
 
     Examples
     --------
-    The first two of four exchange their ranks, one pair of six:
+    The first two of four are swapped, which is one pair of six:
 
     >>> change = order_change([5.0, 6.0, 7.0, 8.0, np.nan], [6.0, 5.0, 7.0, 8.0, 9.0])
     >>> change.both, change.either, round(change.rank_correlation, 3), round(change.swapped, 3)
@@ -189,7 +189,7 @@ def _latencies(name: str, values: ArrayLike) -> FloatArray:
     latency = np.asarray(values, dtype=np.float64)
     if latency.ndim != 1 or np.isinf(latency).any():
         raise InputError(
-            f"{name} must be one row of times, NaN for the silent: got shape {latency.shape}"
+            f"{name} must be a one-dimensional array of times, NaN if silent: got shape {latency.shape}"
             f"{' with infinite times' if latency.ndim == 1 else ''}."
         )
     return latency
@@ -207,7 +207,7 @@ def _swapped(r: FloatArray, s: FloatArray) -> float:
     n = r.size
     if n < 2:
         return float("nan")
-    # Row by row in blocks: 10,000 afferents have 50 million pairs, too many to hold at once.
+    # In blocks of rows: 10,000 afferents have 50 million pairs, too many for the memory.
     rows = max(1, _PAIRS_AT_A_TIME // n)
     reversed_twice = sum(
         np.count_nonzero((r[start : start + rows, None] - r) * (s[start : start + rows, None] - s) < 0.0)
@@ -218,12 +218,12 @@ def _swapped(r: FloatArray, s: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class PopulationRate:
-    """Spikes of groups of afferents over time.
+    """Spike counts of groups of afferents over time.
 
     Parameters
     ----------
     edges_ms : array (n_bins + 1,)
-        Borders of the bins, increasing. [ms]
+        Edges of the bins, increasing. [ms]
     spikes : array (n_groups, n_bins)
         Spikes of each group in each bin; whole numbers unless smoothed.
     active : int array (n_groups, n_bins)
@@ -239,7 +239,7 @@ class PopulationRate:
 
     @property
     def times_ms(self) -> FloatArray:
-        """Middles of the bins, (n_bins,). [ms]"""
+        """Centres of the bins, (n_bins,). [ms]"""
         return 0.5 * (self.edges_ms[1:] + self.edges_ms[:-1])
 
     @property
@@ -249,16 +249,16 @@ class PopulationRate:
 
     @property
     def active_fraction(self) -> FloatArray:
-        """Share of the afferents that fire in each bin, (n_groups, n_bins); NaN for an empty group. [0-1]"""
+        """Share of the afferents that fire in each bin, (n_groups, n_bins); NaN if empty. [0-1]"""
         return self._per_afferent(self.active)
 
     def rate_per_area(self, density_per_cm2: float) -> FloatArray:
-        """Rate per area of skin, the rate per afferent times the density.
+        """Rate per area of skin: the rate per afferent times the density.
 
         Parameters
         ----------
         density_per_cm2 : float
-            Afferents per area of skin: of this layout, or of any that samples the same response. [1/cm2]
+            Afferents per area of skin. [1/cm2]
 
         Returns
         -------
@@ -280,26 +280,26 @@ class PopulationRate:
 def population_rate(
     spikes: SpikeTrains, edges_ms: ArrayLike, groups: ArrayLike | None = None, smoothing_ms: float = 0.0
 ) -> PopulationRate:
-    """Count the spikes of a population per time bin (peristimulus histogram).
+    """Compute the peristimulus histogram of a population.
 
-    A bin excludes its start and includes its end, as the windows of `firing_rate_hz` do. Smoothing
-    distributes the n_j spikes of bin j, uniform within the bin, by a normal density phi:
+    A bin excludes its start and includes its end, as the windows of `firing_rate_hz` do. Smoothing convolves
+    the counts n_j, taken as uniform within bin j, with a normal density phi:
 
         n_i <- sum_j K_ij n_j,    K_ij ~ integral over t in bin i, s in bin j of phi(t - s),    sum_i K_ij = 1
 
-    The weights of each spike sum to 1, so smoothing preserves the number of spikes, also at the ends of the
-    histogram. The number of active afferents is not smoothed.
+    The weights of each spike add up to 1, so smoothing conserves the number of spikes, also at the ends of
+    the histogram. The numbers of active afferents are not smoothed.
 
     Parameters
     ----------
     spikes : SpikeTrains
         One train per afferent.
     edges_ms : array_like (n_bins + 1,)
-        Borders of the bins, increasing. [ms]
+        Edges of the bins, increasing. [ms]
     groups : int array_like (n_afferents,), optional
-        Group number of each afferent, from 0, or `NO_GROUP`; for example from `rings`. Default: one group.
+        Group of each afferent, from 0, or `NO_GROUP`, such as those of `rings`. Default: one group.
     smoothing_ms : float, optional
-        Standard deviation of phi; 0 does not smooth. [ms]
+        Standard deviation of phi; 0 for no smoothing. [ms]
 
     Returns
     -------
@@ -308,8 +308,8 @@ def population_rate(
     Raises
     ------
     InputError
-        If there is no bin, the edges do not increase, there is not one group per afferent, or the smoothing
-        is negative.
+        If there is no bin, the edges do not increase, the number of groups is not that of the afferents, or
+        the smoothing is negative.
 
     Examples
     --------
@@ -320,7 +320,7 @@ def population_rate(
     """
     edges = increasing("edges_ms", float_array("edges_ms", edges_ms, 1))
     if edges.size < 2:
-        raise InputError(f"edges_ms must hold the two borders of at least one bin: got {edges.size} numbers.")
+        raise InputError(f"edges_ms must hold the two edges of at least one bin: got {edges.size} numbers.")
     not_negative("smoothing_ms", smoothing_ms, "ms")
     group = _groups(groups, len(spikes))
     n_groups, n_bins = int(group.max(initial=0)) + 1, edges.size - 1
@@ -330,7 +330,7 @@ def population_rate(
     counted = (place >= 0) & (place < n_bins) & (group[owner] != NO_GROUP)
     owner, place = owner[counted], place[counted]
 
-    # Times within a train increase, so the spikes of an afferent in one bin are adjacent.
+    # Trains and the spikes within them are in order: the spikes of an afferent in one bin are adjacent.
     again = np.zeros(owner.size, dtype=bool)
     again[1:] = (owner[1:] == owner[:-1]) & (place[1:] == place[:-1])
     cell = group[owner] * n_bins + place
@@ -361,9 +361,9 @@ def _groups(groups: ArrayLike | None, n_afferents: int) -> np.ndarray:
 
 
 def _kernel(edges: FloatArray, smoothing_ms: float) -> FloatArray:
-    """K_ij: share of bin j in bin i, (n_bins, n_bins).
+    """Weights K_ij of the counts of bin j in bin i, (n_bins, n_bins).
 
-    The double integral of phi is G(x) = x Phi(x) + phi(x), with signs, at the four pairs of borders.
+    The double integral of phi is G(x) = x Phi(x) + phi(x), with signs, at the four pairs of edges.
     """
     # A density much narrower than the bins has no effect, and its square overflows.
     scale_ms = max(smoothing_ms, _LEAST_SMOOTHING * np.diff(edges).min())
@@ -374,7 +374,7 @@ def _kernel(edges: FloatArray, smoothing_ms: float) -> FloatArray:
 
 
 def rings(positions_mm: ArrayLike, centre_mm: ArrayLike, radii_mm: ArrayLike) -> np.ndarray:
-    """Assign receptors to rings about a point, such as the middle of the contact.
+    """Assign receptors to rings about a point, such as the centre of the contact.
 
     Parameters
     ----------
@@ -388,13 +388,13 @@ def rings(positions_mm: ArrayLike, centre_mm: ArrayLike, radii_mm: ArrayLike) ->
     Returns
     -------
     int array (n_receptors,)
-        Ring of each receptor from 0, its inner radius included and its outer not; `NO_GROUP` beyond the
-        last and inside the first.
+        Ring of each receptor from 0, including its inner radius and excluding its outer one; `NO_GROUP`
+        outside of all rings.
 
     Raises
     ------
     InputError
-        If centre and positions differ in dimension, a radius is negative, or radii do not increase.
+        If centre and positions differ in dimension, a radius is negative, or the radii do not increase.
 
     Examples
     --------

@@ -30,7 +30,7 @@ def firing_rate_hz(spikes: SpikeTrains, window_ms: tuple[float, ...]) -> FloatAr
     Returns
     -------
     array (n_afferents,)
-        Rate; 0 where no interval closes in the window. [spikes/s]
+        Rate; 0 for an afferent without an interval that closes in the window. [spikes/s]
 
     Raises
     ------
@@ -108,12 +108,13 @@ class IntervalStatistics:
     count : int array (n_afferents,)
         Intervals that close in the window.
     mean_ms : array (n_afferents,)
-        Mean interval; NaN without any. [ms]
+        Mean interval; NaN without an interval. [ms]
     coefficient_of_variation : array (n_afferents,)
-        Standard deviation over mean, 0 if regular and 1 for a Poisson process; NaN below two intervals. [1]
+        Standard deviation over mean: 0 for equal intervals, 1 for a Poisson process; NaN for fewer than two.
+        [1]
     local_variation : array (n_afferents,)
-        The same from adjacent intervals only, also 0 and 1, with little influence of slow changes of the
-        rate; NaN below two intervals. [1]
+        Variation of adjacent intervals, with the same values 0 and 1, hardly affected by slow changes of the
+        rate; NaN for fewer than two. [1]
     """
 
     count: np.ndarray
@@ -123,7 +124,7 @@ class IntervalStatistics:
 
 
 def interval_statistics(spikes: SpikeTrains, window_ms: tuple[float, ...]) -> IntervalStatistics:
-    """Compute the interval statistics of every afferent in a window.
+    """Compute the statistics of the intervals of every afferent in a window.
 
     An interval belongs to the window that contains its closing spike, as in `firing_rate_hz`.
 
@@ -189,7 +190,7 @@ def first_spike_latency_ms(spikes: SpikeTrains) -> FloatArray:
     Returns
     -------
     array (n_afferents,)
-        Latency; NaN for an afferent that stays silent. [ms]
+        Latency; NaN for a silent afferent. [ms]
 
     Examples
     --------
@@ -208,8 +209,8 @@ def modulation_index(largest_hz: ArrayLike, smallest_hz: ArrayLike) -> FloatArra
     Parameters
     ----------
     largest_hz, smallest_hz : array_like
-        Rates with the edge and with the flat part of the stimulus above the receptor; same shape or
-        shapes that broadcast. [spikes/s]
+        Rates with the edge and with the flat part of the stimulus above the receptor; shapes that
+        broadcast. [spikes/s]
 
     Returns
     -------
@@ -227,7 +228,7 @@ def modulation_index(largest_hz: ArrayLike, smallest_hz: ArrayLike) -> FloatArra
 
 
 def modulation_difference(largest_hz: ArrayLike, smallest_hz: ArrayLike) -> FloatArray:
-    """Difference R_max - R_min, which the paper's text calls modulation index.
+    """Difference R_max - R_min, which the text of the paper calls modulation index.
 
     Parameters
     ----------

@@ -1,14 +1,14 @@
 """Strain energy density at the end organ -> membrane current (paper, Eqs. 1-2).
 
-The current needs the rate of change of strain energy density (SED), but SED is computed at some times only.
-Between them it is interpolated by a monotone cubic (PCHIP), one interpolant per phase of the motion, so the
-rate may be discontinuous between ramp and hold. Its derivative is exact and does not change sign between two
-given times, so the absolute value of Eq. 2 adds no kink there.
+The current needs the rate of change of strain energy density (SED), but mechanics computes SED only at some
+times. Between them SED is interpolated by monotone cubics (PCHIP), with one interpolant per phase of the
+motion, so that the rate may jump between ramp and hold. The derivative of the interpolant does not change
+sign between two given times, so the absolute value in Eq. 2 adds no kink there.
 
-A `Drive` holds SED and its rate on fine knots, which do not depend on the gains. It is computed once for many
-gains; each then costs a linear combination.
+A `Drive` holds what does not depend on the gains: SED and its rate on fine knots. It is computed once; the
+current for any gains is then a linear combination.
 
-In the paper SED drives both terms. As an extension, traces may contain another quantity for the dynamic term:
+In the paper both terms use SED. As an extension, traces may contain another quantity Q for the dynamic term:
 I = beta + k_d |Q'| + k_s U (docs/decisions/dynamic-term-quantity.md).
 """
 
@@ -26,10 +26,10 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import STORED_ENERGY, CurrentTraces, SedTraces
 
 PIECES_PER_INTERVAL = 32
-"""Largest number of linear pieces that approximate the cubic between two given times."""
+"""Largest number of linear pieces that replace the cubic between two given times."""
 
 SHORTEST_PIECE_MS = 0.25
-"""Smallest length of a piece; short intervals have fewer pieces. [ms]"""
+"""Shortest linear piece: shorter intervals are divided into fewer pieces. [ms]"""
 
 
 @dataclass(frozen=True)
@@ -39,14 +39,14 @@ class Drive:
     Parameters
     ----------
     times_ms : array (n_knots,)
-        Knots; a repeated one is a discontinuity of the rate. [ms]
+        Knots; a repeated knot is a jump of the rate. [ms]
     sed_kpa : array (n_knots, n_sites)
         Strain energy density. [kPa]
     rate_kpa_per_ms : array (n_knots, n_sites)
-        Absolute rate of change of SED, U' of Eq. 2, or of the other quantity of the dynamic term; 0 at the
-        onset. [kPa/ms, of a strain 1/ms]
+        Absolute rate of change of SED, U' of Eq. 2, or of another quantity of the dynamic term; 0 at the
+        onset. [kPa/ms, for a strain 1/ms]
     dynamic_quantity : str, optional
-        Name of that quantity, see `SkinResponse.sample`; "stored" is SED.
+        The quantity of that rate, by the names of `SkinResponse.sample`; "stored" is SED.
     """
 
     times_ms: FloatArray
@@ -80,7 +80,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Transduction:
-    """Gains that turn strain energy density (SED) into membrane current.
+    """Gains that transform strain energy density (SED) to membrane current.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class Transduction:
 
     Examples
     --------
-    SED increases by 2 kPa in 50 ms and is then constant:
+    SED rises by 2 kPa in 50 ms and stays: the current jumps, grows, drops and stays.
 
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
     >>> current = Transduction(0.0, dynamic_gain=1e-4, static_gain=1e-6).current(sed)
@@ -111,17 +111,17 @@ class Transduction:
         finite("static_gain", self.static_gain, "mA/kPa")
 
     def current(self, sed: SedTraces | Drive) -> CurrentTraces:
-        """Turn SED into the current through the membrane at every site, Eq. 1: I = beta + k_d U' + k_s U.
+        """Compute the current through the membrane at every site, Eq. 1: I = beta + k_d U' + k_s U.
 
         Parameters
         ----------
         sed : SedTraces or Drive
-            Traces are resampled with the defaults of `drive`; a drive is used as it is.
+            Traces are resampled with the defaults of `drive`.
 
         Returns
         -------
         CurrentTraces
-            Discontinuous where the rate is.
+            It jumps where the rate jumps.
         """
         driven = sed if isinstance(sed, Drive) else drive(sed)
         current_ma = (
@@ -137,33 +137,33 @@ def drive(
     pieces: int = PIECES_PER_INTERVAL,
     shortest_piece_ms: float = SHORTEST_PIECE_MS,
 ) -> Drive:
-    """Resample strain energy density and find its rate of change, Eq. 2.
+    """Resample strain energy density and compute its rate of change, Eq. 2.
 
-    Each interval between two given times is cut into `pieces` equal pieces (fewer where they would be
-    shorter than `shortest_piece_ms`), on which the cubic and its derivative are replaced by straight
-    lines. The error decreases with the square of the number of pieces and is proportional to the change of
-    SED in the interval, so long smooth intervals need no more knots than short steep ones. Twice the default
-    number moves no spike of a ramp and hold given at 8 + 12 steps by more than 0.1 ms (a spike that just
-    reaches the threshold), and half of the spikes by less than 0.005 ms.
+    Each interval between two given times is divided into `pieces` equal pieces (fewer if they would be
+    shorter than `shortest_piece_ms`), on which the cubic and its derivative are replaced by linear
+    functions. The error decreases with the square of the number of pieces and is proportional to the change
+    of SED in the interval, so long smooth intervals need no more knots than short steep ones. Twice the
+    default number moves half of the spikes of a ramp and hold of 8 + 12 steps by less than 0.005 ms, and
+    none by more than 0.1 ms (a spike whose potential hardly exceeds the threshold).
 
     Parameters
     ----------
     sed : SedTraces
-        Its `kinks_ms` separate the phases that are interpolated separately. With `dynamic_kpa`, the rate is
-        that of this quantity.
+        Its `kinks_ms` separate the phases, each with its own interpolant. If it has `dynamic_kpa`, the rate
+        is that of this quantity.
     difference_step_ms : float, optional
         Step h of the backward difference printed as Eq. 2 (the paper: 0.001 ms). Before the onset SED is
         that of the onset. Default: the limit h -> 0, the derivative of the interpolant. [ms]
     pieces : int, optional
-        Linear pieces per interval, at most.
+        Largest number of linear pieces per interval.
     shortest_piece_ms : float, optional
-        No piece is made shorter than this. [ms]
+        Lower limit of the length of a piece. [ms]
 
     Returns
     -------
     Drive
-        The rate is 0 at the onset and discontinuous there and at each kink; a difference changes over
-        `difference_step_ms` instead.
+        The rate is 0 at the onset and jumps there and at each kink; with `difference_step_ms`, a jump takes
+        one step.
 
     Raises
     ------
@@ -211,16 +211,16 @@ def drive(
 
 @njit(cache=True, nogil=True)
 def _evaluate(coefficients, breaks, times, values, rates):  # type: ignore[no-untyped-def]
-    """Write a piecewise cubic and the absolute value of its derivative at increasing times within `breaks`.
+    """Evaluate a piecewise cubic and the absolute value of its derivative at increasing times.
 
-    Equal to SciPy to the last bit, but both at once and for all sites.
+    The results are bit-equal to SciPy's; both are computed in one pass over all sites.
 
     Parameters
     ----------
     coefficients : array (4, n_breaks - 1, n_sites)
-        Of the third to the zeroth power of the time since the break before.
+        Coefficients of the third to the zeroth power of the time since the previous break.
     breaks, times : array (n_breaks,), (n_times,)
-        Borders of the pieces, and times of the values. [ms]
+        Ends of the pieces, and times of the values, within the breaks. [ms]
     values, rates : array (n_times, n_sites)
         Overwritten.
     """
@@ -237,7 +237,7 @@ def _evaluate(coefficients, breaks, times, values, rates):  # type: ignore[no-un
 
 
 def _phases(sed: SedTraces) -> list[PPoly]:
-    """Return one monotone interpolant of SED for each stretch between kinks."""
+    """Return one monotone interpolant of SED for each phase between kinks."""
     parts = np.searchsorted(sed.times_ms, sed.kinks_ms)
     inner = parts[(parts > 0) & (parts < sed.times_ms.size - 1)]
     ends = [0, *inner.tolist(), sed.times_ms.size - 1]
@@ -248,7 +248,7 @@ def _phases(sed: SedTraces) -> list[PPoly]:
 
 
 def _knots(times_ms: FloatArray, pieces: int, shortest_piece_ms: float) -> FloatArray:
-    """Divide every interval of `times_ms` into equal pieces; the given times remain knots exactly."""
+    """Divide every interval of `times_ms` into equal pieces; the given times stay knots, bit-equal."""
     lengths = np.diff(times_ms)
     counts = np.clip(np.floor(lengths / shortest_piece_ms).astype(np.int64), 1, pieces)
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -257,11 +257,11 @@ def _knots(times_ms: FloatArray, pieces: int, shortest_piece_ms: float) -> Float
 
 
 def _difference(phases: list[PPoly], knots: list[FloatArray], step_ms: float) -> Drive:
-    """Return the backward difference of Eq. 2, as printed: U' = |U(t) - U(t - h)| / h."""
+    """Compute the backward difference of Eq. 2 as printed: U' = |U(t) - U(t - h)| / h."""
     given = np.concatenate([phases[0].x[:1], *(phase.x[1:] for phase in phases)])
     sed = PPoly(np.concatenate([phase.c for phase in phases], axis=1), given)
     onset, end = given[0], given[-1]
-    # One step after a kink the difference is within the new phase; a knot there limits the transition.
+    # From one step after a kink on, the difference lies within one phase: a knot there limits the jump.
     settled = np.array([phase.x[0] + step_ms for phase in phases])
     times = np.unique(np.concatenate([*knots, settled[settled < end]]))
     before = np.maximum(times - step_ms, onset)

@@ -28,8 +28,6 @@ from fingerpad.psychophysics.response_models import (
 )
 from fingerpad.psychophysics.sensitivity import (
     Sensitivity,
-    d_prime_of_answers,
-    d_prime_of_populations,
     sensitivity,
 )
 from fingerpad.psychophysics.tasks import (
@@ -60,8 +58,6 @@ __all__ = [
     "bootstrap",
     "code_efficiency",
     "code_statistic",
-    "d_prime_of_answers",
-    "d_prime_of_populations",
     "d_prime_of_proportion",
     "discriminability",
     "efficiency",

@@ -14,10 +14,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from fingerpad.core.checks import FloatArray, float_array, one_of, positive, whole
+from fingerpad.core.checks import FloatArray, one_of, positive, whole
 from fingerpad.core.errors import InputError
 
 CORRECTIONS = ("log-linear", "half", "none")
@@ -107,74 +106,6 @@ def _rate(of: str, count: int, among: str, total: int, correction: str) -> float
             f"{of} is {k} of {n}, for which d' is infinite: choose the correction 'log-linear' or 'half'."
         )
     return k / n
-
-
-def d_prime_of_answers(standard: ArrayLike, comparison: ArrayLike) -> float:
-    """Return d' of an observer's statistic for two stimuli, such as Gradient Sums.
-
-    Parameters
-    ----------
-    standard, comparison : array_like (n_trials,)
-        Values of the statistic. [any unit]
-
-    Returns
-    -------
-    float
-        Difference of the means over the root of the mean variance, d_a; negative if the mean of the
-        comparison is smaller.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two values, or all are equal.
-
-    Examples
-    --------
-    >>> d_prime_of_answers([1.0, 2.0, 3.0], [3.0, 4.0, 5.0])
-    2.0
-    """
-    first, second = float_array("standard", standard, 1), float_array("comparison", comparison, 1)
-    if min(first.size, second.size) < 2:
-        raise InputError(f"d' needs two values for each stimulus: got {first.size} and {second.size}.")
-    variance = 0.5 * (first.var(ddof=1) + second.var(ddof=1))
-    if variance == 0.0:
-        raise InputError("d' needs values that vary: these are equal in every trial; add noise.")
-    return float((second.mean() - first.mean()) / math.sqrt(variance))
-
-
-def d_prime_of_populations(difference: ArrayLike, covariance: ArrayLike) -> float:
-    """Return d' of the best weighted sum of many receptors' responses.
-
-        d' = sqrt(dmu^T S^-1 dmu)
-
-    Parameters
-    ----------
-    difference : array_like (n_receptors,)
-        dmu, mean responses to the comparison minus those to the standard. [any unit]
-    covariance : array_like (n_receptors, n_receptors)
-        S, of the responses; the mean of both where they differ. [unit squared]
-
-    Returns
-    -------
-    float
-        [standard deviations]
-
-    Raises
-    ------
-    InputError
-        If shapes do not match or the covariance is not positive definite.
-
-    Examples
-    --------
-    >>> d_prime_of_populations([3.0, 4.0], [[1.0, 0.0], [0.0, 1.0]])
-    5.0
-    """
-    change, spread = float_array("difference", difference, 1), float_array("covariance", covariance, 2)
-    if spread.shape != (change.size, change.size):
-        raise InputError(
-            f"covariance must have one row and column per receptor: got {spread.shape} for {change.size}."
-        )
-    return float(np.linalg.norm(whitened(change, cholesky("covariance", spread))))
 
 
 def cholesky(name: str, matrix: FloatArray) -> FloatArray:

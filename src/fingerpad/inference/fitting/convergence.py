@@ -1,8 +1,8 @@
-"""Whether a sampler has converged: split R-hat, autocorrelation and effective number of draws.
+"""Convergence of MCMC: split R-hat, autocorrelation and effective sample size.
 
-The walkers of one ensemble learn from each other and are no independent chains. Ensembles are: R-hat compares
-halves of ensembles, and the autocorrelation is that of an ensemble's mean over the steps, which counts what
-its walkers have in common.
+The walkers of one ensemble are not independent chains, but the ensembles are. R-hat therefore compares halves
+of ensembles, and the autocorrelation is that of the mean of an ensemble over the steps, which includes the
+correlation between its walkers.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
 
 TAILS = (0.025, 0.975)
-"""Quantiles at which the effective size of the tails is judged: the ends of a 95 % interval."""
+"""Quantiles of the effective sample size of the tails: the ends of a 95 % interval."""
 
 
 def split_r_hat(draws: FloatArray) -> float:
-    """Return how much wider all draws spread than halves of single ensembles do; 1 once all agree.
+    """Return split R-hat: 1 if the halves of all ensembles have the same distribution, else larger.
 
     Parameters
     ----------
     draws : array (n_ensembles, n_steps, n_walkers)
-        One quantity along the chains.
+        One parameter along the chains.
 
     Returns
     -------
     float
-        The larger of the R-hat of ranks, which sees places that differ, and of distances from the median,
-        which sees widths that differ. [1]
+        The larger of the R-hat of ranks, sensitive to different locations, and that of distances from the
+        median, sensitive to different widths. [1]
 
     Notes
     -----
     R-hat = sqrt(((n - 1)/n W + B)/W) with W the mean variance within halves of n draws, and B the variance
-    of their means, after ranks became normal scores (Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021).
+    of their means, both of rank-normalised draws (Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021).
 
     Examples
     --------
@@ -49,12 +49,12 @@ def split_r_hat(draws: FloatArray) -> float:
 
 
 def effective_size(draws: FloatArray) -> float:
-    """Return how many independent draws would tell the mean as well.
+    """Return the effective sample size of the mean.
 
     Parameters
     ----------
     draws : array (n_ensembles, n_steps, n_walkers)
-        One quantity along the chains.
+        One parameter along the chains.
 
     Returns
     -------
@@ -63,9 +63,9 @@ def effective_size(draws: FloatArray) -> float:
 
     Notes
     -----
-    The mean over all draws is a mean of the ensembles' means over the steps. The variance of a mean of such
-    series is var (1 + 2 sum rho_t)/(n_ensembles n_steps), the sum of autocorrelations cut where pairs of
-    them are no longer positive and made to fall (Geyer 1992).
+    The series of each ensemble is the mean of its walkers. The variance of the mean of such series is
+    var (1 + 2 sum rho_t)/(n_ensembles n_steps). The sum of autocorrelations is truncated at the first pair
+    that is not positive, and pairs are made monotone (Geyer 1992).
 
     Examples
     --------
@@ -82,28 +82,28 @@ def effective_size(draws: FloatArray) -> float:
     correlations, spread = _autocorrelations(series)
     pairs = correlations[: n_steps // 2 * 2].reshape(-1, 2).sum(axis=1)
     positive = int(np.argmax(pairs <= 0.0)) if (pairs <= 0.0).any() else pairs.size
-    # An antithetic chain may do better than independent draws, but no estimate of that is to be trusted.
+    # An estimate above that of independent draws, as for antithetic chains, is not reliable.
     time = max(2.0 * float(np.minimum.accumulate(pairs[:positive]).sum()) - 1.0, 1.0 / values.shape[2])
     variance_of_mean = spread * time / (n_ensembles * n_steps)
     return float(min(variance / variance_of_mean, values.size))
 
 
 def bulk_effective_size(draws: FloatArray) -> float:
-    """Return how many independent draws would tell the middle as well: the effective size of their ranks.
+    """Return the effective sample size of the centre: that of rank-normalised draws.
 
     Parameters
     ----------
     draws : array (n_ensembles, n_steps, n_walkers)
-        One quantity along the chains.
+        One parameter along the chains.
 
     Returns
     -------
     float
-        The same for every increasing function of the quantity: a long tail does not count for more. [1]
+        It is invariant under increasing transformations of the parameter. [1]
 
     Notes
     -----
-    Ranks became normal scores (Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021).
+    Rank normalisation (Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021).
 
     Examples
     --------
@@ -115,17 +115,17 @@ def bulk_effective_size(draws: FloatArray) -> float:
 
 
 def tail_effective_size(draws: FloatArray) -> float:
-    """Return the smaller effective size of being beyond either end of the central 95 %.
+    """Return the smaller effective sample size of the indicators of both 2.5 % tails.
 
     Parameters
     ----------
     draws : array (n_ensembles, n_steps, n_walkers)
-        One quantity along the chains.
+        One parameter along the chains.
 
     Returns
     -------
     float
-        How many independent draws would tell the ends of the interval as well. [1]
+        Effective sample size of the ends of a 95 % interval. [1]
     """
     values = _checked(draws)
     return min(effective_size((values <= end).astype(np.float64)) for end in np.quantile(values, TAILS))
@@ -158,9 +158,9 @@ def _r_hat(values: FloatArray) -> float:
 
 
 def _autocorrelations(series: FloatArray) -> tuple[FloatArray, float]:
-    """Autocorrelations of several series of one law, (n_steps,), and the variance they refer to.
+    """Autocorrelations of several series of one distribution, (n_steps,), and their variance.
 
-    What the series' means differ by counts as correlation that lasts.
+    Differences between the means of the series count as correlation at all lags.
     """
     n_series, n_steps = series.shape
     centred = series - series.mean(axis=1, keepdims=True)

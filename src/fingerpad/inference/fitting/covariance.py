@@ -1,4 +1,4 @@
-"""How well fitted parameters are determined, from the fits that a cross validation makes anyway."""
+"""Covariance of fitted parameters from the fits of a cross validation."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from fingerpad.core.checks import FloatArray, float_array
 
 
 def jackknife_covariance(estimates: ArrayLike) -> FloatArray | None:
-    """Covariance of fitted parameters, from fits that each leave one of g groups of observations out.
+    """Covariance of fitted parameters from fits that each leave out one of g groups of observations.
 
     With the estimate theta_j without group j and the mean of all of them,
 
         V = (g - 1)/g sum over j of (theta_j - mean)(theta_j - mean)'.
 
-    Nothing is differentiated: rates jump where a spike enters its window, and a fit may end in any of many
-    lumps. Slopes at the best fit see neither and promise too much (docs/decisions/jackknife.md).
+    It uses no derivatives: rates jump where a spike enters its window, and a fit may end in any of many local
+    maxima. A covariance from derivatives at the best fit neglects both and is too small
+    (docs/decisions/jackknife.md).
 
     Parameters
     ----------
@@ -25,7 +26,7 @@ def jackknife_covariance(estimates: ArrayLike) -> FloatArray | None:
     Returns
     -------
     array (n_parameters, n_parameters) or None
-        None if there are no more groups than parameters: the scatter then has no width in some direction.
+        None if there are no more groups than parameters: the covariance would be singular.
 
     Notes
     -----
@@ -33,8 +34,8 @@ def jackknife_covariance(estimates: ArrayLike) -> FloatArray | None:
 
     Examples
     --------
-    The mean of 1, 2 and 6, which left out one by one leave means of 4, 3.5 and 1.5. Their mean varies by
-    7/3, with 7 the variance of the three numbers.
+    Without one of the numbers 1, 2 and 6 the mean is 4, 3.5 or 1.5. The variance of the mean of all three
+    is 7/3, where 7 is their variance.
 
     >>> float(jackknife_covariance([[4.0], [3.5], [1.5]])[0, 0].round(6))
     2.333333

@@ -1,4 +1,4 @@
-"""Evolution strategy with covariance matrix adaptation (CMA-ES): needs scores only, and minds no jumps."""
+"""Evolution strategy with covariance matrix adaptation (CMA-ES): it needs no derivatives."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from fingerpad.inference.fitting.problem import Problem
 
 @dataclass(frozen=True)
 class CovarianceAdaptation:
-    """CMA-ES around one start; the package `cma` does the work.
+    """CMA-ES from one start, with the package `cma`.
 
     Parameters
     ----------
     start : array_like (n_parameters,)
-        Middle of the first generation.
+        Mean of the first generation.
     scales : array_like (n_parameters,)
-        A change of each parameter that matters as much as those of the others.
+        Typical changes of the parameters, which set their units in the search.
     lower_bounds, upper_bounds : array_like (n_parameters,)
         Limits; -inf and inf for none.
     first_spread : float
         Standard deviation of the first generation, in units of `scales`.
     most_evaluations : int
-        The search ends with the generation that reaches so many, or when nothing more is gained.
+        The search ends with the generation that reaches this number, or when it has converged.
     seed : int
-        Of all random numbers: the same seed gives the same bits.
+        Seed of the random numbers; the same seed gives the same bits.
 
     Raises
     ------
@@ -78,7 +78,7 @@ class CovarianceAdaptation:
             object.__setattr__(self, name, np.broadcast_to(getattr(self, name), start.shape))
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
-        """Search until nothing is gained; the best of all places visited is the result."""
+        """Search until convergence; the result is the best of all evaluated points."""
         from cma import CMAEvolutionStrategy  # takes a second to load
 
         clock, scales = time.perf_counter(), np.asarray(self.scales)
@@ -91,7 +91,7 @@ class CovarianceAdaptation:
                     list(np.asarray(side) / scales) for side in (self.lower_bounds, self.upper_bounds)
                 ],
                 "maxfevals": self.most_evaluations,
-                # Its own random numbers would come from NumPy's global state.
+                # By default cma draws from NumPy's global state.
                 "seed": np.nan,
                 "randn": lambda *shape: generator.standard_normal(shape),
                 "verbose": -9,

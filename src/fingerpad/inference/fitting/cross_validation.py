@@ -1,4 +1,4 @@
-"""Cross validation: fit on five sixths of the observations, judge on the rest (paper, section 2.2.2)."""
+"""Cross validation: fit five sixths of the observations, score the rest (paper, section 2.2.2)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class FoldFit:
     fold : int
         Number of the fold, from 0.
     fit : Fit
-        To the training set.
+        Fit of the training set.
     score_test : float
         Score of its parameters on the observations left out.
     training, testing : int array (n_training,), (n_testing,)
@@ -67,12 +67,12 @@ class CrossValidation:
 
 
 def interleaved_folds(n_observations: int, n_folds: int = int(protocol.FOLDS.value)) -> IntArray:
-    """Fold of each observation, dealt out in turn: index modulo the number of folds.
+    """Assign observations to folds in turn: index modulo the number of folds.
 
     Parameters
     ----------
     n_observations, n_folds : int
-        The first must not be smaller than the second.
+        There must be at least one observation per fold.
 
     Returns
     -------
@@ -89,14 +89,14 @@ def interleaved_folds(n_observations: int, n_folds: int = int(protocol.FOLDS.val
 
 
 def folds_of(testing_sets: Sequence[Sequence[int]], n_observations: int) -> IntArray:
-    """Fold of each observation from lists of those that each fold leaves out, as in the paper's Table 3.
+    """Fold of each observation from the testing sets of the folds, as in the paper's Table 3.
 
     Parameters
     ----------
     testing_sets : sequence of sequence of int
         Observations of each fold, counted from 0.
     n_observations : int
-        How many there are.
+        Number of observations.
 
     Returns
     -------
@@ -133,16 +133,16 @@ def folds_of(testing_sets: Sequence[Sequence[int]], n_observations: int) -> IntA
 
 
 def cross_validate(problem: Problem, method: Method, memberships: ArrayLike) -> CrossValidation:
-    """Fit every fold without its own observations, and judge the result on them.
+    """Fit without the observations of each fold, and score the result on them.
 
     Parameters
     ----------
     problem : Problem
-        What is fitted.
+        The problem.
     method : Method
-        How.
+        The method.
     memberships : int array (n_observations,)
-        Fold of each observation, 0 ... n_folds - 1, none empty; `interleaved_folds` deals them out.
+        Fold of each observation, 0 ... n_folds - 1, none empty, such as from `interleaved_folds`.
 
     Returns
     -------
@@ -153,7 +153,7 @@ def cross_validate(problem: Problem, method: Method, memberships: ArrayLike) -> 
     InputError
         If an observation has no fold, or a fold is empty.
     ConvergenceError
-        If a fit does not end.
+        If a fit does not converge.
 
     Notes
     -----

@@ -10,15 +10,15 @@ from fingerpad.data import protocol
 
 
 def fractional_sum_of_squares(observed: ArrayLike, predicted: ArrayLike) -> float:
-    """Share of the observed sum of squares that the prediction leaves no residual for (Eqs. 13, 14).
+    """Fractional sum of squares, FSS (Eqs. 13, 14).
 
-    FSS = 1 - sum (observed - predicted)^2 / sum observed^2; 1 is perfect, silence gives 0, and there is no
-    lower limit. It differs from R2, which measures against the mean and not against zero.
+    FSS = 1 - sum (observed - predicted)^2 / sum observed^2. It is 1 for a perfect prediction, 0 for predicted
+    rates of 0, and has no lower limit. R2 differs: it refers to the mean of the observations instead of 0.
 
     Parameters
     ----------
     observed, predicted : array (n_shifts,)
-        Rates at the same shifts; the sums run over all of them. [spikes/s]
+        Rates at the same shifts. [spikes/s]
 
     Returns
     -------
@@ -27,7 +27,7 @@ def fractional_sum_of_squares(observed: ArrayLike, predicted: ArrayLike) -> floa
     Raises
     ------
     InputError
-        If the two differ in length or nothing was observed.
+        If the two differ in length or all observed rates are 0.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def weighted_fractional_sum_of_squares(
     dynamic_weight: float = protocol.DYNAMIC_WEIGHT.value,
     static_weight: float = protocol.STATIC_WEIGHT.value,
 ) -> float:
-    """Both phases in one number, FSS = w_d FSS_d + w_s FSS_s (Eq. 12).
+    """Weighted FSS of both phases, FSS = w_d FSS_d + w_s FSS_s (Eq. 12).
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def weighted_fractional_sum_of_squares(
     Raises
     ------
     InputError
-        If a pair differs in length, nothing was observed, or a weight is negative.
+        If a pair differs in length, all observed rates are 0, or a weight is negative.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Which combinations of parameters an answer depends on: singular values of its Jacobian.
+"""Identifiable combinations of parameters: singular values of the Jacobian of a model's outputs.
 
-Steps are shares of the parameters, so that a direction says by which percentages parameters change together.
-A direction whose singular value is zero is one along which no data can tell the parameters.
+Derivatives are with respect to the parameters over their scales. Data cannot determine the parameters along a
+direction with a singular value of zero.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from fingerpad.core.checks import FloatArray, float_array, positive
 from fingerpad.core.errors import InputError
 
 Answer = Callable[[FloatArray], FloatArray]
-"""Called with parameters (n_parameters,); returns what is observed, (n_answers,)."""
+"""From parameters (n_parameters,) to observable outputs (n_answers,)."""
 
 JACOBIAN_STEP = 1e-6
-"""Step over the scale of a parameter: small enough that hardly any answer jumps within it. [1]"""
+"""Step over the scale of a parameter: so small that outputs with jumps rarely jump within it. [1]"""
 
 ZERO = 1e-5
 """Singular values below this share of the largest count as zero: above the round-off of such steps. [1]"""
@@ -27,18 +27,18 @@ ZERO = 1e-5
 
 @dataclass(frozen=True)
 class Identifiability:
-    """What answers can tell of their parameters.
+    """Identifiable directions of parameters.
 
     Parameters
     ----------
     names : tuple of str
         Names of the parameters.
     singular_values : array (n_parameters,)
-        Change of the answers per unit step along each direction, largest first.
+        Change of the outputs per unit step along each direction, largest first.
     directions : array (n_parameters, n_parameters)
-        One unit direction per row, in shares of the parameters' scales; those of the zeros come last.
+        One unit direction per row, in units of the scales; those with singular value 0 are last.
     rank : int
-        Number of singular values that are not zero: so many numbers can be told.
+        Number of singular values above zero, the number of identifiable combinations.
     """
 
     names: tuple[str, ...]
@@ -48,23 +48,23 @@ class Identifiability:
 
     @property
     def silent_directions(self) -> FloatArray:
-        """Directions along which no answer changes, (n_parameters - rank, n_parameters)."""
+        """Directions along which no output changes, (n_parameters - rank, n_parameters)."""
         return self.directions[self.rank :]
 
 
 def jacobian(
     answer: Answer, parameters: ArrayLike, scales: ArrayLike, step: float = JACOBIAN_STEP
 ) -> FloatArray:
-    """Change of every answer per scale of every parameter, by central differences.
+    """Change of every output per scale of every parameter, by central differences.
 
     Parameters
     ----------
     answer : callable
-        From parameters (n_parameters,) to answers (n_answers,).
+        From parameters (n_parameters,) to outputs (n_answers,).
     parameters, scales : array (n_parameters,)
-        Where, and one unit of each parameter; |parameters| makes units shares.
+        The point, and the scale of each parameter, such as |parameters|.
     step : float, optional
-        Half width of a difference over the scale. Where answers have jumps, a wide one averages over them.
+        Half width of a difference over the scale. A wide one averages over jumps of the outputs.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def jacobian(
     Raises
     ------
     InputError
-        If a scale or the step is not positive, or an answer is not finite.
+        If a scale or the step is not positive, or an output is not finite.
 
     Examples
     --------
@@ -103,7 +103,7 @@ def identifiability(
     step: float = JACOBIAN_STEP,
     zero: float = ZERO,
 ) -> Identifiability:
-    """Find the combinations of parameters that answers depend on, and those that they do not.
+    """Find the combinations of parameters on which outputs depend, and those on which they do not.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Least squares from several starts, for residuals that jump where a spike enters or leaves a window.
 
-A difference quotient over a tiny step sees either no jump or nothing but one. The steps are therefore as
-large as the changes that matter and shrink from round to round; or the slopes come from elsewhere, as from a
-formula that knows no single spikes. Slopes only say where to go: every place is judged by its own score.
+A difference quotient over a tiny step contains either no jump or only a jump. The steps are therefore as
+large as typical changes of the parameters and shrink from round to round. Alternatively a smooth model gives
+the derivatives. They only set the search direction: every point is judged by its own score.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ class LeastSquares:
     Parameters
     ----------
     starts : array_like (n_starts, n_parameters)
-        Where fits may begin; all are scored.
+        Start points; all are scored.
     scales : array_like (n_parameters,)
-        A change of each parameter that matters as much as those of the others; steps are counted in it.
+        Typical changes of the parameters, the units of the steps.
     lower_bounds, upper_bounds : array_like (n_parameters,)
         Limits; -inf and inf for none.
     n_refined : int
-        From how many of the starts, the best ones first, a fit is made.
+        Number of starts, the best ones, from which a fit is made.
     difference_steps : tuple of float
-        Half the distance over which slopes are taken, round by round, in units of `scales`.
+        Half widths of the central differences, round by round, in units of `scales`.
     jacobian : callable, optional
-        `jacobian(parameters, chosen)`: slopes of the residuals, instead of differences.
+        `jacobian(parameters, chosen)`: derivatives of the residuals, instead of differences.
     most_iterations : int
-        Of each round.
+        Iterations of each round.
 
     Raises
     ------
@@ -51,8 +51,8 @@ class LeastSquares:
 
     Notes
     -----
-    The method of `scipy.optimize.least_squares`, "trf" (Branch, Coleman & Li 1999), and the best of all
-    places that it visited. Nothing is random.
+    The method of `scipy.optimize.least_squares`, "trf" (Branch, Coleman & Li 1999); the result is the best of
+    all evaluated points. The method is deterministic.
 
     Examples
     --------
@@ -128,7 +128,7 @@ class LeastSquares:
         return Fit(steps[-1].parameters, steps[-1].score, visited.n_evaluations, seconds, tuple(steps))
 
     def _slopes(self, visited: _Visited, difference: float) -> Callable[[FloatArray], FloatArray]:
-        """Slopes of the residuals at a place, given and wanted in units of the scales."""
+        """Return the derivatives of the residuals as a function of a point, in units of the scales."""
         scales = np.asarray(self.scales)
         if self.jacobian is not None:
             jacobian = self.jacobian
@@ -150,7 +150,7 @@ class LeastSquares:
 
 
 class _Visited:
-    """Residuals of a problem in scaled parameters, with a count and the best place so far."""
+    """Residuals of a problem in scaled parameters, with a count and the best point so far."""
 
     def __init__(self, problem: Problem, chosen: IntArray, scales: FloatArray):
         self.problem, self.chosen, self.scales = problem, chosen, scales

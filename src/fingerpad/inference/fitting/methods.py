@@ -1,4 +1,4 @@
-"""Methods of fitting behind one interface: what each needs is in its settings, what it finds is a `Fit`."""
+"""Methods of fitting with one interface: a method has its settings as fields and returns a `Fit`."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from fingerpad.inference.fitting.response_surface import maximise
 
 @dataclass(frozen=True)
 class FitStep:
-    """A place where a fit stood, one row of the table of its steps.
+    """One step of a fit.
 
     Parameters
     ----------
     parameters : array (n_parameters,)
-        Where it stood.
+        Parameters at the step.
     score : float
-        How well that fits the chosen observations.
+        Score of the chosen observations.
     """
 
     parameters: FloatArray
@@ -34,7 +34,7 @@ class FitStep:
 
 @dataclass(frozen=True)
 class Fit:
-    """Where a method ended, how it came there and what that took.
+    """Result of a method: parameters, score, effort and history.
 
     Parameters
     ----------
@@ -43,15 +43,15 @@ class Fit:
     score : float
         Their score over the chosen observations.
     n_evaluations : int
-        How often the model was run, over all starts.
+        Evaluations of the model, over all starts.
     seconds : float
-        Time on the clock, over all starts. [s]
+        Elapsed time, over all starts. [s]
     history : tuple of FitStep
-        The steps from the start that led there; the first is the start, the last the result.
+        Steps of the best fit; the first is its start, the last the result.
     start : int
-        Number of that start, from 0; the first one of equals.
+        Number of its start, from 0; the first one of equals.
     attempts : tuple of Fit
-        The fits from each start, in their order; empty for a method that has one start only.
+        The fit from each start, in their order; empty for a method with one start.
     """
 
     parameters: FloatArray
@@ -64,11 +64,11 @@ class Fit:
 
 
 class Method(Protocol):
-    """A way to fit any problem; its settings are its fields."""
+    """Contract of a method that fits any problem."""
 
     @property
     def name(self) -> str:
-        """What tables call it."""
+        """Name in tables."""
         ...
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
@@ -77,7 +77,7 @@ class Method(Protocol):
 
 
 def best_of(attempts: tuple[Fit, ...]) -> Fit:
-    """Return the attempt with the highest score, with the effort of all; the first one of equals.
+    """Return the fit with the highest score, with the effort of all fits; the first one of equals.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def best_of(attempts: tuple[Fit, ...]) -> Fit:
 
 @dataclass(frozen=True)
 class ResponseSurface:
-    """The paper's method: response surfaces and steepest ascent from each start, the better one taken.
+    """The paper's method: response surfaces and steepest ascent from each start; the best result is taken.
 
     Parameters
     ----------
@@ -118,11 +118,11 @@ class ResponseSurface:
     increments : array_like (n_parameters,) or (n_starts, n_parameters)
         One coded unit of each parameter, for all start points or for each.
     lower_bounds : array_like (n_parameters,), optional
-        No run goes below them; -inf for none.
+        Lower limits of all evaluations; -inf for none.
     smallest_gain : float
-        An iteration that gains no more than this ends a climb.
+        A gain of at most this much ends a fit.
     most_iterations : int
-        Give up after so many.
+        Largest number of iterations.
 
     Raises
     ------
@@ -131,9 +131,8 @@ class ResponseSurface:
 
     Notes
     -----
-    Gerling et al. 2014, section 2.2.2; see `fingerpad.inference.fitting.maximise`. Nothing is random: the
-    same input
-    gives the same bits.
+    Gerling et al. 2014, section 2.2.2; see `fingerpad.inference.fitting.maximise`. The method is
+    deterministic.
     """
 
     starts: ArrayLike
@@ -154,7 +153,7 @@ class ResponseSurface:
         object.__setattr__(self, "increments", np.broadcast_to(units, starts.shape))
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
-        """Climb from every start."""
+        """Fit from every start."""
 
         def climb(start: FloatArray, units: FloatArray) -> Fit:
             clock = time.perf_counter()
@@ -175,18 +174,18 @@ class ResponseSurface:
 
 @dataclass(frozen=True)
 class Continued:
-    """Two methods in a row: a cheap one that finds the hill, and one that climbs it.
+    """Two methods in sequence: a cheap one for the start of the second.
 
     Parameters
     ----------
     first : Method
-        Finds where to begin.
+        Finds the start of the second.
     second : callable
-        `second(parameters)`: the method that begins there.
+        `second(parameters)`: the method that starts there.
     first_problem : Problem, optional
-        What the first one fits, if it is a simpler problem with the same observations.
+        Problem of the first method, if it is a simpler one with the same observations.
     name : str
-        What tables call it.
+        Name in tables.
 
     Examples
     --------
@@ -208,7 +207,7 @@ class Continued:
     name: str = "continued"
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
-        """Fit with the first method, then with the second from where it ended; the effort is that of both."""
+        """Fit with the first method, then with the second from its result; the effort is that of both."""
         begun = self.first.fit(problem if self.first_problem is None else self.first_problem, chosen)
         ended = self.second(begun.parameters).fit(problem, chosen)
         return replace(

@@ -1,4 +1,4 @@
-"""What a method of fitting needs to know of a problem: names, residuals and a score."""
+"""Contract between problems and methods of fitting: names, residuals and a score."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from fingerpad.core.checks import FloatArray, IntArray
 
 
 class Problem(Protocol):
-    """A model to be fitted to observations; whoever fits it needs to know no more.
+    """A model and the observations to which it is fitted.
 
     Notes
     -----
-    `score = 1 - residuals @ residuals` up to round-off: a method may lift the one or press down the other.
-    Both depend on nothing but their arguments.
+    `score = 1 - residuals @ residuals` up to round-off, so a method may maximise the score or minimise the
+    residuals.
     """
 
     @property
@@ -23,11 +23,11 @@ class Problem(Protocol):
 
     @property
     def n_observations(self) -> int:
-        """Number of stimuli that were observed; `chosen` counts them from 0."""
+        """Number of observed stimuli; `chosen` are their numbers from 0."""
         ...
 
     def residuals(self, parameters: FloatArray, chosen: IntArray) -> FloatArray:
-        """Scaled differences between what was observed under the chosen stimuli and what is predicted."""
+        """Scaled differences between observations and predictions under the chosen stimuli."""
         ...
 
     def score(self, parameters: FloatArray, chosen: IntArray) -> float:

@@ -1,8 +1,8 @@
-"""Profile likelihood: how well the data can still be explained when one parameter is held elsewhere.
+"""Profile likelihood: the largest likelihood for each fixed value of one parameter.
 
-One parameter is moved away from the best fit in steps, and all others are fitted anew at each. Where twice
-the loss of log likelihood passes the quantile of chi-square with one degree of freedom, the confidence
-interval ends. A side on which that never happens is open: the data do not bound the parameter there.
+One parameter is fixed at steps away from the best fit, and all others are fitted at each step. The confidence
+interval ends where twice the loss of log likelihood exceeds the quantile of chi-square with one degree of
+freedom. If that does not happen on one side, the data do not bound the parameter there.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.threads import in_blocks
 
 LogLikelihood = Callable[[FloatArray], FloatArray]
-"""Called with points (n_points, n_parameters); returns their log likelihoods, -inf where impossible."""
+"""From points (n_points, n_parameters) to their log likelihoods, -inf where impossible."""
 
 PROFILE_STEP = 0.5
-"""Step of the parameter that is held, over its scale. [1]"""
+"""Step of the fixed parameter over its scale. [1]"""
 
 LIKELIHOOD_TOLERANCE = 0.02
-"""Fits of the others end when they differ by this much: in log likelihood, and over the scales. [1]"""
+"""Tolerance of the fits of the others, in log likelihood and in parameters over their scales. [1]"""
 
 NEAREST = 20
-"""Starts nearest to where a parameter is held, the best of which is climbed from."""
+"""Number of starts nearest to a fixed value; a fit starts from the best of them."""
 
 MOST_EVALUATIONS = 2000
 RESTARTS = 5
@@ -42,17 +42,17 @@ class ProfileLikelihood:
     Parameters
     ----------
     name : str
-        The parameter.
+        Name of the parameter.
     values : array (n_values,)
-        Where it was held, increasing.
+        Its fixed values, increasing.
     losses : array (n_values,)
-        Largest log likelihood anywhere less the largest one there. [1]
+        Largest log likelihood of all minus the largest one for this value. [1]
     points : array (n_values, n_parameters)
-        The best parameters there.
+        The best parameters for each value.
     interval : (float, float)
-        Ends of the confidence interval; infinite where the data set no end.
+        Ends of the confidence interval; infinite where the data set no bound.
     level : float
-        Its level of confidence. [0-1]
+        Level of confidence. [0-1]
     """
 
     name: str
@@ -70,9 +70,9 @@ class ProfileLikelihoods:
     Parameters
     ----------
     best : array (n_parameters,)
-        The most likely parameters that were met.
+        The most likely parameters found.
     log_likelihood : float
-        Theirs.
+        Their log likelihood.
     profiles : tuple of ProfileLikelihood
         One per parameter.
     n_evaluations : int
@@ -96,24 +96,26 @@ def profile_likelihoods(
 ) -> ProfileLikelihoods:
     """Profile the likelihood of every parameter.
 
-    Each profile is swept outwards from the best fit. A fit starts from its neighbour's and, where several
-    starts are given, also from the best of those nearby: a likelihood with many lumps needs that.
+    Each profile is computed outwards from the best fit. A fit starts from the result of its neighbour and, if
+    several starts are given, also from the best of the nearest ones, since the likelihood has many local
+    maxima.
 
     Parameters
     ----------
     log_likelihood : callable
         Of rows of parameters.
     starts : array (n_parameters,) or (n_starts, n_parameters)
-        Near the best fit, which is looked for first from the most likely of them; draws from a posterior do.
+        Points near the best fit, such as draws from a posterior. The search for the best fit starts from the
+        most likely of them.
     scales : array (n_parameters,)
-        About the standard deviation of each parameter.
+        Approximate standard deviation of each parameter.
     names : sequence of str
         Names of the parameters, two at least.
     level : float, optional
         Level of confidence. [0-1]
     most_steps : int, optional
-        Steps of half a scale to either side, at most; a sweep ends earlier once two values in a row are
-        beyond the interval.
+        Largest number of steps of half a scale to each side; a side ends earlier after two consecutive values
+        outside of the interval.
 
     Returns
     -------
@@ -124,7 +126,7 @@ def profile_likelihoods(
     InputError
         If sizes disagree or all starts are impossible.
     ConvergenceError
-        If a fit does not end.
+        If a fit does not converge.
 
     Examples
     --------
@@ -159,7 +161,7 @@ def profile_likelihoods(
     allowed = 0.5 * float(chi2.ppf(level, 1))
 
     def sweep(indices: slice) -> tuple[_Search, list[tuple[FloatArray, float]]]:
-        # A search of its own, so that threads share nothing.
+        # Threads do not share a search.
         own = _Search(log_likelihood, units, origins)
         return own, own.sweep(best, indices.start, allowed, most_steps)
 
@@ -176,7 +178,7 @@ def profile_likelihoods(
 
 
 class _Search:
-    """Looks for the most likely parameters, some of them held."""
+    """Search for the most likely parameters, with at most one of them fixed."""
 
     def __init__(self, log_likelihood: LogLikelihood, scales: FloatArray, starts: FloatArray):
         self.log_likelihood = log_likelihood
@@ -212,7 +214,7 @@ class _Search:
             return point
 
         found = minimize(
-            # It compares: a large number stands for what is impossible.
+            # Nelder-Mead compares values: a large finite number replaces infinity.
             lambda offsets: min(-self.height(moved(offsets)), 1e300),
             np.zeros(free.size),
             method="Nelder-Mead",
@@ -225,7 +227,7 @@ class _Search:
         )
         if not found.success:
             raise ConvergenceError(
-                f"A fit of the profile has not ended after {MOST_EVALUATIONS} evaluations, near "
+                f"A fit of the profile has not converged after {MOST_EVALUATIONS} evaluations, near "
                 f"{moved(found.x).tolist()}: choose smaller scales.",
                 (f"log likelihood {-found.fun:.4f}",),
             )
@@ -234,7 +236,7 @@ class _Search:
     def sweep(
         self, best: FloatArray, index: int, allowed: float, most_steps: int
     ) -> list[tuple[FloatArray, float]]:
-        """Fit the others with one parameter held at steps to both sides; returns points and heights."""
+        """Fit the others with one parameter fixed at steps to both sides; return points and values."""
         top = self.height(best)
         fits = [(best, top)]
         for side in (-1.0, 1.0):
@@ -246,7 +248,7 @@ class _Search:
         return fits
 
     def _fit(self, neighbour: FloatArray, index: int, value: float) -> tuple[FloatArray, float]:
-        """Most likely point with one parameter held, from the neighbour and from the best start nearby."""
+        """Most likely point with one parameter fixed, from the neighbour and from the best near start."""
         nearest = np.argsort(np.abs(self.starts[:, index] - value), kind="stable")[:NEAREST]
         pools = [neighbour[None], self.starts[nearest]] if len(self.starts) > 1 else [neighbour[None]]
         climbed = []
@@ -273,9 +275,9 @@ def _profile(
 
 
 def _interval(values: FloatArray, losses: FloatArray, allowed: float) -> tuple[float, float]:
-    """Outermost crossings of the allowed loss, between values by straight lines."""
+    """Outermost crossings of the allowed loss, by linear interpolation."""
     inside = np.flatnonzero(losses <= allowed)
-    if not inside.size:  # a better point lies on another profile, away from all values of this one
+    if not inside.size:  # a better point lies on the profile of another parameter
         return float("-inf"), float("inf")
 
     def crossing(within: int, beyond: int) -> float:

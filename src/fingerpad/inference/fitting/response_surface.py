@@ -1,8 +1,9 @@
-"""Response surface method: climb any function of a few parameters (paper, section 2.2.2).
+"""Response surface method: maximise any function of a few parameters (paper, section 2.2.2).
 
-One iteration runs the 2^k corners one coding increment away from the base and the base itself, fits a plane
-to the results by linear regression, and follows the plane's steepest ascent until nothing is gained. The next
-iteration starts from there; the climb ends with the first iteration that gains nothing.
+An iteration evaluates the 2^k corners of a factorial design, one coding increment from the base, and the base
+itself; it fits a plane to the values by linear regression and follows the steepest ascent of the plane while
+the objective rises. The next iteration starts from the best point. The method stops at the first iteration
+without gain.
 """
 
 from __future__ import annotations
@@ -24,21 +25,21 @@ _MOST_STEPS = 200
 
 @dataclass(frozen=True)
 class Iteration:
-    """One row of the history of a climb.
+    """One iteration of the response surface method.
 
     Parameters
     ----------
     parameters : array (n_parameters,)
-        Where the iteration ended.
+        Parameters at the end of the iteration.
     objective : float
         Value of the objective there.
     slopes : array (n_parameters,)
-        Regression coefficients, gain per coding increment, at the iteration's beginning; zeros in the row
-        of the start, which precedes any regression.
+        Regression coefficients at the base, gain per coding increment; zeros in the row of the start, which
+        precedes any regression.
     n_steps : int
-        Steps of the ascent that gained.
+        Steps of the ascent with a gain.
     n_runs : int
-        Evaluations of the objective, corners, base and steps together; 0 in the row of the start.
+        Evaluations of the objective at corners, base and steps; 0 in the row of the start.
     """
 
     parameters: FloatArray
@@ -50,7 +51,7 @@ class Iteration:
 
 @dataclass(frozen=True)
 class ResponseSurfaceFit:
-    """Where a climb ended and how it came there.
+    """Result of the response surface method.
 
     Parameters
     ----------
@@ -59,9 +60,9 @@ class ResponseSurfaceFit:
     objective : float
         Value of the objective there.
     history : tuple of Iteration
-        The start first, then one row per iteration that gained; the last row is the result.
+        The start, then one row per iteration with a gain; the last row is the result.
     n_runs : int
-        Evaluations of the objective, the last iteration without gain included.
+        Evaluations of the objective, including the last iteration without gain.
     """
 
     parameters: FloatArray
@@ -69,14 +70,9 @@ class ResponseSurfaceFit:
     history: tuple[Iteration, ...]
     n_runs: int
 
-    @property
-    def n_iterations(self) -> int:
-        """Iterations that gained."""
-        return len(self.history) - 1
-
 
 def factorial_design(n_parameters: int) -> FloatArray:
-    """Two-level full factorial design with its centre, in coded units.
+    """Two-level full factorial design with centre point, in coded units.
 
     Parameters
     ----------
@@ -131,7 +127,7 @@ def regression_slopes(design: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def coding_increments(base: ArrayLike, share: float, where_zero: ArrayLike | None = None) -> FloatArray:
-    """Increments as a share of the base; a parameter that starts at zero needs its own.
+    """Increments as a share of the base; a parameter whose base is zero needs an increment of its own.
 
     Parameters
     ----------
@@ -149,7 +145,7 @@ def coding_increments(base: ArrayLike, share: float, where_zero: ArrayLike | Non
     Raises
     ------
     InputError
-        If an increment comes out as zero or negative.
+        If an increment is not positive.
 
     Examples
     --------
@@ -171,23 +167,23 @@ def maximise(
     smallest_gain: float = 1.0e-4,
     most_iterations: int = 200,
 ) -> ResponseSurfaceFit:
-    """Climb `objective` from `start` by the response surface method.
+    """Maximise `objective` from `start` by the response surface method.
 
     Parameters
     ----------
     objective : callable
-        Value of one vector of parameters; larger is better. It must depend on nothing else.
+        Value of one vector of parameters; larger is better.
     start : array (n_parameters,)
-        Where to begin.
+        Start point.
     increments : array (n_parameters,)
-        One coded unit of each parameter: small against the parameter, large against the jumps that whole
-        spikes cause in the objective. They stay the same for the whole climb.
+        One coded unit of each parameter: small compared with the parameter, but large enough to average over
+        the jumps that single spikes cause in the objective. They are constant during the fit.
     lower_bounds : array (n_parameters,), optional
-        No run goes below them; the base keeps one increment above them. Use -inf for none.
+        Lower limits of all evaluations; the base stays one increment above them. Use -inf for none.
     smallest_gain : float
-        An iteration that gains no more than this ends the climb, and is not taken.
+        An iteration with a gain of at most this much is rejected and ends the fit.
     most_iterations : int
-        Give up after so many iterations.
+        Largest number of iterations.
 
     Returns
     -------
@@ -198,13 +194,13 @@ def maximise(
     InputError
         If shapes disagree, the start lies within an increment of a bound, or the objective is not finite.
     ConvergenceError
-        If the climb still gains after `most_iterations`, or an ascent never stops gaining.
+        If the objective still rises after `most_iterations`, or an ascent does not end.
 
     Notes
     -----
     Gerling et al. 2014, section 2.2.2; Box & Wilson 1951 for the method. Steps along the ascent are one coded
-    unit at first, double after each gain and halve after each loss; the ascent ends when one unit gains
-    nothing.
+    unit at first, double after each gain and halve after each loss; the ascent ends when a step of one unit
+    has no gain.
 
     Examples
     --------
@@ -232,7 +228,7 @@ def maximise(
         history.append(iteration)
         base = iteration.parameters
     raise ConvergenceError(
-        f"maximise still gains after {most_iterations} iterations: allow more, or take larger increments.",
+        f"maximise has not converged after {most_iterations} iterations: allow more or larger increments.",
         tuple(f"iteration {number}: {row.objective:.6g}" for number, row in enumerate(history)),
     )
 
@@ -240,7 +236,7 @@ def maximise(
 def _iterate(
     objective: Objective, design: FloatArray, base: FloatArray, units: FloatArray, floor: FloatArray
 ) -> tuple[Iteration, float]:
-    """Factorial runs, regression, steepest ascent; with the value at the base, the design's last run."""
+    """One iteration: factorial runs, regression and steepest ascent; also return the value at the base."""
     values = np.array([_value(objective, base + coded * units) for coded in design])
     slopes = regression_slopes(design, values)
     best, best_value, n_gains, n_trials = _ascend(objective, base, values[-1], slopes, units, floor)
@@ -256,7 +252,7 @@ def _ascend(
     units: FloatArray,
     floor: FloatArray,
 ) -> tuple[FloatArray, float, int, int]:
-    """Best point on the path of steepest ascent, its value, the steps that gained and the steps tried."""
+    """Best point on the path of steepest ascent, its value, the steps with a gain and all steps."""
     best, best_value = base, float(value_at_base)
     steepness = float(np.linalg.norm(slopes))
     if steepness == 0.0:
@@ -274,7 +270,7 @@ def _ascend(
         else:
             return best, best_value, n_gains, n_trials
     raise ConvergenceError(
-        f"The ascent still gains after {_MOST_STEPS} steps: the objective needs a maximum.",
+        f"The ascent has not ended after {_MOST_STEPS} steps: the objective must have a maximum.",
         (f"last point {best.tolist()}: {best_value:.6g}",),
     )
 
@@ -293,7 +289,7 @@ def _checked_increments(increments: ArrayLike, base: FloatArray) -> FloatArray:
 
 
 def _floor(lower_bounds: ArrayLike | None, base: FloatArray, units: FloatArray) -> FloatArray:
-    """Lowest base whose corners all keep to the bounds."""
+    """Lowest base whose corners all lie within the bounds."""
     if lower_bounds is None:
         return np.full(base.size, -np.inf)
     bounds = np.array(lower_bounds, dtype=np.float64)
