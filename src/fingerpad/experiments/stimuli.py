@@ -1,4 +1,4 @@
-"""What touched the skin while an afferent was recorded: the shifted bar, or stimuli of one's own."""
+"""Stimuli of a recording: the shifted bar, or stimuli of your own."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class ShiftedBar:
 
 @dataclass(frozen=True)
 class ListedStimuli:
-    """Stimuli of one's own, each with a name.
+    """Stimuli of your own, each with a name.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class ListedStimuli:
     column: str = "stimulus"
 
     def named(self, entry: str) -> tuple[str, TactileStimulus]:
-        """Return the name and what it stands for."""
+        """Return the name and the stimulus."""
         if entry not in self.stimuli:
             raise InputError(
                 f"{self.column} must be one of {self.source}, {', '.join(self.stimuli)}: got {entry!r}."

@@ -135,7 +135,7 @@ def _law(material: Material, name: str, elastic_moduli: str | None) -> list[str]
 
 
 def _in_two_terms(law: Law) -> Law:
-    """Halve the one term of a foam: CalculiX 2.20 reads a foam of N=1 wrongly, and says nothing."""
+    """Halve the one term of a foam: CalculiX 2.20 reads a foam of N=1 wrongly, without a message."""
     if not isinstance(law, Hyperfoam) or len(law.exponents) > 1:
         return law
     return replace(law, moduli_kpa=(law.moduli_kpa[0] / 2,) * 2, exponents=law.exponents * 2)

@@ -119,7 +119,7 @@ def resolution_grading(
 def covering(gradings: Sequence[Grading]) -> Grading:
     """One grading that is as fine as each of several, wherever that one is fine.
 
-    What is told apart should be pressed into one mesh: the error of a mesh is then the same for all.
+    Stimuli that are discriminated should share one mesh: its error is then the same for all.
 
     Parameters
     ----------

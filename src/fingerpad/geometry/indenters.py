@@ -3,7 +3,7 @@
 Every indenter lives in its own frame: its face touches y = 0, y runs along the direction of pressing (into
 the skin), x along the finger and z across it, unless a touch turns it. The body fills y < 0 below its face.
 `gap` is positive outside the body and negative inside; the normal points out of the body, along which a
-frictionless contact pushes. Bodies whose edges are the question stand in
+frictionless contact pushes. Bodies with sharp edges are in
 `fingerpad.geometry.edged_indenters`.
 """
 

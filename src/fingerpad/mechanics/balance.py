@@ -2,7 +2,7 @@
 
     external = stored + dissipated + contact                                        [µJ = mN mm = kPa mm³]
 
-Each term is found in its own way, so that their balance tells whether the press can be trusted:
+Each term is computed independently, so their balance is a check of the indentation:
 
 - external: the force of the indenter over its path, integral of F dd;
 - stored: the energy that springs hold now, summed over the elements (`viscoelastic.stored_energy_density`);

@@ -1,6 +1,6 @@
-"""Stress, strain and energies of elements over time, for whoever asks more of a press than where nodes went.
+"""Stress, strain and energies of elements over time.
 
-Everything is a mean over the element, since a brick with one pressure knows no more than that:
+Every value is a mean over the element, the resolution of a brick with one pressure:
 
 - deformation: the mean gradient Fbar = 1/V sum_q w_q F_q, scaled so that its determinant is the element's
   dilatation Jbar = v/V. One gradient for all strain measures keeps them compatible with each other; its

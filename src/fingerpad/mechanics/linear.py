@@ -152,7 +152,7 @@ def choose_preconditioner(
     InputError
         If the material is beyond the reach of every solver that this machine has for this mesh.
     """
-    # Materials are told apart by their moduli, from which the ratio comes back with the last digits changed.
+    # Materials are distinguished by moduli; the ratio computed from them differs in the last digits.
     if poisson > DIRECT_POISSON + 1e-9:
         raise InputError(
             f"Poisson's ratio must not exceed {DIRECT_POISSON}: got {poisson:.7g}; use {DIRECT_POISSON}, "

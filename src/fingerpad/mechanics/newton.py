@@ -44,7 +44,7 @@ assembled only if it is needed after all."""
 AT_REST = 1e-2
 """Residual over contact force below which the depth is moved towards the given force."""
 DEPTH_FORCING = 1e-3
-"""Tolerance of the linear solve for the body's answer to the indenter's advance."""
+"""Tolerance of the linear solve for the body's response to the indenter's displacement."""
 FIRST_DEPTH_MM, MOST_ADVANCE = 0.01, 4.0
 """Where the search for the depth of a force begins, and the factor by which one step may change it. [mm]"""
 

@@ -306,7 +306,7 @@ def press(
         take, a depth drives the indenter into the bone, or a force pushes it deeper
         than `deepest_mm`.
     ConvergenceError
-        If a step fails even when it is cut; the history tells each attempt.
+        If a step fails even when it is cut; the history lists each attempt.
     """
     settings = settings or PressSettings()
     check_mesh(mesh, len(materials))

@@ -34,7 +34,7 @@ SMALLEST_SHARE = 1.0 / 4096
 
 SMOOTH_SHARE = 0.5
 """Share of the tolerance that the estimated error may take. The rest is for kinks of SED within a step, where
-a node comes to touch: an estimate made for curves tells only a part of their error."""
+a node comes to touch: an estimate for smooth curves gives only a part of their error."""
 
 SAFETY, SHORTEN, LENGTHEN = 0.85, 0.25, 2.0
 """Aim below the tolerance, and bounds on how much one step's length may differ from the last one's."""

@@ -137,7 +137,7 @@ def save_figure(
     skin : SkinResponse
         From `indent`.
     response : ResponseMap
-        What a population answers to it.
+        Response of a population to it.
     indenter : PressedBody, optional
         The body that pressed, to be drawn as well; as it stands when it is not spun.
 

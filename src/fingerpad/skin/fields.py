@@ -1,7 +1,7 @@
 """Fields of an indentation, each declared once: name, unit, place, how it is stored, sampled and exported.
 
 `Touch.solve` computes, `Store` writes and reads, `SkinResponse.sample` interpolates and `write_vtu_series`
-exports what stands in `FIELDS`. To add a field, add one entry.
+exports the entries of `FIELDS`. To add a field, add one entry.
 """
 
 from __future__ import annotations

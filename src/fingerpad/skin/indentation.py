@@ -131,12 +131,12 @@ class Touch:
             )
 
     def solve(self, threads: int | None = None) -> SkinResponse:
-        """Press and return the answer of the skin.
+        """Compute the indentation and return the response of the skin.
 
         Parameters
         ----------
         threads : int, optional
-            Threads to use, all by default; the answer has the same bits on any number of them.
+            Threads to use, all by default; the response has the same bits on any number of them.
 
         Raises
         ------

@@ -252,7 +252,7 @@ def _begin(parent: int) -> None:
 
 
 def _end_with_parent(parent: int) -> None:
-    """Let a worker end when its parent was killed: nothing else would tell it."""
+    """End a worker when its parent was killed; it gets no other signal."""
 
     def watch() -> None:
         while os.getppid() == parent:

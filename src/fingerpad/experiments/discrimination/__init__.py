@@ -1,1 +1,1 @@
-"""Discrimination tasks: which stimuli can an observer of a population tell apart?"""
+"""Discrimination tasks: which stimuli can an observer of a population discriminate?"""

@@ -183,7 +183,7 @@ class PopulationSettings(TaskPart):
     offset_mm : (float, float)
         Middle of grid, rectangle or ellipse from the middle of the pad, along the finger and across. [mm]
     jitter : float
-        How far afferents of a jittered layout stray: standard deviation over the pitch.
+        Displacement of afferents in a jittered layout: standard deviation over the pitch.
     separation : float
         Least distance in a Poisson-disc layout over 1/sqrt(density).
     seed : int

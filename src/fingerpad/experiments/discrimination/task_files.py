@@ -40,7 +40,7 @@ def example_tasks() -> dict[str, str]:
     Examples
     --------
     >>> print(example_tasks()["sphere_curvature"].splitlines()[0])
-    question: Which spheres can be told from one of 287 /m?
+    question: Which spheres can be discriminated from one of 287 /m?
     """
     folder = files("fingerpad.experiments.discrimination") / "tasks"
     return {
@@ -56,7 +56,7 @@ def title(text: str) -> str:
     Examples
     --------
     >>> title(example_tasks()["sphere_curvature"])
-    'Which spheres can be told from one of 287 /m?'
+    'Which spheres can be discriminated from one of 287 /m?'
     """
     return parse_task(read_yaml(text, "task")).question
 

@@ -156,7 +156,7 @@ def _listed(task: DiscriminationTask) -> list[TaskStimulus]:
 def _presented(
     place: str, common: StimulusSettings, own: StimulusSettings, name: str, level: float | None
 ) -> TaskStimulus:
-    """Build one stimulus from what all share and what it says itself."""
+    """Build one stimulus from the common values and its own."""
     given = _merged(place, common, own)
     kind = given.get("indenter")
     if kind is None:
@@ -187,7 +187,7 @@ def _presented(
 
 
 def _merged(place: str, common: StimulusSettings, own: StimulusSettings) -> dict[str, Any]:
-    """Let what a stimulus says itself replace what all share, its own depth a common force as well."""
+    """Replace common values by those of a stimulus; its own depth also replaces a common force."""
     for where, settings in ((place, own.given), ("common", common.given)):
         if settings.keys() >= _EXCLUSIVE.keys():
             raise InputError(f"{where}: depth_mm and force_mn exclude each other: leave one out.")

@@ -101,7 +101,7 @@ class TaskPart(BaseModel):
 
     @property
     def given(self) -> dict[str, Any]:
-        """What the file says itself, without defaults."""
+        """The values in the file, without defaults."""
         return self.chosen(*type(self).model_fields)
 
     def chosen(self, *names: str) -> dict[str, Any]:

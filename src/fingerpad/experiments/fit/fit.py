@@ -197,11 +197,11 @@ def fit_recordings(
     with_profiles : bool, optional
         Whether the likelihood of each of the four numbers is profiled.
     with_sensitivity : bool, optional
-        Whether Sobol's indices tell what FSS is sensitive to.
+        Whether Sobol indices of FSS are computed.
     beside : mapping of float to SedTraces or to a sequence of SedTraces, optional
         The same energy density at places beside the receptor, by their offset along the finger, distal
         positive [mm], on both sides of 0: with it the receptor's offset is fitted as a seventh parameter,
-        by least squares or CMA-ES, and told beside the fit.
+        by least squares or CMA-ES, and reported with the fit.
     positions_mm : array_like (n_stimuli,), optional
         Where along a line each stimulus was: in posterior and profiles, neighbours may miss alike. [mm]
 

@@ -96,7 +96,7 @@ class Prepared:
 
 
 def check_spikes(recordings: RateRecordings | SpikeRecordings, n_motions: int) -> SpikeRecordings:
-    """Return the recordings if the likelihood of their spikes can be told, else raise `InputError`.
+    """Return the recordings if the likelihood of their spikes is defined, else raise `InputError`.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def _scatter_of(
 
 
 def _four_numbers(model: AfferentModel, rates: RateRecordings, method_of: MethodOf) -> Prepared:
-    """Prepare a method for the four numbers that firing can tell."""
+    """Prepare a method for the four identifiable parameters."""
     problem = four_number_problem(model, rates)
     return Prepared(
         problem,

@@ -85,7 +85,7 @@ Beside = Mapping[float, SedTraces | Sequence[SedTraces]]
 
 
 def check_offset(method: str, places_mm: Sequence[float]) -> None:
-    """Raise `InputError` if a receptor's offset cannot be told.
+    """Raise `InputError` if a receptor's offset cannot be determined.
 
     Parameters
     ----------

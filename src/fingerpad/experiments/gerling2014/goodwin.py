@@ -19,7 +19,7 @@ HIT_RATES = psychophysics.GOODWIN_HIT_RATES.value
 TRIALS = int(psychophysics.GOODWIN_TRIALS.value)
 
 SMALLEST_NOISE, LARGEST_NOISE = 1e-4, 2.0
-"""Range in which the noise that fits people is sought."""
+"""Bounds of the noise fitted to the observed hit rates."""
 
 
 @result_class

@@ -1,6 +1,6 @@
 """Level 3, Figure 6: responses of afferents all over the pad to a sphere, their order and their time course.
 
-A dense sheet of afferents stands for populations of any density: an afferent at some place responds as the
+A dense layout of afferents represents populations of any density: an afferent at some place responds as the
 sheet does there. For maps the sheet is square, seen from below; where skin is measured it is even by area.
 Beside the paper's three maps stand the order of first spikes, a code of its own (Johansson & Birznieks 2004)
 that the paper names in section 4.2, and the population rate.

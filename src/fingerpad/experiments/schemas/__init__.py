@@ -1,6 +1,6 @@
 """JSON schemas of the files of results, generated from their types; a file is checked before it is written.
 
-`python -m fingerpad.experiments.schemas` writes them anew after a change of a type.
+`python -m fingerpad.experiments.schemas` rewrites them after a change of a type.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`python -m fingerpad.experiments.schemas`: write the JSON schema of every file of results anew."""
+"""`python -m fingerpad.experiments.schemas`: rewrite the JSON schema of every file of results."""
 
 from __future__ import annotations
 
