@@ -12,8 +12,8 @@
 
 PYTHON ?= python3
 ARGS ?=
-# One file per process: the tests of a file may share one long run.
-PYTEST_ARGS ?= -n 2 --dist loadfile
+# One file per process: the tests of a file may share one long run. The longest come first (tests/conftest.py).
+PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder
 # Tests of all that README and docs show.
 PAGES := tests/test_readme.py
 

@@ -469,7 +469,7 @@ def test_an_example_task_runs_by_name_or_as_a_file_of_ones_own(call, tmp_path, a
         (["mine.yaml", "--jobs", "0"], "jobs must be a whole number of at least 1"),
         (["mine.yaml", "--resolution", "high"], "skin.resolution must be one of quick"),
         (["--example", "bumps"], "--example must be one of"),
-        (["mine.yaml", "--out", "mine.yaml"], "--out must be a folder that can be written"),
+        (["mine.yaml", "--out", "mine.yaml"], "--out must be a writable folder"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
