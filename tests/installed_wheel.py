@@ -81,6 +81,7 @@ def main() -> None:
             run(sys.executable, "-m", "venv", "--without-pip", environment, folder=folder)
             run(*pip, "--python", python, "install", "--no-compile", wheel, folder=folder)
             run(*pip, "--python", python, "check", folder=folder)
+            run(environment / "bin" / "fingerpad", "--version", folder=folder)
         (site_packages,) = environment.glob("lib/python*/site-packages")
         total = size_mb(environment)
         listed = ", ".join(f"{package} {size:.0f}" for package, size in largest(site_packages).items())
