@@ -5,18 +5,48 @@ from __future__ import annotations
 import typer
 
 from fingerpad.cli import run
-from studies import code_efficiency, fit_methods, mesh_noise, spike_fit
-from studies.commands.drives import drives_command
+from studies import (
+    code_efficiency,
+    drive_study,
+    fit_methods,
+    mesh_noise,
+    mesh_refinement,
+    paper_size,
+    spike_fit,
+)
 from studies.commands.materials import materials_command
-from studies.commands.refine import refine_command
 from studies.commands.results import results_command
 from studies.pages.code_efficiency import code_efficiency_page
+from studies.pages.drive_study import drives_page
 from studies.pages.fit_methods import methods_page
 from studies.pages.mesh_noise import mesh_noise_page
+from studies.pages.mesh_refinement import mesh_refinement_page
+from studies.pages.paper_size import paper_size_page
 from studies.pages.spike_fit import spike_fit_page
 from studies.study import Study, command_of
 
 STUDIES = (
+    Study(
+        "drives",
+        "Compare what may drive the afferent: quantities, explanations of the dynamic rates, depths.",
+        drive_study.run,
+        drives_page,
+        resolution="standard",
+    ),
+    Study(
+        "mesh-refinement",
+        "Press bars and spheres into finer meshes, and report the error of the meshes of every resolution.",
+        lambda runner, conditions: mesh_refinement.run(runner),
+        mesh_refinement_page,
+        resolution=None,
+    ),
+    Study(
+        "paper-size",
+        "Compare the meshes of quick and standard with one of the paper's size.",
+        lambda runner, conditions: paper_size.run(runner),
+        paper_size_page,
+        resolution=None,
+    ),
     Study(
         "methods",
         "Compare start points, methods of fitting and models on the rates under the bar.",
@@ -42,12 +72,10 @@ STUDIES = (
         code_efficiency_page,
     ),
 )
-"""Studies of the afferent and the spheres of the reproduction."""
+"""Studies without options of their own."""
 
 app = typer.Typer(help="Research on the model itself.", add_completion=False, pretty_exceptions_enable=False)
-app.command("drives")(drives_command)
 app.command("materials")(materials_command)
-app.command("refine")(refine_command)
 app.command("results")(results_command)
 for study in STUDIES:
     app.command(study.name)(command_of(study))

@@ -7,7 +7,7 @@ from typing import Any
 import typer
 
 from fingerpad.cli import app
-from studies.pages.markdown import table
+from fingerpad.report.page import markdown_table as table
 
 INTRODUCTION = """# Command line
 

@@ -2,115 +2,95 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from dataclasses import dataclass
-from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fingerpad import __version__
-from fingerpad.core.checks import FloatArray, whole
-from fingerpad.core.results import to_json
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.results import result_class
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.gerling2014 import drive_fits, drive_quantities, single_unit
 from fingerpad.experiments.gerling2014.drive_fits import RELATIVE_NAMES, Judged
-from fingerpad.experiments.runner import STORE_FOLDER
+from fingerpad.experiments.gerling2014.drive_quantities import DriveResult
+from fingerpad.experiments.manifest import Manifest
+from fingerpad.experiments.runner import Runner
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
-from fingerpad.skin.behaviour import code_hash
-from fingerpad.skin.store import Store, solve_missing
 from studies import drive_depths, dynamic_response
 from studies.drive_fits import information, thorough_method
 from studies.dynamic_response import EXPLANATIONS, ExplainedModel, Explanation, Patch
 from studies.plain_values import plain
 
 
-@dataclass(frozen=True)
+@result_class
 class DriveStudy:
-    """A run of the comparison.
+    """Result of `python -m studies drives`.
 
     Parameters
     ----------
-    conditions : Conditions
-        Finger, tissues, resolution and seed.
-    folder : Path
-        Where finished presses are stored.
-    jobs : int
-        Processes to press with; the numbers do not depend on it.
-
-    Raises
-    ------
-    InputError
-        If `jobs` is below 1.
+    quantities : DriveResult
+        Every quantity, by both methods.
+    explanations : tuple of dict
+        See `explained`.
+    depths : dict
+        See `studies.drive_depths.result`.
+    manifest : Manifest
+        What ran.
     """
 
-    conditions: Conditions
-    folder: Path
-    jobs: int = 1
-
-    def __post_init__(self) -> None:
-        whole("jobs", self.jobs, at_least=1)
+    quantities: DriveResult
+    explanations: tuple[dict[str, Any], ...]
+    depths: dict[str, Any]
+    manifest: Manifest
 
 
-def study_drives(study: DriveStudy, on_finished: Callable[[str], None] | None = None) -> dict[str, Any]:
+def run(runner: Runner, conditions: Conditions) -> DriveStudy:
     """Press the bar at all shifts, and compare what may drive the afferent.
 
     Parameters
     ----------
-    study : DriveStudy
-        What to run and where to keep finished presses.
-    on_finished : callable, optional
-        Called with the name of each finished part.
+    runner : Runner
+        Where indentations are stored.
+    conditions : Conditions
+        Finger, tissues, resolution and seed.
 
     Returns
     -------
-    dict
-        Plain numbers, strings and lists: the fields of `drive_quantities.DriveResult`, `explanations`,
-        `depths` and `manifest`.
+    DriveStudy
 
     Raises
     ------
     ConvergenceError
-        If a press cannot be solved; finished ones stay stored.
+        If an indentation cannot be solved; finished ones stay stored.
     StoreError
-        If a stored press is damaged or the folder cannot be written.
+        If a stored indentation is damaged or the folder cannot be written.
     """
-
-    def finished(part: str) -> None:
-        if on_finished:
-            on_finished(part)
-
-    conditions = study.conditions
-    store, touches = Store(study.folder / STORE_FOLDER), single_unit.bar_touches(conditions)
-    solve_missing(touches, store, study.jobs)
-    responses = [store.load(touch) for touch in touches]
-    finished("presses")
+    touches = dict(enumerate(single_unit.bar_touches(conditions)))
+    responses = list(runner.responses({"bar, 36 shifts": touches})["bar, 36 shifts"].values())
     recordings, generator = single_unit.bar_recordings(), np.random.default_rng(conditions.seed)
-    quantities = drive_quantities.drive_result(
-        drive_quantities.quantity_traces(responses),
-        recordings,
-        generator,
-        (*drive_quantities.ALONE, *drive_quantities.APART),
-        thorough_method(conditions.seed),
-        with_response_surface=True,
+    with runner.stage("quantities", 1) as advance:
+        quantities = drive_quantities.drive_result(
+            drive_quantities.quantity_traces(responses),
+            recordings,
+            generator,
+            (*drive_quantities.ALONE, *drive_quantities.APART),
+            thorough_method(conditions.seed),
+            with_response_surface=True,
+        )
+        advance()
+    with runner.stage("explanations", len(EXPLANATIONS)) as advance:
+        patch = dynamic_response.sampled_patch(responses)
+        explanations = explained(patch, recordings, conditions.seed, generator, lambda explanation: advance())
+    with runner.stage("depths", 1) as advance:
+        depths = drive_depths.result(responses, recordings, generator)
+        advance()
+    return DriveStudy(
+        quantities=quantities,
+        explanations=tuple(plain(explanations)),
+        depths=plain(depths),
+        manifest=runner.manifest(conditions),
     )
-    results: dict[str, Any] = json.loads(to_json(quantities))
-    finished("quantities")
-    patch = dynamic_response.sampled_patch(responses)
-    results["explanations"] = explained(patch, recordings, conditions.seed, generator, finished)
-    results["depths"] = drive_depths.result(responses, recordings, generator)
-    finished("depths")
-    results["manifest"] = {
-        "date": datetime.now(UTC).date().isoformat(),
-        "version": __version__,
-        "code_hash": code_hash(),
-        "resolution": conditions.resolution,
-        "seed": conditions.seed,
-    }
-    return plain(results)
 
 
 def explained(

@@ -7,7 +7,7 @@ somebody who follows the paper's order, the second whether that material could r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +21,7 @@ from fingerpad.data import neuron, protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014 import single_unit, sphere_discrimination
 from fingerpad.experiments.gerling2014.skin_deflection import deflection_r2
+from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, Cylinder
 from fingerpad.mechanics.materials import Tissues
@@ -30,7 +31,6 @@ from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.psychophysics.noise_fit import expected_hit_rates, fit_noise_sigma
 from fingerpad.skin.sampling import SkinResponse
-from fingerpad.skin.store import Store, solve_missing
 
 SHOWN_DISTANCES_MM = (1.0, 2.0, 3.0, 4.0, 5.0)
 """Where the deflection is told, mean of both sides. [mm]"""
@@ -303,11 +303,9 @@ def deflection(cylinder: SkinResponse) -> dict[str, Any]:
 
 def compare(
     candidates: Sequence[MaterialSet],
+    runner: Runner,
     conditions: Conditions,
-    store: Store,
-    jobs: int = 1,
     effort: Effort | None = None,
-    on_finished: Callable[[str], None] | None = None,
 ) -> list[dict[str, Any]]:
     """Judge candidates one after the other; a stopped run goes on from the last finished press.
 
@@ -315,16 +313,12 @@ def compare(
     ----------
     candidates : sequence of MaterialSet
         What is tried; names must differ.
+    runner : Runner
+        Where indentations are stored.
     conditions : Conditions
         Finger, resolution and seed; its materials are not used.
-    store : Store
-        Finished presses.
-    jobs : int
-        Processes to press with; the numbers do not depend on it.
     effort : Effort, optional
         How much of each level is looked at.
-    on_finished : callable, optional
-        Called with the name of each finished candidate.
 
     Returns
     -------
@@ -347,18 +341,16 @@ def compare(
     for candidate in candidates:
         wanted = touches(candidate, conditions, effort.shifted_bars)
         try:
-            solve_missing(list(wanted.values()), store, jobs)
-            responses = {key: store.load(touch) for key, touch in wanted.items()}
+            runner.solve(list(wanted.values()), candidate.name)
+            responses = {key: runner.store.load(touch) for key, touch in wanted.items()}
             rows.append(evaluate(candidate, responses, conditions, effort))
         except ConvergenceError as error:
             rows.append({"name": candidate.name, "basis": candidate.basis, "unsolved": str(error)})
-        if on_finished:
-            on_finished(candidate.name)
     return rows
 
 
 def deflections(
-    candidates: Sequence[MaterialSet], conditions: Conditions, store: Store, jobs: int = 1
+    candidates: Sequence[MaterialSet], runner: Runner, conditions: Conditions
 ) -> list[dict[str, Any]]:
     """Judge candidates by the cylinder alone; arguments as in `compare`.
 
@@ -375,8 +367,11 @@ def deflections(
         If a stored press is damaged.
     """
     pressed = {candidate.name: _cylinder_touch(candidate, conditions) for candidate in candidates}
-    solve_missing(list(pressed.values()), store, jobs)
-    return [_described(one) | {"deflection": deflection(store.load(pressed[one.name]))} for one in candidates]
+    runner.solve(list(pressed.values()), "deflection alone")
+    return [
+        _described(one) | {"deflection": deflection(runner.store.load(pressed[one.name]))}
+        for one in candidates
+    ]
 
 
 def pareto_front(rows: Sequence[Mapping[str, Any]]) -> list[str]:

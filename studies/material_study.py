@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from datetime import UTC, datetime
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from fingerpad import __version__
-from fingerpad.core.checks import one_of, whole
+from fingerpad.core.checks import one_of
+from fingerpad.core.results import Vector, result_class
 from fingerpad.data import paper
 from fingerpad.data import tissues as published
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.runner import STORE_FOLDER
-from fingerpad.skin.behaviour import code_hash
-from fingerpad.skin.store import Store, solve_missing
+from fingerpad.experiments.manifest import Manifest
+from fingerpad.experiments.runner import Runner
 from studies import trial_order
 from studies.hyperfoam_fit import polynomial_of_hyperfoam
 from studies.material_candidates import candidates, deflection_candidates
@@ -34,94 +30,125 @@ COMPRESSIONS = (0.3, 0.5)
 """Shortenings up to which Wu's stress is fitted; the second is used."""
 
 
-@dataclass(frozen=True)
-class MaterialStudy:
-    """A run of the comparison.
+@result_class
+class Polynomial:
+    """A polynomial that stands for one of Wu's hyperfoams.
 
     Parameters
     ----------
-    conditions : Conditions
-        Finger, resolution and seed; its materials are not used.
-    folder : Path
-        Where finished presses are stored.
-    jobs : int
-        Processes to press with; the numbers do not depend on it.
-    effort : Effort
-        How much of each level is looked at.
-    names : tuple of str
-        Candidates to compare; all by default.
-
-    Raises
-    ------
-    InputError
-        If `jobs` is below 1 or a name is unknown.
+    layer : str
+        Of the skin.
+    poisson, compression : float
+        Poisson ratio, and the shortening up to which the stress is fitted. [1]
+    coefficients_kpa : array (5,)
+        C10, C01, C20, C11, C02. [kPa]
+    misfit : float
+        Root mean square of the stress error over the largest stress. [1]
     """
 
-    conditions: Conditions
-    folder: Path
-    jobs: int = 1
-    effort: Effort = field(default_factory=Effort)
-    names: tuple[str, ...] = tuple(candidate.name for candidate in candidates())
-
-    def __post_init__(self) -> None:
-        whole("jobs", self.jobs, at_least=1)
-        for name in self.names:
-            one_of("each of names", name, [candidate.name for candidate in candidates()])
+    layer: str
+    poisson: float
+    compression: float
+    coefficients_kpa: Vector
+    misfit: float
 
 
-def study_materials(study: MaterialStudy, on_finished: Callable[[str], None] | None = None) -> dict[str, Any]:
+@result_class
+class Targets:
+    """When a level counts as met: R² from `r2` on, hit rates within `hit_rate_error` of Goodwin's. [1]"""
+
+    r2: float = LEAST_R2
+    hit_rate_error: float = LARGEST_HIT_RATE_ERROR
+
+
+@result_class
+class MaterialStudy:
+    """Result of `python -m studies materials`.
+
+    Parameters
+    ----------
+    sets : tuple of dict
+        One per candidate, see `studies.material_sets.evaluate`, with the levels that it `meets`.
+    pareto : tuple of str
+        Candidates that no other beats on all levels.
+    deflection_only : tuple of dict
+        Candidates judged by the cylinder alone.
+    order : dict
+        See `studies.trial_order.result`.
+    polynomials : tuple of Polynomial
+        Wu's tissues.
+    targets : Targets
+        Of the levels.
+    shifted_bars : bool
+        Whether the bar was indented at all shifts.
+    manifest : Manifest
+        What ran.
+    """
+
+    sets: tuple[dict[str, Any], ...]
+    pareto: tuple[str, ...]
+    deflection_only: tuple[dict[str, Any], ...]
+    order: dict[str, Any]
+    polynomials: tuple[Polynomial, ...]
+    targets: Targets
+    shifted_bars: bool
+    manifest: Manifest
+
+
+NAMES = tuple(candidate.name for candidate in candidates())
+"""Candidates that are compared."""
+
+
+def run(
+    runner: Runner,
+    conditions: Conditions,
+    effort: Effort | None = None,
+    names: Sequence[str] = NAMES,
+) -> MaterialStudy:
     """Compare candidates on all levels, and the trials in their order.
 
     Parameters
     ----------
-    study : MaterialStudy
-        What to run and where to keep finished presses.
-    on_finished : callable, optional
-        Called with the name of each finished part.
+    runner : Runner
+        Where indentations are stored.
+    conditions : Conditions
+        Finger, resolution and seed; its materials are not used.
+    effort : Effort, optional
+        How much of each level is looked at.
+    names : sequence of str, optional
+        Candidates to compare; all by default.
 
     Returns
     -------
-    dict
-        Plain numbers, strings and lists: `sets`, `pareto`, `deflection_only`, `order`, `polynomials`,
-        `targets` and `manifest`.
+    MaterialStudy
 
     Raises
     ------
+    InputError
+        If a name is unknown.
     ConvergenceError
-        If a press by the cylinder alone, or of the trials' order, cannot be solved.
+        If an indentation by the cylinder alone, or of the trials' order, cannot be solved.
     StoreError
-        If a stored press is damaged or the folder cannot be written.
+        If a stored indentation is damaged or the folder cannot be written.
     """
-    store = Store(study.folder / STORE_FOLDER)
-    chosen = [candidate for candidate in candidates() if candidate.name in study.names]
-    rows = compare(chosen, study.conditions, store, study.jobs, study.effort, on_finished)
+    effort = effort or Effort()
+    for name in names:
+        one_of("each of names", name, NAMES)
+    chosen = [candidate for candidate in candidates() if candidate.name in names]
+    rows = compare(chosen, runner, conditions, effort)
     for row in rows:
         row["meets"] = meets(row)
-    alone = deflections(deflection_candidates(), study.conditions, store, study.jobs)
-    if on_finished:
-        on_finished("deflection alone")
-    pressed = trial_order.touches(study.conditions)
-    solve_missing(list(pressed.values()), store, study.jobs)
-    order = trial_order.result({key: store.load(touch) for key, touch in pressed.items()})
-    if on_finished:
-        on_finished("order of the trials")
-    return plain(
-        {
-            "sets": rows,
-            "pareto": pareto_front(rows),
-            "deflection_only": alone,
-            "order": order,
-            "polynomials": polynomials(),
-            "targets": {"r2": LEAST_R2, "hit_rate_error": LARGEST_HIT_RATE_ERROR},
-            "manifest": {
-                "date": datetime.now(UTC).date().isoformat(),
-                "version": __version__,
-                "code_hash": code_hash(),
-                "resolution": study.conditions.resolution,
-                "seed": study.conditions.seed,
-                "shifted_bars": study.effort.shifted_bars,
-            },
-        }
+    alone = deflections(deflection_candidates(), runner, conditions)
+    order = runner.responses({"order of the trials": trial_order.touches(conditions)})
+    return MaterialStudy(
+        sets=tuple(plain(rows)),
+        pareto=tuple(pareto_front(rows)),
+        deflection_only=tuple(plain(alone)),
+        order=plain(trial_order.result(order["order of the trials"])),
+        polynomials=polynomials(),
+        targets=Targets(),
+        shifted_bars=effort.shifted_bars,
+        manifest=runner.manifest(conditions),
     )
 
 
@@ -142,7 +169,7 @@ def meets(row: Mapping[str, Any]) -> dict[str, bool]:
     }
 
 
-def polynomials() -> list[dict[str, Any]]:
+def polynomials() -> tuple[Polynomial, ...]:
     """Coefficients of the polynomials that stand for Wu's hyperfoams, and how well they do. [kPa]"""
     layers = {
         "dermis": (published.WU_SKIN_HYPERFOAM_MU.value, published.WU_SKIN_HYPERFOAM_ALPHA.value),
@@ -155,12 +182,12 @@ def polynomials() -> list[dict[str, Any]]:
             for compression in COMPRESSIONS:
                 coefficients, misfit = polynomial_of_hyperfoam(mu, alpha, poisson, compression)
                 rows.append(
-                    {
-                        "layer": layer,
-                        "poisson": poisson,
-                        "compression": compression,
-                        "coefficients_kpa": coefficients,
-                        "misfit": misfit,
-                    }
+                    Polynomial(
+                        layer=layer,
+                        poisson=poisson,
+                        compression=compression,
+                        coefficients_kpa=coefficients,
+                        misfit=misfit,
+                    )
                 )
-    return rows
+    return tuple(rows)

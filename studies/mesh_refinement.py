@@ -7,26 +7,23 @@ the error that a mesh carries into the results: afferent, noise and random numbe
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import positive
-from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, sphere_discrimination
-from fingerpad.experiments.runner import STORE_FOLDER
+from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.grading import Grading
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.skin.behaviour import code_hash
 from fingerpad.skin.indentation import Touch
-from fingerpad.skin.store import Store, solve_missing
 from studies.mesh_errors import (
     Reading,
     compare,
@@ -202,31 +199,26 @@ def _examples(conditions: Conditions) -> dict[str, Touch]:
     }
 
 
-def run(folder: Path, jobs: int = 1, progress: Progress | None = None) -> dict[str, Any]:
+def run(runner: Runner) -> dict[str, Any]:
     """Press everything that is not stored yet, and compare the meshes.
 
     About an hour on one core. Finished touches are stored one by one, so a run that was stopped goes on.
 
     Parameters
     ----------
-    folder : Path
-        Where finished touches are.
-    jobs : int
-        Processes to use; the numbers do not depend on it.
-    progress : Progress, optional
-        Told about each finished touch.
+    runner : Runner
+        Where indentations are stored.
 
     Returns
     -------
     dict
-        Plain numbers, strings and lists, as `report.mesh_refinement` shows them.
+        Plain numbers, strings and lists, as `studies.pages.mesh_refinement` shows them.
 
     Raises
     ------
     ConvergenceError
         If an indentation cannot be solved.
     """
-    progress, store = progress or NoProgress(), Store(folder / STORE_FOLDER)
     pressed = {level.name: (level.bars(), level.balls()) for level in LEVELS}
     changes, steps = single_changes(), step_changes()
     groups: dict[str, list[Touch]] = {
@@ -235,15 +227,14 @@ def run(folder: Path, jobs: int = 1, progress: Progress | None = None) -> dict[s
     groups["one at a time"] = [touch for each in changes.values() for touch in each.values()]
     groups["steps"] = [touch for counts in steps.values() for touch in counts.values()]
     for name, touches in groups.items():
-        with progress.stage(name, sum(not store.holds(touch) for touch in touches)) as advance:
-            _solve(touches, store, jobs, advance)
+        runner.solve(touches, name)
 
     population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
     receptor = np.array([[RECEPTOR_X_MM, 0.0]])
 
     def reading(touches: Mapping[Any, Touch], receptors_mm: np.ndarray) -> Reading:
         sheets = next(iter(touches.values())).grading.living_epidermis
-        return read({key: store.load(touch) for key, touch in touches.items()}, receptors_mm, sheets)
+        return read({key: runner.store.load(touch) for key, touch in touches.items()}, receptors_mm, sheets)
 
     bars = {name: reading(touches, receptor) for name, (touches, _) in pressed.items()}
     balls = {name: reading(touches, population.positions_mm) for name, (_, touches) in pressed.items()}
@@ -272,10 +263,6 @@ def run(folder: Path, jobs: int = 1, progress: Progress | None = None) -> dict[s
             },
         }
     )
-
-
-def _solve(touches: list[Touch], store: Store, jobs: int, advance: Callable[[], None]) -> None:
-    solve_missing(touches, store, jobs, lambda seconds: advance())
 
 
 def _described(level: Level) -> dict[str, Any]:

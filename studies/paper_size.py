@@ -7,19 +7,17 @@ check; and twice the elements through the deep layers tell what the paper's size
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.data import psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, skin_deflection, sphere_discrimination
-from fingerpad.experiments.runner import STORE_FOLDER
+from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import LAYERS, Mesh, finger_mesh
 from fingerpad.neuron.population import Population
@@ -27,7 +25,6 @@ from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.skin.behaviour import code_hash
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
-from fingerpad.skin.store import Store, solve_missing
 from studies.mesh_errors import (
     Reading,
     compare,
@@ -125,7 +122,7 @@ def deeper_touches() -> dict[str, Touch]:
     }
 
 
-def run(folder: Path, jobs: int = 1, progress: Progress | None = None) -> dict[str, Any]:
+def run(runner: Runner) -> dict[str, Any]:
     """Press everything that is not stored yet, and compare quick and standard with the paper's size.
 
     23 presses at the paper's size or above it; finished ones are stored one by one, so a run that was
@@ -133,31 +130,25 @@ def run(folder: Path, jobs: int = 1, progress: Progress | None = None) -> dict[s
 
     Parameters
     ----------
-    folder : Path
-        Where finished touches are.
-    jobs : int
-        Processes to use; the numbers do not depend on it.
-    progress : Progress, optional
-        Told about each finished touch.
+    runner : Runner
+        Where indentations are stored.
 
     Returns
     -------
     dict
-        Plain numbers, strings and lists, as `report.paper_size` shows them.
+        Plain numbers, strings and lists, as `studies.pages.paper_size` shows them.
 
     Raises
     ------
     ConvergenceError
         If an indentation cannot be solved.
     """
-    progress, store = progress or NoProgress(), Store(folder / STORE_FOLDER)
     pressed = {name: Touches.of(name) for name in MESHES}
     deeper, whole = deeper_touches(), whole_touch()
     groups = {name: touches.all() for name, touches in pressed.items()}
     groups["checks"] = [*deeper.values(), whole]
     for name, touches in groups.items():
-        with progress.stage(name, sum(not store.holds(touch) for touch in touches)) as advance:
-            _solve(touches, store, jobs, advance)
+        runner.solve(touches, name)
 
     receptor = np.array([[RECEPTOR_X_MM, 0.0]])
     population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
@@ -165,10 +156,10 @@ def run(folder: Path, jobs: int = 1, progress: Progress | None = None) -> dict[s
 
     def reading(touches: Mapping[Any, Touch], receptors_mm: FloatArray) -> Reading:
         sheets = next(iter(touches.values())).grading.living_epidermis
-        return read({key: store.load(touch) for key, touch in touches.items()}, receptors_mm, sheets)
+        return read({key: runner.store.load(touch) for key, touch in touches.items()}, receptors_mm, sheets)
 
     deflection = {
-        name: {trial: store.load(touch) for trial, touch in touches.deflection.items()}
+        name: {trial: runner.store.load(touch) for trial, touch in touches.deflection.items()}
         for name, touches in pressed.items()
     }
     bars = {name: reading(touches.bars, receptor) for name, touches in pressed.items()}
@@ -191,10 +182,6 @@ def run(folder: Path, jobs: int = 1, progress: Progress | None = None) -> dict[s
             },
         }
     )
-
-
-def _solve(touches: list[Touch], store: Store, jobs: int, advance: Callable[[], None]) -> None:
-    solve_missing(touches, store, jobs, lambda seconds: advance())
 
 
 def preset() -> dict[str, Any]:

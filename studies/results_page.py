@@ -14,8 +14,8 @@ from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.results import Number, Vector, from_json, read_results, result_class
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.report.formatting import ABSENT, fixed, number
+from fingerpad.report.page import markdown_table as table
 from studies.fit_methods import FitMethods, MethodsStudy
-from studies.pages.markdown import table
 
 COMMAND = "python -m studies results"
 README_START, README_END = f"<!-- {COMMAND} writes this table -->", "<!-- end of the table -->"

@@ -36,12 +36,15 @@ class Study:
         From a runner and conditions to a result, an instance of a `result_class`.
     page : callable
         From that result to its page.
+    resolution : str or None, optional
+        Resolution by default; None for a study that has resolutions and random numbers of its own.
     """
 
     name: str
     help: str
     run: Callable[[Runner, Conditions], Any]
     page: Callable[[Any], Page]
+    resolution: str | None = "quick"
 
 
 def run_study(study: Study, runner: Runner, conditions: Conditions) -> tuple[Path, Path]:
@@ -75,23 +78,30 @@ def run_study(study: Study, runner: Runner, conditions: Conditions) -> tuple[Pat
 
 
 def command_of(study: Study) -> Callable[..., None]:
-    """Return the command line of a study: resolution, folder, processes and seed."""
+    """Return the command line of a study: folder, processes and, where it has them, resolution and seed."""
 
     def command(
-        resolution: Resolution = "quick", out: Out = Path(study.name), jobs: Jobs = None, seed: Seed = 0
+        resolution: Resolution = study.resolution or "",
+        out: Out = Path(study.name),
+        jobs: Jobs = None,
+        seed: Seed = 0,
     ) -> None:
         execute(study, Conditions(resolution=resolution, seed=seed), out, jobs)
 
-    command.__doc__ = study.help
-    return command
+    def without_conditions(out: Out = Path(study.name), jobs: Jobs = None) -> None:
+        execute(study, Conditions(), out, jobs)
+
+    chosen = command if study.resolution else without_conditions
+    chosen.__doc__ = study.help
+    return chosen
 
 
 def execute(study: Study, conditions: Conditions, out: Path, jobs: int | None) -> None:
     """Run a study from the command line, with bars on a terminal, and say where its files are."""
     from rich.console import Console
 
+    runner = Runner(out, processes(jobs), Bars(Console(stderr=True)))
     make_writable(out)
     with interruptible():
-        runner = Runner(out, processes(jobs), Bars(Console(stderr=True)))
         page, numbers = run_study(study, runner, conditions)
     typer.echo(f"Page: {page}\nResults: {numbers}")

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,9 +12,10 @@ from scipy.stats import norm
 from fingerpad.core.errors import InputError
 from fingerpad.core.results import from_json, to_json
 from fingerpad.core.signals import SedTraces
-from fingerpad.experiments.conditions import RECEPTOR_X_MM
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import drive_fits, drive_quantities
 from fingerpad.experiments.gerling2014.drive_quantities import ALONE, APART, EXTENDED, PAPER, SHOWN, Drivers
+from fingerpad.experiments.runner import Runner
 from fingerpad.inference.fitting import Fit, interleaved_folds
 from fingerpad.inference.identifiable import identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel
@@ -25,6 +25,7 @@ from fingerpad.inference.start_points import start_points
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.report import drive_quantities as report
+from fingerpad.report.page import write_markdown
 from fingerpad.report.style import png
 from studies import drive_study, dynamic_response
 from studies.drive_fits import BestOf, information, thorough_method
@@ -522,8 +523,8 @@ def test_words_name_the_best_and_tables_hold_its_scores(found):
     assert all(len(row.cells) == len(table.columns) for row in table.rows)
 
 
-def explained(section):
-    """Results with two explanations that the page shows, and a depth."""
+def explained(section, tmp_path):
+    """A study with two explanations that the page shows, and a depth."""
     fit = section["candidates"][0]["fit"]
     paper = {"name": "the paper's model", "free_numbers": 4, "added": {}} | fit
     paper |= {"aic_difference": 0.0, "bic_difference": 0.0}
@@ -531,42 +532,43 @@ def explained(section):
     power |= {"aic_difference": -50.9, "bic_difference": -48.6, "gain_interval": [0.01, 0.2]}
     candidates = [candidate | {"response_surface": candidate["fit"]} for candidate in section["candidates"]]
     layer = {"tissue": "dermis", "from_mm": 0.5, "to_mm": 1.0, "largest_sed_kpa": 2.0, **fit}
-    return section | {
-        "candidates": candidates,
-        "explanations": [paper, power],
-        "depths": {"method": "least squares", "own_layer": 0, "layers": [layer]},
-        "manifest": {"date": "2026-01-01", "resolution": "quick", "seed": 3, "code_hash": "abc"},
-    }
+    quantities = json.dumps(section | {"candidates": candidates}).encode()
+    return drive_study.DriveStudy(
+        quantities=from_json(drive_quantities.DriveResult, quantities),
+        explanations=(paper, power),
+        depths={"method": "least squares", "own_layer": 0, "layers": [layer]},
+        manifest=Runner(tmp_path).manifest(Conditions("quick", seed=3)),
+    )
 
 
 def test_the_page_tells_every_explanation_and_both_methods(section, tmp_path):
-    results = explained(section)
-    path = drives_report.write_drive_page(results, tmp_path, "python -m studies drives --resolution quick")
-    text = path.read_text(encoding="utf-8")
-    assert "`python -m studies drives --resolution quick` on 2026-01-01" in text
+    result = explained(section, tmp_path)
+    page = drives_report.drives_page(result)
+    text = write_markdown(page, tmp_path / "drives.md").read_text(encoding="utf-8")
+    assert f"`python -m studies drives` on {result.manifest.started[:10]}" in text
+    assert "quick resolution, seed 3" in text
     assert "## By quantity, response surface" in text
     assert "| power law of the dynamic term | 5 | exponent 0.39 |" in text
     assert "| +0.010 … +0.200 | −50.9 | −48.6 |" in text
     assert "| dermis | 0.50 | 1.00 | 2.00 |" in text
-    for name, draw in drives_report.DRAWN.items():
-        file = drives_report.FIGURES[name]
-        assert f"](images/{file})" in text
-        assert (tmp_path / "images" / file).read_bytes() == png(draw, results)
+    assert len(page.drawings) == 3
+    for drawing in page.drawings:
+        assert f"](images/{drawing.name}.png)" in text
+        assert (tmp_path / "images" / f"{drawing.name}.png").read_bytes() == png(drawing.draw)
 
 
-def test_explanations_are_drawn_by_what_they_predict_and_gain(section):
-    results = explained(section)
-    scores, gains = drives_report.draw_explanations(results).axes
+def test_explanations_are_drawn_by_what_they_predict_and_gain(section, tmp_path):
+    result = explained(section, tmp_path)
+    scores, gains = drives_report.draw_explanations(result).axes
     drawn = {line.get_label(): line.get_xdata().tolist() for line in scores.get_lines()}
-    rows = results["explanations"]
+    rows = result.explanations
     assert drawn["both, weighted"] == [row["fss_out_of_sample"] for row in rows]
     assert drawn["dynamic rates"] == [row["fss_out_of_sample_dynamic"] for row in rows]
     assert [label.get_text() for label in scores.get_yticklabels()][1] == "power law of the dynamic term (5)"
     (intervals,) = gains.collections
     assert [path[:, 0].tolist() for path in intervals.get_segments()] == [[0.0, 0.0], [0.01, 0.2]]
-    assert "Smallest AIC: power law of the dynamic term; 0 more" in drives_report.caption_explanations(
-        results
-    )
+    said = drives_report.caption_explanations(result)
+    assert "Smallest AIC: power law of the dynamic term; 0 more" in said
 
 
 def test_numbers_that_a_run_does_not_have_are_dashes(section):
@@ -582,11 +584,6 @@ def test_numbers_that_a_run_does_not_have_are_dashes(section):
     (table,) = report.drive_tables(empty)
     assert set(table.rows[1].cells[1:]) == {"–", "– … –"}
     assert "FSS –" in report.caption_drive_quantities(empty)
-
-
-def test_a_study_needs_a_process():
-    with pytest.raises(InputError, match="jobs must be a whole number of at least 1"):
-        drive_study.DriveStudy(SimpleNamespace(), "out", jobs=0)
 
 
 def test_a_drive_that_is_filtered_keeps_the_rest():

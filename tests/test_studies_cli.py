@@ -2,23 +2,22 @@
 
 import json
 import sys
-from pathlib import Path
 
 import pytest
+import typer
 
+from fingerpad.core.results import result_class
+from fingerpad.experiments import runner
+from fingerpad.report.parts import Page
 from studies import __main__ as command
-from studies import drive_study, mesh_refinement, paper_size
-from studies.pages import drive_study as drives_report
-from studies.pages import mesh_refinement as report
-from studies.pages import paper_size as paper_report
+from studies.study import Study, command_of
 
 
 @pytest.fixture
 def call(monkeypatch, capsys, tmp_path):
     """Run a study in this process, in an empty folder; a press would fail the test."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(mesh_refinement, "run", pytest.fail)
-    monkeypatch.setattr(paper_size, "run", pytest.fail)
+    monkeypatch.setattr(runner, "solve_missing", pytest.fail)
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["studies", *arguments])
@@ -30,44 +29,52 @@ def call(monkeypatch, capsys, tmp_path):
     return run
 
 
+@result_class
+class Found:
+    """What a study found."""
+
+    rate_hz: float
+
+
 @pytest.mark.parametrize(
-    ("chosen", "study", "name"),
+    ("resolution", "chosen", "conditions"),
     [
-        ((), mesh_refinement, "mesh_refinement.md"),
-        (("--against", "fine"), mesh_refinement, "mesh_refinement.md"),
-        (("--against", "paper"), paper_size, "paper_size.md"),
+        ("standard", ("--seed", "5"), ("standard", 5)),
+        ("standard", ("--resolution", "quick"), ("quick", 0)),
+        (None, (), ("standard", 0)),
     ],
-    ids=["default", "fine", "paper"],
 )
-def test_refine_writes_its_page_numbers_and_figure(call, monkeypatch, tmp_path, chosen, study, name):
-    asked = []
-    page = {mesh_refinement: report, paper_size: paper_report}[study]
-    monkeypatch.setattr(study, "run", lambda *arguments: asked.append(arguments[:2]) or {})
-    monkeypatch.setattr(page, "documents", lambda results: {name: b"errors"})
-    status, said, _ = call("refine", "--out", "meshes", "--jobs", "3", *chosen)
-    assert (status, asked) == (0, [(Path("meshes"), 3)])
-    assert said == f"Report: {Path('meshes') / name}\n"
-    assert (tmp_path / "meshes" / name).read_bytes() == b"errors"
-
-
-def test_drives_writes_its_page_and_numbers_for_the_conditions_given(call, monkeypatch, tmp_path):
+def test_a_study_is_run_with_what_was_asked_and_writes_page_and_numbers(
+    monkeypatch, capsys, tmp_path, resolution, chosen, conditions
+):
     asked = []
 
-    def study(task, on_finished):
-        asked.append((task.conditions.resolution, task.conditions.seed, task.folder, task.jobs))
-        return {"candidates": []}
+    def run(runner, conditions):
+        asked.append((conditions.resolution, conditions.seed, runner.folder, runner.jobs))
+        return Found(rate_hz=63.0)
 
-    def write(results, folder, command):
-        (folder / "page.md").write_text(command)
-        return folder / "page.md"
+    def page(found):
+        return Page("Rates", f"{found.rate_hz:g} spikes/s.", [], [])
 
-    monkeypatch.setattr(drive_study, "study_drives", study)
-    monkeypatch.setattr(drives_report, "write_drive_page", write)
-    status, said, _ = call("drives", "--resolution", "quick", "--out", "found", "--jobs", "2", "--seed", "5")
-    assert (status, asked) == (0, [("quick", 5, Path("found"), 2)])
-    assert said == f"Page: {Path('found/page.md')}\nResults: {Path('found/drive_quantities.json')}\n"
-    assert (tmp_path / "found" / "page.md").read_text() == "python -m studies drives --resolution quick"
-    assert json.loads((tmp_path / "found" / "drive_quantities.json").read_text()) == {"candidates": []}
+    app = typer.Typer()
+    app.callback()(lambda: None)  # otherwise the only command has no name
+    app.command("rates")(command_of(Study("rates", "Fire.", run, page, resolution)))
+    out = tmp_path / "found"
+    monkeypatch.setattr(sys, "argv", ["studies", "rates", "--out", str(out), "--jobs", "2", *chosen])
+    app(standalone_mode=False)
+    assert asked == [(*conditions, out, 2)]
+    assert capsys.readouterr().out == f"Page: {out / 'rates.md'}\nResults: {out / 'rates.json'}\n"
+    assert (out / "rates.md").read_text() == "# Rates\n\n63 spikes/s.\n"
+    assert json.loads((out / "rates.json").read_text()) == {"rate_hz": 63.0}
+
+
+def test_every_study_has_a_command_and_a_line_of_help(call):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("COLUMNS", "200")
+        _, said, _ = call("--help")
+    names = [study.name for study in command.STUDIES]
+    assert len(names) == len(set(names)) == 7
+    assert all(f" {name} " in said for name in (*names, "materials", "results"))
 
 
 @pytest.mark.parametrize(
@@ -76,9 +83,9 @@ def test_drives_writes_its_page_and_numbers_for_the_conditions_given(call, monke
         (["drives", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
         (["drives", "--seed", "-1"], "seed must be a whole number of at least 0", "-1"),
         (["drives", "--resolution", "fine"], "resolution must be one of quick, standard, paper", "'fine'"),
-        (["refine", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
-        (["refine", "--against", "coarse"], "against must be one of fine, paper", "'coarse'"),
-        (["refine", "--resolution", "quick"], "No such option", "--resolution"),
+        (["paper-size", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
+        (["mesh-refinement", "--resolution", "quick"], "No such option", "--resolution"),
+        (["materials", "--name", "Trial 4"], "--name must be one of Trial 1", "'Trial 4'"),
         (["results", "none.json"], "none.json cannot be read as JSON", "No such file"),
         (["meshes"], "No such command", "'meshes'"),
     ],

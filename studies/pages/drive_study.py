@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
+from functools import partial
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from fingerpad.core.files import write_atomically
-from fingerpad.core.results import from_json
-from fingerpad.experiments.gerling2014.drive_quantities import DriveResult
 from fingerpad.report.drive_quantities import (
     caption_drive_quantities,
     draw_drive_quantities,
@@ -21,15 +17,11 @@ from fingerpad.report.drive_quantities import (
     gain,
 )
 from fingerpad.report.formatting import ABSENT, fixed
-from fingerpad.report.parts import Row, Table
-from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, numbers, png
-from studies.pages.markdown import table as markdown_table
+from fingerpad.report.manifest import edition
+from fingerpad.report.parts import Chapter, Drawing, Page, Row, Table
+from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, numbers
+from studies.drive_study import DriveStudy
 
-FIGURES = {
-    "quantities": "drive_quantities.png",
-    "explanations": "drive_explanations.png",
-    "depths": "drive_depths.png",
-}
 _OUT_OF_SAMPLE = tuple(f"fss_out_of_sample{phase}" for phase in ("", "_dynamic", "_static"))
 _EXPLANATION_COLUMNS = (
     "explanation",
@@ -56,25 +48,19 @@ _DEPTH_COLUMNS = (
 )
 
 
-def quantities(results: Mapping[str, Any]) -> DriveResult:
-    """Return the part of the results that compares quantities."""
-    fields = {name: results[name] for name in DriveResult.__dataclass_fields__}
-    return from_json(DriveResult, json.dumps(fields).encode())
-
-
-def draw_explanations(section: Mapping[str, Any]) -> Figure:
+def draw_explanations(section: DriveStudy) -> Figure:
     """Draw what each explanation predicts, and what it gains over the paper's model.
 
     Parameters
     ----------
-    section : dict
-        What `studies.drive_study.study_drives` returns.
+    section : DriveStudy
+        From `studies.drive_study.run`.
 
     Returns
     -------
     Figure
     """
-    rows = section["explanations"]
+    rows = section.explanations
     height = np.arange(len(rows))
     figure = new_figure(10.0, 1.4 + 0.32 * len(rows))
     scores, gains = figure.subplots(1, 2, sharey=True, width_ratios=(1.0, 1.0))
@@ -100,9 +86,9 @@ def draw_explanations(section: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def caption_explanations(section: Mapping[str, Any]) -> str:
+def caption_explanations(section: DriveStudy) -> str:
     """Describe the comparison, and count the explanations that are as good as the best one."""
-    rows = section["explanations"]
+    rows = section.explanations
     known = [row for row in rows if row["aic_difference"] is not None]
     best = min(known, key=lambda row: row["aic_difference"], default=None)
     near = [row for row in known if best and row["aic_difference"] - best["aic_difference"] <= NEAR_AIC]
@@ -123,19 +109,19 @@ NEAR_AIC = 4.0
 """Differences of AIC below which the worse of two models still has some support (Burnham & Anderson 2004)."""
 
 
-def draw_depths(section: Mapping[str, Any]) -> Figure:
+def draw_depths(section: DriveStudy) -> Figure:
     """Draw the out-of-sample fit of the paper's model with energy density sampled at other depths.
 
     Parameters
     ----------
-    section : dict
+    section : DriveStudy
         As in `draw_explanations`.
 
     Returns
     -------
     Figure
     """
-    found = section["depths"]
+    found = section.depths
     layers = found["layers"]
     own = layers[found["own_layer"]]
     figure = new_figure(7.5, 4.2)
@@ -166,10 +152,10 @@ def draw_depths(section: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def caption_depths(section: Mapping[str, Any]) -> str:
+def caption_depths(section: DriveStudy) -> str:
     """Describe the figure, with the depth of the best fit."""
-    layers = section["depths"]["layers"]
-    own = layers[section["depths"]["own_layer"]]
+    layers = section.depths["layers"]
+    own = layers[section.depths["own_layer"]]
     best = max(layers, key=lambda layer: layer["fss_out_of_sample"] or 0.0)
     return (
         "The paper's model with energy density sampled in each layer of elements below the receptor. Shaded: "
@@ -180,15 +166,15 @@ def caption_depths(section: Mapping[str, Any]) -> str:
     )
 
 
-def tables(section: Mapping[str, Any]) -> list[Table]:
+def tables(section: DriveStudy) -> list[Table]:
     """Return the tables of quantities, explanations and depths, as far as the results have them."""
-    made = drive_tables(quantities(section))
-    if section.get("explanations"):
-        rows = [_explanation_row(row) for row in section["explanations"]]
+    made = drive_tables(section.quantities)
+    if section.explanations:
+        rows = [_explanation_row(row) for row in section.explanations]
         note = "ΔAIC, ΔBIC: difference from the first row; smaller is better. Gain: as above."
         made.append(Table("Explanations of the dynamic rates", _EXPLANATION_COLUMNS, rows, note))
-    if section.get("depths"):
-        rows = [_depth_row(layer) for layer in section["depths"]["layers"]]
+    if section.depths:
+        rows = [_depth_row(layer) for layer in section.depths["layers"]]
         note = (
             "Stored energy density in both terms, four free parameters, least squares. Other quantities are "
             "stored in the living epidermis only. Gain: over the living epidermis."
@@ -235,74 +221,30 @@ def _spelled(name: str) -> str:
     return name.replace("_", " ")
 
 
-def page(results: Mapping[str, Any], command: str = "python -m studies drives") -> str:
-    """Write the page: every quantity by both methods, every explanation, every depth.
-
-    Parameters
-    ----------
-    results : dict
-        What `studies.drive_study.study_drives` returns.
-    command : str, optional
-        The command that computed them, for the page.
-
-    Returns
-    -------
-    str
-        Markdown.
-    """
-    manifest = results["manifest"]
-    parts = [
-        "# Which quantity drives the afferent",
-        f"Written by `{command}` on {manifest['date']}: {manifest['resolution']} resolution, seed "
-        f"{manifest['seed']}, mechanical code {manifest['code_hash']}. Conclusions are on "
+def drives_page(result: DriveStudy) -> Page:
+    """Return the page of `python -m studies drives`: quantities by both methods, explanations and depths."""
+    manifest, quantities = result.manifest, result.quantities
+    drawings = [
+        Drawing(
+            "drive_quantities",
+            "Rates by quantity",
+            partial(draw_drive_quantities, quantities),
+            caption_drive_quantities(quantities),
+        ),
+        Drawing(
+            "drive_explanations",
+            "Explanations of the dynamic rates",
+            partial(draw_explanations, result),
+            caption_explanations(result),
+        ),
+        Drawing("drive_depths", "Sampling depth", partial(draw_depths, result), caption_depths(result)),
+    ]
+    return Page(
+        "Which quantity drives the afferent",
+        f"Written by `python -m studies drives` on {manifest.started[:10]}: {edition(manifest)}, mechanical "
+        f"code {manifest.code_hash}. Conclusions are on "
         "[quantity that drives the dynamic term](decisions/dynamic-term-quantity.md) and "
         "[one afferent, fitted](single-unit.md).",
-        f"![Rates by quantity](images/{FIGURES['quantities']})",
-        caption_drive_quantities(quantities(results)),
-        f"![Explanations of the dynamic rates](images/{FIGURES['explanations']})",
-        caption_explanations(results),
-        f"![Sampling depth](images/{FIGURES['depths']})",
-        caption_depths(results),
-    ]
-    for one in tables(results):
-        parts += [f"## {one.title}", markdown_table(one.columns, [row.cells for row in one.rows]), one.note]
-    return "\n\n".join(parts) + "\n"
-
-
-def write_drive_page(
-    results: Mapping[str, Any], folder: Path, command: str = "python -m studies drives"
-) -> Path:
-    """Write `drive-quantities.md` and its figures.
-
-    Parameters
-    ----------
-    results : dict
-        What `studies.drive_study.study_drives` returns.
-    folder : Path
-        Made if needed.
-    command : str, optional
-        The command that made them.
-
-    Returns
-    -------
-    Path
-        The page.
-
-    Raises
-    ------
-    StoreError
-        If the folder cannot be written.
-    """
-    images, section = Path(folder) / "images", dict(results)
-    for name, draw in DRAWN.items():
-        write_atomically(images / FIGURES[name], png(draw, section))
-    path = Path(folder) / "drive-quantities.md"
-    write_atomically(path, page(results, command).encode())
-    return path
-
-
-DRAWN = {
-    "quantities": lambda section: draw_drive_quantities(quantities(section)),
-    "explanations": draw_explanations,
-    "depths": draw_depths,
-}
+        [],
+        [Chapter("", [*drawings, *tables(result)])],
+    )

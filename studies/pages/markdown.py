@@ -1,16 +1,18 @@
-"""Tables for pages in Markdown, and shares as they stand in them."""
+"""Parts of the studies' pages, and shares as they stand in them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from fingerpad.report.formatting import fixed
+from fingerpad.report.page import markdown_blocks
+from fingerpad.report.parts import Chapter, Paragraph, Part, Row, Table
 
 PERCENT = 100.0
 
 
-def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table in Markdown.
+def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """Return a table without a title, for a paragraph that introduces it.
 
     Parameters
     ----------
@@ -21,17 +23,30 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
     Returns
     -------
-    str
+    Table
+    """
+    return Table("", columns, [Row(row) for row in rows])
+
+
+def parts_of(*content: str | Part) -> list[Part]:
+    """Return parts of a page, strings among them as paragraphs."""
+    return [Paragraph(part) if isinstance(part, str) else part for part in content]
+
+
+def section(parts: Sequence[Part]) -> str:
+    """Return parts as Markdown without a heading, for a page that is put together elsewhere.
 
     Examples
     --------
-    >>> print(table(("mesh", "nodes"), [("quick", "6730")]))
+    >>> print(section(parts_of("Nodes:", table(("mesh", "nodes"), [("quick", "6730")]))))
+    Nodes:
+    <BLANKLINE>
     | mesh | nodes |
     | --- | --- |
     | quick | 6730 |
+    <BLANKLINE>
     """
-    lines = [columns, ["---"] * len(columns), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+    return "\n\n".join(block for block in markdown_blocks(Chapter("", parts)) if block) + "\n"
 
 
 def share(value: float, decimals: int = 1) -> str:

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.core.files import write_atomically
 from fingerpad.data import paper, psychophysics
 from fingerpad.report.formatting import fixed
-from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, png
-from studies.pages.markdown import table
+from fingerpad.report.manifest import edition
+from fingerpad.report.parts import Chapter, Drawing, Page, Part
+from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure
+from studies.material_study import MaterialStudy, Targets
+from studies.pages.markdown import parts_of, table
 
-FIGURE = "material_sets.png"
 _SIGMA = psychophysics.NOISE_SIGMA.value
 _FSS = paper.FSS_OUT_OF_SAMPLE.value
 ONE_BAR = (
@@ -27,7 +28,7 @@ _LETTERS = {"deflection": "d", "firing": "f", "discrimination": "p"}
 _REGIONS = {"near_mm": "within 0.5 mm", "far_mm": "0.5 to 5 mm"}
 
 
-def draw(section: dict[str, Any]) -> Figure:
+def draw(section: MaterialStudy) -> Figure:
     """Draw FSS and noise against R²; each set has its number in the table.
 
     Parameters
@@ -41,7 +42,7 @@ def draw(section: dict[str, Any]) -> Figure:
     """
     figure = new_figure(10.0, 4.6)
     left, middle, right = figure.subplots(1, 3)
-    rows, front = _numbered(section), set(section["pareto"])
+    rows, front = _numbered(section), set(section.pareto)
 
     def r2(row: Mapping[str, Any]) -> float:
         return row["deflection"]["r2"]
@@ -56,7 +57,7 @@ def draw(section: dict[str, Any]) -> Figure:
     _cloud(middle, rows, front, r2, sigma)
     _cloud(right, rows, front, fss, sigma)
     for axes in (left, middle):
-        axes.axvspan(section["targets"]["r2"], 1.0, color=PALE, zorder=0)
+        axes.axvspan(section.targets.r2, 1.0, color=PALE, zorder=0)
         axes.set_xlim(right=1.0)
         axes.set_xlabel("deflection: $R^2$ under the cylinder")
     left.axhline(_FSS, color=GREY, linewidth=1.0)
@@ -72,107 +73,131 @@ def draw(section: dict[str, Any]) -> Figure:
     return figure
 
 
-def page(results: Mapping[str, Any], command: str = "python -m studies materials") -> str:
-    """Write the page: material sets, results of each level, and order of the trials.
-
-    Parameters
-    ----------
-    results : dict
-        What `studies.material_study.study_materials` returns.
-    command : str, optional
-        The command that computed them, for the page.
-
-    Returns
-    -------
-    str
-        Markdown.
-    """
-    manifest, targets = results["manifest"], results["targets"]
+def materials_page(results: MaterialStudy) -> Page:
+    """Return the page of `python -m studies materials`: sets, levels, and order of the trials."""
+    manifest, targets = results.manifest, results.targets
     bars = (
         "36 indentations of the bar"
-        if manifest["shifted_bars"]
+        if results.shifted_bars
         else "one indentation of the bar, sampled at 36 shifted sites"
     )
-    parts = [
-        "# Material sets on three levels",
-        f"Written by `{command}` on {manifest['date']}: {manifest['resolution']} resolution, {bars}, seed "
-        f"{manifest['seed']}, mechanical code {manifest['code_hash']}. Conclusions are on "
+    drawing = Drawing(
+        "material_sets",
+        "R², FSS and noise of every set",
+        partial(draw, results),
+        "Orange: Pareto front; no other set is at least as good on all three levels and better on one. "
+        f"Shaded: R² of {targets.r2:g} or more. Lines: the paper's {_FSS:g} and {_SIGMA:g}. Labels: "
+        "numbers of the sets in the table.",
+    )
+    return Page(
+        "Material sets on three levels",
+        f"Written by `python -m studies materials` on {manifest.started[:10]}: {edition(manifest)}, {bars}, "
+        f"mechanical code {manifest.code_hash}. Conclusions are on "
         "[substitutes for the lost hyperelastic coefficients](decisions/lost-hyperelastic-coefficients.md), "
         "[order of the three trials in deflection](decisions/order-of-the-trials.md) and "
         "[one material set for three levels](decisions/one-set-for-three-levels.md).",
-        _met(results),
-        *([] if manifest["shifted_bars"] else [ONE_BAR]),
-        f"![R², FSS and noise of every set](images/{FIGURE})",
-        "Orange: Pareto front; no other set is at least as good on all three levels and better on one. "
-        f"Shaded: R² of {targets['r2']:g} or more. Lines: the paper's {_FSS:g} and {_SIGMA:g}. Labels: "
-        "numbers of the sets in the table.",
-        "## Material sets",
-        table(
-            ("", "set", "epidermis", "dermis", "subcutis", "basis and status"),
-            [_moduli(number, row) for number, row in enumerate(results["sets"], start=1)],
-        ),
-        "Initial shear moduli in kPa. All layers relax by the same Prony series (recalled).",
-        "## Results on three levels",
-        table(
-            (
-                "",
-                "R²",
-                "deflection at 1, 2, 3, 4, 5 mm [mm]",
-                "force [mN]",
-                "FSS (dynamic, static)",
-                "fitted noise",
-                "hit rates at 0.055",
-                "joint FSS",
-                "joint hit rates",
-                "meets",
+        [_met(results), *([] if results.shifted_bars else [ONE_BAR])],
+        [
+            Chapter("", [drawing]),
+            Chapter(
+                "Material sets",
+                parts_of(
+                    table(
+                        ("", "set", "epidermis", "dermis", "subcutis", "basis and status"),
+                        [_moduli(number, row) for number, row in enumerate(results.sets, start=1)],
+                    ),
+                    "Initial shear moduli in kPa. All layers relax by the same Prony series (recalled).",
+                ),
             ),
-            [_levels(number, row) for number, row in _numbered(results)],
-        ),
+            Chapter(
+                "Results on three levels",
+                parts_of(
+                    table(
+                        (
+                            "",
+                            "R²",
+                            "deflection at 1, 2, 3, 4, 5 mm [mm]",
+                            "force [mN]",
+                            "FSS (dynamic, static)",
+                            "fitted noise",
+                            "hit rates at 0.055",
+                            "joint FSS",
+                            "joint hit rates",
+                            "meets",
+                        ),
+                        [_levels(number, row) for number, row in _numbered(results)],
+                    ),
+                    _legend(targets),
+                    *_unsolved(results),
+                ),
+            ),
+            Chapter(
+                "Deflection of further sets",
+                parts_of(
+                    table(
+                        ("set", "epidermis", "dermis", "subcutis", "R²", "force [mN]"),
+                        [
+                            (
+                                row["name"],
+                                *(f"{value:.4g}" for value in row["shear_kpa"].values()),
+                                fixed(row["deflection"]["r2"], 3),
+                                fixed(row["deflection"]["force_mn"], 0),
+                            )
+                            for row in results.deflection_only
+                        ],
+                    ),
+                    "Cylinder only. Initial shear moduli in kPa, all assumed except Wu's (recalled).",
+                ),
+            ),
+            Chapter(
+                "Order of the trials",
+                parts_of(
+                    *_order(results.order),
+                ),
+            ),
+            Chapter(
+                "Wu's tissues as polynomials",
+                parts_of(
+                    table(
+                        (
+                            "layer",
+                            "nu",
+                            "fitted up to",
+                            "C10, C01, C20, C11, C02 [kPa]",
+                            "rms error / largest stress",
+                        ),
+                        [
+                            (
+                                row.layer,
+                                f"{row.poisson:.2f}",
+                                f"{row.compression:.0%}",
+                                ", ".join(f"{value:.4f}" for value in row.coefficients_kpa),
+                                f"{row.misfit:.2%}",
+                            )
+                            for row in results.polynomials
+                        ],
+                    ),
+                ),
+            ),
+        ],
+    )
+
+
+def _legend(targets: Targets) -> str:
+    return (
         "R² and deflection (mean of both sides) are under the 3.17 mm cylinder at a depth of 1 mm; the force "
         "is that at the end of the hold. FSS is in sample, over all 36 shifts, of the best free fit of four "
         'parameters. "Fitted noise" is the sigma_1 for which the hit rates of that afferent are closest to '
         f"Goodwin's 0.58 and 0.95; hit rates are at the paper's {_SIGMA:g}. "
         '"Joint" is an afferent fitted to FSS minus the root mean square error of the hit rates at '
         f"{_SIGMA:g}. "
-        f"Criteria of the levels: R² of {targets['r2']:g} or more (d), a joint FSS of {_FSS:g} or more (f), "
-        f"both joint hit rates within {targets['hit_rate_error']:g} of Goodwin's (p).",
-        *_unsolved(results),
-        "## Deflection of further sets",
-        table(
-            ("set", "epidermis", "dermis", "subcutis", "R²", "force [mN]"),
-            [
-                (
-                    row["name"],
-                    *(f"{value:.4g}" for value in row["shear_kpa"].values()),
-                    fixed(row["deflection"]["r2"], 3),
-                    fixed(row["deflection"]["force_mn"], 0),
-                )
-                for row in results["deflection_only"]
-            ],
-        ),
-        "Cylinder only. Initial shear moduli in kPa, all assumed except Wu's (recalled).",
-        "## Order of the trials",
-        _order(results["order"]),
-        "## Wu's tissues as polynomials",
-        table(
-            ("layer", "nu", "fitted up to", "C10, C01, C20, C11, C02 [kPa]", "rms error / largest stress"),
-            [
-                (
-                    row["layer"],
-                    f"{row['poisson']:.2f}",
-                    f"{row['compression']:.0%}",
-                    ", ".join(f"{value:.4f}" for value in row["coefficients_kpa"]),
-                    f"{row['misfit']:.2%}",
-                )
-                for row in results["polynomials"]
-            ],
-        ),
-    ]
-    return "\n\n".join(parts) + "\n"
+        f"Criteria of the levels: R² of {targets.r2:g} or more (d), a joint FSS of {_FSS:g} or more (f), "
+        f"both joint hit rates within {targets.hit_rate_error:g} of Goodwin's (p)."
+    )
 
 
-def _numbered(results: Mapping[str, Any]) -> list[tuple[int, Mapping[str, Any]]]:
-    rows = enumerate(results["sets"], start=1)
+def _numbered(results: MaterialStudy) -> list[tuple[int, Mapping[str, Any]]]:
+    rows = enumerate(results.sets, start=1)
     return [(number, row) for number, row in rows if "unsolved" not in row]
 
 
@@ -194,8 +219,8 @@ def _cloud(
         )
 
 
-def _met(results: Mapping[str, Any]) -> str:
-    all_three = [row["name"] for row in results["sets"] if all(row["meets"].values())]
+def _met(results: MaterialStudy) -> str:
+    all_three = [row["name"] for row in results.sets if all(row["meets"].values())]
     if not all_three:
         return "**No set meets all three levels.**"
     return f"**Sets that meet all three levels: {', '.join(all_three)}.**"
@@ -224,15 +249,15 @@ def _levels(number: int, row: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _unsolved(results: Mapping[str, Any]) -> list[str]:
+def _unsolved(results: MaterialStudy) -> list[str]:
     return [
         f"Set {number} could not be solved: {row['unsolved']}"
-        for number, row in enumerate(results["sets"], start=1)
+        for number, row in enumerate(results.sets, start=1)
         if "unsolved" in row
     ]
 
 
-def _order(order: Mapping[str, Any]) -> str:
+def _order(order: Mapping[str, Any]) -> list[str | Part]:
     def cells(found: Mapping[str, Any]) -> tuple[str, ...]:
         return (
             *(fixed(found["same_depth"][region], 3) for region in _REGIONS),
@@ -255,36 +280,11 @@ def _order(order: Mapping[str, Any]) -> str:
     )
     stiff = table(columns, [(name, *cells(found)) for name, found in order["stiff_epidermis"].items()])
     inner = table(columns, [(name, *cells(found)) for name, found in order["inner_layers"].items()])
-    return "\n\n".join(
-        (
-            "Mean deflection under the cylinder minus the observed one, at a depth of 1 mm:",
-            observed,
-            "Trial 2 minus Trial 3: stiff minus soft epidermis over the same inner layers.",
-            stiff,
-            "Trial 1 minus Trial 3: Maeno's inner layers minus others, under the same soft epidermis.",
-            inner,
-        )
-    )
-
-
-def write_material_page(results: Mapping[str, Any], folder: Path, command: str) -> Path:
-    """Write page and figure into a folder.
-
-    Parameters
-    ----------
-    results : dict
-        What `studies.material_study.study_materials` returns.
-    folder : Path
-        Gets `material-sets.md` and `images/material_sets.png`.
-    command : str
-        Command that computed them, for the page.
-
-    Returns
-    -------
-    Path
-        The page.
-    """
-    write_atomically(folder / "images" / FIGURE, png(draw, dict(results)))
-    path = folder / "material-sets.md"
-    write_atomically(path, page(results, command).encode())
-    return path
+    return [
+        "Mean deflection under the cylinder minus the observed one, at a depth of 1 mm:",
+        observed,
+        "Trial 2 minus Trial 3: stiff minus soft epidermis over the same inner layers.",
+        stiff,
+        "Trial 1 minus Trial 3: Maeno's inner layers minus others, under the same soft epidermis.",
+        inner,
+    ]

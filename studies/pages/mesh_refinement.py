@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from matplotlib.figure import Figure
 
 from fingerpad.data import protocol
 from fingerpad.report.formatting import ABSENT, fixed, number
-from fingerpad.report.style import BLACK, BLUE, GREEN, ORANGE, new_figure, numbers, png
-from studies.pages.markdown import PERCENT, share, signed, table
+from fingerpad.report.parts import Chapter, Drawing, Page, Part
+from fingerpad.report.style import BLACK, BLUE, GREEN, ORANGE, new_figure, numbers
+from studies.pages.markdown import PERCENT, parts_of, section, share, signed, table
 
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
 LINES: dict[str, dict[str, Any]] = {
@@ -24,26 +25,19 @@ PHASES = ("ramp", "hold")
 RATES = ("dynamic", "static")
 
 
-PAGE, NUMBERS, FIGURE = "mesh_refinement.md", "mesh_refinement.json", "mesh_refinement.png"
+NUMBERS, FIGURE = "mesh_refinement.json", "mesh_refinement.png"
 
 
-def documents(results: dict[str, Any]) -> dict[str, bytes]:
-    """Return the files that show a run: page, numbers and figure, by name.
-
-    Parameters
-    ----------
-    results : dict
-        From `studies.mesh_refinement.run`.
-
-    Returns
-    -------
-    dict of bytes
-    """
-    return {
-        PAGE: markdown(results).encode(),
-        NUMBERS: (json.dumps(results, indent=1, allow_nan=False) + "\n").encode(),
-        FIGURE: png(draw, results),
-    }
+def mesh_refinement_page(results: dict[str, Any]) -> Page:
+    """Return the page of `python -m studies mesh-refinement`, from `studies.mesh_refinement.run`."""
+    drawing = Drawing(
+        "mesh_refinement",
+        "Strain energy density and firing rates on every mesh",
+        partial(draw, results),
+        "Strain energy density and firing rates on every mesh.",
+    )
+    subtitle = f"Bars and spheres on meshes of four sizes. Mechanical code {results['code_hash']}."
+    return Page("Mesh errors", subtitle, [], [Chapter("", [drawing, *parts(results)])])
 
 
 def draw(results: Mapping[str, Any]) -> Figure:
@@ -85,7 +79,12 @@ def draw(results: Mapping[str, Any]) -> Figure:
 
 
 def markdown(results: Mapping[str, Any]) -> str:
-    """Return the section of the verification page: the meshes and their errors, as tables.
+    """Return the section of the verification page as Markdown without a title."""
+    return section(parts(results))
+
+
+def parts(results: Mapping[str, Any]) -> list[Part]:
+    """Return the meshes and their errors: tables and the sentences that introduce them.
 
     Parameters
     ----------
@@ -94,11 +93,10 @@ def markdown(results: Mapping[str, Any]) -> str:
 
     Returns
     -------
-    str
-        Markdown without a title.
+    list of Paragraph and Table
     """
     finest = results["levels"][-1]["name"]
-    parts = [
+    return parts_of(
         table(
             (
                 "mesh",
@@ -168,8 +166,7 @@ def markdown(results: Mapping[str, Any]) -> str:
                 for name, row in results["steps"].items()
             ],
         ),
-    ]
-    return "\n\n".join(parts) + "\n"
+    )
 
 
 ERROR_COLUMNS = (

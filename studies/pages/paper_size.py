@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.report.formatting import fixed, joined, number
-from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure, numbers, png
-from studies.pages.markdown import PERCENT, share, signed, table
+from fingerpad.report.page import markdown_table
+from fingerpad.report.parts import Chapter, Drawing, Page, Part, Table
+from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure, numbers
+from studies.pages.markdown import PERCENT, parts_of, section, share, signed, table
 from studies.pages.mesh_refinement import ERROR_COLUMNS, RATES, errors
 
-PAGE, NUMBERS, FIGURE = "paper_size.md", "paper_size.json", "paper_size.png"
+NUMBERS, FIGURE = "paper_size.json", "paper_size.png"
 REFERENCE = "paper"
 LINES: dict[str, dict[str, Any]] = {
     "quick": {"color": ORANGE, "linestyle": "--", "marker": "v", "markerfacecolor": "white"},
@@ -34,23 +36,16 @@ DEFLECTION_COLUMNS = (
 COLUMNS = (*ERROR_COLUMNS[3:], "latency: max [ms]", "RMS", "force: max")
 
 
-def documents(results: dict[str, Any]) -> dict[str, bytes]:
-    """Return the files that show a run: page, numbers and figure, by name.
-
-    Parameters
-    ----------
-    results : dict
-        From `studies.paper_size.run`.
-
-    Returns
-    -------
-    dict of bytes
-    """
-    return {
-        PAGE: markdown(results).encode(),
-        NUMBERS: (json.dumps(results, indent=1, allow_nan=False) + "\n").encode(),
-        FIGURE: png(draw, results),
-    }
+def paper_size_page(results: dict[str, Any]) -> Page:
+    """Return the page of `python -m studies paper-size`, from `studies.paper_size.run`."""
+    drawing = Drawing(
+        "paper_size",
+        "Deflection, strain energy density and hit rates on three meshes",
+        partial(draw, results),
+        "Deflection, strain energy density and hit rates on three meshes.",
+    )
+    subtitle = f"Quick and standard against the paper's size. Mechanical code {results['code_hash']}."
+    return Page("The paper's size of mesh", subtitle, [], [Chapter("", [drawing, *parts(results)])])
 
 
 def draw(results: Mapping[str, Any]) -> Figure:
@@ -141,7 +136,7 @@ def summary(results: Mapping[str, Any]) -> str:
     columns = {name: _summed(results, name) for name in results["meshes"] if name != REFERENCE}
     quantities = next(iter(columns.values()))
     fss = results["bars"]["fss"]
-    return table(
+    return markdown_table(
         ("largest difference from the paper's size", *columns),
         [
             *((quantity, *(column[quantity] for column in columns.values())) for quantity in quantities),
@@ -186,7 +181,12 @@ def _farthest(spheres: Mapping[str, Any], name: str, measure: str) -> float:
 
 
 def markdown(results: Mapping[str, Any]) -> str:
-    """Return the section of the verification page: the preset, the meshes and their errors, as tables.
+    """Return the section of the verification page as Markdown without a title."""
+    return section(parts(results))
+
+
+def parts(results: Mapping[str, Any]) -> list[Part]:
+    """Return the meshes and their errors: tables and the sentences that introduce them.
 
     Parameters
     ----------
@@ -195,12 +195,11 @@ def markdown(results: Mapping[str, Any]) -> str:
 
     Returns
     -------
-    str
-        Markdown without a title.
+    list of Paragraph and Table
     """
     deflection, bars, spheres = (results[name] for name in ("deflection", "bars", "spheres"))
     against = [name for name in results["meshes"] if name != REFERENCE]
-    parts = [
+    return parts_of(
         "The preset, both halves of the finger; edges over an oval of 11 by 9 mm of the pad:",
         _preset(results["preset"]),
         "Nodes of the meshes used here, half of the finger:",
@@ -268,8 +267,7 @@ def markdown(results: Mapping[str, Any]) -> str:
             ],
         ),
         f"Half of the finger against both, standard sphere at 18 receptors: {_halves(results)}.",
-    ]
-    return "\n\n".join(parts) + "\n"
+    )
 
 
 def _errors(row: Mapping[str, Any]) -> list[str]:
@@ -277,7 +275,7 @@ def _errors(row: Mapping[str, Any]) -> list[str]:
     return [*errors(row), *waits, share(row["force"]["max"])]
 
 
-def _preset(preset: Mapping[str, Any]) -> str:
+def _preset(preset: Mapping[str, Any]) -> Table:
     def lengths(edges: Mapping[str, float]) -> str:
         smallest, median, largest = (fixed(edges[key], 3) for key in ("smallest", "median", "largest"))
         return f"{smallest} to {largest}, median {median}"

@@ -1,6 +1,5 @@
 """Sets of tissues on three levels: closed forms, a search that recovers the truth, and one tiny run."""
 
-import json
 import re
 from dataclasses import replace
 from types import SimpleNamespace
@@ -8,18 +7,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fingerpad import cli
 from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.results import from_json, to_json
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
 from fingerpad.data import tissues as published
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.grading import Grading
 from fingerpad.mechanics.laws import Hyperfoam, Polynomial
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.afferent import Afferent
+from fingerpad.report.page import markdown, write_markdown
 from fingerpad.skin.sampling import SurfaceProfile
 from fingerpad.skin.store import Store
+from studies import __main__ as command
 from studies import material_sets, material_study, trial_order
 from studies.hyperfoam_fit import (
     hyperfoam_stress_kpa,
@@ -36,8 +38,8 @@ from studies.material_sets import (
     pareto_front,
     touches,
 )
-from studies.material_study import MaterialStudy, meets, study_materials
-from studies.pages.material_sets import FIGURE, page, write_material_page
+from studies.material_study import MaterialStudy, meets
+from studies.pages.material_sets import materials_page
 
 WU_SKIN = (published.WU_SKIN_HYPERFOAM_MU.value, published.WU_SKIN_HYPERFOAM_ALPHA.value)
 
@@ -280,26 +282,27 @@ def test_equal_sets_do_not_beat_each_other():
 
 
 def test_a_set_that_cannot_be_solved_is_told_and_the_others_are_judged(monkeypatch, tmp_path):
-    def solve(wanted, store, jobs):
+    def solve(runner, wanted, stage):
+        asked.append(stage)
         if wanted[0].tissues == named_tissues("trial1"):
             raise ConvergenceError("no answer", [])
 
-    monkeypatch.setattr(material_sets, "solve_missing", solve)
+    asked = []
+    monkeypatch.setattr(Runner, "solve", solve)
     monkeypatch.setattr(Store, "load", lambda store, touch: None)
     monkeypatch.setattr(material_sets, "evaluate", lambda candidate, *rest: {"name": candidate.name})
     chosen = [candidate for candidate in candidates() if candidate.name in ("Trial 1", "Trial 3")]
-    finished = []
-    rows = compare(chosen, Conditions("quick"), Store(tmp_path), on_finished=finished.append)
+    rows = compare(chosen, Runner(tmp_path), Conditions("quick"))
     assert rows[0]["name"] == "Trial 1"
     assert "no answer" in rows[0]["unsolved"]
     assert rows[1] == {"name": "Trial 3"}
-    assert finished == ["Trial 1", "Trial 3"]
+    assert asked == ["Trial 1", "Trial 3"]
 
 
 def test_names_must_differ(tmp_path):
     twice = [candidates()[0]] * 2
     with pytest.raises(InputError, match="must have different names"):
-        compare(twice, Conditions("quick"), Store(tmp_path))
+        compare(twice, Runner(tmp_path), Conditions("quick"))
 
 
 # Order of the trials
@@ -375,14 +378,17 @@ def use_few(patch):
 def tiny(tmp_path_factory):
     folder = tmp_path_factory.mktemp("materials")
     effort = Effort(generations=2, population=4)
-    study = MaterialStudy(Coarse("quick"), folder, 1, effort, names=("Trial 1", "Trial 3"))
+
+    def run():
+        return material_study.run(Runner(folder), Coarse("quick"), effort, ("Trial 1", "Trial 3"))
+
     with pytest.MonkeyPatch.context() as patch:
         use_few(patch)
-        return SimpleNamespace(study=study, folder=folder, results=study_materials(study))
+        return SimpleNamespace(run=run, results=run())
 
 
 def test_each_set_is_judged_on_all_levels(tiny):
-    first, third = tiny.results["sets"]
+    first, third = tiny.results.sets
     assert (first["name"], third["name"]) == ("Trial 1", "Trial 3")
     assert first["deflection"]["force_mn"] > third["deflection"]["force_mn"] > 0.0
     for found in (first, third):
@@ -391,12 +397,12 @@ def test_each_set_is_judged_on_all_levels(tiny):
             assert again.time_constant_ms > 0.0
             assert all(0.0 <= rate <= 1.0 for rate in afferent["hit_rate"])
         assert found["joint"]["fss"] <= found["firing"]["fss"] + 0.5
-    assert tiny.results["pareto"]
+    assert tiny.results.pareto
 
 
 def test_a_stiff_epidermis_spreads_the_deflection_at_equal_depth(tiny):
     for inner in ("Maeno", "identified"):
-        found = tiny.results["order"]["stiff_epidermis"][inner]
+        found = tiny.results.order["stiff_epidermis"][inner]
         assert found["same_depth"]["far_mm"] > 0.0
         assert found["force_ratio"] > 1.0
 
@@ -404,55 +410,53 @@ def test_a_stiff_epidermis_spreads_the_deflection_at_equal_depth(tiny):
 def test_a_second_run_presses_nothing_and_says_the_same(tiny, monkeypatch):
     monkeypatch.setattr("fingerpad.skin.store._compute", pytest.fail)
     use_few(monkeypatch)
-    again = study_materials(tiny.study)
-    for results in (again, tiny.results):
-        json.dumps(results, allow_nan=False)
-    assert again["sets"] == tiny.results["sets"]
+    again = tiny.run()
+    assert from_json(MaterialStudy, to_json(again)).sets == again.sets == tiny.results.sets
 
 
 def test_the_page_tells_every_set_and_its_numbers(tiny, tmp_path):
-    path = write_material_page(tiny.results, tmp_path, "python -m studies materials")
-    text = path.read_text(encoding="utf-8")
-    assert (tmp_path / "images" / FIGURE).read_bytes().startswith(b"\x89PNG")
-    for number, found in enumerate(tiny.results["sets"], start=1):
+    text = write_markdown(materials_page(tiny.results), tmp_path / "materials.md").read_text(encoding="utf-8")
+    assert (tmp_path / "images" / "material_sets.png").read_bytes().startswith(b"\x89PNG")
+    for number, found in enumerate(tiny.results.sets, start=1):
         assert f"| {number} | {found['name']} |" in text
         assert f"| {number} | {found['deflection']['r2']:.3f}".replace("-", "−") in text
-    (alone,) = tiny.results["deflection_only"]
+    (alone,) = tiny.results.deflection_only
     assert (
         f"| {alone['name']} | 20 | 25.4 | 2.373 | {alone['deflection']['r2']:.3f}".replace("-", "−") in text
     )
-    assert f"](images/{FIGURE})" in text
-    assert tiny.results["manifest"]["date"] in text
+    assert "](images/material_sets.png)" in text
+    assert tiny.results.manifest.started[:10] in text
 
 
 def test_the_page_says_what_was_not_solved_and_which_sets_meet_everything(tiny):
     good = {
-        **tiny.results["sets"][0],
+        **tiny.results.sets[0],
         "meets": dict.fromkeys(("deflection", "firing", "discrimination"), True),
     }
     unsolved = {"name": "odd", "basis": "assumed", "unsolved": "It folded.", "meets": meets({"unsolved": ""})}
-    text = page({**tiny.results, "sets": [good, unsolved]})
+    text = markdown(materials_page(replace(tiny.results, sets=(good, unsolved))))
     assert f"Sets that meet all three levels: {good['name']}." in text
     assert "Set 2 could not be solved: It folded." in text
-    assert "No set meets all three levels" in page({**tiny.results, "sets": [unsolved]})
+    assert "No set meets all three levels" in markdown(
+        materials_page(replace(tiny.results, sets=(unsolved,)))
+    )
 
 
-def test_unusable_studies_are_refused(tmp_path):
+def test_an_unknown_set_is_refused(tmp_path):
     with pytest.raises(InputError, match="each of names must be one of"):
-        MaterialStudy(Conditions("quick"), tmp_path, names=("Trial 4",))
-    with pytest.raises(InputError, match="jobs"):
-        MaterialStudy(Conditions("quick"), tmp_path, jobs=0)
+        material_study.run(Runner(tmp_path), Conditions("quick"), names=("Trial 4",))
 
 
-def test_the_command_hands_over_what_was_asked_and_writes_three_files(tiny, tmp_path, monkeypatch, capsys):
+def test_the_command_hands_over_what_was_asked_and_writes_page_and_numbers(
+    tiny, tmp_path, monkeypatch, capsys
+):
     asked = []
 
-    def study(run, on_finished):
-        asked.append(run)
-        on_finished("Trial 3")
-        return tiny.results
+    def run(runner, conditions, effort, names):
+        asked.append((tuple(names), effort.shifted_bars, conditions.seed, runner.jobs))
+        return replace(tiny.results, shifted_bars=effort.shifted_bars)
 
-    monkeypatch.setattr(material_study, "study_materials", study)
+    monkeypatch.setattr(material_study, "run", run)
     out = tmp_path / "out"
     words = [
         "materials",
@@ -466,15 +470,14 @@ def test_the_command_hands_over_what_was_asked_and_writes_three_files(tiny, tmp_
         "--jobs",
         "1",
     ]
-    monkeypatch.setattr("sys.argv", ["fingerpad", *words])
+    monkeypatch.setattr("sys.argv", ["studies", *words])
     with pytest.raises(SystemExit) as ended:
-        cli.main()
+        command.main()
     assert not ended.value.code
-    (run,) = asked
-    assert (run.names, run.effort.shifted_bars, run.conditions.seed, run.jobs) == (("Trial 3",), True, 5, 1)
-    assert json.loads((out / "material_sets.json").read_text()) == tiny.results
-    assert capsys.readouterr().out.startswith(f"Page: {out / 'material-sets.md'}")
-    assert '--shifted-bars --name "Trial 3"' in (out / "material-sets.md").read_text(encoding="utf-8")
+    assert asked == [(("Trial 3",), True, 5, 1)]
+    assert from_json(MaterialStudy, (out / "materials.json").read_bytes()).sets == tiny.results.sets
+    assert capsys.readouterr().out.startswith(f"Page: {out / 'materials.md'}")
+    assert "36 indentations of the bar" in (out / "materials.md").read_text(encoding="utf-8")
 
 
 def test_conditions_take_tissues_of_ones_own():
@@ -484,8 +487,8 @@ def test_conditions_take_tissues_of_ones_own():
 
 
 def test_polynomials_of_the_page_are_those_of_the_candidates():
-    rows = [found for found in material_study.polynomials() if found["compression"] == 0.5]
-    own = {(found["layer"], found["poisson"]): found["coefficients_kpa"] for found in rows}
+    rows = [found for found in material_study.polynomials() if found.compression == 0.5]
+    own = {(found.layer, found.poisson): found.coefficients_kpa for found in rows}
     dermis, subcutis = wu_polynomials(0.48, 0.48)
     for layer, material in (("dermis", dermis), ("subcutis", subcutis)):
         law = material.law

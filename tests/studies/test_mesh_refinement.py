@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
+from fingerpad.core.results import to_json
 from fingerpad.data import bar_firing_rates
+from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, sphere_discrimination
 from fingerpad.geometry.fingertip import Fingertip
@@ -19,6 +21,7 @@ from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import neighbour_pairs
+from fingerpad.report.page import markdown
 from fingerpad.skin.indentation import touch_of
 from studies import mesh_refinement
 from studies.mesh_errors import (
@@ -248,10 +251,10 @@ def results(pressed, tmp_path_factory):
     few = (mesh_refinement.PEAK_SHIFT, 18)
     levels = tuple(replace(level, shifts=few) for level in mesh_refinement.LEVELS)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mesh_refinement, "Store", Formula)
         patch.setattr(mesh_refinement, "LEVELS", levels)
-        patch.setattr(mesh_refinement, "solve_missing", lambda touches, *rest: solved.extend(touches))
-        found = mesh_refinement.run(tmp_path_factory.mktemp("refinement"))
+        patch.setattr(runner, "Store", Formula)
+        patch.setattr(runner, "solve_missing", lambda touches, *rest: solved.extend(touches))
+        found = mesh_refinement.run(runner.Runner(tmp_path_factory.mktemp("refinement")))
     return found, solved, levels
 
 
@@ -287,10 +290,11 @@ def test_a_run_presses_every_mesh_and_finds_the_known_error_and_order(results):
 
 def test_pages_say_every_mesh_with_its_errors(results):
     found = results[0]
-    files = report.documents(found)
-    assert json.loads(files[report.NUMBERS]) == found
-    assert files[report.FIGURE].startswith(b"\x89PNG")
-    page = files[report.PAGE].decode()
+    assert json.loads(to_json(found)) == found
+    made = report.mesh_refinement_page(found)
+    page = markdown(made)
+    assert report.markdown(found) in page
+    assert [f"{drawing.name}.png" for drawing in made.drawings] == [report.FIGURE]
     error = 100.0 * found["bars"]["errors"]["standard"]["sed"]["ramp"]["max"]
     assert f"| standard | fine | 2 | {error:.1f} %" in page
     rates = found["spheres"]["errors"]["standard"]["rate"]

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fingerpad.core.results import to_json
+from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, skin_deflection, sphere_discrimination
 from fingerpad.geometry.fingertip import Fingertip
@@ -15,6 +17,7 @@ from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import block_mesh, finger_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press import PressSettings
+from fingerpad.report.page import markdown
 from fingerpad.skin.indentation import touch_of
 from studies import paper_size
 from studies.mesh_refinement import PEAK_SHIFT
@@ -130,9 +133,9 @@ def results(tmp_path_factory):
             )
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paper_size, "Store", Formula)
-        patch.setattr(paper_size, "solve_missing", lambda touches, *rest: solved.extend(touches))
-        found = paper_size.run(tmp_path_factory.mktemp("paper_size"))
+        patch.setattr(runner, "Store", Formula)
+        patch.setattr(runner, "solve_missing", lambda touches, *rest: solved.extend(touches))
+        found = paper_size.run(runner.Runner(tmp_path_factory.mktemp("paper_size")))
     return found, solved, pressed
 
 
@@ -192,10 +195,11 @@ def test_sizes_tell_the_wire_from_the_rest(results):
 
 def test_pages_say_every_mesh_with_its_errors(results):
     found = results[0]
-    files = report.documents(found)
-    assert json.loads(files[report.NUMBERS]) == found
-    assert files[report.FIGURE].startswith(b"\x89PNG")
-    page = files[report.PAGE].decode()
+    assert json.loads(to_json(found)) == found
+    made = report.paper_size_page(found)
+    page = markdown(made)
+    assert report.markdown(found) in page
+    assert [f"{drawing.name}.png" for drawing in made.drawings] == [report.FIGURE]
     assert "| bar | −10.0 % | −10.0 % | −10.0 % |" in page
     assert "| trial 3, line | standard |" in page
     for name in ("quick", "standard"):

@@ -1,7 +1,7 @@
 """Last sections of the page: the standard meshes compared with finer ones, from stored runs.
 
-The runs take more than an hour and are not repeated for the page. `python -m studies refine` indents every
-mesh. Its numbers and figures are kept beside the page with the hash of the code that made them.
+The runs take more than an hour and are not repeated for the page. `python -m studies mesh-refinement`
+indents every mesh. Its numbers and figures are kept beside the page with the hash of the code that made them.
 """
 
 from __future__ import annotations
@@ -64,8 +64,8 @@ There is no closed-form solution for a fingertip. The meshes of every resolution
 with a finer one. Compared are the strain energy density (SED) at the receptor under the shifted bar and at
 the receptors of the population under spheres, and the firing rates, goodness of fit and hit rates computed
 from it. Afferent, noise and random numbers are the same on every mesh. The coarse, standard and fine
-meshes differ by one factor in every direction. `python -m studies refine` computes these tables; the ones
-below come from code {code_hash}. Conclusions about the choice of a mesh are on [mesh
+meshes differ by one factor in every direction. `python -m studies mesh-refinement` computes these tables;
+the ones below come from code {code_hash}. Conclusions about the choice of a mesh are on [mesh
 resolutions](decisions/mesh-resolutions.md).
 """,
     "SED at the receptor and its firing rates against the shift of the bar, on every mesh",
@@ -79,7 +79,7 @@ The same indentations on the quick mesh, the standard mesh and a mesh of the pap
 cylinder with the materials of three trials, the bar at its edges, at its centre and beside it, four
 spheres at both positions. The meshes differ along the skin only. The standard mesh and the mesh of the
 paper's size have the same elements through the depth; a mesh with twice as many elements through dermis
-and subcutis shows the remaining error. `python -m studies refine --against paper` computes these tables;
+and subcutis shows the remaining error. `python -m studies paper-size` computes these tables;
 the ones below come from code {code_hash}. The preset and the conclusions are on [the mesh of the paper's
 size](decisions/paper-size.md).
 """,
