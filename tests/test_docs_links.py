@@ -85,3 +85,13 @@ def test_commands_and_their_options_exist(page: Path) -> None:
             if called[1] not in known or not options <= known[called[1]]:
                 lost.append(line)
     assert lost == []
+
+
+def test_the_index_of_decisions_has_the_heading_of_each_page() -> None:
+    index = ROOT / "docs" / "decisions" / "README.md"
+    wrong = [
+        (title, heading)
+        for title, file in re.findall(r"\[([^\]]+)\]\(([\w-]+\.md)\)", index.read_text(encoding="utf-8"))
+        if title != (heading := (index.parent / file).read_text(encoding="utf-8").splitlines()[0][2:])
+    ]
+    assert wrong == []
