@@ -1,4 +1,4 @@
-"""Peers in environments of their own: none is a dependency of fingerpad, and Brian2 needs an older NumPy."""
+"""Other programs in environments of their own: none is a dependency; Brian2 needs an older NumPy."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 FOLDER = Path(__file__).parent / ".peers"
-"""Where environments are made; git ignores it, and it may be deleted at any time."""
+"""Folder of the environments; git ignores it, and it can be deleted at any time."""
 
 REQUIREMENTS = {
     "felupe": ("felupe>=11.3,<12", "pypardiso>=0.4.6,<0.5", "psutil>=6,<8"),
@@ -22,7 +22,7 @@ class MissingPeerError(RuntimeError):
 
 
 def environment_of(peer: str, folder: Path = FOLDER) -> Path:
-    """Make the environment of a peer, unless it is there with the same requirements.
+    """Create the environment of a peer, unless it exists with the same requirements.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def environment_of(peer: str, folder: Path = FOLDER) -> Path:
 
 
 def calculix() -> str:
-    """Find CalculiX, or install it where apt-get may.
+    """Find CalculiX, or install it with apt-get.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def calculix() -> str:
     Raises
     ------
     MissingPeerError
-        If it is neither there nor can be installed.
+        If it is not installed and cannot be installed.
     """
     if found := shutil.which("ccx"):
         return found
@@ -86,6 +86,4 @@ def calculix() -> str:
             ) from error
     if found := shutil.which("ccx"):
         return found
-    raise MissingPeerError(
-        "apt-get installed calculix-ccx, and there is still no ccx on the PATH: add it there."
-    )
+    raise MissingPeerError("apt-get installed calculix-ccx, but ccx is not on the PATH: add it to the PATH.")

@@ -1,4 +1,4 @@
-"""How long it takes until Python can go on: imports of fingerpad, and commands that compute nothing."""
+"""Times of the imports of fingerpad and of the commands that compute nothing."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ TIMED = "import json, time; start = time.perf_counter(); {}; print(json.dumps(ti
 
 
 def import_s(statement: str, folder: Path | None = None) -> float:
-    """Seconds of an import in a new interpreter, without those that the interpreter takes to start.
+    """Measure an import in a new interpreter, without the start of the interpreter. [s]
 
     Parameters
     ----------
     statement : str
         The import.
     folder : Path, optional
-        An empty folder for Python's bytecode, which is then made anew; by default what lies there is used.
+        An empty folder for the bytecode, which is compiled again. Default: existing bytecode is used.
 
     Returns
     -------
@@ -51,19 +51,19 @@ def import_s(statement: str, folder: Path | None = None) -> float:
 
 
 def import_without_bytecode_s(statement: str) -> float:
-    """Seconds of the first import after an installation that compiles no bytecode."""
+    """Measure the first import after an installation without bytecode. [s]"""
     with TemporaryDirectory() as folder:
         return import_s(statement, Path(folder))
 
 
 def command_s(options: str) -> float:
-    """Seconds of `fingerpad OPTIONS`, from the shell and back to it."""
+    """Measure `fingerpad OPTIONS` from its start to its end. [s]"""
     command = [sys.executable, "-m", "fingerpad", *options.split()]
     return run(command, threads=1, environment={"PYTHONPATH": str(ROOT / "src")}).wall_s
 
 
 def measure() -> Report:
-    """Repeat every import and command in new interpreters."""
+    """Repeat every import and command in new interpreters, and report the times."""
     imports = {statement: [import_s(statement) for _ in range(REPEATS)] for statement in IMPORTS}
     first = {statement: import_without_bytecode_s(statement) for statement in IMPORTS}
     commands = {options: [command_s(options) for _ in range(REPEATS)] for options in COMMANDS}
