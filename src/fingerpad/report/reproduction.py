@@ -15,19 +15,25 @@ from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, Repr
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
-from fingerpad.report import (
-    curvature_thresholds,
-    discrimination,
-    nail,
-    population,
-    population_rate,
-    recruitment,
+from fingerpad.report.curvature_thresholds import caption_thresholds, draw_thresholds, threshold_tables
+from fingerpad.report.discrimination import (
+    caption_criterion,
+    caption_noise,
+    caption_observers,
+    discrimination_tables,
+    draw_criterion,
+    draw_noise,
+    draw_observers,
 )
 from fingerpad.report.drive_quantities import caption_drive_quantities, draw_drive_quantities, drive_tables
 from fingerpad.report.formatting import fixed, joined, number, plain, whole_percent
 from fingerpad.report.manifest import edition, manifest_chapter
+from fingerpad.report.nail import caption_nail, draw_nail
 from fingerpad.report.page import write_html
-from fingerpad.report.parts import Chapter, Drawing, Kind, Page, Row, Table
+from fingerpad.report.parts import Chapter, Drawing, Kind, Page, Part, Row, Table
+from fingerpad.report.population import caption_population, draw_population
+from fingerpad.report.population_rate import caption_population_rate, draw_population_rate
+from fingerpad.report.recruitment import caption_recruitment, draw_recruitment, recruitment_tables
 from fingerpad.report.single_unit import caption_single_unit, draw_single_unit, single_unit_tables
 from fingerpad.report.single_unit_uncertainty import (
     caption_uncertainty,
@@ -84,173 +90,90 @@ def reproduction_page(result: ReproductionResult) -> Page:
         reproduction_summary(result),
         [
             Chapter("Comparison with the paper", [comparison_table(result.comparison)]),
-            *_skin_and_afferent(result),
-            *_population_and_percept(result),
+            *_levels(result),
             Chapter("Published numbers used", input_tables(result.inputs)),
             manifest_chapter(result.manifest),
         ],
     )
 
 
-def _drawing(
-    figure: int,
-    name: str,
-    title: str,
-    draw: Callable[[Section], Figure],
-    caption: Callable[[Section], str],
-    section: Section,
-) -> Drawing:
-    return Drawing(f"figure_{figure}_{name}", title, partial(draw, section), caption(section), figure)
-
-
-def _skin_and_afferent(result: ReproductionResult) -> list[Chapter]:
-    """Levels 1 and 2."""
-    skin, unit = result.skin_deflection, result.single_unit
-    chapters = [
-        Chapter(
-            "Level 1: skin",
-            [
-                _drawing(
-                    4,
-                    "skin_deflection",
-                    "Deflection of the skin",
-                    draw_skin_deflection,
-                    caption_skin_deflection,
-                    skin,
-                ),
-                *skin_deflection_tables(skin),
-            ],
+def _levels(result: ReproductionResult) -> list[Chapter]:
+    """Return the chapters of the three levels; numbers of figures up to 9 are the paper's."""
+    timing = result.population_timing
+    order, rates = (timing.recruitment, timing.rates) if timing else (None, None)
+    chapters = {
+        "Level 1: skin": _parts(
+            result.skin_deflection,
+            skin_deflection_tables,
+            (4, "skin_deflection", "Deflection of the skin", draw_skin_deflection, caption_skin_deflection),
         ),
-        Chapter(
-            "Level 2: single afferent",
-            [
-                _drawing(5, "single_unit", "Rates under a bar", draw_single_unit, caption_single_unit, unit),
-                *single_unit_tables(unit),
-            ],
+        "Level 2: single afferent": _parts(
+            result.single_unit,
+            single_unit_tables,
+            (5, "single_unit", "Rates under a bar", draw_single_unit, caption_single_unit),
         ),
-    ]
-    if (uncertainty := result.single_unit_uncertainty) is not None:
-        drawing = _drawing(
-            12,
-            "uncertainty",
-            "Uncertainty of the fit to rates under a bar",
-            draw_uncertainty,
-            caption_uncertainty,
-            uncertainty,
-        )
-        chapters.append(
-            Chapter("Level 2: uncertainty of the fit", [drawing, *uncertainty_tables(uncertainty)])
-        )
-    if (drives := result.drive_quantities) is not None:
-        drawing = _drawing(
-            10,
-            "drive_quantities",
-            "Rates by quantity",
-            draw_drive_quantities,
-            caption_drive_quantities,
-            drives,
-        )
-        chapters.append(
-            Chapter("Level 2: quantity that drives the afferent", [drawing, *drive_tables(drives)])
-        )
-    return chapters
+        "Level 2: uncertainty of the fit": _parts(
+            result.single_unit_uncertainty,
+            uncertainty_tables,
+            (12, "uncertainty", "Uncertainty of the fit", draw_uncertainty, caption_uncertainty),
+        ),
+        "Level 2: quantity that drives the afferent": _parts(
+            result.drive_quantities,
+            drive_tables,
+            (10, "drive_quantities", "Rates by quantity", draw_drive_quantities, caption_drive_quantities),
+        ),
+        "Level 3: population": _parts(
+            result.population,
+            None,
+            (6, "population", "Rates and latencies under a sphere", draw_population, caption_population),
+        ),
+        "Level 3: population over time": [
+            *_parts(
+                order,
+                recruitment_tables,
+                (13, "recruitment", "Order of first spikes", draw_recruitment, caption_recruitment),
+            ),
+            *_parts(
+                rates,
+                None,
+                (14, "population_rate", "Population rate", draw_population_rate, caption_population_rate),
+            ),
+        ],
+        "Level 3: discrimination": _parts(
+            result.discrimination,
+            discrimination_tables,
+            (7, "discrimination", "Discrimination of spheres", draw_observers, caption_observers),
+            (8, "varied_criterion", "The same with a varied criterion", draw_criterion, caption_criterion),
+            (15, "noise", "Amount of noise", draw_noise, caption_noise),
+        ),
+        "Level 3: curvature thresholds": _parts(
+            result.curvature_thresholds,
+            threshold_tables,
+            (16, "curvature_thresholds", "Thresholds of curvature", draw_thresholds, caption_thresholds),
+        ),
+        "The border of the nail": _parts(
+            result.nail, None, (9, "nail", "Stress at the border of the nail", draw_nail, caption_nail)
+        ),
+    }
+    return [Chapter(title, parts) for title, parts in chapters.items() if parts]
 
 
-def _population_and_percept(result: ReproductionResult) -> list[Chapter]:
-    """Level 3."""
-    found = result.discrimination
-    chapters = [
-        Chapter(
-            "Level 3: population",
-            [
-                _drawing(
-                    6,
-                    "population",
-                    "Rates and latencies under a sphere",
-                    population.draw_population,
-                    population.caption_population,
-                    result.population,
-                )
-            ],
-        )
+def _parts(
+    section: Section | None,
+    tables: Callable[[Section], Sequence[Table]] | None,
+    *figures: tuple[int, str, str, Callable[[Section], Figure], Callable[[Section], str]],
+) -> list[Part]:
+    """Return the figures and tables of a section, none if it was not run.
+
+    A figure is its number, file name, title, and the functions that draw and caption it.
+    """
+    if section is None:
+        return []
+    drawings = [
+        Drawing(f"figure_{figure}_{name}", title, partial(draw, section), caption(section), figure)
+        for figure, name, title, draw, caption in figures
     ]
-    if (timing := result.population_timing) is not None:
-        order, rates = timing.recruitment, timing.rates
-        chapters.append(
-            Chapter(
-                "Level 3: population over time",
-                [
-                    _drawing(
-                        13,
-                        "recruitment",
-                        "Order of first spikes",
-                        recruitment.draw_recruitment,
-                        recruitment.caption_recruitment,
-                        order,
-                    ),
-                    _drawing(
-                        14,
-                        "population_rate",
-                        "Population rate over time",
-                        population_rate.draw_population_rate,
-                        population_rate.caption_population_rate,
-                        rates,
-                    ),
-                    *recruitment.recruitment_tables(order),
-                ],
-            )
-        )
-    chapters.append(
-        Chapter(
-            "Level 3: discrimination",
-            [
-                _drawing(
-                    7,
-                    "discrimination",
-                    "Spheres discriminated from the standard",
-                    discrimination.draw_observers,
-                    discrimination.caption_observers,
-                    found,
-                ),
-                _drawing(
-                    8,
-                    "varied_criterion",
-                    "The same with a varied criterion",
-                    discrimination.draw_criterion,
-                    discrimination.caption_criterion,
-                    found,
-                ),
-                _drawing(
-                    15,
-                    "noise",
-                    "Amount of noise",
-                    discrimination.draw_noise,
-                    discrimination.caption_noise,
-                    found,
-                ),
-                *discrimination.discrimination_tables(found),
-            ],
-        )
-    )
-    if (thresholds := result.curvature_thresholds) is not None:
-        drawing = _drawing(
-            16,
-            "curvature_thresholds",
-            "Least difference of curvature",
-            curvature_thresholds.draw_thresholds,
-            curvature_thresholds.caption_thresholds,
-            thresholds,
-        )
-        chapters.append(
-            Chapter(
-                "Level 3: curvature thresholds",
-                [drawing, *curvature_thresholds.threshold_tables(thresholds)],
-            )
-        )
-    drawing = _drawing(
-        9, "nail", "Stress at the border of the nail", nail.draw_nail, nail.caption_nail, result.nail
-    )
-    return [*chapters, Chapter("The border of the nail", [drawing])]
+    return [*drawings, *(tables(section) if tables else ())]
 
 
 def reproduction_summary(result: ReproductionResult) -> list[str]:
