@@ -22,6 +22,12 @@ def test_every_file_of_results_has_its_own_format(tmp_path):
     assert len(list(tmp_path.iterdir())) == len(RESULT_FILES)
 
 
+def test_a_docstring_is_no_part_of_a_format(monkeypatch, tmp_path):
+    monkeypatch.setattr(RESULT_FILES[0], "__doc__", "Rewritten in plain English.")
+    test_the_schema_in_the_package_is_the_one_that_the_types_give(RESULT_FILES[0], tmp_path)
+    assert "description" not in json.dumps(schema(file_format(RESULT_FILES[0])[0]))
+
+
 @pytest.mark.parametrize("results", RESULT_FILES)
 def test_a_schema_refuses_a_file_without_its_parts(results):
     name, version = file_format(results)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from fingerpad.core.files import write_json
 from fingerpad.core.results import file_format, schema_of
@@ -18,7 +19,27 @@ RESULT_FILES: tuple[type, ...] = (ReproductionResult, FitFile, DiscriminationFil
 def write_schemas(folder: Path = Path(__file__).parent) -> None:
     """Write the schemas into a folder, that of the package by default."""
     for results in RESULT_FILES:
-        write_json(folder / file_name(file_format(results)[0]), schema_of(results))
+        write_json(folder / file_name(file_format(results)[0]), structure(schema_of(results)))
+
+
+def structure(schema: Any) -> Any:
+    """Return a schema without titles and descriptions: a docstring is no part of a format.
+
+    Examples
+    --------
+    >>> structure({"title": "Rates", "type": "object", "properties": {"title": {"title": "Title"}}})
+    {'type': 'object', 'properties': {'title': {}}}
+    """
+    if isinstance(schema, list):
+        return [structure(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    named = ("properties", "$defs")
+    return {
+        key: {name: structure(item) for name, item in value.items()} if key in named else structure(value)
+        for key, value in schema.items()
+        if key not in ("title", "description")
+    }
 
 
 if __name__ == "__main__":
