@@ -70,7 +70,13 @@ def test_a_result_is_frozen_arrays_included() -> None:
 
 @pytest.mark.parametrize(
     "changed",
-    [{"rates_hz": [[1.0]]}, {"rate_hz": [1.0]}, {"counts": ["two"]}, {"folds": [{"score": 1.0}]}],
+    [
+        {"rates_hz": [[1.0]]},
+        {"rate_hz": [1.0]},
+        {"counts": ["two"]},
+        {"counts": [None]},
+        {"folds": [{"score": 1.0}]},
+    ],
 )
 def test_an_unknown_missing_or_unfit_field_is_an_error(changed: dict[str, object]) -> None:
     fields = json.loads(to_json(found())) | changed

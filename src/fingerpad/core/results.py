@@ -39,7 +39,10 @@ def _array(dtype: type, ndim: int | None, item: dict[str, Any]) -> GetPydanticSc
     """Make the validation, JSON and schema of a read-only array; null stands for NaN."""
 
     def validated(value: Any) -> NDArray[Any]:
-        array: NDArray[Any] = np.array(value, dtype=dtype)
+        try:
+            array: NDArray[Any] = np.array(value, dtype=dtype)
+        except TypeError as error:  # which pydantic does not take for an unfit value
+            raise ValueError(f"must hold numbers of type {np.dtype(dtype)}") from error
         if ndim is not None and array.ndim != ndim:
             if array.size == 0 and array.ndim < ndim:
                 array = array.reshape((0,) * ndim)
