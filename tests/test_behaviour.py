@@ -90,7 +90,7 @@ def test_names_and_order_of_files_do_not_count():
         for name, text in SOURCES.items()
     }
     modules = frozenset(module.replace("assembly", "gathering") for module in MODULES)
-    assert "gathering._add_chunk" in renamed["skin/indentation.py"]
+    assert "gathering._add_chunk" in renamed["mechanics/kernels.py"]
     assert "from fingerpad.mechanics.gathering import" in "".join(renamed.values())
     assert code(renamed, modules) == BEFORE
 
