@@ -760,7 +760,7 @@ def test_a_job_says_what_is_wrong_with_it():
         replace(job, materials=job.materials[:3])
     broken = job.mesh.elements.copy()
     broken[5, 6] = broken[5, 0]
-    with pytest.raises(InputError, match="Element 5 repeats nodes"):
+    with pytest.raises(InputError, match="element 5 has the nodes"):
         abaqus_deck(replace(job, mesh=replace(job.mesh, elements=broken)))
 
 

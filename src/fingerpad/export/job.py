@@ -153,31 +153,8 @@ class Job:
 
     @cached_property
     def wedges(self) -> IntArray:
-        """Nodes of each wedge (n_elements, 6), lower triangle first; -1 where the element is a brick.
-
-        Raises
-        ------
-        InputError
-            If an element repeats nodes in another way than a brick with one collapsed side.
-        """
-        elements = self.mesh.elements
-        wedges = np.full((len(elements), 6), -1, dtype=np.int64)
-        lower, upper = elements[:, :4], elements[:, 4:]
-        for corner in range(4):
-            after = (corner + 1) % 4
-            collapsed = (lower[:, corner] == lower[:, after]) & (upper[:, corner] == upper[:, after])
-            kept = [n for n in range(4) if n != after]
-            wedges[collapsed] = np.concatenate([lower[:, kept], upper[:, kept]], axis=1)[collapsed]
-        is_wedge = wedges[:, 0] >= 0
-        nodes = np.where(is_wedge[:, None], np.pad(wedges, ((0, 0), (0, 2)), mode="edge"), elements)
-        different = (np.diff(np.sort(nodes, axis=1), axis=1) > 0).sum(axis=1) + 1
-        strange = np.flatnonzero(different != np.where(is_wedge, 6, 8))
-        if strange.size:
-            raise InputError(
-                f"Element {strange[0]} repeats nodes ({elements[strange[0]].tolist()}): only bricks and "
-                "bricks with one collapsed side, wedges, can be exported."
-            )
-        return wedges
+        """Nodes of each wedge (n_elements, 6), see `wedge_nodes`."""
+        return wedge_nodes(self.mesh)
 
     @property
     def is_wedge(self) -> np.ndarray:
@@ -279,6 +256,34 @@ class Job:
             + ".",
             f"{self.times_ms.size - 1} steps from 0 to {self.times_ms[-1]:g} ms.",
         )
+
+
+def wedge_nodes(mesh: Mesh) -> IntArray:
+    """Nodes of each wedge (n_elements, 6), lower triangle first; -1 where the element is a brick.
+
+    Raises
+    ------
+    InputError
+        If an element repeats nodes in another way than a brick with one collapsed side.
+    """
+    elements = mesh.elements
+    wedges = np.full((len(elements), 6), -1, dtype=np.int64)
+    lower, upper = elements[:, :4], elements[:, 4:]
+    for corner in range(4):
+        after = (corner + 1) % 4
+        collapsed = (lower[:, corner] == lower[:, after]) & (upper[:, corner] == upper[:, after])
+        kept = [n for n in range(4) if n != after]
+        wedges[collapsed] = np.concatenate([lower[:, kept], upper[:, kept]], axis=1)[collapsed]
+    is_wedge = wedges[:, 0] >= 0
+    nodes = np.where(is_wedge[:, None], np.pad(wedges, ((0, 0), (0, 2)), mode="edge"), elements)
+    different = (np.diff(np.sort(nodes, axis=1), axis=1) > 0).sum(axis=1) + 1
+    strange = np.flatnonzero(different != np.where(is_wedge, 6, 8))
+    if strange.size:
+        raise InputError(
+            f"mesh must consist of bricks and of wedges, bricks with one collapsed side, to be exported: "
+            f"element {strange[0]} has the nodes {elements[strange[0]].tolist()}."
+        )
+    return wedges
 
 
 def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike | None = None) -> Job:

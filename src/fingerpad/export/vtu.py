@@ -16,6 +16,7 @@ import numpy as np
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
+from fingerpad.export.job import wedge_nodes
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.press import Deformation
 from fingerpad.skin.fields import FIELDS, Place
@@ -180,24 +181,13 @@ def cells_of(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     InputError
         If an element repeats nodes and is not a wedge.
     """
-    # In a wedge, nodes a and b of the lower face are one, and so are the two above them.
-    lower, upper = mesh.elements[:, :4], mesh.elements[:, 4:]
-    repeated = lower == np.roll(lower, -1, axis=1)
-    distinct = np.array([len(set(nodes)) for nodes in mesh.elements.tolist()])
-    is_wedge = repeated.sum(axis=1) == 1
-    regular = np.where(is_wedge, distinct == 6, distinct == 8)
-    if not regular.all():
-        element = int(np.flatnonzero(~regular)[0])
-        raise InputError(
-            f"mesh must consist of bricks and of wedges with one side collapsed: element {element} has the "
-            f"nodes {mesh.elements[element].tolist()}."
-        )
-    cells = [
-        np.concatenate([below[~twice], above[~twice]])
-        for below, above, twice in zip(lower, upper, repeated, strict=True)
-    ]
-    offsets = np.concatenate([[0], np.cumsum([cell.size for cell in cells])])
-    return offsets, np.concatenate(cells), np.where(is_wedge, WEDGE, HEXAHEDRON).astype(np.uint8)
+    wedges = wedge_nodes(mesh)
+    is_wedge = wedges[:, 0] >= 0
+    sizes = np.where(is_wedge, 6, 8)
+    nodes = np.where(is_wedge[:, None], np.pad(wedges, ((0, 0), (0, 2))), mesh.elements)
+    used = np.arange(8) < sizes[:, None]
+    offsets = np.concatenate([[0], np.cumsum(sizes)])
+    return offsets, nodes[used], np.where(is_wedge, WEDGE, HEXAHEDRON).astype(np.uint8)
 
 
 def _grid(vtk: Any, mesh: Mesh) -> Any:
