@@ -107,7 +107,7 @@ def test_receptors_beside_the_nail_have_end_organs():
     [
         (lambda: NailEdge(reach_mm=0.0), "reach_mm must be greater than 0"),
         (lambda: NailEdge(replace(Fingertip(), nail_half_width_mm=9.0)), "must leave skin beside it"),
-        (lambda: NAIL.points([[0.0, 4.5]]), "within 4 mm of its edge"),
+        (lambda: NAIL.points([[0.0, 4.5]]), "within 4 mm of the edge of the nail"),
         (lambda: NAIL.points([[0.0, 1.0], [30.0, 1.0]]), "got along = 30, distance = 1 mm"),
         (lambda: NAIL.points([[0.0, 1.0, 2.0]]), "two columns"),
         (lambda: NAIL.region(5.0), "width_mm must not exceed the reach of 4 mm"),

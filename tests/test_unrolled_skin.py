@@ -183,7 +183,7 @@ def test_receptors_all_over_the_pad_have_end_organs_of_their_own():
         (lambda: SKIN.pad(x_mm=(26.0, 8.0)), "x_mm must increase"),
         (lambda: SKIN.pad(x_mm=(8.0, 40.0)), "x_mm must be two ends within"),
         (lambda: SKIN.pad(faces_deg=0.0), "faces_deg must be above 0"),
-        (lambda: SKIN.pad(x_mm=(30.0, 31.0), faces_deg=10.0), "faces the volar side so far"),
+        (lambda: SKIN.pad(x_mm=(30.0, 31.0), faces_deg=10.0), "is within 10 degrees of the volar direction"),
     ],
 )
 def test_what_is_no_place_is_refused(wrong, message):

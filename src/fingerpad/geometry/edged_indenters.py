@@ -1,10 +1,8 @@
-"""Rigid bodies whose edges are the question: a flat body that ends, a bar with a gap, a grating.
+"""Rigid bodies with edges: a flat body that ends, a bar with a gap, a grating.
 
-Their frame is that of `fingerpad.geometry.indenters`. All three are made of one piece, the corner: all
-points with
-u <= 0 and y <= 0, its edge rounded. Where two corners bound one ridge, the ridge is what both have in common,
-and its gap is the larger of the two: exact on both sides of its face, as long as the flat between the two
-roundings is not negative.
+Their frame is that of `fingerpad.geometry.indenters`. All three are composed of corners: all points with
+u <= 0 and y <= 0, with a rounded edge. A ridge is the intersection of two corners, and its gap is the larger
+of their gaps. This is exact on both sides of its face if the flat between the two fillets is not negative.
 """
 
 from __future__ import annotations
@@ -27,7 +25,7 @@ def _corner(
 
 
 def _along_x(signs: FloatArray) -> FloatArray:
-    """Vectors (n, 3) along x with these signs, that of 0 taken as positive."""
+    """Vectors (n, 3) along x with the given signs; 0 counts as positive."""
     return np.where(signs < 0.0, -1.0, 1.0)[:, None] * [1.0, 0.0, 0.0]
 
 
@@ -54,12 +52,12 @@ class Edge(Indenter):
 
     @property
     def half_width_mm(self) -> float:
-        """Half of the extent along x: no limit."""
+        """Half of the extent along x: infinite."""
         return np.inf
 
     @property
     def edge_reach_mm(self) -> float:
-        """How far to either side of x = 0 skin bends about the edge. [mm]"""
+        """Half-width about x = 0 within which skin bends about the edge. [mm]"""
         return self.fillet_mm + BESIDE_EDGE_MM
 
     def front(self, points_mm: FloatArray) -> FloatArray:
@@ -74,10 +72,10 @@ class Edge(Indenter):
 
 @dataclass(frozen=True)
 class Gap(Indenter):
-    """Flat bar across the finger with a gap along its middle: two ridges that one body holds.
+    """Flat bar across the finger with a gap along its middle: two ridges of one rigid body.
 
-    The gap is deeper than skin can bulge. Its lips are never rounder than half of it, so that a gap that
-    closes leaves the bar without one.
+    The gap is deeper than skin can bulge. The radius of its lips is at most half of its width, so a gap of
+    width 0 gives the plain bar.
 
     Parameters
     ----------
@@ -97,8 +95,8 @@ class Gap(Indenter):
 
     References
     ----------
-    Johnson & Phillips 1981: stimuli of one overall size, much larger than their gaps, told from those
-    without a gap.
+    Johnson & Phillips 1981: discrimination of stimuli with and without a gap, of one overall size that is
+    much larger than the gap.
 
     Examples
     --------
@@ -140,12 +138,12 @@ class Gap(Indenter):
 
     @property
     def edge_reach_mm(self) -> float:
-        """How far to either side of x = 0 skin bends about the lips; 0 without a gap. [mm]"""
+        """Half-width about x = 0 within which skin bends about the lips; 0 without a gap. [mm]"""
         return self.gap_mm / 2 + BESIDE_EDGE_MM if self.gap_mm > 0.0 else 0.0
 
     @property
     def narrowest_mm(self) -> float:
-        """Width of the gap; no limit without one. [mm]"""
+        """Width of the gap; infinite without one. [mm]"""
         return self.gap_mm if self.gap_mm > 0.0 else np.inf
 
     def front(self, points_mm: FloatArray) -> FloatArray:
@@ -169,7 +167,7 @@ class Gap(Indenter):
 
 @dataclass(frozen=True)
 class Grating(Indenter):
-    """Grating larger than the finger: flat ridges across it, a groove between any two, a ridge over x = 0.
+    """Grating larger than the finger: flat ridges across it with grooves between them, one ridge at x = 0.
 
     Parameters
     ----------
@@ -206,7 +204,7 @@ class Grating(Indenter):
 
     @property
     def half_width_mm(self) -> float:
-        """Half of the extent along x: no limit."""
+        """Half of the extent along x: infinite."""
         return np.inf
 
     def mirrors(self, spin_deg: float) -> bool:
@@ -215,12 +213,12 @@ class Grating(Indenter):
 
     @property
     def edge_reach_mm(self) -> float:
-        """How far to either side of x = 0 skin bends about edges: no limit."""
+        """Half-width about x = 0 within which skin bends about edges: infinite."""
         return np.inf
 
     @property
     def narrowest_mm(self) -> float:
-        """Width of ridge or groove, whichever is narrower. [mm]"""
+        """Smaller of the widths of ridge and groove. [mm]"""
         return min(self.ridge_mm, self.groove_mm)
 
     def front(self, points_mm: FloatArray) -> FloatArray:

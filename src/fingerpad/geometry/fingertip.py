@@ -1,4 +1,4 @@
-"""The finger as geometry: outline, layer depths, bone and nail, with no mesh and no mechanics.
+"""Geometry of the fingertip: outline, layer depths, bone and nail.
 
 Axes: x from the cut at the middle phalanx to the tip, y towards the nail, z to the side. Every cross-section
 of the skin is two half-ellipses joined at y = 0, so three profiles of x are the whole outline: volar depth a,
@@ -19,8 +19,8 @@ from fingerpad.core.checks import FloatArray, finite, float_array, increasing, n
 from fingerpad.core.errors import InputError
 from fingerpad.data import fingertip as published
 
-# Readings carry two decimals. Interpolated, that noise would tilt the skin's normals by degrees; this much
-# smoothing moves the profiles by about 0.01 mm and leaves slopes true to a quarter of a degree on the pad.
+# Readings have two decimals. Interpolation of this rounding would tilt the skin's normals by degrees. This
+# smoothing moves the profiles by about 0.01 mm; on the pad slopes are accurate to a quarter of a degree.
 SMOOTHING = 5e-7
 _MOST_RAY_STEPS = 60
 

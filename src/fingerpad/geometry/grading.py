@@ -1,4 +1,4 @@
-"""Where a finger's mesh is fine and where it may be coarse."""
+"""Sizes of the elements of a finger's mesh, fine about the contact and coarse elsewhere."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RESOLUTIONS = ("quick", "standard", "paper")
 
 @dataclass(frozen=True)
 class Grading:
-    """Where the mesh of a finger is fine, and how fine.
+    """Fine zone of the mesh of a finger and sizes of its elements.
 
     Parameters
     ----------
@@ -33,10 +33,10 @@ class Grading:
     stratum_corneum, living_epidermis, dermis, subcutis : int
         Number of elements through each layer.
     full : bool
-        Both halves of the finger, or only z >= 0.
+        Whether both halves of the finger are meshed, or only z >= 0.
     core_half_length_mm, core_size_mm : float
-        Part of the fine zone with elements that are smaller still along the finger, under a wire: extent to
-        either side of its middle, and their size. Both 0 for none. [mm]
+        Part of the fine zone with even smaller elements along the finger, under a wire: half-length about its
+        middle, and size of the elements. Both 0 for none. [mm]
 
     Raises
     ------
@@ -90,9 +90,9 @@ def resolution_grading(
     Parameters
     ----------
     resolution : {"quick", "standard", "paper"}
-        "quick" for a look, "standard" for results, "paper" for the published size: both halves, at least
-        232,000 nodes, edges of 0.1 mm (none above 0.106 mm) over an oval pad of 11 by 9 mm, at the skin and
-        at the epidermal-dermal border.
+        "quick" for a first look, "standard" for results, "paper" for the published size: both halves, at
+        least 232,000 nodes, edges of 0.1 mm (none above 0.106 mm) over an oval pad of 11 by 9 mm, at the skin
+        and at the epidermal-dermal border.
     centre_mm, half_length_mm, half_width_mm : float
         The fine zone, as in `Grading`; "paper" widens it to the whole pad. [mm]
 
@@ -117,9 +117,9 @@ def resolution_grading(
 
 
 def covering(gradings: Sequence[Grading]) -> Grading:
-    """One grading that is as fine as each of several, wherever that one is fine.
+    """One grading that is at least as fine everywhere as each of several.
 
-    Stimuli that are discriminated should share one mesh: its error is then the same for all.
+    Stimuli that are compared should be pressed into one mesh, so that the error of the mesh is the same.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def covering(gradings: Sequence[Grading]) -> Grading:
     Returns
     -------
     Grading
-        Its fine zone reaches over all of theirs; of both halves if one of them is.
+        Its fine zone covers all of theirs; both halves are meshed if one of them requires it.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def covering(gradings: Sequence[Grading]) -> Grading:
     first = gradings[0].centre_mm
     proximal = min(grading.centre_mm - grading.half_length_mm - first for grading in gradings)
     distal = max(grading.centre_mm + grading.half_length_mm - first for grading in gradings)
-    same_centre = all(grading.centre_mm == first for grading in gradings)  # then nothing is rounded
+    same_centre = all(grading.centre_mm == first for grading in gradings)  # avoids rounding
     centre = first if same_centre else first + 0.5 * (proximal + distal)
 
     def reach(name: str, parts: Sequence[Grading]) -> float:
@@ -203,7 +203,7 @@ def lines_along(grading: Grading, length: float) -> FloatArray:
     growth, largest = grading.growth, grading.largest_mm
     if not grading.core_size_mm:
         return graded_lines(fine, size, length, growth, largest)
-    if length < fine + size:  # the finger ends with its fine zone, not with slivers beyond it
+    if length < fine + size:  # no thin elements between the fine zone and the end of the finger
         fine = length
     core = graded_lines(grading.core_half_length_mm, grading.core_size_mm, fine, growth, size)
     beyond = graded_lines(0.0, size, length - fine, growth, largest)

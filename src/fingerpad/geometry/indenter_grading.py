@@ -1,4 +1,4 @@
-"""Where the mesh must be fine for an indenter: about contact, edges and grooves, as it is turned."""
+"""Grading for an indenter: fine about the contact, its edges and its grooves, depending on its rotation."""
 
 from __future__ import annotations
 
@@ -10,41 +10,41 @@ from fingerpad.geometry.grading import Grading, resolution_grading
 from fingerpad.geometry.indenters import Indenter
 
 THIN_SIZE_MM = 0.025
-"""Elements along the finger below a wire: two across the strip that it pushes. [mm]"""
+"""Size along the finger of elements below a wire: two across the strip in contact. [mm]"""
 
 EDGE_SIZE_MM = {"quick": 0.2, "standard": 0.1, "paper": 0.1}
-"""Elements across edges that lie along lines of the mesh, as those of the paper's bar. [mm]"""
+"""Size of elements across edges that are parallel to grid lines, as those of the paper's bar. [mm]"""
 
 OBLIQUE_SIZE_MM = {"quick": 0.3, "standard": 0.2, "paper": 0.1}
-"""Elements under edges that cross lines of the mesh, and meet all positions between two of them. [mm]"""
+"""Size of elements under edges that cross grid lines at an angle. [mm]"""
 
 ACROSS_GROOVE, FEWEST_ACROSS_GROOVE = 4, 2
-"""Elements across the narrowest groove or ridge: in a mesh that is graded about it, and in any."""
+"""Number of elements across the narrowest groove or ridge: in a mesh graded for it, and the least in any."""
 
 LONGEST_REACH_MM = 5.0
-"""How far a fine zone goes at most: skin farther away curves away from any indenter. [mm]"""
+"""Largest half-extent of a fine zone: skin farther away curves away from any indenter. [mm]"""
 
 
 def grading_about(
     indenter: Indenter, resolution: str, x_mm: float, z_mm: float = 0.0, spin_deg: float = 0.0
 ) -> Grading:
-    """Mesh that is fine where an indenter at (x, z) touches and just beyond, and finer about its edges.
+    """Grading that is fine under an indenter at (x, z) and 1 mm beyond, and finer about its edges.
 
     Parameters
     ----------
     indenter : Indenter
         The rigid body.
     resolution : {"quick", "standard", "paper"}
-        How fine.
+        Named resolution.
     x_mm, z_mm : float
-        Where its axis meets the skin. [mm]
+        Position at which its axis meets the skin. [mm]
     spin_deg : float
         Rotation about its direction of pressing, as of a `Touch`. [degrees]
 
     Returns
     -------
     Grading
-        Of both halves if the indenter is off the midline or turned out of its symmetry.
+        Both halves are meshed if the indenter is off the midline or not symmetric when turned.
 
     Examples
     --------
@@ -53,7 +53,7 @@ def grading_about(
     (False, True)
     """
     reach = indenter.half_width_mm + 1.0
-    if not indenter.mirrors(spin_deg):  # a square, turned, reaches this far along and across
+    if not indenter.mirrors(spin_deg):  # extent of a turned square along and across
         reach *= sum(map(abs, cosine_and_sine(spin_deg)))
     reach = min(reach, LONGEST_REACH_MM)
     grading = resolution_grading(resolution, x_mm, half_length_mm=reach, half_width_mm=abs(z_mm) + reach)
@@ -62,13 +62,13 @@ def grading_about(
     if indenter.half_width_mm < grading.size_x_mm:
         if spin_deg % 180.0 != 0.0:
             raise InputError(
-                f"spin_deg must be 0 for {type(indenter).__name__}, since it is thinner than "
+                f"spin_deg must be 0 for {type(indenter).__name__}, because it is thinner than "
                 f"{2 * grading.size_x_mm:g} mm, two elements of {resolution}: got {spin_deg:g} degrees; "
                 "give a grading that is fine enough."
             )
-        # A wire needs elements of its own size below it; a few of them, from which the mesh grows.
+        # A wire needs a few elements of its own size below it, from which the sizes grow.
         few_mm = 4 * THIN_SIZE_MM
-        if resolution == "paper":  # whose fine zone is the whole pad
+        if resolution == "paper":  # its fine zone is the whole pad
             return replace(grading, core_half_length_mm=few_mm, core_size_mm=THIN_SIZE_MM)
         return replace(grading, half_length_mm=few_mm, size_x_mm=THIN_SIZE_MM)
     if indenter.edge_reach_mm == 0.0:
@@ -79,7 +79,7 @@ def grading_about(
 
 
 def _finer_across_edges(grading: Grading, size_mm: float, reach_mm: float, spin_deg: float) -> Grading:
-    """Make elements across edges within reach of the axis smaller; only along the finger can a core do it."""
+    """Make elements across edges within reach of the axis smaller; a core exists only along the finger."""
     along, across = min(size_mm, grading.size_x_mm), min(size_mm, grading.size_z_mm)
     if spin_deg % 90.0 != 0.0:
         return replace(grading, size_x_mm=along, size_z_mm=across)

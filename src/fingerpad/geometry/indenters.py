@@ -1,9 +1,9 @@
-"""Rigid indenters as signed gaps: how far a point of the skin is from the body, and which way it is pushed.
+"""Rigid indenters as signed gaps: distance of a point of the skin from the body, and the normal there.
 
-Every indenter lives in its own frame: its face touches y = 0, y runs along the direction of pressing (into
-the skin), x along the finger and z across it, unless a touch turns it. The body fills y < 0 below its face.
-`gap` is positive outside the body and negative inside; the normal points out of the body, along which a
-frictionless contact pushes. Bodies with sharp edges are in
+Every indenter has its own frame: its face touches y = 0, y is the direction of pressing (into the skin), x
+runs along the finger and z across it, unless the indentation turns the body. The body fills y < 0 below its
+face. `gap` is positive outside the body and negative inside; the normal points out of the body and is the
+direction of the contact force without friction. Edge, bar with a gap and grating are in
 `fingerpad.geometry.edged_indenters`.
 """
 
@@ -20,11 +20,11 @@ from fingerpad.core.units import radius_mm
 from fingerpad.data import protocol
 
 BESIDE_EDGE_MM = 0.4
-"""How far beside the wall of an edge skin bends sharply about it. [mm]"""
+"""Distance from the wall of an edge within which the skin bends sharply. [mm]"""
 
 
 class Indenter(ABC):
-    """A rigid body with a signed gap; derive from it to press a body of your own."""
+    """A rigid body with a signed gap; derive from it to define another body."""
 
     @abstractmethod
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -40,29 +40,29 @@ class Indenter(ABC):
         """Half of the body's extent along x where it can touch. [mm]"""
 
     def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
-        """Which of the undeformed points (n, 3) can come into contact at all; bool (n,)."""
+        """Whether each undeformed point (n, 3) can come into contact; bool (n,)."""
         return np.ones(len(undeformed_mm), dtype=bool)
 
     @property
     def grips(self) -> bool:
-        """Whether the skin that may touch cannot slide along the finger; most bodies are frictionless."""
+        """Whether skin in contact cannot slide along the finger; False for most bodies."""
         return False
 
     def mirrors(self, spin_deg: float) -> bool:
         """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0.
 
-        Half a finger can be solved only then. A body of your own is taken to be one as it stands.
+        Half a finger can be solved only then. By default a body is symmetric as long as it is not turned.
         """
         return spin_deg % 180.0 == 0.0
 
     @property
     def edge_reach_mm(self) -> float:
-        """How far to either side of x = 0 the mesh is finer, for the edges there; 0 if it is not. [mm]"""
+        """Half-width about x = 0 of the finer mesh for edges there; 0 without edges. [mm]"""
         return 0.0
 
     @property
     def narrowest_mm(self) -> float:
-        """Width of the narrowest groove or ridge, which a mesh must resolve; no limit without. [mm]"""
+        """Width of the narrowest groove or ridge, which a mesh must resolve; infinite without one. [mm]"""
         return np.inf
 
 
@@ -82,8 +82,8 @@ def round_front(beside: FloatArray, radius: float) -> FloatArray:
 def _ball(centred: FloatArray, lateral: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
     """Gap and normal of a ball or cylinder from offsets (n, 3) to its centre or axis.
 
-    A thin body moves past a node within one step. A node behind the widest section is therefore measured
-    along the direction of pressing, so that it is pushed out in front and not out at the back.
+    A thin body can move past a node within one step. The gap of a node behind the widest section is therefore
+    measured along the direction of pressing, so that the contact force points to the front of the body.
     """
     distance, normal = _norm_and_direction(centred)
     passed = (centred[:, 1] < 0.0) & (lateral < radius)
@@ -157,7 +157,7 @@ class Cylinder(Indenter):
 
 @dataclass(frozen=True)
 class Line(Indenter):
-    """Line load across the finger: a wire thinner than the elements of the skin, taken as a blade.
+    """Line load across the finger: a wire thinner than the elements of the skin, modelled as a blade.
 
     Nodes cannot resolve the roundness of a body as thin as their spacing: one node would balance on its top
     and slide off. The strip of skin that lies under the undeformed wire is therefore pushed along the
@@ -233,7 +233,7 @@ class Sphere(Indenter):
         return self.radius_mm
 
     def mirrors(self, spin_deg: float) -> bool:
-        """Whether the body, turned about y, is its own mirror image across z = 0: however it is turned."""
+        """Whether the body, turned about y, is its own mirror image across z = 0: always."""
         return True
 
     def front(self, points_mm: FloatArray) -> FloatArray:
@@ -282,7 +282,7 @@ class Bar(Indenter):
 
     @property
     def edge_reach_mm(self) -> float:
-        """How far to either side of x = 0 skin bends about the edges. [mm]"""
+        """Half-width about x = 0 within which skin bends about the edges. [mm]"""
         return self.width_mm / 2 + BESIDE_EDGE_MM
 
     def front(self, points_mm: FloatArray) -> FloatArray:
@@ -323,7 +323,7 @@ class FlatPunch(Indenter):
         return self.diameter_mm / 2
 
     def mirrors(self, spin_deg: float) -> bool:
-        """Whether the body, turned about y, is its own mirror image across z = 0: however it is turned."""
+        """Whether the body, turned about y, is its own mirror image across z = 0: always."""
         return True
 
     def front(self, points_mm: FloatArray) -> FloatArray:
@@ -347,11 +347,11 @@ class Plate(Indenter):
 
     @property
     def half_width_mm(self) -> float:
-        """Half of the extent along x: no limit."""
+        """Half of the extent along x: infinite."""
         return np.inf
 
     def mirrors(self, spin_deg: float) -> bool:
-        """Whether the body, turned about y, is its own mirror image across z = 0: however it is turned."""
+        """Whether the body, turned about y, is its own mirror image across z = 0: always."""
         return True
 
     def front(self, points_mm: FloatArray) -> FloatArray:
@@ -364,7 +364,7 @@ class Plate(Indenter):
 
 
 def fillet_within(fillet_mm: float, width_mm: float, width_name: str) -> None:
-    """Refuse a fillet that is negative or takes more than half of a width. [mm]"""
+    """Raise an error if a fillet is negative or larger than half of a width. [mm]"""
     not_negative("fillet_mm", fillet_mm, "mm")
     if fillet_mm > width_mm / 2:
         raise InputError(

@@ -1,8 +1,8 @@
-"""From geometry to bricks: one structured grid along x around x through, for a finger or a block.
+"""Structured mesh of bricks along, around and through a finger or a block.
 
 Every element is an 8-node brick with its lower face on the bone's side and its upper face on the skin's side.
-At the tip of the finger all rays of a grid line meet in one pole; the bricks there have one side collapsed
-(two pairs of repeated nodes), so one kernel serves bricks and wedges alike.
+At the tip of the finger all rays of a grid line meet in one pole. The bricks there have one side collapsed
+(two pairs of repeated nodes), so one kernel computes bricks and wedges.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Mesh:
     shape : (int, int, int)
         Number of elements along, around and through.
     full : bool
-        Whether both halves are there; else only z >= 0, with `symmetry_nodes` on the plane z = 0.
+        Whether both halves are meshed; otherwise only z >= 0, with `symmetry_nodes` on the plane z = 0.
     skin_grid : int array (n_along + 1, n_around + 1)
         Nodes of the skin in grid order; the pole, and the seam of a full finger, appear more than once.
     bone_nodes, nail_nodes, symmetry_nodes : int array
@@ -79,7 +79,7 @@ class Mesh:
     def grid(self) -> IntArray:
         """Nodes in grid order, (n_along + 1, n_around + 1, n_through + 1), through from the skin downwards.
 
-        The nodes of one place on the skin are numbered in a row; pole and seam appear more than once.
+        Nodes below one point of the skin are numbered consecutively; pole and seam appear more than once.
         """
         through = np.arange(self.shape[2] + 1)
         return self.skin_grid[:, :, None] + through
@@ -166,7 +166,7 @@ def block_mesh(
     layers : sequence of int
         Index into `LAYERS` for each interval of `y_edges`.
     symmetric : bool
-        Whether the plane z = 0, the first of `z_edges`, is one of symmetry.
+        Whether the plane z = 0, the first of `z_edges`, is a plane of symmetry.
 
     Returns
     -------
@@ -206,7 +206,7 @@ def block_mesh(
 
 @dataclass(frozen=True)
 class GridLines:
-    """The grid of a finger's mesh before it is mapped to the finger.
+    """Grid lines of a finger's mesh in coordinates along, around and through.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ class GridLines:
 def _rays(finger: Fingertip, station: FloatArray, around_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Origins and directions (..., 3) of rays from the bone's axis.
 
-    `station` is x along the axis and, beyond its end, 1 mm per radian of the fan that turns towards the tip.
+    `station` is x along the axis and, beyond its end, 1 mm per radian of the rays that fan out to the tip.
     """
     turn = np.clip(station - finger.spine_end_x_mm, 0.0, 0.5 * np.pi)
     # Exact zeros on the plane of symmetry and at the pole, where sin(pi) and cos(pi / 2) leave rounding.
@@ -270,7 +270,7 @@ def finger_lines(finger: Fingertip, grading: Grading) -> GridLines:
     finger : Fingertip
         The geometry.
     grading : Grading
-        Where it is fine, and how fine.
+        Fine zone and sizes of elements.
 
     Returns
     -------
@@ -330,7 +330,7 @@ def finger_mesh(finger: Fingertip, grading: Grading | GridLines) -> Mesh:
     finger : Fingertip
         The geometry.
     grading : Grading or GridLines
-        What to build; lines come from `finger_lines`.
+        Sizes of the elements, or grid lines from `finger_lines`.
 
     Returns
     -------

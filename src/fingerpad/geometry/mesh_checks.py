@@ -1,6 +1,6 @@
-"""What a mesh must fulfil before anything is solved on it, each failing in a sentence that names the place.
+"""Checks of a mesh before a solution; each error names the node or element and its place.
 
-A mesh from `block_mesh` or `finger_mesh` fulfils all of it; this is for meshes made or changed by hand.
+Meshes from `block_mesh` and `finger_mesh` pass all checks; they are for meshes made or changed by hand.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from fingerpad.geometry.mesh import CORNERS, LAYERS, Mesh
 from fingerpad.geometry.mesh_quality import element_place, jacobian_at_gauss, rigid_motions
 
 PLANE_TOLERANCE = 1e-6
-"""How far a node of the plane of symmetry may lie from z = 0, over the size of the mesh."""
+"""Largest distance of a node of the plane of symmetry from z = 0, over the size of the mesh."""
 
 JOINING_NODES = 3
-"""Nodes that two elements must share to hold each other: a face of a brick or a wedge, not an edge."""
+"""Nodes that two elements must share to be joined: a face of a brick or a wedge, not an edge."""
 
 _RIGID_MOTIONS = 6
 
 
 def check_mesh(mesh: Mesh, n_materials: int = len(LAYERS)) -> None:
-    """Raise an error that names what is wrong with a mesh, if anything is.
+    """Raise an error if a mesh cannot be solved.
 
     Parameters
     ----------
     mesh : Mesh
         The undeformed body.
     n_materials : int
-        How many materials its layers may refer to.
+        Number of materials.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def _node_place(mesh: Mesh, node: int) -> str:
 
 
 def _check_arrays(mesh: Mesh) -> None:
-    """Shapes, and numbers that can be used to look anything up."""
+    """Shapes of the arrays, and finite coordinates."""
     nodes, elements = mesh.nodes_mm, mesh.elements
     if nodes.ndim != 2 or nodes.shape[1] != 3 or not len(nodes):
         raise InputError(f"nodes_mm needs one row of x, y and z per node: got shape {nodes.shape}.")
@@ -80,7 +80,7 @@ def _check_arrays(mesh: Mesh) -> None:
 
 
 def _check_elements(mesh: Mesh, n_materials: int) -> None:
-    """Nodes that exist, wedges that are wedges, layers that have a material, and no node left over."""
+    """Check that nodes exist and are used, elements are bricks or wedges, and layers have a material."""
     n_nodes = len(mesh.nodes_mm)
     outside = np.flatnonzero(((mesh.elements < 0) | (mesh.elements >= n_nodes)).any(axis=1))
     if outside.size:
@@ -123,7 +123,7 @@ def _is_wedge(elements: IntArray) -> np.ndarray:
 
 
 def _check_sets(mesh: Mesh) -> None:
-    """Find every set of nodes and elements in range, and a skin, a support and a plane of symmetry."""
+    """Check that sets are valid, that skin and supports exist, and the plane of symmetry of half a body."""
     n_nodes, n_elements = len(mesh.nodes_mm), len(mesh.elements)
     for name, last in (
         ("skin_grid", n_nodes),
@@ -142,7 +142,9 @@ def _check_sets(mesh: Mesh) -> None:
             "skin_grid must name the nodes of the skin, where the indenter touches: it is empty."
         )
     if not mesh.fixed_nodes.size:
-        raise InputError("bone_nodes and nail_nodes are empty: nothing holds the body; name nodes that do.")
+        raise InputError(
+            "bone_nodes and nail_nodes are empty, so nothing holds the body: give the nodes that are fixed."
+        )
     if mesh.full != (not mesh.symmetry_nodes.size):
         raise InputError(
             f"symmetry_nodes must be given for half a body and only then: got full={mesh.full} "
@@ -156,15 +158,15 @@ def _check_plane(mesh: Mesh) -> None:
     """Half a body lies at z >= 0, and its nodes at z = 0 are those of the plane of symmetry."""
     tolerance_mm = PLANE_TOLERANCE * float(np.ptp(mesh.nodes_mm, axis=0).max())
     z = mesh.nodes_mm[:, 2]
-    said = np.zeros(len(z), dtype=bool)
-    said[mesh.symmetry_nodes] = True
-    off = np.flatnonzero(said & (np.abs(z) > tolerance_mm))
+    listed = np.zeros(len(z), dtype=bool)
+    listed[mesh.symmetry_nodes] = True
+    off = np.flatnonzero(listed & (np.abs(z) > tolerance_mm))
     if off.size:
         raise InputError(f"symmetry_nodes must lie at z = 0: {_node_place(mesh, off[0])} does not.")
     beyond = np.flatnonzero(z < -tolerance_mm)
     if beyond.size:
         raise InputError(f"Half a body must lie at z >= 0: {_node_place(mesh, beyond[0])} does not.")
-    missing = np.flatnonzero(~said & (np.abs(z) <= tolerance_mm))
+    missing = np.flatnonzero(~listed & (np.abs(z) <= tolerance_mm))
     if missing.size:
         raise InputError(
             f"symmetry_nodes must hold every node at z = 0: {_node_place(mesh, missing[0])} is missing."
@@ -172,7 +174,7 @@ def _check_plane(mesh: Mesh) -> None:
 
 
 def _check_jacobians(mesh: Mesh) -> None:
-    """No element is turned inside out where the kernels evaluate it."""
+    """Check that Jacobians are positive at the Gauss points."""
     smallest = jacobian_at_gauss(mesh).min(axis=1)
     inverted = np.flatnonzero(~(smallest > 0.0))
     if inverted.size:
@@ -180,12 +182,12 @@ def _check_jacobians(mesh: Mesh) -> None:
         raise InputError(
             "The Jacobian of an element must be above 0 at its Gauss points: that of "
             f"{element_place(mesh, worst)} is {smallest[worst]:.3g} mm³, one of {inverted.size} such "
-            "elements; move its nodes or turn their order."
+            "elements; move its nodes or reverse their order."
         )
 
 
 def _check_held(mesh: Mesh) -> None:
-    """No part of the body floats: fixed nodes and the plane of symmetry rule out every rigid motion of it."""
+    """Check that fixed nodes and the plane of symmetry prevent every rigid motion of each part."""
     n_elements, n_nodes = len(mesh.elements), len(mesh.nodes_mm)
     rows = np.repeat(np.arange(n_elements), len(CORNERS))
     incidence = coo_array(
@@ -210,12 +212,12 @@ def _check_held(mesh: Mesh) -> None:
         rows_held = motions[nodes][held[nodes]]
         if np.linalg.matrix_rank(rows_held.T @ rows_held) == _RIGID_MOTIONS:
             continue
-        who = f"{members.size} element(s) with {element_place(mesh, int(members[0]))}"
+        which = f"{members.size} element(s) with {element_place(mesh, int(members[0]))}"
         if np.isin(nodes, mesh.fixed_nodes).any():
             raise InputError(
-                f"A part of the body must be held in all directions: {who} can still move as a whole; "
+                f"A part of the body must be held in all directions: {which} can still move as a whole; "
                 "fix three or more nodes that do not lie on one line."
             )
         raise InputError(
-            f"Every part of the body must be joined face to face to bone or nail: {who} floats free."
+            f"Every part of the body must be joined face to face to bone or nail: {which} is not."
         )

@@ -1,4 +1,4 @@
-"""How good the bricks of a mesh are: Jacobians, volumes and shape; and how they move as a whole."""
+"""Quality of the elements of a mesh (Jacobians, volumes, shape), and rigid motions of its nodes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ def jacobian_at_gauss(mesh: Mesh) -> FloatArray:
 def scaled_jacobian(mesh: Mesh) -> FloatArray:
     """Smallest Jacobian of each element over the product of its edges' lengths, (n_elements,); 1 is a box.
 
-    Bricks are judged at their corners; wedges, whose collapsed side has none, at the Gauss points.
+    Bricks are evaluated at their corners. Wedges have no Jacobian at the collapsed side and are evaluated at
+    the Gauss points.
     """
     wedge = (np.diff(np.sort(mesh.elements, axis=1), axis=1) == 0).any(axis=1)
     quality = np.empty(len(mesh.elements))
@@ -43,7 +44,7 @@ def scaled_jacobian(mesh: Mesh) -> FloatArray:
 
 
 def element_place(mesh: Mesh, element: int) -> str:
-    """Name an element with its layer and its middle.
+    """Describe an element by its number, layer and middle.
 
     Examples
     --------
@@ -58,7 +59,7 @@ def element_place(mesh: Mesh, element: int) -> str:
 
 
 def squeezed_most(mesh: Mesh, displacement_mm: FloatArray) -> tuple[int, float]:
-    """Find the element that is nearest to being turned inside out.
+    """Find the element with the smallest ratio of present to undeformed volume.
 
     Parameters
     ----------
@@ -70,8 +71,7 @@ def squeezed_most(mesh: Mesh, displacement_mm: FloatArray) -> tuple[int, float]:
     Returns
     -------
     (int, float)
-        The element, and its smallest ratio of present to undeformed volume at a Gauss point; not above 0 if
-        it is inside out.
+        The element, and its smallest ratio at a Gauss point; 0 or below if it is inverted.
 
     Examples
     --------
@@ -98,8 +98,8 @@ def rigid_motions(nodes_mm: FloatArray) -> FloatArray:
     Returns
     -------
     array (n_nodes, 3, 6)
-        Displacement of every node in each motion; rotations turn by 1 over the size of the body, so that all
-        columns are of one size.
+        Displacement of every node in each motion. Rotations are divided by the size of the body, so that all
+        columns have similar size.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The motion of the indenter: ramp and hold of its depth or of its force, and the phases of both."""
+"""Motion of the indenter: ramp and hold of its depth or of its force."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fingerpad.data import protocol
 
 
 class Motion:
-    """A ramp at constant speed from nothing, then a hold: what all motions of the indenter share."""
+    """A ramp at a constant rate from 0, then a hold: common part of all motions of the indenter."""
 
     ramp_ms: float
     hold_ms: float
@@ -23,13 +23,13 @@ class Motion:
         return self.ramp_ms + self.hold_ms
 
     def share_at(self, times_ms: ArrayLike) -> FloatArray:
-        """Share of the ramp that is done at `times_ms`, any shape: 0 at the start, 1 in the hold."""
+        """Completed share of the ramp at `times_ms`, any shape: 0 at the start, 1 in the hold."""
         return np.clip(np.asarray(times_ms, dtype=float) / self.ramp_ms, 0.0, 1.0)
 
     def times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
         """List the times to solve at: 0, equal ramp steps, hold steps that grow geometrically. [ms]
 
-        The first hold step is as long as a ramp step where that leaves room to grow, since relaxation is
+        The first hold step is as long as a ramp step, or shorter for a short hold, because relaxation is
         fastest right after the ramp.
 
         Examples

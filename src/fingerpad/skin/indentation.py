@@ -1,4 +1,4 @@
-"""One touch: put an indenter on the finger, press, and hand over what the skin did."""
+"""One indentation: an indenter, its place on the finger and its motion; solved for the skin's response."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _CLEARANCE_TO_BONE = 0.8
 
 @dataclass(frozen=True)
 class Touch:
-    """Everything that determines one indentation: its value is the key under which the result is stored.
+    """Everything that determines one indentation; its value is the key of the stored result.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Touch:
     tissues : Tissues
         Laws of the four layers.
     grading : Grading
-        Where the mesh is fine.
+        Fine zone and element sizes of the mesh.
     settings : PressSettings
         Steps and tolerances.
     at_mm : (float, float)
@@ -117,11 +117,11 @@ class Touch:
         if isinstance(self.stimulus, RampAndHold) and self.stimulus.depth_mm > self.deepest_mm:
             raise InputError(
                 f"depth_mm must stay below {self.deepest_mm:.2f} mm at x = {x:g}, z = {z:g} mm, "
-                f"where the bone comes: got {self.stimulus.depth_mm:g} mm."
+                f"because of the bone: got {self.stimulus.depth_mm:g} mm."
             )
 
     def _check_grooves(self) -> None:
-        """No node presses on a ridge, or fits into a groove, that lies between two of them."""
+        """Check that elements are small enough: a ridge or groove between two nodes would have no effect."""
         size_mm, narrowest_mm = max(sizes_across(self.grading, self.spin_deg)), self.indenter.narrowest_mm
         if size_mm > narrowest_mm / FEWEST_ACROSS_GROOVE:
             raise InputError(
@@ -131,19 +131,19 @@ class Touch:
             )
 
     def solve(self, threads: int | None = None) -> SkinResponse:
-        """Compute the indentation and return the response of the skin.
+        """Solve the indentation and return the response of the skin.
 
         Parameters
         ----------
         threads : int, optional
-            Threads to use, all by default; the response has the same bits on any number of them.
+            Number of threads, all by default; the result has the same bits on any number of threads.
 
         Raises
         ------
         InputError
-            If a force pushes the indenter deeper than `deepest_mm`, or there are not so many threads.
+            If a force pushes the indenter deeper than `deepest_mm`, or there are fewer threads.
         ConvergenceError
-            If a step cannot be solved; nothing partial is returned.
+            If a step cannot be solved.
         """
         mesh = self.mesh
         done = self._press(mesh.living_epidermis.ravel(), threads)
@@ -177,9 +177,9 @@ class Touch:
         )
 
     def deform(self, threads: int | None = None) -> Deformation:
-        """Press and return everything that is known of every element and node over time.
+        """Solve the indentation and return all fields of all elements and nodes over time.
 
-        For looking at one touch (`fingerpad.export`); `solve` keeps what the later stages need.
+        For the study of one indentation (`fingerpad.export`); `solve` keeps what the later stages need.
 
         Parameters
         ----------
@@ -194,7 +194,7 @@ class Touch:
         Raises
         ------
         ConvergenceError
-            If a step cannot be solved; nothing partial is returned.
+            If a step cannot be solved.
         """
         return self._press(np.arange(len(self.mesh.elements)), threads)
 
@@ -215,19 +215,19 @@ class Touch:
 
     @property
     def placement(self) -> Placement:
-        """Where the indenter stands at first touch."""
+        """Position and rotation of the indenter at first touch."""
         skin = self.mesh.nodes_mm[self.mesh.skin_nodes]
         at = self.finger.skin_point(*self.at_mm)
         return place(self.indenter, skin, at, _rotation(self.tilt_deg, self.spin_deg))
 
     @property
     def deepest_mm(self) -> float:
-        """Depth that an indentation must not exceed: most of the way to the bone. [mm]"""
+        """Largest allowed depth, 80 % of the distance to the bone. [mm]"""
         return _CLEARANCE_TO_BONE * float(self.finger.depth_available_mm(*self.at_mm))
 
     @property
     def mesh(self) -> Mesh:
-        """The undeformed finger of this touch."""
+        """Mesh of the undeformed finger."""
         return _mesh(self.finger, self.grading)
 
 
@@ -278,7 +278,7 @@ def touch_of(
     """
     one_of("resolution", resolution, RESOLUTIONS)
     x, z = _check_position(at_mm)
-    # The mesh is graded about this point, so finger, indenter and point are checked before it is.
+    # The grading depends on this point, so finger, indenter and point are checked first.
     instance("finger", finger, Fingertip).skin_point(x, z)
     instance("indenter", indenter, Indenter)
     return Touch(
@@ -304,7 +304,7 @@ def indent(
     at_mm: Sequence[float] = CONTACT_POINT_MM,
     settings: PressSettings | None = None,
 ) -> SkinResponse:
-    """Press an indenter into a finger.
+    """Press an indenter into a finger and return the response of the skin.
 
     Parameters
     ----------

@@ -1,13 +1,13 @@
 """The skin beside and in front of the nail, unrolled from the nail's edge.
 
-The edge runs from one side's proximal end around the front to the other's. From each of its points a straight
-line of the skin, a geodesic, leaves at right angles; where the edge has a corner, a fan of them. In the plane
+The edge runs from the proximal end of one side around the front to that of the other. A geodesic of the skin
+starts at right angles from each of its points; a fan of geodesics starts at a corner. In the plane
 
     along    = arc of the line at the same distance from the edge, from the midline in front of the nail,
     distance = length of the geodesic.
 
-Lines of equal distance cross the geodesics at right angles (Gauss), so areas of the plane are areas of skin.
-Receptors in rows along the edge are rows of the plane.
+Lines of equal distance are perpendicular to the geodesics (Gauss), so areas in the plane equal areas of skin.
+Rows of receptors along the edge are rows of the plane.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from fingerpad.core.regions import Polygon
 from fingerpad.geometry.fingertip import Fingertip
 
 REACH_MM = 4.0
-"""How far from the nail the skin is unrolled. [mm]"""
+"""Largest distance from the nail of the unrolled skin. [mm]"""
 
 _STEP_MM = 0.05
 _FAN_LINES = 48
@@ -40,7 +40,7 @@ class NailEdge:
     Parameters
     ----------
     finger : Fingertip
-        Whose nail.
+        The finger.
     reach_mm : float
         Largest distance from the nail's edge. [mm]
 
@@ -104,8 +104,8 @@ class NailEdge:
         if outside.any():
             wrong = places[np.argmax(outside)]
             raise InputError(
-                f"places_mm must lie beside the nail, within {self.reach_mm:g} mm of its edge and no farther "
-                f"along than it goes: got along = {wrong[0]:g}, distance = {wrong[1]:g} mm."
+                f"places_mm must lie within {self.reach_mm:g} mm of the edge of the nail and between its "
+                f"ends: got along = {wrong[0]:g}, distance = {wrong[1]:g} mm."
             )
         lines, arcs = self._lines
         step = np.clip(distance / _STEP_MM, 0.0, arcs.shape[1] - 1 - 1e-9)
@@ -130,7 +130,7 @@ class NailEdge:
         Parameters
         ----------
         width_mm : float
-            How far it goes from the edge, at most the reach. [mm]
+            Its width from the edge, at most the reach. [mm]
 
         Returns
         -------
@@ -146,15 +146,15 @@ class NailEdge:
         return Polygon(tuple(map(tuple, np.concatenate([side, side[::-1] * [-1.0, 1.0]]))))
 
     def rows(self, count: int, density_per_cm2: float) -> Layout:
-        """Lay receptors in rows along the edge, the first half a pitch away from it.
+        """Place receptors in rows along the edge, the first at half a pitch from it.
 
         Parameters
         ----------
         count : int
             Number of rows.
         density_per_cm2 : float
-            Receptors per area; rows are 1/sqrt(density) apart, and receptors in a row as nearly so as whole
-            numbers allow. [1/cm²]
+            Receptors per area; the distance of rows is 1/sqrt(density), that of receptors in a row as close
+            to it as whole numbers allow. [1/cm²]
 
         Returns
         -------
@@ -212,9 +212,9 @@ class NailEdge:
         backwards = np.linspace(distal, proximal, math.ceil((distal - proximal) / _STEP_MM) + 1)
         front = self._dorsal(np.full_like(across, distal), across)
         side = self._dorsal(backwards, np.full_like(backwards, half_width))
-        # The edge goes from the middle to +z and then back: seen from outside, the nail is on its other side.
+        # The edge runs from the middle to +z and then in the proximal direction.
         leaving, going = self._leaving(front), self._leaving(side)
-        leaving[0, 2] = 0.0  # the middle one stays on the plane of symmetry
+        leaving[0, 2] = 0.0  # the line from the middle lies on the plane of symmetry
         turn = math.acos(float(np.clip(leaving[-1] @ going[0], -1.0, 1.0)))
         angles = np.linspace(0.0, turn, _FAN_LINES)[1:-1, None]
         fan = (np.sin(turn - angles) * leaving[-1] + np.sin(angles) * going[0]) / math.sin(turn)

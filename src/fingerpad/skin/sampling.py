@@ -1,4 +1,4 @@
-"""The only place where skin becomes signal: surface profile, and strain energy density at receptor depth."""
+"""Response of the skin to an indentation: surface profile, and strain energy density at the receptors."""
 
 from __future__ import annotations
 
@@ -40,16 +40,16 @@ class SurfaceProfile:
 
 @dataclass(frozen=True)
 class SkinResponse:
-    """What one indentation did to the skin; the end of the mechanical half of the chain.
+    """Response of the skin to one indentation; the end of the mechanical half of the chain.
 
     Parameters
     ----------
     mesh : Mesh
         The undeformed body.
     kinks_ms : tuple of float
-        Times at which the motion changes its speed abruptly: the end of the ramp. [ms]
+        Times at which the speed of the motion jumps: the end of the ramp. [ms]
     axis_x_mm : float
-        Where the indenter's axis meets the midline. [mm]
+        x at which the indenter's axis meets the midline. [mm]
     direction : array (3,)
         Unit direction of pressing.
     fields : mapping of str to array
@@ -63,9 +63,9 @@ class SkinResponse:
     penetration_mm : float
         Deepest penetration of the indenter by any node at any time. [mm]
     newton_steps, factorisations : int
-        Work that the solution took.
+        Numbers of Newton steps and of factorisations.
     linear_solver : str
-        Which linear solver was chosen, and why.
+        The linear solver, and why it was chosen.
 
     Raises
     ------
@@ -139,7 +139,7 @@ class SkinResponse:
         Parameters
         ----------
         time_index : int
-            Which of `times_ms`; the last by default.
+            Index into `times_ms`; the last by default.
 
         Returns
         -------
@@ -167,7 +167,8 @@ class SkinResponse:
         sites : array (n_sites, 2) or (n_sites, 3)
             x and z of end organs on the volar side, or x, y and z of the skin above them on any side. [mm]
         dynamic_quantity : str, optional
-            What the dynamic response follows, by the names of `sample`. Default: SED, as in the paper.
+            Quantity whose rate drives the dynamic response, a name of `sample`. Default: SED, as in the
+            paper.
 
         Returns
         -------
@@ -190,9 +191,9 @@ class SkinResponse:
         )
 
     def sample(self, quantity: str, sites: ArrayLike) -> FloatArray:
-        """Anything that may drive an afferent, in the living epidermis below points of the undeformed skin.
+        """Sample a quantity that may drive an afferent, below points of the undeformed skin.
 
-        Read as `sed` reads the stored energy density, which is one of them.
+        The interpolation is that of `sed`; the stored energy density is one of the quantities.
 
         Parameters
         ----------

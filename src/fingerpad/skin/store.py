@@ -1,8 +1,9 @@
-"""Finished touches on disk: found again by everything that determines them, and computed where missing.
+"""Stored indentations on disk: found by everything that determines them, computed where missing.
 
-The key of a touch is a hash of its whole value (finger, indenter, motion, tissues, mesh, tolerances) and of
-the behaviour of the mechanical sources (`skin.behaviour`). One file per touch, written atomically, so a run
-that is killed at any moment goes on from the last finished touch and ends with the same bits.
+The key of an indentation is a hash of its whole value (finger, indenter, motion, tissues, mesh, tolerances)
+and of the behaviour of the mechanical sources (`skin.behaviour`). There is one file per indentation, written
+atomically: a run that is killed at any moment continues from the last finished indentation and ends with the
+same bits.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ _LOOK_FOR_PARENT_S = 0.1
 
 
 def touch_key(touch: Touch) -> str:
-    """Key under which a touch is stored, 32 hexadecimal digits.
+    """Key under which an indentation is stored, 32 hexadecimal digits.
 
     Examples
     --------
@@ -64,7 +65,7 @@ def touch_key(touch: Touch) -> str:
 
 
 def _plain(value: Any, is_float: bool = False) -> Any:
-    """Nested lists and exact numbers: the same for equal values, others for others."""
+    """Nested lists and exact numbers, the same for equal values and different for different ones."""
     if is_dataclass(value):
         return [
             class_tag(type(value)),
@@ -77,37 +78,37 @@ def _plain(value: Any, is_float: bool = False) -> Any:
     if isinstance(value, str | int | bool) or value is None:
         return value
     raise InputError(
-        f"A touch can only be stored if its parts are frozen values: got {type(value).__name__}."
+        f"An indentation can only be stored if its parts are frozen values: got {type(value).__name__}."
     )
 
 
 def _holds_floats(field: Field[Any]) -> bool:
-    """Whether a whole number in this field means a float: 287 and 287.0 are the same sphere."""
+    """Whether whole numbers in this field are floats: 287 and 287.0 describe the same sphere."""
     return "float" in str(field.type)
 
 
 class Store:
-    """Folder of finished touches.
+    """Folder of stored indentations.
 
     Parameters
     ----------
     folder : Path
-        Made when first needed.
+        It is created when it is first needed.
     """
 
     def __init__(self, folder: Path):
         self.folder = Path(folder)
 
     def path(self, touch: Touch) -> Path:
-        """File of a touch, whether it exists or not."""
+        """File of an indentation, whether it exists or not."""
         return self.folder / f"{touch_key(touch)}.npz"
 
     def holds(self, touch: Touch) -> bool:
-        """Whether a touch is finished."""
+        """Whether an indentation is stored."""
         return self.path(touch).exists()
 
     def save(self, touch: Touch, response: SkinResponse) -> None:
-        """Write a finished touch; nothing half-written is ever left behind.
+        """Write an indentation, as a whole or not at all.
 
         Raises
         ------
@@ -117,7 +118,7 @@ class Store:
         write_atomically(self.path(touch), _packed(response))
 
     def load(self, touch: Touch) -> SkinResponse:
-        """Read a finished touch.
+        """Read an indentation.
 
         Raises
         ------
@@ -134,7 +135,7 @@ class Store:
                 name: kind(number) for (name, kind), number in zip(_SOLUTION.items(), numbers, strict=True)
             }
             return touch.response(fields, linear_solver=linear_solver, **solution)
-        except Exception as error:  # bytes that are not ours may fail in any way
+        except Exception as error:  # a file of unknown content may fail in any way
             said = " ".join(str(error).split()).rstrip(".")
             raise StoreError(
                 f"The stored result {path} cannot be read ({said}): delete it and run again."
@@ -156,9 +157,9 @@ def _packed(response: SkinResponse) -> bytes:
 
 
 def _compute(touch: Touch, path: Path, threads: int | None = None) -> float:
-    """Solve one touch and store it at `path`; return the seconds it took.
+    """Solve one indentation and store it at `path`; return the seconds it took.
 
-    The path is given, not found again: a worker would hash the sources as they are by then.
+    The path is an argument because a worker would hash the sources as they are at that time.
     """
     started = time.perf_counter()
     write_atomically(path, _packed(touch.solve(threads)))
@@ -168,28 +169,28 @@ def _compute(touch: Touch, path: Path, threads: int | None = None) -> float:
 def solve_missing(
     touches: Sequence[Touch], store: Store, jobs: int, on_finished: Callable[[float], None] | None = None
 ) -> int:
-    """Compute the touches that the store does not hold.
+    """Compute the indentations that are not in the store.
 
     Parameters
     ----------
     touches : sequence of Touch
-        What is wanted; equal ones are computed once.
+        Indentations to have in the store; equal ones are computed once.
     store : Store
-        Where finished ones are.
+        The store.
     jobs : int
-        Processes to use; the results do not depend on it.
+        Number of processes; the results do not depend on it.
     on_finished : callable, optional
-        Called with the seconds that each finished touch took.
+        Called with the seconds that each indentation took.
 
     Returns
     -------
     int
-        How many were computed.
+        Number of computed indentations.
 
     Raises
     ------
     ConvergenceError
-        If one cannot be solved; those finished before stay in the store.
+        If one cannot be solved; those finished before remain in the store.
     """
     whole("jobs", jobs, at_least=1)
     missing = {store.path(touch): touch for touch in touches if not store.holds(touch)}
@@ -232,7 +233,7 @@ def _in_processes(touches: Mapping[Path, Touch], jobs: int) -> Iterator[float]:
 
 @contextmanager
 def _environment(variables: dict[str, str]) -> Iterator[None]:
-    """Environment that new processes start with: one thread each for the libraries."""
+    """Set environment variables of new processes: one thread each for the libraries."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:
@@ -252,7 +253,7 @@ def _begin(parent: int) -> None:
 
 
 def _end_with_parent(parent: int) -> None:
-    """End a worker when its parent was killed; it gets no other signal."""
+    """End a worker when its parent was killed, which it would not notice otherwise."""
 
     def watch() -> None:
         while os.getppid() == parent:

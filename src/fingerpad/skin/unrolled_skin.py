@@ -1,4 +1,4 @@
-"""The skin of the finger, unrolled into a plane in which every area is the same area of skin.
+"""The skin of the finger, unrolled into a plane by a map that preserves areas.
 
 A point of the skin is P(s, phi), with s = sqrt(1 - x / L) and phi around the section, 0 volar and pi dorsal:
 
@@ -9,9 +9,9 @@ a(s) being the volar depth or, for phi beyond pi/2, the dorsal height, and c(s) 
     along  = arc of the volar midline, u(s)
     around = integral of |dP/ds x dP/dphi| / |du/ds| from 0 to phi.
 
-Areas in this plane are areas of skin, so that a density in the plane is a density of the skin. On a body of
-revolution `around` is the arc around the section; on this finger it differs by some per cent. Lengths are
-stretched or shortened by at most 3 % within 3 mm of the contact point, by 12 % on the pad, more at the tip.
+A density in the plane is therefore a density on the skin. On a body of revolution `around` is the arc around
+the section; on this finger it differs by some per cent. Lengths change by at most 3 % within 3 mm of the
+contact point, by 12 % on the pad, and by more at the tip.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class UnrolledSkin:
     Parameters
     ----------
     finger : Fingertip
-        Whose skin.
+        The finger.
     origin_x_mm : float
         x of the point of the volar midline at which `along` is 0, distal positive. [mm]
 
@@ -169,19 +169,19 @@ class UnrolledSkin:
         if outside.any():
             wrong = places[np.argmax(outside)]
             raise InputError(
-                f"places_mm must lie on the finger, along within {first:.2f} ... {last:.2f} mm and around no "
-                f"farther than the dorsal midline: got along = {wrong[0]:g}, around = {wrong[1]:g} mm."
+                f"places_mm must lie on the finger, along within {first:.2f} ... {last:.2f} mm and around up "
+                f"to the dorsal midline: got along = {wrong[0]:g}, around = {wrong[1]:g} mm."
             )
         return self._point(s, np.copysign(self._phi(s, np.minimum(around, half_girth)), places[:, 1]))
 
     def places(self, points_mm: ArrayLike) -> FloatArray:
-        """Find points of the skin in the plane.
+        """Convert points of the skin to the plane.
 
         Parameters
         ----------
         points_mm : array_like (n, 3)
-            x, y and z of points on the skin; any other is taken for the one on its ray from the section's
-            middle. [mm]
+            x, y and z of points on the skin. Another point is projected onto the skin along its ray from the
+            middle of the section. [mm]
 
         Returns
         -------
@@ -243,7 +243,8 @@ class UnrolledSkin:
         along, around = self._along(s), self._around(s, low)
         if not around.max() > 0.0:
             raise InputError(
-                f"No skin between x = {ends[0]:g} and {ends[1]:g} mm faces the volar side so far."
+                f"No skin between x = {ends[0]:g} and {ends[1]:g} mm is within {faces_deg:g} degrees of "
+                "the volar direction: raise faces_deg or move x_mm."
             )
         border = np.stack([along, around], axis=1)
         return Polygon(tuple(map(tuple, np.concatenate([border, border[::-1] * [1.0, -1.0]]))))
