@@ -90,9 +90,11 @@ def test_names_and_order_of_files_do_not_count():
         for name, text in SOURCES.items()
     }
     modules = frozenset(module.replace("assembly", "gathering") for module in MODULES)
-    assert "gathering._add_chunk" in renamed["mechanics/kernels.py"]
     assert "from fingerpad.mechanics.gathering import" in "".join(renamed.values())
     assert code(renamed, modules) == BEFORE
+    use = "from fingerpad.mechanics import assembly as a, laws\na.assemble(laws.Polynomial)"
+    other = use.replace("assembly as a", "gathering").replace("a.assemble", "gathering.assemble")
+    assert code({"m": use}) == code({"m": other}, modules) != code({"m": use.replace("a.assemble", "a.add")})
 
 
 @pytest.mark.parametrize("name", ["Sphere", "Fingertip", "PressSettings", "Deformation", "Touch", "Tissues"])
