@@ -144,11 +144,11 @@ def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 10
     history = [value]
     # Far from the maximum, steps of tau are unreliable: fit the four concave parameters first.
     for free in (slice(0, 4), slice(0, N_PARAMETERS)):
-        here, information = _climb(recorded, here, free, history, most_steps)
+        here, information = _maximise(recorded, here, free, history, most_steps)
     return _finished(recorded, here, information, history)
 
 
-def _climb(
+def _maximise(
     recorded: SpikeLikelihood, start: FloatArray, free: slice, history: list[float], most_steps: int
 ) -> tuple[FloatArray, FloatArray]:
     """Maximise log L in the free parameters; append each value to the history."""

@@ -86,7 +86,7 @@ class SpikeLikelihood:
     duration_ms: float | FloatArray | None = None
     refractory_ms: float = neuron.REFRACTORY.value
     escape_ms: float = ESCAPE_TIME_MS
-    _stretches: tuple[FloatArray, np.ndarray, np.ndarray] = field(init=False, repr=False, compare=False)
+    _intervals: tuple[FloatArray, np.ndarray, np.ndarray] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         instance("drive", self.drive, Drive)
@@ -109,7 +109,7 @@ class SpikeLikelihood:
                 f"duration_ms must lie within the drive, {times[0]:g} ... {times[-1]:g} ms: got {given}."
             )
         _check_spikes(self.trains, times[0], ends, self.refractory_ms)
-        stretches = cut(
+        intervals = cut(
             times,
             self.drive.rate_kpa_per_ms,
             self.drive.sed_kpa,
@@ -119,7 +119,7 @@ class SpikeLikelihood:
             self.trains.offsets,
             float(self.refractory_ms),
         )
-        for name, value in (("sites", sites), ("duration_ms", ends), ("_stretches", stretches)):
+        for name, value in (("sites", sites), ("duration_ms", ends), ("_intervals", intervals)):
             object.__setattr__(self, name, value)
 
     @property
@@ -212,9 +212,9 @@ class SpikeLikelihood:
 
     def _part(self, trains: slice) -> tuple[FloatArray, np.ndarray]:
         """Intervals of some trains."""
-        values, flags, offsets = self._stretches
-        stretches = slice(offsets[trains.start], offsets[trains.stop])
-        return values[stretches], flags[stretches]
+        values, flags, offsets = self._intervals
+        intervals = slice(offsets[trains.start], offsets[trains.stop])
+        return values[intervals], flags[intervals]
 
 
 @dataclass(frozen=True)

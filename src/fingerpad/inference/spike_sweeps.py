@@ -33,9 +33,9 @@ def cut(
 
     Returns
     -------
-    array (n_stretches, 5)
+    array (n_intervals, 5)
         Length [ms], U' at the beginning and end [kPa/ms], U at the beginning and end [kPa].
-    bool array (n_stretches, 2)
+    bool array (n_intervals, 2)
         Whether the potential starts at 0, and whether a spike ends the interval.
     array (n_trains + 1,)
         Index of the first interval of each train.
@@ -77,7 +77,7 @@ def cut(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def sweep(
-    stretches: FloatArray,
+    intervals: FloatArray,
     flags: np.ndarray,
     numbers: FloatArray,
     escape: float,
@@ -97,13 +97,13 @@ def sweep(
     x1 = x2 = x3 = z = 0.0
     slopes = np.empty(5)
     slopes[3] = -1.0
-    for n in range(stretches.shape[0]):
+    for n in range(intervals.shape[0]):
         if flags[n, 0]:
             x1 = x2 = x3 = z = 0.0
-        length = stretches[n, 0] / tau
-        w2, w3 = tau * stretches[n, 1], tau * stretches[n, 3]
-        drift2 = (tau * stretches[n, 2] - w2) / length
-        drift3 = (tau * stretches[n, 4] - w3) / length
+        length = intervals[n, 0] / tau
+        w2, w3 = tau * intervals[n, 1], tau * intervals[n, 3]
+        drift2 = (tau * intervals[n, 2] - w2) / length
+        drift3 = (tau * intervals[n, 4] - w3) / length
         u = a * x1 + b * x2 + c * x3
         q = b * drift2 + c * drift3
         p = a * tau + b * w2 + c * w3 - q
@@ -144,15 +144,15 @@ def sweep(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def operational_times(
-    stretches: FloatArray, flags: np.ndarray, numbers: FloatArray, escape: float
+    intervals: FloatArray, flags: np.ndarray, numbers: FloatArray, escape: float
 ) -> FloatArray:
     """Integral of the hazard up to the end of each interval with a spike."""
     found = np.empty(flags[:, 1].sum())
     gradient, information = np.zeros(5), np.zeros((5, 5))
     count, first = 0, 0
-    for n in range(stretches.shape[0]):
+    for n in range(intervals.shape[0]):
         if flags[n, 1]:
-            sweep(stretches[first : n + 1], flags[first : n + 1], numbers, escape, gradient, information)
+            sweep(intervals[first : n + 1], flags[first : n + 1], numbers, escape, gradient, information)
             first = n + 1
             count += 1
             # d log L/dG is the integral minus one for each spike.

@@ -32,7 +32,7 @@ from fingerpad.psychophysics.signal_detection import decision_point, hit_probabi
 END_OF_STIMULUS_MS = protocol.RAMP.value + protocol.HOLD.value
 """A usual value for the latency of a silent receptor. [ms]"""
 
-WAVERING = ("point", "fraction")
+CRITERION_MOVES = ("point", "fraction")
 """Quantity multiplied by a varied criterion: the decision point, or the fraction beta."""
 
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
@@ -83,14 +83,14 @@ class Experiment:
     criterion: float = psychophysics.DECISION_CRITERION.value
     criterion_sigma: float = 0.0
     presentations_varied: int = _REPETITIONS_VARIED
-    criterion_moves: str = WAVERING[0]
+    criterion_moves: str = CRITERION_MOVES[0]
 
     def __post_init__(self) -> None:
         for name in ("presentations", "distributions", "pairs", "hit_rates", "presentations_varied"):
             whole(name, getattr(self, name), 2)
         finite("criterion", self.criterion)
         not_negative("criterion_sigma", self.criterion_sigma)
-        one_of("criterion_moves", self.criterion_moves, WAVERING)
+        one_of("criterion_moves", self.criterion_moves, CRITERION_MOVES)
 
     @property
     def sums_per_sphere(self) -> tuple[int, int]:
@@ -330,12 +330,12 @@ def _varied_criterion(
     """Return hit rates (hit_rates, n_comparisons) of one distribution per sphere, with a varied criterion."""
     trials = session_trials(session, means.shape[1] - 1)
     draws = normals(seed, trials, 1, Purpose.CRITERION, plan.hit_rates)[:, 0].T
-    wavering = 1.0 + plan.criterion_sigma * draws
+    factors = 1.0 + plan.criterion_sigma * draws
     standard, comparison = means[0, 0], means[0, 1:]
     if plan.criterion_moves == "point":
-        point = decision_point(standard, comparison, plan.criterion) * wavering
+        point = decision_point(standard, comparison, plan.criterion) * factors
     else:
-        point = decision_point(standard, comparison, plan.criterion * wavering)
+        point = decision_point(standard, comparison, plan.criterion * factors)
     return hit_probability(point, comparison, spreads[0, 1:], side(means[:1]))
 
 

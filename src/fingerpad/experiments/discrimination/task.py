@@ -31,7 +31,7 @@ from fingerpad.experiments.discrimination.task_types import (
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.geometry.names import INDENTERS, MOTION_UNITS, SIZE_UNITS
 from fingerpad.mechanics.tissues import TISSUES
-from fingerpad.psychophysics.discrimination import WAVERING
+from fingerpad.psychophysics.discrimination import CRITERION_MOVES
 from fingerpad.psychophysics.functions import SIGMOIDS
 from fingerpad.skin.fields import sampled_fields
 
@@ -269,7 +269,7 @@ class ExperimentSettings(TaskPart):
     seed: Seed = 0
     criterion: Share = psychophysics.DECISION_CRITERION.value
     criterion_sigma: NotNegative = 0.0
-    criterion_moves: Annotated[str, choice_of(WAVERING)] = WAVERING[0]
+    criterion_moves: Annotated[str, choice_of(CRITERION_MOVES)] = CRITERION_MOVES[0]
     presentations: Several = _REPETITIONS
     distributions: Several = _REPETITIONS
     pairs: Several = _REPETITIONS

@@ -155,7 +155,7 @@ class ResponseSurface:
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit from every start."""
 
-        def climb(start: FloatArray, units: FloatArray) -> Fit:
+        def fit_from(start: FloatArray, units: FloatArray) -> Fit:
             clock = time.perf_counter()
             found = maximise(
                 lambda parameters: problem.score(parameters, chosen),
@@ -169,7 +169,7 @@ class ResponseSurface:
             return Fit(found.parameters, found.objective, found.n_runs, time.perf_counter() - clock, steps)
 
         starts, increments = np.asarray(self.starts), np.asarray(self.increments)
-        return best_of(tuple(climb(start, units) for start, units in zip(starts, increments, strict=True)))
+        return best_of(tuple(fit_from(start, units) for start, units in zip(starts, increments, strict=True)))
 
 
 @dataclass(frozen=True)

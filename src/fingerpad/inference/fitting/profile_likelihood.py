@@ -154,7 +154,7 @@ def profile_likelihoods(
     if not np.isfinite(highest):
         raise InputError(f"log_likelihood must be finite at a start: it is not at {best.tolist()}.")
     for _ in range(RESTARTS):
-        point = search.climb(best)
+        point = search.maximise(best)
         gain, best = search.height(point) - search.height(best), point
         if gain <= LIKELIHOOD_TOLERANCE:
             break
@@ -204,7 +204,7 @@ class _Search:
         heights = self.heights(points)
         return points[int(heights.argmax())], float(heights.max())
 
-    def climb(self, start: FloatArray, held: int | None = None) -> FloatArray:
+    def maximise(self, start: FloatArray, held: int | None = None) -> FloatArray:
         """Most likely point near the start, by Nelder and Mead's method."""
         free = np.array([index for index in range(start.size) if index != held])
 
@@ -251,12 +251,12 @@ class _Search:
         """Most likely point with one parameter fixed, from the neighbour and from the best near start."""
         nearest = np.argsort(np.abs(self.starts[:, index] - value), kind="stable")[:NEAREST]
         pools = [neighbour[None], self.starts[nearest]] if len(self.starts) > 1 else [neighbour[None]]
-        climbed = []
+        found = []
         for pool in pools:
             held = pool.copy()
             held[:, index] = value
-            climbed.append(self.climb(self.best_of(held)[0], held=index))
-        return self.best_of(np.array(climbed))
+            found.append(self.maximise(self.best_of(held)[0], held=index))
+        return self.best_of(np.array(found))
 
 
 def _profile(
