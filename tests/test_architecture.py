@@ -20,15 +20,20 @@ LAYERS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["t
 ][0]["layers"]
 
 
+def modules_imported(folder: Path) -> set[str]:
+    """Dotted names of all modules that the modules of a folder import."""
+    found = set()
+    for module in folder.rglob("*.py"):
+        for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+            found |= {alias.name for alias in node.names} if isinstance(node, ast.Import) else set()
+            found |= {node.module or ""} if isinstance(node, ast.ImportFrom) else set()
+    return found
+
+
 def imported(package: str) -> set[str]:
     """Other packages that the modules of one name in an import."""
-    found = set()
-    for module in (PACKAGE / package).rglob("*.py"):
-        for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
-            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-            found |= {match[1] for name in names if (match := re.match(r"fingerpad\.(\w+)", name))}
-    return found - {package}
+    names = modules_imported(PACKAGE / package)
+    return {match[1] for name in names if (match := re.match(r"fingerpad\.(\w+)", name))} - {package}
 
 
 def test_the_page_and_the_contract_list_every_package_in_the_same_order():
@@ -45,3 +50,9 @@ def test_a_package_imports_only_what_its_row_names(package):
     stated = ROWS[package][2]
     named = set(FOLDERS) if "all others" in stated else set(re.findall(r"`(\w+)`", stated))
     assert imported(package) <= named | ({"core", "data"} if package not in ("core", "data") else {"core"})
+
+
+def test_the_installed_package_imports_nothing_that_stands_beside_it():
+    beside = {"studies", "benchmarks", "tests"}
+    assert not {name for name in modules_imported(PACKAGE) if name.split(".")[0] in beside}
+    assert beside & {name.split(".")[0] for name in modules_imported(ROOT / "studies")} == {"studies"}

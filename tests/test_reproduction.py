@@ -124,6 +124,24 @@ def extended(first, tmp_path_factory):
     return run(folder, "--extended")
 
 
+@pytest.fixture(scope="session")
+def studied(first, tmp_path_factory):
+    """Numbers of two studies on the same indentations, each run in a process whose warnings are errors."""
+    folder = tmp_path_factory.mktemp("studies") / "out"
+    shutil.copytree(first.folder / STORE_FOLDER, folder / STORE_FOLDER)
+
+    def numbers_of(study):
+        subprocess.run(
+            [sys.executable, "-W", "error", "-m", "studies", study, "--out", str(folder), "--jobs", "2"],
+            check=True,
+            cwd=Path(__file__).parents[1],
+        )
+        assert (folder / f"{study}.md").is_file()
+        return json.loads((folder / f"{study}.json").read_text(encoding="utf-8"))
+
+    return numbers_of
+
+
 # From nothing
 
 
@@ -231,6 +249,31 @@ def test_every_quantity_that_is_shown_is_judged_on_the_same_folds(extended):
     # The target of a fit by any method; the paper's model misses it.
     assert best["fit"]["fss_out_of_sample"] >= 0.92
     assert best["fit"]["fss_out_of_sample_dynamic"] > paper["fit"]["fss_out_of_sample_dynamic"] + 0.1
+
+
+def test_the_nearest_step_is_the_skins_and_not_the_meshs(first, studied):
+    """Two more meshes of the same resolution; at quick, steps differ by 2 %."""
+    found = studied("mesh-noise")["mesh_noise"]
+    assert np.shape(found["static_sum"]) == (3, 2)
+    assert found["step"] == pytest.approx(np.diff(found["static_sum"]).ravel(), rel=1e-9)
+    assert min(found["step"]) > 0.0
+    assert len(set(found["step"])) == 3
+    assert found["largest_difference"] < found["limit"] == 0.1
+    ours, _ = found["static_sum"][0]
+    usual = first.results["discrimination"]["gradient_sums"]["static"][0][0]
+    assert ours == pytest.approx(usual, rel=1e-12)
+
+
+def test_spike_trains_are_complete(studied):
+    found = studied("spike-fit")["spike_fit"]
+    assert len(found["variability"]["sources"]) == 5
+    recovery = found["recovery"]
+    for name in ("start", "truth", "estimate", "standard_error", "low", "high"):
+        assert len(recovery[name]) == len(found["names"]) == 5
+    assert recovery["n_held"] >= 3
+    assert recovery["rescaled"]["distance"] < 2.0 * recovery["rescaled"]["limit"]
+    assert len(found["raster"]["spikes_ms"]) == 36
+    assert len(found["other_noise"]) == 3
 
 
 def test_discrimination_is_complete(first):
