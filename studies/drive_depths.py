@@ -8,16 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.results import Number, result_class
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.gerling2014.drive_fits import (
+    DriveFit,
     drive_fit,
     judge,
     quick_method,
@@ -32,6 +33,48 @@ from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.transduction import drive
 from fingerpad.skin.fields import FIELDS, Place
 from fingerpad.skin.sampling import SkinResponse
+
+
+@result_class
+class LayerFit:
+    """Fit with the energy density sampled in one layer of elements.
+
+    Parameters
+    ----------
+    tissue : str
+        Of the layer.
+    from_mm, to_mm : float
+        Depths of its borders. [mm]
+    largest_sed_kpa : float
+        At the receptor. [kPa]
+    fit : DriveFit
+        Its gain is over the living epidermis.
+    """
+
+    tissue: str
+    from_mm: float
+    to_mm: float
+    largest_sed_kpa: Number
+    fit: DriveFit
+
+
+@result_class
+class DepthStudy:
+    """Fits by sampling depth.
+
+    Parameters
+    ----------
+    method : str
+        Name of the method.
+    own_layer : int
+        Number of the layer where the paper puts the end organs.
+    layers : tuple of LayerFit
+        From the skin downwards.
+    """
+
+    method: str
+    own_layer: int
+    layers: tuple[LayerFit, ...]
 
 
 def borders_mm(mesh: Mesh) -> FloatArray:
@@ -80,7 +123,7 @@ def result(
     recordings: RateRecordings,
     generator: np.random.Generator,
     method: Method | None = None,
-) -> dict[str, Any]:
+) -> DepthStudy:
     """Fit the paper's model with its energy density read at every depth.
 
     Parameters
@@ -96,10 +139,7 @@ def result(
 
     Returns
     -------
-    dict
-        `method` and `layers`: per layer of elements its tissue, `from_mm` and `to_mm`, the largest energy
-        density at the receptor, and the fields of `drive_fits.DriveFit`; gains are those over the living
-        epidermis, `own_layer`.
+    DepthStudy
     """
     method = method or quick_method()
     mesh = responses[0].mesh
@@ -119,17 +159,17 @@ def result(
         )
         for driven in drives
     ]
-    return {
-        "method": method.name,
-        "own_layer": own,
-        "layers": [
-            {
-                "tissue": LAYERS[mesh.layer[layer]],
-                "from_mm": borders[layer],
-                "to_mm": borders[layer + 1],
-                "largest_sed_kpa": driven.sed_kpa.max(),
-                **vars(drive_fit(one, judged[own], recordings, generator)),
-            }
+    return DepthStudy(
+        method=method.name,
+        own_layer=own,
+        layers=tuple(
+            LayerFit(
+                tissue=LAYERS[mesh.layer[layer]],
+                from_mm=borders[layer],
+                to_mm=borders[layer + 1],
+                largest_sed_kpa=driven.sed_kpa.max(),
+                fit=drive_fit(one, judged[own], recordings, generator),
+            )
             for layer, (driven, one) in enumerate(zip(drives, judged, strict=True))
-        ],
-    }
+        ),
+    )

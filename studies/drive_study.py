@@ -3,24 +3,53 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.core.results import result_class
+from fingerpad.core.results import Number, result_class
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.gerling2014 import drive_fits, drive_quantities, single_unit
-from fingerpad.experiments.gerling2014.drive_fits import RELATIVE_NAMES, Judged
+from fingerpad.experiments.gerling2014.drive_fits import RELATIVE_NAMES, DriveFit, Judged
 from fingerpad.experiments.gerling2014.drive_quantities import DriveResult
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 from studies import drive_depths, dynamic_response
+from studies.drive_depths import DepthStudy
 from studies.drive_fits import information, thorough_method
 from studies.dynamic_response import EXPLANATIONS, ExplainedModel, Explanation, Patch
-from studies.plain_values import plain
+
+
+@result_class
+class ExplanationFit:
+    """Fit of one explanation of the dynamic rates.
+
+    Parameters
+    ----------
+    name : str
+        Of the explanation.
+    free_numbers : int
+        How many numbers are fitted.
+    added : dict of str to float
+        Those that the explanation adds, by name.
+    fit : DriveFit
+        Its gain is over the first explanation.
+    aic, bic : float
+        Information criteria, see `studies.drive_fits.information`.
+    aic_difference, bic_difference : float
+        From the first explanation.
+    """
+
+    name: str
+    free_numbers: int
+    added: dict[str, Number]
+    fit: DriveFit
+    aic: Number
+    bic: Number
+    aic_difference: Number
+    bic_difference: Number
 
 
 @result_class
@@ -31,17 +60,17 @@ class DriveStudy:
     ----------
     quantities : DriveResult
         Every quantity, by both methods.
-    explanations : tuple of dict
-        See `explained`.
-    depths : dict
-        See `studies.drive_depths.result`.
+    explanations : tuple of ExplanationFit
+        Of the dynamic rates, the paper's model first.
+    depths : DepthStudy
+        By layer of elements.
     manifest : Manifest
         What ran.
     """
 
     quantities: DriveResult
-    explanations: tuple[dict[str, Any], ...]
-    depths: dict[str, Any]
+    explanations: tuple[ExplanationFit, ...]
+    depths: DepthStudy
     manifest: Manifest
 
 
@@ -87,8 +116,8 @@ def run(runner: Runner, conditions: Conditions) -> DriveStudy:
         advance()
     return DriveStudy(
         quantities=quantities,
-        explanations=tuple(plain(explanations)),
-        depths=plain(depths),
+        explanations=explanations,
+        depths=depths,
         manifest=runner.manifest(conditions),
     )
 
@@ -100,7 +129,7 @@ def explained(
     generator: np.random.Generator,
     on_finished: Callable[[str], None] = lambda part: None,
     explanations: tuple[Explanation, ...] = EXPLANATIONS,
-) -> list[dict[str, Any]]:
+) -> tuple[ExplanationFit, ...]:
     """Fit every explanation of the dynamic rates in the same way.
 
     Parameters
@@ -120,11 +149,9 @@ def explained(
 
     Returns
     -------
-    list of dict
-        Per explanation its name, numbers, the fields of `drive_fits.DriveFit`, "aic" and "bic", and their
-        differences from the first.
+    tuple of ExplanationFit
     """
-    rows: list[dict[str, Any]] = []
+    rows: list[ExplanationFit] = []
     baseline: Judged | None = None
     for explanation in explanations:
         model = ExplainedModel.from_start(explanation, patch)
@@ -132,21 +159,21 @@ def explained(
         judged = drive_fits.judge(RateProblem(model, recordings), method)
         baseline = baseline or judged
         free = len(RELATIVE_NAMES) + len(explanation.added)
+        found = information(judged.in_sample["total"], recordings.n_rates, free)
+        first = rows[0] if rows else None
         rows.append(
-            {
-                "name": explanation.name,
-                "free_numbers": free,
-                "added": _added(explanation, model.numbers(judged.fit.parameters)),
-                **vars(drive_fits.drive_fit(judged, baseline, recordings, generator)),
-                **information(judged.in_sample["total"], recordings.n_rates, free),
-            }
+            ExplanationFit(
+                name=explanation.name,
+                free_numbers=free,
+                added=_added(explanation, model.numbers(judged.fit.parameters)),
+                fit=drive_fits.drive_fit(judged, baseline, recordings, generator),
+                **found,
+                aic_difference=found["aic"] - first.aic if first else 0.0,
+                bic_difference=found["bic"] - first.bic if first else 0.0,
+            )
         )
         on_finished(explanation.name)
-    for criterion in ("aic", "bic"):
-        first = rows[0][criterion]
-        for row in rows:
-            row[f"{criterion}_difference"] = row[criterion] - first
-    return rows
+    return tuple(rows)
 
 
 def _added(explanation: Explanation, numbers: FloatArray) -> dict[str, float]:

@@ -27,7 +27,7 @@ from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.report import drive_quantities as report
 from fingerpad.report.page import write_markdown
 from fingerpad.report.style import png
-from studies import drive_study, dynamic_response
+from studies import drive_depths, drive_study, dynamic_response
 from studies.drive_fits import BestOf, information, thorough_method
 from studies.dynamic_response import EXPLANATIONS, ExplainedModel, Patch, low_passed
 from studies.pages import drive_study as drives_report
@@ -476,14 +476,14 @@ def test_explanations_are_judged_alike_and_told_by_what_they_add(monkeypatch):
     chosen = tuple(by_name[name] for name in names)
     told = []
     rows = drive_study.explained(PATCH, RECORDINGS, 0, np.random.default_rng(0), told.append, chosen)
-    assert told == [row["name"] for row in rows] == [explanation.name for explanation in chosen]
+    assert told == [row.name for row in rows] == [explanation.name for explanation in chosen]
     paper, offset, extended = rows
-    assert [row["free_numbers"] for row in rows] == [4, 5, 4]
-    assert set(offset["added"]) == {"offset_mm"}
-    assert paper["aic_difference"] == paper["bic_difference"] == 0.0
-    assert extended["aic_difference"] < -20.0
-    assert extended["fss_out_of_sample_dynamic"] > paper["fss_out_of_sample_dynamic"] + 0.1
-    assert offset["bic"] - offset["aic"] == pytest.approx(5 * (np.log(48) - 2.0))
+    assert [row.free_numbers for row in rows] == [4, 5, 4]
+    assert set(offset.added) == {"offset_mm"}
+    assert paper.aic_difference == paper.bic_difference == 0.0
+    assert extended.aic_difference < -20.0
+    assert extended.fit.fss_out_of_sample_dynamic > paper.fit.fss_out_of_sample_dynamic + 0.1
+    assert offset.bic - offset.aic == pytest.approx(5 * (np.log(48) - 2.0))
 
 
 # The report
@@ -526,17 +526,32 @@ def test_words_name_the_best_and_tables_hold_its_scores(found):
 def explained(section, tmp_path):
     """A study with two explanations that the page shows, and a depth."""
     fit = section["candidates"][0]["fit"]
-    paper = {"name": "the paper's model", "free_numbers": 4, "added": {}} | fit
-    paper |= {"aic_difference": 0.0, "bic_difference": 0.0}
-    power = {"name": "power law of the dynamic term", "free_numbers": 5, "added": {"exponent": 0.39}} | fit
-    power |= {"aic_difference": -50.9, "bic_difference": -48.6, "gain_interval": [0.01, 0.2]}
     candidates = [candidate | {"response_surface": candidate["fit"]} for candidate in section["candidates"]]
-    layer = {"tissue": "dermis", "from_mm": 0.5, "to_mm": 1.0, "largest_sed_kpa": 2.0, **fit}
+    paper = drive_study.ExplanationFit(
+        name="the paper's model",
+        free_numbers=4,
+        added={},
+        fit=drive_fits.DriveFit(**fit),
+        aic=1.0,
+        bic=2.0,
+        aic_difference=0.0,
+        bic_difference=0.0,
+    )
+    power = replace(
+        paper,
+        name="power law of the dynamic term",
+        free_numbers=5,
+        added={"exponent": 0.39},
+        fit=drive_fits.DriveFit(**fit | {"gain_interval": (0.01, 0.2)}),
+        aic_difference=-50.9,
+        bic_difference=-48.6,
+    )
+    layer = drive_depths.LayerFit(tissue="dermis", from_mm=0.5, to_mm=1.0, largest_sed_kpa=2.0, fit=paper.fit)
     quantities = json.dumps(section | {"candidates": candidates}).encode()
     return drive_study.DriveStudy(
         quantities=from_json(drive_quantities.DriveResult, quantities),
         explanations=(paper, power),
-        depths={"method": "least squares", "own_layer": 0, "layers": [layer]},
+        depths=drive_depths.DepthStudy(method="least squares", own_layer=0, layers=(layer,)),
         manifest=Runner(tmp_path).manifest(Conditions("quick", seed=3)),
     )
 
@@ -562,8 +577,8 @@ def test_explanations_are_drawn_by_what_they_predict_and_gain(section, tmp_path)
     scores, gains = drives_report.draw_explanations(result).axes
     drawn = {line.get_label(): line.get_xdata().tolist() for line in scores.get_lines()}
     rows = result.explanations
-    assert drawn["both, weighted"] == [row["fss_out_of_sample"] for row in rows]
-    assert drawn["dynamic rates"] == [row["fss_out_of_sample_dynamic"] for row in rows]
+    assert drawn["both, weighted"] == [row.fit.fss_out_of_sample for row in rows]
+    assert drawn["dynamic rates"] == [row.fit.fss_out_of_sample_dynamic for row in rows]
     assert [label.get_text() for label in scores.get_yticklabels()][1] == "power law of the dynamic term (5)"
     (intervals,) = gains.collections
     assert [path[:, 0].tolist() for path in intervals.get_segments()] == [[0.0, 0.0], [0.01, 0.2]]

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -20,7 +18,8 @@ from fingerpad.report.formatting import ABSENT, fixed
 from fingerpad.report.manifest import edition
 from fingerpad.report.parts import Chapter, Drawing, Page, Row, Table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, numbers
-from studies.drive_study import DriveStudy
+from studies.drive_depths import DepthStudy, LayerFit
+from studies.drive_study import DriveStudy, ExplanationFit
 
 _OUT_OF_SAMPLE = tuple(f"fss_out_of_sample{phase}" for phase in ("", "_dynamic", "_static"))
 _EXPLANATION_COLUMNS = (
@@ -68,14 +67,14 @@ def draw_explanations(section: DriveStudy) -> Figure:
         "": ("both, weighted", "o", BLACK),
         "_dynamic": ("dynamic rates", "s", ORANGE),
     }.items():
-        values = numbers([row[f"fss_out_of_sample{phase}"] for row in rows])
+        values = numbers([getattr(row.fit, f"fss_out_of_sample{phase}") for row in rows])
         scores.plot(values, height, marker, color=colour, label=label, linestyle="none")
-    scores.set_yticks(height, [f"{row['name']} ({row['free_numbers']})" for row in rows])
+    scores.set_yticks(height, [f"{row.name} ({row.free_numbers})" for row in rows])
     scores.invert_yaxis()
     scores.set_xlabel("FSS out of sample [1]")
     scores.set_title("(a) out-of-sample fit")
-    ends = numbers([row["gain_interval"] for row in rows])
-    total = numbers([row["fss_out_of_sample"] for row in rows])
+    ends = numbers([row.fit.gain_interval for row in rows])
+    total = numbers([row.fit.fss_out_of_sample for row in rows])
     gains.axvline(0.0, color=GREY, linewidth=1.0)
     gains.hlines(height, *ends.T, color=BLUE, linewidth=2.0)
     gains.plot(total - total[0], height, "o", color=BLACK)
@@ -89,11 +88,11 @@ def draw_explanations(section: DriveStudy) -> Figure:
 def caption_explanations(section: DriveStudy) -> str:
     """Describe the comparison, and count the explanations that are as good as the best one."""
     rows = section.explanations
-    known = [row for row in rows if row["aic_difference"] is not None]
-    best = min(known, key=lambda row: row["aic_difference"], default=None)
-    near = [row for row in known if best and row["aic_difference"] - best["aic_difference"] <= NEAR_AIC]
+    known = [row for row in rows if np.isfinite(row.aic_difference)]
+    best = min(known, key=lambda row: row.aic_difference, default=None)
+    near = [row for row in known if best and row.aic_difference - best.aic_difference <= NEAR_AIC]
     said = (
-        f" Smallest AIC: {best['name']}; {len(near) - 1} more lie within {NEAR_AIC:g} of it and cannot be "
+        f" Smallest AIC: {best.name}; {len(near) - 1} more lie within {NEAR_AIC:g} of it and cannot be "
         "discriminated by this recording."
         if best
         else ""
@@ -122,12 +121,12 @@ def draw_depths(section: DriveStudy) -> Figure:
     Figure
     """
     found = section.depths
-    layers = found["layers"]
-    own = layers[found["own_layer"]]
+    layers = found.layers
+    own = layers[found.own_layer]
     figure = new_figure(7.5, 4.2)
     axes = figure.subplots()
-    axes.axvspan(own["from_mm"], own["to_mm"], color=PALE, zorder=0)
-    depth = numbers([(layer["from_mm"] + layer["to_mm"]) / 2.0 for layer in layers])
+    axes.axvspan(own.from_mm, own.to_mm, color=PALE, zorder=0)
+    depth = numbers([(layer.from_mm + layer.to_mm) / 2.0 for layer in layers])
     for phase, (label, style, colour) in {
         "": ("both, weighted", "o-", BLACK),
         "_dynamic": ("dynamic rates", "s--", ORANGE),
@@ -135,14 +134,14 @@ def draw_depths(section: DriveStudy) -> Figure:
     }.items():
         axes.plot(
             depth,
-            numbers([layer[f"fss_out_of_sample{phase}"] for layer in layers]),
+            numbers([getattr(layer.fit, f"fss_out_of_sample{phase}") for layer in layers]),
             style,
             color=colour,
             label=label,
         )
     for above, below in pairwise(layers):
-        if above["tissue"] != below["tissue"]:
-            axes.axvline(above["to_mm"], color=GREY, linewidth=0.8, linestyle=":")
+        if above.tissue != below.tissue:
+            axes.axvline(above.to_mm, color=GREY, linewidth=0.8, linestyle=":")
     axes.set_xscale("log")
     axes.set_xticks([0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0], ["0.05", "0.1", "0.2", "0.5", "1", "2", "5"])
     axes.minorticks_off()
@@ -154,61 +153,61 @@ def draw_depths(section: DriveStudy) -> Figure:
 
 def caption_depths(section: DriveStudy) -> str:
     """Describe the figure, with the depth of the best fit."""
-    layers = section.depths["layers"]
-    own = layers[section.depths["own_layer"]]
-    best = max(layers, key=lambda layer: layer["fss_out_of_sample"] or 0.0)
+    layers = section.depths.layers
+    own = layers[section.depths.own_layer]
+    best = max(layers, key=lambda layer: layer.fit.fss_out_of_sample or 0.0)
     return (
         "The paper's model with energy density sampled in each layer of elements below the receptor. Shaded: "
         "the living epidermis, where the paper places the end organs. Dotted lines: borders of tissues. "
-        f"There FSS out of sample is {fixed(own['fss_out_of_sample'], 3)}; it is largest, "
-        f"{fixed(best['fss_out_of_sample'], 3)}, between {fixed(best['from_mm'], 2)} and "
-        f"{fixed(best['to_mm'], 2)} mm, in the {best['tissue']}."
+        f"There FSS out of sample is {fixed(own.fit.fss_out_of_sample, 3)}; it is largest, "
+        f"{fixed(best.fit.fss_out_of_sample, 3)}, between {fixed(best.from_mm, 2)} and "
+        f"{fixed(best.to_mm, 2)} mm, in the {best.tissue}."
     )
 
 
 def tables(section: DriveStudy) -> list[Table]:
-    """Return the tables of quantities, explanations and depths, as far as the results have them."""
-    made = drive_tables(section.quantities)
-    if section.explanations:
-        rows = [_explanation_row(row) for row in section.explanations]
-        note = "ΔAIC, ΔBIC: difference from the first row; smaller is better. Gain: as above."
-        made.append(Table("Explanations of the dynamic rates", _EXPLANATION_COLUMNS, rows, note))
-    if section.depths:
-        rows = [_depth_row(layer) for layer in section.depths["layers"]]
-        note = (
-            "Stored energy density in both terms, four free parameters, least squares. Other quantities are "
-            "stored in the living epidermis only. Gain: over the living epidermis."
-        )
-        made.append(Table("Sampling depth", _DEPTH_COLUMNS, rows, note))
-    return made
+    """Return the tables of quantities, explanations and depths."""
+    rows = [_explanation_row(row) for row in section.explanations]
+    note = "ΔAIC, ΔBIC: difference from the first row; smaller is better. Gain: as above."
+    explanations = Table("Explanations of the dynamic rates", _EXPLANATION_COLUMNS, rows, note)
+    return [*drive_tables(section.quantities), explanations, depth_table(section.depths)]
 
 
-def _explanation_row(row: Mapping[str, Any]) -> Row:
-    added = ", ".join(f"{_spelled(name)} {fixed(value, 2)}" for name, value in row["added"].items())
+def depth_table(section: DepthStudy) -> Table:
+    """Return the fits by sampling depth."""
+    note = (
+        "Stored energy density in both terms, four free parameters, least squares. Other quantities are "
+        "stored in the living epidermis only. Gain: over the living epidermis."
+    )
+    return Table("Sampling depth", _DEPTH_COLUMNS, [_depth_row(layer) for layer in section.layers], note)
+
+
+def _explanation_row(row: ExplanationFit) -> Row:
+    added = ", ".join(f"{_spelled(name)} {fixed(value, 2)}" for name, value in row.added.items())
     return Row(
         (
-            row["name"],
-            str(row["free_numbers"]),
+            row.name,
+            str(row.free_numbers),
             added or ABSENT,
-            fixed(row["fss_in_sample"], 3),
-            *(fixed(row[key], 3) for key in _OUT_OF_SAMPLE),
-            gain(row["gain_interval"]),
-            fixed(row["aic_difference"], 1),
-            fixed(row["bic_difference"], 1),
+            fixed(row.fit.fss_in_sample, 3),
+            *(fixed(getattr(row.fit, key), 3) for key in _OUT_OF_SAMPLE),
+            gain(row.fit.gain_interval),
+            fixed(row.aic_difference, 1),
+            fixed(row.bic_difference, 1),
         )
     )
 
 
-def _depth_row(layer: Mapping[str, Any]) -> Row:
+def _depth_row(layer: LayerFit) -> Row:
     return Row(
         (
-            layer["tissue"],
-            fixed(layer["from_mm"], 2),
-            fixed(layer["to_mm"], 2),
-            fixed(layer["largest_sed_kpa"], 2),
-            fixed(layer["fss_in_sample"], 3),
-            *(fixed(layer[key], 3) for key in _OUT_OF_SAMPLE),
-            gain(layer["gain_interval"]),
+            layer.tissue,
+            fixed(layer.from_mm, 2),
+            fixed(layer.to_mm, 2),
+            fixed(layer.largest_sed_kpa, 2),
+            fixed(layer.fit.fss_in_sample, 3),
+            *(fixed(getattr(layer.fit, key), 3) for key in _OUT_OF_SAMPLE),
+            gain(layer.fit.gain_interval),
         )
     )
 

@@ -1,6 +1,7 @@
 """How deep the end organ lies: layers of a block, a truth that lies in one of them, and what is said."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +19,6 @@ from fingerpad.report.style import png
 from fingerpad.skin.sampling import SkinResponse
 from studies import drive_depths
 from studies.pages import drive_study as report
-from studies.plain_values import plain
 
 DEPTHS_MM = np.array([0.0, 0.2, 0.371, 0.471, 1.0, 1.624, 5.0])
 TISSUE = [0, 0, 1, 2, 2, 3]
@@ -78,10 +78,7 @@ def recordings():
 @pytest.fixture(scope="module")
 def found():
     method = replace(quick_method(), n_refined=1, difference_steps=(0.1,))
-    return plain(drive_depths.result(SKINS, recordings(), np.random.default_rng(0), method))
-
-
-RATES = ("observed_dynamic_rate_hz", "observed_static_rate_hz")
+    return drive_depths.result(SKINS, recordings(), np.random.default_rng(0), method)
 
 
 def test_borders_are_those_of_the_mesh_below_the_receptor():
@@ -106,34 +103,32 @@ def test_what_is_not_kept_there_is_not_made_up():
 
 
 def test_the_depth_that_made_the_rates_predicts_them_best(found):
-    layers = found["layers"]
-    assert [layer["tissue"] for layer in layers] == [LAYERS[tissue] for tissue in TISSUE]
-    assert found["own_layer"] == OWN_LAYER
-    scores = [layer["fss_out_of_sample"] for layer in layers]
+    layers = found.layers
+    assert [layer.tissue for layer in layers] == [LAYERS[tissue] for tissue in TISSUE]
+    assert found.own_layer == OWN_LAYER
+    scores = [layer.fit.fss_out_of_sample for layer in layers]
     assert np.argmax(scores) == TRUE_LAYER
     assert scores[TRUE_LAYER] > 0.98
     assert scores[OWN_LAYER] < scores[TRUE_LAYER] - 0.03
-    assert layers[TRUE_LAYER]["gain_interval"][0] > 0.0
-    assert layers[OWN_LAYER]["gain_interval"] == [0.0, 0.0]
-    assert [layer["from_mm"] for layer in layers[1:]] == [layer["to_mm"] for layer in layers[:-1]]
-    assert layers[5]["largest_sed_kpa"] == pytest.approx(felt_kpa(5, SHIFT_MM).max(), rel=1e-6)
+    assert layers[TRUE_LAYER].fit.gain_interval[0] > 0.0
+    assert layers[OWN_LAYER].fit.gain_interval == (0.0, 0.0)
+    assert [layer.from_mm for layer in layers[1:]] == [layer.to_mm for layer in layers[:-1]]
+    assert layers[5].largest_sed_kpa == pytest.approx(felt_kpa(5, SHIFT_MM).max(), rel=1e-6)
 
 
 def test_the_figure_and_the_words_say_where(found):
-    section = {"depths": found}
+    section = SimpleNamespace(depths=found)
     (axes,) = report.draw_depths(section).axes
     lines = {line.get_label(): line for line in axes.lines}
     for label, phase in (("both, weighted", ""), ("dynamic rates", "_dynamic"), ("static rates", "_static")):
         drawn = lines[label].get_ydata().tolist()
-        assert drawn == [layer[f"fss_out_of_sample{phase}"] for layer in found["layers"]]
+        assert drawn == [getattr(layer.fit, f"fss_out_of_sample{phase}") for layer in found.layers]
     assert_allclose(lines["both, weighted"].get_xdata(), (DEPTHS_MM[:-1] + DEPTHS_MM[1:]) / 2.0)
     assert "[mm]" in axes.get_xlabel()
     assert png(report.draw_depths, section).startswith(b"\x89PNG")
     assert "between 1.00 and 1.62 mm, in the dermis" in report.caption_depths(section)
-    *_, table = report.tables(
-        {"candidates": [], "method": "least squares", "shift_mm": [], **{key: [] for key in RATES}, **section}
-    )
+    table = report.depth_table(found)
     assert table.title == "Sampling depth"
     assert [row.cells[0] for row in table.rows] == [LAYERS[tissue] for tissue in TISSUE]
-    assert table.rows[TRUE_LAYER].cells[5] == f"{found['layers'][TRUE_LAYER]['fss_out_of_sample']:.3f}"
+    assert table.rows[TRUE_LAYER].cells[5] == f"{found.layers[TRUE_LAYER].fit.fss_out_of_sample:.3f}"
     assert all(len(row.cells) == len(table.columns) for row in table.rows)
