@@ -56,7 +56,7 @@ def marched(material, displacements, times_ms, mesh=MESH):
     watched = Watched(everything, mesh.nodes_mm, mesh.elements, mesh.layer, table)
     history = StressHistory.unloaded(len(mesh.elements), table.shares.shape[1])
     moment = FieldState.unloaded(len(mesh.nodes_mm), len(mesh.elements))
-    felt, force = [moment.felt], np.empty_like(mesh.nodes_mm)
+    fields, force = [moment.values], np.empty_like(mesh.nodes_mm)
     blocks = np.empty((sparsity.column.size, 3, 3))
     for displacement, step_ms in zip(displacements, np.diff(times_ms, prepend=0.0), strict=True):
         step = StepCoefficients.of(table, step_ms)
@@ -69,8 +69,8 @@ def marched(material, displacements, times_ms, mesh=MESH):
         history = history.advanced(step, mesh.layer, now.stress_kpa)
         stored = stored_energy_density(*state, history, now)
         moment = watched.after(moment, displacement, history, now, stored)
-        felt.append(moment.felt)
-    return fields_over_time(everything, felt), force, cauchy_stress(mesh, table, displacement, history)
+        fields.append(moment.values)
+    return fields_over_time(everything, fields), force, cauchy_stress(mesh, table, displacement, history)
 
 
 def shaken(size, seed=0):
@@ -92,42 +92,42 @@ def slow_gradients(mesh, displacement, element):
 def test_mean_stress_is_the_moment_of_the_nodal_forces(law):
     """sum f x' over the nodes of a body is the integral of its Cauchy stress: any law, any history."""
     motion = [shaken(0.06, 1), shaken(0.1, 2), shaken(0.12, 3)]
-    felt, force, final = marched(law.with_prony(PRONY), motion, [10.0, 60.0, 400.0])
+    fields, force, final = marched(law.with_prony(PRONY), motion, [10.0, 60.0, 400.0])
     volume = []
     for element in range(2):
         weights, gradients = slow_gradients(MESH, motion[-1], element)
         volume.append(weights @ np.linalg.det(gradients))
-    total = np.einsum("e,ek->k", volume, felt.stress_kpa[-1])[FULL]
+    total = np.einsum("e,ek->k", volume, fields.stress_kpa[-1])[FULL]
     np.testing.assert_allclose(total, force.T @ (MESH.nodes_mm + motion[-1]), rtol=1e-9, atol=1e-9)
-    np.testing.assert_array_equal(felt.stress_kpa[-1], final)
-    assert not felt.stress_kpa[0].any()
+    np.testing.assert_array_equal(fields.stress_kpa[-1], final)
+    assert not fields.stress_kpa[0].any()
 
 
 def test_mean_deformation_is_the_slow_mean_scaled_to_the_volume():
     moved = shaken(0.12)
-    felt, _, _ = marched(LAWS["neo-hooke"], [moved], [1.0])
+    fields, _, _ = marched(LAWS["neo-hooke"], [moved], [1.0])
     for element in range(2):
         weights, gradients = slow_gradients(MESH, moved, element)
         mean = np.einsum("q,qij->ij", weights, gradients) / weights.sum()
         dilatation = weights @ np.linalg.det(gradients) / weights.sum()
         mean *= (dilatation / np.linalg.det(mean)) ** (1 / 3)
-        np.testing.assert_allclose(felt.gradient[-1, element], mean, rtol=1e-12, atol=1e-14)
-        np.testing.assert_allclose(felt.strain[-1, element, :3].sum(), np.log(dilatation), rtol=1e-9)
+        np.testing.assert_allclose(fields.gradient[-1, element], mean, rtol=1e-12, atol=1e-14)
+        np.testing.assert_allclose(fields.strain[-1, element, :3].sum(), np.log(dilatation), rtol=1e-9)
 
 
 def test_strains_are_those_of_matrix_functions():
     gradient = np.array([[1.2, 0.3, -0.1], [0.05, 0.8, 0.2], [0.1, -0.2, 1.1]])
-    felt, _, _ = marched(LAWS["neo-hooke"], [MESH.nodes_mm @ (gradient - np.eye(3)).T], [1.0])
-    np.testing.assert_allclose(felt.gradient[-1], [gradient] * 2, rtol=1e-12, atol=1e-13)
+    fields, _, _ = marched(LAWS["neo-hooke"], [MESH.nodes_mm @ (gradient - np.eye(3)).T], [1.0])
+    np.testing.assert_allclose(fields.gradient[-1], [gradient] * 2, rtol=1e-12, atol=1e-13)
     left_stretch = polar(gradient, side="left")[1]
     logarithm = logm(left_stretch)
     for element in range(2):
-        np.testing.assert_allclose(felt.strain[-1, element][FULL], logarithm, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(fields.strain[-1, element][FULL], logarithm, rtol=1e-9, atol=1e-12)
         green = 0.5 * (gradient.T @ gradient - np.eye(3))
-        np.testing.assert_allclose(felt.green_lagrange_strain[-1, element][FULL], green, atol=1e-12)
+        np.testing.assert_allclose(fields.green_lagrange_strain[-1, element][FULL], green, atol=1e-12)
     principal = np.linalg.eigvalsh(logarithm)
-    np.testing.assert_allclose(felt.principal_strain[-1], [principal] * 2, rtol=1e-9)
-    np.testing.assert_allclose(felt.compressive_strain[-1], -principal[0], rtol=1e-9)
+    np.testing.assert_allclose(fields.principal_strain[-1], [principal] * 2, rtol=1e-9)
+    np.testing.assert_allclose(fields.compressive_strain[-1], -principal[0], rtol=1e-9)
 
 
 def test_rigid_rotation_turns_stress_and_leaves_invariants():
@@ -162,9 +162,9 @@ def test_elastic_work_is_stored_and_the_error_of_steps_is_of_second_order(law):
     errors = []
     for n in (4, 8):
         motion = [share * end for share in np.linspace(0.0, 1.0, n + 1)[1:]]
-        felt, _, _ = marched(law, motion, np.arange(1.0, n + 1))
-        np.testing.assert_allclose(felt.instantaneous_kpa, felt.stored_kpa, rtol=1e-12)
-        errors.append(np.abs(felt.work_kpa[-1] / felt.stored_kpa[-1] - 1).max())
+        fields, _, _ = marched(law, motion, np.arange(1.0, n + 1))
+        np.testing.assert_allclose(fields.instantaneous_kpa, fields.stored_kpa, rtol=1e-12)
+        errors.append(np.abs(fields.work_kpa[-1] / fields.stored_kpa[-1] - 1).max())
     assert errors[1] < 0.002
     assert errors[0] > 3.5 * errors[1]
 
@@ -188,24 +188,26 @@ def test_three_definitions_of_energy_part_when_tissue_relaxes():
     end = MESH.nodes_mm[:, [1]] * [0.02, 0.0, 0.0]
     motion = [share * end for share in (0.25, 0.5, 0.75, 1.0, 1.0, 1.0)]
     relaxing = LAWS["neo-hooke"].with_prony(PRONY)
-    felt, _, _ = marched(relaxing, motion, [0.025, 0.05, 0.075, 0.1, 100.0, 1e6])
+    fields, _, _ = marched(relaxing, motion, [0.025, 0.05, 0.075, 0.1, 100.0, 1e6])
     # gamma = 0.02 of a neo-Hookean body: W0 = G0 gamma²/2, with G0 = G / (1 - 0.6)
     instantaneous = 0.5 * 11.0 / 0.4 * 0.02**2
-    np.testing.assert_allclose(felt.instantaneous_kpa[4:], instantaneous, rtol=1e-9)
-    np.testing.assert_allclose(felt.work_kpa[4:], instantaneous, rtol=2e-3)
-    np.testing.assert_allclose(felt.stored_kpa[4], instantaneous, rtol=3e-3)
-    np.testing.assert_allclose(felt.stored_kpa[6], 0.4 * instantaneous, rtol=1e-9)
+    np.testing.assert_allclose(fields.instantaneous_kpa[4:], instantaneous, rtol=1e-9)
+    np.testing.assert_allclose(fields.work_kpa[4:], instantaneous, rtol=2e-3)
+    np.testing.assert_allclose(fields.stored_kpa[4], instantaneous, rtol=3e-3)
+    np.testing.assert_allclose(fields.stored_kpa[6], 0.4 * instantaneous, rtol=1e-9)
 
 
 def test_invariants_of_a_known_stress():
     stress = np.array([[[3.0, -1.0, -8.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 2.0, 0.0, 0.0]]])
     one = np.ones((1, 2))
-    felt = ElementFields(np.arange(2), np.tile(np.eye(3), (1, 2, 1, 1)), stress, one, one, one)
-    np.testing.assert_allclose(felt.principal_stress_kpa, [[[-8.0, -1.0, 3.0], [-2.0, 0.0, 2.0]]], atol=1e-14)
-    np.testing.assert_allclose(felt.von_mises_kpa, [[np.sqrt(0.5 * (16 + 49 + 121)), 2 * np.sqrt(3)]])
-    np.testing.assert_allclose(felt.compressive_stress_kpa, [[8.0, 2.0]])
-    np.testing.assert_allclose(felt.pressure_kpa, [[2.0, 0.0]], atol=1e-15)
-    assert not felt.compressive_strain.any()
+    fields = ElementFields(np.arange(2), np.tile(np.eye(3), (1, 2, 1, 1)), stress, one, one, one)
+    np.testing.assert_allclose(
+        fields.principal_stress_kpa, [[[-8.0, -1.0, 3.0], [-2.0, 0.0, 2.0]]], atol=1e-14
+    )
+    np.testing.assert_allclose(fields.von_mises_kpa, [[np.sqrt(0.5 * (16 + 49 + 121)), 2 * np.sqrt(3)]])
+    np.testing.assert_allclose(fields.compressive_stress_kpa, [[8.0, 2.0]])
+    np.testing.assert_allclose(fields.pressure_kpa, [[2.0, 0.0]], atol=1e-15)
+    assert not fields.compressive_strain.any()
 
 
 def test_pressure_and_area_of_a_stretched_skin():

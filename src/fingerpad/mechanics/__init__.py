@@ -2,7 +2,7 @@
 
 Read in the order of the computation: `laws` and `materials`, `element` (one brick), `assembly` (all of them),
 `contact` (the rigid indenter), `linear` (the solver behind a Newton step), `newton` (one equilibrium),
-`steps` (how far to go at a time) and `press` (the whole ramp and hold). Beside them, `fields` tells what
-elements feel on the way and `balance` where the work of the indenter went; `mixed` helps Newton's method
-where volume hardly changes.
+`steps` (lengths of the time steps) and `press` (the whole ramp and hold). `fields` computes stress and strain
+of chosen elements over time, `balance` the energy balance, and `mixed` treats pressure as an unknown of its
+own for nearly incompressible tissue.
 """

@@ -7,18 +7,19 @@ columns, at the same depth or one above or below. So the matrix is a list of pai
 
     y_c[a, k] = sum over d, s, b of  A_cd[s, a, b, k]  x_d[b, k + s - 1],      s = 0, 1, 2.
 
-The depth k runs fastest in memory, so that one machine instruction serves many of them. Single precision: the
-matrix steers an iteration whose goal is measured in double precision elsewhere.
+The depth k varies fastest in memory, so that one machine instruction works on several of them. Single
+precision is enough: the matrix is used in an iteration whose residual is computed in double precision
+elsewhere.
 
-Sweeps are an approximation anyway, and reading the matrix is what takes their time. They work on whole
-numbers of 16 bits, Q = D^-1 A D^-1 rounded, with D² the diagonal of A over 32767: of a positive definite
-matrix no entry of Q is larger than those on its diagonal. Vectors are scaled alike, y = D x and D^-1 r
-for r. The error is at most 1/65534 of the diagonal. That of floating-point numbers of 16 bits is in
-proportion to every entry, and with those conjugate gradients stopped converging on thin elements.
+Sweeps are approximations, and most of their time is spent reading the matrix. They use 16-bit integers,
+Q = D^-1 A D^-1 rounded, with D² the diagonal of A over 32767: in a positive definite matrix no entry of Q is
+larger than those on its diagonal. Vectors are scaled in the same way, y = D x and D^-1 r for r. The error is
+at most 1/65534 of the diagonal. The error of 16-bit floating-point numbers is proportional to every entry,
+and with them conjugate gradients did not converge on thin elements.
 
 Columns are coloured so that neighbours differ, and sorted by colour. Within a colour a Gauss-Seidel sweep may
-visit columns in any order, on any number of threads, and gives the same bits; the sorting lets it run through
-memory from one end to the other, which halves its time. Kernels work on columns `first` to `last`.
+take columns in any order, on any number of threads, and gives the same bits. The sorting makes it read memory
+from one end to the other, which halves its time. Kernels work on columns `first` to `last`.
 """
 
 from __future__ import annotations
@@ -283,8 +284,8 @@ def find_scales(first, last, own, matrix, free, scale, shrink):  # type: ignore[
 def round_matrix(first, last, start, neighbour, matrix, shrink, rounded):  # type: ignore[no-untyped-def]
     """Write Q; columns `first` to `last`, other parameters as in `ColumnGraph` and `find_scales`.
 
-    A tangent that is not positive definite may have larger entries than Q can hold. They are cut: conjugate
-    gradients find out about it from the product with A itself.
+    A tangent that is not positive definite may have larger entries than Q can hold. They are clipped:
+    conjugate gradients detect such a tangent from the product with A itself.
     """
     for c in range(first, last):
         for pair in range(start[c], start[c + 1]):

@@ -35,7 +35,7 @@ from fingerpad.mechanics.viscoelastic import InstantaneousState, StressHistory, 
 
 @dataclass(frozen=True)
 class ElementFields:
-    """What some elements feel, over time.
+    """Stress, strain and energies of some elements over time.
 
     Parameters
     ----------
@@ -55,8 +55,8 @@ class ElementFields:
     >>> stretched = np.diag([1.21, 1 / 1.1, 1 / 1.1]).reshape(1, 1, 3, 3)
     >>> tension = np.array([[[6.0, 0, 0, 0, 0, 0]]])
     >>> energy = np.array([[0.5]])
-    >>> felt = ElementFields(np.array([0]), stretched, tension, energy, energy, energy)
-    >>> felt.von_mises_kpa.tolist(), felt.compressive_strain.round(4).tolist()
+    >>> values = ElementFields(np.array([0]), stretched, tension, energy, energy, energy)
+    >>> values.von_mises_kpa.tolist(), values.compressive_strain.round(4).tolist()
     ([[6.0]], [[0.0953]])
     """
 
@@ -125,8 +125,8 @@ def von_mises(stress_kpa: FloatArray) -> FloatArray:
     return np.sqrt(1.5 * (normal + 2.0 * (stress_kpa[..., 3:] ** 2).sum(axis=-1)))
 
 
-class Felt(NamedTuple):
-    """What the watched elements feel at one time: `ElementFields` without the axis of time."""
+class FieldValues(NamedTuple):
+    """Fields of the watched elements at one time: `ElementFields` without the axis of time."""
 
     gradient: FloatArray
     stress_kpa: FloatArray
@@ -141,8 +141,8 @@ class FieldState:
 
     Parameters
     ----------
-    felt : Felt
-        What the elements feel.
+    values : FieldValues
+        Fields of the elements.
     displacement_mm : array (n_nodes, 3)
         Displacements of all nodes. [mm]
     convected_kpa : array (n_elements, 8, 6)
@@ -151,7 +151,7 @@ class FieldState:
         U'(Jbar) and Jbar. [kPa, -]
     """
 
-    felt: Felt
+    values: FieldValues
     displacement_mm: FloatArray
     convected_kpa: FloatArray
     pressure_kpa: FloatArray
@@ -161,14 +161,16 @@ class FieldState:
     def unloaded(cls, n_nodes: int, n_elements: int) -> FieldState:
         """State of a body at rest."""
         zeros = np.zeros(n_elements)
-        rest = Felt(np.tile(np.eye(3), (n_elements, 1, 1)), np.zeros((n_elements, 6)), zeros, zeros, zeros)
+        rest = FieldValues(
+            np.tile(np.eye(3), (n_elements, 1, 1)), np.zeros((n_elements, 6)), zeros, zeros, zeros
+        )
         convected = np.zeros((n_elements, N_POINTS, 6))
         return cls(rest, np.zeros((n_nodes, 3)), convected, zeros, np.ones(n_elements))
 
 
-def fields_over_time(elements: np.ndarray, felt: Sequence[Felt]) -> ElementFields:
-    """Stack what the watched elements feel at each time."""
-    return ElementFields(elements, *(np.stack(values) for values in zip(*felt, strict=True)))
+def fields_over_time(elements: np.ndarray, moments: Sequence[FieldValues]) -> ElementFields:
+    """Stack the fields of the watched elements at each time."""
+    return ElementFields(elements, *(np.stack(values) for values in zip(*moments, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -239,8 +241,10 @@ class Watched:
         work += 0.5 * (before.pressure_kpa + pressure) * (dilatation - before.dilatation)
         weights, isochoric = now.energies[chosen, :, 0], now.energies[chosen, :, 1]
         instantaneous = (weights * isochoric).sum(axis=1) / weights.sum(axis=1) + now.volumetric_kpa[chosen]
-        felt = Felt(gradient, stress, stored_kpa[chosen], instantaneous, before.felt.work_kpa + work)
-        return FieldState(felt, displacement_mm, convected, pressure, dilatation)
+        values = FieldValues(
+            gradient, stress, stored_kpa[chosen], instantaneous, before.values.work_kpa + work
+        )
+        return FieldState(values, displacement_mm, convected, pressure, dilatation)
 
 
 def cauchy_stress(

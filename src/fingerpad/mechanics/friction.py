@@ -8,12 +8,12 @@ from there, at x, costs
            = L (s - L / (2 k))    beyond             (it slips),
     f = -phi'(s) g / s,           |f| = min(k s, L) <= L = mu lambda,
 
-with the stiffness k = epsilon A of the normal contact, so that a sticking node yields by a micron or two. At
-the end of a step the anchor of a node that slipped is dragged along until |f| = k s (return mapping).
+with the stiffness k = epsilon A of the normal contact, so that a sticking node moves by a micron or two. At
+the end of a step the anchor of a node that slipped is moved until |f| = k s (return mapping).
 
 Coulomb's law has no potential, since the limit L depends on the normal force lambda: its tangent is not
 symmetric. Here L, n and a stay as they are while Newton's method runs, which keeps the tangent symmetric and
-not indefinite; they are renewed between its runs until the equilibrium no longer feels it
+not indefinite; they are renewed between its runs until the equilibrium no longer changes
 (docs/decisions/friction.md).
 """
 
@@ -164,7 +164,7 @@ def _slip(
     g = g - n * (n * g).sum(axis=1)[:, None]
     s = np.linalg.norm(g, axis=1)
     slips = stiffness * s > limit
-    # A node without a limit feels no friction, whatever m is.
+    # A node whose limit is 0 has no friction, whatever m is.
     m = np.where(limit > 0.0, np.maximum(s, limit / stiffness), 1.0)
     return g, s, m, np.where(slips[:, None], g / np.where(s > 0.0, s, 1.0)[:, None], 0.0)
 

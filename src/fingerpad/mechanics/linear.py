@@ -56,7 +56,7 @@ class Preconditioner(Protocol):
         ...
 
     def follow(self, blocks: np.ndarray) -> None:
-        """Take a new tangent, blocks (n_blocks, 3, 3), as far as that is cheap."""
+        """Take a new tangent, blocks (n_blocks, 3, 3), where that takes little time."""
         ...
 
     def renew(self, blocks: np.ndarray) -> None:
@@ -64,7 +64,7 @@ class Preconditioner(Protocol):
         ...
 
     def enter(self, values: FloatArray) -> np.ndarray:
-        """Vector, laid out as this preconditioner wants it, of values of the free degrees of freedom."""
+        """Vector, in the layout of this preconditioner, of values of the free degrees of freedom."""
         ...
 
     def leave(self, vector: np.ndarray) -> FloatArray:

@@ -1,8 +1,8 @@
 """Pressure as an unknown of its own in Newton's method, for bodies that hardly change their volume.
 
-The brick takes its pressure from its volume, p = U'(Jbar). Near nu = 0.5 that is a hindrance on the way to
-the solution: a Newton step of size d leaves volumes wrong by d², the bulk modulus turns that into a pressure
-far beyond the true one, and with it the tangent
+The pressure of a brick follows from its volume, p = U'(Jbar). Near nu = 0.5 this slows Newton's method down:
+a Newton step of size d leaves an error of d² in the volumes, the bulk modulus turns it into a pressure far
+above the true one, and with this pressure the tangent
 
     K = K_dev + U''/V dv dv' + p d²v
 
@@ -13,8 +13,8 @@ pressure that its last step u -> u + du has found,
     p = U'(Jbar(u)) + U''/V dv(u)·du,
 
 whose error is that of a linear step, whatever the bulk modulus.
-The equations solved stay as they are: only the tangent changes, and at the solution not even that. Laws that
-couple shape and volume are left alone; they are those of foams.
+The equations are the same: only the tangent changes, and at the solution it is the same too. Laws that couple
+shape and volume, which are those of foams, are not changed.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from fingerpad.mechanics.materials import COUPLED, N_COEFFICIENTS, POLYNOMIAL
 from fingerpad.mechanics.tensors import invert
 
 MIXED_POISSON = 0.49
-"""Poisson's ratio above which it pays: a Newton step takes a quarter more time. There a block takes 15 of
-them instead of 17, at 0.4999 it takes 21 instead of 116."""
+"""Poisson's ratio above which the method is used. A Newton step takes a quarter more time; a block takes 15
+steps instead of 17 at this ratio, and 21 instead of 116 at 0.4999."""
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,10 @@
 """Geometric multigrid on the structured grid of a finger or a block.
 
-The grid is coarsened along and around, never through: a column of nodes keeps its depth. What a coarse grid
-cannot see, smoothing must remove, and Gauss-Seidel sweeps over whole columns (see `columns`) remove all that
-varies with depth, where elements are thin. Lines are merged only where they are close together, up to the
-distance that the finest lines of the coarse grid have: a graded mesh becomes more even with every level.
+The grid is coarsened along and around, never through: a column of nodes keeps its depth. Smoothing must
+remove the errors that a coarse grid cannot represent. Gauss-Seidel sweeps over whole columns (see `columns`)
+remove those that vary with depth, where elements are thin. Lines are merged only where they are close
+together, up to the distance of the finest lines of the coarse grid: a graded mesh becomes more even with
+every level.
 
 Coarse matrices are Galerkin products, A_C = P' A P, with P linear along the grid lines. P acts on whole
 columns, so A_C is a weighted sum of the column pairs of A. One cycle sweeps forward before the correction
@@ -47,18 +48,20 @@ COARSEST_COLUMNS = 100
 """A grid with fewer columns is not coarsened: its factor costs less than a level."""
 
 FEWEST_COLUMNS = 200
-"""Columns of one colour for a thread, at least: waking it takes as long as the work on some tens of them."""
+"""Fewest columns of one colour for a thread: starting it takes as long as the work on some tens of
+columns."""
 
 PIECES_PER_THREAD = 2
 """Pieces that columns are shared out in, for each thread, if there are enough columns."""
 
 ROUNDED_ASPECT = 50.0
-"""Largest step along or around over the smallest through, up to which sweeps may round: fingers are within.
-What holds neighbours together across wide and thin elements is a small part of the diagonal, and would drown:
-at 80 a block of nearly incompressible tissue took twice the iterations, at 300 it did not converge."""
+"""Largest ratio of the widest step along or around to the smallest step through up to which sweeps round; it
+is smaller on fingers. The coupling across wide and thin elements is a small part of the diagonal and would be
+lost in rounding: at 80 a nearly incompressible block took twice the iterations, at 300 it did not
+converge."""
 
 WORTHWHILE = 0.8
-"""Largest ratio of columns, coarse over fine, for which a level pays."""
+"""Largest ratio of columns, coarse over fine, for which a level is added."""
 
 
 @dataclass(frozen=True)
@@ -203,7 +206,7 @@ class ColumnGrid:
             chosen, number = np.unique(self.columns[np.ix_(along, around)], return_inverse=True)
             if chosen.size <= WORTHWHILE * self.n_columns:
                 break
-            # A few lines much closer than all others, as below a wire, are not worth a level.
+            # A few lines much closer than all others, as below a wire, do not justify a level.
             finest_mm *= 2.0
             if finest_mm > largest_mm:
                 return None
@@ -264,7 +267,7 @@ def _share(kernel: Callable[..., None], first: int, last: int, *arguments: Any) 
     if parts == 1:
         kernel(first, last, *arguments)
         return
-    # More pieces than threads: columns differ in work, and whoever is done takes the next piece.
+    # More pieces than threads: columns differ in work, and a thread that is done takes the next piece.
     pieces = min(PIECES_PER_THREAD * parts, (last - first) // FEWEST_COLUMNS)
     ends = [first + (last - first) * n // pieces for n in range(pieces + 1)]
     in_chunks(lambda start, stop: kernel(start, stop, *arguments), list(pairwise(ends)))

@@ -8,8 +8,9 @@ Under a given force F the depth is unknown as well. Whenever u is nearly at rest
 
     Pi(u, d) = internal(u) + contact(u, d) - F d
 
-moves both; then u comes to rest again at the new depth. A line search over both would crawl: every skin node
-that the advancing indenter meets for the first time raises the potential.
+changes both; then Newton's method brings u to rest at the new depth. A line search over both would take very
+short steps, because every skin node that the advancing indenter touches for the first time raises the
+potential.
 """
 
 from __future__ import annotations
@@ -277,15 +278,15 @@ class _Search:
     def line_search(self, start: Configuration, direction: FloatArray, highest_uj: float) -> Configuration:
         """Go along `direction`, halving until the potential falls below the highest remembered one.
 
-        Nodes that come into contact raise the potential for a step or two before the next steps push them
-        out again; a memory of some steps lets them (Grippo, Lampariello & Lucidi 1986).
+        Nodes that come into contact raise the potential for a step or two until the next steps push them out
+        again; a comparison with several earlier potentials allows this (Grippo, Lampariello & Lucidi 1986).
         """
         slope = -float(direction @ start.residual_mn)
         length = 1.0
         while length >= SHORTEST_STEP:
             trial = self.moved(start, length * direction)
             falls = trial.potential_uj <= highest_uj + SUFFICIENT_DECREASE * length * slope
-            # Near the solution the fall of the potential drowns in round-off and the residual decides.
+            # Near the solution the decrease of the potential is below round-off: compare residuals.
             if falls or trial.relative_residual < 0.9 * start.relative_residual:
                 return trial
             length /= 2

@@ -329,7 +329,7 @@ def press(
     follow = Watched(chosen, mesh.nodes_mm, mesh.elements[chosen], mesh.layer[chosen], table)
     job = _Press(body, contact, stimulus, solver, _newton_settings(settings), follow)
     moment = job.unloaded()
-    reached, felt = [], [moment.fields.felt]
+    reached, values = [], [moment.fields.values]
     for moment in _moments(job, settings):
         if moment.found.depth_mm > deepest_mm and isinstance(stimulus, ForceRampAndHold):
             raise InputError(
@@ -339,7 +339,7 @@ def press(
             )
         # Without its history, which is as large as all else together.
         reached.append((moment.time_ms, moment.found, moment.sed_kpa))
-        felt.append(moment.fields.felt)
+        values.append(moment.fields.values)
     times = np.array([0.0, *(time_ms for time_ms, _, _ in reached)])
     whole_body = 2.0 if mesh.symmetry_nodes.size else 1.0
     # Across the plane of symmetry the reactions of the two halves cancel.
@@ -368,7 +368,7 @@ def press(
         nail_reaction_mn=nail_reaction,
         force_imbalance=imbalance,
         stress_kpa=cauchy_stress(mesh, table, displacement[-1], moment.history),
-        fields=fields_over_time(chosen, felt),
+        fields=fields_over_time(chosen, values),
         contact=skin_contact(mesh, displacement, pressed),
         energy=energy_balance(moment.ledger, kinks_ms=(stimulus.ramp_ms,)).at(times),
         penetration_mm=deepest,

@@ -1,15 +1,15 @@
 """Time steps of a press: at given times, cut where they fail, or as long as an error bound on SED allows.
 
-Without friction a step takes stress and energy as linear within itself, and that is all it does to the
-answer: without relaxation the equilibrium at its end does not depend on the way there, and a relaxed stress
-is an average of past stress with weights that sum to less than 1 (see `viscoelastic`). So the error of a
-whole press is that of its worst step, and the error of a step is that of linear interpolation,
+Without friction, the only error in time is that stress and energy are taken as linear within a step: without
+relaxation the equilibrium at its end does not depend on the path, and a relaxed stress is an average of past
+stress with weights that sum to less than 1 (see `viscoelastic`). So the error of a whole press is that of its
+worst step, and the error of a step is that of linear interpolation,
 
     e = h²/4 |w[t-, t, t+]|,    w[t-, t, t+] = (w[t, t+] - w[t-, t]) / (h- + h),
 
-with SED w, its divided differences over the last two steps, and their lengths h- and h. Where the step is
-shorter than the one before, h stands for h- too: SED may have a kink in the step, as where the indenter comes
-to touch, and a long step before it would hide it.
+with SED w, its divided differences over the last two steps, and their lengths h- and h. If the step is
+shorter than the one before, h is used instead of h-: SED may have a kink in the step, for example at first
+touch, which would be underestimated after a long step.
 """
 
 from __future__ import annotations
