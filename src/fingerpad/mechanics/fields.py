@@ -3,15 +3,15 @@
 Every value is a mean over the element, the resolution of a brick with one pressure:
 
 - deformation: the mean gradient Fbar = 1/V sum_q w_q F_q, scaled so that its determinant is the element's
-  dilatation Jbar = v/V. One gradient for all strain measures keeps them compatible with each other; its
-  logarithm has the trace ln Jbar, and for a smooth field it differs from the mean of the points' strains only
-  by the square of the element's size.
+  dilatation Jbar = v/V. All strain measures follow from this one gradient and are compatible. Its logarithm
+  has the trace ln Jbar. In a smooth field it differs from the mean of the strains at the points by the square
+  of the element's size.
 - stress: Cauchy, mean over the present volume, 1/v sum_q w_q tau_q with
   tau_q = dev(F~ (S0 - sum S_i) F~')_q + p J_q 1, and p the element's one pressure.
-- energy density by three definitions: *stored* (what springs hold now), *instantaneous* (W0 + U, what they
-  would hold had nothing relaxed) and *work* (the integral of S : dE, with what was spent on the way).
+- energy density by three definitions: *stored* (energy in the springs now), *instantaneous* (W0 + U, the
+  energy without any relaxation) and *work* (the integral of S : dE, which includes dissipation).
 
-Tensors are stored as xx, yy, zz, xy, yz, xz; shear strains are those of the tensor, not the engineer's.
+Tensors are stored as xx, yy, zz, xy, yz, xz; shear strains are tensor components, not engineering strains.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ class FieldValues(NamedTuple):
 
 @dataclass(frozen=True)
 class FieldState:
-    """State of the watched elements at one time, with what the next step's work is counted from.
+    """State of the watched elements at one time, from which the work of the next step is computed.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def fields_over_time(elements: np.ndarray, moments: Sequence[FieldValues]) -> El
 
 @dataclass(frozen=True)
 class Watched:
-    """Elements whose fields are followed through a press.
+    """Elements whose fields are computed during an indentation.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def cauchy_stress(
     displacement_mm : array (n_nodes, 3)
         Displacements. [mm]
     history : StressHistory
-        Relaxation up to then.
+        State of relaxation.
 
     Returns
     -------
@@ -270,7 +270,7 @@ def cauchy_stress(
     """
     n = len(mesh.elements)
     stress, gradient = np.empty((n, 6)), np.empty((n, 3, 3))
-    # Copies can be written to, as those of `Watched` can: Numba compiles once for both.
+    # Writable copies, as those of `Watched`: Numba then compiles one signature for both.
     corners, layer = mesh.elements.copy(), mesh.layer.copy()
     convected = history.instantaneous - history.relaxed.sum(axis=0)
     now = instantaneous_state(mesh.nodes_mm, mesh.elements, displacement_mm, mesh.layer, table)
@@ -311,7 +311,7 @@ def _mean_fields(  # type: ignore[no-untyped-def]
                 for j in range(3):
                     mean_gradient[e, i, j] += weights[q] / volume * gradients[q, i, j]
         present_volume = dilatation[e] * volume
-        # A law that couples shape and volume carries its pressure in the convected stress, others in U.
+        # Laws that couple shape and volume have their pressure in the convected stress, others in U.
         hydrostatic = pressure[e] + (spherical / present_volume if material[8] == COUPLED else 0.0)
         for k in range(6):
             stress[e, k] = stress[e, k] / present_volume + (hydrostatic if k < 3 else 0.0)
@@ -328,7 +328,7 @@ def _isochoric_work(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Write the element means of 1/2 (S_n + S_n+1) : 1/2 (C_n+1 - C_n), with C = c F'F of `frame_scale`.
 
-    By the trapezium over strain, not over time: for stress linear in strain it is exact in any step.
+    The trapezoidal rule is over strain, not over time: it is exact if stress is linear in strain.
     """
     weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
     old, new, inverse = small_array((N_POINTS, 3, 3)), small_array((N_POINTS, 3, 3)), small_array((3, 3))
