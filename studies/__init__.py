@@ -1,1 +1,17 @@
-"""Research on the model itself: not installed; run with `python -m studies NAME`."""
+"""Research on the model itself, run by `python -m studies NAME`; not installed.
+
+| command | what it studies |
+| --- | --- |
+| `materials` | sets of tissues, polynomials fitted to hyperfoams, order of the trials |
+| `drives` | quantities that drive the afferent, explanations of the dynamic rates, sampling depths |
+| `methods` | start points and units, methods of fitting, models and their limits |
+| `spike-fit` | fits to spike trains, variability of interspike intervals |
+| `mesh-refinement`, `paper-size` | errors of the meshes against finer ones |
+| `mesh-noise` | meshes of one resolution with shifted element boundaries |
+| `code-efficiency` | codes of a population against the ideal observer |
+| `results` | the pages that show the numbers of a reproduction |
+
+The uncertainty of the fit, the drive of choice and curvature thresholds are part of
+`fingerpad reproduce --extended`. A command writes NAME.md with its figures in images/, NAME.json, and keeps
+finished indentations in indentations/, so that studies and reproductions of one folder share them.
+"""

@@ -6,6 +6,7 @@ import sys
 import pytest
 import typer
 
+import studies
 from fingerpad.core.results import result_class
 from fingerpad.experiments import runner
 from fingerpad.report.parts import Page
@@ -75,6 +76,7 @@ def test_every_study_has_a_command_and_a_line_of_help(call):
     names = [study.name for study in command.STUDIES]
     assert len(names) == len(set(names)) == 7
     assert all(f" {name} " in said for name in (*names, "materials", "results"))
+    assert all(f"`{name}`" in studies.__doc__ for name in (*names, "materials", "results"))
 
 
 @pytest.mark.parametrize(
