@@ -21,7 +21,7 @@ from numba.core.errors import TypingError
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
-TRIED = ("0.68",)
+TRIED = ("0.61", "0.65", "0.68")
 """Versions of Numba with which this file was tried."""
 
 ALIGNMENT = 64
