@@ -14,7 +14,7 @@ import psutil
 
 ROOT = Path(__file__).parents[1]
 
-PACKAGES = ("numpy", "scipy", "numba", "pypardiso", "mkl", "pyamg")
+PACKAGES = ("numpy", "scipy", "numba", "pyamg")
 """Packages on whose versions times depend."""
 
 WRITTEN_HERE = (":!benchmarks/results", ":!benchmarks/README.md")

@@ -14,18 +14,14 @@ from benchmarks.results import Report, Table
 
 THREADS = 2
 
-MULTIGRID, MULTIGRID_WITHOUT_MKL = "multigrid, coarsest by PARDISO", "multigrid, coarsest by SuperLU"
-PARDISO, SUPERLU, PYAMG = "PARDISO (MKL)", "SuperLU (SciPy)", "smoothed aggregation (pyamg)"
+MULTIGRID = "multigrid, coarsest by SuperLU"
+SUPERLU, PYAMG = "SuperLU (SciPy)", "smoothed aggregation (pyamg)"
 
 RUNS = (
     ("quick", MULTIGRID),
-    ("quick", MULTIGRID_WITHOUT_MKL),
-    ("quick", PARDISO),
     ("quick", SUPERLU),
     ("quick", PYAMG),
     ("standard", MULTIGRID),
-    ("standard", MULTIGRID_WITHOUT_MKL),
-    ("standard", PARDISO),
 )
 """Resolutions and preconditioners; SuperLU and pyamg take too long for more than `quick`."""
 
@@ -65,15 +61,13 @@ class Aggregation:
 def preconditioner(name: str, sparsity: Any, free: np.ndarray, mesh: Any) -> Any:
     """Make the preconditioner of a name of `RUNS` for a mesh."""
     from fingerpad.geometry.mesh_quality import rigid_motions
-    from fingerpad.mechanics.factors import PardisoFactor, SuperLuFactor
     from fingerpad.mechanics.linear import KeptFactor
     from fingerpad.mechanics.multigrid import Multigrid
 
-    if name in (MULTIGRID, MULTIGRID_WITHOUT_MKL):
-        coarsest = PardisoFactor if name == MULTIGRID else SuperLuFactor
-        return Multigrid(sparsity, free, mesh.nodes_mm, mesh.grid, coarsest)
-    if name in (PARDISO, SUPERLU):
-        return KeptFactor(sparsity, free, PardisoFactor if name == PARDISO else SuperLuFactor)
+    if name == MULTIGRID:
+        return Multigrid(sparsity, free, mesh.nodes_mm, mesh.grid)
+    if name == SUPERLU:
+        return KeptFactor(sparsity, free)
     rigid = rigid_motions(mesh.nodes_mm).reshape(-1, 6)[free]
 
     def aggregation(row: np.ndarray, column: np.ndarray) -> Aggregation:
@@ -156,7 +150,5 @@ def measure(runs: Sequence[tuple[str, str]] = RUNS) -> Report:
                 rows,
             )
         ],
-        notes=[
-            "A processor without MKL runs the multigrid with SuperLU; pyamg is here for comparison only.",
-        ],
+        notes=["pyamg is measured for comparison only."],
     )  # fmt: skip

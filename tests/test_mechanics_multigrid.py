@@ -14,7 +14,6 @@ from fingerpad.mechanics import linear, multigrid
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.columns import find_scales, round_matrix, to_columns, to_nodes
 from fingerpad.mechanics.contact import place
-from fingerpad.mechanics.factors import SuperLuFactor
 from fingerpad.mechanics.linear import LinearSolver, free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material, MaterialTable, Prony
 from fingerpad.mechanics.multigrid import Multigrid
@@ -49,7 +48,7 @@ def system(mesh, poisson=0.45, stretch=0.02):
 
 def made(mesh, poisson=0.45, stretch=0.02):
     sparsity, free, blocks = system(mesh, poisson, stretch)
-    hierarchy = Multigrid(sparsity, free, mesh.nodes_mm, mesh.grid, SuperLuFactor)
+    hierarchy = Multigrid(sparsity, free, mesh.nodes_mm, mesh.grid)
     hierarchy.renew(blocks)
     return hierarchy, sparsity, free, blocks
 
@@ -260,10 +259,11 @@ def test_iterations_do_not_grow_with_the_mesh():
 
 def test_iterations_stay_few_on_the_finger_up_to_the_largest_ratio():
     mesh = finger_mesh(Fingertip(), QUICK)
-    found = [iterations(mesh, poisson) for poisson in (0.45, 0.485, linear.MULTIGRID_POISSON)]
+    found = [iterations(mesh, poisson) for poisson in (0.45, 0.485, 0.495, linear.MULTIGRID_POISSON)]
     assert found[0] <= 15
     assert found[1] <= 27
     assert found[2] <= 48
+    assert found[3] <= 145
 
 
 @pytest.mark.skipif(available_threads() < 2, reason="this machine has one core")
@@ -278,8 +278,7 @@ def test_same_bits_on_any_number_of_threads(monkeypatch):
     np.testing.assert_array_equal(found[1], found[0])
 
 
-@pytest.mark.parametrize("mkl", [True, False])
-def test_press_equals_that_of_a_factor_in_every_step(monkeypatch, mkl):
+def test_press_equals_that_of_a_factor_in_every_step(monkeypatch):
     """The plain path: a new double-precision factor for every Newton step."""
     edges = np.linspace(-4.0, 4.0, 13)
     mesh = block_mesh(edges, [0.0, 0.2, 0.4, 0.8, 1.6, 3.0], edges[6:], [0, 1, 2, 2, 3], symmetric=True)
@@ -292,14 +291,11 @@ def test_press_equals_that_of_a_factor_in_every_step(monkeypatch, mkl):
     def pressed():
         return press(mesh, materials, sphere, placement, RampAndHold(0.4, 50, 200), settings)
 
-    if not mkl:
-        monkeypatch.setattr(linear, "pypardiso", None)
     monkeypatch.setattr(linear, "MULTIGRID_NODES", 100)
     monkeypatch.setattr(multigrid, "COARSEST_COLUMNS", 10)
     fast = pressed()
     assert fast.linear_solver.startswith("geometric multigrid, levels: 4")
     monkeypatch.setattr(linear, "MULTIGRID_NODES", 10**9)
-    monkeypatch.setattr(linear, "pypardiso", None)
     monkeypatch.setattr(linear.KeptFactor, "patience", -(10**9))
     plain = pressed()
     assert plain.factorisations == plain.newton_steps

@@ -70,7 +70,7 @@ def test_import_chooses_no_plotting_backend_and_warns_of_nothing() -> None:
 
 
 HEAVY = (
-    "numpy", "scipy", "numba", "llvmlite", "matplotlib", "jinja2", "typer", "rich", "pypardiso",
+    "numpy", "scipy", "numba", "llvmlite", "matplotlib", "jinja2", "typer", "rich",
     "threadpoolctl", "vtkmodules",
 )  # fmt: skip
 """Libraries that take from a tenth to several tenths of a second to load."""

@@ -8,13 +8,9 @@ from __future__ import annotations
 import felupe
 import numpy as np
 from felupe.mechanics import ContactRigidBase
+from scipy.sparse.linalg import spsolve
 
 from fingerpad.export.job import Job
-
-try:
-    from pypardiso import spsolve
-except ImportError:  # no MKL wheel for this processor
-    from scipy.sparse.linalg import spsolve
 
 NODE_STIFFNESS_MN_PER_MM = 1e4
 """Penalty of a node; those under the sphere carry up to 10 mN, so they penetrate by a micron."""

@@ -18,19 +18,19 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.columns import MOST_LANES
-from fingerpad.mechanics.factors import MakeFactor, PardisoFactor, SuperLuFactor, pypardiso
+from fingerpad.mechanics.factors import MakeFactor, SuperLuFactor
 from fingerpad.mechanics.multigrid import Multigrid
 
 MOST_ITERATIONS = 400
-DIRECT_POISSON, MULTIGRID_POISSON = 0.4999, 0.495
-"""Largest Poisson's ratio with a factor, and with multigrid, whose iterations grow beyond (see
+DIRECT_POISSON, MULTIGRID_POISSON = 0.4999, 0.499
+"""Largest Poisson's ratio with a factor, and with multigrid, whose iterations grow above it (see
 docs/decisions/linear-solver.md)."""
 
 MULTIGRID_NODES = 4_000
-"""Smallest mesh for multigrid; below it a factor costs next to nothing."""
+"""Smallest mesh for multigrid; for a smaller mesh a factor takes a fraction of a second."""
 
-SUPERLU_NODES = 20_000
-"""Largest mesh for SuperLU: one of its factors then takes about 1 GB and a quarter of a minute."""
+DIRECT_NODES = 20_000
+"""Largest mesh for a factor, which then takes about 1 GB and 15 s."""
 
 NO_NODES = np.empty(0, dtype=np.int64)
 
@@ -89,14 +89,14 @@ class KeptFactor:
         Block pattern of the tangent.
     free : int array (n_free,)
         Degrees of freedom that move.
-    factor : callable
+    factor : callable, optional
         Makes the factor.
     """
 
     patience = 14
     number_type = np.float64
 
-    def __init__(self, sparsity: Sparsity, free: np.ndarray, factor: MakeFactor):
+    def __init__(self, sparsity: Sparsity, free: np.ndarray, factor: MakeFactor = SuperLuFactor):
         self._sparsity, self._free = sparsity, free
         self._factor = factor(*sparsity.entries(free))
 
@@ -150,7 +150,7 @@ def choose_preconditioner(
     Raises
     ------
     InputError
-        If the material is beyond the reach of every solver that this machine has for this mesh.
+        If no solver serves a mesh of this size with this material.
     """
     # Materials are distinguished by moduli; the ratio computed from them differs in the last digits.
     if poisson > DIRECT_POISSON + 1e-9:
@@ -159,27 +159,24 @@ def choose_preconditioner(
             "where a force is within 0.05 % of that of tissue that keeps its volume."
         )
     n_nodes = len(mesh.nodes_mm)
-    factor: MakeFactor = PardisoFactor if pypardiso is not None else SuperLuFactor
-    name = "PARDISO" if pypardiso is not None else "SuperLU"
     shallow = mesh.grid.shape[2] <= MOST_LANES
     if n_nodes >= MULTIGRID_NODES and shallow and poisson <= MULTIGRID_POISSON + 1e-9:
-        multigrid = Multigrid(sparsity, free, mesh.nodes_mm, mesh.grid, factor)
+        multigrid = Multigrid(sparsity, free, mesh.nodes_mm, mesh.grid)
         reason = (
-            f"geometric multigrid, levels: {len(multigrid.columns_of_levels)}, the coarsest by {name}: "
+            f"geometric multigrid, levels: {len(multigrid.columns_of_levels)}, the coarsest by SuperLU: "
             f"{n_nodes} nodes are at least {MULTIGRID_NODES}, and Poisson's ratio {poisson:.4g} is within "
             f"{MULTIGRID_POISSON}."
         )
         return multigrid, reason
-    if pypardiso is not None:
-        reason = f"PARDISO's factor: MKL is here, and it serves any Poisson's ratio up to {DIRECT_POISSON}."
-        return KeptFactor(sparsity, free, PardisoFactor), reason
-    if n_nodes <= SUPERLU_NODES:
-        reason = f"SuperLU's factor: no MKL here, and {n_nodes} nodes are within its {SUPERLU_NODES}."
-        return KeptFactor(sparsity, free, SuperLuFactor), reason
+    if n_nodes <= DIRECT_NODES:
+        reason = (
+            f"SuperLU's factor of the whole tangent: {n_nodes} nodes are within {DIRECT_NODES}, and "
+            f"Poisson's ratio {poisson:.4g} is within {DIRECT_POISSON}."
+        )
+        return KeptFactor(sparsity, free), reason
     raise InputError(
-        f"Poisson's ratio must not exceed {MULTIGRID_POISSON} here: got {poisson:.6g}, {n_nodes} nodes are "
-        f"above SuperLU's {SUPERLU_NODES}, and this machine has no MKL (pypardiso); use a smaller ratio, a "
-        "coarser mesh or an x86-64 one."
+        f"Poisson's ratio must not exceed {MULTIGRID_POISSON} for a mesh of more than {DIRECT_NODES} nodes: "
+        f"got {poisson:.6g} and {n_nodes} nodes; use a smaller ratio or a coarser mesh."
     )
 
 

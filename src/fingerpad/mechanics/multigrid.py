@@ -39,7 +39,7 @@ from fingerpad.mechanics.columns import (
     to_columns,
     to_nodes,
 )
-from fingerpad.mechanics.factors import MakeFactor
+from fingerpad.mechanics.factors import SuperLuFactor
 
 MERGED_OVER_FINEST = 4.0
 """Largest distance of two lines that become one step, over the smallest distance on the grid."""
@@ -348,8 +348,6 @@ class Multigrid:
         Reference nodes. [mm]
     grid : int array (n_along, n_around, depth)
         Nodes in grid order, `Mesh.grid`.
-    factor : callable
-        Makes the factor of the coarsest matrix.
     """
 
     patience = 3
@@ -361,7 +359,6 @@ class Multigrid:
         free: np.ndarray,
         nodes_mm: FloatArray,
         grid: np.ndarray,
-        factor: MakeFactor,
     ):
         self._sparsity, self._free, self._depth = sparsity, free, grid.shape[2]
         depth, skin = self._depth, nodes_mm[grid[:, :, 0]]
@@ -396,7 +393,7 @@ class Multigrid:
         self._coarsest = moving[:, :, 1 : depth + 1] > 0.0
         number = np.full(self._coarsest.shape, -1, dtype=np.int64)
         number[self._coarsest] = np.arange(self._coarsest.sum())
-        self._factor = factor(*graph.entries(number))
+        self._factor = SuperLuFactor(*graph.entries(number))
 
     @property
     def columns_of_levels(self) -> tuple[int, ...]:

@@ -46,7 +46,7 @@ _SOLUTION = {
 }
 """Content of the stored array "solution", in this order."""
 
-_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 _LOOK_FOR_PARENT_S = 0.1
 
 
