@@ -15,7 +15,12 @@ from fingerpad.experiments.gerling2014 import sphere_discrimination
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.neuron.population import Population
-from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD, TRIALS, code_efficiency, code_statistic
+from fingerpad.psychophysics.code_efficiency import (
+    EFFICIENCY_TRIALS,
+    SMALLEST_SPREAD,
+    code_efficiency,
+    code_statistic,
+)
 from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, neighbour_pairs, taking_part
 from fingerpad.psychophysics.ideal_observer import present
 from fingerpad.psychophysics.response_models import PoissonResponses, ResponseModel, multiplied_responses
@@ -163,7 +168,7 @@ def _compared(
 ) -> list[EfficiencyRow]:
     """Compare both codes with the ideal observer, for one kind of noise."""
     standard, comparison = models
-    shown = present(standard, comparison, seed, TRIALS, SESSION)
+    shown = present(standard, comparison, seed, EFFICIENCY_TRIALS, SESSION)
     found = []
     for code, name in CODE_NAMES.items():
         of_code = code_efficiency(shown, code_statistic(code, standard, neighbours, seed, SESSION))

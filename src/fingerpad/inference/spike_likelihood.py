@@ -38,7 +38,7 @@ from fingerpad.inference.spike_parameters import (
     canonical_jacobian,
     checked_spike_parameters,
 )
-from fingerpad.inference.spike_sweeps import cut, operational_times, sweep
+from fingerpad.inference.spike_sweeps import accumulate, cut, operational_times
 from fingerpad.neuron.escape_rate import ESCAPE_TIME_MS
 from fingerpad.neuron.transduction import Drive
 
@@ -178,7 +178,7 @@ class SpikeLikelihood:
 
         def block(trains: slice) -> tuple[float, FloatArray, FloatArray]:
             gradient, information = np.zeros(N_PARAMETERS), np.zeros((N_PARAMETERS, N_PARAMETERS))
-            value = sweep(*self._part(trains), numbers, float(self.escape_ms), gradient, information)
+            value = accumulate(*self._part(trains), numbers, float(self.escape_ms), gradient, information)
             return value, gradient, information
 
         blocks = in_blocks(block, len(self.trains), _TRAINS_PER_BLOCK)

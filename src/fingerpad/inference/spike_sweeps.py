@@ -76,7 +76,7 @@ def cut(
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def sweep(
+def accumulate(
     intervals: FloatArray,
     flags: np.ndarray,
     numbers: FloatArray,
@@ -152,7 +152,7 @@ def operational_times(
     count, first = 0, 0
     for n in range(intervals.shape[0]):
         if flags[n, 1]:
-            sweep(intervals[first : n + 1], flags[first : n + 1], numbers, escape, gradient, information)
+            accumulate(intervals[first : n + 1], flags[first : n + 1], numbers, escape, gradient, information)
             first = n + 1
             count += 1
             # d log L/dG is the integral minus one for each spike.

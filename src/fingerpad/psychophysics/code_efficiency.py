@@ -27,11 +27,11 @@ from fingerpad.psychophysics.ideal_observer import (
 from fingerpad.psychophysics.noisy_responses import session_trials
 from fingerpad.psychophysics.response_models import ResponseModel, multiplied_responses
 
-CODES = ("gradient_sum", "euclidean")
+POPULATION_CODES = ("gradient_sum", "euclidean")
 SMALLEST_SPREAD = 1.0
 """Noise floor s. [spikes/s or ms]"""
 
-TRIALS = 4000
+EFFICIENCY_TRIALS = 4000
 """Presentations of either stimulus behind one efficiency."""
 
 LEAST_KNOWN = 10.0
@@ -77,7 +77,7 @@ def noisy_presentations(
         One per comparison.
     """
     standard, *comparisons = (multiplied_responses(row, noise_sigma, SMALLEST_SPREAD) for row in table)
-    return [present(standard, comparison, seed, TRIALS, session) for comparison in comparisons]
+    return [present(standard, comparison, seed, EFFICIENCY_TRIALS, session) for comparison in comparisons]
 
 
 def code_statistic(
@@ -100,9 +100,9 @@ def code_statistic(
     -------
     Statistic
     """
-    if one_of("code", code, CODES) == "gradient_sum":
+    if one_of("code", code, POPULATION_CODES) == "gradient_sum":
         return lambda responses: gradient_sum(responses, neighbours)
-    memory = standard.draw(seed, session_trials(session, 3, TRIALS)[2])
+    memory = standard.draw(seed, session_trials(session, 3, EFFICIENCY_TRIALS)[2])
     return lambda responses: distance(responses, memory)
 
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from fingerpad.core.checks import FloatArray
 from fingerpad.experiments.gerling2014.drive_fits import DriveFit
 from fingerpad.experiments.gerling2014.drive_quantities import DriveCandidate, DriveResult
-from fingerpad.report.formatting import ABSENT, PHASES, fixed
+from fingerpad.report.formatting import ABSENT, PHASE_LABELS, fixed
 from fingerpad.report.parts import Row, Table
 from fingerpad.report.single_unit import BAR_HALF_WIDTH_MM
 from fingerpad.report.style import BLACK, BLUE, GREY, PALE, new_figure
@@ -28,7 +28,7 @@ def draw_drive_quantities(section: DriveResult) -> Figure:
     """Draw rates against the position of the bar: a column per candidate, the ramp above the hold."""
     candidates = section.candidates
     figure = new_figure(2.6 * len(candidates), 5.4)
-    grid = figure.subplots(len(PHASES), len(candidates), sharex=True, sharey="row", squeeze=False)
+    grid = figure.subplots(len(PHASE_LABELS), len(candidates), sharex=True, sharey="row", squeeze=False)
     for candidate, ramp, hold in zip(candidates, *grid, strict=True):
         _draw_rates(
             ramp,
@@ -48,7 +48,7 @@ def draw_drive_quantities(section: DriveResult) -> Figure:
         )
         ramp.set_title(drivers_label(candidate, ";\ndynamic: "), fontsize=9.0)
         hold.set_xlabel("position of the bar [mm]")
-    for phase, (first, *_) in zip(PHASES.values(), grid, strict=True):
+    for phase, (first, *_) in zip(PHASE_LABELS.values(), grid, strict=True):
         first.set_ylabel(f"{phase}\nfiring rate [spikes/s]")
         first.set_ylim(bottom=0.0)
     figure.legend(*hold.get_legend_handles_labels(), loc="outside lower center", ncols=3)

@@ -8,7 +8,7 @@ from typing import Any
 
 ABSENT = "–"
 UNBROKEN = "\N{NO-BREAK SPACE}"
-PHASES = {"dynamic": "dynamic ramp", "static": "static hold"}
+PHASE_LABELS = {"dynamic": "dynamic ramp", "static": "static hold"}
 PARAMETER_SYMBOLS = {
     "intercept_ma": "intercept β",
     "dynamic_gain": "dynamic gain k_d",

@@ -17,7 +17,7 @@ from fingerpad.report.formatting import (
     ABSENT,
     IDENTIFIABLE_SYMBOLS,
     PARAMETER_SYMBOLS,
-    PHASES,
+    PHASE_LABELS,
     fixed,
     number,
     plain,
@@ -91,7 +91,7 @@ def draw_fit(found: FitResult) -> Figure:
             markersize=5.0,
             label="observed",
         )
-        axes.set_title(f"{PHASES[phase]}, FSS = {rates.fss_in_sample:.2f}")
+        axes.set_title(f"{PHASE_LABELS[phase]}, FSS = {rates.fss_in_sample:.2f}")
         axes.set_ylabel("firing rate [spikes/s]")
         axes.set_ylim(bottom=0.0)
         _name_places(axes, found)
@@ -124,7 +124,7 @@ def draw_fit_residuals(found: FitResult) -> Figure:
         axes.vlines(where, 0.0, left, color=BLUE, linewidth=1.2)
         axes.plot(where, left, "o", color=BLUE, markersize=4.0, label="fitted to all")
         axes.plot(where, left_out, "x", color=ORANGE, label="predicted without its fold")
-        axes.set_title(f"{PHASES[phase]}, observed less predicted")
+        axes.set_title(f"{PHASE_LABELS[phase]}, observed less predicted")
         axes.set_ylabel("residual [spikes/s]")
         _name_places(axes, found)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
@@ -147,7 +147,7 @@ def caption_fit_residuals(found: FitResult) -> str:
     for phase, rates, observed_hz in _recorded(found):
         residual = observed_hz - rates.out_of_sample_hz
         row = int(np.argmax(np.abs(residual)))
-        worst.append(f"{PHASES[phase]}: {found.stimulus[row]}, {number(residual[row])}")
+        worst.append(f"{PHASE_LABELS[phase]}: {found.stimulus[row]}, {number(residual[row])}")
     return (
         "Residuals. Where adjacent residuals have the same sign, the misfit is systematic and not noise. "
         f"Largest residuals out of sample [spikes/s]: {'; '.join(worst)}."
@@ -249,7 +249,7 @@ def _recorded(found: FitResult) -> list[tuple[str, PhaseRates, FloatArray]]:
     """Phases that were recorded, with their rates and what was observed. [spikes/s]"""
     return [
         (phase, found.phases[phase], observed_hz)
-        for phase in PHASES
+        for phase in PHASE_LABELS
         if (observed_hz := found.phases[phase].observed_hz) is not None
     ]
 

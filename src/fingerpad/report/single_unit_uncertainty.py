@@ -10,7 +10,14 @@ from fingerpad.experiments.gerling2014.single_unit_uncertainty import (
     PosteriorConvergence,
     UncertaintyResult,
 )
-from fingerpad.report.formatting import ABSENT, IDENTIFIABLE_SYMBOLS, PHASES, fixed, number, whole_percent
+from fingerpad.report.formatting import (
+    ABSENT,
+    IDENTIFIABLE_SYMBOLS,
+    PHASE_LABELS,
+    fixed,
+    number,
+    whole_percent,
+)
 from fingerpad.report.parts import Row, Table
 from fingerpad.report.rate_uncertainty import draw_profile, profile_ends, sensitivity_table
 from fingerpad.report.style import BLACK, BLUE, PALE, new_figure
@@ -45,7 +52,7 @@ def draw_uncertainty(section: UncertaintyResult) -> Figure:
             markerfacecolor="white",
             markersize=4.5,
         )
-        axes.set_title(f"({'ab'[column]}) {PHASES[phase]}")
+        axes.set_title(f"({'ab'[column]}) {PHASE_LABELS[phase]}")
         axes.set_xlabel("position of the bar, proximal positive [mm]")
         axes.set_ylabel("firing rate [spikes/s]")
         axes.set_ylim(bottom=0.0)
@@ -129,7 +136,7 @@ def _residuals(section: UncertaintyResult) -> Table:
     rows = [
         Row(
             (
-                PHASES[phase],
+                PHASE_LABELS[phase],
                 *_interval(rates.residual_deviation_hz),
                 *_interval(rates.residual_length_mm),
                 number(rates.probability_of_independence, 2),

@@ -35,8 +35,8 @@ from fingerpad.experiments.discrimination.task import (
 from fingerpad.experiments.discrimination.task_stimuli import TaskStimulus, stimulus_index
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.code_efficiency import (
+    EFFICIENCY_TRIALS,
     SMALLEST_SPREAD,
-    TRIALS,
     code_efficiency,
     code_statistic,
     noisy_presentations,
@@ -457,7 +457,7 @@ def _decoding(
             code=code,
             measure=measure,
             hit_rate=best,
-            hit_rate_sd=np.sqrt(best * (1.0 - best) / TRIALS),
+            hit_rate_sd=np.sqrt(best * (1.0 - best) / EFFICIENCY_TRIALS),
             d_prime=np.array([presentation.ideal().d_prime for presentation in shown]),
         )
     else:
