@@ -6,10 +6,13 @@ import pytest
 
 LONGEST = (
     "test_reproduction.py",
+    "test_recording_fit.py",
+    "test_report.py",
     "verification/test_verification.py",
     "verification/test_oracles.py",
     "test_store.py",
     "test_discrimination_task.py",
+    "test_psychometric.py",
     "test_studies.py",
     "test_estimation_afferent_posterior.py",
     "studies/test_spike_fit.py",
