@@ -166,7 +166,7 @@ def test_a_posterior_is_part_of_the_fit_and_of_its_page(recovered, monkeypatch):
         covariance=np.eye(4),
         bands={"static": PhaseBands(predicted=band, new=band)},
     )
-    monkeypatch.setattr(study, "posterior", lambda *given: asked.append(given) or drawn)
+    monkeypatch.setattr(study, "rate_posterior", lambda *given: asked.append(given) or drawn)
     fitted = study.fit_recordings(
         SED, RATES, np.arange(8) % 2, seed=5, with_posterior=True, positions_mm=range(8)
     )
