@@ -13,7 +13,6 @@ from typing import Any
 import felupe
 import numpy as np
 from felupe.mechanics import ContactRigidBase
-from pypardiso import spsolve
 
 NODE_STIFFNESS_MN_PER_MM = 1e4
 """Penalty of a node of the skin: at 10 mN it penetrates by a micron."""
@@ -37,6 +36,8 @@ class Ball(ContactRigidBase):
 
 def press_block(block: str, found: str) -> dict[str, Any]:
     """Press; arguments and answer as in `peer_block.press_block`."""
+    from pypardiso import spsolve  # only in the environment of this program
+
     with np.load(block) as stored:
         job = {name: stored[name] for name in stored.files}
     started = perf_counter()

@@ -213,3 +213,18 @@ def test_singular_tangent_is_refused_by_superlu():
     blocks = np.zeros_like(tangent())
     with pytest.raises(ConvergenceError, match="SuperLU could not factor"):
         KeptFactor(SPARSITY, FREE).renew(blocks)
+
+
+def test_an_indefinite_matrix_is_refused_by_superlu():
+    """Its factor solves it as well, but a Newton step along that solution may lead to no minimum."""
+    places = np.indices((3, 3))
+    factor = SuperLuFactor(*places)
+    matrix = np.array([[4.0, 1.0, 0.0], [1.0, 3.0, 1.0], [0.0, 1.0, 2.0]])
+    factor.renew(matrix)
+    np.testing.assert_allclose(factor.solve(matrix @ [1.0, 2.0, 3.0]), [1.0, 2.0, 3.0], rtol=1e-12)
+    for indefinite in (
+        matrix - 3.0 * np.eye(3),
+        np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+    ):
+        with pytest.raises(NotPositiveDefiniteError):
+            factor.renew(indefinite)

@@ -488,7 +488,8 @@ def prepared(first, folder):
 
 def answer(folder):
     results = json.loads((folder / "discriminate.json").read_text())
-    return results["discrimination"], results["manifest"]
+    (stimuli,) = (stage for stage in results["manifest"]["stages"] if stage["name"] == "stimuli")
+    return results["discrimination"], stimuli
 
 
 @pytest.fixture(scope="session")
@@ -497,19 +498,19 @@ def asked(first, tmp_path_factory):
     folder = prepared(first, tmp_path_factory.mktemp("question"))
     said, errors = (run := discriminate(folder, "--jobs", "1")).communicate()
     assert (run.returncode, errors) == (0, "")
-    assert said.startswith("Gradient Sum of static rates tells 296 from 287 in ")
+    assert said.startswith("Gradient Sum of static rates discriminates 296 from 287 in ")
     return folder
 
 
 def test_the_papers_question_asked_as_ones_own_has_the_papers_hit_rates(first, asked):
-    found, manifest = answer(asked)
+    found, stimuli = answer(asked)
     theirs = first.results["discrimination"]["gradient_sum"]
-    assert (manifest["computed"], manifest["indentations"]) == (0, 7)
-    assert {reading["measure"] for reading in found["readings"]} == set(MEASURES)
-    for reading in found["readings"]:
-        rates = theirs[reading["measure"]]
-        assert reading["hit_rate"] == rates["hit_rate"]
-        assert reading["hit_rate_sd"] == rates["hit_rate_sd"]
+    assert (stimuli["computed"], stimuli["indentations"]) == (0, 7)
+    assert {decoding["measure"] for decoding in found["decodings"]} == set(MEASURES)
+    for decoding in found["decodings"]:
+        rates = theirs[decoding["measure"]]
+        assert decoding["hit_rate"] == rates["hit_rate"]
+        assert decoding["hit_rate_sd"] == rates["hit_rate_sd"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="kill -9 and process groups are POSIX")
@@ -532,8 +533,8 @@ def test_a_question_killed_at_any_moment_goes_on_and_ends_with_the_same_bits(fir
 
     _, errors = (again := discriminate(folder, "--jobs", "2")).communicate()
     assert (again.returncode, errors) == (0, "")
-    found, manifest = answer(folder)
-    assert 0 < manifest["computed"] < 3
+    found, stimuli = answer(folder)
+    assert 0 < stimuli["computed"] < 3
     assert found == answer(asked)[0]
     assert [path.read_bytes() for path in spheres] == [
         (asked / STORE_FOLDER / path.name).read_bytes() for path in spheres

@@ -245,7 +245,7 @@ def cube_energies() -> np.ndarray:
         lines += [f"*MATERIAL, NAME={name}", *law, f"*SOLID SECTION, ELSET={name}, MATERIAL={name}"]
         if material:
             moves += [
-                f"{first + node}, {axis + 1}, {axis + 1}, {cards.number(value)}"
+                f"{first + node}, {axis + 1}, {axis + 1}, {cards.digits(value)}"
                 for (node, axis), value in np.ndenumerate(displacement)
             ]
     lines += [

@@ -18,11 +18,18 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError
 
 
+class NotPositiveDefiniteError(ConvergenceError):
+    """A tangent with a direction along which it has no stiffness."""
+
+    def __init__(self) -> None:
+        super().__init__("The tangent is not positive definite.")
+
+
 class Factor(Protocol):
     """A factor that is renewed for other numbers in the same places."""
 
     def renew(self, values: np.ndarray) -> None:
-        """Factor the matrix of these values; ConvergenceError if that fails."""
+        """Factor the matrix of these values; ConvergenceError if it is not positive definite."""
         ...
 
     def solve(self, right: np.ndarray) -> FloatArray:
@@ -58,8 +65,10 @@ class SuperLuFactor:
 
         Raises
         ------
+        NotPositiveDefiniteError
+            If the matrix is not positive definite.
         ConvergenceError
-            If the matrix is singular.
+            If it is singular.
         """
         chosen = values.ravel()[self._entries].astype(np.float64)
         shape = (self._size, self._size)
@@ -71,6 +80,10 @@ class SuperLuFactor:
             )
         except RuntimeError as error:
             raise ConvergenceError(f"SuperLU could not factor the tangent: {error}.") from error
+        # Pivots on the diagonal: the factor is L D L^T, and the signs of D are those of the eigenvalues.
+        pivoted = (self._factor.perm_r != self._factor.perm_c).any()
+        if pivoted or self._factor.U.diagonal().min() <= 0.0:
+            raise NotPositiveDefiniteError
 
     def solve(self, right: np.ndarray) -> FloatArray:
         """Solve for a right-hand side (n,)."""

@@ -18,7 +18,7 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.columns import MOST_LANES
-from fingerpad.mechanics.factors import MakeFactor, SuperLuFactor
+from fingerpad.mechanics.factors import MakeFactor, NotPositiveDefiniteError, SuperLuFactor
 from fingerpad.mechanics.multigrid import Multigrid
 
 MOST_ITERATIONS = 400
@@ -33,13 +33,6 @@ DIRECT_NODES = 20_000
 """Largest mesh for a factor, which then takes about 1 GB and 15 s."""
 
 NO_NODES = np.empty(0, dtype=np.int64)
-
-
-class NotPositiveDefiniteError(ConvergenceError):
-    """A tangent with a direction along which it has no stiffness."""
-
-    def __init__(self) -> None:
-        super().__init__("The tangent is not positive definite.")
 
 
 class Preconditioner(Protocol):

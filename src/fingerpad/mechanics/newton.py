@@ -24,8 +24,9 @@ from fingerpad.core.errors import ConvergenceError
 from fingerpad.geometry.mesh_quality import element_place, squeezed_most
 from fingerpad.mechanics.configuration import Balance, Body, Configuration, Lagging, Load, evaluate
 from fingerpad.mechanics.contact import ContactState
+from fingerpad.mechanics.factors import NotPositiveDefiniteError
 from fingerpad.mechanics.friction import Anchors, rubbing_heat
-from fingerpad.mechanics.linear import LinearSolver, NotPositiveDefiniteError
+from fingerpad.mechanics.linear import LinearSolver
 
 SUFFICIENT_DECREASE = 1e-4
 SHORTEST_STEP = 1.0 / 64
