@@ -222,9 +222,7 @@ def test_an_indefinite_matrix_is_refused_by_superlu():
     matrix = np.array([[4.0, 1.0, 0.0], [1.0, 3.0, 1.0], [0.0, 1.0, 2.0]])
     factor.renew(matrix)
     np.testing.assert_allclose(factor.solve(matrix @ [1.0, 2.0, 3.0]), [1.0, 2.0, 3.0], rtol=1e-12)
-    for indefinite in (
-        matrix - 3.0 * np.eye(3),
-        np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
-    ):
+    crossed = np.array([[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    for indefinite in (matrix - 3.5 * np.eye(3), crossed):
         with pytest.raises(NotPositiveDefiniteError):
             factor.renew(indefinite)
