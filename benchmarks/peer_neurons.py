@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.runge_kutta import runge_kutta_spikes
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 
@@ -75,7 +76,7 @@ def check(currents: str, every: int) -> dict[str, Any]:
     exact = neuron.spikes(current)
     differences = []
     for step_ms in STEPS_MS:
-        stepped = neuron.spikes_runge_kutta(current, step_ms)
+        stepped = runge_kutta_spikes(neuron, current, step_ms)
         differences.append(largest_difference_ms(exact, stepped))
     return {"afferents": current.current_ma.shape[1], "differences_ms": differences}
 

@@ -23,16 +23,16 @@ from fingerpad.data import neuron
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.escape_rate import EscapeRate
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
-from fingerpad.neuron.membrane_noise import (
+from fingerpad.neuron.transduction import Drive
+from studies.interval_statistics import interval_statistics
+from studies.membrane_noise import (
     CorrelatedCurrentNoise,
     GainNoise,
     MembraneNoise,
     ThresholdNoise,
     WhiteCurrentNoise,
 )
-from fingerpad.neuron.noisy_lif import noisy_spikes
-from fingerpad.neuron.spikes import interval_statistics
-from fingerpad.neuron.transduction import Drive
+from studies.noisy_lif import noisy_spikes
 
 DURATION_MS = 10_000.0
 SETTLED_MS = 500.0

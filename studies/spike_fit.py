@@ -35,17 +35,18 @@ from fingerpad.inference.spike_parameters import (
 )
 from fingerpad.inference.start_points import spike_start
 from fingerpad.neuron.afferent import Afferent
-from fingerpad.neuron.membrane_noise import (
+from fingerpad.neuron.transduction import Drive, drive
+from studies import isi_variability
+from studies.escape_intensity import intensity_per_ms
+from studies.fitted_bars import fit_bars
+from studies.isi_variability import CORRELATION_MS, SOFT_THRESHOLD, STEP_MS, IsiVariability
+from studies.membrane_noise import (
     CorrelatedCurrentNoise,
     MembraneNoise,
     ThresholdNoise,
     WhiteCurrentNoise,
 )
-from fingerpad.neuron.noisy_lif import noisy_spikes
-from fingerpad.neuron.transduction import Drive, drive
-from studies import isi_variability
-from studies.fitted_bars import fit_bars
-from studies.isi_variability import CORRELATION_MS, SOFT_THRESHOLD, STEP_MS, IsiVariability
+from studies.noisy_lif import noisy_spikes
 
 WIDTH = 0.2
 """Width of the true threshold over the threshold."""
@@ -368,7 +369,7 @@ def _raster(recorded: SpikeLikelihood, fit: SpikeFit, true: FloatArray, shift_mm
     intensity_hz = {}
     for name, parameters in (("truth", true), ("fitted", fit.parameters)):
         soft, current = soft_membrane(recorded.drive, parameters)
-        intensity_hz[name] = MS_PER_S * soft.intensity_per_ms(current, train, [busiest], times)[:, 0]
+        intensity_hz[name] = MS_PER_S * intensity_per_ms(soft, current, train, [busiest], times)[:, 0]
     return Raster(
         shift_mm=shift_mm, spikes_ms=tuple(first), shown=busiest, times_ms=times, intensity_hz=intensity_hz
     )

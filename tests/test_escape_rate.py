@@ -12,7 +12,7 @@ from scipy.stats import kstest
 from fingerpad.core import threads
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Presentations, Purpose, uniforms
-from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.core.signals import CurrentTraces
 from fingerpad.neuron.escape_rate import EscapeRate, _integral, panels
 from fingerpad.neuron.exact_spikes import potential_at
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
@@ -101,24 +101,6 @@ def test_tau_e_only_moves_the_threshold():
     assert_allclose(slow.spikes(touched(), SEED)[0], moved.spikes(touched(), SEED)[0], rtol=1e-11)
 
 
-def test_intensity_is_the_hazard_of_the_potential_since_the_last_spike():
-    slow = EscapeRate(NEURON, 0.2, escape_ms=2.0)
-    current = touched(2)
-    spikes = SpikeTrains.from_lists([[15.0, 62.0], []])
-    times = [0.0, 10.0, 15.0, 16.0, 18.0, 40.0, 60.0, 62.0, 64.9, 65.0, 250.0]
-    found = slow.intensity_per_ms(current, spikes, [1, 0], times)
-    for train, (site, restarts) in enumerate(((1, [0.0, 18.0, 65.0]), (0, [0.0]))):
-        for row, time in enumerate(times):
-            resting = train == 0 and any(spike < time < spike + REFRACTORY for spike in (15.0, 62.0))
-            begin = max(begin for begin in restarts if begin <= time)
-            if resting:
-                assert found[row, train] == 0.0
-                continue
-            u = free_potential(current, site, begin, time)[-1][2](time)[0] if time > begin else 0.0
-            assert_allclose(found[row, train], 0.5 * math.exp((u - 1.0) / 0.2), rtol=1e-8)
-            assert_allclose(found[row, train], slow.hazard_per_ms(THRESHOLD * u), rtol=1e-8)
-
-
 def test_gauss_on_panels_errs_by_a_billionth_at_most():
     rng = np.random.default_rng(0)
     for _ in range(40):
@@ -153,14 +135,6 @@ def test_the_same_seed_gives_the_same_spikes_on_any_number_of_threads(monkeypatc
         (lambda: EscapeRate(NEURON, 0.0), "width"),
         (lambda: EscapeRate(NEURON, 0.1, escape_ms=-1.0), "escape_ms"),
         (lambda: SOFT.spikes(touched(), 0, Presentations([1], [0], [0])), "sites must be within 0 ... 0"),
-        (
-            lambda: SOFT.intensity_per_ms(touched(), SpikeTrains.from_lists([[]]), [0, 0], [1.0]),
-            "sites needs one entry per train: got 2 for 1",
-        ),
-        (
-            lambda: SOFT.intensity_per_ms(touched(), SpikeTrains.from_lists([[]]), [0], [1.0, 300.0]),
-            "times_ms must increase within 0 ... 250 ms",
-        ),
     ],
 )
 def test_what_makes_no_sense_is_refused(make, said):

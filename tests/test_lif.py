@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from benchmarks.runge_kutta import runge_kutta_spikes
 from fingerpad.core import threads
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import CurrentTraces
@@ -169,7 +170,7 @@ def bumpy_current(n_sites=4):
 def test_runge_kutta_spikes_are_late_by_less_than_a_step_each():
     """A delay is handed on: spike k is late by at most k + 1 steps under a steady current."""
     current = constant(3e-6, 300.0)
-    exact, stepped = NEURON.spikes(current)[0], NEURON.spikes_runge_kutta(current, 0.001)[0]
+    exact, stepped = NEURON.spikes(current)[0], runge_kutta_spikes(NEURON, current, 0.001)[0]
     late = stepped - exact
     assert exact.size == stepped.size > 10
     assert (late > -1e-9).all()
@@ -181,7 +182,7 @@ def test_runge_kutta_approaches_the_exact_spikes_as_its_step_shrinks():
     exact = NEURON.spikes(current)
     errors = []
     for step_ms in (0.01, 0.001):
-        stepped = NEURON.spikes_runge_kutta(current, step_ms)
+        stepped = runge_kutta_spikes(NEURON, current, step_ms)
         assert_array_equal(stepped.offsets, exact.offsets)
         errors.append(np.abs(stepped.times_ms - exact.times_ms).max())
     assert exact.times_ms.size > 20
@@ -343,4 +344,4 @@ def test_a_membrane_needs_positive_numbers(name, value):
 
 def test_runge_kutta_needs_a_positive_step():
     with pytest.raises(InputError, match="step_ms"):
-        NEURON.spikes_runge_kutta(constant(1e-6), 0.0)
+        runge_kutta_spikes(NEURON, constant(1e-6), 0.0)

@@ -14,10 +14,10 @@ from fingerpad.inference.spike_parameters import (
     SPIKE_PARAMETER_NAMES,
 )
 from fingerpad.neuron.afferent import Afferent
-from fingerpad.neuron.spikes import interval_statistics
 from fingerpad.neuron.transduction import drive
 from fingerpad.report.style import png
 from studies import isi_variability, spike_fit
+from studies.interval_statistics import interval_statistics
 from studies.isi_variability import SETTLED_MS, SOURCES, held_at_its_rate
 from studies.pages import spike_fit as report
 

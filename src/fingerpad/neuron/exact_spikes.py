@@ -70,9 +70,7 @@ def _next_guess(guess: float, missing: float, rise: float, drift: float, high: f
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _refine(
-    high: float, reached: float, start: float, steady: float, drift: float, threshold: float
-) -> float:
+def refine(high: float, reached: float, start: float, steady: float, drift: float, threshold: float) -> float:
     """Time of the only crossing within (0, high]; at `high` the potential `reached` is above the threshold.
 
     Iterates `_next_guess`, with bisection where it leaves the bracket.
@@ -93,44 +91,6 @@ def _refine(
             return following
         guess = following
     return guess
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def first_crossing(
-    length: float, start: float, steady: float, later: float, threshold: float
-) -> tuple[bool, float, float]:
-    """Integrate one potential between two knots, for kernels that treat neurons one by one.
-
-    Parameters
-    ----------
-    length : float
-        Time between the knots over tau, above 0. [1]
-    start : float
-        Potential at the first knot, below the threshold. [mV]
-    steady, later : float
-        w at the two knots. [mV]
-    threshold : float
-        Potential to reach. [mV]
-
-    Returns
-    -------
-    crosses : bool
-        Whether the potential reaches the threshold by the second knot.
-    x : float
-        Time of the first crossing; the length without one. [1]
-    reached : float
-        Potential at the second knot without a threshold. [mV]
-    """
-    drift = (later - steady) / length
-    at_knot = reached = potential_at(length, start, steady, drift)
-    high = length
-    if reached < threshold and steady >= threshold > later:
-        # As in `_bracket`: the potential peaks between the knots.
-        high = min(high, math.log1p(-(steady - start) / drift))
-        reached = potential_at(high, start, steady, drift)
-    if reached < threshold:
-        return False, length, at_knot
-    return True, _refine(high, reached, start, steady, drift, threshold), at_knot
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -289,7 +249,7 @@ def _cross(searches: FloatArray, threshold: float, crossings: FloatArray) -> Non
         rise = steady[n] + drift[n] * guesses[n] - potential
         crossings[n], exact = _next_guess(guesses[n], threshold - potential, rise, drift[n], highs[n])
         if not (exact and 0.0 < crossings[n] <= highs[n]):
-            crossings[n] = _refine(highs[n], reached[n], starts[n], steady[n], drift[n], threshold)
+            crossings[n] = refine(highs[n], reached[n], starts[n], steady[n], drift[n], threshold)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

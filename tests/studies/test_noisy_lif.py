@@ -13,7 +13,8 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Presentations, Purpose, normals
 from fingerpad.core.signals import CurrentTraces
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
-from fingerpad.neuron.membrane_noise import (
+from studies.interval_statistics import interval_statistics
+from studies.membrane_noise import (
     CorrelatedCurrentNoise,
     GainNoise,
     MembraneNoise,
@@ -21,8 +22,7 @@ from fingerpad.neuron.membrane_noise import (
     WhiteCurrentNoise,
     log_spread,
 )
-from fingerpad.neuron.noisy_lif import noisy_spikes
-from fingerpad.neuron.spikes import interval_statistics
+from studies.noisy_lif import noisy_spikes
 
 TAU, CAPACITANCE, THRESHOLD, REFRACTORY = 68.0, 1e-6, 50.0, 1.0
 NEURON = LeakyIntegrateAndFire(TAU, CAPACITANCE, THRESHOLD, REFRACTORY)

@@ -24,9 +24,9 @@ from fingerpad.core.philox import four_normals
 from fingerpad.core.random_streams import Presentations, Purpose, checked_sites
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
 from fingerpad.core.threads import in_blocks
-from fingerpad.neuron.exact_spikes import first_crossing
+from fingerpad.neuron.exact_spikes import potential_at, refine
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
-from fingerpad.neuron.membrane_noise import (
+from studies.membrane_noise import (
     CorrelatedCurrentNoise,
     MembraneNoise,
     WhiteCurrentNoise,
@@ -76,7 +76,7 @@ def noisy_spikes(
 
     Examples
     --------
-    >>> from fingerpad.neuron.membrane_noise import ThresholdNoise
+    >>> from studies.membrane_noise import ThresholdNoise
     >>> neuron = LeakyIntegrateAndFire(68.0, 1e-6, 50.0, 1.0)
     >>> steady = CurrentTraces([0.0, 100.0], [[2e-6], [2e-6]])
     >>> noise = MembraneNoise(threshold=ThresholdNoise(0.1))
@@ -120,6 +120,44 @@ def _current_numbers(
     if isinstance(noise, WhiteCurrentNoise):
         return float(noise.step_ms), noise.level_ma(time_constant_ms), 0.0
     return float(noise.step_ms), float(noise.standard_deviation_ma), noise.memory
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _first_crossing(
+    length: float, start: float, steady: float, later: float, threshold: float
+) -> tuple[bool, float, float]:
+    """Integrate one potential between two knots.
+
+    Parameters
+    ----------
+    length : float
+        Time between the knots over tau, above 0. [1]
+    start : float
+        Potential at the first knot, below the threshold. [mV]
+    steady, later : float
+        w at the two knots. [mV]
+    threshold : float
+        Potential to reach. [mV]
+
+    Returns
+    -------
+    crosses : bool
+        Whether the potential reaches the threshold by the second knot.
+    x : float
+        Time of the first crossing; the length without one. [1]
+    reached : float
+        Potential at the second knot without a threshold. [mV]
+    """
+    drift = (later - steady) / length
+    at_knot = reached = potential_at(length, start, steady, drift)
+    high = length
+    if reached < threshold and steady >= threshold > later:
+        # The potential peaks between the knots.
+        high = min(high, math.log1p(-(steady - start) / drift))
+        reached = potential_at(high, start, steady, drift)
+    if reached < threshold:
+        return False, length, at_knot
+    return True, refine(high, reached, start, steady, drift, threshold), at_knot
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -179,7 +217,7 @@ def _noisy_trains(
                 at_begin += level + noise_slope * (begin - step_start)
                 at_end = at_begin + (slope + noise_slope) * (end - begin)
                 length = (end - begin) / tau
-                crosses, x, potential = first_crossing(
+                crosses, x, potential = _first_crossing(
                     length, potential, resistance * at_begin, resistance * at_end, limit
                 )
                 if crosses:

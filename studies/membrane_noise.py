@@ -1,6 +1,6 @@
 """Models of the noise of a membrane and its input: current, threshold and gain of the end organ.
 
-`fingerpad.neuron.noisy_lif` simulates a membrane with them.
+`studies.noisy_lif` simulates a membrane with them.
 """
 
 from __future__ import annotations
