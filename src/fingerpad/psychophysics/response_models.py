@@ -21,7 +21,6 @@ from scipy.stats import poisson
 from fingerpad.core.checks import FloatArray, IntArray, float_array, not_negative, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Purpose, normals, uniforms
-from fingerpad.psychophysics.sensitivity import cholesky, whitened
 
 
 class ResponseModel(Protocol):
@@ -80,8 +79,13 @@ class GaussianResponses:
 
     @cached_property
     def factor(self) -> FloatArray:
-        """L, the lower factor of the covariance."""
-        return cholesky("covariance", self.covariance)
+        """L, the lower factor of the covariance, S = L L^T."""
+        try:
+            return np.asarray(np.linalg.cholesky(self.covariance), dtype=np.float64)
+        except np.linalg.LinAlgError as error:
+            raise InputError(
+                "covariance must be positive definite: a receptor has no noise, or two share it."
+            ) from error
 
     @property
     def n_receptors(self) -> int:
@@ -90,7 +94,9 @@ class GaussianResponses:
 
     def log_likelihood(self, responses: FloatArray) -> FloatArray:
         """Logarithm (...,) of the probability density of responses (..., n_receptors)."""
-        distance = np.square(whitened(responses - self.mean, self.factor)).sum(axis=-1)
+        # L^-1 (r - mu) has independent standard normal entries.
+        whitened = np.linalg.solve(self.factor, (responses - self.mean)[..., np.newaxis])[..., 0]
+        distance = np.square(whitened).sum(axis=-1)
         volume = np.log(np.diagonal(self.factor)).sum() + 0.5 * self.n_receptors * np.log(2.0 * np.pi)
         return -0.5 * distance - volume
 

@@ -13,10 +13,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
 from scipy.special import ndtri
 
-from fingerpad.core.checks import FloatArray, one_of, positive, whole
+from fingerpad.core.checks import one_of, positive, whole
 from fingerpad.core.errors import InputError
 
 CORRECTIONS = ("log-linear", "half", "none")
@@ -106,30 +105,3 @@ def _rate(of: str, count: int, among: str, total: int, correction: str) -> float
             f"{of} is {k} of {n}, for which d' is infinite: choose the correction 'log-linear' or 'half'."
         )
     return k / n
-
-
-def cholesky(name: str, matrix: FloatArray) -> FloatArray:
-    """Return the lower factor L of a covariance, S = L L^T, or raise `InputError` if it has none.
-
-    Examples
-    --------
-    >>> cholesky("covariance", np.array([[4.0]])).tolist()
-    [[2.0]]
-    """
-    try:
-        return np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
-    except np.linalg.LinAlgError as error:
-        raise InputError(
-            f"{name} must be positive definite: a receptor has no noise, or two share it."
-        ) from error
-
-
-def whitened(vectors: FloatArray, factor: FloatArray) -> FloatArray:
-    """Return L^-1 x of vectors (..., n): their noise then is independent and standard normal.
-
-    Examples
-    --------
-    >>> whitened(np.array([2.0]), np.array([[2.0]])).tolist()
-    [1.0]
-    """
-    return np.asarray(np.linalg.solve(factor, vectors[..., np.newaxis])[..., 0], dtype=np.float64)
