@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray
+from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.results import Number, result_class
-from fingerpad.core.signals import SpikeTrains
 from fingerpad.data import neuron
 from fingerpad.inference.afferent_methods import (
     Bounds,
@@ -25,22 +24,12 @@ from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.fitting import CrossValidation, Fit, Method
 from fingerpad.inference.fitting.covariance import jackknife_covariance
 from fingerpad.inference.fitting.methods import Continued
-from fingerpad.inference.fitting.problem import Problem
 from fingerpad.inference.identifiable import identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
-from fingerpad.inference.soft_afferent import SoftAfferent
-from fingerpad.inference.spike_fit import fit_spikes
-from fingerpad.inference.spike_likelihood import (
-    SpikeLikelihood,
-    time_rescaling,
-)
-from fingerpad.inference.spike_parameters import (
-    SPIKE_PARAMETER_NAMES,
-)
-from fingerpad.inference.start_points import response_surface, spike_start
-from fingerpad.neuron.transduction import Drive
+from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_NAMES
+from fingerpad.inference.start_points import response_surface
 
 MethodOf = Callable[[RateProblem, Bounds], Method]
 
@@ -192,72 +181,14 @@ def _evolution(
     return _four_numbers(model, rates, method_of)
 
 
-@dataclass(frozen=True)
-class MaximumLikelihood:
-    """Fit the soft threshold under which the spikes of the chosen stimuli are most likely.
-
-    Parameters
-    ----------
-    drive : Drive
-        One column per stimulus.
-    recordings : SpikeRecordings
-        Spikes of all presentations.
-    sites : int array (n_presentations,)
-        Column of the drive that each presentation belongs to.
-    """
-
-    drive: Drive
-    recordings: SpikeRecordings
-    sites: IntArray
-    name: str = "likelihood"
-
-    def of(self, chosen: IntArray) -> SpikeLikelihood:
-        """Likelihood of the spikes under the chosen stimuli."""
-        rows = np.flatnonzero(np.isin(self.sites, chosen))
-        trains = SpikeTrains.from_lists([self.recordings.trains[int(row)] for row in rows])
-        return SpikeLikelihood(self.drive, trains, self.sites[rows], self.recordings.duration_ms[rows])
-
-    def fit(self, problem: Problem, chosen: IntArray) -> Fit:
-        """Climb to the likeliest parameters; the problem only scores them."""
-        clock = time.perf_counter()
-        found = fit_spikes(self.of(chosen), spike_start())
-        seconds = time.perf_counter() - clock
-        score = problem.score(found.parameters, chosen)
-        return Fit(found.parameters, score, len(found.history), seconds, ())
-
-
 def _likelihood(
     model: AfferentModel, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
 ) -> Prepared:
-    """Prepare maximum likelihood of spike trains under a soft threshold."""
-    trains, (drive,) = check_spikes(recordings, len(model.drives)), model.drives
-    sites = np.array([rates.stimuli.index(name) for name in trains.stimuli], dtype=np.int64)
-    method = MaximumLikelihood(drive, trains, sites)
-    everything = method.of(np.arange(drive.n_sites))
-
-    def covariance(five: FloatArray) -> FloatArray:
-        return np.linalg.inv(everything.derivatives(five)[2]).astype(np.float64)
-
-    def summary(fit: Fit, folds: CrossValidation) -> SpikeFitSummary:
-        left_out = [(method.of(fold.testing), fold.fit.parameters) for fold in folds.folds]
-        test = time_rescaling(everything, fit.parameters)
-        return SpikeFitSummary(
-            n_spikes=everything.n_spikes,
-            log_likelihood=everything.log_likelihood(fit.parameters),
-            log_likelihood_out_of_sample=sum(part.log_likelihood(five) for part, five in left_out),
-            escape_width=fit.parameters[4],
-            escape_width_standard_error=np.sqrt(covariance(fit.parameters)[4, 4]),
-            time_rescaling_distance=test.statistic,
-            time_rescaling_p_value=test.p_value,
-        )
-
-    return Prepared(
-        RateProblem(SoftAfferent(drive, model.windows_ms, seed), rates),
-        method,
-        lambda five: six_parameters(five[:4]),
-        lambda fit, folds: covariance(fit.parameters)[:4, :4],
-        summary,
+    """Prepare maximum likelihood of spike trains, whose module and kernels only this method loads."""
+    prepared: Prepared = import_module("fingerpad.experiments.fit.spike_method").prepare(
+        model, recordings, rates, seed
     )
+    return prepared
 
 
 METHODS: dict[

@@ -15,7 +15,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
 from fingerpad.core.signals import STORED_ENERGY
-from fingerpad.data import bar_firing_rates
+from fingerpad.data.observations import bar_firing_rates
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.fit.fit import FitResult, check_enough, fit_recordings, folds_in_turn
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
