@@ -2,6 +2,8 @@
 
 import ast
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -50,6 +52,15 @@ def test_a_package_imports_only_what_its_row_names(package):
     stated = ROWS[package][2]
     named = set(FOLDERS) if "all others" in stated else set(re.findall(r"`(\w+)`", stated))
     assert imported(package) <= named | ({"core", "data"} if package not in ("core", "data") else {"core"})
+
+
+def test_a_command_loads_what_its_options_need_when_they_are_given():
+    """The method of spikes, and regions of the skin, stand behind names that are loaded on demand."""
+    late = ("inference.spike_likelihood", "neuron.escape_rate", "skin.unrolled_skin", "core.regions")
+    loading = "import sys, fingerpad.experiments.fit.session, fingerpad.experiments.discrimination.run; "
+    stated = f"{loading}print(*[name for name in {late!r} if 'fingerpad.' + name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", stated], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
 
 
 def test_the_installed_package_imports_nothing_that_stands_beside_it():

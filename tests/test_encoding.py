@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.layouts import hexagonal, jittered, poisson_disc, rectangular, uniform
+from fingerpad.core.patterns import hexagonal, jittered, poisson_disc, rectangular, uniform
 from fingerpad.core.regions import Ellipse
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import (

@@ -11,16 +11,8 @@ from scipy.spatial import cKDTree
 from scipy.stats import chisquare, kstest
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.layouts import (
-    MOST_RECEPTORS,
-    PATTERNS,
-    Layout,
-    hexagonal,
-    jittered,
-    poisson_disc,
-    rectangular,
-    uniform,
-)
+from fingerpad.core.layouts import PATTERNS, Layout
+from fingerpad.core.patterns import MOST_RECEPTORS, hexagonal, jittered, poisson_disc, rectangular, uniform
 from fingerpad.core.regions import Ellipse, Polygon, Rectangle
 from fingerpad.neuron.population import Population
 

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import kstest
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.layouts import jittered
+from fingerpad.core.patterns import jittered
 from fingerpad.core.regions import Ellipse
 from fingerpad.core.signals import SedTraces
 from fingerpad.neuron.afferent import Afferent

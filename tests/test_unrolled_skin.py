@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from scipy.stats import poisson
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.layouts import hexagonal, jittered, poisson_disc, rectangular, uniform
+from fingerpad.core.patterns import hexagonal, jittered, poisson_disc, rectangular, uniform
 from fingerpad.core.regions import Ellipse, Rectangle
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading

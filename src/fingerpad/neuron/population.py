@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, positive, whole
 from fingerpad.core.errors import InputError
-from fingerpad.core.layouts import Layout, _Place, around_zero
+from fingerpad.core.layouts import Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Skin
 from fingerpad.data import fingertip, protocol, psychophysics
@@ -120,7 +120,7 @@ class Population:
     def of_layout(
         cls,
         layout: Layout,
-        place: _Place | None = None,
+        place: Place | None = None,
         afferent: Afferent | None = None,
         sensitivity: ArrayLike | None = None,
     ) -> Population:
@@ -144,7 +144,7 @@ class Population:
 
         Examples
         --------
-        >>> from fingerpad.core.layouts import hexagonal
+        >>> from fingerpad.core.patterns import hexagonal
         >>> from fingerpad.core.regions import Ellipse
         >>> disc = Ellipse(3.0, 3.0, centre_mm=(17.37, 0.0))
         >>> len(Population.of_layout(hexagonal(disc, density_per_cm2=100.0)))

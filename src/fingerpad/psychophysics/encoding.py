@@ -142,7 +142,7 @@ def neighbours_of(places_mm: ArrayLike, pitch_mm: float, pattern: str) -> np.nda
 
     Examples
     --------
-    >>> from fingerpad.core.layouts import hexagonal
+    >>> from fingerpad.core.patterns import hexagonal
     >>> from fingerpad.core.regions import Ellipse
     >>> seven = hexagonal(Ellipse(1.2, 1.2), density_per_cm2=115.47)
     >>> len(neighbours_of(seven.places_mm, seven.pitch_mm, seven.pattern))

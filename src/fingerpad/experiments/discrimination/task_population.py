@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import read_text
-from fingerpad.core.layouts import PATTERNS, Layout, hexagonal, jittered, poisson_disc, rectangular, uniform
-from fingerpad.core.regions import Ellipse, Polygon, Rectangle, Region
+from fingerpad.core.layouts import PATTERNS
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
@@ -18,16 +16,12 @@ from fingerpad.experiments.discrimination.task import (
     DEFAULT,
     GRID,
     NAIL_ROWS,
-    PAD,
     AfferentSettings,
     DiscriminationTask,
     PopulationSettings,
-    RegionSettings,
 )
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.population import Population, sensitivities
-from fingerpad.skin.nail_edge import NailEdge
-from fingerpad.skin.unrolled_skin import UnrolledSkin
 
 _OF_LAYOUT = {
     "rows": (GRID, NAIL_ROWS),
@@ -36,12 +30,6 @@ _OF_LAYOUT = {
     "offset_mm": (GRID, *PATTERNS),
     "jitter": ("jittered",),
     "separation": ("poisson-disc",),
-}
-_OF_SHAPE = {
-    "rectangle": ("length_mm", "width_mm"),
-    "ellipse": ("length_mm", "width_mm"),
-    "polygon": ("corners_mm",),
-    PAD: (),
 }
 
 
@@ -110,7 +98,7 @@ def task_population(task: DiscriminationTask, beside: Path = Path()) -> Populati
                 f"population.{key} must not be given: it belongs to the layout {' or '.join(layouts)}, and "
                 f"this one is {settings.layout}."
             )
-    laid = _LAID.get(settings.layout, _in_region)(settings, afferent)
+    laid = _grid(settings, afferent) if settings.layout == GRID else _on_skin(settings, afferent)
     if settings.sensitivity_spread == 0.0:
         return laid
     return replace(laid, sensitivity=sensitivities(len(laid), settings.sensitivity_spread, settings.seed))
@@ -127,70 +115,9 @@ def _grid(settings: PopulationSettings, afferent: Afferent) -> Population:
     )
 
 
-def _along_nail(settings: PopulationSettings, afferent: Afferent) -> Population:
-    """Lay rows along the edge of the nail."""
-    nail = NailEdge()
-    with _placed("population"):
-        rows = nail.rows(settings.rows or 1, settings.density_per_cm2)
-    return Population.of_layout(rows, nail.points, afferent)
-
-
-def _in_region(settings: PopulationSettings, afferent: Afferent) -> Population:
-    """Fill a region of the unrolled skin."""
-    if settings.region is None:
-        raise InputError(f"population.region must be given for the layout {settings.layout}: it is missing.")
-    skin = UnrolledSkin(origin_x_mm=RECEPTOR_X_MM)
-    region = _region(settings.region, settings.offset_mm, skin)
-    with _placed("population"):
-        return Population.of_layout(_layout(settings, region, skin), skin.points, afferent)
-
-
-def _region(settings: RegionSettings, offset_mm: tuple[float, ...], skin: UnrolledSkin) -> Region:
-    """Part of the unrolled skin that is meant."""
-    wanted = _OF_SHAPE[settings.shape]
-    for key in wanted:
-        if key not in settings.given:
-            raise InputError(f"population.region.{key} must be given for a {settings.shape}: it is missing.")
-    for key in settings.given:
-        if key not in ("shape", *wanted):
-            raise InputError(
-                f"population.region.{key} must not be given: a {settings.shape} has "
-                f"{', '.join(wanted) or 'no size'}."
-            )
-    along, across = offset_mm
-    length, width = settings.length_mm or 0.0, settings.width_mm or 0.0
-    with _placed("population.region"):
-        if settings.shape == PAD:
-            return skin.pad()
-        if settings.shape == "polygon":
-            corners = [(along + x, across + z) for x, z in settings.corners_mm or ()]
-            return Polygon(tuple(corners))
-        if settings.shape == "ellipse":
-            return Ellipse(0.5 * length, 0.5 * width, (along, across))
-        return Rectangle(length, width, (along, across))
-
-
-def _layout(settings: PopulationSettings, region: Region, skin: UnrolledSkin) -> Layout:
-    """Places in a region."""
-    density, seed = settings.density_per_cm2, settings.seed
-    if settings.layout == "rectangular":
-        return rectangular(region, density)
-    if settings.layout == "hexagonal":
-        return hexagonal(region, density)
-    if settings.layout == "uniform":
-        return uniform(region, density, seed)
-    if settings.layout == "jittered":
-        return jittered(region, density, seed, **settings.chosen("jitter"))
-    return poisson_disc(region, density, seed, **settings.chosen("separation"), place=skin.points)
-
-
-_LAID = {GRID: _grid, NAIL_ROWS: _along_nail}
-
-
-@contextmanager
-def _placed(key: str) -> Iterator[None]:
-    """Put the key in front of an `InputError` from within."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{key}: {error}") from error
+def _on_skin(settings: PopulationSettings, afferent: Afferent) -> Population:
+    """Lay afferents along the nail or in a region; only such tasks load the modules that unroll the skin."""
+    laid: Population = import_module("fingerpad.experiments.discrimination.skin_layouts").lay(
+        settings, afferent
+    )
+    return laid

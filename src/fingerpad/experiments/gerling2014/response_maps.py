@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, positive
 from fingerpad.core.errors import InputError
-from fingerpad.core.layouts import MM2_PER_CM2, hexagonal
+from fingerpad.core.layouts import MM2_PER_CM2
+from fingerpad.core.patterns import hexagonal
 from fingerpad.core.regions import Ellipse
 from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_class
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap, SedTraces
