@@ -15,7 +15,8 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.inference.afferent_methods import four_number_problem
-from fingerpad.inference.fitting import Method, cross_validate, interleaved_folds
+from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
+from fingerpad.inference.fitting.methods import Method
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.start_points import response_surface, start_points
 from fingerpad.neuron.transduction import drive

@@ -23,8 +23,9 @@ from fingerpad.psychophysics.code_efficiency import (
 )
 from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, neighbour_pairs, taking_part
 from fingerpad.psychophysics.ideal_observer import present
-from fingerpad.psychophysics.response_models import PoissonResponses, ResponseModel, multiplied_responses
+from fingerpad.psychophysics.response_models import ResponseModel, multiplied_responses
 from studies.fitted_bars import fit_bars
+from studies.poisson_responses import PoissonResponses
 
 PAIR_PER_M = (287.0, 316.0)
 """Two spheres near the threshold of people, at which efficiency is measured. [1/m]"""

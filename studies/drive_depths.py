@@ -26,7 +26,7 @@ from fingerpad.experiments.gerling2014.drive_fits import (
     scaled_starts,
 )
 from fingerpad.geometry.mesh import LAYERS, Mesh
-from fingerpad.inference.fitting import Method
+from fingerpad.inference.fitting.methods import Method
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings

@@ -8,8 +8,8 @@ import numpy as np
 
 from fingerpad.core.checks import IntArray
 from fingerpad.experiments.gerling2014.drive_fits import RELATIVE_NAMES, quick_method
-from fingerpad.inference.fitting import Fit, Method, best_of
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
+from fingerpad.inference.fitting.methods import Fit, Method, best_of
 from fingerpad.inference.fitting.problem import Problem
 
 

@@ -30,17 +30,11 @@ from fingerpad.inference.afferent_methods import (
     search_from,
 )
 from fingerpad.inference.closed_form import ClosedFormModel
-from fingerpad.inference.fitting import (
-    Continued,
-    CrossValidation,
-    Fit,
-    Method,
-    cross_validate,
-    fractional_sum_of_squares,
-    interleaved_folds,
-)
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
+from fingerpad.inference.fitting.cross_validation import CrossValidation, cross_validate, interleaved_folds
+from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
 from fingerpad.inference.fitting.least_squares import LeastSquares
+from fingerpad.inference.fitting.methods import Continued, Fit, Method
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.receptor_offset import ReceptorOffset

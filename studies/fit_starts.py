@@ -11,7 +11,7 @@ from fingerpad.core.results import Matrix, Number, Vector, result_class
 from fingerpad.core.signals import SedTraces
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data import neuron, paper
-from fingerpad.inference.fitting import interleaved_folds
+from fingerpad.inference.fitting.cross_validation import interleaved_folds
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.start_points import printed_starts, response_surface

@@ -10,7 +10,8 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import Conditions, Touch
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.runner import Runner
-from fingerpad.inference.fitting import CrossValidation, Fit
+from fingerpad.inference.fitting.cross_validation import CrossValidation
+from fingerpad.inference.fitting.methods import Fit
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.sampling import SkinResponse

@@ -13,7 +13,7 @@ from fingerpad.core.checks import FloatArray, float_array
 from fingerpad.core.errors import InputError
 from fingerpad.data import bar_firing_rates, protocol, psychophysics
 from fingerpad.experiments.gerling2014.discrepancy import PATIENCE_MS
-from fingerpad.inference.fitting import weighted_fractional_sum_of_squares
+from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.spikes import firing_rate_hz, first_spike_latency_ms
 from fingerpad.psychophysics.noise_fit import expected_hit_rates
@@ -217,12 +217,11 @@ def goodness_of_fit(reading: Reading) -> float:
     """Weighted FSS of Eqs. 12-14 of the rates at the shifts that were pressed, parameters as they are."""
     observed = bar_firing_rates()
     shifts = list(reading.touches)
-    return weighted_fractional_sum_of_squares(
-        observed.dynamic_rate_hz[shifts],
-        reading.rate_hz["dynamic"][:, 0],
-        observed.static_rate_hz[shifts],
-        reading.rate_hz["static"][:, 0],
+    dynamic, static = (
+        fractional_sum_of_squares(rates_hz[shifts], reading.rate_hz[phase][:, 0])
+        for phase, rates_hz in (("dynamic", observed.dynamic_rate_hz), ("static", observed.static_rate_hz))
     )
+    return protocol.DYNAMIC_WEIGHT.value * dynamic + protocol.STATIC_WEIGHT.value * static
 
 
 def hit_rates(

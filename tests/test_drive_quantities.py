@@ -16,7 +16,8 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import drive_fits, drive_quantities
 from fingerpad.experiments.gerling2014.drive_quantities import ALONE, APART, EXTENDED, PAPER, SHOWN, Drivers
 from fingerpad.experiments.runner import Runner
-from fingerpad.inference.fitting import Fit, interleaved_folds
+from fingerpad.inference.fitting.cross_validation import interleaved_folds
+from fingerpad.inference.fitting.methods import Fit
 from fingerpad.inference.identifiable import identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem

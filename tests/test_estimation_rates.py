@@ -7,8 +7,9 @@ import pytest
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import CurrentTraces, SedTraces
+from fingerpad.experiments.gerling2014.single_unit import bar_recordings
 from fingerpad.inference.closed_form import ClosedFormModel, constant_drive_rate
-from fingerpad.inference.fitting import weighted_fractional_sum_of_squares
+from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
 from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel, Reparametrised, four_number_model
@@ -55,14 +56,45 @@ def test_residuals_make_the_score_and_the_score_is_the_papers(four_numbers):
     residuals = four_numbers.residuals(other, chosen)
     assert residuals.shape == (10,)
     observed, (dynamic, static) = four_numbers.recordings, four_numbers.model.evaluate(other)
-    papers = weighted_fractional_sum_of_squares(
-        observed.dynamic_rate_hz[chosen], dynamic[chosen], observed.static_rate_hz[chosen], static[chosen]
-    )
+    papers = 0.25 * fractional_sum_of_squares(
+        observed.dynamic_rate_hz[chosen], dynamic[chosen]
+    ) + 0.75 * fractional_sum_of_squares(observed.static_rate_hz[chosen], static[chosen])
     assert four_numbers.score(other, chosen) == papers < 0.99
     assert 1.0 - residuals @ residuals == pytest.approx(papers, abs=1e-14)
     by_phase = four_numbers.score_by_phase(other, chosen)
     assert 0.25 * by_phase["dynamic"] + 0.75 * by_phase["static"] == pytest.approx(papers, abs=1e-14)
     assert four_numbers.score(FOUR, chosen) == 1.0
+
+
+class Fixed:
+    """Rates that depend on no parameter."""
+
+    names, n_stimuli = (), 36
+
+    def __init__(self, *rates_hz):
+        self.rates_hz = rates_hz
+
+    def evaluate(self, parameters):
+        return self.rates_hz
+
+
+def score_of_the_bar(dynamic_hz, static_hz, **weights) -> float:
+    observed = bar_recordings()
+    return RateProblem(Fixed(dynamic_hz, static_hz), observed, **weights).score(np.empty(0), np.arange(36))
+
+
+def test_static_phase_weighs_three_times_the_dynamic_phase() -> None:
+    dynamic, static = bar_recordings().dynamic_rate_hz, bar_recordings().static_rate_hz
+    silent = np.zeros(36)
+    assert score_of_the_bar(dynamic, silent) == 0.25
+    assert score_of_the_bar(silent, static) == 0.75
+    assert score_of_the_bar(dynamic, silent, dynamic_weight=0.4, static_weight=0.6) == 0.4
+
+
+def test_best_symmetric_prediction_of_the_bar_has_the_known_weighted_score() -> None:
+    dynamic, static = bar_recordings().dynamic_rate_hz, bar_recordings().static_rate_hz
+    score = score_of_the_bar((dynamic + dynamic[::-1]) / 2, (static + static[::-1]) / 2)
+    assert score == pytest.approx(0.979, abs=5e-4)
 
 
 def test_a_phase_that_was_not_recorded_has_no_part_in_the_score(four_numbers):

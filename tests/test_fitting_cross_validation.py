@@ -7,15 +7,10 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.inference.fitting import (
-    ResponseSurface,
-    coding_increments,
-    cross_validate,
-    folds_of,
-    interleaved_folds,
-    maximise,
-    weighted_fractional_sum_of_squares,
-)
+from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
+from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
+from fingerpad.inference.fitting.methods import ResponseSurface
+from fingerpad.inference.fitting.response_surface import coding_increments, maximise
 
 SHIFTS = np.linspace(-3.5, 3.5, 36)
 TRUTH = np.array([0.15, 2.0, 1.8])
@@ -44,9 +39,9 @@ class Scored:
 def toy_problem(observed: tuple[np.ndarray, np.ndarray]) -> Scored:
     def score(parameters: np.ndarray, chosen: np.ndarray) -> float:
         dynamic, static = toy_rates(parameters)
-        return weighted_fractional_sum_of_squares(
-            observed[0][chosen], dynamic[chosen], observed[1][chosen], static[chosen]
-        )
+        return 0.25 * fractional_sum_of_squares(
+            observed[0][chosen], dynamic[chosen]
+        ) + 0.75 * fractional_sum_of_squares(observed[1][chosen], static[chosen])
 
     return Scored(score)
 
@@ -142,29 +137,6 @@ def test_memberships_with_a_gap_are_refused(memberships: list[float]) -> None:
 def test_memberships_that_miss_an_observation_are_refused() -> None:
     with pytest.raises(InputError, match="memberships needs one fold per observation: got 3 for 4"):
         cross_validate(Scored(lambda *_: 0.0, 4), ResponseSurface([[0.0]], [0.1]), [0, 1, 0])
-
-
-def test_folds_come_from_lists_of_what_each_leaves_out() -> None:
-    folds = folds_of([[4, 0], [1, 2, 5], [3]], 6)
-    assert folds.tolist() == [0, 1, 1, 2, 0, 1]
-    np.testing.assert_array_equal(
-        folds_of([range(fold, 36, 6) for fold in range(6)], 36), interleaved_folds(36)
-    )
-
-
-@pytest.mark.parametrize(
-    ("testing_sets", "words"),
-    [
-        ([[0, 1], [1, 2]], "must not overlap: observation 1 is in fold 0 and in fold 1"),
-        ([[0], [0, 1, 2]], "must not overlap: observation 0 is in fold 0 and in fold 1"),
-        ([[0], [2]], "must hold every observation: observation 1 is in none"),
-        ([[0, 1], [2, 3]], "must hold observations 0 ... 2: fold 1 holds 3"),
-        ([[0, 1], [-1]], "an observation of fold 1 must be a whole number of at least 0: got -1"),
-    ],
-)
-def test_folds_that_overlap_or_miss_an_observation_are_refused(testing_sets, words) -> None:
-    with pytest.raises(InputError, match=words):
-        folds_of(testing_sets, 3)
 
 
 def test_other_wrong_shapes_are_refused() -> None:

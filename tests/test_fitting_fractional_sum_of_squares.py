@@ -1,4 +1,4 @@
-"""FSS against its closed forms (Eqs. 12-14)."""
+"""FSS against its closed forms (Eqs. 13-14)."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fingerpad.core.errors import InputError
-from fingerpad.data import bar_firing_rates
-from fingerpad.inference.fitting import fractional_sum_of_squares, weighted_fractional_sum_of_squares
+from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
 
 RATES = np.array([0.0, 20.0, 135.0, 210.0, 72.0, 5.0])
 
@@ -36,24 +35,6 @@ def test_the_score_does_not_depend_on_the_unit_of_the_rates() -> None:
     )
 
 
-def test_static_phase_weighs_three_times_the_dynamic_phase() -> None:
-    observed = bar_firing_rates()
-    dynamic, static = observed.dynamic_rate_hz, observed.static_rate_hz
-    silent = np.zeros(dynamic.size)
-    assert weighted_fractional_sum_of_squares(dynamic, dynamic, static, silent) == 0.25
-    assert weighted_fractional_sum_of_squares(dynamic, silent, static, static) == 0.75
-    assert weighted_fractional_sum_of_squares(dynamic, dynamic, static, silent, 0.4, 0.6) == 0.4
-
-
-def test_best_symmetric_prediction_of_the_bar_has_the_known_weighted_score() -> None:
-    observed = bar_firing_rates()
-    dynamic, static = observed.dynamic_rate_hz, observed.static_rate_hz
-    score = weighted_fractional_sum_of_squares(
-        dynamic, (dynamic + dynamic[::-1]) / 2, static, (static + static[::-1]) / 2
-    )
-    assert score == pytest.approx(0.979, abs=5e-4)
-
-
 def test_what_cannot_be_scored_is_refused() -> None:
     with pytest.raises(InputError, match="must match: got 2 and 3 values"):
         fractional_sum_of_squares([1.0, 2.0], [1.0, 2.0, 3.0])
@@ -61,5 +42,3 @@ def test_what_cannot_be_scored_is_refused() -> None:
         fractional_sum_of_squares([0.0, 0.0], [1.0, 2.0])
     with pytest.raises(InputError, match="predicted must hold finite numbers"):
         fractional_sum_of_squares([1.0, 2.0], [1.0, np.nan])
-    with pytest.raises(InputError, match="static_weight must not be negative"):
-        weighted_fractional_sum_of_squares([1.0], [1.0], [1.0], [1.0], static_weight=-0.75)

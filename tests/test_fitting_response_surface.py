@@ -8,7 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.inference.fitting import coding_increments, factorial_design, maximise, regression_slopes
+from fingerpad.inference.fitting.response_surface import (
+    coding_increments,
+    factorial_design,
+    maximise,
+    regression_slopes,
+)
 
 
 class Counted:

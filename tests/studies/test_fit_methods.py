@@ -12,7 +12,7 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.inference import afferent_methods
 from fingerpad.inference.afferent_methods import OFFSETS_MM, four_number_problem
-from fingerpad.inference.fitting import interleaved_folds
+from fingerpad.inference.fitting.cross_validation import interleaved_folds
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import start_points

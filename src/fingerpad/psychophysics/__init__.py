@@ -16,13 +16,11 @@ from fingerpad.psychophysics.ideal_observer import (
     discriminability,
     efficiency,
     gaussian_information,
-    poisson_information,
     present,
 )
 from fingerpad.psychophysics.psychometric import PsychometricFit, fit_psychometric
 from fingerpad.psychophysics.response_models import (
     GaussianResponses,
-    PoissonResponses,
     ResponseModel,
     multiplied_responses,
 )
@@ -48,7 +46,6 @@ __all__ = [
     "GaussianResponses",
     "GoodnessOfFit",
     "JudgementCounts",
-    "PoissonResponses",
     "Presentation",
     "PsychometricFit",
     "PsychometricFunction",
@@ -67,7 +64,6 @@ __all__ = [
     "goodness_of_fit",
     "multiplied_responses",
     "noisy_presentations",
-    "poisson_information",
     "posterior",
     "present",
     "same_different_by_difference",

@@ -138,7 +138,7 @@ def present(
     Parameters
     ----------
     standard, comparison : ResponseModel
-        Distributions of the responses: `GaussianResponses`, `PoissonResponses`, or another model.
+        Distributions of the responses: `GaussianResponses` or another model.
     seed : int
         Of the random numbers, keyed by trial and receptor.
     n_trials : int, optional
@@ -264,37 +264,3 @@ def gaussian_information(
         )
     variance = np.square(sigma * values) + floor**2
     return float((np.square(rises) / variance + 2.0 * np.square(sigma**2 * values * rises / variance)).sum())
-
-
-def poisson_information(mean_counts: ArrayLike, slopes: ArrayLike) -> float:
-    """Fisher information of Poisson spike counts: J = sum_i lambda_i'^2 / lambda_i.
-
-    Parameters
-    ----------
-    mean_counts : array_like (n_receptors,)
-        lambda, positive.
-    slopes : array_like (n_receptors,)
-        lambda', their derivatives by the stimulus x. [1/unit of x]
-
-    Returns
-    -------
-    float
-        J. [1/unit of x squared]
-
-    Raises
-    ------
-    InputError
-        If sizes differ or a mean is not positive.
-
-    Examples
-    --------
-    >>> poisson_information([4.0], [2.0])
-    1.0
-    """
-    means, rises = float_array("mean_counts", mean_counts, 1), float_array("slopes", slopes, 1)
-    if means.size != rises.size or (means <= 0.0).any():
-        raise InputError(
-            f"mean_counts must be positive, and slopes be as many: got {rises.size} slopes for {means.size} "
-            f"means, the smallest {means.min(initial=np.inf):g}."
-        )
-    return float((np.square(rises) / means).sum())

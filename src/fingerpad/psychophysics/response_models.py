@@ -1,7 +1,6 @@
 """Distributions of the responses of a population, which the ideal observer knows.
 
-    Gaussian    ln p(r) = -1/2 |L^-1 (r - mu)|^2 - sum ln L_ii - n/2 ln 2 pi,    S = L L^T
-    Poisson     ln p(r) = sum_i (r_i ln lambda_i - lambda_i - ln r_i!)
+    ln p(r) = -1/2 |L^-1 (r - mu)|^2 - sum ln L_ii - n/2 ln 2 pi,    S = L L^T
 
 The paper's noise multiplies each response by Normal(1, sigma_1): a Gaussian with the standard deviation
 sigma_1 mu_i, which depends on the stimulus as well.
@@ -15,12 +14,10 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import gammaln, xlogy
-from scipy.stats import poisson
 
 from fingerpad.core.checks import FloatArray, IntArray, float_array, not_negative, positive
 from fingerpad.core.errors import InputError
-from fingerpad.core.random_streams import Purpose, normals, uniforms
+from fingerpad.core.random_streams import Purpose, normals
 
 
 class ResponseModel(Protocol):
@@ -145,49 +142,3 @@ def multiplied_responses(
             "smallest_spread."
         )
     return GaussianResponses(values, np.diag(np.square(sigma * values) + floor**2))
-
-
-@dataclass(frozen=True)
-class PoissonResponses:
-    """Spike counts of Poisson processes.
-
-    Parameters
-    ----------
-    mean_counts : array (n_receptors,)
-        lambda, not negative: rates times the length of the window.
-
-    Raises
-    ------
-    InputError
-        If a mean is negative.
-
-    Examples
-    --------
-    >>> one = PoissonResponses([2.0])
-    >>> np.exp(one.log_likelihood(np.array([0.0]))).round(4).tolist()
-    0.1353
-    """
-
-    mean_counts: FloatArray
-
-    def __post_init__(self) -> None:
-        means = float_array("mean_counts", self.mean_counts, 1)
-        if (means < 0.0).any():
-            raise InputError(f"mean_counts must not be negative: the smallest is {means.min():g}.")
-        object.__setattr__(self, "mean_counts", means)
-
-    @property
-    def n_receptors(self) -> int:
-        """Number of receptors."""
-        return self.mean_counts.size
-
-    def log_likelihood(self, responses: FloatArray) -> FloatArray:
-        """Logarithm (...,) of the probability of counts (..., n_receptors); -inf for impossible ones."""
-        each = xlogy(responses, self.mean_counts) - self.mean_counts - gammaln(responses + 1.0)
-        return each.sum(axis=-1)
-
-    def draw(self, seed: int, trials: IntArray) -> FloatArray:
-        """Sample counts (n_trials, n_receptors) with the random numbers of these trials."""
-        shares = uniforms(seed, trials, self.n_receptors, Purpose.SPIKE_COUNT, 1)[..., 0]
-        # A share of exactly 0 would be a count of -1.
-        return np.maximum(poisson.ppf(shares, self.mean_counts), 0.0)

@@ -16,12 +16,8 @@ from fingerpad.experiments.fit.methods import METHODS, Prepared, SpikeFitSummary
 from fingerpad.experiments.fit.offset import Beside, OffsetFit, check_beside, fit_offset
 from fingerpad.experiments.fit.posterior import RatePosterior, profiled, rate_posterior
 from fingerpad.experiments.fit.rate_uncertainty import FssSensitivity, ParameterProfile, fss_sensitivity
-from fingerpad.inference.fitting import (
-    CrossValidation,
-    cross_validate,
-    fractional_sum_of_squares,
-    interleaved_folds,
-)
+from fingerpad.inference.fitting.cross_validation import CrossValidation, cross_validate, interleaved_folds
+from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
 from fingerpad.inference.identifiable import (
     IDENTIFIABLE_NAMES,
     IDENTIFIABLE_UNITS,

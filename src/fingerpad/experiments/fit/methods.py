@@ -21,9 +21,9 @@ from fingerpad.inference.afferent_methods import (
     search_from,
 )
 from fingerpad.inference.closed_form import ClosedFormModel
-from fingerpad.inference.fitting import CrossValidation, Fit, Method
 from fingerpad.inference.fitting.covariance import jackknife_covariance
-from fingerpad.inference.fitting.methods import Continued
+from fingerpad.inference.fitting.cross_validation import CrossValidation
+from fingerpad.inference.fitting.methods import Continued, Fit, Method
 from fingerpad.inference.identifiable import identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem

@@ -27,9 +27,10 @@ from fingerpad.inference.afferent_methods import (
     search_from,
 )
 from fingerpad.inference.closed_form import ClosedFormModel
-from fingerpad.inference.fitting import Continued, Method, cross_validate
 from fingerpad.inference.fitting.covariance import jackknife_covariance
+from fingerpad.inference.fitting.cross_validation import cross_validate
 from fingerpad.inference.fitting.least_squares import LeastSquares
+from fingerpad.inference.fitting.methods import Continued, Method
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.rate_model import Windows
 from fingerpad.inference.receptor_offset import ReceptorOffset

@@ -10,7 +10,8 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.experiments.fit.methods import Prepared, SpikeFitSummary, check_spikes
-from fingerpad.inference.fitting import CrossValidation, Fit
+from fingerpad.inference.fitting.cross_validation import CrossValidation
+from fingerpad.inference.fitting.methods import Fit
 from fingerpad.inference.fitting.problem import Problem
 from fingerpad.inference.identifiable import six_parameters
 from fingerpad.inference.rate_model import AfferentModel

@@ -14,13 +14,9 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, IntArray, whole
 from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.data import protocol
-from fingerpad.inference.fitting import (
-    Fit,
-    Method,
-    cross_validate,
-    interleaved_folds,
-)
+from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
 from fingerpad.inference.fitting.least_squares import LeastSquares
+from fingerpad.inference.fitting.methods import Fit, Method
 from fingerpad.inference.identifiable import identifiable, six_parameters
 from fingerpad.inference.rate_model import RateModel, Reparametrised
 from fingerpad.inference.rate_problem import RateProblem

@@ -28,7 +28,7 @@ from fingerpad.experiments.gerling2014.drive_fits import (
     scaled_starts,
     six_of_relative,
 )
-from fingerpad.inference.fitting import Method
+from fingerpad.inference.fitting.methods import Method
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem

@@ -13,13 +13,13 @@ from fingerpad.core.signals import STORED_ENERGY, SedTraces
 from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.geometry.indenters import Bar
-from fingerpad.inference.fitting import (
+from fingerpad.inference.fitting.cross_validation import (
     CrossValidation,
-    Fit,
     FoldFit,
     cross_validate,
     interleaved_folds,
 )
+from fingerpad.inference.fitting.methods import Fit
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
@@ -115,9 +115,7 @@ def fit(problem: RateProblem, memberships: ArrayLike | None = None) -> tuple[Fit
     problem : RateProblem
         From `rate_problem`.
     memberships : int array (n_shifts,), optional
-        Fold of each shift, as `fingerpad.inference.fitting.folds_of` makes them from a table like the
-        paper's Table 3;
-        default: dealt out in turn.
+        Fold of each shift; default: assigned in turn.
     """
     method, everything = response_surface(), np.arange(problem.n_observations)
     folds = interleaved_folds(everything.size) if memberships is None else memberships

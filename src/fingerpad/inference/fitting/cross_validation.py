@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,50 +87,6 @@ def interleaved_folds(n_observations: int, n_folds: int = int(protocol.FOLDS.val
     return np.arange(n_observations, dtype=np.int64) % n_folds
 
 
-def folds_of(testing_sets: Sequence[Sequence[int]], n_observations: int) -> IntArray:
-    """Fold of each observation from the testing sets of the folds, as in the paper's Table 3.
-
-    Parameters
-    ----------
-    testing_sets : sequence of sequence of int
-        Observations of each fold, counted from 0.
-    n_observations : int
-        Number of observations.
-
-    Returns
-    -------
-    int array (n_observations,)
-
-    Raises
-    ------
-    InputError
-        If an observation is in two folds or in none, or does not exist.
-
-    Examples
-    --------
-    >>> folds_of([[0, 3], [1], [2, 4]], 5).tolist()
-    [0, 1, 2, 0, 2]
-    """
-    memberships = np.full(whole("n_observations", n_observations, at_least=2), -1, dtype=np.int64)
-    for fold, observations in enumerate(testing_sets):
-        for observation in observations:
-            row = whole(f"an observation of fold {fold}", observation, at_least=0)
-            if row >= n_observations:
-                raise InputError(
-                    f"Folds must hold observations 0 ... {n_observations - 1}: fold {fold} holds {row}."
-                )
-            if memberships[row] >= 0:
-                raise InputError(
-                    "Folds must not overlap: "
-                    f"observation {row} is in fold {memberships[row]} and in fold {fold}."
-                )
-            memberships[row] = fold
-    missed = np.flatnonzero(memberships < 0)
-    if missed.size:
-        raise InputError(f"Folds must hold every observation: observation {missed[0]} is in none.")
-    return memberships
-
-
 def cross_validate(problem: Problem, method: Method, memberships: ArrayLike) -> CrossValidation:
     """Fit without the observations of each fold, and score the result on them.
 
@@ -161,7 +116,7 @@ def cross_validate(problem: Problem, method: Method, memberships: ArrayLike) -> 
 
     Examples
     --------
-    >>> from fingerpad.inference.fitting import ResponseSurface
+    >>> from fingerpad.inference.fitting.methods import ResponseSurface
     >>> class Line:
     ...     names, n_observations = ("slope",), 4
     ...     def residuals(self, slope, chosen):

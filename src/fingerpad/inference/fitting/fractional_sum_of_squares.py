@@ -1,12 +1,11 @@
-"""Goodness of fit between observed and predicted firing rates (paper, Eqs. 12-14)."""
+"""Goodness of fit between observed and predicted firing rates (paper, Eqs. 13-14)."""
 
 from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import float_array, not_negative
+from fingerpad.core.checks import float_array
 from fingerpad.core.errors import InputError
-from fingerpad.data import protocol
 
 
 def fractional_sum_of_squares(observed: ArrayLike, predicted: ArrayLike) -> float:
@@ -47,43 +46,3 @@ def fractional_sum_of_squares(observed: ArrayLike, predicted: ArrayLike) -> floa
         raise InputError("observed must hold at least one value other than 0: FSS divides by its squares.")
     residual = observed_rate - predicted_rate
     return 1.0 - float(residual @ residual) / observed_squares
-
-
-def weighted_fractional_sum_of_squares(
-    observed_dynamic: ArrayLike,
-    predicted_dynamic: ArrayLike,
-    observed_static: ArrayLike,
-    predicted_static: ArrayLike,
-    dynamic_weight: float = protocol.DYNAMIC_WEIGHT.value,
-    static_weight: float = protocol.STATIC_WEIGHT.value,
-) -> float:
-    """Weighted FSS of both phases, FSS = w_d FSS_d + w_s FSS_s (Eq. 12).
-
-    Parameters
-    ----------
-    observed_dynamic, predicted_dynamic : array (n_shifts,)
-        Rates during the ramp. [spikes/s]
-    observed_static, predicted_static : array (n_shifts,)
-        Rates during the hold. [spikes/s]
-    dynamic_weight, static_weight : float
-        w_d and w_s. [1]
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    InputError
-        If a pair differs in length, all observed rates are 0, or a weight is negative.
-
-    Examples
-    --------
-    >>> weighted_fractional_sum_of_squares([200.0], [0.0], [60.0], [60.0])
-    0.75
-    """
-    dynamic_share = not_negative("dynamic_weight", dynamic_weight)
-    static_share = not_negative("static_weight", static_weight)
-    dynamic = fractional_sum_of_squares(observed_dynamic, predicted_dynamic)
-    static = fractional_sum_of_squares(observed_static, predicted_static)
-    return dynamic_share * dynamic + static_share * static

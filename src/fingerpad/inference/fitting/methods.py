@@ -131,8 +131,8 @@ class ResponseSurface:
 
     Notes
     -----
-    Gerling et al. 2014, section 2.2.2; see `fingerpad.inference.fitting.maximise`. The method is
-    deterministic.
+    Gerling et al. 2014, section 2.2.2; see
+    `fingerpad.inference.fitting.response_surface.maximise`. The method is deterministic.
     """
 
     starts: ArrayLike
