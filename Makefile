@@ -48,7 +48,9 @@ wheel: .venv/installed-for-tests
 results: .venv/installed
 	$(bin)/fingerpad reproduce --extended $(ARGS)
 	$(bin)/python -m studies methods --resolution standard --out reproduction
-	$(bin)/python -m studies results reproduction/results.json --methods reproduction/methods.json
+	$(bin)/python -m studies drives --resolution standard --out reproduction
+	$(bin)/python -m studies results reproduction/results.json --methods reproduction/methods.json \
+		--drives reproduction/drives.json
 
 verification: .venv/installed-for-tests
 	$(bin)/python -m tests.verification $(ARGS)

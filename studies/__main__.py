@@ -12,6 +12,7 @@ from studies import (
     mesh_noise,
     mesh_refinement,
     paper_size,
+    population_timing,
     spike_fit,
 )
 from studies.commands.materials import materials_command
@@ -22,6 +23,7 @@ from studies.pages.fit_methods import methods_page
 from studies.pages.mesh_noise import mesh_noise_page
 from studies.pages.mesh_refinement import mesh_refinement_page
 from studies.pages.paper_size import paper_size_page
+from studies.pages.population_timing import population_timing_page
 from studies.pages.spike_fit import spike_fit_page
 from studies.study import Study, command_of
 
@@ -64,6 +66,12 @@ STUDIES = (
         "Press the two nearest spheres on meshes with shifted element boundaries.",
         mesh_noise.run,
         mesh_noise_page,
+    ),
+    Study(
+        "population-timing",
+        "Order of first spikes and population rate about the contact under the spheres.",
+        population_timing.run,
+        population_timing_page,
     ),
     Study(
         "code-efficiency",

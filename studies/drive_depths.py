@@ -17,14 +17,6 @@ from fingerpad.core.results import Number, result_class
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.gerling2014 import single_unit
-from fingerpad.experiments.gerling2014.drive_fits import (
-    DriveFit,
-    drive_fit,
-    judge,
-    quick_method,
-    relative_model,
-    scaled_starts,
-)
 from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.inference.fitting.methods import Method
 from fingerpad.inference.rate_model import AfferentModel
@@ -33,6 +25,14 @@ from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.transduction import drive
 from fingerpad.skin.fields import FIELDS, Place
 from fingerpad.skin.sampling import SkinResponse
+from studies.drive_fits import (
+    DriveFit,
+    drive_fit,
+    judge,
+    quick_method,
+    relative_model,
+    scaled_starts,
+)
 
 
 @result_class

@@ -9,16 +9,15 @@ import numpy as np
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Number, result_class
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.gerling2014 import drive_fits, drive_quantities, single_unit
-from fingerpad.experiments.gerling2014.drive_fits import RELATIVE_NAMES, DriveFit, Judged
-from fingerpad.experiments.gerling2014.drive_quantities import DriveResult
+from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
-from studies import drive_depths, dynamic_response
+from studies import drive_depths, drive_fits, drive_quantities, dynamic_response
 from studies.drive_depths import DepthStudy
-from studies.drive_fits import information, thorough_method
+from studies.drive_fits import RELATIVE_NAMES, DriveFit, Judged, information, thorough_method
+from studies.drive_quantities import DriveResult
 from studies.dynamic_response import EXPLANATIONS, ExplainedModel, Explanation, Patch
 
 
@@ -103,8 +102,6 @@ def run(runner: Runner, conditions: Conditions) -> DriveStudy:
             drive_quantities.quantity_traces(responses),
             recordings,
             generator,
-            (*drive_quantities.ALONE, *drive_quantities.APART),
-            thorough_method(conditions.seed),
             with_response_surface=True,
         )
         advance()

@@ -18,13 +18,13 @@ import numpy as np
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.signals import STORED_ENERGY, SedTraces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
-from fingerpad.experiments.gerling2014.drive_fits import RELATIVE_NAMES, scaled_starts, six_of_relative
-from fingerpad.experiments.gerling2014.drive_quantities import EXTENDED
 from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.identifiable import identifiable
 from fingerpad.inference.rate_model import AfferentModel, Rates, evaluate_rows
 from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.skin.sampling import SkinResponse
+from studies.drive_fits import RELATIVE_NAMES, scaled_starts, six_of_relative
+from studies.drive_quantities import EXTENDED
 
 ALONG_MM = tuple(round(0.1 * step, 1) for step in range(-15, 16))
 """Sites along the finger about the receptor. [mm]"""

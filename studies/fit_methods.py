@@ -17,7 +17,6 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit
-from fingerpad.experiments.gerling2014.drive_quantities import EXTENDED
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.inference.afferent_methods import (
@@ -42,6 +41,7 @@ from fingerpad.inference.recordings import PHASES, RateRecordings
 from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.skin.sampling import SkinResponse
 from studies import fit_starts
+from studies.drive_quantities import EXTENDED
 from studies.fitted_bars import fit_bars
 
 

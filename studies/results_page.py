@@ -9,15 +9,20 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.results import Number, Vector, from_json, read_results, result_class
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.report.formatting import ABSENT, fixed, number
 from fingerpad.report.page import markdown_table as table
+from studies.drive_quantities import DriveResult
+from studies.drive_study import DriveStudy
 from studies.fit_methods import FitMethods, MethodsStudy
+from studies.pages.drive_quantities import QUANTITIES
 
 COMMAND = "python -m studies results"
+Kind = TypeVar("Kind")
 README_START, README_END = f"<!-- {COMMAND} writes this table -->", "<!-- end of the table -->"
 VERDICTS = {True: "✓", False: "✗", None: "○"}
 
@@ -33,13 +38,6 @@ README_ROWS = (
     ("percept", "Static hit rates with the 0.2 mm shift, largest change"),
 )
 """Rows of the README's table: the level, and the quantity as the comparison names it."""
-
-QUANTITIES = {
-    "stored": "strain energy density",
-    "von_mises": "von Mises stress",
-    "compressive_stress": "compressive stress",
-    "compressive_strain": "compressive strain",
-}
 
 
 @result_class
@@ -143,7 +141,9 @@ class Excerpt:
     percept: Percept
 
 
-def read_excerpt(path: Path, methods: Path | None = None, before: Excerpt | None = None) -> Excerpt:
+def read_excerpt(
+    path: Path, methods: Path | None = None, drives: Path | None = None, before: Excerpt | None = None
+) -> Excerpt:
     """Take from the results of `fingerpad reproduce --extended` what the pages show.
 
     Parameters
@@ -152,31 +152,39 @@ def read_excerpt(path: Path, methods: Path | None = None, before: Excerpt | None
         Its results.json.
     methods : Path, optional
         The methods.json of `python -m studies methods`.
+    drives : Path, optional
+        The drives.json of `python -m studies drives`.
     before : Excerpt, optional
-        What the pages show now; without `methods` they keep its methods and models.
+        What the pages show now; they keep those of its rows that no file replaces.
 
     Raises
     ------
     StoreError
-        If a file cannot be read, or has no section on the quantities that drive the afferent.
+        If a file cannot be read.
     """
     results = read_results(path, ReproductionResult)
-    if results.drive_quantities is None:
-        raise StoreError(
-            f"{path} must come from `fingerpad reproduce --extended`: it lacks drive_quantities."
-        )
-    if methods is None:
-        shown = excerpt(results)
-        return shown if before is None else replace(shown, methods=before.methods, models=before.models)
+    compared = None if methods is None else _studied(methods, MethodsStudy, "methods").methods
+    driven = None if drives is None else _studied(drives, DriveStudy, "drives").quantities
+    shown = excerpt(results, compared, driven)
+    if before is not None and compared is None:
+        shown = replace(shown, methods=before.methods, models=before.models)
+    if before is not None and driven is None:
+        shown = replace(shown, drives=before.drives)
+    return shown
+
+
+def _studied(path: Path, kind: type[Kind], study: str) -> Kind:
     try:
-        return excerpt(results, from_json(MethodsStudy, methods.read_bytes()).methods)
+        return from_json(kind, path.read_bytes())
     except (OSError, InputError) as error:
-        raise StoreError(f"{methods} must come from `python -m studies methods`: {error}") from error
+        raise StoreError(f"{path} must come from `python -m studies {study}`: {error}") from error
 
 
-def excerpt(results: ReproductionResult, compared: FitMethods | None = None) -> Excerpt:
+def excerpt(
+    results: ReproductionResult, compared: FitMethods | None = None, drives: DriveResult | None = None
+) -> Excerpt:
     """Pick from whole results what the pages show; what a run did not compute stays empty."""
-    found, manifest, drives = results.discrimination, results.manifest, results.drive_quantities
+    found, manifest = results.discrimination, results.manifest
     codes = {
         f"Gradient Sum, {phase}": found.gradient_sum[phase] for phase in ("static", "dynamic", "latency")
     }
@@ -274,7 +282,8 @@ def results_page(shown: Excerpt) -> str:
         "along the finger ([decision](decisions/receptor-offset.md)).",
         _models(shown.models),
         "## FSS by the quantity that drives the afferent",
-        "All fitted by least squares ([discussion](single-unit.md#quantities-that-drive-the-afferent)).",
+        "All fitted by least squares, with `python -m studies drives` "
+        "([discussion](single-unit.md#quantities-that-drive-the-afferent)).",
         _drives(shown.drives),
         "## Hit rates",
         f"Hit rate of each sphere against one of {number(shown.percept.standard_per_m)} /m. "
@@ -338,7 +347,7 @@ def _drives(rows: Sequence[Drive]) -> str:
         columns,
         [
             (
-                *(QUANTITIES.get(term, term) for term in (row.static, row.dynamic)),
+                *(QUANTITIES[term] for term in (row.static, row.dynamic)),
                 fixed(row.fss_in_sample, 3),
                 f"**{fixed(row.fss_out_of_sample, 3)}**",
                 *(fixed(score, 3) for score in (row.fss_out_of_sample_dynamic, row.fss_out_of_sample_static)),

@@ -6,10 +6,36 @@ from typing import TypeVar
 import numpy as np
 
 from fingerpad.core.results import from_json
+from fingerpad.core.signals import SedTraces
+from fingerpad.neuron.afferent import Afferent
 
 CURVATURE_PER_M = [287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0]
 CODES = ("static", "dynamic", "latency", "euclidean")
 Kind = TypeVar("Kind")
+
+
+class SphereSkin:
+    """SED below a ball: the more curved, the higher and narrower."""
+
+    def __init__(self, position_mm, curvature_per_m):
+        self.centre = np.array([17.37 + position_mm, 0.0])
+        sharpness = curvature_per_m / 287.0
+        self.peak_kpa, self.width_mm = 2.5 * sharpness**1.5, 2.0 / sharpness**0.5
+
+    def sed(self, sites):
+        squared = np.square(np.asarray(sites)[:, [0, -1]] - self.centre).sum(axis=1)
+        peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
+        return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.85], peaks), kinks_ms=[50.0])
+
+
+SKINS = {
+    (position, curvature): SphereSkin(position, curvature)
+    for position in (0.0, 0.2)
+    for curvature in CURVATURE_PER_M
+}
+SENSITIVE = Afferent(static_gain=1.2e-6)
+RESTLESS = Afferent(static_gain=1.2e-6, intercept_ma=8e-7)
+"""It fires without a touch: beta tau / C is above the threshold."""
 
 
 def typed(cls: type[Kind], section: dict) -> Kind:

@@ -15,14 +15,12 @@ from fingerpad.core.results import schema_of, to_json
 from fingerpad.data import all_published
 from fingerpad.experiments.gerling2014.nail_border import NailBorder
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
-from fingerpad.experiments.gerling2014.response_maps import PopulationMaps, PopulationTiming
+from fingerpad.experiments.gerling2014.response_maps import PopulationMaps
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 from fingerpad.report import (
     discrimination,
     nail,
     population,
-    population_rate,
-    recruitment,
     reproduction,
     single_unit,
     skin_deflection,
@@ -51,11 +49,9 @@ def synthetic_results() -> dict:
         "skin_deflection": _skin_deflection(),
         "single_unit": _single_unit(),
         "single_unit_uncertainty": _single_unit_uncertainty(),
-        "drive_quantities": _drive_quantities(),
         "discrimination": discrimination_section(),
         "curvature_thresholds": _curvature_thresholds(),
         "population": _population(),
-        "population_timing": _population_timing(),
         "nail": nail_section(),
         "comparison": [
             _compared("FSS out of sample", "0.81", "0.84", "+0.03", True),
@@ -200,37 +196,6 @@ def _single_unit() -> dict:
     }
 
 
-def _drive_quantities() -> dict:
-    wave = np.abs(np.sin(SHIFT_MM))
-    scores = {
-        f"fss_{sample}{phase}": 0.9
-        for sample in ("in_sample", "out_of_sample")
-        for phase in ("", "_dynamic", "_static")
-    }
-    fit = scores | {"fss_folds": [0.8, 0.95], "gain_interval": [0.01, 0.05], "evaluations": 300}
-    rates = {
-        f"{kind}{phase}_rate_hz": (scale * wave).tolist()
-        for kind in ("", "left_out_")
-        for phase, scale in (("dynamic", 200.0), ("static", 60.0))
-    }
-    return {
-        "method": "least squares",
-        "shift_mm": SHIFT_MM.tolist(),
-        "observed_dynamic_rate_hz": (190.0 * wave).tolist(),
-        "observed_static_rate_hz": (55.0 * wave).tolist(),
-        "candidates": [
-            {
-                "static": "stored",
-                "dynamic": dynamic,
-                "fit": fit,
-                "parameters": {"time_constant_ms": 40.0},
-                **rates,
-            }
-            for dynamic in ("stored", "compressive_stress")
-        ],
-    }
-
-
 def _single_unit_uncertainty() -> dict:
     names = ("intercept_per_ms", "dynamic_gain_per_kpa", "static_gain_per_kpa_ms", "time_constant_ms")
     interval = {"low": 0.5, "median": 1.0, "high": 1.5}
@@ -346,13 +311,6 @@ def _population() -> dict:
     }
 
 
-def _population_timing() -> dict:
-    sheet = _population()
-    latency = [value for row in sheet["first_spike_latency_ms"] for value in row]
-    positions = [[x, z] for x in sheet["x_mm"] for z in sheet["z_mm"]]
-    return {"recruitment": _recruitment(positions, latency), "rates": _rates()}
-
-
 def _finger() -> dict:
     """Half of a tube with a closed end, its pad below."""
     along, angle = np.meshgrid(np.linspace(0.0, 31.0, 20), np.linspace(0.0, np.pi, 16), indexing="ij")
@@ -369,54 +327,6 @@ def _finger() -> dict:
         "static_rate_hz": rate.tolist(),
         "first_spike_latency_ms": latency,
         "half": True,
-    }
-
-
-def _recruitment(positions: list, early: list) -> dict:
-    late = [None if value is None else 1.5 * value for value in early]
-
-    def rank(values: list) -> list:
-        known = sorted(value for value in values if value is not None)
-        return [None if value is None else 1.0 + known.index(value) for value in values]
-
-    numbers = {"recruited_mm2": 22.5, "recruited_in_ramp_mm2": 16.8, "first_ms": 6.0, "median_ms": 20.0}
-    return {
-        "positions_mm": positions,
-        "area_per_afferent_mm2": 0.75,
-        "resting_latency_ms": None,
-        "touches": [
-            {"name": "287 /m", "both": 60, "either": 60, "rank_correlation": 1.0, "swapped": 0.0, **numbers},
-            {"name": "365 /m", "both": 60, "either": 60, "rank_correlation": 0.987, "swapped": 0.031}
-            | numbers,
-        ],
-        "afferents": [
-            {"name": name, "first_spike_latency_ms": values, "recruitment_rank": rank(values)}
-            for name, values in (("287 /m", early), ("365 /m", late))
-        ],
-    }
-
-
-def _rates() -> dict:
-    edges = np.concatenate([np.arange(0.0, 150.0, 10.0), np.arange(150.0, 1001.0, 50.0)])
-    active_edges = np.arange(0.0, 1001.0, 50.0)
-    rate = 60.0 + 140.0 * (edges[1:] <= 50.0)
-    return {
-        "edges_ms": edges.tolist(),
-        "active_edges_ms": active_edges.tolist(),
-        "smoothing_ms": 2.0,
-        "density_per_cm2": 100.0,
-        "resting_latency_ms": 251.0,
-        "radii_mm": [0.0, 1.0, 2.0],
-        "n_afferents": [50, 150],
-        "touches": [
-            {
-                "name": name,
-                "rate_hz": [rate.tolist(), (0.5 * rate).tolist()],
-                "active_fraction": [[1.0] * (active_edges.size - 1), [0.5] * (active_edges.size - 1)],
-                "together_per_cm2_hz": (factor * 60.0 * rate).tolist(),
-            }
-            for name, factor in (("287 /m", 1.0), ("365 /m", 1.1))
-        ],
     }
 
 
@@ -593,9 +503,7 @@ def test_what_does_not_exist_is_drawn_as_nothing_and_written_as_a_dash(tmp_path)
 
 BEYOND = (
     "single_unit_uncertainty",
-    "drive_quantities",
     "curvature_thresholds",
-    "population_timing",
 )
 
 
@@ -762,64 +670,10 @@ def test_figure_6_colours_the_finger_where_afferents_fire_and_mirrors_half_of_it
 
 
 def test_captions_say_what_afferents_do_without_a_touch():
-    section, timing = typed(PopulationMaps, _population()), typed(PopulationTiming, _population_timing())
+    section = typed(PopulationMaps, _population())
     assert "also fires without touch, 4 spikes/s from 251 ms on" in population.caption_population(section)
     silent = replace(section, at_rest=replace(section.at_rest, first_spike_latency_ms=np.nan))
     assert "without touch" not in population.caption_population(silent)
-    assert "first fire at 251 ms. All start" in population_rate.caption_population_rate(timing.rates)
-    assert "Without touch" not in recruitment.caption_recruitment(timing.recruitment)
-    firing = replace(timing.recruitment, resting_latency_ms=251.0)
-    assert "first fire at 251 ms. They count as recruited" in recruitment.caption_recruitment(firing)
-
-
-def test_figure_13_ranks_every_afferent_that_fires_and_counts_skin():
-    section = typed(PopulationTiming, _population_timing()).recruitment
-    drawn = recruitment.draw_recruitment(section).axes
-    first, silent = section.afferents[0], drawn[0].collections[0]
-    latency = np.array(first.first_spike_latency_ms, dtype=float)
-    fires = np.isfinite(latency)
-    assert len(silent.get_offsets()) == (~fires).sum() > 0
-    ranks = np.array(first.recruitment_rank, dtype=float)[fires]
-    np.testing.assert_array_equal(drawn[0].collections[1].get_array(), ranks)
-    np.testing.assert_array_equal(
-        drawn[0].collections[1].get_offsets(), np.array(section.positions_mm)[fires]
-    )
-    steps = lines(drawn[2])["365 /m"]
-    np.testing.assert_array_equal(steps.get_xdata(), 1.5 * np.sort(latency[fires]))
-    assert steps.get_ydata()[-1] == 0.75 * fires.sum()
-    beside = lines(drawn[3])["365 /m"].get_xydata()
-    np.testing.assert_array_equal(beside[fires], np.stack([latency[fires], 1.5 * latency[fires]], axis=1))
-
-
-def test_figure_13_and_its_table_say_how_much_the_order_changes():
-    section = typed(PopulationTiming, _population_timing()).recruitment
-    assert (
-        "365 /m: rank correlation 0.987, 3.1 % of the pairs in reversed order"
-        in recruitment.caption_recruitment(section)
-    )
-    table = recruitment.recruitment_tables(section)[0]
-    assert list(table.rows[1].cells) == ["365 /m", "22.5", "16.8", "6.0", "20.0", "0.987", "3.1 %"]
-
-
-def test_figure_13_of_one_touch_leaves_the_comparison_empty():
-    section = typed(PopulationTiming, _population_timing()).recruitment
-    alone = replace(section, touches=section.touches[:1], afferents=section.afferents[:1])
-    texts = [text.get_text() for axes in recruitment.draw_recruitment(alone).axes for text in axes.texts]
-    assert texts.count("no other touch") == 2
-    assert "rank correlation" not in recruitment.caption_recruitment(alone)
-
-
-def test_figure_14_has_one_scale_per_afferent_and_per_area():
-    section = typed(PopulationTiming, _population_timing()).rates
-    figure = population_rate.draw_population_rate(section)
-    early = figure.axes[0]
-    assert [patch.get_label() for patch in early.patches] == ["0 to 1 mm", "1 to 2 mm"]
-    np.testing.assert_array_equal(early.patches[1].get_data().values, section.touches[0].rate_hz[1])
-    beside = figure.axes[1].child_axes[0]
-    figure.draw_without_rendering()
-    # 100 per cm2 that fire 50 spikes/s each make 5000 spikes/s per cm2.
-    assert beside.get_ylim()[1] / figure.axes[1].get_ylim()[1] == pytest.approx(5.0 / 50.0)
-    assert "1000 spikes/s per cm²" in beside.get_ylabel()
 
 
 def test_figure_7_keeps_the_papers_letters_and_shows_people_in_every_panel():

@@ -33,7 +33,7 @@ from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SurfaceProfile
-from sections import discrimination_section, nail_section, typed
+from sections import RESTLESS, SENSITIVE, SKINS, SphereSkin, discrimination_section, nail_section, typed
 from studies.plain_values import plain
 
 RESOLUTIONS = ["quick", "standard", "paper"]
@@ -333,28 +333,6 @@ def test_sed_of_the_receptor_is_one_column_per_touch():
 # Level 3
 
 
-class SphereSkin:
-    """SED below a ball: the more curved, the higher and narrower."""
-
-    def __init__(self, position_mm, curvature_per_m):
-        self.centre = np.array([17.37 + position_mm, 0.0])
-        sharpness = curvature_per_m / 287.0
-        self.peak_kpa, self.width_mm = 2.5 * sharpness**1.5, 2.0 / sharpness**0.5
-
-    def sed(self, sites):
-        squared = np.square(np.asarray(sites)[:, [0, -1]] - self.centre).sum(axis=1)
-        peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
-        return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.85], peaks), kinks_ms=[50.0])
-
-
-SKINS = {
-    (position, curvature): SphereSkin(position, curvature)
-    for position in (0.0, 0.2)
-    for curvature in CURVATURES
-}
-SENSITIVE = Afferent(static_gain=1.2e-6)
-
-
 @pytest.fixture(scope="module")
 def discrimination():
     return sphere_discrimination.discriminate_spheres(SKINS, SENSITIVE, seed=0, sessions=2)
@@ -459,83 +437,6 @@ def test_population_map_is_a_sheet_that_peaks_under_the_sphere_and_is_silent_far
     assert np.unravel_index(moved.argmax(), moved.shape) == (24, 20)
 
 
-@pytest.fixture(scope="module")
-def sheet_answers():
-    population = response_maps.sheet(SENSITIVE)
-    return {
-        "standard": population.respond(SphereSkin(0.0, 287.0)),
-        "curved": population.respond(SphereSkin(0.0, 365.0)),
-        "moved": population.respond(SphereSkin(1.0, 287.0)),
-    }
-
-
-def test_a_moved_sphere_changes_who_comes_first_and_a_more_curved_one_only_when(sheet_answers):
-    """These skins are functions of the distance from the middle: every curvature has the same order."""
-    found = response_maps.recruitment(sheet_answers, area_per_afferent_mm2=0.0625)
-    standard, curved, moved = found.touches
-    assert (standard.rank_correlation, standard.swapped) == (pytest.approx(1.0), 0.0)
-    # Equal distances may come out of the exponential a bit apart, one touch's order of them being another's.
-    assert curved.swapped < 0.01
-    assert curved.rank_correlation > 0.999
-    assert curved.median_ms != standard.median_ms
-    assert moved.swapped > 0.1
-    assert moved.rank_correlation < 0.9
-    latency = sheet_answers["moved"].first_spike_latency_ms
-    assert moved.recruited_mm2 == np.isfinite(latency).sum() / 16
-    assert moved.recruited_in_ramp_mm2 == (latency <= 50.0).sum() / 16
-    assert moved.first_ms == np.nanmin(latency)
-    np.testing.assert_array_equal(found.afferents[2].first_spike_latency_ms, latency)
-
-
-def test_rings_about_the_sphere_hold_all_spikes_near_it(sheet_answers):
-    found = response_maps.population_rates(sheet_answers, (RECEPTOR_X_MM, 0.0), density_per_cm2=100.0)
-    away = np.hypot(*(sheet_answers["standard"].positions_mm - [RECEPTOR_X_MM, 0.0]).T)
-    for touch in found.touches:
-        trains = sheet_answers[touch.name].spikes
-        total = sum(trains[afferent].size for afferent in np.flatnonzero(away < 4.0))
-        spikes = touch.rate_hz * np.diff(found.edges_ms) / 1000.0 * found.n_afferents[:, None]
-        assert total > 0
-        np.testing.assert_allclose(spikes.sum(), total, rtol=1e-9)
-        # 100 per cm2 on the skin of all rings fire as often as the mean afferent of them, a hundredfold.
-        mean_hz = spikes.sum(axis=0) / found.n_afferents.sum() / np.diff(found.edges_ms) * 1000.0
-        np.testing.assert_allclose(touch.together_per_cm2_hz, 100.0 * mean_hz, rtol=1e-9)
-        ring = np.flatnonzero((away >= 1.0) & (away < 2.0))
-        firing = [((trains[afferent] > 500.0) & (trains[afferent] <= 510.0)).any() for afferent in ring]
-        assert touch.active_fraction.shape == (4, 100)
-        assert touch.active_fraction[1, 50] == np.mean(firing)
-
-
-def test_timing_asks_every_sphere_over_the_middle_and_the_standard_beside_it():
-    found = response_maps.population_timing(SKINS, SENSITIVE)
-    names = [touch.name for touch in found.recruitment.touches]
-    assert names == [*(f"{curvature:g} /m" for curvature in CURVATURES), "287 /m, 0.2 mm away"]
-    assert [touch.name for touch in found.rates.touches] == ["287 /m", "365 /m"]
-    population = response_maps.disc(Fingertip(), SENSITIVE)
-    shown = found.recruitment.afferents
-    assert [touch.name for touch in shown] == ["287 /m", "365 /m", "287 /m, 0.2 mm away"]
-    for touch, key in zip(shown, ((0.0, 287.0), (0.0, 365.0), (0.2, 287.0)), strict=True):
-        latency = population.respond(SKINS[key]).first_spike_latency_ms
-        np.testing.assert_array_equal(touch.first_spike_latency_ms, latency)
-    # Rings are those about the contact point on the curved skin.
-    away = np.linalg.norm(population.positions_mm - Fingertip().skin_point(RECEPTOR_X_MM, 0.0), axis=1)
-    np.testing.assert_array_equal(found.rates.n_afferents, np.histogram(away, response_maps.RINGS_MM)[0])
-
-
-def test_the_disc_has_its_density_on_the_skin_itself():
-    """A round patch of skin holds its area times the density, however far it turns to the side."""
-    population = response_maps.disc(Fingertip(), SENSITIVE)
-    assert abs(len(population) / (np.pi * 5.0**2 * 16.0) - 1.0) < 0.01
-    along, around = population.places_mm.T
-    assert np.hypot(along, around).max() <= 5.0
-    # The plane is true to area; seen from below, the rim is foreshortened.
-    z = population.positions_mm[:, 2]
-    assert np.abs(z).max() < 0.97 * np.abs(around).max()
-
-
-RESTLESS = Afferent(static_gain=1.2e-6, intercept_ma=8e-7)
-"""It fires without a touch: beta tau / C is above the threshold."""
-
-
 def test_at_rest_an_afferent_fires_where_its_current_alone_reaches_the_threshold():
     """Closed form: u = beta tau/C (1 - exp(-t/tau)) meets v at t = -tau ln(1 - v C / (beta tau))."""
     resting = response_maps.resting_response(RESTLESS)
@@ -548,32 +449,12 @@ def test_at_rest_an_afferent_fires_where_its_current_alone_reaches_the_threshold
     assert response_maps.resting_response(extended) == resting
 
 
-def test_spikes_that_come_without_a_touch_recruit_nobody(tiny_skin):
-    latency = response_maps.resting_response(RESTLESS).first_spike_latency_ms
-    answer = response_maps.sheet(RESTLESS).respond(SphereSkin(0.0, 287.0))
-    assert np.isfinite(answer.first_spike_latency_ms).all()
-    found = response_maps.recruitment({"standard": answer}, 0.0625, resting_latency_ms=latency)
-    early = (answer.first_spike_latency_ms <= latency / 2).sum()
-    assert 0 < early < answer.first_spike_latency_ms.size
-    assert found.touches[0].recruited_mm2 == early / 16
-    everybody = response_maps.recruitment({"standard": answer}, 0.0625).touches[0]
-    assert everybody.recruited_mm2 == answer.first_spike_latency_ms.size / 16
-    # On the finger, untouched skin is left open in all three maps.
+def test_untouched_skin_is_left_open_on_the_finger(tiny_skin):
     untouched = tiny_skin.with_fields(sed_kpa=np.zeros_like(tiny_skin.sed_kpa))
     finger = response_maps.finger_map(untouched, RESTLESS)
     assert np.isnan(finger.static_rate_hz).all()
     assert np.isnan(finger.dynamic_rate_hz).all()
     assert np.isnan(finger.first_spike_latency_ms).all()
-
-
-def test_answers_of_other_afferents_are_refused(sheet_answers):
-    other = response_maps.sheet(SENSITIVE, reach_mm=1.0).respond(SphereSkin(0.0, 287.0))
-    with pytest.raises(InputError, match="those of 'other' are at other positions than those of 'one'"):
-        response_maps.recruitment({"one": sheet_answers["standard"], "other": other}, 0.0625)
-    with pytest.raises(InputError, match="at least one touch"):
-        response_maps.population_rates({}, (17.37, 0.0), 100.0)
-    with pytest.raises(InputError, match="area_per_afferent_mm2 must be greater than 0"):
-        response_maps.recruitment(sheet_answers, 0.0)
 
 
 def test_the_finger_carries_the_answers_of_the_afferents_below_its_faces(tiny_skin):

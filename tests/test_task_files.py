@@ -10,6 +10,7 @@ import pytest
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.core.results import file_format
 from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.discrimination.analysis import PreparedTask
@@ -17,6 +18,8 @@ from fingerpad.experiments.discrimination.task import DiscriminationTask, Stimul
 from fingerpad.experiments.discrimination.task_files import example_tasks, parse_task, read_task
 from fingerpad.experiments.discrimination.task_population import task_afferent, task_population
 from fingerpad.experiments.discrimination.task_stimuli import task_stimuli, task_touches
+from fingerpad.experiments.fit.session import FitFile
+from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import discrimination_touches
 from fingerpad.geometry.indenters import Bar, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
@@ -183,11 +186,12 @@ def test_an_afferent_is_ours_or_ones_own_numbers_or_of_a_file_of_results(tmp_pat
     expected = Afferent.from_parameters(list(six.values()))
     # The parts of a file that an afferent needs; the rest is left to the schemas' own tests.
     monkeypatch.setattr(schemas, "check_schema", lambda *_: None)
-    for name, results in (
-        ("fit.json", {"format": "fingerpad fit", "fit": {"parameters": six}, "dynamic_quantity": "stored"}),
-        ("results.json", {"format": "fingerpad reproduction", "single_unit": {"parameters": six}}),
+    for name, kind, results in (
+        ("fit.json", FitFile, {"fit": {"parameters": six}, "dynamic_quantity": "stored"}),
+        ("results.json", ReproductionResult, {"single_unit": {"parameters": six}}),
     ):
-        (tmp_path / name).write_text(json.dumps(results | {"format_version": 1}))
+        named, version = file_format(kind)
+        (tmp_path / name).write_text(json.dumps(results | {"format": named, "format_version": version}))
         assert task_afferent(parse_task(changed(SPHERES, afferent=name)), tmp_path) == expected
 
 

@@ -8,18 +8,18 @@ from itertools import pairwise
 import numpy as np
 from matplotlib.figure import Figure
 
-from fingerpad.report.drive_quantities import (
-    caption_drive_quantities,
-    draw_drive_quantities,
-    drive_tables,
-    gain,
-)
 from fingerpad.report.formatting import ABSENT, fixed
 from fingerpad.report.manifest import edition
 from fingerpad.report.parts import Chapter, Drawing, Page, Row, Table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure, numbers
 from studies.drive_depths import DepthStudy, LayerFit
 from studies.drive_study import DriveStudy, ExplanationFit
+from studies.pages.drive_quantities import (
+    caption_drive_quantities,
+    draw_drive_quantities,
+    drive_tables,
+    gain,
+)
 
 _OUT_OF_SAMPLE = tuple(f"fss_out_of_sample{phase}" for phase in ("", "_dynamic", "_static"))
 _EXPLANATION_COLUMNS = (

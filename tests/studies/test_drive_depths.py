@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
-from fingerpad.experiments.gerling2014.drive_fits import quick_method
 from fingerpad.geometry.mesh import LAYERS, block_mesh
 from fingerpad.inference.identifiable import six_parameters
 from fingerpad.inference.rate_model import AfferentModel
@@ -18,6 +17,7 @@ from fingerpad.inference.recordings import RateRecordings
 from fingerpad.report.style import png
 from fingerpad.skin.sampling import SkinResponse
 from studies import drive_depths
+from studies.drive_fits import quick_method
 from studies.pages import drive_study as report
 
 DEPTHS_MM = np.array([0.0, 0.2, 0.371, 0.471, 1.0, 1.624, 5.0])

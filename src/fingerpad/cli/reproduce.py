@@ -28,7 +28,7 @@ def reproduce_command(
         bool | None,
         typer.Option(
             "--extended/--no-extended",
-            help="Also run what goes beyond the paper: other methods and drives, spike trains, uncertainty. "
+            help="Also run what goes beyond the paper: uncertainty of the fit, curvature thresholds. "
             "Default: yes, except at quick resolution.",
         ),
     ] = None,

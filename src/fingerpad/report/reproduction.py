@@ -25,15 +25,12 @@ from fingerpad.report.discrimination import (
     draw_noise,
     draw_observers,
 )
-from fingerpad.report.drive_quantities import caption_drive_quantities, draw_drive_quantities, drive_tables
 from fingerpad.report.formatting import fixed, joined, number, plain, whole_percent
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.nail import caption_nail, draw_nail
 from fingerpad.report.page import write_html
 from fingerpad.report.parts import Chapter, Drawing, Kind, Page, Part, Row, Table
 from fingerpad.report.population import caption_population, draw_population
-from fingerpad.report.population_rate import caption_population_rate, draw_population_rate
-from fingerpad.report.recruitment import caption_recruitment, draw_recruitment, recruitment_tables
 from fingerpad.report.single_unit import caption_single_unit, draw_single_unit, single_unit_tables
 from fingerpad.report.single_unit_uncertainty import (
     caption_uncertainty,
@@ -99,8 +96,6 @@ def reproduction_page(result: ReproductionResult) -> Page:
 
 def _levels(result: ReproductionResult) -> list[Chapter]:
     """Return the chapters of the three levels; numbers of figures up to 9 are the paper's."""
-    timing = result.population_timing
-    order, rates = (timing.recruitment, timing.rates) if timing else (None, None)
     chapters = {
         "Level 1: skin": _parts(
             result.skin_deflection,
@@ -115,41 +110,24 @@ def _levels(result: ReproductionResult) -> list[Chapter]:
         "Level 2: uncertainty of the fit": _parts(
             result.single_unit_uncertainty,
             uncertainty_tables,
-            (12, "uncertainty", "Uncertainty of the fit", draw_uncertainty, caption_uncertainty),
-        ),
-        "Level 2: quantity that drives the afferent": _parts(
-            result.drive_quantities,
-            drive_tables,
-            (10, "drive_quantities", "Rates by quantity", draw_drive_quantities, caption_drive_quantities),
+            (10, "uncertainty", "Uncertainty of the fit", draw_uncertainty, caption_uncertainty),
         ),
         "Level 3: population": _parts(
             result.population,
             None,
             (6, "population", "Rates and latencies under a sphere", draw_population, caption_population),
         ),
-        "Level 3: population over time": [
-            *_parts(
-                order,
-                recruitment_tables,
-                (13, "recruitment", "Order of first spikes", draw_recruitment, caption_recruitment),
-            ),
-            *_parts(
-                rates,
-                None,
-                (14, "population_rate", "Population rate", draw_population_rate, caption_population_rate),
-            ),
-        ],
         "Level 3: discrimination": _parts(
             result.discrimination,
             discrimination_tables,
             (7, "discrimination", "Discrimination of spheres", draw_observers, caption_observers),
             (8, "varied_criterion", "The same with a varied criterion", draw_criterion, caption_criterion),
-            (15, "noise", "Amount of noise", draw_noise, caption_noise),
+            (11, "noise", "Amount of noise", draw_noise, caption_noise),
         ),
         "Level 3: curvature thresholds": _parts(
             result.curvature_thresholds,
             threshold_tables,
-            (16, "curvature_thresholds", "Thresholds of curvature", draw_thresholds, caption_thresholds),
+            (12, "curvature_thresholds", "Thresholds of curvature", draw_thresholds, caption_thresholds),
         ),
         "The border of the nail": _parts(
             result.nail, None, (9, "nail", "Stress at the border of the nail", draw_nail, caption_nail)
@@ -182,10 +160,10 @@ def reproduction_summary(result: ReproductionResult) -> list[str]:
         [_skin(result.skin_deflection), _afferent(result.single_unit), _percept(result.discrimination)]
     )
     paragraphs = [found, _verdicts(result.comparison)]
-    if result.drive_quantities is None:
+    if result.single_unit_uncertainty is None:
         paragraphs.append(
-            "Parts beyond the paper were not run: uncertainty of the fit, other quantities that may drive "
-            "the afferent, the population over time, curvature thresholds (`fingerpad reproduce --extended`)."
+            "Parts beyond the paper were not run: uncertainty of the fit and curvature thresholds "
+            "(`fingerpad reproduce --extended`)."
         )
     return paragraphs
 

@@ -7,8 +7,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
 from fingerpad.core.checks import whole
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
@@ -16,7 +14,6 @@ from fingerpad.data import all_published
 from fingerpad.experiments.conditions import Conditions, Touch
 from fingerpad.experiments.gerling2014 import (
     curvature_thresholds,
-    drive_quantities,
     nail_border,
     response_maps,
     single_unit,
@@ -27,9 +24,8 @@ from fingerpad.experiments.gerling2014 import (
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow
 from fingerpad.experiments.gerling2014.comparison import comparison
 from fingerpad.experiments.gerling2014.curvature_thresholds import CurvatureThresholds
-from fingerpad.experiments.gerling2014.drive_quantities import DriveResult
 from fingerpad.experiments.gerling2014.nail_border import NailBorder
-from fingerpad.experiments.gerling2014.response_maps import PopulationMaps, PopulationTiming
+from fingerpad.experiments.gerling2014.response_maps import PopulationMaps
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.single_unit_uncertainty import UncertaintyResult
 from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult
@@ -54,9 +50,8 @@ class Reproduction:
     jobs : int
         Processes to use; the numbers do not depend on it.
     extended : bool, optional
-        Whether to go beyond the paper: other quantities that may drive the afferent, uncertainty of the fit,
-        the population over time, and thresholds at other standards. By default not at "quick" resolution,
-        where this takes half as long again.
+        Whether to go beyond the paper: uncertainty of the fit, and curvature thresholds at other standards.
+        By default not at "quick" resolution, where this takes half as long again.
     """
 
     conditions: Conditions
@@ -112,8 +107,7 @@ class ReproductionResult:
         Level 2.
     discrimination, population, nail : SphereDiscrimination, PopulationMaps, NailBorder
         Level 3.
-    drive_quantities, single_unit_uncertainty : DriveResult, UncertaintyResult, optional
-    curvature_thresholds, population_timing : CurvatureThresholds, PopulationTiming, optional
+    single_unit_uncertainty, curvature_thresholds : UncertaintyResult, CurvatureThresholds, optional
         What goes beyond the paper, None where it was not asked for.
     comparison : tuple of ClaimRow
         The paper's numbers beside ours.
@@ -124,16 +118,14 @@ class ReproductionResult:
     """
 
     format: Literal["fingerpad reproduction"] = "fingerpad reproduction"
-    format_version: Literal[1] = 1
+    format_version: Literal[2] = 2
     skin_deflection: SkinDeflectionResult
     single_unit: SingleUnitResult
     discrimination: SphereDiscrimination
     population: PopulationMaps
     nail: NailBorder
-    drive_quantities: DriveResult | None = None
     single_unit_uncertainty: UncertaintyResult | None = None
     curvature_thresholds: CurvatureThresholds | None = None
-    population_timing: PopulationTiming | None = None
     comparison: tuple[ClaimRow, ...]
     inputs: tuple[PublishedNumber, ...]
     manifest: Manifest
@@ -178,8 +170,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
     sphere_responses, nail_response = responses["spheres"], responses["nail"]["nail"]
 
     with runner.stage("fit and discrimination", 3) as advance:
-        bars = list(bar_responses.values())
-        bar_sed = single_unit.receptor_sed(bars)
+        bar_sed = single_unit.receptor_sed(list(bar_responses.values()))
         problem = single_unit.rate_problem(bar_sed)
         best, folds = single_unit.fit(problem)
         advance()
@@ -192,17 +183,10 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
         population = response_maps.population_maps(sphere_responses[STANDARD_SPHERE], afferent)
         nail = nail_border.nail_border(nail_response)
         advance()
-    drives: DriveResult | None = None
     uncertainty: UncertaintyResult | None = None
     thresholds: CurvatureThresholds | None = None
-    timing: PopulationTiming | None = None
     if run.goes_beyond:
-        with runner.stage("beyond the paper", 4) as advance:
-            traces = drive_quantities.quantity_traces(bars, drive_quantities.SHOWN_QUANTITIES)
-            drives = drive_quantities.drive_result(
-                traces, problem.recordings, np.random.default_rng(conditions.seed)
-            )
-            advance()
+        with runner.stage("beyond the paper", 2) as advance:
             uncertainty = single_unit_uncertainty.uncertainty_result(
                 bar_sed, best.parameters, conditions.seed
             )
@@ -217,8 +201,6 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
                 conditions.seed,
             )
             advance()
-            timing = response_maps.population_timing(sphere_responses, afferent, conditions.finger)
-            advance()
     meshes = {"sphere": spheres[STANDARD_SPHERE].mesh, "bar": bar_responses[0].mesh} | {
         name: deflection["trial3", name].mesh for name in skin_deflection.INDENTERS
     }
@@ -229,10 +211,8 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
         discrimination=discrimination,
         population=population,
         nail=nail,
-        drive_quantities=drives,
         single_unit_uncertainty=uncertainty,
         curvature_thresholds=thresholds,
-        population_timing=timing,
         comparison=tuple(comparison(skin, unit, discrimination, nail, thresholds)),
         inputs=tuple(PublishedNumber(**asdict(number)) for number in all_published()),
         manifest=runner.manifest(conditions, meshes, half_model=not spheres[STANDARD_SPHERE].grading.full),

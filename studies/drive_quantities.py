@@ -18,7 +18,15 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import STORED_ENERGY, SedTraces
 from fingerpad.experiments.gerling2014 import single_unit
-from fingerpad.experiments.gerling2014.drive_fits import (
+from fingerpad.inference.fitting.methods import Method
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
+from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.rate_problem import RateProblem
+from fingerpad.inference.recordings import RateRecordings
+from fingerpad.inference.start_points import response_surface
+from fingerpad.neuron.transduction import Drive, drive
+from fingerpad.skin.sampling import SkinResponse
+from studies.drive_fits import (
     DriveFit,
     Judged,
     drive_fit,
@@ -28,14 +36,6 @@ from fingerpad.experiments.gerling2014.drive_fits import (
     scaled_starts,
     six_of_relative,
 )
-from fingerpad.inference.fitting.methods import Method
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.rate_model import AfferentModel
-from fingerpad.inference.rate_problem import RateProblem
-from fingerpad.inference.recordings import RateRecordings
-from fingerpad.inference.start_points import response_surface
-from fingerpad.neuron.transduction import Drive, drive
-from fingerpad.skin.sampling import SkinResponse
 
 QUANTITIES = (
     STORED_ENERGY,
@@ -81,11 +81,8 @@ EXTENDED = Drivers(STORED_ENERGY, "compressive_stress")
 APART = (EXTENDED, *(Drivers(STORED_ENERGY, quantity) for quantity in ("von_mises", "compressive_strain")))
 """SED for the static term, another quantity for the dynamic one."""
 
-SHOWN = (PAPER, *(Drivers(quantity, quantity) for quantity in QUANTITIES[3:]), EXTENDED)
-"""Candidates of a reproduction: the other energies differ from the stored one by about one percent."""
-
-SHOWN_QUANTITIES = (STORED_ENERGY, *QUANTITIES[3:])
-"""Quantities that it reads for that."""
+CANDIDATES = (*ALONE, *APART)
+"""All that is compared."""
 
 
 def quantity_traces(
@@ -194,7 +191,7 @@ def drive_result(
     traces: Mapping[str, SedTraces],
     recordings: RateRecordings,
     generator: np.random.Generator,
-    candidates: Sequence[Drivers] = SHOWN,
+    candidates: Sequence[Drivers] = CANDIDATES,
     method: Method | None = None,
     with_response_surface: bool = False,
 ) -> DriveResult:

@@ -13,8 +13,6 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.results import from_json, to_json
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.gerling2014 import drive_fits, drive_quantities
-from fingerpad.experiments.gerling2014.drive_quantities import ALONE, APART, EXTENDED, PAPER, SHOWN, Drivers
 from fingerpad.experiments.runner import Runner
 from fingerpad.inference.fitting.cross_validation import interleaved_folds
 from fingerpad.inference.fitting.methods import Fit
@@ -25,12 +23,13 @@ from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import start_points
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.transduction import Drive, drive
-from fingerpad.report import drive_quantities as report
 from fingerpad.report.page import write_markdown
 from fingerpad.report.style import png
-from studies import drive_depths, drive_study, dynamic_response
+from studies import drive_depths, drive_fits, drive_quantities, drive_study, dynamic_response
 from studies.drive_fits import BestOf, information, thorough_method
+from studies.drive_quantities import ALONE, APART, CANDIDATES, EXTENDED, PAPER, Drivers
 from studies.dynamic_response import EXPLANATIONS, ExplainedModel, Patch, low_passed
+from studies.pages import drive_quantities as report
 from studies.pages import drive_study as drives_report
 
 TIMES_MS = np.concatenate([np.linspace(0.0, 50.0, 5), [60.0, 100.0, 300.0, 1000.0]])
@@ -97,10 +96,10 @@ def found():
 
 
 def test_the_paper_comes_first_and_every_quantity_once():
-    assert ALONE[0] == SHOWN[0] == PAPER == Drivers("stored", "stored")
+    assert ALONE[0] == CANDIDATES[0] == PAPER == Drivers("stored", "stored")
     assert len({drivers.static for drivers in ALONE}) == len(ALONE) == 6
     assert EXTENDED in APART
-    assert EXTENDED in SHOWN
+    assert len(set(CANDIDATES)) == len(CANDIDATES) == 9
     assert all(drivers.static == "stored" != drivers.dynamic for drivers in APART)
 
 
@@ -294,7 +293,10 @@ def test_results_hold_what_was_observed_and_predicted(found):
     assert_allclose(found.shift_mm, SHIFT_MM, rtol=1e-5)
     extended = found.candidates[2]
     assert_allclose(extended.static_rate_hz, RECORDINGS.static_rate_hz, atol=2.0)
-    assert len(extended.fit.fss_folds) == 6
+    for candidate in found.candidates:
+        assert candidate.dynamic_rate_hz.size == candidate.left_out_static_rate_hz.size == SHIFT_MM.size
+        assert candidate.fit.fss_folds.size == 6
+        assert candidate.fit.fss_out_of_sample == pytest.approx(candidate.fit.fss_folds.mean(), rel=1e-12)
     assert found.method == "least squares"
 
 

@@ -6,12 +6,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.experiments.gerling2014.drive_fits import DriveFit
-from fingerpad.experiments.gerling2014.drive_quantities import DriveCandidate, DriveResult
 from fingerpad.report.formatting import ABSENT, PHASE_LABELS, fixed
 from fingerpad.report.parts import Row, Table
 from fingerpad.report.single_unit import BAR_HALF_WIDTH_MM
 from fingerpad.report.style import BLACK, BLUE, GREY, PALE, new_figure
+from studies.drive_fits import DriveFit
+from studies.drive_quantities import DriveCandidate, DriveResult
 
 QUANTITIES = {
     "stored": "strain energy density",
