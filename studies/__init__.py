@@ -8,10 +8,11 @@
 | `spike-fit` | fits to spike trains, variability of interspike intervals |
 | `mesh-refinement`, `paper-size` | errors of the meshes against finer ones |
 | `mesh-noise` | meshes of one resolution with shifted element boundaries |
+| `population-timing` | order of first spikes and population rate about the contact |
 | `code-efficiency` | codes of a population against the ideal observer |
 | `results` | the pages that show the numbers of a reproduction |
 
-The uncertainty of the fit, the drive of choice and curvature thresholds are part of
-`fingerpad reproduce --extended`. A command writes NAME.md with its figures in images/, NAME.json, and keeps
-finished indentations in indentations/, so that studies and reproductions of one folder share them.
+The uncertainty of the fit and curvature thresholds are part of `fingerpad reproduce --extended`. A command
+writes NAME.md with its figures in images/, NAME.json, and keeps finished indentations in indentations/, so
+that studies and reproductions of one folder share them.
 """
