@@ -21,8 +21,8 @@ from studies.pages.code_efficiency import code_efficiency_page
 from studies.pages.drive_study import drives_page
 from studies.pages.fit_methods import methods_page
 from studies.pages.mesh_noise import mesh_noise_page
-from studies.pages.mesh_refinement import mesh_refinement_page
-from studies.pages.paper_size import paper_size_page
+from studies.pages.mesh_refinement import MESH_REFINEMENT
+from studies.pages.paper_size import PAPER_SIZE
 from studies.pages.population_timing import population_timing_page
 from studies.pages.spike_fit import spike_fit_page
 from studies.study import Study, command_of
@@ -39,14 +39,14 @@ STUDIES = (
         "mesh-refinement",
         "Press bars and spheres into finer meshes, and report the error of the meshes of every resolution.",
         lambda runner, conditions: mesh_refinement.run(runner),
-        mesh_refinement_page,
+        MESH_REFINEMENT.page,
         resolution=None,
     ),
     Study(
         "paper-size",
         "Compare the meshes of quick and standard with one of the paper's size.",
         lambda runner, conditions: paper_size.run(runner),
-        paper_size_page,
+        PAPER_SIZE.page,
         resolution=None,
     ),
     Study(

@@ -1,4 +1,4 @@
-"""What a mesh's error does to what receptors, afferents and observers say."""
+"""Effect of mesh errors on strain energy density (SED), firing rates, fit and hit rates."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from scipy.optimize import brentq
 
 from fingerpad.core.checks import FloatArray, float_array
 from fingerpad.core.errors import InputError
+from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.data import bar_firing_rates, protocol, psychophysics
 from fingerpad.experiments.gerling2014.discrepancy import PATIENCE_MS
+from fingerpad.experiments.runner import Runner
 from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.spikes import firing_rate_hz, first_spike_latency_ms
 from fingerpad.psychophysics.noise_fit import expected_hit_rates
+from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
 
 DRAWS = 5000
@@ -26,14 +29,129 @@ LOWEST_ORDER, HIGHEST_ORDER = 0.3, 6.0
 """A quantity that converges slower or faster is not taken to converge at all on these meshes."""
 
 
+HitRates = dict[str, Vector]
+"""Hit rate of each comparison, by response measure. [0-1]"""
+
+
+@result_class
+class MeshSize:
+    """Size of a mesh.
+
+    Parameters
+    ----------
+    nodes, elements : int
+        How many.
+    size_x_mm, size_z_mm : float
+        Smallest elements along and across the finger. [mm]
+    counts : tuple of int
+        Elements through stratum corneum, living epidermis, dermis and subcutis.
+    """
+
+    nodes: int
+    elements: int
+    size_x_mm: float
+    size_z_mm: float
+    counts: tuple[int, ...]
+
+    @classmethod
+    def of(cls, touch: Touch) -> MeshSize:
+        """Size of the mesh of a touch."""
+        grading = touch.grading
+        return cls(
+            nodes=len(touch.mesh.nodes_mm),
+            elements=len(touch.mesh.elements),
+            size_x_mm=grading.core_size_mm or grading.size_x_mm,
+            size_z_mm=grading.size_z_mm,
+            counts=grading.counts,
+        )
+
+
+@result_class
+class Differences:
+    """Differences between values and a reference, in the unit of the field that holds them.
+
+    Parameters
+    ----------
+    max, rms : float
+        Largest absolute difference, and root mean square.
+    mean : float
+        With its sign.
+    """
+
+    max: Number
+    rms: Number
+    mean: Number
+
+
+@result_class
+class MeshErrors:
+    """Errors of one mesh at the touches that it shares with a finer one.
+
+    Parameters
+    ----------
+    touches : int
+        How many are shared.
+    sed : dict of Differences
+        At the end of the "ramp" and of the "hold", over the largest SED on the finer mesh. [1]
+    rate_hz : dict of Differences
+        "dynamic" and "static" firing rate. [spikes/s]
+    latency_ms : Differences
+        First spike, at most `PATIENCE_MS`. [ms]
+    force : Differences
+        At the end of the hold, over the largest force on the finer mesh. [1]
+    """
+
+    touches: int
+    sed: dict[str, Differences]
+    rate_hz: dict[str, Differences]
+    latency_ms: Differences
+    force: Differences
+
+
+@result_class
+class LargestChanges:
+    """Relative change of the largest SED at the end of ramp and hold, and of the force. [1]"""
+
+    sed_ramp: float
+    sed_hold: float
+    force: float
+
+
+@result_class
+class BarProfile:
+    """Response of one receptor on one mesh to each shift of the bar; arrays are (n_shifts,).
+
+    Parameters
+    ----------
+    shift_mm : array
+        Position of the bar, proximal positive. [mm]
+    sed_ramp_kpa, sed_hold_kpa : array
+        SED at the end of ramp and hold. [kPa]
+    dynamic_rate_hz, static_rate_hz : array
+        Firing rates. [spikes/s]
+    latency_ms : array
+        First spike; NaN of a silent afferent. [ms]
+    force_mn : array
+        At the end of the hold. [mN]
+    """
+
+    shift_mm: Vector
+    sed_ramp_kpa: Vector
+    sed_hold_kpa: Vector
+    dynamic_rate_hz: Vector
+    static_rate_hz: Vector
+    latency_ms: Vector
+    force_mn: Vector
+
+
 @dataclass(frozen=True)
 class Reading:
-    """What receptors say on one mesh; arrays are (n_touches, n_receptors) unless said otherwise.
+    """Responses of receptors on one mesh; arrays are (n_touches, n_receptors) unless said otherwise.
 
     Parameters
     ----------
     touches : tuple
-        What was pressed: numbers of the bar's shifts, or positions and curvatures of spheres.
+        Numbers of the bar's shifts, or positions and curvatures of spheres.
     sed_kpa : dict of arrays
         Strain energy density at the end of the "ramp" and of the "hold". [kPa]
     rate_hz : dict of arrays
@@ -62,20 +180,32 @@ class Reading:
         )
 
     def measures(self) -> dict[str, FloatArray]:
-        """Return the response measures that an observer reads, latencies as far as he waits for them."""
+        """Return the response measures that an observer compares; latencies are at most `PATIENCE_MS`."""
         return {**self.rate_hz, "latency": np.fmin(self.latency_ms, PATIENCE_MS)}
+
+    def profile(self) -> BarProfile:
+        """Return the responses of the first receptor to the bar; touches are the numbers of its shifts."""
+        return BarProfile(
+            shift_mm=np.array([protocol.BAR_SHIFTS.value[shift] for shift in self.touches]),
+            sed_ramp_kpa=self.sed_kpa["ramp"][:, 0],
+            sed_hold_kpa=self.sed_kpa["hold"][:, 0],
+            dynamic_rate_hz=self.rate_hz["dynamic"][:, 0],
+            static_rate_hz=self.rate_hz["static"][:, 0],
+            latency_ms=self.latency_ms[:, 0],
+            force_mn=self.force_mn,
+        )
 
 
 def over_thickness(skin: SkinResponse, sheets: int) -> SkinResponse:
-    """Let the lowest sheet of the living epidermis hold the mean of all its sheets.
+    """Give the lowest sheet of the living epidermis the mean SED of all its sheets.
 
-    A receptor reads the mean over the living epidermis, 0.1 mm thick. With one element through it that is the
-    element's own mean; with more, reading the lowest alone would be another depth and not another accuracy.
+    A receptor samples the mean over the living epidermis, which is 0.1 mm thick. With one element through it,
+    this is the element's own mean. With more, the lowest sheet alone would be another sampling depth.
 
     Parameters
     ----------
     skin : SkinResponse
-        Answer of a mesh with `sheets` elements through the living epidermis.
+        On a mesh with `sheets` elements through the living epidermis.
     sheets : int
         How many those are; they are equally thick.
 
@@ -91,12 +221,12 @@ def over_thickness(skin: SkinResponse, sheets: int) -> SkinResponse:
 
 
 def read(responses: Mapping[Any, SkinResponse], receptors_mm: FloatArray, sheets: int) -> Reading:
-    """Let equal afferents at some places answer the touches of one mesh.
+    """Return the responses of equal afferents at given places to the touches of one mesh.
 
     Parameters
     ----------
     responses : mapping of SkinResponse
-        What the skin did, by touch.
+        By touch.
     receptors_mm : array (n_receptors, 2)
         x and z. [mm]
     sheets : int
@@ -125,8 +255,34 @@ def read(responses: Mapping[Any, SkinResponse], receptors_mm: FloatArray, sheets
     )
 
 
-def differences(values: FloatArray, reference: FloatArray, unit: float = 1.0) -> dict[str, float]:
-    """Summarise how far values are from a reference.
+def read_stored(runner: Runner, touches: Mapping[Any, Touch], receptors_mm: FloatArray) -> Reading:
+    """Return the responses of equal afferents to stored touches of one mesh.
+
+    Parameters
+    ----------
+    runner : Runner
+        Holds every touch.
+    touches : mapping of Touch
+        All on meshes with as many elements through the living epidermis.
+    receptors_mm : array (n_receptors, 2)
+        x and z. [mm]
+
+    Returns
+    -------
+    Reading
+        Its touches are the keys of the mapping.
+
+    Raises
+    ------
+    StoreError
+        If a stored touch is damaged.
+    """
+    sheets = next(iter(touches.values())).grading.living_epidermis
+    return read({key: runner.store.load(touch) for key, touch in touches.items()}, receptors_mm, sheets)
+
+
+def differences(values: FloatArray, reference: FloatArray, unit: float = 1.0) -> Differences:
+    """Summarise the differences between values and a reference.
 
     Parameters
     ----------
@@ -137,8 +293,8 @@ def differences(values: FloatArray, reference: FloatArray, unit: float = 1.0) ->
 
     Returns
     -------
-    dict
-        "max" of the absolute differences, their "rms", and the "mean" with its sign. [unit]
+    Differences
+        In multiples of the unit.
 
     Raises
     ------
@@ -147,7 +303,7 @@ def differences(values: FloatArray, reference: FloatArray, unit: float = 1.0) ->
 
     Examples
     --------
-    >>> differences(np.array([1.0, 5.0]), np.array([1.0, 2.0]), unit=2.0)["max"]
+    >>> differences(np.array([1.0, 5.0]), np.array([1.0, 2.0]), unit=2.0).max
     1.5
     """
     if np.shape(values) != np.shape(reference):
@@ -155,44 +311,41 @@ def differences(values: FloatArray, reference: FloatArray, unit: float = 1.0) ->
             f"values and reference must match: got shapes {np.shape(values)} and {np.shape(reference)}."
         )
     difference = (np.asarray(values) - reference) / unit
-    return {
-        "max": float(np.abs(difference).max()),
-        "rms": float(np.sqrt(np.square(difference).mean())),
-        "mean": float(difference.mean()),
-    }
+    return Differences(
+        max=np.abs(difference).max(),
+        rms=np.sqrt(np.square(difference).mean()),
+        mean=difference.mean(),
+    )
 
 
-def compare(reading: Reading, reference: Reading) -> dict[str, Any]:
-    """Errors of one mesh, at the touches that it shares with a finer one.
+def compare(reading: Reading, reference: Reading) -> MeshErrors:
+    """Return the errors of one mesh at the touches that it shares with a finer one.
 
     Parameters
     ----------
     reading, reference : Reading
-        The mesh to judge and the finer one.
+        On the mesh that is judged and on the finer one.
 
     Returns
     -------
-    dict
-        Number of common touches; `differences` of "sed", by phase, as shares of the reference's largest SED;
-        of "rate", by phase [spikes/s]; of "latency" as far as an observer waits [ms]; and of "force" as
-        shares of the reference's largest.
+    MeshErrors
     """
     common = [touch for touch in reference.touches if touch in reading.touches]
     ours, finer = reading.only(common), reference.only(common)
-    return {
-        "touches": len(common),
-        "sed": {
+    return MeshErrors(
+        touches=len(common),
+        sed={
             phase: differences(ours.sed_kpa[phase], finer.sed_kpa[phase], float(finer.sed_kpa[phase].max()))
             for phase in finer.sed_kpa
         },
-        "rate": {phase: differences(ours.rate_hz[phase], finer.rate_hz[phase]) for phase in finer.rate_hz},
-        "latency": differences(ours.measures()["latency"], finer.measures()["latency"]),
-        "force": differences(ours.force_mn, finer.force_mn, float(finer.force_mn.max())),
-    }
+        rate_hz={phase: differences(ours.rate_hz[phase], finer.rate_hz[phase]) for phase in finer.rate_hz},
+        latency_ms=differences(ours.measures()["latency"], finer.measures()["latency"]),
+        force=differences(ours.force_mn, finer.force_mn, float(finer.force_mn.max())),
+    )
 
 
-def largest_changes(before: Reading, after: Reading) -> dict[str, float]:
-    """Return what a change of the mesh does to the largest SED and to the force, as shares of them.
+def largest_changes(before: Reading, after: Reading) -> LargestChanges:
+    """Return the relative change of the largest SED and of the force between two meshes.
 
     Parameters
     ----------
@@ -201,20 +354,17 @@ def largest_changes(before: Reading, after: Reading) -> dict[str, float]:
 
     Returns
     -------
-    dict
-        "sed_ramp", "sed_hold" and "force".
+    LargestChanges
     """
-    return {
-        **{
-            f"sed_{phase}": float(after.sed_kpa[phase].max() / sed.max()) - 1.0
-            for phase, sed in before.sed_kpa.items()
-        },
-        "force": float(after.force_mn[0] / before.force_mn[0]) - 1.0,
-    }
+    ramp, hold = (
+        float(after.sed_kpa[phase].max() / before.sed_kpa[phase].max()) - 1.0 for phase in ("ramp", "hold")
+    )
+    force = float(after.force_mn[0] / before.force_mn[0]) - 1.0
+    return LargestChanges(sed_ramp=ramp, sed_hold=hold, force=force)
 
 
 def goodness_of_fit(reading: Reading) -> float:
-    """Weighted FSS of Eqs. 12-14 of the rates at the shifts that were pressed, parameters as they are."""
+    """Return the weighted FSS (Eqs. 12-14) of the rates at the indented shifts; no parameter is fitted."""
     observed = bar_firing_rates()
     shifts = list(reading.touches)
     dynamic, static = (
@@ -226,7 +376,7 @@ def goodness_of_fit(reading: Reading) -> float:
 
 def hit_rates(
     reading: Reading, position_mm: float, curvatures: Sequence[float], neighbours: np.ndarray, seed: int = 0
-) -> dict[str, FloatArray]:
+) -> HitRates:
     """Hit rates of Gradient Sum at one position, the same random numbers on every mesh.
 
     Parameters

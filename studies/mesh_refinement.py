@@ -1,7 +1,7 @@
-"""How far the meshes are from a finer one: in strain energy density, in firing rates, in hit rates.
+"""Differences between meshes and a finer one: strain energy density (SED), firing rates, hit rates.
 
-The same bars and spheres are pressed into a family of meshes. What the neural half makes of the difference is
-the error that a mesh carries into the results: afferent, noise and random numbers stay the same.
+The same bars and spheres are indented on a family of meshes. Afferent, noise and random numbers are the same
+on each, so that differences in rates and hit rates are errors of the mesh.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fingerpad.core.checks import positive
+from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, sphere_discrimination
@@ -25,15 +26,19 @@ from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.skin.behaviour import code_hash
 from fingerpad.skin.indentation import Touch
 from studies.mesh_errors import (
+    BarProfile,
+    HitRates,
+    LargestChanges,
+    MeshErrors,
+    MeshSize,
     Reading,
     compare,
     goodness_of_fit,
     hit_rates,
     largest_changes,
     observed_order,
-    read,
+    read_stored,
 )
-from studies.plain_values import plain
 
 Sphere = tuple[float, float]
 """Position along the finger [mm] and curvature [1/m]."""
@@ -199,10 +204,115 @@ def _examples(conditions: Conditions) -> dict[str, Touch]:
     }
 
 
-def run(runner: Runner) -> dict[str, Any]:
-    """Press everything that is not stored yet, and compare the meshes.
+@result_class
+class LevelMeshes:
+    """Meshes of a level, see `Level`: their sizes under bar and sphere."""
 
-    About an hour on one core. Finished touches are stored one by one, so a run that was stopped goes on.
+    name: str
+    factor: float
+    resolution: str
+    bar: MeshSize
+    sphere: MeshSize
+
+
+@result_class
+class AgainstFiner:
+    """One mesh against a finer one.
+
+    Parameters
+    ----------
+    mesh, against : str
+        Their names.
+    errors : MeshErrors
+        At the touches that both have.
+    fss, fss_against : float, optional
+        Weighted FSS of the rates under the bar on either mesh; NaN of spheres. [1]
+    """
+
+    mesh: str
+    against: str
+    errors: MeshErrors
+    fss: Number = float("nan")
+    fss_against: Number = float("nan")
+
+
+@result_class
+class Convergence:
+    """Order of convergence of the largest SED of a touch at the end of the ramp.
+
+    Parameters
+    ----------
+    touch : str
+        Which.
+    sed_kpa : array (3,)
+        On the three similar meshes, from coarse to fine. [kPa]
+    order, limit_kpa : float
+        See `studies.mesh_errors.observed_order`; NaN without an order. [1, kPa]
+    """
+
+    touch: str
+    sed_kpa: Vector
+    order: Number
+    limit_kpa: Number
+
+
+@result_class
+class RefinedBars:
+    """Bars: profiles by mesh, errors against finer meshes, orders of convergence."""
+
+    profiles: dict[str, BarProfile]
+    against_finer: tuple[AgainstFiner, ...]
+    convergence: tuple[Convergence, ...]
+
+
+@result_class
+class RefinedSpheres:
+    """Spheres: errors against finer meshes, orders of convergence, and hit rates by mesh.
+
+    Hit rates are of `comparisons_per_m` [1/m] at 0.0 mm, with the same random numbers.
+    """
+
+    against_finer: tuple[AgainstFiner, ...]
+    convergence: tuple[Convergence, ...]
+    comparisons_per_m: Vector
+    hit_rates: dict[str, HitRates]
+
+
+@result_class
+class MeshRefinement:
+    """Result of `python -m studies mesh-refinement`.
+
+    Parameters
+    ----------
+    code_hash : str
+        Of the mechanics that solved the touches.
+    levels : tuple of LevelMeshes
+        From coarse to fine.
+    bars : RefinedBars
+        One receptor under the shifted bar.
+    spheres : RefinedSpheres
+        The receptors of the population under spheres.
+    one_at_a_time : dict of dict of LargestChanges
+        By "bar" or "sphere", and by change of the standard mesh.
+    step_counts : (int, int)
+        Steps in ramp and in hold that are compared.
+    steps : dict of MeshErrors
+        Few steps against many, by "bar" or "sphere".
+    """
+
+    code_hash: str
+    levels: tuple[LevelMeshes, ...]
+    bars: RefinedBars
+    spheres: RefinedSpheres
+    one_at_a_time: dict[str, dict[str, LargestChanges]]
+    step_counts: tuple[int, int]
+    steps: dict[str, MeshErrors]
+
+
+def run(runner: Runner) -> MeshRefinement:
+    """Solve every indentation that is not stored yet, and compare the meshes.
+
+    About an hour on one core. Finished touches are stored one by one; a stopped run continues after them.
 
     Parameters
     ----------
@@ -211,8 +321,7 @@ def run(runner: Runner) -> dict[str, Any]:
 
     Returns
     -------
-    dict
-        Plain numbers, strings and lists, as `studies.pages.mesh_refinement` shows them.
+    MeshRefinement
 
     Raises
     ------
@@ -230,85 +339,73 @@ def run(runner: Runner) -> dict[str, Any]:
         runner.solve(touches, name)
 
     population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
-    receptor = np.array([[RECEPTOR_X_MM, 0.0]])
-
-    def reading(touches: Mapping[Any, Touch], receptors_mm: np.ndarray) -> Reading:
-        sheets = next(iter(touches.values())).grading.living_epidermis
-        return read({key: runner.store.load(touch) for key, touch in touches.items()}, receptors_mm, sheets)
-
-    bars = {name: reading(touches, receptor) for name, (touches, _) in pressed.items()}
-    balls = {name: reading(touches, population.positions_mm) for name, (_, touches) in pressed.items()}
-    receptors = {"bar": receptor, "sphere": population.positions_mm}
+    receptors = {"bar": np.array([[RECEPTOR_X_MM, 0.0]]), "sphere": population.positions_mm}
+    bars = {name: read_stored(runner, touches, receptors["bar"]) for name, (touches, _) in pressed.items()}
+    balls = {
+        name: read_stored(runner, touches, receptors["sphere"]) for name, (_, touches) in pressed.items()
+    }
     standard = {
         "bar": bars["standard"].only([PEAK_SHIFT]),
         "sphere": balls["standard"].only(CHOSEN_SPHERES[:1]),
     }
-    neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
-    return plain(
-        {
-            "code_hash": code_hash(),
-            "levels": [_described(level) for level in LEVELS],
-            "bars": _bars(bars),
-            "spheres": _balls(balls, neighbours),
-            "one_at_a_time": {
-                name: {
-                    change: largest_changes(standard[name], reading({0: touch}, receptors[name]))
-                    for change, touch in each.items()
-                }
-                for name, each in changes.items()
-            },
-            "steps": {
-                name: _steps({count: reading({0: touch}, receptors[name]) for count, touch in counts.items()})
-                for name, counts in steps.items()
-            },
-        }
+
+    def example(name: str, touch: Touch) -> Reading:
+        return read_stored(runner, {0: touch}, receptors[name])
+
+    return MeshRefinement(
+        code_hash=code_hash(),
+        levels=tuple(_meshes(level) for level in LEVELS),
+        bars=_bars(bars),
+        spheres=_spheres(balls, neighbour_pairs(population.positions_mm, population.pitch_mm)),
+        one_at_a_time={
+            name: {
+                change: largest_changes(standard[name], example(name, touch))
+                for change, touch in each.items()
+            }
+            for name, each in changes.items()
+        },
+        step_counts=STEPS,
+        steps={
+            name: compare(*(example(name, counts[count]) for count in STEPS))
+            for name, counts in steps.items()
+        },
     )
 
 
-def _described(level: Level) -> dict[str, Any]:
-    """Sizes of the meshes of a level."""
-    described: dict[str, Any] = {"name": level.name, "factor": level.factor, "resolution": level.resolution}
-    for name, touch in (
-        ("bar", next(iter(level.bars().values()))),
-        ("sphere", next(iter(level.balls().values()))),
-    ):
-        described[name] = {
-            "nodes": len(touch.mesh.nodes_mm),
-            "size_x_mm": touch.grading.size_x_mm,
-            "size_z_mm": touch.grading.size_z_mm,
-            "counts": touch.grading.counts,
-        }
-    return described
+def _meshes(level: Level) -> LevelMeshes:
+    return LevelMeshes(
+        name=level.name,
+        factor=level.factor,
+        resolution=level.resolution,
+        bar=MeshSize.of(next(iter(level.bars().values()))),
+        sphere=MeshSize.of(next(iter(level.balls().values()))),
+    )
 
 
-def _bars(readings: Mapping[str, Reading]) -> dict[str, Any]:
-    """Profiles over the shifts, errors against the finest mesh, orders."""
-    finest = readings[LEVELS[-1].name]
-    return {
-        "profiles": {
-            name: {
-                "shift_mm": [SHIFTS_MM[shift] for shift in reading.touches],
-                "sed_ramp_kpa": reading.sed_kpa["ramp"][:, 0],
-                "sed_hold_kpa": reading.sed_kpa["hold"][:, 0],
-                "dynamic_rate_hz": reading.rate_hz["dynamic"][:, 0],
-                "static_rate_hz": reading.rate_hz["static"][:, 0],
-                "force_mn": reading.force_mn,
-            }
-            for name, reading in readings.items()
-        },
-        "errors": {
-            name: compare(reading, finest)
-            | {"fss": goodness_of_fit(reading.only(finest.touches)), "fss_finest": goodness_of_fit(finest)}
-            for name, reading in readings.items()
-            if reading is not finest
-        },
-        "quick_to_standard": compare(readings["quick"], readings["standard"])
-        | {"fss": goodness_of_fit(readings["quick"]), "fss_finest": goodness_of_fit(readings["standard"])},
-        "orders": _orders(readings),
-    }
+def _pairs(readings: Mapping[str, Reading]) -> list[tuple[str, str]]:
+    """Names of the meshes that are compared: each with the finest, then quick with standard."""
+    finest = LEVELS[-1].name
+    return [*((name, finest) for name in readings if name != finest), ("quick", "standard")]
 
 
-def _orders(readings: Mapping[str, Reading]) -> list[dict[str, Any]]:
+def _bars(readings: Mapping[str, Reading]) -> RefinedBars:
+    return RefinedBars(
+        profiles={name: reading.profile() for name, reading in readings.items()},
+        against_finer=tuple(
+            AgainstFiner(
+                mesh=name,
+                against=finer,
+                errors=compare(readings[name], readings[finer]),
+                fss=goodness_of_fit(readings[name].only(readings[finer].touches)),
+                fss_against=goodness_of_fit(readings[finer]),
+            )
+            for name, finer in _pairs(readings)
+        ),
+        convergence=_convergence(readings),
+    )
+
+
+def _convergence(readings: Mapping[str, Reading]) -> tuple[Convergence, ...]:
     """Order and limit of each touch's largest SED at the end of the ramp, on the three similar meshes."""
     similar = [level for level in LEVELS if level.resolution == "standard"]
     rows = []
@@ -316,9 +413,9 @@ def _orders(readings: Mapping[str, Reading]) -> list[dict[str, Any]]:
         sed = np.array([readings[level.name].only([touch]).sed_kpa["ramp"][0] for level in similar])
         values = sed[:, sed[-1].argmax()]
         found = observed_order(values.tolist(), [level.factor for level in similar])
-        order, limit = found if found else (None, None)
-        rows.append({"touch": _named(touch), "sed_kpa": values, "order": order, "limit_kpa": limit})
-    return rows
+        order, limit = found or (np.nan, np.nan)
+        rows.append(Convergence(touch=_named(touch), sed_kpa=values, order=order, limit_kpa=limit))
+    return tuple(rows)
 
 
 def _named(touch: int | Sphere) -> str:
@@ -332,32 +429,15 @@ def _named(touch: int | Sphere) -> str:
     return f"sphere {touch[1]:g} /m at {touch[0]:g} mm"
 
 
-def _balls(readings: Mapping[str, Reading], neighbours: np.ndarray) -> dict[str, Any]:
-    """Errors at all receptors against the finest mesh, and hit rates with the same random numbers."""
-    finest = readings[LEVELS[-1].name]
-    curvatures = sphere_discrimination.CURVATURES
-    return {
-        "errors": {
-            name: compare(reading, finest) for name, reading in readings.items() if reading is not finest
-        },
-        "quick_to_standard": compare(readings["quick"], readings["standard"]),
-        "orders": _orders(readings),
-        "comparisons_per_m": CHOSEN_CURVATURES[1:],
-        "hit_rates": {
+def _spheres(readings: Mapping[str, Reading], neighbours: np.ndarray) -> RefinedSpheres:
+    return RefinedSpheres(
+        against_finer=tuple(
+            AgainstFiner(mesh=name, against=finer, errors=compare(readings[name], readings[finer]))
+            for name, finer in _pairs(readings)
+        ),
+        convergence=_convergence(readings),
+        comparisons_per_m=np.array(CHOSEN_CURVATURES[1:]),
+        hit_rates={
             name: hit_rates(reading, 0.0, CHOSEN_CURVATURES, neighbours) for name, reading in readings.items()
         },
-        "all_comparisons_per_m": curvatures[1:],
-        "all_hit_rates": {
-            name: {
-                f"{position:g}": hit_rates(readings[name], position, curvatures, neighbours)
-                for position in sphere_discrimination.POSITIONS_MM
-            }
-            for name in ("quick", "standard")
-        },
-    }
-
-
-def _steps(readings: Mapping[int, Reading]) -> dict[str, Any]:
-    """Errors of few steps against many."""
-    few, many = (readings[count] for count in STEPS)
-    return compare(few, many) | {"steps": STEPS}
+    )

@@ -1,19 +1,19 @@
-"""How far quick and standard are from the paper's mesh: 0.1 mm at skin and border over the whole pad.
+"""Quick and standard against the paper's mesh: 0.1 mm at skin and border over the whole pad.
 
-The same touches are pressed into three meshes: six for the deflection of the skin, the bar at its edges, its
-centre and beside it, four spheres at both positions. Half of the finger is solved, once the whole one as a
-check; and twice the elements through the deep layers tell what the paper's size itself leaves open.
+The same touches are solved on three meshes: six for the deflection of the skin, the bar at its edges, its
+centre and beside it, four spheres at both positions. Half of the finger is solved, and once the whole one as
+a check. A mesh with twice the elements through the deep layers shows the error that the paper's size has.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.data import psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, skin_deflection, sphere_discrimination
@@ -26,16 +26,21 @@ from fingerpad.skin.behaviour import code_hash
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
 from studies.mesh_errors import (
+    BarProfile,
+    Differences,
+    HitRates,
+    LargestChanges,
+    MeshErrors,
+    MeshSize,
     Reading,
     compare,
     differences,
     goodness_of_fit,
     hit_rates,
     largest_changes,
-    read,
+    read_stored,
 )
 from studies.mesh_refinement import PEAK_SHIFT, SHIFTS_MM, Sphere
-from studies.plain_values import plain
 
 MESHES = ("quick", "standard", "paper")
 REFERENCE = "paper"
@@ -122,11 +127,151 @@ def deeper_touches() -> dict[str, Touch]:
     }
 
 
-def run(runner: Runner) -> dict[str, Any]:
-    """Press everything that is not stored yet, and compare quick and standard with the paper's size.
+@result_class
+class Edges:
+    """Edges of elements: how many, and their lengths. [mm]"""
 
-    23 presses at the paper's size or above it; finished ones are stored one by one, so a run that was
-    stopped goes on.
+    count: int
+    median_mm: float
+    smallest_mm: float
+    largest_mm: float
+
+
+@result_class
+class Preset:
+    """Mesh of the preset as it is: both halves of the finger.
+
+    Parameters
+    ----------
+    nodes, elements : int
+        How many.
+    elements_with_subcutis_of_wedges : int
+        Elements if each brick of the subcutis were cut into two wedges, which adds no node.
+    skin_edges, border_edges : Edges
+        On the skin and on the epidermal-dermal border, see `pad_edges`.
+    """
+
+    nodes: int
+    elements: int
+    elements_with_subcutis_of_wedges: int
+    skin_edges: Edges
+    border_edges: Edges
+
+
+@result_class
+class DeflectionErrors:
+    """One deflection against that at the paper's size.
+
+    Parameters
+    ----------
+    profile_mm : Differences
+        Of the skin within 10 mm of the indenter. [mm]
+    force, peak_force : float
+        Relative difference at the end of the hold and of the largest force. [1]
+    r2, r2_reference : float
+        Against the observations on either mesh; NaN under the line, where there are none. [1]
+    """
+
+    profile_mm: Differences
+    force: float
+    peak_force: float
+    r2: Number
+    r2_reference: Number
+
+
+@result_class
+class Deflections:
+    """Profiles of the skin at the end of the hold, and their errors against the paper's size.
+
+    Parameters
+    ----------
+    distance_mm : array (n_distances,)
+        From the indenter, proximal positive. [mm]
+    deflection_mm : dict of dict of arrays (n_distances,)
+        By mesh, then by trial and indenter. [mm]
+    errors : dict of dict of DeflectionErrors
+        By mesh, then by trial and indenter.
+    """
+
+    distance_mm: Vector
+    deflection_mm: dict[str, dict[str, Vector]]
+    errors: dict[str, dict[str, DeflectionErrors]]
+
+
+@result_class
+class BarErrors:
+    """Bars: profiles, errors against the paper's size and weighted FSS [1], by mesh."""
+
+    profiles: dict[str, BarProfile]
+    errors: dict[str, MeshErrors]
+    fss: dict[str, Number]
+
+
+@result_class
+class SphereErrors:
+    """Spheres: energy density, errors against the paper's size and hit rates, by mesh.
+
+    Parameters
+    ----------
+    position_mm, curvature_per_m : array (n_spheres,)
+        What is indented. [mm, 1/m]
+    largest_sed_ramp_kpa : dict of arrays (n_spheres,)
+        Over the receptors at the end of the ramp. [kPa]
+    errors : dict of dict of MeshErrors
+        By mesh and position.
+    comparisons_per_m : array (n_comparisons,)
+        Curvatures that are compared with the standard. [1/m]
+    hit_rates : dict of dict of HitRates
+        By mesh and position.
+    """
+
+    position_mm: Vector
+    curvature_per_m: Vector
+    largest_sed_ramp_kpa: dict[str, Vector]
+    errors: dict[str, dict[str, MeshErrors]]
+    comparisons_per_m: Vector
+    hit_rates: dict[str, dict[str, HitRates]]
+
+
+@result_class
+class PaperSize:
+    """Result of `python -m studies paper-size`.
+
+    Parameters
+    ----------
+    code_hash : str
+        Of the mechanics that solved the touches.
+    preset : Preset
+        The mesh of the paper's size.
+    meshes : dict of dict of MeshSize
+        By mesh and kind of touch, half of the finger.
+    deflection : Deflections
+        Line and cylinder in three trials.
+    bars : BarErrors
+        One receptor under the shifted bar.
+    spheres : SphereErrors
+        18 receptors under spheres.
+    half_against_whole : MeshErrors
+        Half of the finger against both halves, standard sphere.
+    twice_as_deep : dict of LargestChanges
+        With twice the elements through the deep layers, under "bar" and "sphere".
+    """
+
+    code_hash: str
+    preset: Preset
+    meshes: dict[str, dict[str, MeshSize]]
+    deflection: Deflections
+    bars: BarErrors
+    spheres: SphereErrors
+    half_against_whole: MeshErrors
+    twice_as_deep: dict[str, LargestChanges]
+
+
+def run(runner: Runner) -> PaperSize:
+    """Solve every indentation that is not stored yet, and compare quick and standard with the paper's size.
+
+    23 indentations at the paper's size or above it. Finished ones are stored one by one; a stopped run
+    continues after them.
 
     Parameters
     ----------
@@ -135,8 +280,7 @@ def run(runner: Runner) -> dict[str, Any]:
 
     Returns
     -------
-    dict
-        Plain numbers, strings and lists, as `studies.pages.paper_size` shows them.
+    PaperSize
 
     Raises
     ------
@@ -152,60 +296,51 @@ def run(runner: Runner) -> dict[str, Any]:
 
     receptor = np.array([[RECEPTOR_X_MM, 0.0]])
     population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
-    neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
-
-    def reading(touches: Mapping[Any, Touch], receptors_mm: FloatArray) -> Reading:
-        sheets = next(iter(touches.values())).grading.living_epidermis
-        return read({key: runner.store.load(touch) for key, touch in touches.items()}, receptors_mm, sheets)
-
-    deflection = {
-        name: {trial: runner.store.load(touch) for trial, touch in touches.deflection.items()}
-        for name, touches in pressed.items()
-    }
-    bars = {name: reading(touches.bars, receptor) for name, touches in pressed.items()}
-    spheres = {name: reading(touches.spheres, population.positions_mm) for name, touches in pressed.items()}
-    sphere = spheres[REFERENCE].only([STANDARD_SPHERE])
-    return plain(
-        {
-            "code_hash": code_hash(),
-            "preset": preset(),
-            "meshes": {name: _sizes(touches) for name, touches in pressed.items()},
-            "deflection": deflections(deflection),
-            "bars": _bars(bars),
-            "spheres": _spheres(spheres, neighbours),
-            "half_against_whole": compare(sphere, reading({STANDARD_SPHERE: whole}, population.positions_mm)),
-            "twice_as_deep": {
-                "bar": largest_changes(
-                    bars[REFERENCE].only([PEAK_SHIFT]), reading({0: deeper["bar"]}, receptor)
-                ),
-                "sphere": largest_changes(sphere, reading({0: deeper["sphere"]}, population.positions_mm)),
+    sites = population.positions_mm
+    bars = {name: read_stored(runner, touches.bars, receptor) for name, touches in pressed.items()}
+    spheres = {name: read_stored(runner, touches.spheres, sites) for name, touches in pressed.items()}
+    bar, sphere = bars[REFERENCE].only([PEAK_SHIFT]), spheres[REFERENCE].only([STANDARD_SPHERE])
+    return PaperSize(
+        code_hash=code_hash(),
+        preset=preset(),
+        meshes={name: _sizes(touches) for name, touches in pressed.items()},
+        deflection=deflections(
+            {
+                name: {trial: runner.store.load(touch) for trial, touch in touches.deflection.items()}
+                for name, touches in pressed.items()
+            }
+        ),
+        bars=BarErrors(
+            profiles={name: reading.profile() for name, reading in bars.items()},
+            errors={
+                name: compare(reading, bars[REFERENCE]) for name, reading in bars.items() if name != REFERENCE
             },
-        }
+            fss={name: goodness_of_fit(reading) for name, reading in bars.items()},
+        ),
+        spheres=_spheres(spheres, neighbour_pairs(sites, population.pitch_mm)),
+        half_against_whole=compare(sphere, read_stored(runner, {STANDARD_SPHERE: whole}, sites)),
+        twice_as_deep={
+            "bar": largest_changes(bar, read_stored(runner, {0: deeper["bar"]}, receptor)),
+            "sphere": largest_changes(sphere, read_stored(runner, {0: deeper["sphere"]}, sites)),
+        },
     )
 
 
-def preset() -> dict[str, Any]:
-    """Count and measure the preset as it is: both halves of the finger.
-
-    Returns
-    -------
-    dict
-        Nodes and elements; elements if each brick of the subcutis were cut into two wedges, which adds no
-        node; and edges on the skin and on the epidermal-dermal border, see `pad_edges`.
-    """
+def preset() -> Preset:
+    """Count and measure the preset."""
     conditions = Conditions(REFERENCE)
     mesh = finger_mesh(conditions.finger, resolution_grading(REFERENCE, RECEPTOR_X_MM))
     border = int((mesh.layer[: mesh.shape[2]] < LAYERS.index("dermis")).sum())
-    return {
-        "nodes": len(mesh.nodes_mm),
-        "elements": len(mesh.elements),
-        "elements_with_subcutis_of_wedges": len(mesh.elements) + int((mesh.layer == SUBCUTIS).sum()),
-        "skin_edges": pad_edges(mesh, RECEPTOR_X_MM, below=0),
-        "border_edges": pad_edges(mesh, RECEPTOR_X_MM, below=border),
-    }
+    return Preset(
+        nodes=len(mesh.nodes_mm),
+        elements=len(mesh.elements),
+        elements_with_subcutis_of_wedges=len(mesh.elements) + int((mesh.layer == SUBCUTIS).sum()),
+        skin_edges=pad_edges(mesh, RECEPTOR_X_MM, below=0),
+        border_edges=pad_edges(mesh, RECEPTOR_X_MM, below=border),
+    )
 
 
-def pad_edges(mesh: Mesh, centre_mm: float, below: int) -> dict[str, float]:
+def pad_edges(mesh: Mesh, centre_mm: float, below: int) -> Edges:
     """Measure the edges on one sheet of nodes, below an oval of the volar skin.
 
     Parameters
@@ -219,8 +354,7 @@ def pad_edges(mesh: Mesh, centre_mm: float, below: int) -> dict[str, float]:
 
     Returns
     -------
-    dict
-        "count", and "median", "smallest" and "largest" length. [mm]
+    Edges
     """
     skin = mesh.nodes_mm[mesh.skin_grid]
     along, across = PAD_HALF_AXES_MM
@@ -233,16 +367,16 @@ def pad_edges(mesh: Mesh, centre_mm: float, below: int) -> dict[str, float]:
             np.linalg.norm(np.diff(points, axis=1), axis=-1)[pad[:, :-1] & pad[:, 1:]],
         ]
     )
-    return {
-        "count": edges.size,
-        "median": float(np.median(edges)),
-        "smallest": float(edges.min()),
-        "largest": float(edges.max()),
-    }
+    return Edges(
+        count=edges.size,
+        median_mm=float(np.median(edges)),
+        smallest_mm=float(edges.min()),
+        largest_mm=float(edges.max()),
+    )
 
 
-def _sizes(touches: Touches) -> dict[str, Any]:
-    """Nodes and elements of each kind of touch."""
+def _sizes(touches: Touches) -> dict[str, MeshSize]:
+    """Sizes of the meshes, by kind of touch."""
     (_, line), (_, cylinder) = list(touches.deflection.items())[:2]
     examples = {
         "line": line,
@@ -250,20 +384,11 @@ def _sizes(touches: Touches) -> dict[str, Any]:
         "bar": next(iter(touches.bars.values())),
         "sphere": next(iter(touches.spheres.values())),
     }
-    return {
-        name: {
-            "nodes": len(touch.mesh.nodes_mm),
-            "elements": len(touch.mesh.elements),
-            "size_x_mm": touch.grading.core_size_mm or touch.grading.size_x_mm,
-            "size_z_mm": touch.grading.size_z_mm,
-            "counts": touch.grading.counts,
-        }
-        for name, touch in examples.items()
-    }
+    return {name: MeshSize.of(touch) for name, touch in examples.items()}
 
 
-def deflections(responses: Mapping[str, Mapping[Trial, SkinResponse]]) -> dict[str, Any]:
-    """Profiles of the skin on every mesh, and their errors against the paper's size.
+def deflections(responses: Mapping[str, Mapping[Trial, SkinResponse]]) -> Deflections:
+    """Return profiles of the skin on every mesh, and their errors against the paper's size.
 
     Parameters
     ----------
@@ -272,41 +397,42 @@ def deflections(responses: Mapping[str, Mapping[Trial, SkinResponse]]) -> dict[s
 
     Returns
     -------
-    dict
-        "distance_mm"; "deflection_mm" at the end of the hold, by mesh and touch; and "errors": `differences`
-        of the profile [mm], of the force as a share of the paper's size's, and R² against the observations
-        under the cylinder on both meshes.
+    Deflections
     """
     reference = responses[REFERENCE]
-    return {
-        "distance_mm": DISTANCES_MM,
-        "deflection_mm": {
+    return Deflections(
+        distance_mm=DISTANCES_MM,
+        deflection_mm={
             name: {_named(trial): _profile(skin) for trial, skin in of_mesh.items()}
             for name, of_mesh in responses.items()
         },
-        "errors": {
+        errors={
             name: {
-                _named(trial): {
-                    "profile": differences(_profile(skin), _profile(reference[trial])),
-                    "force": float(skin.force_mn[-1] / reference[trial].force_mn[-1]) - 1.0,
-                    "peak_force": float(skin.force_mn.max() / reference[trial].force_mn.max()) - 1.0,
-                    "r2": _r2(trial, skin),
-                    "r2_reference": _r2(trial, reference[trial]),
-                }
+                _named(trial): _deflection_errors(trial, skin, reference[trial])
                 for trial, skin in of_mesh.items()
             }
             for name, of_mesh in responses.items()
             if name != REFERENCE
         },
-    }
+    )
+
+
+def _deflection_errors(trial: Trial, skin: SkinResponse, reference: SkinResponse) -> DeflectionErrors:
+    return DeflectionErrors(
+        profile_mm=differences(_profile(skin), _profile(reference)),
+        force=float(skin.force_mn[-1] / reference.force_mn[-1]) - 1.0,
+        peak_force=float(skin.force_mn.max() / reference.force_mn.max()) - 1.0,
+        r2=_r2(trial, skin),
+        r2_reference=_r2(trial, reference),
+    )
 
 
 def _profile(skin: SkinResponse) -> FloatArray:
     return skin.surface_profile().at(-DISTANCES_MM)  # a profile counts distal as positive
 
 
-def _r2(trial: Trial, skin: SkinResponse) -> float | None:
-    return skin_deflection.deflection_r2(skin.surface_profile()) if trial[1] == "cylinder" else None
+def _r2(trial: Trial, skin: SkinResponse) -> float:
+    return skin_deflection.deflection_r2(skin.surface_profile()) if trial[1] == "cylinder" else float("nan")
 
 
 def _named(trial: Trial) -> str:
@@ -318,56 +444,31 @@ def _named(trial: Trial) -> str:
     return f"{trial[0].replace('trial', 'trial ')}, {trial[1]}"
 
 
-def _bars(readings: Mapping[str, Reading]) -> dict[str, Any]:
-    """Return what the receptor says at each shift, and how far that is from the paper's size."""
+def _spheres(readings: Mapping[str, Reading], neighbours: np.ndarray) -> SphereErrors:
     reference = readings[REFERENCE]
-    return {
-        "shift_mm": [SHIFTS_MM[shift] for shift in CHOSEN_SHIFTS],
-        "profiles": {
-            name: {
-                "sed_ramp_kpa": reading.sed_kpa["ramp"][:, 0],
-                "sed_hold_kpa": reading.sed_kpa["hold"][:, 0],
-                "dynamic_rate_hz": reading.rate_hz["dynamic"][:, 0],
-                "static_rate_hz": reading.rate_hz["static"][:, 0],
-                "latency_ms": reading.latency_ms[:, 0],
-                "force_mn": reading.force_mn,
-            }
-            for name, reading in readings.items()
-        },
-        "errors": {
-            name: compare(reading, reference) for name, reading in readings.items() if name != REFERENCE
-        },
-        "fss": {name: goodness_of_fit(reading) for name, reading in readings.items()},
-    }
-
-
-def _spheres(readings: Mapping[str, Reading], neighbours: np.ndarray) -> dict[str, Any]:
-    """Return what 18 receptors say under each sphere, and what an observer makes of it."""
-    reference = readings[REFERENCE]
-    return {
-        "position_mm": [position for position, _ in reference.touches],
-        "curvature_per_m": [curvature for _, curvature in reference.touches],
-        "largest_sed_ramp_kpa": {
+    positions = sphere_discrimination.POSITIONS_MM
+    return SphereErrors(
+        position_mm=np.array([position for position, _ in reference.touches]),
+        curvature_per_m=np.array([curvature for _, curvature in reference.touches]),
+        largest_sed_ramp_kpa={
             name: reading.sed_kpa["ramp"].max(axis=1) for name, reading in readings.items()
         },
-        "errors": {
+        errors={
             name: {
-                f"{position:g}": compare(reading, reference.only(_at(position)))
-                for position in sphere_discrimination.POSITIONS_MM
+                f"{position:g}": compare(
+                    reading, reference.only([(position, curvature) for curvature in CURVATURES])
+                )
+                for position in positions
             }
             for name, reading in readings.items()
             if name != REFERENCE
         },
-        "comparisons_per_m": CURVATURES[1:],
-        "hit_rates": {
+        comparisons_per_m=np.array(CURVATURES[1:]),
+        hit_rates={
             name: {
                 f"{position:g}": hit_rates(reading, position, CURVATURES, neighbours)
-                for position in sphere_discrimination.POSITIONS_MM
+                for position in positions
             }
             for name, reading in readings.items()
         },
-    }
-
-
-def _at(position_mm: float) -> list[Sphere]:
-    return [(position_mm, curvature) for curvature in CURVATURES]
+    )

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Sequence
+from math import isnan
 from typing import Any
 
 from matplotlib.figure import Figure
 
 from fingerpad.data import protocol
 from fingerpad.report.formatting import ABSENT, fixed, number
-from fingerpad.report.parts import Chapter, Drawing, Page, Part
-from fingerpad.report.style import BLACK, BLUE, GREEN, ORANGE, new_figure, numbers
-from studies.pages.markdown import PERCENT, parts_of, section, share, signed, table
+from fingerpad.report.parts import Part
+from fingerpad.report.style import BLACK, BLUE, GREEN, ORANGE, new_figure
+from studies.mesh_refinement import AgainstFiner, Convergence, LevelMeshes, MeshRefinement
+from studies.pages.markdown import PERCENT, parts_of, signed, table
+from studies.pages.mesh_comparison import ERROR_COLUMNS, MeshComparison, error_cells
 
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
 LINES: dict[str, dict[str, Any]] = {
@@ -21,32 +23,14 @@ LINES: dict[str, dict[str, Any]] = {
     "standard": {"color": BLUE, "linestyle": "-", "marker": ""},
     "fine": {"color": BLACK, "linestyle": "", "marker": "o", "markerfacecolor": "white"},
 }
-PHASES = ("ramp", "hold")
-RATES = ("dynamic", "static")
 
 
-NUMBERS, FIGURE = "mesh_refinement.json", "mesh_refinement.png"
-
-
-def mesh_refinement_page(results: dict[str, Any]) -> Page:
-    """Return the page of `python -m studies mesh-refinement`, from `studies.mesh_refinement.run`."""
-    drawing = Drawing(
-        "mesh_refinement",
-        "Strain energy density and firing rates on every mesh",
-        partial(draw, results),
-        "Strain energy density and firing rates on every mesh.",
-    )
-    subtitle = f"Bars and spheres on meshes of four sizes. Mechanical code {results['code_hash']}."
-    return Page("Mesh errors", subtitle, [], [Chapter("", [drawing, *parts(results)])])
-
-
-def draw(results: Mapping[str, Any]) -> Figure:
+def draw(results: MeshRefinement) -> Figure:
     """Draw strain energy density and firing rates against the bar's shift, on every mesh.
 
     Parameters
     ----------
-    results : dict
-        From `studies.mesh_refinement.run`.
+    results : MeshRefinement
 
     Returns
     -------
@@ -54,7 +38,7 @@ def draw(results: Mapping[str, Any]) -> Figure:
     """
     figure = new_figure(10.0, 7.5)
     panels = figure.subplots(2, 2)
-    profiles = results["bars"]["profiles"]
+    profiles = results.bars.profiles
     columns = (
         ("sed_ramp_kpa", "(a) energy density, end of the ramp", "[kPa]"),
         ("sed_hold_kpa", "(b) energy density, end of the hold", "[kPa]"),
@@ -65,8 +49,8 @@ def draw(results: Mapping[str, Any]) -> Figure:
         axes.axvspan(-BAR_HALF_WIDTH_MM, BAR_HALF_WIDTH_MM, color="#f3f1ea", zorder=0)
         for level, profile in profiles.items():
             axes.plot(
-                numbers(profile["shift_mm"]),
-                numbers(profile[name]),
+                profile.shift_mm,
+                getattr(profile, name),
                 label=level,
                 markersize=5.0,
                 **LINES[level],
@@ -78,24 +62,11 @@ def draw(results: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def markdown(results: Mapping[str, Any]) -> str:
-    """Return the section of the verification page as Markdown without a title."""
-    return section(parts(results))
-
-
-def parts(results: Mapping[str, Any]) -> list[Part]:
-    """Return the meshes and their errors: tables and the sentences that introduce them.
-
-    Parameters
-    ----------
-    results : dict
-        From `studies.mesh_refinement.run`.
-
-    Returns
-    -------
-    list of Paragraph and Table
-    """
-    finest = results["levels"][-1]["name"]
+def parts(results: MeshRefinement) -> list[Part]:
+    """Return the meshes and their errors: tables and the sentences that introduce them."""
+    finest, similar = results.levels[-1].name, _similar(results)
+    bars, spheres = results.bars, results.spheres
+    few, many = results.step_counts
     return parts_of(
         table(
             (
@@ -106,131 +77,115 @@ def parts(results: Mapping[str, Any]) -> list[Part]:
                 "nodes",
                 "elements through corneum, living, dermis, subcutis",
             ),
-            [_mesh(level) for level in results["levels"]],
+            [_mesh(level) for level in results.levels],
         ),
         f"Bar, one receptor, against {finest}; strain energy density (SED) as a share of its largest value:",
-        table(ERROR_COLUMNS, _error_rows(results["bars"], finest)),
+        _errors(bars.against_finer),
         f"Spheres, 18 receptors, against {finest}:",
-        table(ERROR_COLUMNS, _error_rows(results["spheres"], finest)),
+        _errors(spheres.against_finer),
         "Largest SED of a touch at the end of the ramp on the similar meshes, order of convergence and limit "
         "(Richardson); no order where the values do not settle:",
         table(
-            (
-                "touch",
-                *(f"{name} [kPa]" for name in _similar(results)),
-                "order",
-                "limit [kPa]",
-                "standard less limit",
-            ),
-            [row for name in ("bars", "spheres") for row in _order_rows(results[name], _similar(results))],
+            ("touch", *(f"{name} [kPa]" for name in similar), "order", "limit [kPa]", "standard less limit"),
+            [row for touches in (bars, spheres) for row in _orders(touches.convergence, similar)],
         ),
         "Goodness of fit at the common shifts, parameters unchanged:",
         table(
             ("mesh", "against", "touches", "weighted FSS", "on the finer mesh"),
             [
                 (
-                    name,
-                    row["against"],
-                    str(row["touches"]),
-                    fixed(row["fss"], 3),
-                    fixed(row["fss_finest"], 3),
+                    row.mesh,
+                    row.against,
+                    str(row.errors.touches),
+                    fixed(row.fss, 3),
+                    fixed(row.fss_against, 3),
                 )
-                for name, row in _against(results["bars"], finest)
+                for row in bars.against_finer
             ],
         ),
         "Hit rates of Gradient Sum at the paper's noise, sphere at 0.0 mm, the same random numbers:",
         table(
             (
                 "mesh",
-                *(f"{measure}, {curvature:g} /m" for measure, curvature in _measures(results["spheres"])),
+                *(
+                    f"{measure}, {curvature:g} /m"
+                    for measure in spheres.hit_rates[finest]
+                    for curvature in spheres.comparisons_per_m
+                ),
             ),
             [
                 (name, *(fixed(PERCENT * rate, 1) + " %" for measure in rates for rate in rates[measure]))
-                for name, rates in results["spheres"]["hit_rates"].items()
+                for name, rates in spheres.hit_rates.items()
             ],
         ),
         "One change of the standard mesh at a time; bar shifted to the highest peak, standard sphere:",
         table(
             ("touch", "change", "largest SED, ramp", "hold", "force"),
             [
-                (name, change, *(signed(does[key]) for key in ("sed_ramp", "sed_hold", "force")))
-                for name, changes in results["one_at_a_time"].items()
-                for change, does in changes.items()
+                (name, change, signed(found.sed_ramp), signed(found.sed_hold), signed(found.force))
+                for name, changes in results.one_at_a_time.items()
+                for change, found in changes.items()
             ],
         ),
         "Few steps against many in ramp and in hold, on the quick mesh:",
         table(
-            ("touch", "steps", *ERROR_COLUMNS[3:]),
-            [
-                (name, f"{row['steps'][0]} against {row['steps'][1]}", *errors(row))
-                for name, row in results["steps"].items()
-            ],
+            ("touch", "steps", *ERROR_COLUMNS),
+            [(name, f"{few} against {many}", *error_cells(row)) for name, row in results.steps.items()],
         ),
     )
 
 
-ERROR_COLUMNS = (
-    "mesh", "against", "touches", "SED, ramp: max", "RMS", "SED, hold: max", "RMS",
-    "dynamic rate: max [spikes/s]", "RMS", "static rate: max [spikes/s]", "RMS",
-)  # fmt: skip
+def _mesh(level: LevelMeshes) -> Sequence[str]:
+    bar, sphere = (
+        (f"{number(size.size_x_mm)} × {number(size.size_z_mm)}", number(size.nodes))
+        for size in (level.bar, level.sphere)
+    )
+    return level.name, *bar, *sphere, ", ".join(str(count) for count in level.bar.counts)
 
 
-def _mesh(level: Mapping[str, Any]) -> Sequence[str]:
-    sizes = [
-        f"{number(level[name]['size_x_mm'])} × {number(level[name]['size_z_mm'])}"
-        for name in ("bar", "sphere")
-    ]
-    nodes = [number(level[name]["nodes"]) for name in ("bar", "sphere")]
-    counts = ", ".join(str(count) for count in level["bar"]["counts"])
-    return level["name"], sizes[0], nodes[0], sizes[1], nodes[1], counts
+def _errors(rows: Sequence[AgainstFiner]) -> Part:
+    return table(
+        ("mesh", "against", "touches", *ERROR_COLUMNS),
+        [(row.mesh, row.against, str(row.errors.touches), *error_cells(row.errors)) for row in rows],
+    )
 
 
-def _against(section: Mapping[str, Any], finest: str) -> list[tuple[str, Mapping[str, Any]]]:
-    """Pairs of meshes that were compared; the last one is at every touch."""
-    rows = [(name, {**row, "against": finest}) for name, row in section["errors"].items()]
-    return [*rows, ("quick", {**section["quick_to_standard"], "against": "standard"})]
-
-
-def _error_rows(section: Mapping[str, Any], finest: str) -> list[Sequence[str]]:
-    return [
-        (
-            name,
-            row["against"],
-            str(row["touches"]),
-            *errors(row),
-        )
-        for name, row in _against(section, finest)
-    ]
-
-
-def errors(row: Mapping[str, Any]) -> list[str]:
-    """Return the cells of `ERROR_COLUMNS` after the third, from what `mesh_errors.compare` found."""
-    shares = [share(row["sed"][phase][key]) for phase in PHASES for key in ("max", "rms")]
-    return shares + [fixed(row["rate"][phase][key], 1) for phase in RATES for key in ("max", "rms")]
-
-
-def _similar(results: Mapping[str, Any]) -> list[str]:
+def _similar(results: MeshRefinement) -> list[str]:
     """Names of the meshes that differ by one factor."""
-    return [level["name"] for level in results["levels"] if level["resolution"] == "standard"]
+    return [level.name for level in results.levels if level.resolution == "standard"]
 
 
-def _order_rows(section: Mapping[str, Any], names: Sequence[str]) -> list[Sequence[str]]:
+def _orders(rows: Sequence[Convergence], names: Sequence[str]) -> list[Sequence[str]]:
     """Rows of the orders; the distance from the limit is a share of the largest SED on the finest mesh."""
-    peak = max(row["sed_kpa"][-1] for row in section["orders"])
+    peak = max(row.sed_kpa[-1] for row in rows)
     return [
         (
-            row["touch"],
-            *(fixed(value, 3) for value in row["sed_kpa"]),
-            fixed(row["order"], 1),
-            fixed(row["limit_kpa"], 3),
+            row.touch,
+            *(fixed(value, 3) for value in row.sed_kpa),
+            fixed(row.order, 1),
+            fixed(row.limit_kpa, 3),
             ABSENT
-            if row["limit_kpa"] is None
-            else signed((row["sed_kpa"][names.index("standard")] - row["limit_kpa"]) / peak),
+            if isnan(row.limit_kpa)
+            else signed((row.sed_kpa[names.index("standard")] - row.limit_kpa) / peak),
         )
-        for row in section["orders"]
+        for row in rows
     ]
 
 
-def _measures(section: Mapping[str, Any]) -> list[tuple[str, float]]:
-    rates = next(iter(section["hit_rates"].values()))
-    return [(measure, curvature) for measure in rates for curvature in section["comparisons_per_m"]]
+MESH_REFINEMENT = MeshComparison(
+    name="mesh_refinement",
+    result=MeshRefinement,
+    title="Mesh refinement",
+    about="""\
+There is no closed-form solution for a fingertip. The meshes of every resolution are therefore compared
+with a finer one. Compared are the strain energy density (SED) at the receptor under the shifted bar and at
+the receptors of the population under spheres, and the firing rates, goodness of fit and hit rates computed
+from it. Afferent, noise and random numbers are the same on every mesh. The coarse, standard and fine
+meshes differ by one factor in every direction. `python -m studies mesh-refinement` computes these tables;
+the ones below come from mechanical code {code_hash}. Conclusions about the choice of a mesh are on [mesh
+resolutions](decisions/mesh-resolutions.md).""",
+    caption="SED at the receptor and its firing rates against the shift of the bar, on every mesh",
+    draw=draw,
+    parts=parts,
+)
+"""The page of `python -m studies mesh-refinement`."""

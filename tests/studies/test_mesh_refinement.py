@@ -1,14 +1,12 @@
-"""Mesh errors: what is pressed, how differences are summed up, and what the page says of them."""
+"""Mesh refinement: indentations, differences between meshes, and the page that shows them."""
 
-import json
-from dataclasses import replace
-from pathlib import Path
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.results import to_json
+from fingerpad.core.results import from_json, to_json
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
@@ -25,6 +23,7 @@ from fingerpad.report.page import markdown
 from fingerpad.skin.indentation import touch_of
 from studies import mesh_refinement
 from studies.mesh_errors import (
+    Differences,
     Reading,
     compare,
     differences,
@@ -34,9 +33,9 @@ from studies.mesh_errors import (
     over_thickness,
     read,
 )
-from studies.pages import mesh_refinement as report
+from studies.mesh_refinement import MeshRefinement
+from studies.pages.mesh_refinement import MESH_REFINEMENT, draw
 
-RESULTS = Path(__file__).parents[1] / "docs" / "verification" / "mesh_refinement.json"
 COARSE = Grading(RECEPTOR_X_MM, 1.0, 1.0, 1.0, 1.0, stratum_corneum=1, dermis=1, subcutis=1)
 
 
@@ -129,7 +128,8 @@ def test_each_single_change_moves_only_the_mesh_or_only_the_steps():
 
 def test_differences_are_those_of_a_small_table():
     found = differences(np.array([1.0, 2.0, 6.0]), np.array([1.0, 4.0, 2.0]), unit=2.0)
-    assert found == {"max": 2.0, "rms": pytest.approx(np.sqrt(5.0 / 3.0)), "mean": pytest.approx(1.0 / 3.0)}
+    expected = {"max": 2.0, "rms": np.sqrt(5.0 / 3.0), "mean": 1.0 / 3.0}
+    assert asdict(found) == pytest.approx(expected)
     with pytest.raises(InputError, match="must match"):
         differences(np.zeros(2), np.zeros(3))
 
@@ -160,17 +160,13 @@ def test_comparison_uses_common_touches_and_the_peak_of_the_finer_mesh():
     finer = reading([[2.0], [4.0]], touches=[3, 7])
     coarser = reading([[9.0], [2.2], [3.8]], touches=[1, 3, 7])
     found = compare(coarser, finer)
-    assert found["touches"] == 2
-    assert found["sed"]["ramp"] == {
-        "max": pytest.approx(0.05),
-        "rms": pytest.approx(0.05),
-        "mean": pytest.approx(0.0),
-    }
-    assert found["rate"]["dynamic"]["max"] == pytest.approx(2.0)
-    assert found["rate"]["static"]["max"] == pytest.approx(1.0)
-    assert found["force"]["rms"] == pytest.approx(0.05)
+    assert found.touches == 2
+    assert asdict(found.sed["ramp"]) == pytest.approx({"max": 0.05, "rms": 0.05, "mean": 0.0})
+    assert found.rate_hz["dynamic"].max == pytest.approx(2.0)
+    assert found.rate_hz["static"].max == pytest.approx(1.0)
+    assert found.force.rms == pytest.approx(0.05)
     itself = compare(finer, finer)
-    assert itself["sed"]["hold"]["max"] == itself["rate"]["dynamic"]["rms"] == 0.0
+    assert itself.sed["hold"] == itself.rate_hz["dynamic"] == Differences(max=0.0, rms=0.0, mean=0.0)
 
 
 def test_rates_as_observed_fit_perfectly_at_any_shifts():
@@ -269,38 +265,44 @@ def test_a_run_presses_every_mesh_and_finds_the_known_error_and_order(results):
         "quick": (1.0 + 4.0 * ERROR) / fine - 1.0,  # 0.2 mm against 0.1 mm
         "standard": (1.0 + ERROR) / fine - 1.0,
     }
-    for name, error in expected.items():
-        assert found["bars"]["errors"][name]["sed"]["ramp"]["max"] == pytest.approx(error, rel=1e-6)
-    assert found["spheres"]["errors"]["standard"]["sed"]["hold"]["max"] == pytest.approx(expected["standard"])
-    between = found["bars"]["quick_to_standard"]["sed"]["ramp"]["max"]
-    assert between == pytest.approx((1.0 + 4.0 * ERROR) / (1.0 + ERROR) - 1.0, rel=1e-6)
-    assert [row["touch"] for row in found["bars"]["orders"]] == ["bar, shift 1.3 mm", "bar, shift 0.1 mm"]
-    for row in found["bars"]["orders"] + found["spheres"]["orders"]:
-        assert row["order"] == pytest.approx(2.0, rel=1e-6)
-        assert row["limit_kpa"] == pytest.approx(row["sed_kpa"][-1] / fine, rel=1e-6)
+    between = (1.0 + 4.0 * ERROR) / (1.0 + ERROR) - 1.0
+    *rows, last = found.bars.against_finer
+    assert {row.mesh: row.errors.sed["ramp"].max for row in rows} == pytest.approx(expected, rel=1e-6)
+    assert {row.against for row in rows} == {"fine"}
+    assert (last.mesh, last.against) == ("quick", "standard")
+    assert last.errors.sed["ramp"].max == pytest.approx(between, rel=1e-6)
+    standard = found.spheres.against_finer[2]
+    assert standard.mesh == "standard"
+    assert standard.errors.sed["hold"].max == pytest.approx(expected["standard"])
+    assert [row.touch for row in found.bars.convergence] == ["bar, shift 1.3 mm", "bar, shift 0.1 mm"]
+    for row in found.bars.convergence + found.spheres.convergence:
+        assert row.order == pytest.approx(2.0, rel=1e-6)
+        assert row.limit_kpa == pytest.approx(row.sed_kpa[-1] / fine, rel=1e-6)
     halved = (1.0 + ERROR / 4.0) / (1.0 + ERROR) - 1.0
-    changes = found["one_at_a_time"]
-    assert changes["bar"]["half the size along the finger"]["sed_ramp"] == pytest.approx(halved)
+    changes = found.one_at_a_time
+    assert changes["bar"]["half the size along the finger"].sed_ramp == pytest.approx(halved)
     for name in ("bar", "sphere"):
-        assert changes[name]["twice the elements through dermis and subcutis"]["sed_hold"] == pytest.approx(
-            0.0
-        )
-    assert found["steps"]["bar"]["sed"]["ramp"]["max"] == 0.0
+        deeper = changes[name]["twice the elements through dermis and subcutis"]
+        assert deeper.sed_hold == pytest.approx(0.0)
+    assert found.steps["bar"].sed["ramp"].max == 0.0
 
 
 def test_pages_say_every_mesh_with_its_errors(results):
     found = results[0]
-    assert json.loads(to_json(found)) == found
-    made = report.mesh_refinement_page(found)
+    assert to_json(from_json(MeshRefinement, to_json(found))) == to_json(found)
+    made = MESH_REFINEMENT.page(found)
     page = markdown(made)
-    assert report.markdown(found) in page
-    assert [f"{drawing.name}.png" for drawing in made.drawings] == [report.FIGURE]
-    error = 100.0 * found["bars"]["errors"]["standard"]["sed"]["ramp"]["max"]
+    assert MESH_REFINEMENT.section(found) == f"#{page}"
+    assert "![SED at the receptor" in page
+    assert f"mechanical code {found.code_hash}." in page
+    error = 100.0 * found.bars.against_finer[2].errors.sed["ramp"].max
     assert f"| standard | fine | 2 | {error:.1f} %" in page
-    rates = found["spheres"]["errors"]["standard"]["rate"]
-    shown = [f"{rates[phase][key]:.1f}" for phase in ("dynamic", "static") for key in ("max", "rms")]
+    rates = found.spheres.against_finer[2].errors.rate_hz
+    shown = [
+        f"{value:.1f}" for phase in ("dynamic", "static") for value in (rates[phase].max, rates[phase].rms)
+    ]
     assert f"% | {' | '.join(shown)} |" in page
-    rate = 100.0 * found["spheres"]["hit_rates"]["fine"]["static"][1]
+    rate = 100.0 * found.spheres.hit_rates["fine"]["static"][1]
     assert f"{rate:.1f} %" in page
     for name, changes in mesh_refinement.ONE_AT_A_TIME.items():
         for change in changes:
@@ -309,15 +311,15 @@ def test_pages_say_every_mesh_with_its_errors(results):
     for table in tables:
         assert len({line.count("|") for line in table}) == 1
     assert len(tables) == 8
-    row = found["bars"]["orders"][0]
-    peak = max(row["sed_kpa"][-1] for row in found["bars"]["orders"])
-    distance = 100.0 * ERROR * row["limit_kpa"] / peak
-    assert f"| 2.0 | {row['limit_kpa']:.3f} | +{distance:.1f} % |" in page
+    row = found.bars.convergence[0]
+    peak = max(row.sed_kpa[-1] for row in found.bars.convergence)
+    distance = 100.0 * ERROR * row.limit_kpa / peak
+    assert f"| 2.0 | {row.limit_kpa:.3f} | +{distance:.1f} % |" in page
     assert "| bar | 8 against 32 | 0.0 %" in page
 
 
 def test_the_figure_draws_every_mesh_in_every_panel(results):
-    figure = report.draw(results[0])
+    figure = draw(results[0])
     for axes in figure.axes:
         assert [line.get_label() for line in axes.get_lines()] == [
             level.name for level in mesh_refinement.LEVELS

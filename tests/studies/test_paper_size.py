@@ -1,13 +1,11 @@
-"""Quick and standard against the paper's size: what is pressed, and what is made of a known difference."""
+"""Quick and standard against the paper's size: indentations, and how a known difference is shown."""
 
-import copy
-import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
-from fingerpad.core.results import to_json
+from fingerpad.core.results import from_json, to_json
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, skin_deflection, sphere_discrimination
@@ -21,7 +19,8 @@ from fingerpad.report.page import markdown
 from fingerpad.skin.indentation import touch_of
 from studies import paper_size
 from studies.mesh_refinement import PEAK_SHIFT
-from studies.pages import paper_size as report
+from studies.pages.paper_size import PAPER_SIZE, draw, summary
+from studies.paper_size import PaperSize
 
 COARSE = Grading(RECEPTOR_X_MM, 1.0, 1.0, 1.0, 1.0, stratum_corneum=1, dermis=1, subcutis=1)
 ERRORS = {"quick": 0.2, "standard": 0.05, "paper": 0.0, "deeper": -0.1}
@@ -76,12 +75,12 @@ def test_checks_differ_in_what_they_check(touches):
 def test_the_preset_meets_the_papers_description():
     """Fewer bricks than the paper's bricks and wedges but more nodes; as wedges there would be more."""
     preset = paper_size.preset()
-    assert preset["nodes"] >= 232_000
-    assert preset["elements"] < 276_000 <= preset["elements_with_subcutis_of_wedges"]
-    for edges in (preset["skin_edges"], preset["border_edges"]):
-        assert edges["count"] > 15_000
-        assert edges["largest"] < 0.106
-        assert edges["median"] == pytest.approx(0.1, abs=0.002)
+    assert preset.nodes >= 232_000
+    assert preset.elements < 276_000 <= preset.elements_with_subcutis_of_wedges
+    for edges in (preset.skin_edges, preset.border_edges):
+        assert edges.count > 15_000
+        assert edges.largest_mm < 0.106
+        assert edges.median_mm == pytest.approx(0.1, abs=0.002)
 
 
 def test_edges_of_the_pad_are_those_of_a_block():
@@ -91,9 +90,9 @@ def test_edges_of_the_pad_are_those_of_a_block():
     narrowing = np.column_stack([x * (1.0 - 0.2 * depth), depth - 10.0, 0.5 * z])
     for below, along in ((0, 0.5), (2, 0.45)):
         edges = paper_size.pad_edges(replace(block, nodes_mm=narrowing), 0.0, below)
-        assert (edges["smallest"], edges["largest"]) == pytest.approx((0.25, along))
+        assert (edges.smallest_mm, edges.largest_mm) == pytest.approx((0.25, along))
     nodes = ((lines[:, None] / 5.5) ** 2 + (0.5 * lines / 4.5) ** 2 < 1.0).sum()
-    assert 1.8 * nodes < edges["count"] < 2.0 * nodes
+    assert 1.8 * nodes < edges.count < 2.0 * nodes
 
 
 @pytest.fixture(scope="module")
@@ -145,67 +144,67 @@ def test_a_run_presses_each_mesh_once_and_finds_the_known_errors(results):
     deepest = pressed.surface_profile().deflection_mm.max()
     for name in ("quick", "standard"):
         error = ERRORS[name]
-        for row in found["deflection"]["errors"][name].values():
-            assert row["profile"]["max"] == pytest.approx(error * deepest, rel=0.02)
-            assert row["force"] == row["peak_force"] == pytest.approx(error)
-        sed = found["bars"]["errors"][name]["sed"]
-        assert [sed[phase]["max"] for phase in ("ramp", "hold")] == pytest.approx([error] * 2, rel=1e-6)
+        for row in found.deflection.errors[name].values():
+            assert row.profile_mm.max == pytest.approx(error * deepest, rel=0.02)
+            assert row.force == row.peak_force == pytest.approx(error)
+        sed = found.bars.errors[name].sed
+        assert [sed[phase].max for phase in ("ramp", "hold")] == pytest.approx([error] * 2, rel=1e-6)
         for position in ("0", "0.2"):
-            row = found["spheres"]["errors"][name][position]
-            assert row["touches"] == len(paper_size.CURVATURES)
-            assert row["force"]["max"] == pytest.approx(error, rel=1e-6)
-        assert found["spheres"]["errors"][name]["0"]["sed"]["ramp"]["max"] == pytest.approx(error, rel=1e-6)
-    latencies = [found["bars"]["errors"][name]["latency"]["max"] for name in ("quick", "standard")]
+            row = found.spheres.errors[name][position]
+            assert row.touches == len(paper_size.CURVATURES)
+            assert row.force.max == pytest.approx(error, rel=1e-6)
+        assert found.spheres.errors[name]["0"].sed["ramp"].max == pytest.approx(error, rel=1e-6)
+    latencies = [found.bars.errors[name].latency_ms.max for name in ("quick", "standard")]
     assert latencies[0] > latencies[1] > 0.0
-    for changes in found["twice_as_deep"].values():
-        for change in changes.values():
+    for changes in found.twice_as_deep.values():
+        for change in asdict(changes).values():
             assert change == pytest.approx(ERRORS["deeper"])
-    assert found["half_against_whole"]["sed"]["ramp"]["max"] == pytest.approx(1e-7, rel=1e-3)
+    assert found.half_against_whole.sed["ramp"].max == pytest.approx(1e-7, rel=1e-3)
 
 
 def test_profiles_count_proximal_as_positive_and_only_cylinders_have_observations(results):
     found, _, pressed = results
     profile = pressed.surface_profile()
-    shown = found["deflection"]["deflection_mm"]["paper"]["trial 3, line"]
-    proximal = found["deflection"]["distance_mm"].index(3.0)
+    shown = found.deflection.deflection_mm["paper"]["trial 3, line"]
+    proximal = found.deflection.distance_mm.tolist().index(3.0)
     assert shown[proximal] == pytest.approx(profile.at(-3.0))
     assert shown[proximal] != pytest.approx(profile.at(3.0))
-    for trial, row in found["deflection"]["errors"]["quick"].items():
-        assert (row["r2"] is None) == (trial.split(", ")[1] == "line")
-    cylinder = found["deflection"]["errors"]["quick"]["trial 1, cylinder"]
-    assert cylinder["r2_reference"] == skin_deflection.deflection_r2(profile)
+    for trial, row in found.deflection.errors["quick"].items():
+        assert np.isnan(row.r2) == (trial.split(", ")[1] == "line")
+    cylinder = found.deflection.errors["quick"]["trial 1, cylinder"]
+    assert cylinder.r2_reference == skin_deflection.deflection_r2(profile)
 
 
 def test_hit_rates_are_at_every_position_and_share_their_random_numbers(results):
-    spheres = results[0]["spheres"]
-    for positions in spheres["hit_rates"].values():
+    spheres = results[0].spheres
+    for positions in spheres.hit_rates.values():
         assert set(positions) == {"0", "0.2"}
         for rates in positions.values():
             assert np.diff(rates["static"]).min() > 0.0
-    assert spheres["hit_rates"]["paper"] != spheres["hit_rates"]["quick"]
-    assert spheres["position_mm"].count(0.2) == len(paper_size.CURVATURES)
+    static = [spheres.hit_rates[name]["0"]["static"] for name in ("paper", "quick")]
+    assert not np.array_equal(*static)
+    assert spheres.position_mm.tolist().count(0.2) == len(paper_size.CURVATURES)
 
 
 def test_sizes_tell_the_wire_from_the_rest(results):
-    sizes = results[0]["meshes"]
-    assert {size["line"]["size_x_mm"] for size in sizes.values()} == {0.025}
-    nodes = {kind: size["nodes"] for kind, size in sizes["paper"].items()}
+    sizes = results[0].meshes
+    assert {size["line"].size_x_mm for size in sizes.values()} == {0.025}
+    nodes = {kind: size.nodes for kind, size in sizes["paper"].items()}
     assert nodes["line"] > nodes["cylinder"] == nodes["bar"] == nodes["sphere"]
 
 
 def test_pages_say_every_mesh_with_its_errors(results):
     found = results[0]
-    assert json.loads(to_json(found)) == found
-    made = report.paper_size_page(found)
-    page = markdown(made)
-    assert report.markdown(found) in page
-    assert [f"{drawing.name}.png" for drawing in made.drawings] == [report.FIGURE]
+    assert to_json(from_json(PaperSize, to_json(found))) == to_json(found)
+    page = markdown(PAPER_SIZE.page(found))
+    assert PAPER_SIZE.section(found) == f"#{page}"
+    assert "](images/paper_size.png)" in page
     assert "| bar | −10.0 % | −10.0 % | −10.0 % |" in page
     assert "| trial 3, line | standard |" in page
     for name in ("quick", "standard"):
         assert f"| {name} | {100 * ERRORS[name]:.1f} % |" in page
         assert page.count(f"| {name} | 0.2 |") == 2
-        rates = found["spheres"]["hit_rates"][name]["0.2"]
+        rates = found.spheres.hit_rates[name]["0.2"]
         shown = [f"{100 * rate:.1f} %" for measure in ("dynamic", "static") for rate in rates[measure]]
         assert f"| {name} | 0.2 | {' | '.join(shown)} |" in page
     tables = [block.splitlines() for block in page.split("\n\n") if block.startswith("|")]
@@ -215,22 +214,26 @@ def test_pages_say_every_mesh_with_its_errors(results):
 
 
 def test_the_summary_holds_the_worst_of_every_touch(results):
-    found = copy.deepcopy(results[0])
-    found["deflection"]["errors"]["standard"]["trial 2, line"]["profile"]["max"] = 0.123
-    rows = dict(line.strip("| ").split(" | ", 1) for line in report.summary(found).splitlines())
-    deepest = max(found["deflection"]["deflection_mm"]["paper"]["trial 1, line"])
+    found = results[0]
+    errors = {name: dict(rows) for name, rows in found.deflection.errors.items()}
+    worst = errors["standard"]["trial 2, line"]
+    worst = replace(worst, profile_mm=replace(worst.profile_mm, max=0.123))
+    errors["standard"]["trial 2, line"] = worst
+    found = replace(found, deflection=replace(found.deflection, errors=errors))
+    rows = dict(line.strip("| ").split(" | ", 1) for line in summary(found).splitlines())
+    deepest = max(found.deflection.deflection_mm["paper"]["trial 1, line"])
     assert rows["skin, six deflections [µm]"] == f"{200 * deepest:.0f} | 123"
     for quantity in ("their force", "energy density at the receptor, bar"):
         assert rows[quantity] == "20.0 % | 5.0 %"
     rates = [
         max(
-            row["rate"]["dynamic"]["max"]
-            for row in (found["bars"]["errors"][name], *found["spheres"]["errors"][name].values())
+            row.rate_hz["dynamic"].max
+            for row in (found.bars.errors[name], *found.spheres.errors[name].values())
         )
         for name in ("quick", "standard")
     ]
     assert rows["dynamic rate, bar and spheres [spikes/s]"] == " | ".join(f"{rate:.1f}" for rate in rates)
-    hits = found["spheres"]["hit_rates"]
+    hits = found.spheres.hit_rates
     points = [
         max(
             abs(np.subtract(hits[name][position]["static"], hits["paper"][position]["static"])).max()
@@ -242,7 +245,7 @@ def test_the_summary_holds_the_worst_of_every_touch(results):
 
 
 def test_the_figure_draws_every_mesh(results):
-    figure = report.draw(results[0])
+    figure = draw(results[0])
     deflection, errors, bars, rates = figure.axes
     assert [line.get_label() for line in bars.get_lines()] == list(paper_size.MESHES)
     assert len(deflection.get_lines()) == len(rates.get_lines()) == 6

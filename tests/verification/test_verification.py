@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studies.pages import paper_size
+from studies.pages.mesh_refinement import MESH_REFINEMENT
+from studies.pages.paper_size import PAPER_SIZE, summary
 
 from .case import at_least, at_most, equal, near
 from .cases import ORDERED, THEMES
 from .page import PAGE, allowance, case_text, expectation, page_text, rows_shown
-from .stored_runs import PAPER_SIZE, REFINEMENT, closing
+from .stored_runs import STORED_RUNS, closing, picture, results
 
 FAST = [case for case in ORDERED if not case.slow]
 SHOWN = rows_shown(PAGE.read_text(encoding="utf-8"))
@@ -44,47 +45,48 @@ def test_the_page_shows_what_is_measured(case):
 def test_the_page_ends_with_the_stored_runs_which_belong_to_no_case():
     text = PAGE.read_text(encoding="utf-8")
     assert text.endswith("\n\n" + closing())
-    assert REFINEMENT.picture.exists()
-    assert PAPER_SIZE.picture.exists()
+    assert all(picture(run).exists() for run in STORED_RUNS)
     assert rows_shown(page_text(FAST[:1], {}, "", closing())) == rows_shown(page_text(FAST[:1], {}, ""))
 
 
 def test_stored_errors_are_those_of_the_stored_profiles():
     """Largest differences of SED and rates again from the profiles, so that none on the page is stale."""
-    bars = REFINEMENT.results()["bars"]
-    finest = bars["profiles"]["fine"]
-    columns = [("sed", "ramp", "sed_ramp_kpa"), ("sed", "hold", "sed_hold_kpa"),
-               ("rate", "dynamic", "dynamic_rate_hz"), ("rate", "static", "static_rate_hz")]  # fmt: skip
-    for name, errors in bars["errors"].items():
-        profile = bars["profiles"][name]
-        rows = [profile["shift_mm"].index(shift) for shift in finest["shift_mm"]]
-        assert errors["touches"] == len(rows)
+    bars = results(MESH_REFINEMENT).bars
+    columns = [
+        *(("sed", phase, f"sed_{phase}_kpa") for phase in ("ramp", "hold")),
+        *(("rate_hz", phase, f"{phase}_rate_hz") for phase in ("dynamic", "static")),
+    ]
+    assert len(bars.against_finer) == 4
+    for row in bars.against_finer:
+        profile, finest = bars.profiles[row.mesh], bars.profiles[row.against]
+        rows = [profile.shift_mm.tolist().index(shift) for shift in finest.shift_mm]
+        assert row.errors.touches == len(rows)
         for kind, phase, column in columns:
-            finer = np.array(finest[column])
+            finer = getattr(finest, column)
             unit = finer.max() if kind == "sed" else 1.0
-            largest = np.abs(np.array(profile[column])[rows] - finer).max() / unit
-            assert errors[kind][phase]["max"] == pytest.approx(largest, rel=1e-12)
+            largest = np.abs(getattr(profile, column)[rows] - finer).max() / unit
+            assert getattr(row.errors, kind)[phase].max == pytest.approx(largest, rel=1e-12)
 
 
 def test_stored_errors_of_the_papers_size_are_those_of_the_stored_profiles():
-    results = PAPER_SIZE.results()
-    bars, deflection = results["bars"], results["deflection"]
-    paper = {name: np.array(profile) for name, profile in bars["profiles"]["paper"].items()}
-    for name, errors in bars["errors"].items():
-        ours = {key: np.array(profile) for key, profile in bars["profiles"][name].items()}
-        sed = np.abs(ours["sed_ramp_kpa"] - paper["sed_ramp_kpa"]).max() / paper["sed_ramp_kpa"].max()
-        assert errors["sed"]["ramp"]["max"] == pytest.approx(sed, rel=1e-12)
+    stored = results(PAPER_SIZE)
+    bars, deflection = stored.bars, stored.deflection
+    paper = bars.profiles["paper"]
+    for name, errors in bars.errors.items():
+        ours = bars.profiles[name]
+        sed = np.abs(ours.sed_ramp_kpa - paper.sed_ramp_kpa).max() / paper.sed_ramp_kpa.max()
+        assert errors.sed["ramp"].max == pytest.approx(sed, rel=1e-12)
         for rate in ("dynamic", "static"):
-            largest = np.abs(ours[f"{rate}_rate_hz"] - paper[f"{rate}_rate_hz"]).max()
-            assert errors["rate"][rate]["max"] == pytest.approx(largest, rel=1e-12)
-        for touch, row in deflection["errors"][name].items():
-            profiles = (np.array(deflection["deflection_mm"][mesh][touch]) for mesh in (name, "paper"))
-            assert row["profile"]["max"] == pytest.approx(np.abs(np.subtract(*profiles)).max(), rel=1e-12)
+            rates = (getattr(profile, f"{rate}_rate_hz") for profile in (ours, paper))
+            assert errors.rate_hz[rate].max == pytest.approx(np.abs(np.subtract(*rates)).max(), rel=1e-12)
+        for touch, row in deflection.errors[name].items():
+            profiles = (deflection.deflection_mm[mesh][touch] for mesh in (name, "paper"))
+            assert row.profile_mm.max == pytest.approx(np.abs(np.subtract(*profiles)).max(), rel=1e-12)
 
 
 def test_the_decision_on_the_papers_size_shows_the_stored_differences():
     page = (PAGE.parent / "decisions" / "paper-size.md").read_text(encoding="utf-8")
-    assert paper_size.summary(PAPER_SIZE.results()) in page
+    assert summary(results(PAPER_SIZE)) in page
 
 
 def test_names_and_titles_of_cases_are_their_own():
