@@ -1,21 +1,22 @@
 """One set of tissues for all three levels: deflection, firing and discrimination of each candidate.
 
-Every candidate is pressed by the cylinder, by bars and by spheres. An afferent is then fitted twice: to the
-firing rates alone, and to firing rates and hit rates at once. The first asks what a material gives to
-somebody who follows the paper's order, the second whether that material could reconcile the levels at all.
+Every candidate is indented by the cylinder, by bars and by spheres. An afferent is then fitted twice: to the
+firing rates alone, as in the paper, and to firing rates and hit rates at once. The second fit shows whether
+any afferent meets both levels with this material.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
 from fingerpad.core.checks import FloatArray, not_negative, whole
 from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import neuron, protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
@@ -33,17 +34,17 @@ from fingerpad.psychophysics.noise_fit import expected_hit_rates, fit_noise_sigm
 from fingerpad.skin.sampling import SkinResponse
 
 SHOWN_DISTANCES_MM = (1.0, 2.0, 3.0, 4.0, 5.0)
-"""Where the deflection is told, mean of both sides. [mm]"""
+"""Distances from the indenter at which the deflection is reported, mean of both sides. [mm]"""
 
 NOISE_SIGMA = psychophysics.NOISE_SIGMA.value
 GOODWIN = np.array(psychophysics.GOODWIN_HIT_RATES.value)
 SPHERES = (psychophysics.SPHERE_CURVATURES.value[0], *psychophysics.GOODWIN_CURVATURES.value)
 
 NOISE_DRAWS = 400
-"""Common random presentations behind expected hit rates, many thousand times in a search."""
+"""Presentations behind each expected hit rate; a search evaluates thousands of hit rates with them."""
 
 CHANCE = 0.5
-"""Hit rate of an observer who learns nothing. [0-1]"""
+"""Hit rate of an observer who guesses. [0-1]"""
 
 SITE_MARGIN_MM = 0.3
 """Fine zone of the one bar beyond its outermost shifted site. [mm]"""
@@ -75,13 +76,13 @@ class MaterialSet:
 
 @dataclass(frozen=True)
 class Effort:
-    """How much of each level is looked at, and how hard an afferent is searched for.
+    """Indentations of the bar, and length of the search for an afferent.
 
     Parameters
     ----------
     shifted_bars : bool
-        Press the bar at all 36 shifts; or press it once and read the energy density at 36 shifted sites,
-        which costs a thirtieth and neglects that the pad is curved along the finger.
+        Indent the bar at all 36 shifts; or indent it once and sample the energy density at 36 shifted
+        sites, which costs a thirtieth and neglects the curvature of the pad along the finger.
     generations, population : int
         Of the search for the afferent (differential evolution, four numbers).
     percept_weight : float
@@ -104,10 +105,108 @@ class Effort:
         not_negative("percept_weight", self.percept_weight)
 
 
+@result_class
+class CylinderDeflection:
+    """Deflection of the skin under the cylinder.
+
+    Parameters
+    ----------
+    r2, r2_mirrored : float
+        Against the observations, and against the observations with proximal and distal exchanged. [1]
+    distance_mm, deflection_mm : array (n_distances,)
+        Distance from the indenter, and the deflection there, mean of both sides. [mm]
+    force_mn : float
+        At the end of the hold. [mN]
+    """
+
+    r2: float
+    r2_mirrored: float
+    distance_mm: Vector
+    deflection_mm: Vector
+    force_mn: float
+
+
+@result_class
+class FittedAfferent:
+    """Rates and hit rates of one afferent.
+
+    Parameters
+    ----------
+    fss, fss_dynamic, fss_static : float
+        FSS over all shifts, weighted and by phase. [1]
+    noise_sigma, noise_fit_error : float
+        Noise at which the hit rates are closest to Goodwin's, and the root mean square error there; NaN if
+        none is found. [1]
+    hit_rate : array (2,)
+        At the paper's noise. [0-1]
+    percept_error : float
+        Root mean square error of these hit rates. [0-1]
+    parameters : dict of float
+        By name, see `fingerpad.neuron.afferent.PARAMETER_NAMES`.
+    """
+
+    fss: float
+    fss_dynamic: float
+    fss_static: float
+    noise_sigma: Number
+    noise_fit_error: Number
+    hit_rate: Vector
+    percept_error: float
+    parameters: dict[str, float]
+
+
+@result_class
+class DeflectedSet:
+    """Deflection of a material set.
+
+    Parameters
+    ----------
+    name, basis : str
+        As in `MaterialSet`.
+    shear_kpa : dict of float
+        Initial shear modulus by layer. [kPa]
+    deflection : CylinderDeflection
+        Under the cylinder.
+    """
+
+    name: str
+    basis: str
+    shear_kpa: dict[str, float]
+    deflection: CylinderDeflection
+
+
+@result_class
+class EvaluatedSet(DeflectedSet):
+    """A material set on all three levels.
+
+    Parameters
+    ----------
+    name, basis, shear_kpa, deflection
+        As in `DeflectedSet`.
+    sed_peak_kpa : float
+        Largest strain energy density at the receptor under the bar, at the end of the hold. [kPa]
+    firing, joint : FittedAfferent
+        Fitted to rates alone, and to rates and hit rates.
+    """
+
+    sed_peak_kpa: float
+    firing: FittedAfferent
+    joint: FittedAfferent
+
+
+@result_class
+class UnsolvedSet:
+    """A material set whose mechanics could not be solved, with the reason as `unsolved`."""
+
+    name: str
+    basis: str
+    unsolved: str
+
+
 def touches(
     candidate: MaterialSet, conditions: Conditions, shifted_bars: bool = False
 ) -> dict[tuple[str, float], Touch]:
-    """Everything that one candidate is pressed with.
+    """All indentations of one candidate.
 
     Returns
     -------
@@ -134,13 +233,15 @@ def _cylinder_touch(candidate: MaterialSet, conditions: Conditions) -> Touch:
     return conditions.touch(cylinder, RECEPTOR_X_MM, grading, candidate.tissues)
 
 
-def _described(candidate: MaterialSet) -> dict[str, Any]:
-    """Name, basis and initial shear moduli [kPa]."""
-    layers = ("living_epidermis", "dermis", "subcutis")
-    names = ("epidermis", "dermis", "subcutis")
-    moduli = (getattr(candidate.tissues, layer).shear_modulus_kpa for layer in layers)
-    shear = dict(zip(names, moduli, strict=True))
-    return {"name": candidate.name, "basis": candidate.basis, "shear_kpa": shear}
+def _deflected(candidate: MaterialSet, cylinder: SkinResponse) -> DeflectedSet:
+    tissues = candidate.tissues
+    layers = {"epidermis": tissues.living_epidermis, "dermis": tissues.dermis, "subcutis": tissues.subcutis}
+    return DeflectedSet(
+        name=candidate.name,
+        basis=candidate.basis,
+        shear_kpa={name: layer.shear_modulus_kpa for name, layer in layers.items()},
+        deflection=deflection(cylinder),
+    )
 
 
 def _wide_bar_grading(conditions: Conditions) -> Grading:
@@ -163,7 +264,7 @@ def bar_sed(responses: Mapping[tuple[str, float], SkinResponse], tilt_deg: float
 
 
 class Levels:
-    """What one candidate's presses say to an afferent: the drive under bars and under spheres.
+    """Drive of an afferent under bars and spheres with one candidate; evaluates and fits afferents.
 
     Parameters
     ----------
@@ -188,7 +289,7 @@ class Levels:
         self.rate_peak_kpa_per_ms = float(drive(sed).rate_kpa_per_ms.max())
 
     def parameters(self, searched: FloatArray) -> FloatArray:
-        """Six numbers of an afferent from the four that are searched, see `BOUNDS`."""
+        """Six parameters of an afferent from the four that are searched, see `BOUNDS`."""
         capacitance, threshold = neuron.CAPACITANCE.value, neuron.THRESHOLD.value
         intercept, log_static, log_dynamic, log_time = searched
         time_constant = 10.0**log_time
@@ -212,7 +313,7 @@ class Levels:
         """Predict the hit rates at 296 and 365 /m of the static Gradient Sum."""
         afferent = Afferent.from_parameters(parameters)
         static = np.array([afferent.rates(traces)[1] for traces in self.spheres])
-        if not static.any():  # the search also tries afferents that stay silent; those can only guess
+        if not static.any():  # the search also tries silent afferents, whose observer guesses
             return np.full(len(SPHERES) - 1, CHANCE)
         return expected_hit_rates(static, self.neighbours, noise_sigma, self.draws)
 
@@ -239,24 +340,24 @@ class Levels:
         )
         return self.parameters(found.x)
 
-    def judged(self, parameters: FloatArray) -> dict[str, Any]:
-        """FSS, hit rates and the noise that would be needed, of one afferent."""
+    def evaluated(self, parameters: FloatArray) -> FittedAfferent:
+        """Return FSS and hit rates of one afferent, and the noise that fits Goodwin's hit rates best."""
         by_phase = self.problem.score_by_phase(parameters, self.everything)
         try:
             noise = fit_noise_sigma(lambda sigma: self.hit_rates(parameters, sigma))
             sigma, error = noise.noise_sigma, noise.root_mean_square_error
-        except ConvergenceError:  # a response that does not tell the spheres apart: no noise brings it there
+        except ConvergenceError:  # where the responses to all spheres are equal, no noise fits
             sigma, error = float("nan"), float("nan")
-        return {
-            "fss": self.fss(parameters),
-            "fss_dynamic": by_phase["dynamic"],
-            "fss_static": by_phase["static"],
-            "noise_sigma": sigma,
-            "noise_fit_error": error,
-            "hit_rate": self.hit_rates(parameters, NOISE_SIGMA),
-            "percept_error": self.percept_error(parameters),
-            "parameters": dict(zip(PARAMETER_NAMES, parameters, strict=True)),
-        }
+        return FittedAfferent(
+            fss=self.fss(parameters),
+            fss_dynamic=by_phase["dynamic"],
+            fss_static=by_phase["static"],
+            noise_sigma=sigma,
+            noise_fit_error=error,
+            hit_rate=self.hit_rates(parameters, NOISE_SIGMA),
+            percept_error=self.percept_error(parameters),
+            parameters=dict(zip(PARAMETER_NAMES, parameters, strict=True)),
+        )
 
 
 def evaluate(
@@ -264,15 +365,8 @@ def evaluate(
     responses: Mapping[tuple[str, float], SkinResponse],
     conditions: Conditions,
     effort: Effort,
-) -> dict[str, Any]:
-    """Judge one candidate on the three levels.
-
-    Returns
-    -------
-    dict
-        `deflection`, `firing` (afferent fitted to rates alone) and `joint` (to rates and hit rates), beside
-        the candidate's name, basis and initial shear moduli.
-    """
+) -> EvaluatedSet:
+    """Evaluate one candidate on the three levels."""
     cylinder = next(skin for (kind, _), skin in responses.items() if kind == "cylinder")
     sites = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0)).positions_mm
     levels = Levels(
@@ -280,25 +374,29 @@ def evaluate(
         [responses["sphere", curvature].sed(sites) for curvature in SPHERES],
         conditions.seed,
     )
-    return _described(candidate) | {
-        "deflection": deflection(cylinder),
-        "sed_peak_kpa": levels.sed_peak_kpa,
-        "firing": levels.judged(levels.search(effort, 0.0)),
-        "joint": levels.judged(levels.search(effort, effort.percept_weight)),
-    }
+    deflected = _deflected(candidate, cylinder)
+    return EvaluatedSet(
+        name=deflected.name,
+        basis=deflected.basis,
+        shear_kpa=deflected.shear_kpa,
+        deflection=deflected.deflection,
+        sed_peak_kpa=levels.sed_peak_kpa,
+        firing=levels.evaluated(levels.search(effort, 0.0)),
+        joint=levels.evaluated(levels.search(effort, effort.percept_weight)),
+    )
 
 
-def deflection(cylinder: SkinResponse) -> dict[str, Any]:
-    """R² under the cylinder, deflection on a few distances (mean of both sides) and force."""
+def deflection(cylinder: SkinResponse) -> CylinderDeflection:
+    """Return R² under the cylinder, deflection at a few distances and force."""
     profile = cylinder.surface_profile()
     distance = np.array(SHOWN_DISTANCES_MM)
-    return {
-        "r2": deflection_r2(profile),
-        "r2_mirrored": deflection_r2(profile, proximal_positive=False),
-        "distance_mm": distance,
-        "deflection_mm": (profile.at(distance) + profile.at(-distance)) / 2.0,
-        "force_mn": cylinder.force_mn[-1],
-    }
+    return CylinderDeflection(
+        r2=deflection_r2(profile),
+        r2_mirrored=deflection_r2(profile, proximal_positive=False),
+        distance_mm=distance,
+        deflection_mm=(profile.at(distance) + profile.at(-distance)) / 2.0,
+        force_mn=cylinder.force_mn[-1],
+    )
 
 
 def compare(
@@ -306,38 +404,37 @@ def compare(
     runner: Runner,
     conditions: Conditions,
     effort: Effort | None = None,
-) -> list[dict[str, Any]]:
-    """Judge candidates one after the other; a stopped run goes on from the last finished press.
+) -> list[EvaluatedSet | UnsolvedSet]:
+    """Evaluate candidates one after the other; a stopped run continues after the last stored indentation.
 
     Parameters
     ----------
     candidates : sequence of MaterialSet
-        What is tried; names must differ.
+        To evaluate; names must differ.
     runner : Runner
         Where indentations are stored.
     conditions : Conditions
         Finger, resolution and seed; its materials are not used.
     effort : Effort, optional
-        How much of each level is looked at.
+        Indentations of the bar, and length of the search.
 
     Returns
     -------
-    list of dict
-        One per candidate, see `evaluate`. A candidate whose mechanics cannot be solved has its name, its
-        basis and the reason as `unsolved`, and no number.
+    list of EvaluatedSet or UnsolvedSet
+        One per candidate.
 
     Raises
     ------
     InputError
         If two candidates have one name.
     StoreError
-        If a stored press is damaged.
+        If a stored indentation is damaged.
     """
     names = [candidate.name for candidate in candidates]
     if len(set(names)) != len(names):
         raise InputError(f"candidates must have different names: got {', '.join(names)}.")
     effort = effort or Effort()
-    rows = []
+    rows: list[EvaluatedSet | UnsolvedSet] = []
     for candidate in candidates:
         wanted = touches(candidate, conditions, effort.shifted_bars)
         try:
@@ -345,54 +442,45 @@ def compare(
             responses = {key: runner.store.load(touch) for key, touch in wanted.items()}
             rows.append(evaluate(candidate, responses, conditions, effort))
         except ConvergenceError as error:
-            rows.append({"name": candidate.name, "basis": candidate.basis, "unsolved": str(error)})
+            rows.append(UnsolvedSet(name=candidate.name, basis=candidate.basis, unsolved=str(error)))
     return rows
 
 
 def deflections(
     candidates: Sequence[MaterialSet], runner: Runner, conditions: Conditions
-) -> list[dict[str, Any]]:
-    """Judge candidates by the cylinder alone; arguments as in `compare`.
-
-    Returns
-    -------
-    list of dict
-        `name`, `basis`, `shear_kpa` and `deflection` of each.
+) -> list[DeflectedSet]:
+    """Evaluate candidates with the cylinder alone; arguments as in `compare`.
 
     Raises
     ------
     ConvergenceError
-        If a press cannot be solved.
+        If an indentation cannot be solved.
     StoreError
-        If a stored press is damaged.
+        If a stored indentation is damaged.
     """
     pressed = {candidate.name: _cylinder_touch(candidate, conditions) for candidate in candidates}
     runner.solve(list(pressed.values()), "deflection alone")
-    return [
-        _described(one) | {"deflection": deflection(runner.store.load(pressed[one.name]))}
-        for one in candidates
-    ]
+    return [_deflected(one, runner.store.load(pressed[one.name])) for one in candidates]
 
 
-def pareto_front(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Names of the candidates that no other beats on all three levels.
+def pareto_front(merits: FloatArray) -> NDArray[np.bool_]:
+    """Return which candidates no other beats on all levels.
 
-    Levels are R² under the cylinder, FSS of the joint fit and its error in hit rates. A candidate is beaten
-    by another that is at least as good on each and better on one.
+    A candidate is beaten by another that is at least as good on each level and better on one.
+
+    Parameters
+    ----------
+    merits : array (n_candidates, n_levels)
+        Larger is better.
+
+    Returns
+    -------
+    boolean array (n_candidates,)
 
     Examples
     --------
-    >>> def row(name, r2, fss, error):
-    ...     return {"name": name, "deflection": {"r2": r2}, "joint": {"fss": fss, "percept_error": error}}
-    >>> pareto_front([row("a", 0.9, 0.8, 0.1), row("b", 0.8, 0.9, 0.1), row("c", 0.8, 0.8, 0.1)])
-    ['a', 'b']
+    >>> pareto_front(np.array([[0.9, 0.8], [0.8, 0.9], [0.8, 0.8]])).tolist()
+    [True, True, False]
     """
-    solved = [row for row in rows if "unsolved" not in row]
-    merits = np.array(
-        [[row["deflection"]["r2"], row["joint"]["fss"], -row["joint"]["percept_error"]] for row in solved]
-    )
-    return [
-        row["name"]
-        for row, merit in zip(solved, merits, strict=True)
-        if not ((merits >= merit).all(axis=1) & (merits > merit).any(axis=1)).any()
-    ]
+    beaten = [((merits >= merit).all(axis=1) & (merits > merit).any(axis=1)).any() for merit in merits]
+    return ~np.array(beaten, dtype=bool)

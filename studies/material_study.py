@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,8 +16,16 @@ from fingerpad.experiments.runner import Runner
 from studies import trial_order
 from studies.hyperfoam_fit import polynomial_of_hyperfoam
 from studies.material_candidates import candidates, deflection_candidates
-from studies.material_sets import GOODWIN, Effort, compare, deflections, pareto_front
-from studies.plain_values import plain
+from studies.material_sets import (
+    GOODWIN,
+    DeflectedSet,
+    Effort,
+    EvaluatedSet,
+    UnsolvedSet,
+    compare,
+    deflections,
+    pareto_front,
+)
 
 LEAST_R2 = 0.96
 """R² under the cylinder from which the first level counts as met."""
@@ -62,19 +69,35 @@ class Targets:
 
 
 @result_class
+class LevelsMet:
+    """Which levels a material set meets with the afferent of its joint fit, see `Targets`."""
+
+    deflection: bool
+    firing: bool
+    discrimination: bool
+
+    @property
+    def all(self) -> bool:
+        """Whether every level is met."""
+        return self.deflection and self.firing and self.discrimination
+
+
+@result_class
 class MaterialStudy:
     """Result of `python -m studies materials`.
 
     Parameters
     ----------
-    sets : tuple of dict
-        One per candidate, see `studies.material_sets.evaluate`, with the levels that it `meets`.
+    sets : tuple of EvaluatedSet or UnsolvedSet
+        One per candidate.
+    meets : dict of LevelsMet
+        By name of each set that was solved.
     pareto : tuple of str
-        Candidates that no other beats on all levels.
-    deflection_only : tuple of dict
-        Candidates judged by the cylinder alone.
-    order : dict
-        See `studies.trial_order.result`.
+        Sets that no other beats in R² under the cylinder, FSS and hit-rate error of the joint fit.
+    deflection_only : tuple of DeflectedSet
+        Candidates evaluated with the cylinder alone.
+    order : TrialOrder
+        Of the three trials.
     polynomials : tuple of Polynomial
         Wu's tissues.
     targets : Targets
@@ -85,10 +108,11 @@ class MaterialStudy:
         What ran.
     """
 
-    sets: tuple[dict[str, Any], ...]
+    sets: tuple[EvaluatedSet | UnsolvedSet, ...]
+    meets: dict[str, LevelsMet]
     pareto: tuple[str, ...]
-    deflection_only: tuple[dict[str, Any], ...]
-    order: dict[str, Any]
+    deflection_only: tuple[DeflectedSet, ...]
+    order: trial_order.TrialOrder
     polynomials: tuple[Polynomial, ...]
     targets: Targets
     shifted_bars: bool
@@ -114,7 +138,7 @@ def run(
     conditions : Conditions
         Finger, resolution and seed; its materials are not used.
     effort : Effort, optional
-        How much of each level is looked at.
+        Indentations of the bar, and length of the search.
     names : sequence of str, optional
         Candidates to compare; all by default.
 
@@ -136,15 +160,16 @@ def run(
         one_of("each of names", name, NAMES)
     chosen = [candidate for candidate in candidates() if candidate.name in names]
     rows = compare(chosen, runner, conditions, effort)
-    for row in rows:
-        row["meets"] = meets(row)
+    solved = [row for row in rows if isinstance(row, EvaluatedSet)]
+    merits = np.array([[row.deflection.r2, row.joint.fss, -row.joint.percept_error] for row in solved])
     alone = deflections(deflection_candidates(), runner, conditions)
     order = runner.responses({"order of the trials": trial_order.touches(conditions)})
     return MaterialStudy(
-        sets=tuple(plain(rows)),
-        pareto=tuple(pareto_front(rows)),
-        deflection_only=tuple(plain(alone)),
-        order=plain(trial_order.result(order["order of the trials"])),
+        sets=tuple(rows),
+        meets={row.name: meets(row) for row in solved},
+        pareto=tuple(row.name for row, best in zip(solved, pareto_front(merits), strict=True) if best),
+        deflection_only=tuple(alone),
+        order=trial_order.result(order["order of the trials"]),
         polynomials=polynomials(),
         targets=Targets(),
         shifted_bars=effort.shifted_bars,
@@ -152,21 +177,18 @@ def run(
     )
 
 
-def meets(row: Mapping[str, Any]) -> dict[str, bool]:
-    """Which levels a candidate meets, with the afferent of its joint fit.
+def meets(row: EvaluatedSet) -> LevelsMet:
+    """Return the levels that a set meets with the afferent of its joint fit.
 
     Deflection: R² of at least `LEAST_R2`. Firing: FSS, in sample, of at least what the paper reports out of
     sample. Discrimination: both hit rates close to Goodwin's at the paper's noise.
     """
-    if "unsolved" in row:
-        return dict.fromkeys(("deflection", "firing", "discrimination"), False)
-    joint = row["joint"]
-    error = np.abs(np.asarray(joint["hit_rate"]) - GOODWIN).max()
-    return {
-        "deflection": bool(row["deflection"]["r2"] >= LEAST_R2),
-        "firing": bool(joint["fss"] >= paper.FSS_OUT_OF_SAMPLE.value),
-        "discrimination": bool(error <= LARGEST_HIT_RATE_ERROR),
-    }
+    error = np.abs(row.joint.hit_rate - GOODWIN).max()
+    return LevelsMet(
+        deflection=row.deflection.r2 >= LEAST_R2,
+        firing=row.joint.fss >= paper.FSS_OUT_OF_SAMPLE.value,
+        discrimination=error <= LARGEST_HIT_RATE_ERROR,
+    )
 
 
 def polynomials() -> tuple[Polynomial, ...]:

@@ -1,4 +1,4 @@
-"""Which trial deflects more? The paper's order of Trials 1 to 3, asked of every stand-in for the lost table.
+"""Order of Trials 1 to 3 in deflection, for every substitute of the lost coefficients.
 
 Over each pair of inner layers a soft epidermis (Trials 1 and 3) is exchanged for a stiff one (Trial 2), and
 Maeno's inner layers (Trial 1) for the others (Trial 3), at the same depth and at the same force.
@@ -7,12 +7,12 @@ Maeno's inner layers (Trial 1) for the others (Trial 3), at the same depth and a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.results import result_class
 from fingerpad.data import cylinder_deflection
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.geometry.indenters import Cylinder
@@ -28,14 +28,58 @@ from studies.material_candidates import (
 )
 
 NEAR_MM, FAR_MM = 0.5, 5.0
-"""The paper looks at the skin within 0.5 mm of the indenter, and from there to 5 mm. [mm]"""
+"""Regions of the paper: skin within 0.5 mm of the indenter, and from there to 5 mm. [mm]"""
 
 EPIDERMES_KPA = {"soft": SOFT_EPIDERMIS_KPA, "stiff": STIFF_EPIDERMIS_KPA}
 _DISTANCES_MM = np.linspace(-FAR_MM, FAR_MM, 201)
 
 
+@result_class
+class Excess:
+    """Mean difference of two deflections up to `NEAR_MM` from the indenter, and on to `FAR_MM`. [mm]"""
+
+    near_mm: float
+    far_mm: float
+
+
+@result_class
+class TrialDifference:
+    """One trial against another.
+
+    Parameters
+    ----------
+    same_depth, same_force : Excess
+        Deflection of the first minus the second at the same depth and at the same force.
+    force_ratio : float
+        Force of the first over the second at the end of the ramp. [1]
+    """
+
+    same_depth: Excess
+    same_force: Excess
+    force_ratio: float
+
+
+@result_class
+class TrialOrder:
+    """Comparison of the trials.
+
+    Parameters
+    ----------
+    observed : dict of Excess
+        Each set against the observations at 1 mm.
+    stiff_epidermis : dict of TrialDifference
+        Trial 2 against Trial 3, by inner layers.
+    inner_layers : dict of TrialDifference
+        Trial 1 against Trial 3, by the inner layers of Trial 3.
+    """
+
+    observed: dict[str, Excess]
+    stiff_epidermis: dict[str, TrialDifference]
+    inner_layers: dict[str, TrialDifference]
+
+
 def inner_layers() -> dict[str, Tissues]:
-    """Stand-ins whose dermis and subcutis are looked at; Maeno's are those of Trial 1."""
+    """Substitutes whose dermis and subcutis are compared; Maeno's are those of Trial 1."""
     return {
         "Maeno": named_tissues("trial1"),
         "identified": named_tissues("trial3"),
@@ -93,59 +137,61 @@ def profile_at_force(skin: SkinResponse, force_mn: float) -> SurfaceProfile:
     return SurfaceProfile(profiles[below].distance_mm, deflection)
 
 
-def excess(more: SurfaceProfile, less: SurfaceProfile) -> dict[str, float]:
-    """By how much one profile is deeper than another on average, near the indenter and farther away. [mm]"""
+def excess(more: SurfaceProfile, less: SurfaceProfile) -> Excess:
+    """Return the mean difference of two profiles near the indenter and farther away. [mm]"""
     difference = more.at(_DISTANCES_MM) - less.at(_DISTANCES_MM)
     near = np.abs(_DISTANCES_MM) <= NEAR_MM
-    return {"near_mm": float(difference[near].mean()), "far_mm": float(difference[~near].mean())}
+    return Excess(near_mm=difference[near].mean(), far_mm=difference[~near].mean())
 
 
-def excess_over_observed(profile: SurfaceProfile) -> dict[str, float]:
-    """By how much a profile is deeper than the one observed under the cylinder. [mm]"""
+def excess_over_observed(profile: SurfaceProfile) -> Excess:
+    """Return the mean difference of a profile from the one observed under the cylinder. [mm]"""
     observed = cylinder_deflection()
     # Positive distances of the observations point to the proximal end, those of a profile to the distal one.
     order = np.argsort(-observed.distance_mm)
     return excess(profile, SurfaceProfile(-observed.distance_mm[order], observed.deflection_mm[order]))
 
 
-def result(responses: Mapping[tuple[str, str], SkinResponse]) -> dict[str, Any]:
-    """Compare trials.
-
-    Returns
-    -------
-    dict
-        `observed`: each set against the observations at 1 mm. `stiff_epidermis`: Trial 2 against Trial 3
-        with each inner layer. `inner_layers`: Trial 1 against Trial 3 with each inner layer. Both at the same
-        depth and at the same force.
-    """
-
-    def compared(more: tuple[str, str], less: tuple[str, str]) -> dict[str, Any]:
-        first, second = responses[more], responses[less]
-        force = min(ramp_force_mn(first), ramp_force_mn(second))
-        return {
-            "same_depth": excess(first.surface_profile(), second.surface_profile()),
-            "same_force": excess(profile_at_force(first, force), profile_at_force(second, force)),
-            "force_ratio": ramp_force_mn(first) / ramp_force_mn(second),
-        }
-
-    inner = list(inner_layers())
-    return {
-        "observed": {
-            f"{name}, {epidermis} epidermis": excess_over_observed(skin.surface_profile())
-            for (name, epidermis), skin in responses.items()
-        },
-        "stiff_epidermis": {name: compared((name, "stiff"), (name, "soft")) for name in inner},
-        "inner_layers": {name: compared(("Maeno", "soft"), (name, "soft")) for name in inner[1:]},
-    }
-
-
-def order_holds(found: Mapping[str, Any], inner: str, at: str, direction: float = 1.0) -> bool:
-    """Whether Trial 1 lies beyond Trial 3 and Trial 2 short of it in both regions, as the paper says.
+def result(responses: Mapping[tuple[str, str], SkinResponse]) -> TrialOrder:
+    """Compare the trials, by inner layers and epidermis.
 
     Parameters
     ----------
-    found : dict
-        What `result` returns.
+    responses : mapping of SkinResponse
+        From `touches`.
+
+    Returns
+    -------
+    TrialOrder
+    """
+
+    def compared(more: tuple[str, str], less: tuple[str, str]) -> TrialDifference:
+        first, second = responses[more], responses[less]
+        force = min(ramp_force_mn(first), ramp_force_mn(second))
+        return TrialDifference(
+            same_depth=excess(first.surface_profile(), second.surface_profile()),
+            same_force=excess(profile_at_force(first, force), profile_at_force(second, force)),
+            force_ratio=ramp_force_mn(first) / ramp_force_mn(second),
+        )
+
+    inner = list(inner_layers())
+    return TrialOrder(
+        observed={
+            f"{name}, {epidermis} epidermis": excess_over_observed(skin.surface_profile())
+            for (name, epidermis), skin in responses.items()
+        },
+        stiff_epidermis={name: compared((name, "stiff"), (name, "soft")) for name in inner},
+        inner_layers={name: compared(("Maeno", "soft"), (name, "soft")) for name in inner[1:]},
+    )
+
+
+def order_holds(found: TrialOrder, inner: str, at: str, direction: float = 1.0) -> bool:
+    """Return whether Trial 1 exceeds Trial 3 and Trial 3 exceeds Trial 2 in both regions, as in the paper.
+
+    Parameters
+    ----------
+    found : TrialOrder
+        From `result`.
     inner : str
         Inner layers of Trials 2 and 3.
     at : {"same_depth", "same_force"}
@@ -157,8 +203,9 @@ def order_holds(found: Mapping[str, Any], inner: str, at: str, direction: float 
     -------
     bool
     """
-    trial_1, trial_2 = found["inner_layers"][inner][at], found["stiff_epidermis"][inner][at]
+    above = getattr(found.inner_layers[inner], at)
+    below = getattr(found.stiff_epidermis[inner], at)
     return all(
-        direction * trial_1[region] > 0.0 and direction * trial_2[region] < 0.0
-        for region in ("near_mm", "far_mm")
+        direction * more > 0.0 and direction * less < 0.0
+        for more, less in ((above.near_mm, below.near_mm), (above.far_mm, below.far_mm))
     )

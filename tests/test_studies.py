@@ -1,6 +1,5 @@
 """The studies press what the paper pressed and read from it what they say, miss or no miss."""
 
-import json
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -34,7 +33,6 @@ from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SurfaceProfile
 from sections import RESTLESS, SENSITIVE, SKINS, SphereSkin, discrimination_section, nail_section, typed
-from studies.plain_values import plain
 
 RESOLUTIONS = ["quick", "standard", "paper"]
 CURVATURES = [287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0]
@@ -808,27 +806,6 @@ def test_both_numbers_and_their_difference_are_written(quantity, published, ours
 
 
 # What is written
-
-
-def test_plain_values_are_json_and_say_none_where_there_is_no_number():
-    value = {
-        "rates": np.array([[1.0, np.nan], [np.inf, -np.inf]]),
-        287.0: (np.float32(0.5), np.int64(3), np.bool_(True), True, None, "word"),
-        "deep": [{"latency": float("nan"), "empty": np.array([])}],
-        "scalar": np.array(2.5),
-    }
-    expected = {
-        "rates": [[1.0, None], [None, None]],
-        "287.0": [0.5, 3, True, True, None, "word"],
-        "deep": [{"latency": None, "empty": []}],
-        "scalar": 2.5,
-    }
-    found = plain(value)
-    assert found == expected
-    assert found["287.0"][2] is True
-    assert isinstance(found["287.0"][1], int)
-    assert json.loads(json.dumps(found, allow_nan=False)) == expected
-    assert np.isnan(value["rates"][0, 1])  # the input is left as it was
 
 
 def test_a_wire_presses_straight_and_every_other_body_along_the_normal_of_the_skin():

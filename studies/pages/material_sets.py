@@ -1,10 +1,11 @@
-"""Material sets on three levels: one figure, and one page in Markdown."""
+"""The page of `python -m studies materials`: a figure and tables of the sets on three levels."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from functools import partial
-from typing import Any
+from math import isnan
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,8 +15,10 @@ from fingerpad.report.formatting import fixed
 from fingerpad.report.manifest import edition
 from fingerpad.report.parts import Chapter, Drawing, Page, Part
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure
-from studies.material_study import MaterialStudy, Targets
+from studies.material_sets import EvaluatedSet, UnsolvedSet
+from studies.material_study import LevelsMet, MaterialStudy, Targets
 from studies.pages.markdown import parts_of, table
+from studies.trial_order import TrialDifference, TrialOrder
 
 _SIGMA = psychophysics.NOISE_SIGMA.value
 _FSS = paper.FSS_OUT_OF_SAMPLE.value
@@ -25,7 +28,7 @@ ONE_BAR = (
     "criterion than that may lie on the other side of it."
 )
 _LETTERS = {"deflection": "d", "firing": "f", "discrimination": "p"}
-_REGIONS = {"near_mm": "within 0.5 mm", "far_mm": "0.5 to 5 mm"}
+_REGIONS = ("within 0.5 mm", "0.5 to 5 mm")
 
 
 def draw(section: MaterialStudy) -> Figure:
@@ -33,8 +36,7 @@ def draw(section: MaterialStudy) -> Figure:
 
     Parameters
     ----------
-    section : dict
-        What `studies.material_study.study_materials` returns.
+    section : MaterialStudy
 
     Returns
     -------
@@ -44,14 +46,14 @@ def draw(section: MaterialStudy) -> Figure:
     left, middle, right = figure.subplots(1, 3)
     rows, front = _numbered(section), set(section.pareto)
 
-    def r2(row: Mapping[str, Any]) -> float:
-        return row["deflection"]["r2"]
+    def r2(row: EvaluatedSet) -> float:
+        return row.deflection.r2
 
-    def fss(row: Mapping[str, Any]) -> float:
-        return row["firing"]["fss"]
+    def fss(row: EvaluatedSet) -> float:
+        return row.firing.fss
 
-    def sigma(row: Mapping[str, Any]) -> float:
-        return row["firing"]["noise_sigma"]
+    def sigma(row: EvaluatedSet) -> float:
+        return row.firing.noise_sigma
 
     _cloud(left, rows, front, r2, fss)
     _cloud(middle, rows, front, r2, sigma)
@@ -125,7 +127,7 @@ def materials_page(results: MaterialStudy) -> Page:
                             "joint hit rates",
                             "meets",
                         ),
-                        [_levels(number, row) for number, row in _numbered(results)],
+                        [_levels(number, row, results.meets[row.name]) for number, row in _numbered(results)],
                     ),
                     _legend(targets),
                     *_unsolved(results),
@@ -138,10 +140,10 @@ def materials_page(results: MaterialStudy) -> Page:
                         ("set", "epidermis", "dermis", "subcutis", "R²", "force [mN]"),
                         [
                             (
-                                row["name"],
-                                *(f"{value:.4g}" for value in row["shear_kpa"].values()),
-                                fixed(row["deflection"]["r2"], 3),
-                                fixed(row["deflection"]["force_mn"], 0),
+                                row.name,
+                                *(f"{value:.4g}" for value in row.shear_kpa.values()),
+                                fixed(row.deflection.r2, 3),
+                                fixed(row.deflection.force_mn, 0),
                             )
                             for row in results.deflection_only
                         ],
@@ -196,23 +198,23 @@ def _legend(targets: Targets) -> str:
     )
 
 
-def _numbered(results: MaterialStudy) -> list[tuple[int, Mapping[str, Any]]]:
+def _numbered(results: MaterialStudy) -> list[tuple[int, EvaluatedSet]]:
     rows = enumerate(results.sets, start=1)
-    return [(number, row) for number, row in rows if "unsolved" not in row]
+    return [(number, row) for number, row in rows if isinstance(row, EvaluatedSet)]
 
 
 def _cloud(
     axes: Axes,
-    rows: Sequence[tuple[int, Mapping[str, Any]]],
+    rows: Sequence[tuple[int, EvaluatedSet]],
     front: set[str],
-    across: Callable[[Mapping[str, Any]], float],
-    up: Callable[[Mapping[str, Any]], float | None],
+    across: Callable[[EvaluatedSet], float],
+    up: Callable[[EvaluatedSet], float],
 ) -> None:
     for number, row in rows:
         x, y = across(row), up(row)
-        if y is None:
+        if isnan(y):
             continue
-        colour = ORANGE if row["name"] in front else BLUE
+        colour = ORANGE if row.name in front else BLUE
         axes.plot(x, y, "o", markersize=5.0, color=colour)
         axes.annotate(
             str(number), (x, y), xytext=(4, 3), textcoords="offset points", fontsize=8.0, color=BLACK
@@ -220,66 +222,61 @@ def _cloud(
 
 
 def _met(results: MaterialStudy) -> str:
-    all_three = [row["name"] for row in results.sets if all(row["meets"].values())]
+    all_three = [name for name, levels in results.meets.items() if levels.all]
     if not all_three:
         return "**No set meets all three levels.**"
     return f"**Sets that meet all three levels: {', '.join(all_three)}.**"
 
 
-def _moduli(number: int, row: Mapping[str, Any]) -> tuple[str, ...]:
-    shear = row.get("shear_kpa")
-    values = (f"{value:.4g}" for value in shear.values()) if shear else ("-", "-", "-")
-    return (str(number), row["name"], *values, row["basis"])
+def _moduli(number: int, row: EvaluatedSet | UnsolvedSet) -> tuple[str, ...]:
+    shear_kpa = row.shear_kpa if isinstance(row, EvaluatedSet) else {}
+    values = [f"{value:.4g}" for value in shear_kpa.values()] or ["-"] * 3
+    return (str(number), row.name, *values, row.basis)
 
 
-def _levels(number: int, row: Mapping[str, Any]) -> tuple[str, ...]:
-    deflection, firing, joint = row["deflection"], row["firing"], row["joint"]
-    met = [_LETTERS[level] for level, reached in row["meets"].items() if reached]
+def _levels(number: int, row: EvaluatedSet, levels: LevelsMet) -> tuple[str, ...]:
+    deflection, firing, joint = row.deflection, row.firing, row.joint
+    met = [_LETTERS[level] for level, reached in asdict(levels).items() if reached]
     return (
         str(number),
-        fixed(deflection["r2"], 3),
-        ", ".join(fixed(value, 2) for value in deflection["deflection_mm"]),
-        fixed(deflection["force_mn"], 0),
-        f"{fixed(firing['fss'], 3)} ({fixed(firing['fss_dynamic'], 2)}, {fixed(firing['fss_static'], 2)})",
-        fixed(firing["noise_sigma"], 3),
-        ", ".join(fixed(rate, 2) for rate in firing["hit_rate"]),
-        fixed(joint["fss"], 3),
-        ", ".join(fixed(rate, 2) for rate in joint["hit_rate"]),
+        fixed(deflection.r2, 3),
+        ", ".join(fixed(value, 2) for value in deflection.deflection_mm),
+        fixed(deflection.force_mn, 0),
+        f"{fixed(firing.fss, 3)} ({fixed(firing.fss_dynamic, 2)}, {fixed(firing.fss_static, 2)})",
+        fixed(firing.noise_sigma, 3),
+        ", ".join(fixed(rate, 2) for rate in firing.hit_rate),
+        fixed(joint.fss, 3),
+        ", ".join(fixed(rate, 2) for rate in joint.hit_rate),
         " ".join(met) or "-",
     )
 
 
 def _unsolved(results: MaterialStudy) -> list[str]:
     return [
-        f"Set {number} could not be solved: {row['unsolved']}"
+        f"Set {number} could not be solved: {row.unsolved}"
         for number, row in enumerate(results.sets, start=1)
-        if "unsolved" in row
+        if isinstance(row, UnsolvedSet)
     ]
 
 
-def _order(order: Mapping[str, Any]) -> list[str | Part]:
-    def cells(found: Mapping[str, Any]) -> tuple[str, ...]:
-        return (
-            *(fixed(found["same_depth"][region], 3) for region in _REGIONS),
-            *(fixed(found["same_force"][region], 3) for region in _REGIONS),
-            fixed(found["force_ratio"], 2),
-        )
+def _order(order: TrialOrder) -> list[str | Part]:
+    def cells(found: TrialDifference) -> tuple[str, ...]:
+        depth, force = found.same_depth, found.same_force
+        lengths = (depth.near_mm, depth.far_mm, force.near_mm, force.far_mm)
+        return (*(fixed(length, 3) for length in lengths), fixed(found.force_ratio, 2))
 
     observed = table(
-        ("inner layers and epidermis", *(f"{region} [mm]" for region in _REGIONS.values())),
-        [
-            (name, *(fixed(found[region], 3) for region in _REGIONS))
-            for name, found in order["observed"].items()
-        ],
+        ("inner layers and epidermis", *(f"{region} [mm]" for region in _REGIONS)),
+        [(name, fixed(found.near_mm, 3), fixed(found.far_mm, 3)) for name, found in order.observed.items()],
     )
     columns = (
         "inner layers of Trials 2 and 3",
-        *(f"{region}, same depth [mm]" for region in _REGIONS.values()),
-        *(f"{region}, same force [mm]" for region in _REGIONS.values()),
+        *(f"{region}, same depth [mm]" for region in _REGIONS),
+        *(f"{region}, same force [mm]" for region in _REGIONS),
         "force ratio at 1 mm",
     )
-    stiff = table(columns, [(name, *cells(found)) for name, found in order["stiff_epidermis"].items()])
-    inner = table(columns, [(name, *cells(found)) for name, found in order["inner_layers"].items()])
+    stiff = table(columns, [(name, *cells(found)) for name, found in order.stiff_epidermis.items()])
+    inner = table(columns, [(name, *cells(found)) for name, found in order.inner_layers.items()])
     return [
         "Mean deflection under the cylinder minus the observed one, at a depth of 1 mm:",
         observed,

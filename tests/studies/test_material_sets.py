@@ -1,7 +1,7 @@
 """Sets of tissues on three levels: closed forms, a search that recovers the truth, and one tiny run."""
 
 import re
-from dataclasses import replace
+from dataclasses import asdict, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -30,16 +30,21 @@ from studies.hyperfoam_fit import (
 )
 from studies.material_candidates import candidates, deflection_candidates, layered, wu_polynomials
 from studies.material_sets import (
+    CylinderDeflection,
     Effort,
+    EvaluatedSet,
+    FittedAfferent,
     Levels,
     MaterialSet,
+    UnsolvedSet,
     bar_sed,
     compare,
     pareto_front,
     touches,
 )
-from studies.material_study import MaterialStudy, meets
+from studies.material_study import LevelsMet, MaterialStudy, meets
 from studies.pages.material_sets import materials_page
+from studies.trial_order import Excess, TrialDifference, TrialOrder
 
 WU_SKIN = (published.WU_SKIN_HYPERFOAM_MU.value, published.WU_SKIN_HYPERFOAM_ALPHA.value)
 
@@ -207,7 +212,7 @@ def test_the_search_finds_an_afferent_that_answers_like_the_one_that_made_the_ra
     assert static.max() > 20.0
     found = levels.search(EFFORT, percept_weight=0.0)
     assert levels.fss(found) > 0.99
-    assert levels.judged(found)["fss"] == levels.fss(found)
+    assert levels.evaluated(found).fss == levels.fss(found)
 
 
 def test_stiffness_of_all_layers_at_once_says_nothing_to_an_afferent():
@@ -228,9 +233,9 @@ def test_the_joint_search_gives_up_firing_for_hit_rates_only():
 def test_spheres_that_feel_alike_leave_no_noise_to_fit():
     levels = synthetic_levels()
     levels.spheres = [levels.spheres[0]] * 3
-    judged = levels.judged(TRUTH)
-    assert judged["hit_rate"] == pytest.approx([0.5, 0.5])
-    assert np.isnan(judged["noise_sigma"])
+    found = levels.evaluated(TRUTH)
+    assert found.hit_rate == pytest.approx([0.5, 0.5])
+    assert np.isnan(found.noise_sigma)
 
 
 def test_the_search_is_the_same_for_the_same_seed():
@@ -250,9 +255,28 @@ def test_unusable_effort_is_refused(wrong):
 # Verdicts
 
 
-def row(name="one", r2=0.97, fss=0.85, hit_rate=(0.6, 0.93)):
-    joint = {"fss": fss, "hit_rate": list(hit_rate), "percept_error": 0.0}
-    return {"name": name, "deflection": {"r2": r2}, "joint": joint}
+def row(r2=0.97, fss=0.85, hit_rate=(0.6, 0.93)):
+    """A material set; only these numbers decide which levels it meets."""
+    deflection = {"r2": r2, "r2_mirrored": r2, "distance_mm": [1.0], "deflection_mm": [0.5], "force_mn": 9.0}
+    afferent = FittedAfferent(
+        fss=fss,
+        fss_dynamic=fss,
+        fss_static=fss,
+        noise_sigma=0.05,
+        noise_fit_error=0.0,
+        hit_rate=hit_rate,
+        percept_error=0.0,
+        parameters={},
+    )
+    return EvaluatedSet(
+        name="one",
+        basis="assumed",
+        shear_kpa={},
+        deflection=CylinderDeflection(**deflection),
+        sed_peak_kpa=1.0,
+        firing=afferent,
+        joint=afferent,
+    )
 
 
 @pytest.mark.parametrize(
@@ -266,22 +290,17 @@ def row(name="one", r2=0.97, fss=0.85, hit_rate=(0.6, 0.93)):
     ],
 )
 def test_a_level_is_met_or_missed_by_itself(changed, missed):
-    assert [level for level, reached in meets(row(**changed)).items() if not reached] == (
-        [missed] if missed else []
-    )
-
-
-def test_what_could_not_be_solved_meets_nothing_and_is_on_no_front():
-    unsolved = {"name": "two", "unsolved": "why"}
-    assert not any(meets(unsolved).values())
-    assert pareto_front([row(), unsolved]) == ["one"]
+    levels = meets(row(**changed))
+    assert [level for level, reached in asdict(levels).items() if not reached] == ([missed] if missed else [])
+    assert levels.all is (missed is None)
 
 
 def test_equal_sets_do_not_beat_each_other():
-    assert pareto_front([row("a"), row("b"), row("c", r2=0.9)]) == ["a", "b"]
+    merits = np.array([[0.97, 0.85, 0.0], [0.97, 0.85, 0.0], [0.9, 0.85, 0.0]])
+    assert pareto_front(merits).tolist() == [True, True, False]
 
 
-def test_a_set_that_cannot_be_solved_is_told_and_the_others_are_judged(monkeypatch, tmp_path):
+def test_a_set_that_cannot_be_solved_is_named_and_the_others_are_evaluated(monkeypatch, tmp_path):
     def solve(runner, wanted, stage):
         asked.append(stage)
         if wanted[0].tissues == named_tissues("trial1"):
@@ -290,12 +309,12 @@ def test_a_set_that_cannot_be_solved_is_told_and_the_others_are_judged(monkeypat
     asked = []
     monkeypatch.setattr(Runner, "solve", solve)
     monkeypatch.setattr(Store, "load", lambda store, touch: None)
-    monkeypatch.setattr(material_sets, "evaluate", lambda candidate, *rest: {"name": candidate.name})
+    monkeypatch.setattr(material_sets, "evaluate", lambda candidate, *rest: candidate.name)
     chosen = [candidate for candidate in candidates() if candidate.name in ("Trial 1", "Trial 3")]
     rows = compare(chosen, Runner(tmp_path), Conditions("quick"))
-    assert rows[0]["name"] == "Trial 1"
-    assert "no answer" in rows[0]["unsolved"]
-    assert rows[1] == {"name": "Trial 3"}
+    assert rows[0].name == "Trial 1"
+    assert "no answer" in rows[0].unsolved
+    assert rows[1] == "Trial 3"
     assert asked == ["Trial 1", "Trial 3"]
 
 
@@ -336,21 +355,25 @@ def test_excess_is_told_for_each_region():
     distance = np.linspace(-10.0, 10.0, 2001)
     deeper = SurfaceProfile(distance, np.where(np.abs(distance) <= 0.52, 0.3, 0.1))
     flat = SurfaceProfile(distance, np.zeros(2001))
-    assert trial_order.excess(deeper, flat) == pytest.approx({"near_mm": 0.3, "far_mm": 0.1})
+    assert asdict(trial_order.excess(deeper, flat)) == pytest.approx({"near_mm": 0.3, "far_mm": 0.1})
 
 
 def test_observations_do_not_exceed_themselves():
     observed = trial_order.cylinder_deflection()
     mirrored = SurfaceProfile(-observed.distance_mm[::-1], observed.deflection_mm[::-1])
-    assert trial_order.excess_over_observed(mirrored) == pytest.approx({"near_mm": 0.0, "far_mm": 0.0})
+    excess = trial_order.excess_over_observed(mirrored)
+    assert asdict(excess) == pytest.approx({"near_mm": 0.0, "far_mm": 0.0})
 
 
 @pytest.mark.parametrize(("sign", "upwards", "downwards"), [(1.0, True, False), (-1.0, False, True)])
 def test_the_papers_order_depends_on_which_way_the_axis_points(sign, upwards, downwards):
-    def region(value):
-        return {"same_depth": {"near_mm": value, "far_mm": value}}
+    def difference(value):
+        same = Excess(near_mm=value, far_mm=value)
+        return TrialDifference(same_depth=same, same_force=same, force_ratio=1.0)
 
-    found = {"inner_layers": {"x": region(sign)}, "stiff_epidermis": {"x": region(-sign)}}
+    found = TrialOrder(
+        observed={}, inner_layers={"x": difference(sign)}, stiff_epidermis={"x": difference(-sign)}
+    )
     assert trial_order.order_holds(found, "x", "same_depth") is upwards
     assert trial_order.order_holds(found, "x", "same_depth", direction=-1.0) is downwards
 
@@ -389,56 +412,54 @@ def tiny(tmp_path_factory):
 
 def test_each_set_is_judged_on_all_levels(tiny):
     first, third = tiny.results.sets
-    assert (first["name"], third["name"]) == ("Trial 1", "Trial 3")
-    assert first["deflection"]["force_mn"] > third["deflection"]["force_mn"] > 0.0
+    assert (first.name, third.name) == ("Trial 1", "Trial 3")
+    assert first.deflection.force_mn > third.deflection.force_mn > 0.0
     for found in (first, third):
-        for afferent in (found["firing"], found["joint"]):
-            again = Afferent.from_parameters(list(afferent["parameters"].values()))
+        for afferent in (found.firing, found.joint):
+            again = Afferent.from_parameters(list(afferent.parameters.values()))
             assert again.time_constant_ms > 0.0
-            assert all(0.0 <= rate <= 1.0 for rate in afferent["hit_rate"])
-        assert found["joint"]["fss"] <= found["firing"]["fss"] + 0.5
+            assert all(0.0 <= rate <= 1.0 for rate in afferent.hit_rate)
+        assert found.joint.fss <= found.firing.fss + 0.5
+    assert list(tiny.results.meets) == ["Trial 1", "Trial 3"]
     assert tiny.results.pareto
 
 
 def test_a_stiff_epidermis_spreads_the_deflection_at_equal_depth(tiny):
     for inner in ("Maeno", "identified"):
-        found = tiny.results.order["stiff_epidermis"][inner]
-        assert found["same_depth"]["far_mm"] > 0.0
-        assert found["force_ratio"] > 1.0
+        found = tiny.results.order.stiff_epidermis[inner]
+        assert found.same_depth.far_mm > 0.0
+        assert found.force_ratio > 1.0
 
 
 def test_a_second_run_presses_nothing_and_says_the_same(tiny, monkeypatch):
     monkeypatch.setattr("fingerpad.skin.store._compute", pytest.fail)
     use_few(monkeypatch)
-    again = tiny.run()
-    assert from_json(MaterialStudy, to_json(again)).sets == again.sets == tiny.results.sets
+    again = replace(tiny.run(), manifest=tiny.results.manifest)
+    assert to_json(from_json(MaterialStudy, to_json(again))) == to_json(again) == to_json(tiny.results)
 
 
 def test_the_page_tells_every_set_and_its_numbers(tiny, tmp_path):
     text = write_markdown(materials_page(tiny.results), tmp_path / "materials.md").read_text(encoding="utf-8")
     assert (tmp_path / "images" / "material_sets.png").read_bytes().startswith(b"\x89PNG")
     for number, found in enumerate(tiny.results.sets, start=1):
-        assert f"| {number} | {found['name']} |" in text
-        assert f"| {number} | {found['deflection']['r2']:.3f}".replace("-", "−") in text
+        assert f"| {number} | {found.name} |" in text
+        assert f"| {number} | {found.deflection.r2:.3f}".replace("-", "−") in text
     (alone,) = tiny.results.deflection_only
-    assert (
-        f"| {alone['name']} | 20 | 25.4 | 2.373 | {alone['deflection']['r2']:.3f}".replace("-", "−") in text
-    )
+    assert f"| {alone.name} | 20 | 25.4 | 2.373 | {alone.deflection.r2:.3f}".replace("-", "−") in text
     assert "](images/material_sets.png)" in text
     assert tiny.results.manifest.started[:10] in text
 
 
 def test_the_page_says_what_was_not_solved_and_which_sets_meet_everything(tiny):
-    good = {
-        **tiny.results.sets[0],
-        "meets": dict.fromkeys(("deflection", "firing", "discrimination"), True),
-    }
-    unsolved = {"name": "odd", "basis": "assumed", "unsolved": "It folded.", "meets": meets({"unsolved": ""})}
-    text = markdown(materials_page(replace(tiny.results, sets=(good, unsolved))))
-    assert f"Sets that meet all three levels: {good['name']}." in text
+    good = tiny.results.sets[0]
+    met = {good.name: LevelsMet(deflection=True, firing=True, discrimination=True)}
+    unsolved = UnsolvedSet(name="odd", basis="assumed", unsolved="It folded.")
+    text = markdown(materials_page(replace(tiny.results, sets=(good, unsolved), meets=met)))
+    assert f"Sets that meet all three levels: {good.name}." in text
+    assert "| 2 | odd | - | - | - | assumed |" in text
     assert "Set 2 could not be solved: It folded." in text
     assert "No set meets all three levels" in markdown(
-        materials_page(replace(tiny.results, sets=(unsolved,)))
+        materials_page(replace(tiny.results, sets=(unsolved,), meets={}))
     )
 
 
@@ -475,7 +496,8 @@ def test_the_command_hands_over_what_was_asked_and_writes_page_and_numbers(
         command.main()
     assert not ended.value.code
     assert asked == [(("Trial 3",), True, 5, 1)]
-    assert from_json(MaterialStudy, (out / "materials.json").read_bytes()).sets == tiny.results.sets
+    written = from_json(MaterialStudy, (out / "materials.json").read_bytes())
+    assert to_json(written) == to_json(replace(tiny.results, shifted_bars=True))
     assert capsys.readouterr().out.startswith(f"Page: {out / 'materials.md'}")
     assert "36 indentations of the bar" in (out / "materials.md").read_text(encoding="utf-8")
 
