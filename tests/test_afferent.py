@@ -142,6 +142,12 @@ def test_a_single_wrong_field_is_named():
         Afferent(dynamic_gain=np.inf)
 
 
+def test_an_afferent_refuses_traces_of_another_static_quantity():
+    energy = ramp_and_hold(1.0, 2.0)
+    with pytest.raises(InputError, match="static term of this afferent needs 'work': got traces of 'stored'"):
+        Afferent(static_quantity="work").spikes(energy)
+
+
 def test_an_afferent_and_its_traces_agree_on_what_the_dynamic_term_follows():
     energy = ramp_and_hold(1.0, 2.0)
     both = SedTraces(energy.times_ms, energy.sed_kpa, energy.kinks_ms, 10.0 * energy.sed_kpa, "von_mises")
@@ -156,7 +162,8 @@ def test_an_afferent_and_its_traces_agree_on_what_the_dynamic_term_follows():
             afferent.spikes(traces)
 
 
-def test_what_the_dynamic_term_follows_is_no_fitted_number():
-    extended = Afferent.from_parameters(Afferent().parameters, dynamic_quantity="work")
-    assert extended == Afferent(dynamic_quantity="work")
+def test_what_a_term_follows_is_no_fitted_number():
+    quantities = {"dynamic_quantity": "work", "static_quantity": "von_mises"}
+    extended = Afferent.from_parameters(Afferent().parameters, **quantities)
+    assert extended == Afferent(**quantities)
     assert_array_equal(extended.parameters, Afferent().parameters)

@@ -57,7 +57,7 @@ class Bump:
         self.peak_kpa = peak_kpa * curvature_per_m / 200.0
         self.width_mm = 2.0 * np.sqrt(200.0 / curvature_per_m)
 
-    def sed(self, sites, dynamic_quantity="stored"):
+    def sed(self, sites, dynamic_quantity="stored", static_quantity="stored"):
         squared = np.square(np.asarray(sites)[:, [0, -1]] - [RECEPTOR_X_MM, 0.0]).sum(axis=1)
         peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
         return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.9], peaks), kinks_ms=[50.0])
@@ -66,7 +66,7 @@ class Bump:
 class NearOnly(Bump):
     """A skin that holds nothing beyond 2 mm."""
 
-    def sed(self, sites, dynamic_quantity="stored"):
+    def sed(self, sites, dynamic_quantity="stored", static_quantity="stored"):
         far = np.linalg.norm(np.asarray(sites)[:, [0, -1]] - [RECEPTOR_X_MM, 0.0], axis=1) >= 2.0
         return super().sed(sites).scaled(np.where(far, 1e-6, 1.0))
 

@@ -104,12 +104,18 @@ def test_what_cannot_be_used_is_refused(wrong, message):
 class BumpWithStress(Bump):
     """The same skin, which also knows a stress: wider than the energy."""
 
-    def sed(self, sites, dynamic_quantity="stored"):
+    def sed(self, sites, dynamic_quantity="stored", static_quantity="stored"):
         traces = super().sed(sites)
-        if dynamic_quantity == "stored":
-            return traces
-        stress_kpa = np.sqrt(traces.sed_kpa)
-        return SedTraces(traces.times_ms, traces.sed_kpa, traces.kinks_ms, stress_kpa, dynamic_quantity)
+        values = {"stored": traces.sed_kpa, "compressive_stress": np.sqrt(traces.sed_kpa)}
+        dynamic_kpa = None if dynamic_quantity == static_quantity else values[dynamic_quantity]
+        return SedTraces(
+            traces.times_ms,
+            values[static_quantity],
+            traces.kinks_ms,
+            dynamic_kpa,
+            dynamic_quantity,
+            static_quantity,
+        )
 
 
 def test_a_population_samples_what_the_dynamic_term_of_its_afferent_follows():
@@ -123,6 +129,8 @@ def test_a_population_samples_what_the_dynamic_term_of_its_afferent_follows():
     dynamic_hz, _ = lone.rates(skin.sed(Population.grid().positions_mm, "compressive_stress"))
     assert_array_equal(extended.dynamic_rate_hz, dynamic_hz)
     assert (extended.dynamic_rate_hz != usual.dynamic_rate_hz).any()
+    both = replace(lone, static_quantity="compressive_stress")
+    assert (Population.grid(afferent=both).respond(skin).static_rate_hz != usual.static_rate_hz).any()
 
 
 def test_sensitivity_multiplies_both_gains_and_not_the_intercept():

@@ -259,7 +259,7 @@ def test_another_quantity_for_the_dynamic_term_reaches_the_afferent():
     halved = [KNOWN[0], KNOWN[1] / 2.0, *KNOWN[2:]]
     for rates, expected in zip(doubled.evaluate(np.array(halved)), AFFERENT.rates(SED), strict=True):
         np.testing.assert_allclose(rates, expected, rtol=1e-9)
-    with pytest.raises(InputError, match="one dynamic_quantity: got stored, work"):
+    with pytest.raises(InputError, match="got stored and stored, work and stored"):
         AfferentModel.of_traces([SED, traces([1.0], dynamic_kpa=SED.sed_kpa[:, :1], dynamic_quantity="work")])
 
 
@@ -373,8 +373,8 @@ class Pressed:
     def height(self, offset_mm):
         return 3.0 * np.exp(-((np.abs(self.shift_mm - offset_mm) - 1.5) ** 2)) * self.depth_mm
 
-    def sed(self, sites, dynamic_quantity):
-        assert dynamic_quantity == "stored"
+    def sed(self, sites, dynamic_quantity, static_quantity):
+        assert (dynamic_quantity, static_quantity) == ("stored", "stored")
         offsets = np.array(sites)[:, 0] - RECEPTOR_X_MM
         assert [offset for offset, (_, across) in zip(offsets, sites, strict=True) if across == 0.0].count(
             0.0

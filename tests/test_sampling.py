@@ -117,6 +117,18 @@ def test_energy_comes_with_what_the_dynamic_term_follows():
     assert skin.sed(SITES).dynamic_kpa is None
 
 
+def test_another_quantity_may_take_the_place_of_energy_in_the_static_term_or_in_both():
+    skin = response(block(), bump)
+    energy, stress = skin.sample("stored", SITES), skin.sample("von_mises", SITES)
+    static = skin.sed(SITES, static_quantity="von_mises")
+    np.testing.assert_array_equal(static.sed_kpa, stress)
+    np.testing.assert_array_equal(static.dynamic_kpa, energy)
+    both = skin.sed(SITES, "von_mises", "von_mises")
+    np.testing.assert_array_equal(both.sed_kpa, stress)
+    assert both.dynamic_kpa is None
+    assert both.static_quantity == both.dynamic_quantity == "von_mises"
+
+
 @pytest.mark.parametrize("quantity", ["heat", "", "work"])
 def test_quantity_that_the_skin_does_not_know_is_refused(quantity):
     with pytest.raises(InputError, match="quantity must be one of stored, von_mises: got"):

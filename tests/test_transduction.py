@@ -141,11 +141,11 @@ def test_two_times_are_enough_and_kinks_at_the_ends_change_nothing():
         (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], kinks_ms=[1.0, 0.0]), "kinks_ms must increase"),
         (
             lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], dynamic_kpa=[[0.0], [1.0]]),
-            "dynamic_kpa is needed for every dynamic_quantity but 'stored'.*'stored' with it",
+            "dynamic_kpa is needed if dynamic_quantity is not static_quantity.*'stored' with it",
         ),
         (
             lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], dynamic_quantity="work"),
-            "dynamic_kpa is needed .* got 'work' without it",
+            "dynamic_kpa is needed .* got 'work' and 'stored' without it",
         ),
         (
             lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], (), [[0.0, 1.0], [1.0, 1.0]], "work"),
@@ -210,7 +210,19 @@ def test_a_dynamic_term_that_follows_energy_under_another_name_is_the_papers_to_
     renamed = SedTraces(TIMES_MS, energy.sed_kpa, [RAMP_MS], energy.sed_kpa, "work")
     gains = Transduction(1e-7, 1e-4, 6e-7)
     assert_array_equal(gains.current(renamed).current_ma, gains.current(energy).current_ma)
-    assert drive(energy).dynamic_quantity == "stored"
+    assert drive(energy).dynamic_quantity == drive(energy).static_quantity == "stored"
+
+
+@pytest.mark.parametrize("options", [{}, {"difference_step_ms": 0.001}])
+def test_both_terms_may_follow_one_other_quantity(options):
+    energy = ramp_and_hold()
+    stress = SedTraces(
+        TIMES_MS, energy.sed_kpa, [RAMP_MS], dynamic_quantity="von_mises", static_quantity="von_mises"
+    )
+    driven = drive(stress, **options)
+    assert_array_equal(driven.rate_kpa_per_ms, drive(energy, **options).rate_kpa_per_ms)
+    for kept in (driven, driven.part(slice(0, 1)), stress.part(slice(0, 1)), stress.scaled(np.ones(3))):
+        assert kept.dynamic_quantity == kept.static_quantity == "von_mises"
 
 
 def test_a_part_of_traces_or_of_their_drive_keeps_what_the_dynamic_term_follows():

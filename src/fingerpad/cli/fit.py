@@ -64,6 +64,9 @@ def fit_command(
             f"as an extension, {', '.join(QUANTITY_CHOICES[1:])}."
         ),
     ] = "stored",
+    static_quantity: Annotated[
+        str, typer.Option(help="Quantity that drives the static term; choices as for the dynamic term.")
+    ] = "stored",
     method: Annotated[str, typer.Option(help=f"One of {', '.join(METHOD_CHOICES)}.")] = "least_squares",
     posterior: Annotated[
         bool,
@@ -133,6 +136,7 @@ def fit_command(
         (dynamic_window, static_window),
         processes(jobs),
         dynamic_quantity,
+        static_quantity,
         with_posterior=posterior,
         with_profiles=profiles,
         with_sensitivity=sensitivity,

@@ -7,7 +7,7 @@ Skin -> `SedTraces` -> `CurrentTraces` -> `SpikeTrains` -> `ResponseMap` -> `Hit
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -23,11 +23,17 @@ STORED_ENERGY = "stored"
 class Skin(Protocol):
     """Any object that returns the strain energy density below points of its surface."""
 
-    def sed(self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY) -> SedTraces:
+    def sed(
+        self,
+        sites: ArrayLike,
+        dynamic_quantity: str = STORED_ENERGY,
+        static_quantity: str = STORED_ENERGY,
+    ) -> SedTraces:
         """Strain energy density over time below `sites` of the skin. [mm]
 
         Sites are x and z of end organs on the volar side (n_sites, 2), or x, y and z of the skin above them
-        on any side (n_sites, 3). The traces include the quantity of the dynamic term, if it is another one.
+        on any side (n_sites, 3). Another quantity may take the place of strain energy density in either term
+        of the current.
         """
         ...
 
@@ -57,21 +63,23 @@ class SedTraces:
     times_ms : array (n_times,)
         Strictly increasing, from the onset of the indentation. [ms]
     sed_kpa : array (n_times, n_sites)
-        Strain energy density; not negative. [kPa = µJ/mm³]
+        Strain energy density, or the quantity of the static term in its place; not negative.
+        [kPa = µJ/mm³]
     kinks_ms : array (n_kinks,), optional
         Those of `times_ms` at which the motion changes abruptly, as from ramp to hold: there the
         rate of change of SED is discontinuous, and interpolation must not smooth it. [ms]
     dynamic_kpa : array (n_times, n_sites), optional
-        Quantity that drives the dynamic term instead of SED, an extension of the paper's model; not
-        negative. [kPa, a strain in mm/mm]
-    dynamic_quantity : str, optional
-        Its name, one of those of `SkinResponse.sample`; "stored" is SED itself.
+        Quantity that drives the dynamic term, if it is not that of the static term; not negative.
+        [kPa, a strain in mm/mm]
+    dynamic_quantity, static_quantity : str, optional
+        What each term follows, by the names of `SkinResponse.sample`: "stored" is SED, as in the paper; any
+        other is an extension of its model.
 
     Raises
     ------
     InputError
-        If shapes disagree, a value is not finite or negative, a kink is not among the times, or only one of
-        `dynamic_kpa` and its name is given.
+        If shapes disagree, a value is not finite or negative, a kink is not among the times, or
+        `dynamic_kpa` is given although both terms follow one quantity, or is missing although they do not.
 
     Examples
     --------
@@ -84,6 +92,7 @@ class SedTraces:
     kinks_ms: FloatArray = field(default_factory=lambda: np.empty(0))
     dynamic_kpa: FloatArray | None = None
     dynamic_quantity: str = STORED_ENERGY
+    static_quantity: str = STORED_ENERGY
 
     def __post_init__(self) -> None:
         times, sed = _traces("SedTraces", "sed_kpa", self.times_ms, self.sed_kpa)
@@ -94,10 +103,11 @@ class SedTraces:
         if not np.isin(kinks, times).all():
             raise InputError(f"kinks_ms must be among times_ms: got {kinks[~np.isin(kinks, times)]}.")
         _freeze(self, times_ms=times, sed_kpa=sed, kinks_ms=kinks)
-        if (self.dynamic_kpa is None) != (self.dynamic_quantity == STORED_ENERGY):
+        if (self.dynamic_kpa is None) != (self.dynamic_quantity == self.static_quantity):
             raise InputError(
-                f"dynamic_kpa is needed for every dynamic_quantity but {STORED_ENERGY!r}, and for no other: "
-                f"got {self.dynamic_quantity!r} {'without' if self.dynamic_kpa is None else 'with'} it."
+                "dynamic_kpa is needed if dynamic_quantity is not static_quantity, and only then: got "
+                f"{self.dynamic_quantity!r} and {self.static_quantity!r} "
+                f"{'without' if self.dynamic_kpa is None else 'with'} it."
             )
         if self.dynamic_kpa is not None:
             _, dynamic = _traces("SedTraces", "dynamic_kpa", times, self.dynamic_kpa)
@@ -118,7 +128,7 @@ class SedTraces:
         if sites == slice(0, self.n_sites):
             return self
         dynamic = None if self.dynamic_kpa is None else self.dynamic_kpa[:, sites]
-        return SedTraces(self.times_ms, self.sed_kpa[:, sites], self.kinks_ms, dynamic, self.dynamic_quantity)
+        return replace(self, sed_kpa=self.sed_kpa[:, sites], dynamic_kpa=dynamic)
 
     def scaled(self, factors: ArrayLike) -> SedTraces:
         """Traces with each site's values multiplied by a factor of its own, (n_sites,), not negative.
@@ -132,7 +142,7 @@ class SedTraces:
         if each.size != self.n_sites:
             raise InputError(f"factors needs one number per site: got {each.size} for {self.n_sites}.")
         dynamic = None if self.dynamic_kpa is None else self.dynamic_kpa * each
-        return SedTraces(self.times_ms, self.sed_kpa * each, self.kinks_ms, dynamic, self.dynamic_quantity)
+        return replace(self, sed_kpa=self.sed_kpa * each, dynamic_kpa=dynamic)
 
 
 @dataclass(frozen=True)

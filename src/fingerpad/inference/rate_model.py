@@ -199,10 +199,11 @@ class AfferentModel:
             term.
         """
         traces = [sed] if isinstance(sed, SedTraces) else list(sed)
-        quantities = sorted({trace.dynamic_quantity for trace in traces})
+        quantities = sorted({f"{trace.dynamic_quantity} and {trace.static_quantity}" for trace in traces})
         if len(quantities) != 1:
             raise InputError(
-                f"sed must bring one dynamic_quantity: got {', '.join(quantities) or 'no traces'}."
+                "sed must bring one dynamic_quantity and one static_quantity: got "
+                f"{', '.join(quantities) or 'no traces'}."
             )
         groups: dict[tuple[bytes, bytes], list[tuple[int, SedTraces]]] = {}
         first = 0

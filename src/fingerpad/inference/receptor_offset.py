@@ -129,9 +129,8 @@ class ReceptorOffset:
 
 def _between(near: Drive, far: Drive, share: float) -> Drive:
     """Drive interpolated linearly: `near` for a share of 0, `far` for 1."""
-    return Drive(
-        near.times_ms,
-        (1.0 - share) * near.sed_kpa + share * far.sed_kpa,
-        (1.0 - share) * near.rate_kpa_per_ms + share * far.rate_kpa_per_ms,
-        near.dynamic_quantity,
+    return replace(
+        near,
+        sed_kpa=(1.0 - share) * near.sed_kpa + share * far.sed_kpa,
+        rate_kpa_per_ms=(1.0 - share) * near.rate_kpa_per_ms + share * far.rate_kpa_per_ms,
     )

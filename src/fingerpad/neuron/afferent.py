@@ -52,9 +52,9 @@ class Afferent:
         Potential that elicits a spike, v. [mV]
     refractory_ms : float
         Refractory period after each spike. [ms]
-    dynamic_quantity : str
-        Quantity of the dynamic term, by the names of `SkinResponse.sample`. Any but SED, "stored", is an
-        extension of the paper's model. The unit of k_d depends on it.
+    dynamic_quantity, static_quantity : str
+        What the two terms follow, by the names of `SkinResponse.sample`. Any but SED, "stored", is an
+        extension of the paper's model. The units of k_d and k_s depend on them.
 
     Raises
     ------
@@ -79,6 +79,7 @@ class Afferent:
     threshold_mv: float = neuron.THRESHOLD_FITTED.value
     refractory_ms: float = neuron.REFRACTORY.value
     dynamic_quantity: str = STORED_ENERGY
+    static_quantity: str = STORED_ENERGY
 
     def __post_init__(self) -> None:
         # Both stages check their parameters when they are made.
@@ -90,6 +91,7 @@ class Afferent:
         parameters: ArrayLike,
         refractory_ms: float = neuron.REFRACTORY.value,
         dynamic_quantity: str = STORED_ENERGY,
+        static_quantity: str = STORED_ENERGY,
     ) -> Afferent:
         """Make an afferent from the six fitted numbers.
 
@@ -100,8 +102,8 @@ class Afferent:
             `PARAMETER_NAMES`.
         refractory_ms : float, optional
             Refractory period after each spike, which is not fitted. [ms]
-        dynamic_quantity : str, optional
-            Quantity of the dynamic term.
+        dynamic_quantity, static_quantity : str, optional
+            What the two terms follow.
 
         Returns
         -------
@@ -121,7 +123,12 @@ class Afferent:
         if values.size != len(PARAMETER_NAMES):
             raise InputError(f"parameters must hold {', '.join(PARAMETER_NAMES)}: got {values.size} numbers.")
         fitted = dict(zip(PARAMETER_NAMES, values.tolist(), strict=True))
-        return cls(refractory_ms=refractory_ms, dynamic_quantity=dynamic_quantity, **fitted)
+        return cls(
+            refractory_ms=refractory_ms,
+            dynamic_quantity=dynamic_quantity,
+            static_quantity=static_quantity,
+            **fitted,
+        )
 
     @property
     def parameters(self) -> FloatArray:
@@ -157,13 +164,15 @@ class Afferent:
         Raises
         ------
         InputError
-            If the quantity of the dynamic term is not the one of `sed`.
+            If the quantities of the two terms are not those of `sed`.
         """
-        if sed.dynamic_quantity != self.dynamic_quantity:
-            raise InputError(
-                f"The dynamic term of this afferent needs {self.dynamic_quantity!r}: got traces of "
-                f"{sed.dynamic_quantity!r}; sample the skin with dynamic_quantity={self.dynamic_quantity!r}."
-            )
+        for name in ("dynamic_quantity", "static_quantity"):
+            needed, got = getattr(self, name), getattr(sed, name)
+            if needed != got:
+                raise InputError(
+                    f"The {name.partition('_')[0]} term of this afferent needs {needed!r}: got traces of "
+                    f"{got!r}; sample the skin with {name}={needed!r}."
+                )
 
         def trains(sites: slice) -> SpikeTrains:
             return self.membrane.spikes(self.transduction.current(sed.part(sites)))

@@ -226,15 +226,15 @@ class Population:
         InputError
             If the skin does not return one trace per receptor.
         """
-        dynamic_quantity = self.afferent.dynamic_quantity
-        # A skin without other quantities than SED need not accept the argument of the extension.
-        further = () if dynamic_quantity == STORED_ENERGY else (dynamic_quantity,)
+        quantities = (self.afferent.dynamic_quantity, self.afferent.static_quantity)
+        # A skin without other quantities than SED need not accept the arguments of the extension.
+        further = () if quantities == (STORED_ENERGY, STORED_ENERGY) else quantities
         sed = skin.sed(self.positions_mm, *further)
         if sed.n_sites != len(self.positions_mm):
             raise InputError(
                 f"skin.sed must give one trace per receptor: got {sed.n_sites} for {len(self.positions_mm)}."
             )
-        # Both terms of the current are proportional to SED: scaling SED scales both gains.
+        # Both terms of the current are proportional to what they follow: scaling it scales both gains.
         spikes = self.afferent.spikes(sed if self.sensitivity is None else sed.scaled(self.sensitivity))
         return ResponseMap(
             positions_mm=self.positions_mm,

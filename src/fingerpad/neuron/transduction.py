@@ -8,8 +8,8 @@ sign between two given times, so the absolute value in Eq. 2 adds no kink there.
 A `Drive` holds what does not depend on the gains: SED and its rate on fine knots. It is computed once; the
 current for any gains is then a linear combination.
 
-In the paper both terms use SED. As an extension, traces may contain another quantity Q for the dynamic term:
-I = beta + k_d |Q'| + k_s U (docs/decisions/dynamic-term-quantity.md).
+In the paper both terms use SED. As an extension, another quantity may take its place in either term:
+I = beta + k_d |Q'| + k_s P (docs/decisions/dynamic-term-quantity.md).
 """
 
 from __future__ import annotations
@@ -41,18 +41,19 @@ class Drive:
     times_ms : array (n_knots,)
         Knots; a repeated knot is a jump of the rate. [ms]
     sed_kpa : array (n_knots, n_sites)
-        Strain energy density. [kPa]
+        Strain energy density, or the quantity of the static term in its place. [kPa]
     rate_kpa_per_ms : array (n_knots, n_sites)
         Absolute rate of change of SED, U' of Eq. 2, or of another quantity of the dynamic term; 0 at the
         onset. [kPa/ms, for a strain 1/ms]
-    dynamic_quantity : str, optional
-        The quantity of that rate, by the names of `SkinResponse.sample`; "stored" is SED.
+    dynamic_quantity, static_quantity : str, optional
+        What the two terms follow, by the names of `SkinResponse.sample`; "stored" is SED.
     """
 
     times_ms: FloatArray
     sed_kpa: FloatArray
     rate_kpa_per_ms: FloatArray
     dynamic_quantity: str = STORED_ENERGY
+    static_quantity: str = STORED_ENERGY
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "times_ms", float_array("times_ms", self.times_ms, 1))
@@ -73,9 +74,7 @@ class Drive:
         """Drive of some of the sites."""
         if sites == slice(0, self.n_sites):
             return self
-        return Drive(
-            self.times_ms, self.sed_kpa[:, sites], self.rate_kpa_per_ms[:, sites], self.dynamic_quantity
-        )
+        return replace(self, sed_kpa=self.sed_kpa[:, sites], rate_kpa_per_ms=self.rate_kpa_per_ms[:, sites])
 
 
 @dataclass(frozen=True)
@@ -192,12 +191,16 @@ def drive(
             for values in (sed.sed_kpa, sed.dynamic_kpa)
         )
         return replace(
-            energy, rate_kpa_per_ms=followed.rate_kpa_per_ms, dynamic_quantity=sed.dynamic_quantity
+            energy,
+            rate_kpa_per_ms=followed.rate_kpa_per_ms,
+            dynamic_quantity=sed.dynamic_quantity,
+            static_quantity=sed.static_quantity,
         )
     phases = _phases(sed)
     knots = [_knots(phase.x, pieces, shortest_piece_ms) for phase in phases]
     if difference_step_ms is not None:
-        return _difference(phases, knots, positive("difference_step_ms", difference_step_ms, "ms"))
+        driven = _difference(phases, knots, positive("difference_step_ms", difference_step_ms, "ms"))
+        return replace(driven, dynamic_quantity=sed.dynamic_quantity, static_quantity=sed.static_quantity)
     times = np.concatenate([sed.times_ms[:1], *knots])
     values, rates = np.empty((2, times.size, sed.n_sites))
     values[0], rates[0] = sed.sed_kpa[0], 0.0
@@ -206,7 +209,7 @@ def drive(
         rows = slice(first, first + phase_knots.size)
         _evaluate(phase.c, phase.x, phase_knots, values[rows], rates[rows])
         first = rows.stop
-    return Drive(times, values, rates)
+    return Drive(times, values, rates, sed.dynamic_quantity, sed.static_quantity)
 
 
 @njit(cache=True, nogil=True)

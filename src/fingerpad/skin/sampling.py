@@ -154,7 +154,12 @@ class SkinResponse:
         """Middle plane of the finger, z = 0, as it lies at the last time."""
         return middle_section(self.mesh, self.displacement_mm)
 
-    def sed(self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY) -> SedTraces:
+    def sed(
+        self,
+        sites: ArrayLike,
+        dynamic_quantity: str = STORED_ENERGY,
+        static_quantity: str = STORED_ENERGY,
+    ) -> SedTraces:
         """Strain energy density in the living epidermis below points of the undeformed skin.
 
         End organs lie on the epidermal-dermal border and move with the tissue. A pair gives an organ's own x
@@ -166,9 +171,9 @@ class SkinResponse:
         ----------
         sites : array (n_sites, 2) or (n_sites, 3)
             x and z of end organs on the volar side, or x, y and z of the skin above them on any side. [mm]
-        dynamic_quantity : str, optional
-            Quantity whose rate drives the dynamic response, a name of `sample`. Default: SED, as in the
-            paper.
+        dynamic_quantity, static_quantity : str, optional
+            Quantities that drive the dynamic and the static response, names of `sample`. Default: SED, as in
+            the paper.
 
         Returns
         -------
@@ -181,13 +186,14 @@ class SkinResponse:
             If `sites` is not an array of pairs or triples, a site is not on the skin, or the quantity is
             unknown.
         """
-        stored, *dynamic = self._read(dict.fromkeys((STORED_ENERGY, dynamic_quantity)), sites)
+        static, *dynamic = self._read(dict.fromkeys((static_quantity, dynamic_quantity)), sites)
         return SedTraces(
             self.times_ms,
-            stored,
+            static,
             np.array(self.kinks_ms),
             dynamic[0] if dynamic else None,
             dynamic_quantity,
+            static_quantity,
         )
 
     def sample(self, quantity: str, sites: ArrayLike) -> FloatArray:

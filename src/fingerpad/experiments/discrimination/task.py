@@ -213,8 +213,8 @@ class AfferentSettings(TaskPart):
         As of `fingerpad.Afferent`.
     refractory_ms : float
         Rest after each spike. [ms]
-    dynamic_quantity : str
-        What the dynamic term follows.
+    dynamic_quantity, static_quantity : str
+        What the two terms follow.
     """
 
     intercept_ma: FiniteNumber | None = None
@@ -225,6 +225,7 @@ class AfferentSettings(TaskPart):
     threshold_mv: Positive | None = None
     refractory_ms: NotNegative | None = None
     dynamic_quantity: Annotated[str, choice_of(sampled_fields())] = STORED_ENERGY
+    static_quantity: Annotated[str, choice_of(sampled_fields())] = STORED_ENERGY
 
 
 class WindowSettings(TaskPart):

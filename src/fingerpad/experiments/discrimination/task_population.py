@@ -9,7 +9,6 @@ from pathlib import Path
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import read_text
 from fingerpad.core.layouts import PATTERNS
-from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.discrimination.task import (
@@ -67,8 +66,11 @@ def _fitted(path: Path) -> Afferent:
         raise InputError(f"afferent: {error}") from error
     is_fit = "fit" in values
     parameters = values["fit" if is_fit else "single_unit"]["parameters"]
-    quantity = values["dynamic_quantity"] if is_fit else STORED_ENERGY
-    return Afferent.from_parameters([parameters[name] for name in PARAMETER_NAMES], dynamic_quantity=quantity)
+    quantities = ("dynamic_quantity", "static_quantity")
+    return Afferent.from_parameters(
+        [parameters[name] for name in PARAMETER_NAMES],
+        **({name: values[name] for name in quantities} if is_fit else {}),
+    )
 
 
 def task_population(task: DiscriminationTask, beside: Path = Path()) -> Population:

@@ -50,17 +50,18 @@ class FitFile:
         What was found.
     windows_ms : ((float, float), (float, float))
         Windows of the dynamic and of the static rate. [ms]
-    dynamic_quantity : str
-        Quantity of the dynamic term.
+    dynamic_quantity, static_quantity : str
+        Quantities of the two terms.
     manifest : Manifest
         What ran.
     """
 
     format: Literal["fingerpad fit"] = "fingerpad fit"
-    format_version: Literal[1] = 1
+    format_version: Literal[2] = 2
     fit: FitResult
     windows_ms: tuple[tuple[float, ...], tuple[float, ...]]
     dynamic_quantity: str
+    static_quantity: str
     manifest: Manifest
 
 
@@ -84,9 +85,9 @@ class FitRequest:
         Windows of the dynamic and of the static rate. [ms]
     jobs : int
         Processes to use; the numbers do not depend on it.
-    dynamic_quantity : str
-        What the dynamic term follows: strain energy density, "stored", as in the paper, or another quantity
-        of `SkinResponse.sample` as an extension.
+    dynamic_quantity, static_quantity : str
+        What each term follows: strain energy density, "stored", as in the paper, or another quantity of
+        `SkinResponse.sample` as an extension.
     with_posterior : bool
         Whether credible intervals are drawn as well.
     with_profiles : bool
@@ -111,6 +112,7 @@ class FitRequest:
     windows_ms: Windows = WINDOWS_MS
     jobs: int = 1
     dynamic_quantity: str = STORED_ENERGY
+    static_quantity: str = STORED_ENERGY
     with_posterior: bool = False
     with_profiles: bool = False
     with_sensitivity: bool = False
@@ -119,6 +121,7 @@ class FitRequest:
     def __post_init__(self) -> None:
         one_of("method", self.method, tuple(METHODS))
         one_of("dynamic_quantity", self.dynamic_quantity, tuple(sampled_fields()))
+        one_of("static_quantity", self.static_quantity, tuple(sampled_fields()))
         whole("jobs", self.jobs, at_least=1)
         for start, end in self.windows_ms:
             if not 0.0 <= start < end:
@@ -252,7 +255,8 @@ def run_fit(
     skins = runner.responses({"stimuli": request.touches})["stimuli"]
     offsets_mm = OFFSETS_MM if request.with_offset else (0.0,)
     sites = [[RECEPTOR_X_MM + offset, 0.0] for offset in offsets_mm]
-    sampled = [skin.sed(sites, request.dynamic_quantity) for skin in skins.values()]
+    quantities = (request.dynamic_quantity, request.static_quantity)
+    sampled = [skin.sed(sites, *quantities) for skin in skins.values()]
     beside = {
         offset: [traces.part(slice(place, place + 1)) for traces in sampled]
         for place, offset in enumerate(offsets_mm)
@@ -283,6 +287,7 @@ def run_fit(
         ),
         windows_ms=request.windows_ms,
         dynamic_quantity=request.dynamic_quantity,
+        static_quantity=request.static_quantity,
         manifest=runner.manifest(
             request.conditions,
             {"stimuli": next(iter(skins.values())).mesh},
