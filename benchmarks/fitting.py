@@ -42,7 +42,7 @@ def press(folder: str, traces: str) -> dict[str, Any]:
         Number of times and of shifts.
     """
     touches, store = single_unit.bar_touches(Conditions(resolution=RESOLUTION)), Store(Path(folder))
-    solve_missing(touches, store, JOBS, lambda seconds: None)
+    solve_missing(store.missing(touches), JOBS)
     sed = single_unit.receptor_sed([store.load(touch) for touch in touches])
     np.savez(traces, times_ms=sed.times_ms, sed_kpa=sed.sed_kpa, kinks_ms=sed.kinks_ms)
     return {"times": sed.times_ms.size, "shifts": sed.n_sites}

@@ -360,7 +360,7 @@ def test_noise_is_not_fitted_to_silence():
 def call(monkeypatch, capsys, tmp_path):
     """Run the command in an empty folder; presses take no time."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(runner, "solve_missing", lambda touches, *_: len(touches))
+    monkeypatch.setattr(runner, "solve_missing", lambda *_: None)
 
     def pressed(self, touch):
         skin = Bump(touch.indenter.curvature_per_m)

@@ -1,13 +1,12 @@
 """A file is whole or absent, and what was there before survives every failure."""
 
-import json
 import os
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from fingerpad.core.errors import StoreError
-from fingerpad.core.files import write_atomically, write_json
+from fingerpad.core.files import write_atomically
 
 
 def test_content_arrives_byte_by_byte_and_nothing_else_is_left(tmp_path):
@@ -59,12 +58,3 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").write_bytes(b"in the way")
     with pytest.raises(StoreError, match="note cannot be written"):
         write_atomically(tmp_path / "file" / "note", b"text")
-
-
-def test_results_that_are_not_finite_are_never_written(tmp_path):
-    file = tmp_path / "found.json"
-    with pytest.raises(ValueError, match="JSON"):
-        write_json(file, {"rate_hz": float("nan")})
-    assert list(tmp_path.iterdir()) == []
-    write_json(file, {"rate_hz": [2.5, None]})
-    assert json.loads(file.read_text()) == {"rate_hz": [2.5, None]}

@@ -386,7 +386,7 @@ class Pressed:
 def call(monkeypatch, capsys, tmp_path):
     """Run the command in an empty folder; presses take no time."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(runner, "solve_missing", lambda touches, *_: len(touches))
+    monkeypatch.setattr(runner, "solve_missing", lambda *_: None)
     monkeypatch.setattr(runner.Store, "load", lambda self, touch: Pressed(touch))
 
     def run(*arguments):

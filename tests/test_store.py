@@ -255,7 +255,7 @@ def test_one_declaration_is_stored_loaded_sampled_and_exported(tmp_path, monkeyp
     )
     monkeypatch.setitem(FIELDS, declared.name, declared)
     store, done = Store(tmp_path), TINY.deform()
-    assert solve_missing([TINY], store, jobs=1) == 1
+    solve_missing(store.missing([TINY]), jobs=1)
     back = store.load(TINY)
     elements = TINY.mesh.living_epidermis.ravel()
     pressure = done.fields.pressure_kpa[:, elements].astype(np.float32)
@@ -399,7 +399,7 @@ def test_a_store_that_cannot_be_written_says_so(tmp_path, skin):
         store.save(TINY, skin)
     assert str(store.path(TINY)) in str(refusal.value)
     with pytest.raises(StoreError, match="cannot be written"):
-        solve_missing([TINY], store, jobs=1)
+        solve_missing(store.missing([TINY]), jobs=1)
 
 
 @pytest.mark.parametrize("failure", [KeyboardInterrupt(), OSError(28, "No space left on device")])
@@ -420,7 +420,7 @@ def test_the_rest_of_a_killed_write_does_not_count(stored):
     unfinished = path.with_name(f".{path.name}.0123456789abcdef.part")
     path.rename(unfinished)
     assert not stored.holds(TINY)
-    assert solve_missing([TINY], stored, jobs=1) == 1
+    solve_missing(stored.missing([TINY]), jobs=1)
     assert path.read_bytes() == unfinished.read_bytes()
 
 
@@ -431,7 +431,8 @@ def test_the_rest_of_a_killed_write_does_not_count(stored):
 def uninterrupted(tmp_path_factory):
     """Store in which the six touches were solved in turn, in this process."""
     store = Store(tmp_path_factory.mktemp("uninterrupted"))
-    assert solve_missing(SIX, store, jobs=1) == len(SIX)
+    solve_missing(store.missing(SIX), jobs=1)
+    assert not store.missing(SIX)
     return store
 
 
@@ -449,19 +450,21 @@ def test_each_missing_touch_is_computed_once_and_reported(stored, monkeypatch):
     monkeypatch.setattr(Touch, "solve", noted)
     seconds: list[float] = []
     deeper = replace(TINY, stimulus=RampAndHold(depth_mm=0.11))
-    assert solve_missing([deeper, TINY, deeper, TINY], stored, 1, seconds.append) == 1
+    missing = stored.missing([deeper, TINY, deeper, TINY])
+    assert missing == {stored.path(deeper): deeper}
+    solve_missing(missing, 1, seconds.append)
     assert solved == [deeper]
     assert len(seconds) == 1
     assert seconds[0] > 0.0
-    assert solve_missing([deeper, TINY], stored, 1, seconds.append) == 0
+    assert not stored.missing([deeper, TINY])
+    solve_missing({}, 1, seconds.append)
     assert len(seconds) == 1
-    assert solve_missing([], stored, 1, seconds.append) == 0
 
 
 def test_two_processes_write_the_same_bytes_as_one(tmp_path, uninterrupted):
     store, seconds = Store(tmp_path), []
     environment = dict(os.environ)
-    assert solve_missing([*SIX[:3], *SIX[:3]], store, 2, seconds.append) == 3
+    solve_missing(store.missing([*SIX[:3], *SIX[:3]]), 2, seconds.append)
     assert len(seconds) == 3
     assert dict(os.environ) == environment
     expected = contents(uninterrupted)
@@ -472,12 +475,12 @@ def test_two_processes_write_the_same_bytes_as_one(tmp_path, uninterrupted):
 def test_what_does_not_converge_raises_and_is_not_stored(tmp_path, skin, jobs):
     store = Store(tmp_path)
     with pytest.raises(ConvergenceError) as failure:
-        solve_missing([TINY, HOPELESS], store, jobs)
+        solve_missing(store.missing([TINY, HOPELESS]), jobs)
     assert failure.value.history
     assert not store.holds(HOPELESS)
     wait_until(lambda: store.holds(TINY))  # what is under way in another process is finished and kept
     assert os.listdir(tmp_path) == [store.path(TINY).name]
-    assert solve_missing([TINY], store, jobs) == 0
+    assert not store.missing([TINY])
 
 
 SCRIPT = """
@@ -487,7 +490,7 @@ from fingerpad.skin.store import Store, solve_missing
 
 if __name__ == "__main__":
     touches = pickle.loads(Path(sys.argv[1]).read_bytes())
-    solve_missing(touches, Store(Path(sys.argv[2])), jobs=2)
+    solve_missing(Store(Path(sys.argv[2])).missing(touches), jobs=2)
 """
 
 
@@ -521,7 +524,9 @@ def test_a_run_killed_at_any_moment_goes_on_and_ends_with_the_same_bits(tmp_path
     assert 0 < len(finished) < len(SIX)
     assert contents(store).items() <= contents(uninterrupted).items()
 
-    assert solve_missing(SIX, store, jobs=1) == len(SIX) - len(finished)
+    missing = store.missing(SIX)
+    assert len(missing) == len(SIX) - len(finished)
+    solve_missing(missing, jobs=1)
     assert contents(store) == contents(uninterrupted)
     later = {path.name: path.stat().st_mtime_ns for path in store.folder.glob("*.npz")}
     assert finished.items() <= later.items()

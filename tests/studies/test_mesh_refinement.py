@@ -233,8 +233,8 @@ def results(pressed, tmp_path_factory):
         def __init__(self, folder):
             pass
 
-        def holds(self, touch):
-            return False
+        def missing(self, touches):
+            return {touch: touch for touch in touches}
 
         def load(self, touch):
             sphere = isinstance(touch.indenter, Sphere)
@@ -249,7 +249,7 @@ def results(pressed, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(mesh_refinement, "LEVELS", levels)
         patch.setattr(runner, "Store", Formula)
-        patch.setattr(runner, "solve_missing", lambda touches, *rest: solved.extend(touches))
+        patch.setattr(runner, "solve_missing", lambda missing, *rest: solved.extend(missing.values()))
         found = mesh_refinement.run(runner.Runner(tmp_path_factory.mktemp("refinement")))
     return found, solved, levels
 

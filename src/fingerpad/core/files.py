@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import os
 import secrets
 from pathlib import Path
-from typing import Any
 
 from fingerpad.core.errors import InputError, StoreError
 
@@ -69,36 +67,6 @@ def read_text(path: Path) -> str:
         raise InputError(
             f"{path} must be text in UTF-8: byte {error.start + 1} is not; save it as UTF-8."
         ) from error
-
-
-def write_json(path: Path, results: Any) -> None:
-    """Write results as JSON, atomically; a number that is not finite is an error.
-
-    Parameters
-    ----------
-    path : Path
-        Path of the file; folders are created.
-    results : nested dicts and lists of plain values
-        Such as `studies.reproduction.plain` returns.
-
-    Raises
-    ------
-    StoreError
-        As `write_atomically`.
-    ValueError
-        If a number is not finite.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder:
-    ...     write_json(Path(folder) / "found.json", {"rate_hz": 2.5})
-    ...     print((Path(folder) / "found.json").read_text())
-    {
-     "rate_hz": 2.5
-    }
-    """
-    write_atomically(path, json.dumps(results, indent=1, allow_nan=False).encode())
 
 
 def _sync_folder(folder: Path) -> None:

@@ -7,7 +7,8 @@ four words of 64 bits, so any number of any stream is computed directly, without
     key     = (seed, purpose)
     counter = (block, 0, receptor, trial),    block = 1, 2, ...
 
-NumPy has the same generator with the same counter: `generator` and `uniforms` agree to the last bit.
+NumPy has the same generator with the same counter: its uniform numbers and `uniforms` agree to the last bit.
+The kernels of `neuron` and `psychophysics` compute the numbers of a key inside their loops (`core.philox`).
 """
 
 from __future__ import annotations
@@ -156,48 +157,13 @@ def checked_sites(sites: IntArray, n_sites: int) -> IntArray:
     return sites
 
 
-def generator(seed: int, trial: int, receptor: int, purpose: Purpose) -> np.random.Generator:
-    """Make NumPy's generator of one stream.
-
-    Parameters
-    ----------
-    seed : int
-        Of the whole run; saved with its results.
-    trial, receptor : int
-        Number of the presentation and of the end organ, from 0.
-    purpose : Purpose
-        Purpose of the numbers.
-
-    Returns
-    -------
-    numpy.random.Generator
-        At the beginning of the stream.
-
-    Raises
-    ------
-    InputError
-        If a number is negative or not whole, or the purpose is not a `Purpose`.
-
-    Examples
-    --------
-    >>> first = generator(7, trial=0, receptor=3, purpose=Purpose.GAIN).random()
-    >>> first == generator(7, trial=0, receptor=3, purpose=Purpose.GAIN).random()
-    True
-    """
-    key = [_number("seed", seed), int(instance("purpose", purpose, Purpose))]
-    counter = [0, 0, _number("receptor", receptor), _number("trial", trial)]
-    return np.random.Generator(
-        np.random.Philox(counter=np.array(counter, dtype=np.uint64), key=np.array(key, dtype=np.uint64))
-    )
-
-
 def uniforms(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, count: int) -> FloatArray:
     """Draw uniform numbers of many streams at once.
 
     Parameters
     ----------
     seed : int
-        Of the whole run.
+        Of the whole run; saved with its results.
     trials, receptors : int or sequence of int
         Presentations and end organs: their numbers, such as `range(3, 5)`, or their count, numbered from 0.
     purpose : Purpose
@@ -208,12 +174,12 @@ def uniforms(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, c
     Returns
     -------
     array (n_trials, n_receptors, count)
-        In [0, 1); equal to `generator(...).random` with the same key.
+        In [0, 1).
 
     Raises
     ------
     InputError
-        As in `generator`.
+        If a number is negative or not whole, or the purpose is not a `Purpose`.
 
     Examples
     --------
@@ -224,9 +190,7 @@ def uniforms(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, c
     >>> bool(alone[0, 0, 0] == two_trials[1, 1, 0])
     True
     """
-    numbers = np.empty(_shape(trials, receptors, count))
-    _fill(*_key(seed, trials, receptors, purpose), False, numbers)
-    return numbers
+    return _of_each_pair(seed, trials, receptors, purpose, count, normal=False)
 
 
 def normals(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, count: int) -> FloatArray:
@@ -245,11 +209,11 @@ def normals(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, co
     Raises
     ------
     InputError
-        As in `generator`.
+        As in `uniforms`.
 
     Notes
     -----
-    Box & Muller 1958. `generator` computes normal numbers by another method; they differ from these.
+    Box & Muller 1958. NumPy computes normal numbers of the same generator by another method.
 
     Examples
     --------
@@ -257,25 +221,7 @@ def normals(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, co
     >>> abs(float(numbers.mean())) < 0.05, 0.95 < float(numbers.std()) < 1.05
     (True, True)
     """
-    numbers = np.empty(_shape(trials, receptors, count))
-    _fill(*_key(seed, trials, receptors, purpose), True, numbers)
-    return numbers
-
-
-@njit(cache=True, nogil=True)
-def _fill(seed, trials, receptors, purpose, normal, numbers):  # type: ignore[no-untyped-def]
-    """Write the first numbers of every stream."""
-    count = numbers.shape[2]
-    for i in range(trials.size):
-        for j in range(receptors.size):
-            for first in range(0, count, WORDS):
-                block = first // WORDS + 1
-                if normal:
-                    four = four_normals(seed, trials[i], receptors[j], purpose, block)
-                else:
-                    four = four_uniforms(seed, trials[i], receptors[j], purpose, block)
-                for k in range(min(WORDS, count - first)):
-                    numbers[i, j, first + k] = four[k]
+    return _of_each_pair(seed, trials, receptors, purpose, count, normal=True)
 
 
 def normals_of(seed: int, presentations: Presentations, purpose: Purpose, count: int) -> FloatArray:
@@ -296,7 +242,7 @@ def normals_of(seed: int, presentations: Presentations, purpose: Purpose, count:
     Raises
     ------
     InputError
-        As in `generator`.
+        As in `uniforms`.
 
     Examples
     --------
@@ -305,18 +251,42 @@ def normals_of(seed: int, presentations: Presentations, purpose: Purpose, count:
     >>> bool((normals_of(7, one, Purpose.GAIN, 3)[0] == every[1, 5]).all())
     True
     """
-    numbers = np.empty((len(presentations), whole("count", count, 0)))
-    key = _number("seed", seed), int(instance("purpose", purpose, Purpose))
-    _fill_trains(key[0], presentations.trials, presentations.receptors, key[1], numbers)
+    return _drawn(seed, presentations.trials, presentations.receptors, purpose, count, normal=True)
+
+
+def _of_each_pair(
+    seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, count: int, normal: bool
+) -> FloatArray:
+    """Numbers of every trial with every receptor, (n_trials, n_receptors, count)."""
+    pairs = np.meshgrid(numbered("trials", trials), numbered("receptors", receptors), indexing="ij")
+    numbers = _drawn(seed, pairs[0].ravel(), pairs[1].ravel(), purpose, count, normal)
+    return numbers.reshape(*pairs[0].shape, count)
+
+
+def _drawn(
+    seed: int, trials: IntArray, receptors: IntArray, purpose: Purpose, count: int, normal: bool
+) -> FloatArray:
+    """Numbers of the stream of each trial and receptor (n,), (n, count)."""
+    numbers = np.empty((trials.size, whole("count", count, 0)))
+    _fill(
+        _number("seed", seed), trials, receptors, int(instance("purpose", purpose, Purpose)), normal, numbers
+    )
     return numbers
 
 
 @njit(cache=True, nogil=True)
-def _fill_trains(seed, trials, receptors, purpose, numbers):  # type: ignore[no-untyped-def]
-    """Write the first numbers of one stream per train."""
-    for train in range(trials.size):
-        some = slice(train, train + 1)
-        _fill(seed, trials[some], receptors[some], purpose, True, numbers[some].reshape((1, 1, -1)))
+def _fill(seed, trials, receptors, purpose, normal, numbers):  # type: ignore[no-untyped-def]
+    """Write the first numbers of every stream."""
+    count = numbers.shape[1]
+    for n in range(trials.size):
+        for first in range(0, count, WORDS):
+            block = first // WORDS + 1
+            if normal:
+                four = four_normals(seed, trials[n], receptors[n], purpose, block)
+            else:
+                four = four_uniforms(seed, trials[n], receptors[n], purpose, block)
+            for k in range(min(WORDS, count - first)):
+                numbers[n, first + k] = four[k]
 
 
 def numbered(name: str, which: Numbers) -> IntArray:
@@ -348,21 +318,6 @@ def numbered(name: str, which: Numbers) -> IntArray:
     if isinstance(which, np.ndarray) and np.issubdtype(which.dtype, np.integer) and which.min(initial=0) >= 0:
         return which.astype(np.int64)
     return np.array([_number(name, number) for number in which], dtype=np.int64)
-
-
-def _key(
-    seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose
-) -> tuple[int, IntArray, IntArray, int]:
-    return (
-        _number("seed", seed),
-        numbered("trials", trials),
-        numbered("receptors", receptors),
-        int(instance("purpose", purpose, Purpose)),
-    )
-
-
-def _shape(trials: Numbers, receptors: Numbers, count: int) -> tuple[int, int, int]:
-    return numbered("trials", trials).size, numbered("receptors", receptors).size, whole("count", count, 0)
 
 
 def _number(name: str, value: int) -> int:

@@ -165,10 +165,6 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def _adapter(cls: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(cls)
-
-
 def to_json(result: Any, indent: int | None = 1) -> bytes:
     """JSON of a result, null for NaN.
 
@@ -179,7 +175,7 @@ def to_json(result: Any, indent: int | None = 1) -> bytes:
     indent : int, optional
         Spaces per level; None writes one line.
     """
-    return _adapter(type(result)).dump_json(result, indent=indent)
+    return TypeAdapter(type(result)).dump_json(result, indent=indent)
 
 
 def from_json(cls: type[_Kind], content: bytes) -> _Kind:
@@ -198,7 +194,7 @@ def from_json(cls: type[_Kind], content: bytes) -> _Kind:
         If the content is no JSON, or a field is missing, unknown or unfit; the first one is named.
     """
     try:
-        return _adapter(cls).validate_json(content)
+        return TypeAdapter(cls).validate_json(content)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(str(part) for part in first["loc"]) or "the file"
@@ -207,7 +203,7 @@ def from_json(cls: type[_Kind], content: bytes) -> _Kind:
 
 def schema_of(cls: type) -> dict[str, Any]:
     """JSON schema of a class of results, as a file holds it."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | _adapter(cls).json_schema(
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | TypeAdapter(cls).json_schema(
         mode="serialization"
     )
 
@@ -260,9 +256,9 @@ def read_results(path: Path, cls: type[_Kind]) -> _Kind:
     StoreError
         If the file cannot be read, has another format or version, or is damaged.
     """
-    content = read_format(path, dict([file_format(cls)]))
+    content, _ = _json_of_format(path, dict([file_format(cls)]))
     try:
-        return from_json(cls, json.dumps(content).encode())
+        return from_json(cls, content)
     except InputError as error:
         raise StoreError(f"{path} is damaged: {error} Run the command again.") from error
 
@@ -282,8 +278,14 @@ def read_format(path: Path, versions: Mapping[str, int]) -> dict[str, Any]:
     StoreError
         If the file cannot be read as JSON, or has another format or version.
     """
+    return _json_of_format(path, versions)[1]
+
+
+def _json_of_format(path: Path, versions: Mapping[str, int]) -> tuple[bytes, dict[str, Any]]:
+    """Content of a file and its JSON values: the classes of some fields accept texts only from JSON."""
     try:
-        values = json.loads(Path(path).read_bytes())
+        content = Path(path).read_bytes()
+        values = json.loads(content)
     except (OSError, ValueError) as error:
         raise StoreError(f"{path} cannot be read as JSON ({error}): run the command again.") from error
     found = (values.get("format"), values.get("format_version")) if isinstance(values, dict) else (None, None)
@@ -293,7 +295,7 @@ def read_format(path: Path, versions: Mapping[str, int]) -> dict[str, Any]:
         raise StoreError(
             f"{path} must have the format {wanted}: got {came}; run the command again to write it anew."
         )
-    return values
+    return content, values
 
 
 def file_format(cls: Any) -> tuple[str, int]:

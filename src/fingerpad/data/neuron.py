@@ -4,24 +4,21 @@ The units printed for the gains contradict each other. With the membrane as prin
 rates of the observed order if strain energy density is in kPa; both gains therefore refer to kPa.
 """
 
-from fingerpad.data.published import Published
+from fingerpad.data.published import Published, Source
 
-_START_1 = "Gerling et al. 2014, section 2.2.2, first start point"
-_START_2 = "Gerling et al. 2014, section 2.2.2, second start point"
-_MEMBRANE = "Gerling et al. 2014, section 2.2.2, both start points"
-_IN_KPA = "; read with energy density in kPa"
+_START_1 = Source(
+    "Gerling et al. 2014, section 2.2.2, first start point; read with energy density in kPa", "paper"
+)
+_START_2 = Source(
+    "Gerling et al. 2014, section 2.2.2, second start point; read with energy density in kPa", "paper"
+)
+_MEMBRANE = Source("Gerling et al. 2014, section 2.2.2, both start points", "paper")
 
-INTERCEPT_START = Published("intercept beta at the start", 0.0, "mA", _MEMBRANE, "paper")
-DYNAMIC_GAIN_START_1 = Published(
-    "dynamic gain k_d, first start", 8.0e-9, "mA ms/kPa", _START_1 + _IN_KPA, "paper"
-)
-DYNAMIC_GAIN_START_2 = Published(
-    "dynamic gain k_d, second start", 8.2e-9, "mA ms/kPa", _START_2 + _IN_KPA, "paper"
-)
-STATIC_GAIN_START_1 = Published("static gain k_s, first start", 7.0e-7, "mA/kPa", _START_1 + _IN_KPA, "paper")
-STATIC_GAIN_START_2 = Published(
-    "static gain k_s, second start", 3.0e-7, "mA/kPa", _START_2 + _IN_KPA, "paper"
-)
+INTERCEPT_START = _MEMBRANE("intercept beta at the start", 0.0, "mA")
+DYNAMIC_GAIN_START_1 = _START_1("dynamic gain k_d, first start", 8.0e-9, "mA ms/kPa")
+DYNAMIC_GAIN_START_2 = _START_2("dynamic gain k_d, second start", 8.2e-9, "mA ms/kPa")
+STATIC_GAIN_START_1 = _START_1("static gain k_s, first start", 7.0e-7, "mA/kPa")
+STATIC_GAIN_START_2 = _START_2("static gain k_s, second start", 3.0e-7, "mA/kPa")
 DYNAMIC_GAIN_SCALE = Published(
     "factor on the printed dynamic gains before a fit starts from them",
     3.0e4,
@@ -36,31 +33,29 @@ STATIC_GAIN_SCALE = Published(
     "as if our energy density were a third of the paper's: the second printed start is silent in the hold",
     "assumed",
 )
-TIME_CONSTANT = Published("membrane time constant tau at the start", 68.0, "ms", _MEMBRANE, "paper")
-CAPACITANCE = Published("membrane capacitance C at the start", 1.0e-6, "mF", _MEMBRANE, "paper")
-THRESHOLD = Published("threshold v of the membrane potential at the start", 50.0, "mV", _MEMBRANE, "paper")
-_FITTED = (
-    "our fit of all 36 bar shifts: response surface method from the paper's start points, "
-    "strain energy density at standard resolution with the stand-in materials of Trial 3; "
-    "silent without a touch"
+TIME_CONSTANT = _MEMBRANE("membrane time constant tau at the start", 68.0, "ms")
+CAPACITANCE = _MEMBRANE("membrane capacitance C at the start", 1.0e-6, "mF")
+THRESHOLD = _MEMBRANE("threshold v of the membrane potential at the start", 50.0, "mV")
+_FITTED = Source(
+    "our fit of all 36 bar shifts: response surface method from the paper's start points, strain "
+    "energy density at standard resolution with the stand-in materials of Trial 3; silent without a "
+    "touch",
+    "assumed",
 )
-INTERCEPT_FITTED = Published("fitted intercept beta", 2.32e-7, "mA", _FITTED, "assumed")
-DYNAMIC_GAIN_FITTED = Published("fitted dynamic gain k_d", 1.02e-4, "mA ms/kPa", _FITTED, "assumed")
-STATIC_GAIN_FITTED = Published("fitted static gain k_s", 5.63e-7, "mA/kPa", _FITTED, "assumed")
-TIME_CONSTANT_FITTED = Published("fitted membrane time constant tau", 71.8, "ms", _FITTED, "assumed")
-CAPACITANCE_FITTED = Published("fitted membrane capacitance C", 6.03e-7, "mF", _FITTED, "assumed")
-THRESHOLD_FITTED = Published("fitted threshold v", 30.2, "mV", _FITTED, "assumed")
+INTERCEPT_FITTED = _FITTED("fitted intercept beta", 2.32e-7, "mA")
+DYNAMIC_GAIN_FITTED = _FITTED("fitted dynamic gain k_d", 1.02e-4, "mA ms/kPa")
+STATIC_GAIN_FITTED = _FITTED("fitted static gain k_s", 5.63e-7, "mA/kPa")
+TIME_CONSTANT_FITTED = _FITTED("fitted membrane time constant tau", 71.8, "ms")
+CAPACITANCE_FITTED = _FITTED("fitted membrane capacitance C", 6.03e-7, "mF")
+THRESHOLD_FITTED = _FITTED("fitted threshold v", 30.2, "mV")
 REFRACTORY = Published("refractory period", 1.0, "ms", "Gerling et al. 2014, section 2.1.3", "paper")
 DIFFERENCE_STEP = Published(
     "step h of the rate of change of energy density", 0.001, "ms", "Gerling et al. 2014, Eq. 2", "paper"
 )
-_VARIABILITY = (
+_VARIABILITY = Source(
     "mouse SAI afferents, skin and nerve in a dish, while a touch is held: as quoted in later public "
-    "material of the authors' laboratory"
+    "material of the authors' laboratory",
+    "read",
 )
-INTERVAL_VARIATION = Published(
-    "coefficient of variation of the intervals between spikes", 0.78, "1", _VARIABILITY, "read"
-)
-INTERVAL_VARIATION_SPREAD = Published(
-    "spread of that coefficient from afferent to afferent", 0.09, "1", _VARIABILITY, "read"
-)
+INTERVAL_VARIATION = _VARIABILITY("coefficient of variation of the intervals between spikes", 0.78, "1")
+INTERVAL_VARIATION_SPREAD = _VARIABILITY("spread of that coefficient from afferent to afferent", 0.09, "1")

@@ -1,10 +1,10 @@
 """Protocol of the experiments: stimuli, motion and time windows."""
 
-from fingerpad.data.published import Published
+from fingerpad.data.published import Published, Source
 
 _PROTOCOL = "Gerling et al. 2014, section 2.2.2"
-_MECHANICS = "Gerling et al. 2014, section 2.2.1"
-_SPHERES = "Gerling et al. 2014, section 2.2.3"
+_MECHANICS = Source("Gerling et al. 2014, section 2.2.1", "paper")
+_SPHERES = Source("Gerling et al. 2014, section 2.2.3", "paper")
 
 RAMP = Published("duration of the ramp", 50.0, "ms", _PROTOCOL, "paper")
 HOLD = Published("duration of the hold", 950.0, "ms", _PROTOCOL, "paper")
@@ -42,9 +42,9 @@ BAR_SHIFTS = Published(
     "paper",
 )
 
-LINE_DIAMETER = Published("diameter of the line load", 0.05, "mm", _MECHANICS, "paper")
-CYLINDER_DIAMETER = Published("diameter of the cylinder", 3.17, "mm", _MECHANICS, "paper")
-DEFLECTION_SPACING = Published("spacing of the imaged skin surface", 0.05, "mm", _MECHANICS, "paper")
+LINE_DIAMETER = _MECHANICS("diameter of the line load", 0.05, "mm")
+CYLINDER_DIAMETER = _MECHANICS("diameter of the cylinder", 3.17, "mm")
+DEFLECTION_SPACING = _MECHANICS("spacing of the imaged skin surface", 0.05, "mm")
 
 PUNCH_DIAMETER = Published(
     "diameter of the flat punch",
@@ -53,10 +53,10 @@ PUNCH_DIAMETER = Published(
     "a quarter of an inch, the usual flat probe of compression studies on the finger pad",
     "assumed",
 )
-STANDARD_CURVATURE = Published("curvature of the standard sphere", 287.0, "1/m", _SPHERES, "paper")
+STANDARD_CURVATURE = _SPHERES("curvature of the standard sphere", 287.0, "1/m")
 
-SPHERE_POSITIONS = Published(
-    "positions of the spheres along the finger, relative to the first", (0.0, 0.2), "mm", _SPHERES, "paper"
+SPHERE_POSITIONS = _SPHERES(
+    "positions of the spheres along the finger, relative to the first", (0.0, 0.2), "mm"
 )
 
 DYNAMIC_WEIGHT = Published(

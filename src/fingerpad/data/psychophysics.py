@@ -1,18 +1,18 @@
 """Spheres of the discrimination task, the model observer, the population, and observed hit rates."""
 
-from fingerpad.data.published import Published
+from fingerpad.data.published import Published, Source
 
-_PAPER = "Gerling et al. 2014, section 2.2.3"
-_GOODWIN = "Goodwin, John & Marceglia 1991, as quoted by Gerling et al. 2014, section 2.2.3"
-_LOST = "lost; placed between the known spheres"
+_PAPER = Source("Gerling et al. 2014, section 2.2.3", "paper")
+_GOODWIN = Source("Goodwin, John & Marceglia 1991, as quoted by Gerling et al. 2014, section 2.2.3", "paper")
+_LOST = Source("lost; placed between the known spheres", "assumed")
 
-SPHERE_287 = Published("curvature of sphere 1 of 7, the standard", 287.0, "1/m", _PAPER, "paper")
-SPHERE_296 = Published("curvature of sphere 2 of 7, the nearest comparison", 296.0, "1/m", _PAPER, "paper")
+SPHERE_287 = _PAPER("curvature of sphere 1 of 7, the standard", 287.0, "1/m")
+SPHERE_296 = _PAPER("curvature of sphere 2 of 7, the nearest comparison", 296.0, "1/m")
 SPHERE_305 = Published("curvature of sphere 3 of 7", 305.0, "1/m", "Goodwin, John & Marceglia 1991", "read")
-SPHERE_316 = Published("curvature of sphere 4 of 7", 316.0, "1/m", _LOST, "assumed")
-SPHERE_328 = Published("curvature of sphere 5 of 7", 328.0, "1/m", _LOST, "assumed")
-SPHERE_340 = Published("curvature of sphere 6 of 7", 340.0, "1/m", _LOST, "assumed")
-SPHERE_365 = Published("curvature of sphere 7 of 7, the farthest comparison", 365.0, "1/m", _PAPER, "paper")
+SPHERE_316 = _LOST("curvature of sphere 4 of 7", 316.0, "1/m")
+SPHERE_328 = _LOST("curvature of sphere 5 of 7", 328.0, "1/m")
+SPHERE_340 = _LOST("curvature of sphere 6 of 7", 340.0, "1/m")
+SPHERE_365 = _PAPER("curvature of sphere 7 of 7, the farthest comparison", 365.0, "1/m")
 SPHERES = (SPHERE_287, SPHERE_296, SPHERE_305, SPHERE_316, SPHERE_328, SPHERE_340, SPHERE_365)
 SPHERE_CURVATURES = Published(
     "curvatures of the seven spheres, the standard first",
@@ -22,11 +22,9 @@ SPHERE_CURVATURES = Published(
     "assumed",
 )
 
-GOODWIN_CURVATURES = Published(
-    "comparison spheres with a published hit rate", (296.0, 365.0), "1/m", _GOODWIN, "paper"
-)
-GOODWIN_HIT_RATES = Published(
-    "fraction of trials in which they were told from the standard", (0.58, 0.95), "1", _GOODWIN, "paper"
+GOODWIN_CURVATURES = _GOODWIN("comparison spheres with a published hit rate", (296.0, 365.0), "1/m")
+GOODWIN_HIT_RATES = _GOODWIN(
+    "fraction of trials in which they were told from the standard", (0.58, 0.95), "1"
 )
 GOODWIN_TRIALS = Published(
     "trials behind each of these fractions, for their binomial intervals",
@@ -43,31 +41,19 @@ NOISE_SIGMA = Published(
     "Gerling et al. 2014, Figure 7",
     "paper",
 )
-NOISE_SIGMA_RANGE = Published("range of sigma_1 that was tried", (0.015, 0.085), "1", _PAPER, "paper")
+NOISE_SIGMA_RANGE = _PAPER("range of sigma_1 that was tried", (0.015, 0.085), "1")
 NOISE_SIGMA_SHOWN = Published(
     "other values of sigma_1 that were shown", (0.025, 0.085), "1", "Gerling et al. 2014, Figure 7", "paper"
 )
-DECISION_CRITERION = Published("decision criterion beta", 0.5, "1", _PAPER, "paper")
-DECISION_CRITERION_SIGMA = Published(
-    "standard deviations of the varied decision criterion", (0.01, 0.02), "1", _PAPER, "paper"
-)
-REPETITIONS = Published(
-    "noise draws per sphere, sets per sphere and hit rates per sphere", 100.0, "1", _PAPER, "paper"
-)
-REPETITIONS_VARIED_CRITERION = Published(
-    "gradient sums per sphere when the criterion varies", 5000.0, "1", _PAPER, "paper"
-)
+DECISION_CRITERION = _PAPER("decision criterion beta", 0.5, "1")
+DECISION_CRITERION_SIGMA = _PAPER("standard deviations of the varied decision criterion", (0.01, 0.02), "1")
+REPETITIONS = _PAPER("noise draws per sphere, sets per sphere and hit rates per sphere", 100.0, "1")
+REPETITIONS_VARIED_CRITERION = _PAPER("gradient sums per sphere when the criterion varies", 5000.0, "1")
 
-_GOODWIN_THRESHOLDS = "Goodwin, John & Marceglia 1991, abstract"
-THRESHOLD_STANDARDS = Published(
-    "standards of the curvature thresholds", (144.0, 287.0), "1/m", _GOODWIN_THRESHOLDS, "recalled"
-)
-THRESHOLD_COMPARISONS = Published(
-    "spheres told from these standards in 75 % of trials",
-    (158.0, 319.0),
-    "1/m",
-    _GOODWIN_THRESHOLDS,
-    "recalled",
+_GOODWIN_THRESHOLDS = Source("Goodwin, John & Marceglia 1991, abstract", "recalled")
+THRESHOLD_STANDARDS = _GOODWIN_THRESHOLDS("standards of the curvature thresholds", (144.0, 287.0), "1/m")
+THRESHOLD_COMPARISONS = _GOODWIN_THRESHOLDS(
+    "spheres told from these standards in 75 % of trials", (158.0, 319.0), "1/m"
 )
 WEBER_FRACTIONS = Published(
     "range of the Weber fractions of curvature under a still finger",

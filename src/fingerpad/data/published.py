@@ -62,6 +62,32 @@ class Published(Generic[Value]):
         object.__setattr__(self, "value", _numbers(self.name, self.value))
 
 
+@dataclass(frozen=True)
+class Source:
+    """A publication, and the status of the numbers that were taken from it; called, it makes one of them.
+
+    Parameters
+    ----------
+    text : str
+        Where the numbers stand.
+    status : {"paper", "read", "recalled", "assumed"}
+        Their reliability, see `STATUSES`.
+
+    Examples
+    --------
+    >>> printed = Source("Gerling et al. 2014, section 2.2.2", "paper")
+    >>> printed("time constant", 68, "ms").source
+    'Gerling et al. 2014, section 2.2.2'
+    """
+
+    text: str
+    status: Status
+
+    def __call__(self, name: str, value: Value, unit: str) -> Published[Value]:
+        """Make a number of this source."""
+        return Published(name, value, unit, self.text, self.status)
+
+
 def _numbers(name: str, value: float | tuple[float, ...]) -> float | tuple[float, ...]:
     if not isinstance(value, tuple):
         return finite(name, value)

@@ -4,20 +4,23 @@ The paper's Tables 1 and 2 are missing from every copy at hand. The hyperelastic
 Trials 2 and 3 (polynomial N = 2) are therefore not here; their substitutes are marked as such.
 """
 
-from fingerpad.data.published import Published
+from fingerpad.data.published import Published, Source
 
-_MAENO = "Maeno et al. 1998"
-_WU = "Wu et al. 2004"
-_LABORATORY = "the authors' laboratory, EuroHaptics 2014: fit to deflection and force, mean of four subjects"
-_IDENTIFIED = (
-    "found by us with a reduced model of this fingertip from the observed deflection under a cylinder"
+_MAENO = Source("Maeno et al. 1998", "recalled")
+_WU = Source("Wu et al. 2004", "recalled")
+_LABORATORY = Source(
+    "the authors' laboratory, EuroHaptics 2014: fit to deflection and force, mean of four subjects", "read"
+)
+_IDENTIFIED = Source(
+    "found by us with a reduced model of this fingertip from the observed deflection under a cylinder",
+    "assumed",
 )
 
-POISSON_RATIO = Published("Poisson's ratio of every skin layer", 0.48, "1", _MAENO, "recalled")
+POISSON_RATIO = _MAENO("Poisson's ratio of every skin layer", 0.48, "1")
 
-MAENO_EPIDERMIS_YOUNG = Published("Young's modulus of the epidermis, Maeno", 136.0, "kPa", _MAENO, "recalled")
-MAENO_DERMIS_YOUNG = Published("Young's modulus of the dermis, Maeno", 80.0, "kPa", _MAENO, "recalled")
-MAENO_SUBCUTIS_YOUNG = Published("Young's modulus of the subcutis, Maeno", 34.0, "kPa", _MAENO, "recalled")
+MAENO_EPIDERMIS_YOUNG = _MAENO("Young's modulus of the epidermis, Maeno", 136.0, "kPa")
+MAENO_DERMIS_YOUNG = _MAENO("Young's modulus of the dermis, Maeno", 80.0, "kPa")
+MAENO_SUBCUTIS_YOUNG = _MAENO("Young's modulus of the subcutis, Maeno", 34.0, "kPa")
 
 WU_EPIDERMIS_YOUNG = Published(
     "Young's modulus of the stiff epidermis of Trial 2",
@@ -27,62 +30,49 @@ WU_EPIDERMIS_YOUNG = Published(
     "assumed",
 )
 
-BONE_YOUNG = Published("Young's modulus of bone", 17.0e6, "kPa", _MAENO, "recalled")
-BONE_POISSON = Published("Poisson's ratio of bone", 0.30, "1", _MAENO, "recalled")
-NAIL_YOUNG = Published("Young's modulus of nail", 170.0e3, "kPa", _MAENO, "recalled")
-NAIL_POISSON = Published("Poisson's ratio of nail", 0.30, "1", _MAENO, "recalled")
+BONE_YOUNG = _MAENO("Young's modulus of bone", 17.0e6, "kPa")
+BONE_POISSON = _MAENO("Poisson's ratio of bone", 0.30, "1")
+NAIL_YOUNG = _MAENO("Young's modulus of nail", 170.0e3, "kPa")
+NAIL_POISSON = _MAENO("Poisson's ratio of nail", 0.30, "1")
 
-WU_SKIN_HYPERFOAM_MU = Published(
-    "hyperfoam moduli mu_1..3 of skin, Wu", (-75.94, 11.38, 65.72), "kPa", _WU, "recalled"
+WU_SKIN_HYPERFOAM_MU = _WU("hyperfoam moduli mu_1..3 of skin, Wu", (-75.94, 11.38, 65.72), "kPa")
+WU_SKIN_HYPERFOAM_ALPHA = _WU("hyperfoam exponents alpha_1..3 of skin, Wu", (4.941, 6.425, 4.712), "1")
+WU_SUBCUTIS_HYPERFOAM_MU = _WU("hyperfoam moduli mu_1..3 of subcutis, Wu", (-48.95, 9.89, 39.64), "kPa")
+WU_SUBCUTIS_HYPERFOAM_ALPHA = _WU(
+    "hyperfoam exponents alpha_1..3 of subcutis, Wu", (5.511, 6.571, 5.262), "1"
 )
-WU_SKIN_HYPERFOAM_ALPHA = Published(
-    "hyperfoam exponents alpha_1..3 of skin, Wu", (4.941, 6.425, 4.712), "1", _WU, "recalled"
-)
-WU_SUBCUTIS_HYPERFOAM_MU = Published(
-    "hyperfoam moduli mu_1..3 of subcutis, Wu", (-48.95, 9.89, 39.64), "kPa", _WU, "recalled"
-)
-WU_SUBCUTIS_HYPERFOAM_ALPHA = Published(
-    "hyperfoam exponents alpha_1..3 of subcutis, Wu", (5.511, 6.571, 5.262), "1", _WU, "recalled"
-)
-WU_HYPERFOAM_POISSON = Published("Poisson's ratio of the hyperfoams, Wu", 0.40, "1", _WU, "recalled")
+WU_HYPERFOAM_POISSON = _WU("Poisson's ratio of the hyperfoams, Wu", 0.40, "1")
 
-_WU_FITTED = (
-    "fitted by us to Wu's hyperfoam (recalled) at Poisson's ratio 0.48, in uniaxial compression to 50 %; "
-    "least squares with no negative coefficient"
-)
-WU_SKIN_POLYNOMIAL = Published(
-    "polynomial C10, C01, C20, C11, C02 of skin after Wu",
-    (0.5159, 0.0, 0.0, 0.0798, 0.0558),
-    "kPa",
-    _WU_FITTED,
+_WU_FITTED = Source(
+    "fitted by us to Wu's hyperfoam (recalled) at Poisson's ratio 0.48, in uniaxial compression to "
+    "50 %; least squares with no negative coefficient",
     "assumed",
 )
-WU_SUBCUTIS_POLYNOMIAL = Published(
-    "polynomial C10, C01, C20, C11, C02 of subcutis after Wu",
-    (0.2581, 0.0, 0.0, 0.0227, 0.0403),
-    "kPa",
-    _WU_FITTED,
-    "assumed",
+WU_SKIN_POLYNOMIAL = _WU_FITTED(
+    "polynomial C10, C01, C20, C11, C02 of skin after Wu", (0.5159, 0.0, 0.0, 0.0798, 0.0558), "kPa"
+)
+WU_SUBCUTIS_POLYNOMIAL = _WU_FITTED(
+    "polynomial C10, C01, C20, C11, C02 of subcutis after Wu", (0.2581, 0.0, 0.0, 0.0227, 0.0403), "kPa"
 )
 
-LABORATORY_EPIDERMIS_SHEAR = Published(
-    "neo-Hookean shear modulus of the epidermis, laboratory 2014", 1211.6, "kPa", _LABORATORY, "read"
+LABORATORY_EPIDERMIS_SHEAR = _LABORATORY(
+    "neo-Hookean shear modulus of the epidermis, laboratory 2014", 1211.6, "kPa"
 )
-LABORATORY_DERMIS_SHEAR = Published(
-    "neo-Hookean shear modulus of the dermis, laboratory 2014", 50.70, "kPa", _LABORATORY, "read"
+LABORATORY_DERMIS_SHEAR = _LABORATORY(
+    "neo-Hookean shear modulus of the dermis, laboratory 2014", 50.70, "kPa"
 )
-LABORATORY_SUBCUTIS_SHEAR = Published(
-    "neo-Hookean shear modulus of the subcutis, laboratory 2014", 2.373, "kPa", _LABORATORY, "read"
+LABORATORY_SUBCUTIS_SHEAR = _LABORATORY(
+    "neo-Hookean shear modulus of the subcutis, laboratory 2014", 2.373, "kPa"
 )
 
-SOFT_MIX_EPIDERMIS_SHEAR = Published(
-    "neo-Hookean shear modulus of the epidermis, stand-in for Trial 3", 46.0, "kPa", _IDENTIFIED, "assumed"
+SOFT_MIX_EPIDERMIS_SHEAR = _IDENTIFIED(
+    "neo-Hookean shear modulus of the epidermis, stand-in for Trial 3", 46.0, "kPa"
 )
-SOFT_MIX_DERMIS_SHEAR = Published(
-    "neo-Hookean shear modulus of the dermis, stand-in for Trial 3", 25.4, "kPa", _IDENTIFIED, "assumed"
+SOFT_MIX_DERMIS_SHEAR = _IDENTIFIED(
+    "neo-Hookean shear modulus of the dermis, stand-in for Trial 3", 25.4, "kPa"
 )
-SOFT_MIX_SUBCUTIS_SHEAR = Published(
-    "neo-Hookean shear modulus of the subcutis, stand-in for Trial 3", 4.75, "kPa", _IDENTIFIED, "assumed"
+SOFT_MIX_SUBCUTIS_SHEAR = _IDENTIFIED(
+    "neo-Hookean shear modulus of the subcutis, stand-in for Trial 3", 4.75, "kPa"
 )
 
 STIFFENING_RATIO = Published(
@@ -93,8 +83,8 @@ STIFFENING_RATIO = Published(
     "assumed",
 )
 
-SKIN_PRONY_SHARES = Published("Prony shares g_1..2 of skin, Wu", (0.148, 0.252), "1", _WU, "recalled")
-SKIN_PRONY_TIMES = Published("Prony times tau_1..2 of skin, Wu", (2.123, 9.371), "s", _WU, "recalled")
-_MOUSE = "mouse skin, measured in the authors' laboratory (another species)"
-MOUSE_PRONY_SHARES = Published("Prony shares g_1..2 of mouse skin", (0.391, 0.226), "1", _MOUSE, "read")
-MOUSE_PRONY_TIMES = Published("Prony times tau_1..2 of mouse skin", (0.25, 9.371), "s", _MOUSE, "read")
+SKIN_PRONY_SHARES = _WU("Prony shares g_1..2 of skin, Wu", (0.148, 0.252), "1")
+SKIN_PRONY_TIMES = _WU("Prony times tau_1..2 of skin, Wu", (2.123, 9.371), "s")
+_MOUSE = Source("mouse skin, measured in the authors' laboratory (another species)", "read")
+MOUSE_PRONY_SHARES = _MOUSE("Prony shares g_1..2 of mouse skin", (0.391, 0.226), "1")
+MOUSE_PRONY_TIMES = _MOUSE("Prony times tau_1..2 of mouse skin", (0.25, 9.371), "s")

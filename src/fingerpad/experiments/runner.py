@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -66,20 +66,20 @@ class Runner:
             yield advance
         self._stages.append(StageSummary(name=name, wall_s=round(time.perf_counter() - started, 2)))
 
-    def solve(self, touches: Sequence[Touch], stage: str = "indentations") -> int:
+    def solve(self, touches: Iterable[Touch], stage: str = "indentations") -> Collection[Path]:
         """Solve and store the touches that are not stored yet.
 
         Parameters
         ----------
-        touches : sequence of Touch
+        touches : iterable of Touch
             In the order in which they are started: the longest first keeps all processes busy to the end.
         stage : str, optional
             Name under which this is timed and shown.
 
         Returns
         -------
-        int
-            How many were solved.
+        collection of Path
+            Files of those that were solved.
 
         Raises
         ------
@@ -88,9 +88,10 @@ class Runner:
         StoreError
             If the folder cannot be written.
         """
-        missing = sum(not self.store.holds(touch) for touch in touches)
-        with self.stage(stage, missing) as advance:
-            return solve_missing(touches, self.store, self.jobs, lambda seconds: advance())
+        missing = self.store.missing(touches)
+        with self.stage(stage, len(missing)) as advance:
+            solve_missing(missing, self.jobs, lambda seconds: advance())
+        return missing.keys()
 
     def load(self, name: str, touches: Mapping[Key, Touch]) -> dict[Key, SkinResponse]:
         """Read the indentations of one part of the experiment, all of which are stored.
@@ -140,15 +141,12 @@ class Runner:
         ConvergenceError, StoreError
             As `solve` and `load`.
         """
-        missing = {
-            name: sum(not self.store.holds(touch) for touch in touches.values())
-            for name, touches in groups.items()
-        }
-        self.solve([touch for touches in groups.values() for touch in touches.values()])
+        solved = self.solve(touch for touches in groups.values() for touch in touches.values())
         responses = {}
         for name, touches in groups.items():
             responses[name] = self.load(name, touches)
-            self._stages[-1] = replace(self._stages[-1], computed=missing[name])
+            computed = sum(self.store.path(touch) in solved for touch in touches.values())
+            self._stages[-1] = replace(self._stages[-1], computed=computed)
         return responses
 
     def manifest(

@@ -66,6 +66,24 @@ def _slopes(t: float) -> Four:
 
 
 @njit(cache=True, nogil=True)
+def _interpolated(known: FloatArray, uv: FloatArray, padding: int, with_slopes: bool) -> FloatArray:
+    """Values (1, n_places, n_quantities), or values and slopes (3, n_places, n_quantities)."""
+    found = np.zeros((3 if with_slopes else 1, len(uv), known.shape[2]))
+    for n in range(len(uv)):
+        row, column = math.floor(uv[n, 0]), math.floor(uv[n, 1])
+        along, around = _weights(uv[n, 0] - row), _weights(uv[n, 1] - column)
+        by_u, by_v = _slopes(uv[n, 0] - row), _slopes(uv[n, 1] - column)
+        for i in range(4):
+            for j in range(4):
+                near = known[row + padding - 1 + i, column + padding - 1 + j]
+                for k in range(near.size):
+                    found[0, n, k] += along[i] * around[j] * near[k]
+                    if with_slopes:
+                        found[1, n, k] += by_u[i] * around[j] * near[k]
+                        found[2, n, k] += along[i] * by_v[j] * near[k]
+    return found
+
+
 def values_at(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
     """Interpolate.
 
@@ -89,20 +107,9 @@ def values_at(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
     >>> values_at(known, np.array([[1.5, 2.0]]), 20).round(6).tolist()
     [[4.5]]
     """
-    found = np.zeros((len(uv), known.shape[2]))
-    for n in range(len(uv)):
-        row, column = math.floor(uv[n, 0]), math.floor(uv[n, 1])
-        along, around = _weights(uv[n, 0] - row), _weights(uv[n, 1] - column)
-        for i in range(4):
-            for j in range(4):
-                weight = along[i] * around[j]
-                near = known[row + padding - 1 + i, column + padding - 1 + j]
-                for k in range(near.size):
-                    found[n, k] += weight * near[k]
-    return found
+    return _interpolated(known, uv, padding, False)[0]
 
 
-@njit(cache=True, nogil=True)
 def values_and_slopes_at(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
     """Interpolate, and differentiate by u and by v.
 
@@ -123,16 +130,4 @@ def values_and_slopes_at(known: FloatArray, uv: FloatArray, padding: int) -> Flo
     >>> values_and_slopes_at(known, np.array([[1.5, 2.0]]), 20).ravel().round(6).tolist()
     [4.5, 6.0, 2.25]
     """
-    found = np.zeros((3, len(uv), known.shape[2]))
-    for n in range(len(uv)):
-        row, column = math.floor(uv[n, 0]), math.floor(uv[n, 1])
-        along, around = _weights(uv[n, 0] - row), _weights(uv[n, 1] - column)
-        by_u, by_v = _slopes(uv[n, 0] - row), _slopes(uv[n, 1] - column)
-        for i in range(4):
-            for j in range(4):
-                near = known[row + padding - 1 + i, column + padding - 1 + j]
-                for k in range(near.size):
-                    found[0, n, k] += along[i] * around[j] * near[k]
-                    found[1, n, k] += by_u[i] * around[j] * near[k]
-                    found[2, n, k] += along[i] * by_v[j] * near[k]
-    return found
+    return _interpolated(known, uv, padding, True)

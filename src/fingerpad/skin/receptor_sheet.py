@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -45,6 +45,9 @@ _MIRROR = np.array([1.0, 1.0, -1.0])
 
 Equations = Callable[[FloatArray, np.ndarray], tuple[FloatArray, FloatArray]]
 """From (u, v) of some sites (n, 2) and their numbers to the residual (n, 2) and its Jacobian."""
+
+Surface = Callable[[FloatArray], FloatArray]
+"""From (u, v) (n, 2) to points of a surface and their derivatives by u and by v, (3, n, 3)."""
 
 
 @dataclass(frozen=True)
@@ -250,24 +253,6 @@ class ReceptorSheet:
         return np.argwhere(np.full(self.mesh.living_epidermis.shape, True)).astype(np.float64)
 
     @cached_property
-    def _skin_control(self) -> FloatArray:
-        return self._padded_points(0)
-
-    @cached_property
-    def _border_control(self) -> FloatArray:
-        return self._padded_points(self._through_border)
-
-    @cached_property
-    def _centres(self) -> FloatArray:
-        """Middles of the elements, (n_along, n_around, 3). [mm]"""
-        return self.mesh.nodes_mm[self.mesh.elements[self.mesh.living_epidermis]].mean(axis=2)
-
-    @cached_property
-    def _centre_control(self) -> FloatArray:
-        pole = self._centres[-1].mean(axis=0)
-        return self._control(self._centres, _MIRROR, pole if self.mesh.full else pole * [1.0, 1.0, 0.0])
-
-    @cached_property
     def _volar(self) -> np.ndarray:
         """Whether an element lies on the volar side: its upper face looks towards y < 0, bool (n, m)."""
         corners = self.mesh.nodes_mm[self.mesh.elements[self.mesh.living_epidermis]]
@@ -284,12 +269,6 @@ class ReceptorSheet:
         """Return the determinant of (x, z) by (u, v), (n,); its sign differs on the volar and dorsal side."""
         _, by_u, by_v = self._centre(uv)
         return by_u[:, 0] * by_v[:, 2] - by_u[:, 2] * by_v[:, 0]
-
-    @cached_property
-    def _through_border(self) -> int:
-        """Level of the grid that is the epidermal-dermal border, where the sheet's elements begin."""
-        lower = self.mesh.elements[self.mesh.living_epidermis[0, 0], 0]
-        return int(np.flatnonzero(self.mesh.grid[0, 0] == lower)[0])
 
     def _padded_points(self, through: int) -> FloatArray:
         """Middles of the faces of one level of the grid, lifted onto the surface of its nodes, padded.
@@ -322,17 +301,23 @@ class ReceptorSheet:
         ]
         return np.concatenate([ends[0], nodes, ends[1]], axis=1)
 
-    def _skin(self, uv: FloatArray) -> FloatArray:
-        """Points S of the skin and their derivatives by u and by v, (3, n, 3)."""
-        return values_and_slopes_at(self._skin_control, uv, _PADDING)
+    @cached_property
+    def _skin(self) -> Surface:
+        """Points S of the skin."""
+        return _surface(self._padded_points(0))
 
-    def _centre(self, uv: FloatArray) -> FloatArray:
-        """Points of the surface through the elements' middles, and their derivatives, (3, n, 3)."""
-        return values_and_slopes_at(self._centre_control, uv, _PADDING)
+    @cached_property
+    def _centre(self) -> Surface:
+        """Points of the surface through the elements' middles."""
+        centres = self.mesh.nodes_mm[self.mesh.elements[self.mesh.living_epidermis]].mean(axis=2)
+        pole = centres[-1].mean(axis=0) * [1.0, 1.0, float(self.mesh.full)]
+        return _surface(self._control(centres, _MIRROR, pole))
 
-    def _border(self, uv: FloatArray) -> FloatArray:
-        """Points B of the border and their derivatives by u and by v, (3, n, 3)."""
-        return values_and_slopes_at(self._border_control, uv, _PADDING)
+    @cached_property
+    def _border(self) -> Surface:
+        """Points B of the border, where the sheet's elements begin."""
+        lower = self.mesh.elements[self.mesh.living_epidermis[0, 0], 0]
+        return _surface(self._padded_points(int(np.flatnonzero(self.mesh.grid[0, 0] == lower)[0])))
 
     def _outward(self, uv: FloatArray) -> FloatArray:
         """Outward unit normal of the skin, (n, 3)."""
@@ -372,6 +357,11 @@ class ReceptorSheet:
         else:
             end = _straight_on(rows[:, -2:])
         return coefficients(np.moveaxis(np.concatenate([start, rows, end], axis=1), 0, 1))
+
+
+def _surface(control: FloatArray) -> Surface:
+    """Surface with these coefficients of its spline."""
+    return partial(values_and_slopes_at, control, padding=_PADDING)
 
 
 def _bulge(nodes: FloatArray, axis: int) -> FloatArray:

@@ -15,7 +15,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -107,6 +107,11 @@ class Store:
         """Whether an indentation is stored."""
         return self.path(touch).exists()
 
+    def missing(self, touches: Iterable[Touch]) -> dict[Path, Touch]:
+        """Indentations that are not stored, each once, by the file that each belongs into."""
+        wanted = {self.path(touch): touch for touch in touches}
+        return {path: touch for path, touch in wanted.items() if not path.exists()}
+
     def save(self, touch: Touch, response: SkinResponse) -> None:
         """Write an indentation, as a whole or not at all.
 
@@ -167,25 +172,18 @@ def _compute(touch: Touch, path: Path, threads: int | None = None) -> float:
 
 
 def solve_missing(
-    touches: Sequence[Touch], store: Store, jobs: int, on_finished: Callable[[float], None] | None = None
-) -> int:
-    """Compute the indentations that are not in the store.
+    missing: Mapping[Path, Touch], jobs: int, on_finished: Callable[[float], None] | None = None
+) -> None:
+    """Compute indentations and store them.
 
     Parameters
     ----------
-    touches : sequence of Touch
-        Indentations to have in the store; equal ones are computed once.
-    store : Store
-        The store.
+    missing : mapping of Path to Touch
+        From `Store.missing`.
     jobs : int
         Number of processes; the results do not depend on it.
     on_finished : callable, optional
         Called with the seconds that each indentation took.
-
-    Returns
-    -------
-    int
-        Number of computed indentations.
 
     Raises
     ------
@@ -193,12 +191,10 @@ def solve_missing(
         If one cannot be solved; those finished before remain in the store.
     """
     whole("jobs", jobs, at_least=1)
-    missing = {store.path(touch): touch for touch in touches if not store.holds(touch)}
     in_processes = jobs > 1 and len(missing) > 1
     for seconds in _in_processes(missing, jobs) if in_processes else _in_turn(missing):
         if on_finished:
             on_finished(seconds)
-    return len(missing)
 
 
 def _in_turn(touches: Mapping[Path, Touch]) -> Iterator[float]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
-from fingerpad.core.files import write_json
+from fingerpad.core.files import write_atomically
 from fingerpad.core.results import file_format, schema_of
 from fingerpad.experiments.discrimination.run import DiscriminationFile
 from fingerpad.experiments.fit.session import FitFile
@@ -19,7 +20,8 @@ RESULT_FILES: tuple[type, ...] = (ReproductionResult, FitFile, DiscriminationFil
 def write_schemas(folder: Path = Path(__file__).parent) -> None:
     """Write the schemas into a folder, that of the package by default."""
     for results in RESULT_FILES:
-        write_json(folder / file_name(file_format(results)[0]), structure(schema_of(results)))
+        content = json.dumps(structure(schema_of(results)), indent=1).encode()
+        write_atomically(folder / file_name(file_format(results)[0]), content)
 
 
 def structure(schema: Any) -> Any:
