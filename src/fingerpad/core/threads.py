@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from functools import cache
 from itertools import starmap
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
 
@@ -155,6 +155,31 @@ def in_chunks(work: Callable[[int, int], Result], chunks: Sequence[Chunk]) -> li
         if not helper.cancel():
             helper.result()
     return [results[n] for n in range(len(chunks))]
+
+
+def run_kernel(kernel: Callable[..., Result], count: int, *arguments: Any) -> list[Result]:
+    """Run a kernel on the chunks of `count` elements, on threads as in `in_chunks`.
+
+    Parameters
+    ----------
+    kernel : callable
+        Called with the arguments, then the first and the last number of each chunk.
+    count : int
+        Number of elements.
+    *arguments
+        What the kernel reads and writes.
+
+    Returns
+    -------
+    list
+        One result per chunk, in the order of the chunks.
+
+    Examples
+    --------
+    >>> run_kernel(lambda size, first, last: size * (last - first), 200, 10.0)
+    [1280.0, 720.0]
+    """
+    return in_chunks(lambda first, last: kernel(*arguments, first, last), even_chunks(count))
 
 
 def in_blocks(work: Callable[[slice], Result], count: int, block: int = BLOCK) -> list[Result]:

@@ -12,8 +12,8 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.geometry.indenters import Bar, Indenter
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Stimulus
-from fingerpad.geometry.names import INDENTERS, MOTION_UNITS, SIZE_UNITS
+from fingerpad.geometry.motion import MOTION_UNITS, ForceRampAndHold, RampAndHold, Stimulus
+from fingerpad.geometry.names import INDENTERS, SIZE_UNITS
 from fingerpad.inference.tables import TableRow, read_csv
 
 PLACE = {"x_mm": "mm", "z_mm": "mm", "tilt_deg": "degrees", "spin_deg": "degrees"}

@@ -105,6 +105,7 @@ class Gap(Indenter):
     [0.5, -0.1]
     """
 
+    symmetry_deg = 90.0
     gap_mm: float = protocol.GAP_WIDTH.value
     width_mm: float = protocol.GAPPED_BAR_WIDTH.value
     fillet_mm: float = protocol.BAR_FILLET.value
@@ -131,10 +132,6 @@ class Gap(Indenter):
     def half_width_mm(self) -> float:
         """Half of the full width. [mm]"""
         return self.width_mm / 2
-
-    def mirrors(self, spin_deg: float) -> bool:
-        """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0."""
-        return spin_deg % 90.0 == 0.0
 
     @property
     def edge_reach_mm(self) -> float:
@@ -185,6 +182,7 @@ class Grating(Indenter):
     [0.3, 0.5]
     """
 
+    symmetry_deg = 90.0
     ridge_mm: float = protocol.RIDGE_WIDTH.value
     groove_mm: float = protocol.RIDGE_WIDTH.value
     lip_mm: float = protocol.LIP_RADIUS.value
@@ -206,10 +204,6 @@ class Grating(Indenter):
     def half_width_mm(self) -> float:
         """Half of the extent along x: infinite."""
         return np.inf
-
-    def mirrors(self, spin_deg: float) -> bool:
-        """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0."""
-        return spin_deg % 90.0 == 0.0
 
     @property
     def edge_reach_mm(self) -> float:

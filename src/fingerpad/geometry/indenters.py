@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,6 +26,9 @@ BESIDE_EDGE_MM = 0.4
 
 class Indenter(ABC):
     """A rigid body with a signed gap; derive from it to define another body."""
+
+    symmetry_deg: ClassVar[float | None] = 180.0
+    """Turn about y after which the body is again symmetric across z = 0; None if it always is. [degrees]"""
 
     @abstractmethod
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -53,7 +57,7 @@ class Indenter(ABC):
 
         Half a finger can be solved only then. By default a body is symmetric as long as it is not turned.
         """
-        return spin_deg % 180.0 == 0.0
+        return self.symmetry_deg is None or spin_deg % self.symmetry_deg == 0.0
 
     @property
     def edge_reach_mm(self) -> float:
@@ -130,6 +134,7 @@ class Cylinder(Indenter):
     ([0.5], [[0.0, 1.0, 0.0]])
     """
 
+    symmetry_deg = 90.0
     diameter_mm: float = protocol.CYLINDER_DIAMETER.value
 
     def __post_init__(self) -> None:
@@ -139,10 +144,6 @@ class Cylinder(Indenter):
     def half_width_mm(self) -> float:
         """Half of the body's extent along x. [mm]"""
         return self.diameter_mm / 2
-
-    def mirrors(self, spin_deg: float) -> bool:
-        """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0."""
-        return spin_deg % 90.0 == 0.0
 
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
@@ -217,6 +218,7 @@ class Sphere(Indenter):
     3.484
     """
 
+    symmetry_deg = None
     curvature_per_m: float = protocol.STANDARD_CURVATURE.value
 
     def __post_init__(self) -> None:
@@ -231,10 +233,6 @@ class Sphere(Indenter):
     def half_width_mm(self) -> float:
         """Half of the body's extent along x. [mm]"""
         return self.radius_mm
-
-    def mirrors(self, spin_deg: float) -> bool:
-        """Whether the body, turned about y, is its own mirror image across z = 0: always."""
-        return True
 
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
@@ -264,6 +262,7 @@ class Bar(Indenter):
     [-0.1, 0.0]
     """
 
+    symmetry_deg = 90.0
     width_mm: float = protocol.BAR_WIDTH.value
     fillet_mm: float = protocol.BAR_FILLET.value
 
@@ -275,10 +274,6 @@ class Bar(Indenter):
     def half_width_mm(self) -> float:
         """Half of the width. [mm]"""
         return self.width_mm / 2
-
-    def mirrors(self, spin_deg: float) -> bool:
-        """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0."""
-        return spin_deg % 90.0 == 0.0
 
     @property
     def edge_reach_mm(self) -> float:
@@ -310,6 +305,7 @@ class FlatPunch(Indenter):
         Radius of the rim. [mm]
     """
 
+    symmetry_deg = None
     diameter_mm: float = protocol.PUNCH_DIAMETER.value
     fillet_mm: float = protocol.BAR_FILLET.value
 
@@ -321,10 +317,6 @@ class FlatPunch(Indenter):
     def half_width_mm(self) -> float:
         """Half of the diameter. [mm]"""
         return self.diameter_mm / 2
-
-    def mirrors(self, spin_deg: float) -> bool:
-        """Whether the body, turned about y, is its own mirror image across z = 0: always."""
-        return True
 
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
@@ -345,14 +337,12 @@ class FlatPunch(Indenter):
 class Plate(Indenter):
     """Flat plate without edges, larger than the finger."""
 
+    symmetry_deg = None
+
     @property
     def half_width_mm(self) -> float:
         """Half of the extent along x: infinite."""
         return np.inf
-
-    def mirrors(self, spin_deg: float) -> bool:
-        """Whether the body, turned about y, is its own mirror image across z = 0: always."""
-        return True
 
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""

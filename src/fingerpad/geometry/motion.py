@@ -10,12 +10,20 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, positive
 from fingerpad.data import protocol
 
+MOTION_UNITS = {"depth_mm": "mm", "force_mn": "mN", "ramp_ms": "ms", "hold_ms": "ms"}
+"""Units of the parameters of motions."""
+
 
 class Motion:
     """A ramp at a constant rate from 0, then a hold: common part of all motions of the indenter."""
 
     ramp_ms: float
     hold_ms: float
+
+    def __post_init__(self) -> None:
+        for name, unit in MOTION_UNITS.items():
+            if hasattr(self, name):
+                positive(name, getattr(self, name), unit)
 
     @property
     def end_ms(self) -> float:
@@ -72,11 +80,6 @@ class RampAndHold(Motion):
     ramp_ms: float = protocol.RAMP.value
     hold_ms: float = protocol.HOLD.value
 
-    def __post_init__(self) -> None:
-        positive("depth_mm", self.depth_mm, "mm")
-        positive("ramp_ms", self.ramp_ms, "ms")
-        positive("hold_ms", self.hold_ms, "ms")
-
     def depth_at(self, times_ms: ArrayLike) -> FloatArray:
         """Depth at `times_ms`, any shape. [mm]"""
         return self.depth_mm * self.share_at(times_ms)
@@ -109,11 +112,6 @@ class ForceRampAndHold(Motion):
     force_mn: float
     ramp_ms: float = protocol.RAMP.value
     hold_ms: float = protocol.HOLD.value
-
-    def __post_init__(self) -> None:
-        positive("force_mn", self.force_mn, "mN")
-        positive("ramp_ms", self.ramp_ms, "ms")
-        positive("hold_ms", self.hold_ms, "ms")
 
     def force_at(self, times_ms: ArrayLike) -> FloatArray:
         """Force at `times_ms`, any shape. [mN]"""

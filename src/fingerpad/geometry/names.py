@@ -1,4 +1,4 @@
-"""Names and units by which files refer to indenters, their sizes and their motion."""
+"""Names and units by which files refer to indenters and their sizes."""
 
 from __future__ import annotations
 
@@ -21,6 +21,3 @@ INDENTERS: dict[str, type[Indenter]] = {
 _LENGTHS = ("diameter_mm", "width_mm", "gap_mm", "ridge_mm", "groove_mm", "fillet_mm", "lip_mm")
 SIZE_UNITS = {"curvature_per_m": "1/m"} | dict.fromkeys(_LENGTHS, "mm")
 """Units of the sizes of indenters."""
-
-MOTION_UNITS = {"depth_mm": "mm", "force_mn": "mN", "ramp_ms": "ms", "hold_ms": "ms"}
-"""Units of the parameters of a motion."""

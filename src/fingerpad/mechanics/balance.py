@@ -23,7 +23,7 @@ from scipy.interpolate import CubicSpline
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
-from fingerpad.core.threads import even_chunks, in_chunks
+from fingerpad.core.threads import run_kernel
 from fingerpad.mechanics.element import N_NODES, N_POINTS, frame_scale, gradients_at_points, take_nodes
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
 from fingerpad.mechanics.tensors import invert, push_forward
@@ -326,11 +326,7 @@ def dissipated_energy(
         [µJ]
     """
     c = DissipationCoefficients.of(table, step_ms)
-
-    def find(first: int, last: int) -> float:
-        return _dissipated(
-            nodes, elements, displacement, layer, table.law, table.shares, c.before, c.mixed, c.increment,
-            before.instantaneous, before.relaxed, now.stress_kpa, now.energies, first, last,
-        )  # fmt: skip
-
-    return sum(in_chunks(find, even_chunks(len(elements))))
+    return sum(run_kernel(
+        _dissipated, len(elements), nodes, elements, displacement, layer, table.law, table.shares, c.before,
+        c.mixed, c.increment, before.instantaneous, before.relaxed, now.stress_kpa, now.energies,
+    ))  # fmt: skip

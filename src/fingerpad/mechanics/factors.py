@@ -7,9 +7,6 @@ Rows and columns are given once, when the factor is made. Entries of unknowns th
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol
-
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
@@ -25,24 +22,8 @@ class NotPositiveDefiniteError(ConvergenceError):
         super().__init__("The tangent is not positive definite.")
 
 
-class Factor(Protocol):
-    """A factor that is renewed for other numbers in the same places."""
-
-    def renew(self, values: np.ndarray) -> None:
-        """Factor the matrix of these values; ConvergenceError if it is not positive definite."""
-        ...
-
-    def solve(self, right: np.ndarray) -> FloatArray:
-        """Solve for a right-hand side (n,)."""
-        ...
-
-
-MakeFactor = Callable[[np.ndarray, np.ndarray], Factor]
-"""Makes a factor from the row and the column of every value."""
-
-
 class SuperLuFactor:
-    """Double-precision factor from SciPy's SuperLU.
+    """Double-precision factor from SciPy's SuperLU, renewed for other numbers in the same places.
 
     Parameters
     ----------

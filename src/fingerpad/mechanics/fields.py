@@ -25,7 +25,7 @@ from numba import njit
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
-from fingerpad.core.threads import even_chunks, in_chunks
+from fingerpad.core.threads import run_kernel
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.element import N_NODES, N_POINTS, frame_scale, gradients_at_points, take_nodes
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
@@ -225,19 +225,15 @@ class Watched:
         convected = history.instantaneous[chosen] - history.relaxed[:, chosen].sum(axis=0)
         gradient, stress = np.empty((n, 3, 3)), np.empty((n, 6))
         pressure, dilatation, work = now.pressure_kpa[chosen], now.dilatation[chosen], np.empty(n)
-
-        def find(first: int, last: int) -> None:
-            _mean_fields(
-                self.nodes_mm, self.corners, displacement_mm, self.layer, self.table.law, convected,
-                pressure, dilatation, gradient, stress, first, last,
-            )  # fmt: skip
-            _isochoric_work(
-                self.nodes_mm, self.corners, self.layer, self.table.law, before.displacement_mm,
-                displacement_mm, before.dilatation, dilatation, before.convected_kpa, convected, work,
-                first, last,
-            )  # fmt: skip
-
-        in_chunks(find, even_chunks(n))
+        run_kernel(
+            _mean_fields, n, self.nodes_mm, self.corners, displacement_mm, self.layer, self.table.law,
+            convected, pressure, dilatation, gradient, stress,
+        )  # fmt: skip
+        run_kernel(
+            _isochoric_work, n, self.nodes_mm, self.corners, self.layer, self.table.law,
+            before.displacement_mm, displacement_mm, before.dilatation, dilatation, before.convected_kpa,
+            convected, work,
+        )  # fmt: skip
         work += 0.5 * (before.pressure_kpa + pressure) * (dilatation - before.dilatation)
         weights, isochoric = now.energies[chosen, :, 0], now.energies[chosen, :, 1]
         instantaneous = (weights * isochoric).sum(axis=1) / weights.sum(axis=1) + now.volumetric_kpa[chosen]
@@ -274,14 +270,10 @@ def cauchy_stress(
     corners, layer = mesh.elements.copy(), mesh.layer.copy()
     convected = history.instantaneous - history.relaxed.sum(axis=0)
     now = instantaneous_state(mesh.nodes_mm, mesh.elements, displacement_mm, mesh.layer, table)
-
-    def find(first: int, last: int) -> None:
-        _mean_fields(
-            mesh.nodes_mm, corners, displacement_mm, layer, table.law, convected,
-            now.pressure_kpa, now.dilatation, gradient, stress, first, last,
-        )  # fmt: skip
-
-    in_chunks(find, even_chunks(n))
+    run_kernel(
+        _mean_fields, n, mesh.nodes_mm, corners, displacement_mm, layer, table.law, convected,
+        now.pressure_kpa, now.dilatation, gradient, stress,
+    )  # fmt: skip
     return stress
 
 

@@ -199,7 +199,45 @@ class Polynomial:
 
 
 @dataclass(frozen=True)
-class Ogden:
+class _Powers:
+    """Common part of laws that are a sum of up to three powers of stretches."""
+
+    moduli_kpa: tuple[float, ...]
+    exponents: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        name, moduli, exponents = type(self).__name__, tuple(self.moduli_kpa), tuple(self.exponents)
+        if not 1 <= len(moduli) <= 3 or len(moduli) != len(exponents):
+            raise InputError(
+                f"{name} needs one to three moduli and as many exponents: "
+                f"got {len(moduli)} and {len(exponents)}."
+            )
+        for modulus, exponent in zip(moduli, exponents, strict=True):
+            finite(f"each modulus of {name}", modulus, "kPa")
+            if finite(f"each exponent of {name}", exponent) == 0.0:
+                raise InputError(f"No exponent of {name} may be 0: leave out that term or take Hencky's law.")
+        positive(f"the initial shear modulus of {name}, the sum of its moduli", sum(moduli), "kPa")
+        object.__setattr__(self, "moduli_kpa", moduli)
+        object.__setattr__(self, "exponents", exponents)
+
+    @property
+    def shear_modulus_kpa(self) -> float:
+        """Initial shear modulus. [kPa]"""
+        return sum(self.moduli_kpa)
+
+    def _sum_of(self, term: str, *others: str, **coefficients: float) -> Energy:
+        """Write the sum of `2 mu_i / alpha_i**2 * (term)` and of other terms."""
+        terms = [f"2 * mu{{0}} / alpha{{0}}**2 * ({term})".format(n + 1) for n in range(len(self.exponents))]
+        named = [
+            (f"{name}{n}", float(value))
+            for n, pair in enumerate(zip(self.moduli_kpa, self.exponents, strict=True), start=1)
+            for name, value in zip(("mu", "alpha"), pair, strict=True)
+        ]
+        return Energy(" + ".join((*terms, *others)), (*named, *coefficients.items()))
+
+
+@dataclass(frozen=True)
+class Ogden(_Powers):
     """Sum of up to three powers of the isochoric stretches.
 
     Parameters
@@ -222,18 +260,11 @@ class Ogden:
     10.0
     """
 
-    moduli_kpa: tuple[float, ...]
-    exponents: tuple[float, ...]
     bulk_kpa: float
 
     def __post_init__(self) -> None:
-        _take_terms(self)
+        super().__post_init__()
         positive("bulk_kpa", self.bulk_kpa, "kPa")
-
-    @property
-    def shear_modulus_kpa(self) -> float:
-        """Initial shear modulus. [kPa]"""
-        return sum(self.moduli_kpa)
 
     @property
     def bulk_modulus_kpa(self) -> float:
@@ -243,19 +274,12 @@ class Ogden:
     @property
     def energy(self) -> Energy:
         """The law as a formula."""
-        term = (
-            "2 * mu{0} / alpha{0}**2"
-            " * (lambdabar1**alpha{0} + lambdabar2**alpha{0} + lambdabar3**alpha{0} - 3)"
-        )
-        terms = (term.format(n) for n in range(1, len(self.exponents) + 1))
-        return Energy(
-            " + ".join((*terms, "bulk / 2 * (J - 1)**2")),
-            (*_named_terms(self.moduli_kpa, self.exponents), ("bulk", float(self.bulk_kpa))),
-        )
+        term = "lambdabar1**alpha{0} + lambdabar2**alpha{0} + lambdabar3**alpha{0} - 3"
+        return self._sum_of(term, "bulk / 2 * (J - 1)**2", bulk=float(self.bulk_kpa))
 
 
 @dataclass(frozen=True)
-class Hyperfoam:
+class Hyperfoam(_Powers):
     """Storakers' compressible foam (1986), with one Poisson's ratio for all terms: the form of Wu's tissues.
 
     Parameters
@@ -280,18 +304,11 @@ class Hyperfoam:
     14.0
     """
 
-    moduli_kpa: tuple[float, ...]
-    exponents: tuple[float, ...]
     poisson: float
 
     def __post_init__(self) -> None:
-        _take_terms(self)
+        super().__post_init__()
         check_poisson(self.poisson)
-
-    @property
-    def shear_modulus_kpa(self) -> float:
-        """Initial shear modulus. [kPa]"""
-        return sum(self.moduli_kpa)
 
     @property
     def bulk_modulus_kpa(self) -> float:
@@ -301,14 +318,9 @@ class Hyperfoam:
     @property
     def energy(self) -> Energy:
         """The law as a formula."""
-        term = (
-            "2 * mu{0} / alpha{0}**2 * (lambda1**alpha{0} + lambda2**alpha{0} + lambda3**alpha{0} - 3"
-            " + (J**(-alpha{0} * beta) - 1) / beta)"
-        )
-        terms = (term.format(n) for n in range(1, len(self.exponents) + 1))
-        beta = self.poisson / (1 - 2 * self.poisson)
-        return Energy(
-            " + ".join(terms), (*_named_terms(self.moduli_kpa, self.exponents), ("beta", float(beta)))
+        shape = "lambda1**alpha{0} + lambda2**alpha{0} + lambda3**alpha{0} - 3"
+        return self._sum_of(
+            f"{shape} + (J**(-alpha{{0}} * beta) - 1) / beta", beta=self.poisson / (1 - 2 * self.poisson)
         )
 
 
@@ -351,30 +363,6 @@ class Hencky:
             "shear * (log(lambdabar1)**2 + log(lambdabar2)**2 + log(lambdabar3)**2) + bulk / 2 * log(J)**2",
             (("shear", float(self.shear_kpa)), ("bulk", float(self.bulk_kpa))),
         )
-
-
-def _take_terms(law: Ogden | Hyperfoam) -> None:
-    name, moduli, exponents = type(law).__name__, tuple(law.moduli_kpa), tuple(law.exponents)
-    if not 1 <= len(moduli) <= 3 or len(moduli) != len(exponents):
-        raise InputError(
-            f"{name} needs one to three moduli and as many exponents: got {len(moduli)} and {len(exponents)}."
-        )
-    for modulus, exponent in zip(moduli, exponents, strict=True):
-        finite(f"each modulus of {name}", modulus, "kPa")
-        if finite(f"each exponent of {name}", exponent) == 0.0:
-            raise InputError(f"No exponent of {name} may be 0: leave out that term or take Hencky's law.")
-    positive(f"the initial shear modulus of {name}, the sum of its moduli", sum(moduli), "kPa")
-    object.__setattr__(law, "moduli_kpa", moduli)
-    object.__setattr__(law, "exponents", exponents)
-
-
-def _named_terms(moduli: Sequence[float], exponents: Sequence[float]) -> tuple[tuple[str, float], ...]:
-    pairs = enumerate(zip(moduli, exponents, strict=True), start=1)
-    return tuple(
-        named
-        for n, (modulus, exponent) in pairs
-        for named in ((f"mu{n}", float(modulus)), (f"alpha{n}", float(exponent)))
-    )
 
 
 def check_poisson(poisson: float) -> None:

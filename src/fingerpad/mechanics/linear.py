@@ -7,8 +7,9 @@ when the iterations grow.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, cg
@@ -18,7 +19,7 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.columns import MOST_LANES
-from fingerpad.mechanics.factors import MakeFactor, NotPositiveDefiniteError, SuperLuFactor
+from fingerpad.mechanics.factors import NotPositiveDefiniteError, SuperLuFactor
 from fingerpad.mechanics.multigrid import Multigrid
 
 MOST_ITERATIONS = 400
@@ -83,13 +84,18 @@ class KeptFactor:
     free : int array (n_free,)
         Degrees of freedom that move.
     factor : callable, optional
-        Makes the factor.
+        Makes the factor from the row and the column of every value.
     """
 
     patience = 14
     number_type = np.float64
 
-    def __init__(self, sparsity: Sparsity, free: np.ndarray, factor: MakeFactor = SuperLuFactor):
+    def __init__(
+        self,
+        sparsity: Sparsity,
+        free: np.ndarray,
+        factor: Callable[[np.ndarray, np.ndarray], Any] = SuperLuFactor,
+    ):
         self._sparsity, self._free = sparsity, free
         self._factor = factor(*sparsity.entries(free))
 

@@ -26,7 +26,7 @@ from numba import njit
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
-from fingerpad.core.threads import even_chunks, in_chunks
+from fingerpad.core.threads import in_chunks, run_kernel
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.element import N_NODES, N_POINTS, gradients_at_points, take_nodes
 from fingerpad.mechanics.energy import CARRIED, differentiate
@@ -63,12 +63,9 @@ class Pressures:
         law: FloatArray,
     ) -> Pressures:
         """Pressures of a mesh at its displacements; `law` is that of `MaterialTable`."""
-        pressure, slope = np.empty(len(elements)), np.empty((len(elements), N_NODES, 3))
-
-        def find(first: int, last: int) -> None:
-            _pressures(nodes, elements, displacement, layer, law, pressure, slope, first, last)
-
-        in_chunks(find, even_chunks(len(elements)))
+        n = len(elements)
+        pressure, slope = np.empty(n), np.empty((n, N_NODES, 3))
+        run_kernel(_pressures, n, nodes, elements, displacement, layer, law, pressure, slope)
         return cls(pressure, slope)
 
     def after(self, elements: np.ndarray, step_mm: FloatArray) -> FloatArray:

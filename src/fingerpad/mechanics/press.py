@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -340,42 +340,40 @@ def press(
         # Without its history, which is as large as all else together.
         reached.append((moment.time_ms, moment.found, moment.sed_kpa))
         values.append(moment.fields.values)
-    times = np.array([0.0, *(time_ms for time_ms, _, _ in reached)])
+    times = _from_rest(time_ms for time_ms, _, _ in reached)
+    found = [equilibrium for _, equilibrium, _ in reached]
     whole_body = 2.0 if mesh.symmetry_nodes.size else 1.0
     # Across the plane of symmetry the reactions of the two halves cancel.
     both_halves = np.array([2.0, 2.0, 0.0]) if mesh.symmetry_nodes.size else np.ones(3)
-    displacement = np.zeros((times.size, *mesh.nodes_mm.shape))
-    force, sed = np.zeros(times.size), np.zeros((times.size, len(mesh.elements)))
-    reaction, nail_reaction = np.zeros((times.size, 3)), np.zeros((times.size, 3))
-    depth, imbalance, deepest = np.zeros(times.size), 0.0, 0.0
+    displacement = _from_rest(each.displacement_mm for each in found)
     pressed = np.zeros((times.size, mesh.skin_nodes.size))
-    rows = np.searchsorted(mesh.skin_nodes, contact.nodes)
-    for n, (_, found, sed_kpa) in enumerate(reached, start=1):
-        displacement[n], depth[n], sed[n] = found.displacement_mm, found.depth_mm, sed_kpa
-        force[n] = whole_body * found.contact.force_mn.sum(axis=0) @ placement.axis
-        reaction[n] = both_halves * found.balance.reaction_mn
-        nail_reaction[n] = both_halves * found.balance.nail_mn
-        imbalance = max(imbalance, found.balance.imbalance)
-        deepest = max(deepest, found.contact.penetration_mm)
-        pressed[n, rows] = found.contact.pressed_mn
+    pressed[1:, np.searchsorted(mesh.skin_nodes, contact.nodes)] = [each.contact.pressed_mn for each in found]
     return Deformation(
         times_ms=times,
-        force_mn=force,
+        force_mn=_from_rest(
+            whole_body * each.contact.force_mn.sum(axis=0) @ placement.axis for each in found
+        ),
         displacement_mm=displacement,
-        sed_kpa=sed,
-        depth_mm=depth,
-        reaction_mn=reaction,
-        nail_reaction_mn=nail_reaction,
-        force_imbalance=imbalance,
+        sed_kpa=_from_rest(sed_kpa for _, _, sed_kpa in reached),
+        depth_mm=_from_rest(each.depth_mm for each in found),
+        reaction_mn=_from_rest(both_halves * each.balance.reaction_mn for each in found),
+        nail_reaction_mn=_from_rest(both_halves * each.balance.nail_mn for each in found),
+        force_imbalance=max(each.balance.imbalance for each in found),
         stress_kpa=cauchy_stress(mesh, table, displacement[-1], moment.history),
         fields=fields_over_time(chosen, values),
         contact=skin_contact(mesh, displacement, pressed),
         energy=energy_balance(moment.ledger, kinks_ms=(stimulus.ramp_ms,)).at(times),
-        penetration_mm=deepest,
+        penetration_mm=max(each.contact.penetration_mm for each in found),
         newton_steps=job.newton_steps,
         factorisations=solver.renewals,
         linear_solver=reason,
     )
+
+
+def _from_rest(values: Iterable[FloatArray | float]) -> FloatArray:
+    """Values over time, (n_times, ...), from the unloaded state, in which they are 0."""
+    later = np.array(list(values), dtype=np.float64)
+    return np.concatenate([np.zeros((1, *later.shape[1:])), later])
 
 
 def _check_depth(mesh: Mesh, indenter: Indenter, placement: Placement, depth_mm: float) -> None:

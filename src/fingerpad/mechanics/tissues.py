@@ -32,70 +32,32 @@ def _foam(moduli: Published, exponents: Published) -> Material:
     return Material.hyperfoam(moduli.value, exponents.value, poisson, skin_prony())
 
 
-def trial_1() -> Tissues:
-    """All layers linear elastic after Maeno, with a Prony series."""
-    epidermis = _linear(published.MAENO_EPIDERMIS_YOUNG)
-    dermis, subcutis = _linear(published.MAENO_DERMIS_YOUNG), _linear(published.MAENO_SUBCUTIS_YOUNG)
-    return Tissues(epidermis, epidermis, dermis, subcutis)
+def _layers(epidermis_young: Published, inner: tuple[Material, Material]) -> Tissues:
+    """Linear elastic epidermis over dermis and subcutis."""
+    epidermis = _linear(epidermis_young)
+    return Tissues(epidermis, epidermis, *inner)
 
 
-def trial_2() -> Tissues:
-    """Stiff epidermis over the hyperelastic dermis and subcutis."""
-    epidermis = _linear(published.WU_EPIDERMIS_YOUNG)
-    return Tissues(epidermis, epidermis, *_hyperelastic())
+SOFT, STIFF = published.MAENO_EPIDERMIS_YOUNG, published.WU_EPIDERMIS_YOUNG
+"""Young's moduli of the epidermis."""
 
 
-def trial_3() -> Tissues:
-    """Trial 1's soft epidermis over Trial 2's hyperelastic dermis and subcutis."""
-    epidermis = _linear(published.MAENO_EPIDERMIS_YOUNG)
-    return Tissues(epidermis, epidermis, *_hyperelastic())
-
-
-def trial_2_wu() -> Tissues:
-    """Trial 2 with Wu's hyperfoams rewritten as polynomials N = 2."""
-    epidermis = _linear(published.WU_EPIDERMIS_YOUNG)
-    return Tissues(epidermis, epidermis, *_wu_polynomials())
-
-
-def trial_3_wu() -> Tissues:
-    """Trial 3 with Wu's hyperfoams rewritten as polynomials N = 2: the paper's words taken literally."""
-    epidermis = _linear(published.MAENO_EPIDERMIS_YOUNG)
-    return Tissues(epidermis, epidermis, *_wu_polynomials())
-
-
-def trial_3_stiffening() -> Tissues:
-    """Trial 3 whose dermis and subcutis stiffen, the initial moduli being the same."""
-    epidermis = _linear(published.MAENO_EPIDERMIS_YOUNG)
-    dermis, subcutis = (
-        Material.polynomial(c10, 0.0, published.STIFFENING_RATIO.value * c10, 0.0, 0.0, NU, skin_prony())
-        for c10 in (published.SOFT_MIX_DERMIS_SHEAR.value / 2, published.SOFT_MIX_SUBCUTIS_SHEAR.value / 2)
-    )
-    return Tissues(epidermis, epidermis, dermis, subcutis)
-
-
-def maeno_1998() -> Tissues:
-    """Linear elastic layers after Maeno, without relaxation."""
-    return Tissues(*(layer.with_prony(Prony()) for layer in trial_1().layers))
-
-
-def wu_2007() -> Tissues:
-    """Wu's hyperfoams in dermis and subcutis, nearly a tenth as stiff as Maeno's, under a stiff epidermis."""
-    epidermis = _linear(published.WU_EPIDERMIS_YOUNG)
-    dermis = _foam(published.WU_SKIN_HYPERFOAM_MU, published.WU_SKIN_HYPERFOAM_ALPHA)
-    subcutis = _foam(published.WU_SUBCUTIS_HYPERFOAM_MU, published.WU_SUBCUTIS_HYPERFOAM_ALPHA)
-    return Tissues(epidermis, epidermis, dermis, subcutis)
-
-
-def gerling_2014_fit() -> Tissues:
-    """Neo-Hookean fit of this fingertip, published later by the authors' laboratory."""
-    epidermis = _shear(published.LABORATORY_EPIDERMIS_SHEAR)
-    dermis, subcutis = _shear(published.LABORATORY_DERMIS_SHEAR), _shear(published.LABORATORY_SUBCUTIS_SHEAR)
-    return Tissues(epidermis, epidermis, dermis, subcutis)
+def _maeno() -> tuple[Material, Material]:
+    return _linear(published.MAENO_DERMIS_YOUNG), _linear(published.MAENO_SUBCUTIS_YOUNG)
 
 
 def _hyperelastic() -> tuple[Material, Material]:
     """Dermis and subcutis of Trials 2 and 3: stand-ins for the lost Table 2."""
     return _shear(published.SOFT_MIX_DERMIS_SHEAR), _shear(published.SOFT_MIX_SUBCUTIS_SHEAR)
+
+
+def _stiffening() -> tuple[Material, Material]:
+    """Return the same with a second coefficient, the initial moduli being the same."""
+    dermis, subcutis = (
+        Material.polynomial(c10, 0.0, published.STIFFENING_RATIO.value * c10, 0.0, 0.0, NU, skin_prony())
+        for c10 in (published.SOFT_MIX_DERMIS_SHEAR.value / 2, published.SOFT_MIX_SUBCUTIS_SHEAR.value / 2)
+    )
+    return dermis, subcutis
 
 
 def _wu_polynomials() -> tuple[Material, Material]:
@@ -110,16 +72,37 @@ def _wu_polynomials() -> tuple[Material, Material]:
     return dermis, subcutis
 
 
+def _wu_foams() -> tuple[Material, Material]:
+    return (
+        _foam(published.WU_SKIN_HYPERFOAM_MU, published.WU_SKIN_HYPERFOAM_ALPHA),
+        _foam(published.WU_SUBCUTIS_HYPERFOAM_MU, published.WU_SUBCUTIS_HYPERFOAM_ALPHA),
+    )
+
+
+def _laboratory() -> Tissues:
+    epidermis = _shear(published.LABORATORY_EPIDERMIS_SHEAR)
+    inner = (_shear(published.LABORATORY_DERMIS_SHEAR), _shear(published.LABORATORY_SUBCUTIS_SHEAR))
+    return Tissues(epidermis, epidermis, *inner)
+
+
 TISSUES: dict[str, Callable[[], Tissues]] = {
-    "trial1": trial_1,
-    "trial2": trial_2,
-    "trial3": trial_3,
-    "trial2_wu": trial_2_wu,
-    "trial3_wu": trial_3_wu,
-    "trial3_stiffening": trial_3_stiffening,
-    "maeno1998": maeno_1998,
-    "wu2007": wu_2007,
-    "gerling2014_fit": gerling_2014_fit,
+    # All layers linear elastic after Maeno, with a Prony series.
+    "trial1": lambda: _layers(SOFT, _maeno()),
+    # Stiff epidermis over the hyperelastic dermis and subcutis.
+    "trial2": lambda: _layers(STIFF, _hyperelastic()),
+    # Trial 1's soft epidermis over Trial 2's hyperelastic dermis and subcutis.
+    "trial3": lambda: _layers(SOFT, _hyperelastic()),
+    # Wu's hyperfoams rewritten as polynomials N = 2: the paper's words taken literally.
+    "trial2_wu": lambda: _layers(STIFF, _wu_polynomials()),
+    "trial3_wu": lambda: _layers(SOFT, _wu_polynomials()),
+    # Trial 3 whose dermis and subcutis stiffen.
+    "trial3_stiffening": lambda: _layers(SOFT, _stiffening()),
+    # Linear elastic layers after Maeno, without relaxation.
+    "maeno1998": lambda: Tissues(*(layer.with_prony(Prony()) for layer in _layers(SOFT, _maeno()).layers)),
+    # Wu's hyperfoams in dermis and subcutis, nearly a tenth as stiff as Maeno's, under a stiff epidermis.
+    "wu2007": lambda: _layers(STIFF, _wu_foams()),
+    # Neo-Hookean fit of this fingertip, published later by the authors' laboratory.
+    "gerling2014_fit": _laboratory,
 }
 
 

@@ -20,7 +20,7 @@ from numba import njit
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
-from fingerpad.core.threads import even_chunks, in_chunks
+from fingerpad.core.threads import run_kernel
 from fingerpad.mechanics.element import N_NODES, N_POINTS, element_state, relaxing_norms, take_nodes
 from fingerpad.mechanics.materials import MaterialTable, has_formulas
 
@@ -74,24 +74,16 @@ class StressHistory:
     def carried(self, step: StepCoefficients, layer: np.ndarray) -> FloatArray:
         """H of the next step, (n_elements, 8, 6). [kPa]"""
         total = np.empty_like(self.instantaneous)
-
-        def carry(first: int, last: int) -> None:
-            _carry(step.old, step.decay, layer, self.instantaneous, self.relaxed, total, first, last)
-
-        in_chunks(carry, even_chunks(len(layer)))
+        run_kernel(_carry, len(layer), step.old, step.decay, layer, self.instantaneous, self.relaxed, total)
         return total
 
     def advanced(self, step: StepCoefficients, layer: np.ndarray, instantaneous: FloatArray) -> StressHistory:
         """State at the end of the step, given S0 there."""
         relaxed = np.empty_like(self.relaxed)
-
-        def relax(first: int, last: int) -> None:
-            _relax(
-                step.new, step.old, step.decay, layer, instantaneous, self.instantaneous, self.relaxed,
-                relaxed, first, last,
-            )  # fmt: skip
-
-        in_chunks(relax, even_chunks(len(layer)))
+        run_kernel(
+            _relax, len(layer), step.new, step.old, step.decay, layer, instantaneous, self.instantaneous,
+            self.relaxed, relaxed,
+        )  # fmt: skip
         return StressHistory(instantaneous, relaxed)
 
 
@@ -196,11 +188,7 @@ def instantaneous_state(
         np.empty((n, N_POINTS, 6)), np.empty((n, N_POINTS, 2)), np.empty(n), np.empty(n), np.empty(n)
     )
     formulas = has_formulas(table.law)
-
-    def find(first: int, last: int) -> None:
-        _states(nodes, elements, displacement, layer, table.law, formulas, *state, first, last)
-
-    in_chunks(find, even_chunks(n))
+    run_kernel(_states, n, nodes, elements, displacement, layer, table.law, formulas, *state)
     return state
 
 
@@ -228,12 +216,8 @@ def stored_energy_density(
         Stored energy per reference volume. [kPa = µJ/mm³]
     """
     stored = np.empty(len(elements))
-
-    def find(first: int, last: int) -> None:
-        _stored_energy(
-            nodes, elements, displacement, layer, table.law, table.shares,
-            history.instantaneous, history.relaxed, now.energies, now.volumetric_kpa, stored, first, last,
-        )  # fmt: skip
-
-    in_chunks(find, even_chunks(len(elements)))
+    run_kernel(
+        _stored_energy, len(elements), nodes, elements, displacement, layer, table.law, table.shares,
+        history.instantaneous, history.relaxed, now.energies, now.volumetric_kpa, stored,
+    )  # fmt: skip
     return stored

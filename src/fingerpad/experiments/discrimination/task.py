@@ -29,7 +29,8 @@ from fingerpad.experiments.discrimination.task_types import (
     with_message,
 )
 from fingerpad.geometry.grading import RESOLUTIONS
-from fingerpad.geometry.names import INDENTERS, MOTION_UNITS, SIZE_UNITS
+from fingerpad.geometry.motion import MOTION_UNITS
+from fingerpad.geometry.names import INDENTERS, SIZE_UNITS
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.psychophysics.discrimination import CRITERION_MOVES
 from fingerpad.psychophysics.functions import SIGMOIDS
