@@ -12,7 +12,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, not_negative, one_of, positive
 from fingerpad.core.errors import InputError
-from fingerpad.core.random_streams import Presentations, Purpose, normals_of
+from fingerpad.core.random_streams import Presentations, Purpose, draw_each
 
 STEP_MS = 0.1
 """Default step of the noise of the current. [ms]"""
@@ -173,7 +173,7 @@ class GainNoise:
         if self.new_for == "receptor":
             receptors, which = np.unique(presentations.receptors, return_inverse=True)
             whose = Presentations(receptors, np.zeros_like(receptors), receptors)
-        draws = normals_of(seed, whose, Purpose.GAIN, 1)[:, 0]
+        draws = draw_each(seed, whose.trials, whose.receptors, Purpose.GAIN, 1, normal=True)[:, 0]
         spread = log_spread(self.relative_standard_deviation)
         factors = np.exp(spread * draws - 0.5 * spread**2)
         return factors if self.new_for == "presentation" else factors[which]

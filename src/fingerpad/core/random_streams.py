@@ -224,49 +224,27 @@ def normals(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, co
     return _of_each_pair(seed, trials, receptors, purpose, count, normal=True)
 
 
-def normals_of(seed: int, presentations: Presentations, purpose: Purpose, count: int) -> FloatArray:
-    """Draw standard normal numbers for each train of a set of presentations.
-
-    Parameters
-    ----------
-    seed, purpose, count
-        As in `uniforms`.
-    presentations : Presentations
-        Trials and receptors of the trains.
-
-    Returns
-    -------
-    array (n_trains, count)
-        The numbers of `normals` for the trial and receptor of each train.
-
-    Raises
-    ------
-    InputError
-        As in `uniforms`.
-
-    Examples
-    --------
-    >>> one = Presentations(sites=[0], trials=[1], receptors=[5])
-    >>> every = normals(7, trials=2, receptors=6, purpose=Purpose.GAIN, count=3)
-    >>> bool((normals_of(7, one, Purpose.GAIN, 3)[0] == every[1, 5]).all())
-    True
-    """
-    return _drawn(seed, presentations.trials, presentations.receptors, purpose, count, normal=True)
-
-
 def _of_each_pair(
     seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, count: int, normal: bool
 ) -> FloatArray:
     """Numbers of every trial with every receptor, (n_trials, n_receptors, count)."""
     pairs = np.meshgrid(numbered("trials", trials), numbered("receptors", receptors), indexing="ij")
-    numbers = _drawn(seed, pairs[0].ravel(), pairs[1].ravel(), purpose, count, normal)
+    numbers = draw_each(seed, pairs[0].ravel(), pairs[1].ravel(), purpose, count, normal)
     return numbers.reshape(*pairs[0].shape, count)
 
 
-def _drawn(
+def draw_each(
     seed: int, trials: IntArray, receptors: IntArray, purpose: Purpose, count: int, normal: bool
 ) -> FloatArray:
-    """Numbers of the stream of each trial and receptor (n,), (n, count)."""
+    """Draw uniform or normal numbers of the stream of each trial and receptor (n,), (n, count).
+
+    Examples
+    --------
+    >>> every = normals(7, trials=2, receptors=6, purpose=Purpose.GAIN, count=3)
+    >>> one = draw_each(7, np.array([1]), np.array([5]), Purpose.GAIN, 3, normal=True)
+    >>> bool((one[0] == every[1, 5]).all())
+    True
+    """
     numbers = np.empty((trials.size, whole("count", count, 0)))
     _fill(
         _number("seed", seed), trials, receptors, int(instance("purpose", purpose, Purpose)), normal, numbers
