@@ -11,8 +11,8 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.fit import rate_uncertainty
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.experiments.fit.offset import check_offset, fit_offset
-from fingerpad.experiments.fit.posterior import RatePosterior, profiled
-from fingerpad.experiments.fit.rate_uncertainty import ParameterProfile
+from fingerpad.experiments.fit.posterior import profiled
+from fingerpad.experiments.fit.results import ParameterProfile, RatePosterior
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_likelihood import RateLikelihood
 from fingerpad.inference.rate_model import AfferentModel, four_number_model

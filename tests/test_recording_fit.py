@@ -27,8 +27,8 @@ from fingerpad.experiments.fit import fit as study
 from fingerpad.experiments.fit import posterior as recording_posterior
 from fingerpad.experiments.fit import session
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
-from fingerpad.experiments.fit.posterior import PhaseBands, RateBand, RatePosterior, rate_posterior
-from fingerpad.experiments.fit.rate_uncertainty import ParameterProfile
+from fingerpad.experiments.fit.posterior import rate_posterior
+from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, RateBand, RatePosterior
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.manifest import sha256
 from fingerpad.experiments.recording_files import read_recordings
@@ -166,7 +166,7 @@ def test_a_posterior_is_part_of_the_fit_and_of_its_page(recovered, monkeypatch):
         covariance=np.eye(4),
         bands={"static": PhaseBands(predicted=band, new=band)},
     )
-    monkeypatch.setattr(study, "rate_posterior", lambda *given: asked.append(given) or drawn)
+    monkeypatch.setattr(recording_posterior, "rate_posterior", lambda *given: asked.append(given) or drawn)
     fitted = study.fit_recordings(
         SED, RATES, np.arange(8) % 2, seed=5, with_posterior=True, positions_mm=range(8)
     )
@@ -458,7 +458,7 @@ def test_what_is_asked_for_beside_the_fit_is_on_its_page(call, tmp_path, monkeyp
     profile = {"values": [1.0, 2.0, 3.0], "losses": [3.0, 0.0, 3.0], "low": 1.2, "high": None}
     four = [profile | {"name": name} for name in IDENTIFIABLE_NAMES]
     typed = tuple(ParameterProfile(**each) for each in four)
-    monkeypatch.setattr(study, "profiled", lambda *given: typed)
+    monkeypatch.setattr(recording_posterior, "profiled", lambda *given: typed)
     options = ("--profiles", "--sensitivity", "--offset", "--folds", "2")
     status, _, errors = call("mine.csv", "--stimulus", "bar", *options)
     assert (status, errors) == (0, "")

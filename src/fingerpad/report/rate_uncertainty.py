@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from matplotlib.axes import Axes
 
-from fingerpad.experiments.fit.rate_uncertainty import FssSensitivity, ParameterProfile
+from fingerpad.experiments.fit.results import FssSensitivity, ParameterProfile
 from fingerpad.report.formatting import IDENTIFIABLE_SYMBOLS, fixed, number
 from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE

@@ -7,8 +7,7 @@ from typing import TypeVar
 
 from matplotlib.figure import Figure
 
-from fingerpad.experiments.fit.fit import FitResult
-from fingerpad.experiments.fit.offset import OffsetFit
+from fingerpad.experiments.fit.results import FitResult, OffsetFit
 from fingerpad.report.formatting import ABSENT, IDENTIFIABLE_SYMBOLS, fixed, number
 from fingerpad.report.parts import Row, Table
 from fingerpad.report.rate_uncertainty import draw_indices, draw_profile, profile_ends, sensitivity_table

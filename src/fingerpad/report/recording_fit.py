@@ -10,8 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.experiments.fit.fit import FitResult, PhaseRates
-from fingerpad.experiments.fit.methods import SpikeFitSummary
+from fingerpad.experiments.fit.results import FitResult, PhaseRates, SpikeFitSummary
 from fingerpad.experiments.fit.session import FitFile
 from fingerpad.report.formatting import (
     ABSENT,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import read_text
@@ -119,7 +119,6 @@ def _grid(settings: PopulationSettings, afferent: Afferent) -> Population:
 
 def _on_skin(settings: PopulationSettings, afferent: Afferent) -> Population:
     """Lay afferents along the nail or in a region; only such tasks load the modules that unroll the skin."""
-    laid: Population = import_module("fingerpad.experiments.discrimination.skin_layouts").lay(
-        settings, afferent
-    )
+    lay = resolve_name("fingerpad.experiments.discrimination.skin_layouts:lay")
+    laid: Population = lay(settings, afferent)
     return laid

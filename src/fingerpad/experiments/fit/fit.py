@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pkgutil import resolve_name
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, IntArray, one_of, whole
 from fingerpad.core.errors import InputError
-from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_class
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
-from fingerpad.experiments.fit.methods import METHODS, Prepared, SpikeFitSummary, four_number_problem
-from fingerpad.experiments.fit.offset import Beside, OffsetFit, check_beside, fit_offset
-from fingerpad.experiments.fit.posterior import RatePosterior, profiled, rate_posterior
-from fingerpad.experiments.fit.rate_uncertainty import FssSensitivity, ParameterProfile, fss_sensitivity
+from fingerpad.experiments.fit.methods import METHODS, Prepared, four_number_problem
+from fingerpad.experiments.fit.offset import Beside, check_beside, fit_offset
+from fingerpad.experiments.fit.results import FitResult, FittedFold, PhaseRates
 from fingerpad.inference.fitting.cross_validation import CrossValidation, cross_validate, interleaved_folds
 from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
 from fingerpad.inference.identifiable import (
@@ -28,132 +28,18 @@ from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
 
-
-@result_class
-class PhaseRates:
-    """Rates of one phase, in the ramp or in the hold.
-
-    Parameters
-    ----------
-    fss_in_sample : float, optional
-        Fractional sum of squares over all stimuli; absent where the phase was not recorded.
-    observed_hz : array (n_stimuli,), optional
-        Recorded rates. [spikes/s]
-    fitted_hz : array (n_stimuli,)
-        Rates of the afferent that is fitted to all stimuli. [spikes/s]
-    out_of_sample_hz : array (n_stimuli,)
-        Rates that the fit without the stimulus' fold predicts. [spikes/s]
-    """
-
-    fss_in_sample: float | None
-    observed_hz: Vector | None
-    fitted_hz: Vector
-    out_of_sample_hz: Vector
+_PARTS = {
+    "posterior": "fingerpad.experiments.fit.posterior:rate_posterior",
+    "profiles": "fingerpad.experiments.fit.posterior:profiled",
+    "sensitivity": "fingerpad.experiments.fit.rate_uncertainty:fss_sensitivity",
+}
+"""What computes a part of the uncertainty of a fit; its module is loaded when the part is asked for."""
 
 
-@result_class
-class FittedFold:
-    """One fold of the cross validation.
-
-    Parameters
-    ----------
-    fold : int
-        Number, from 1.
-    stimuli : tuple of str
-        Left out of the fit.
-    fss_train, fss_test : float
-        Fractional sum of squares over the other stimuli and over these.
-    n_evaluations : int
-        Evaluations of the model.
-    seconds : float
-        Time on the clock. [s]
-    parameters, identifiable : dict of str to float
-        The paper's six parameters, and the four that rates identify.
-    """
-
-    fold: int
-    stimuli: tuple[str, ...]
-    fss_train: float
-    fss_test: float
-    n_evaluations: int
-    seconds: float
-    parameters: dict[str, float]
-    identifiable: dict[str, float]
-
-
-@result_class
-class FitResult:
-    """Result of a fit to recordings.
-
-    Parameters
-    ----------
-    method, source : str
-        How it was fitted, and where the recordings come from.
-    n_evaluations : int
-        Evaluations of the model.
-    seconds : float
-        Time on the clock. [s]
-    parameters, identifiable : dict of str to float
-        The paper's six parameters, and the four that rates identify.
-    units, identifiable_units : dict of str to str
-        Their units.
-    identifiable_standard_error : dict of str to float
-        NaN where there is no covariance.
-    identifiable_covariance : array (4, 4), optional
-        Of the four numbers.
-    fss_in_sample, fss_training_mean, fss_out_of_sample : float
-        Over all stimuli; over training sets and testing sets, mean of the folds.
-    stimulus : tuple of str
-        Names.
-    fold : int array (n_stimuli,)
-        Fold of each stimulus, from 1.
-    phases : dict of str to PhaseRates
-        Rates by phase, "dynamic" and "static".
-    folds : tuple of FittedFold
-        The cross validation.
-    spikes : SpikeFitSummary, optional
-        Of the likelihood of spikes.
-    posterior : RatePosterior, optional
-        Credible intervals, where they were asked for.
-    profiles : tuple of ParameterProfile, optional
-        Profile likelihoods, where they were asked for.
-    sensitivity : FssSensitivity, optional
-        Sobol indices, where they were asked for.
-    offset : OffsetFit, optional
-        The fit with the receptor's offset as a further parameter.
-    shift_mm : array (n_stimuli,), optional
-        Shift of each stimulus, proximal positive, where stimuli differ in nothing else. [mm]
-    presentations : tuple of int
-        Presentations of each stimulus.
-    spikes_after_hold : int
-        Spikes that were left out because they came after the hold.
-    """
-
-    method: str
-    source: str
-    n_evaluations: int
-    seconds: float
-    parameters: dict[str, float]
-    identifiable: dict[str, float]
-    units: dict[str, str]
-    identifiable_units: dict[str, str]
-    identifiable_standard_error: dict[str, Number]
-    identifiable_covariance: Matrix | None
-    fss_in_sample: float
-    fss_training_mean: float
-    fss_out_of_sample: float
-    stimulus: tuple[str, ...]
-    fold: WholeVector
-    phases: dict[str, PhaseRates]
-    folds: tuple[FittedFold, ...]
-    spikes: SpikeFitSummary | None
-    posterior: RatePosterior | None
-    profiles: tuple[ParameterProfile, ...] | None
-    sensitivity: FssSensitivity | None
-    offset: OffsetFit | None
-    shift_mm: Vector | None = None
-    presentations: tuple[int, ...] = ()
-    spikes_after_hold: int = 0
+def _part(name: str) -> Callable[..., Any]:
+    """Return the function of one of `_PARTS`."""
+    found: Callable[..., Any] = resolve_name(_PARTS[name])
+    return found
 
 
 def fit_recordings(
@@ -257,10 +143,10 @@ def fit_recordings(
         phases=_phases(prepared.problem, rates, best.parameters, validation),
         folds=_folds(prepared, rates, validation),
         spikes=prepared.spikes(best, validation),
-        posterior=rate_posterior(model, rates, four, seed, positions_mm) if with_posterior else None,
-        profiles=profiled(model, rates, four, positions_mm) if with_profiles else None,
+        posterior=_part("posterior")(model, rates, four, seed, positions_mm) if with_posterior else None,
+        profiles=_part("profiles")(model, rates, four, positions_mm) if with_profiles else None,
         sensitivity=(
-            fss_sensitivity(four_number_problem(model, rates), four, seed) if with_sensitivity else None
+            _part("sensitivity")(four_number_problem(model, rates), four, seed) if with_sensitivity else None
         ),
         offset=None if beside is None else fit_offset(beside, rates, folds, method, windows_ms, seed),
     )

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
+from pkgutil import resolve_name
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
-from fingerpad.core.results import Number, result_class
 from fingerpad.data import neuron
+from fingerpad.experiments.fit.results import SpikeFitSummary
 from fingerpad.inference.afferent_methods import (
     Bounds,
     along_slopes,
@@ -32,31 +32,6 @@ from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_NAMES
 from fingerpad.inference.start_points import response_surface
 
 MethodOf = Callable[[RateProblem, Bounds], Method]
-
-
-@result_class
-class SpikeFitSummary:
-    """Maximum likelihood of spike trains under a soft threshold.
-
-    Parameters
-    ----------
-    n_spikes : int
-        How many were fitted.
-    log_likelihood, log_likelihood_out_of_sample : float
-        Of all spikes, and of each fold's spikes fitted without it.
-    escape_width, escape_width_standard_error : float
-        Width of the threshold over the threshold.
-    time_rescaling_distance, time_rescaling_p_value : float
-        Kolmogorov-Smirnov test of the rescaled intervals.
-    """
-
-    n_spikes: int
-    log_likelihood: float
-    log_likelihood_out_of_sample: float
-    escape_width: float
-    escape_width_standard_error: Number
-    time_rescaling_distance: float
-    time_rescaling_p_value: float
 
 
 @dataclass(frozen=True)
@@ -185,9 +160,8 @@ def _likelihood(
     model: AfferentModel, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
 ) -> Prepared:
     """Prepare maximum likelihood of spike trains, whose module and kernels only this method loads."""
-    prepared: Prepared = import_module("fingerpad.experiments.fit.spike_method").prepare(
-        model, recordings, rates, seed
-    )
+    prepare = resolve_name("fingerpad.experiments.fit.spike_method:prepare")
+    prepared: Prepared = prepare(model, recordings, rates, seed)
     return prepared
 
 

@@ -12,11 +12,9 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray, one_of
 from fingerpad.core.errors import InputError
-from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import SedTraces
-from fingerpad.experiments.fit.methods import (
-    METHODS,
-)
+from fingerpad.experiments.fit.methods import METHODS
+from fingerpad.experiments.fit.results import HeldOffset, OffsetFit
 from fingerpad.inference.afferent_methods import (
     Bounds,
     along_slopes,
@@ -35,51 +33,6 @@ from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.rate_model import Windows
 from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import RateRecordings
-
-
-@result_class
-class HeldOffset:
-    """Best FSS in sample with the receptor held at each offset [mm], (n_offsets,)."""
-
-    offset_mm: Vector
-    fss_in_sample: Vector
-
-
-@result_class
-class OffsetFit:
-    """Fit of the four numbers and the receptor's offset.
-
-    Parameters
-    ----------
-    offset_mm, standard_error_mm : float
-        Offset along the finger, distal positive, and its standard error, NaN where it is not known. [mm]
-    folds_mm : array (n_folds,)
-        Offsets that the folds give. [mm]
-    identifiable : dict of str to float
-        The four numbers.
-    fss_in_sample, fss_out_of_sample : float
-        Fractional sum of squares over all stimuli, and mean over the folds.
-    fss_by_phase : dict of str to float
-        In sample, "dynamic" and "static".
-    n_evaluations : int
-        Evaluations of the model.
-    seconds : float
-        Time on the clock. [s]
-    held : HeldOffset
-        Fits with the receptor held.
-    """
-
-    offset_mm: float
-    standard_error_mm: Number
-    folds_mm: Vector
-    identifiable: dict[str, float]
-    fss_in_sample: float
-    fss_out_of_sample: float
-    fss_by_phase: dict[str, float]
-    n_evaluations: int
-    seconds: float
-    held: HeldOffset
-
 
 Beside = Mapping[float, SedTraces | Sequence[SedTraces]]
 """Strain energy density by offset from the believed place, distal positive [mm], one column per stimulus."""

@@ -8,72 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.core.results import Matrix, Vector, result_class
-from fingerpad.experiments.fit.rate_uncertainty import (
-    LEVEL,
-    ParameterProfile,
-    admissible,
-    likely_points,
-    profiles,
-)
+from fingerpad.experiments.fit.rate_uncertainty import LEVEL, admissible, likely_points, profiles
+from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, RateBand, RatePosterior
 from fingerpad.inference.afferent_posterior import afferent_posterior
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.rate_likelihood import RateLikelihood
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.recordings import RateRecordings
-
-
-@result_class
-class RateBand:
-    """Ends of a credible band of rates, (n_stimuli,). [spikes/s]"""
-
-    low_hz: Vector
-    high_hz: Vector
-
-
-@result_class
-class PhaseBands:
-    """Bands of the predicted rates, and of new recordings with their noise."""
-
-    predicted: RateBand
-    new: RateBand
-
-
-@result_class
-class RatePosterior:
-    """Posterior of the four identifiable numbers.
-
-    Parameters
-    ----------
-    level : float
-        Probability within each interval and band.
-    seed : int
-        Of the random numbers.
-    n_draws, n_evaluations : int
-        Draws that were kept, and evaluations of the likelihood.
-    largest_r_hat, smallest_effective_size : float
-        Convergence: split R-hat and effective number of draws, the worst of the four.
-    median : dict of str to float
-        Of each number.
-    interval : dict of str to (float, float)
-        Credible interval of each number.
-    covariance : array (4, 4)
-        Of the draws.
-    bands : dict of str to PhaseBands
-        By phase.
-    """
-
-    level: float
-    seed: int
-    n_draws: int
-    n_evaluations: int
-    largest_r_hat: float
-    smallest_effective_size: float
-    median: dict[str, float]
-    interval: dict[str, tuple[float, float]]
-    covariance: Matrix
-    bands: dict[str, PhaseBands]
 
 
 def rate_posterior(

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import norm, qmc
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.core.results import Number, Vector, result_class
+from fingerpad.experiments.fit.results import FssSensitivity, ParameterProfile
 from fingerpad.inference.afferent_posterior import from_coordinates, to_coordinates
 from fingerpad.inference.fitting.profile_likelihood import ProfileLikelihood, profile_likelihoods
 from fingerpad.inference.fitting.sensitivity import sobol_indices
@@ -36,58 +36,6 @@ SENSITIVITY_POINTS = 512
 
 MOST_RESTING_SHARE = 0.9
 """Potential at rest over the threshold, at most, where a search begins: untouched skin elicits no spike."""
-
-
-@result_class
-class ParameterProfile:
-    """Profile likelihood of one of the four identifiable numbers.
-
-    Parameters
-    ----------
-    name : str
-        Of the number.
-    values : array (n_values,)
-        Where it was held.
-    losses : array (n_values,)
-        Loss of log likelihood there, the other three numbers fitted.
-    low, high : float, optional
-        Ends of the interval, None where the rates set none.
-    """
-
-    name: str
-    values: Vector
-    losses: Vector
-    low: float | None
-    high: float | None
-
-
-@result_class
-class FssSensitivity:
-    """Sobol indices of FSS for the four identifiable numbers, in their order.
-
-    Parameters
-    ----------
-    lower, upper : array (4,)
-        Range of each number.
-    first, first_half_width : array (4,)
-        First-order index and half of its confidence interval. [1]
-    total, total_half_width : array (4,)
-        Total index and half of its confidence interval. [1]
-    mean_fss, deviation_fss : float
-        Mean and standard deviation of FSS over the ranges. [1]
-    evaluations : int
-        Of FSS.
-    """
-
-    lower: Vector
-    upper: Vector
-    first: Vector
-    first_half_width: Vector
-    total: Vector
-    total_half_width: Vector
-    mean_fss: Number
-    deviation_fss: Number
-    evaluations: int
 
 
 def admissible(four: ArrayLike) -> FloatArray:

@@ -17,9 +17,10 @@ from fingerpad.core.results import result_class
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.data.observations import bar_firing_rates
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.fit.fit import FitResult, check_enough, fit_recordings, folds_in_turn
+from fingerpad.experiments.fit.fit import check_enough, fit_recordings, folds_in_turn
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
 from fingerpad.experiments.fit.offset import check_offset
+from fingerpad.experiments.fit.results import FitResult
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.recording_files import Recorded
 from fingerpad.experiments.runner import Runner

@@ -9,7 +9,8 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.signals import SpikeTrains
-from fingerpad.experiments.fit.methods import Prepared, SpikeFitSummary, check_spikes
+from fingerpad.experiments.fit.methods import Prepared, check_spikes
+from fingerpad.experiments.fit.results import SpikeFitSummary
 from fingerpad.inference.fitting.cross_validation import CrossValidation
 from fingerpad.inference.fitting.methods import Fit
 from fingerpad.inference.fitting.problem import Problem

@@ -11,14 +11,8 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import bar_firing_rates
-from fingerpad.experiments.fit.rate_uncertainty import (
-    LEVEL,
-    SEEDS_OF_PROFILES,
-    FssSensitivity,
-    ParameterProfile,
-    fss_sensitivity,
-    profiles,
-)
+from fingerpad.experiments.fit.rate_uncertainty import LEVEL, SEEDS_OF_PROFILES, fss_sensitivity, profiles
+from fingerpad.experiments.fit.results import FssSensitivity, ParameterProfile
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.inference.afferent_posterior import AfferentPosterior, afferent_posterior
 from fingerpad.inference.fitting.identifiability import identifiability

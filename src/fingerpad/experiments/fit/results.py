@@ -1,0 +1,305 @@
+"""Results of a fit to recordings, and of the parts that can be asked for with it."""
+
+from __future__ import annotations
+
+from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_class
+
+
+@result_class
+class SpikeFitSummary:
+    """Maximum likelihood of spike trains under a soft threshold.
+
+    Parameters
+    ----------
+    n_spikes : int
+        How many were fitted.
+    log_likelihood, log_likelihood_out_of_sample : float
+        Of all spikes, and of each fold's spikes fitted without it.
+    escape_width, escape_width_standard_error : float
+        Width of the threshold over the threshold.
+    time_rescaling_distance, time_rescaling_p_value : float
+        Kolmogorov-Smirnov test of the rescaled intervals.
+    """
+
+    n_spikes: int
+    log_likelihood: float
+    log_likelihood_out_of_sample: float
+    escape_width: float
+    escape_width_standard_error: Number
+    time_rescaling_distance: float
+    time_rescaling_p_value: float
+
+
+@result_class
+class RateBand:
+    """Ends of a credible band of rates, (n_stimuli,). [spikes/s]"""
+
+    low_hz: Vector
+    high_hz: Vector
+
+
+@result_class
+class PhaseBands:
+    """Bands of the predicted rates, and of new recordings with their noise."""
+
+    predicted: RateBand
+    new: RateBand
+
+
+@result_class
+class RatePosterior:
+    """Posterior of the four identifiable numbers.
+
+    Parameters
+    ----------
+    level : float
+        Probability within each interval and band.
+    seed : int
+        Of the random numbers.
+    n_draws, n_evaluations : int
+        Draws that were kept, and evaluations of the likelihood.
+    largest_r_hat, smallest_effective_size : float
+        Convergence: split R-hat and effective number of draws, the worst of the four.
+    median : dict of str to float
+        Of each number.
+    interval : dict of str to (float, float)
+        Credible interval of each number.
+    covariance : array (4, 4)
+        Of the draws.
+    bands : dict of str to PhaseBands
+        By phase.
+    """
+
+    level: float
+    seed: int
+    n_draws: int
+    n_evaluations: int
+    largest_r_hat: float
+    smallest_effective_size: float
+    median: dict[str, float]
+    interval: dict[str, tuple[float, float]]
+    covariance: Matrix
+    bands: dict[str, PhaseBands]
+
+
+@result_class
+class ParameterProfile:
+    """Profile likelihood of one of the four identifiable numbers.
+
+    Parameters
+    ----------
+    name : str
+        Of the number.
+    values : array (n_values,)
+        Where it was held.
+    losses : array (n_values,)
+        Loss of log likelihood there, the other three numbers fitted.
+    low, high : float, optional
+        Ends of the interval, None where the rates set none.
+    """
+
+    name: str
+    values: Vector
+    losses: Vector
+    low: float | None
+    high: float | None
+
+
+@result_class
+class FssSensitivity:
+    """Sobol indices of FSS for the four identifiable numbers, in their order.
+
+    Parameters
+    ----------
+    lower, upper : array (4,)
+        Range of each number.
+    first, first_half_width : array (4,)
+        First-order index and half of its confidence interval. [1]
+    total, total_half_width : array (4,)
+        Total index and half of its confidence interval. [1]
+    mean_fss, deviation_fss : float
+        Mean and standard deviation of FSS over the ranges. [1]
+    evaluations : int
+        Of FSS.
+    """
+
+    lower: Vector
+    upper: Vector
+    first: Vector
+    first_half_width: Vector
+    total: Vector
+    total_half_width: Vector
+    mean_fss: Number
+    deviation_fss: Number
+    evaluations: int
+
+
+@result_class
+class HeldOffset:
+    """Best FSS in sample with the receptor held at each offset [mm], (n_offsets,)."""
+
+    offset_mm: Vector
+    fss_in_sample: Vector
+
+
+@result_class
+class OffsetFit:
+    """Fit of the four numbers and the receptor's offset.
+
+    Parameters
+    ----------
+    offset_mm, standard_error_mm : float
+        Offset along the finger, distal positive, and its standard error, NaN where it is not known. [mm]
+    folds_mm : array (n_folds,)
+        Offsets that the folds give. [mm]
+    identifiable : dict of str to float
+        The four numbers.
+    fss_in_sample, fss_out_of_sample : float
+        Fractional sum of squares over all stimuli, and mean over the folds.
+    fss_by_phase : dict of str to float
+        In sample, "dynamic" and "static".
+    n_evaluations : int
+        Evaluations of the model.
+    seconds : float
+        Time on the clock. [s]
+    held : HeldOffset
+        Fits with the receptor held.
+    """
+
+    offset_mm: float
+    standard_error_mm: Number
+    folds_mm: Vector
+    identifiable: dict[str, float]
+    fss_in_sample: float
+    fss_out_of_sample: float
+    fss_by_phase: dict[str, float]
+    n_evaluations: int
+    seconds: float
+    held: HeldOffset
+
+
+@result_class
+class PhaseRates:
+    """Rates of one phase, in the ramp or in the hold.
+
+    Parameters
+    ----------
+    fss_in_sample : float, optional
+        Fractional sum of squares over all stimuli; absent where the phase was not recorded.
+    observed_hz : array (n_stimuli,), optional
+        Recorded rates. [spikes/s]
+    fitted_hz : array (n_stimuli,)
+        Rates of the afferent that is fitted to all stimuli. [spikes/s]
+    out_of_sample_hz : array (n_stimuli,)
+        Rates that the fit without the stimulus' fold predicts. [spikes/s]
+    """
+
+    fss_in_sample: float | None
+    observed_hz: Vector | None
+    fitted_hz: Vector
+    out_of_sample_hz: Vector
+
+
+@result_class
+class FittedFold:
+    """One fold of the cross validation.
+
+    Parameters
+    ----------
+    fold : int
+        Number, from 1.
+    stimuli : tuple of str
+        Left out of the fit.
+    fss_train, fss_test : float
+        Fractional sum of squares over the other stimuli and over these.
+    n_evaluations : int
+        Evaluations of the model.
+    seconds : float
+        Time on the clock. [s]
+    parameters, identifiable : dict of str to float
+        The paper's six parameters, and the four that rates identify.
+    """
+
+    fold: int
+    stimuli: tuple[str, ...]
+    fss_train: float
+    fss_test: float
+    n_evaluations: int
+    seconds: float
+    parameters: dict[str, float]
+    identifiable: dict[str, float]
+
+
+@result_class
+class FitResult:
+    """Result of a fit to recordings.
+
+    Parameters
+    ----------
+    method, source : str
+        How it was fitted, and where the recordings come from.
+    n_evaluations : int
+        Evaluations of the model.
+    seconds : float
+        Time on the clock. [s]
+    parameters, identifiable : dict of str to float
+        The paper's six parameters, and the four that rates identify.
+    units, identifiable_units : dict of str to str
+        Their units.
+    identifiable_standard_error : dict of str to float
+        NaN where there is no covariance.
+    identifiable_covariance : array (4, 4), optional
+        Of the four numbers.
+    fss_in_sample, fss_training_mean, fss_out_of_sample : float
+        Over all stimuli; over training sets and testing sets, mean of the folds.
+    stimulus : tuple of str
+        Names.
+    fold : int array (n_stimuli,)
+        Fold of each stimulus, from 1.
+    phases : dict of str to PhaseRates
+        Rates by phase, "dynamic" and "static".
+    folds : tuple of FittedFold
+        The cross validation.
+    spikes : SpikeFitSummary, optional
+        Of the likelihood of spikes.
+    posterior : RatePosterior, optional
+        Credible intervals, where they were asked for.
+    profiles : tuple of ParameterProfile, optional
+        Profile likelihoods, where they were asked for.
+    sensitivity : FssSensitivity, optional
+        Sobol indices, where they were asked for.
+    offset : OffsetFit, optional
+        The fit with the receptor's offset as a further parameter.
+    shift_mm : array (n_stimuli,), optional
+        Shift of each stimulus, proximal positive, where stimuli differ in nothing else. [mm]
+    presentations : tuple of int
+        Presentations of each stimulus.
+    spikes_after_hold : int
+        Spikes that were left out because they came after the hold.
+    """
+
+    method: str
+    source: str
+    n_evaluations: int
+    seconds: float
+    parameters: dict[str, float]
+    identifiable: dict[str, float]
+    units: dict[str, str]
+    identifiable_units: dict[str, str]
+    identifiable_standard_error: dict[str, Number]
+    identifiable_covariance: Matrix | None
+    fss_in_sample: float
+    fss_training_mean: float
+    fss_out_of_sample: float
+    stimulus: tuple[str, ...]
+    fold: WholeVector
+    phases: dict[str, PhaseRates]
+    folds: tuple[FittedFold, ...]
+    spikes: SpikeFitSummary | None
+    posterior: RatePosterior | None
+    profiles: tuple[ParameterProfile, ...] | None
+    sensitivity: FssSensitivity | None
+    offset: OffsetFit | None
+    shift_mm: Vector | None = None
+    presentations: tuple[int, ...] = ()
+    spikes_after_hold: int = 0
