@@ -10,9 +10,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.special import ndtri
 from scipy.stats import kstwo
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checks import FloatArray, finite
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Presentations
 from fingerpad.core.results import Matrix, Number, Vector, result_class
@@ -50,6 +51,9 @@ from studies.noisy_lif import noisy_spikes
 
 WIDTH = 0.2
 """Width of the true threshold over the threshold."""
+
+POSITIVE = np.array([False, False, False, True, True])
+"""Whether a parameter is positive: tau and the width are."""
 
 N_REPEATS = 5
 LEVEL = 0.95
@@ -330,8 +334,41 @@ def _fit_if_possible(recorded: SpikeLikelihood) -> SpikeFit | None:
         return None
 
 
+def interval(fit: SpikeFit, level: float) -> FloatArray:
+    """Confidence interval of each parameter, symmetric for the gains, in the logarithm for tau and width.
+
+    Parameters
+    ----------
+    fit : SpikeFit
+        Estimates and their standard errors.
+    level : float
+        Probability that such intervals contain the true value. [0-1]
+
+    Returns
+    -------
+    array (5, 2)
+        Lower and upper end.
+
+    Raises
+    ------
+    InputError
+        If the level does not lie between 0 and 1.
+    """
+    if not 0.0 < finite("level", level) < 1.0:
+        raise InputError(f"level must lie between 0 and 1: got {level!r}.")
+    reach = ndtri(0.5 + 0.5 * level) * fit.standard_errors
+    relative = reach / np.abs(fit.parameters)
+    return np.stack(
+        [
+            np.where(POSITIVE, fit.parameters * np.exp(sign * relative), fit.parameters + sign * reach)
+            for sign in (-1.0, 1.0)
+        ],
+        axis=1,
+    )
+
+
 def _recovery(recorded: SpikeLikelihood, fit: SpikeFit, true: FloatArray) -> Recovery:
-    low, high = fit.interval(LEVEL).T
+    low, high = interval(fit, LEVEL).T
     rescaled = time_rescaling(recorded, fit.parameters)
     shares = (np.arange(N_QUANTILES) + 0.5) / N_QUANTILES
     return Recovery(
@@ -344,7 +381,7 @@ def _recovery(recorded: SpikeLikelihood, fit: SpikeFit, true: FloatArray) -> Rec
         low=low,
         high=high,
         n_held=int(((low < true) & (high > true)).sum()),
-        correlation=fit.correlation,
+        correlation=fit.covariance / np.outer(fit.standard_errors, fit.standard_errors),
         log_likelihood=fit.log_likelihood,
         log_likelihood_of_truth=recorded.log_likelihood(true),
         n_steps=len(fit.history) - 1,

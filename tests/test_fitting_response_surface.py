@@ -59,10 +59,9 @@ def test_direction_on_a_plane_is_exact_in_coded_units() -> None:
 
     fit = maximise(capped_plane, start, increments)
     moved = (fit.history[1].parameters - start) / increments
-    np.testing.assert_allclose(fit.history[1].slopes, slopes, rtol=1e-12)
     # Steps of 1 and 2 units gain 5 and 10; everything farther is flat.
     np.testing.assert_allclose(moved, 3.0 * slopes / 5.0, rtol=1e-12)
-    assert fit.objective == pytest.approx(15.0)
+    assert fit.score == pytest.approx(15.0)
 
 
 def test_first_iteration_runs_65_points_before_it_steps() -> None:
@@ -71,8 +70,8 @@ def test_first_iteration_runs_65_points_before_it_steps() -> None:
     fit = maximise(objective, start, increments)
     np.testing.assert_allclose(objective.points[:65], start + factorial_design(6) * increments)
     np.testing.assert_allclose(objective.points[65], start + 0.01 / np.sqrt(6.0), rtol=1e-12)
-    assert fit.n_runs == len(objective.points)
-    assert fit.n_runs >= 65 * len(fit.history)
+    assert fit.n_evaluations == len(objective.points)
+    assert fit.n_evaluations >= 65 * len(fit.history)
 
 
 @settings(deadline=None, max_examples=25)
@@ -87,27 +86,27 @@ def test_the_top_of_a_bowl_is_found_within_an_increment(centre: list[float], cur
     )
     # No unit step gains: the slope is below half a unit times the largest curvature, divided by the smallest.
     assert np.abs(fit.parameters - centre).max() <= 0.5 * increment * 2.0 / 0.5
-    assert fit.objective <= 1.0
+    assert fit.score <= 1.0
 
 
 def test_history_never_falls_and_ends_with_the_result() -> None:
     centre, curvature = np.array([1.0, -2.0, 0.5]), np.array([1.0, 8.0, 3.0])
     function = bowl(centre, curvature)
     fit = maximise(function, np.zeros(3), np.full(3, 0.01))
-    values = [row.objective for row in fit.history]
+    values = [row.score for row in fit.history]
     assert (np.diff(values) > 1e-4).all()
     assert values == [function(row.parameters) for row in fit.history]
     assert fit.history[0].parameters.tolist() == [0.0, 0.0, 0.0]
-    assert fit.objective == values[-1]
+    assert fit.score == values[-1]
     assert fit.parameters.tolist() == fit.history[-1].parameters.tolist()
-    assert sum(row.n_runs for row in fit.history) + 9 < fit.n_runs
+    assert fit.n_evaluations > 10 * len(fit.history)
     assert len(fit.history) == len(values) >= 3
 
 
 def test_a_start_at_the_top_stays_there() -> None:
     fit = maximise(bowl(np.zeros(2), np.ones(2)), np.zeros(2), np.full(2, 0.1))
     assert fit.parameters.tolist() == [0.0, 0.0]
-    assert (len(fit.history), fit.n_runs) == (1, 5)
+    assert (len(fit.history), fit.n_evaluations) == (1, 5)
 
 
 def test_jumps_smaller_than_an_increment_do_not_stop_the_climb() -> None:
@@ -117,7 +116,7 @@ def test_jumps_smaller_than_an_increment_do_not_stop_the_climb() -> None:
         return float(np.round(100.0 * bowl(centre, np.full(2, 0.1))(parameters)) / 100.0)
 
     fit = maximise(stairs, np.zeros(2), np.full(2, 0.2))
-    assert fit.objective >= 0.98
+    assert fit.score >= 0.98
 
 
 def test_the_climb_is_deterministic() -> None:
@@ -125,7 +124,7 @@ def test_the_climb_is_deterministic() -> None:
         maximise(bowl(np.ones(2), np.array([1.0, 5.0])), [0.0, 0.3], [0.01, 0.02]) for _ in range(2)
     )
     assert first.parameters.tobytes() == second.parameters.tobytes()
-    assert first.n_runs == second.n_runs
+    assert first.n_evaluations == second.n_evaluations
 
 
 def test_no_run_goes_below_a_bound_and_the_free_parameter_still_climbs() -> None:

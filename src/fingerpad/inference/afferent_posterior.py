@@ -1,10 +1,9 @@
 """Posterior of an afferent's four identifiable parameters, given recorded rates.
 
 The draws are in coordinates in which the parameters correlate least: the potential at rest over the
-threshold, u = beta tau/(C v), and the logarithms of both gains and of tau. If the afferent must be silent at
-rest, u < 1, then ln(1 - u) is sampled instead of u. That coordinate is unbounded, and the posterior has
-straight ridges in it: an afferent that fires from an energy density U on determines k_s tau U/(C v) relative
-to 1 - u.
+threshold, u = beta tau/(C v), and the logarithms of both gains and of tau. The afferent is silent at rest,
+u < 1, and ln(1 - u) is sampled instead of u. That coordinate is unbounded, and the posterior has straight
+ridges in it: an afferent that fires from an energy density U on determines k_s tau U/(C v) relative to 1 - u.
 """
 
 from __future__ import annotations
@@ -82,7 +81,8 @@ def from_coordinates(points: ArrayLike) -> FloatArray:
 class AfferentPrior:
     """Weakly informative prior of an afferent's parameters.
 
-    The potential at rest is normal about 0; gains and time constant are log-normal about the start point of
+    The potential at rest is normal about 0 and stays below the threshold, so that no spike occurs without a
+    stimulus; gains and time constant are log-normal about the start point of
     fits, the paper's first one with its gains rescaled. See docs/decisions/priors.md.
 
     Parameters
@@ -93,8 +93,6 @@ class AfferentPrior:
         Medians of k_d/(C v), k_s/(C v) and tau. [1/kPa, 1/(kPa ms), ms]
     gain_factor, time_constant_factor : float
         Two thirds of the prior lie between the median divided and multiplied by this factor. [1]
-    silent_at_rest : bool
-        Whether the potential at rest stays below the threshold, so that no spike occurs without a stimulus.
     """
 
     resting_share_sd: float = 1.0
@@ -103,7 +101,6 @@ class AfferentPrior:
     time_constant_ms: float = float(_START[3])
     gain_factor: float = 10.0
     time_constant_factor: float = 2.0
-    silent_at_rest: bool = True
 
     def __post_init__(self) -> None:
         for name in ("resting_share_sd", *IDENTIFIABLE_NAMES[1:]):
@@ -127,7 +124,7 @@ class AfferentPrior:
     def log_density(self, coordinates: FloatArray) -> FloatArray:
         """Log density of rows of coordinates, up to a constant; -inf where it is impossible."""
         logarithm = -0.5 * (((coordinates - self.centre) / self.spread) ** 2).sum(axis=-1)
-        return np.where(self.silent_at_rest & (coordinates[..., 0] >= 1.0), -np.inf, logarithm)
+        return np.where(coordinates[..., 0] >= 1.0, -np.inf, logarithm)
 
 
 @dataclass(frozen=True)
@@ -217,22 +214,22 @@ def afferent_posterior(
     ConvergenceError
         If the draws have not converged.
     """
-    weak = prior or AfferentPrior()
-    density, centre = log_posterior(likelihood, weak), to_coordinates(start)
-    if weak.silent_at_rest:
-        centre[0] = min(centre[0], 1.0 - SMALLEST_MARGIN)
-        chains = _constrained_chains(
-            sample(
-                _unconstrained_density(density),
-                _unconstrained(centre),
-                START_SPREAD,
-                COORDINATE_NAMES,
-                seed=seed,
-                **settings,
-            )
+    density, centre = log_posterior(likelihood, prior or AfferentPrior()), to_coordinates(start)
+    centre[0] = min(centre[0], 1.0 - SMALLEST_MARGIN)
+
+    def unconstrained_density(points: FloatArray) -> FloatArray:
+        return density(_constrained(points)) + points[:, 0]  # the Jacobian's logarithm is ln(1 - u)
+
+    chains = _constrained_chains(
+        sample(
+            unconstrained_density,
+            _unconstrained(centre),
+            START_SPREAD,
+            COORDINATE_NAMES,
+            seed=seed,
+            **settings,
         )
-    else:
-        chains = sample(density, centre, START_SPREAD, COORDINATE_NAMES, seed=seed, **settings)
+    )
     random = np.random.Generator(np.random.Philox([seed, 1]))
     some = from_coordinates(chains.spread_out(N_PREDICTED))
     return AfferentPosterior(chains, from_coordinates(chains.flat), likelihood.residual_draws(some, random))
@@ -246,11 +243,6 @@ def _unconstrained(coordinates: FloatArray) -> FloatArray:
 def _constrained(points: FloatArray) -> FloatArray:
     """Replace ln(1 - u) by u: the inverse of `_unconstrained`."""
     return np.concatenate([1.0 - np.exp(points[..., :1]), points[..., 1:]], axis=-1)
-
-
-def _unconstrained_density(log_density: LogDensity) -> LogDensity:
-    """Transform a log density in u to one in ln(1 - u); the logarithm of the Jacobian is ln(1 - u)."""
-    return lambda points: log_density(_constrained(points)) + points[:, 0]
 
 
 def _constrained_chains(chains: Chains) -> Chains:

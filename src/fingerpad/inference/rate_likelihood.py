@@ -25,7 +25,7 @@ from scipy.special import logsumexp
 from fingerpad.core.checks import FloatArray, float_array, positive
 from fingerpad.core.errors import InputError
 from fingerpad.inference.rate_model import RateModel
-from fingerpad.inference.recordings import RateRecordings
+from fingerpad.inference.recordings import PHASES, RateRecordings
 
 INDEPENDENT = 0.0
 """Length at which residuals are independent. [mm]"""
@@ -130,26 +130,9 @@ class RateLikelihood:
         -------
         array (n_points,)
         """
-        return self.log_likelihood_of_rates(*self.model.evaluate_batch(points))
-
-    def log_likelihood_of_rates(self, dynamic_hz: FloatArray, static_hz: FloatArray) -> FloatArray:
-        """Log likelihood as above, for predicted rates.
-
-        Parameters
-        ----------
-        dynamic_hz, static_hz : array (n_points, n_stimuli)
-            Predicted rates; those of a phase that was not recorded are not used. [spikes/s]
-
-        Returns
-        -------
-        array (n_points,)
-        """
         return sum(
-            (
-                logsumexp(self._log_shares(squares), axis=1)
-                for _, _, squares in self._phases(dynamic_hz, static_hz)
-            ),
-            start=np.zeros(len(dynamic_hz)),
+            (logsumexp(self._log_shares(squares), axis=1) for _, _, squares in self._phases(points)),
+            start=np.zeros(len(points)),
         )
 
     def residual_draws(self, points: FloatArray, random: np.random.Generator) -> dict[str, ResidualDraws]:
@@ -167,28 +150,9 @@ class RateLikelihood:
         dict of str to ResidualDraws
             By phase.
         """
-        return self.residual_draws_of_rates(*self.model.evaluate_batch(points), random)
-
-    def residual_draws_of_rates(
-        self, dynamic_hz: FloatArray, static_hz: FloatArray, random: np.random.Generator
-    ) -> dict[str, ResidualDraws]:
-        """Draw as above, for predicted rates.
-
-        Parameters
-        ----------
-        dynamic_hz, static_hz : array (n_points, n_stimuli)
-            Predicted rates. [spikes/s]
-        random : Generator
-            Source of the random numbers.
-
-        Returns
-        -------
-        dict of str to ResidualDraws
-            By phase.
-        """
         return {
             phase: self._residuals_of(predicted, squares, random)
-            for phase, predicted, squares in self._phases(dynamic_hz, static_hz)
+            for phase, predicted, squares in self._phases(points)
         }
 
     def _residuals_of(
@@ -203,11 +167,9 @@ class RateLikelihood:
         new = np.maximum(predicted + deviation[:, None] * random.normal(size=predicted.shape), 0.0)
         return ResidualDraws(predicted, new, deviation, np.array(self.lengths_mm)[which])
 
-    def _phases(
-        self, dynamic_hz: FloatArray, static_hz: FloatArray
-    ) -> Iterator[tuple[str, FloatArray, FloatArray]]:
+    def _phases(self, points: FloatArray) -> Iterator[tuple[str, FloatArray, FloatArray]]:
         """Name, predicted rates (n_points, n_stimuli) and q (n_points, n_lengths) of each recorded phase."""
-        predicted = {"dynamic": dynamic_hz, "static": static_hz}
+        predicted = dict(zip(PHASES, self.model.evaluate_batch(points), strict=True))
         for phase in self.phases:
             residuals = getattr(self.recordings, f"{phase}_rate_hz") - predicted[phase]
             white = residuals @ np.swapaxes(self._whitening, 1, 2)  # (n_lengths, n_points, n_stimuli)

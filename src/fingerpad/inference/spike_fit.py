@@ -11,13 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import ndtri
 
-from fingerpad.core.checks import FloatArray, finite, whole
+from fingerpad.core.checks import FloatArray, whole
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.inference.spike_likelihood import (
-    SpikeLikelihood,
-)
+from fingerpad.inference.spike_likelihood import SpikeLikelihood
 from fingerpad.inference.spike_parameters import (
     N_PARAMETERS,
     canonical,
@@ -25,9 +22,6 @@ from fingerpad.inference.spike_parameters import (
     checked_spike_parameters,
     from_canonical,
 )
-
-POSITIVE = np.array([False, False, False, True, True])
-"""Whether a parameter is positive: tau and the width are."""
 
 NARROWEST = 1.0e-3
 """Width below which the threshold is considered hard and log L unbounded."""
@@ -67,41 +61,6 @@ class SpikeFit:
     def standard_errors(self) -> FloatArray:
         """Square roots of the variances (5,), in the units of the parameters."""
         return np.sqrt(np.diag(self.covariance))
-
-    @property
-    def correlation(self) -> FloatArray:
-        """Correlation of the estimates (5, 5)."""
-        return self.covariance / np.outer(self.standard_errors, self.standard_errors)
-
-    def interval(self, level: float = 0.95) -> FloatArray:
-        """Confidence interval of each parameter, symmetric for the gains, in the logarithm for tau and width.
-
-        Parameters
-        ----------
-        level : float, optional
-            Probability that such intervals contain the true value. [0-1]
-
-        Returns
-        -------
-        array (5, 2)
-            Lower and upper end.
-
-        Raises
-        ------
-        InputError
-            If the level does not lie between 0 and 1.
-        """
-        if not 0.0 < finite("level", level) < 1.0:
-            raise InputError(f"level must lie between 0 and 1: got {level!r}.")
-        reach = ndtri(0.5 + 0.5 * level) * self.standard_errors
-        relative = reach / np.abs(self.parameters)
-        return np.stack(
-            [
-                np.where(POSITIVE, self.parameters * np.exp(sign * relative), self.parameters + sign * reach)
-                for sign in (-1.0, 1.0)
-            ],
-            axis=1,
-        )
 
 
 def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 100) -> SpikeFit:

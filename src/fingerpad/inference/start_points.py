@@ -6,8 +6,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.data import neuron
-from fingerpad.inference.fitting.methods import ResponseSurface
-from fingerpad.inference.fitting.response_surface import coding_increments
+from fingerpad.inference.fitting.response_surface import ResponseSurface, coding_increments
 from fingerpad.inference.identifiable import identifiable
 
 INCREMENT = 0.01

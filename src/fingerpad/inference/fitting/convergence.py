@@ -88,8 +88,8 @@ def effective_size(draws: FloatArray) -> float:
     return float(min(variance / variance_of_mean, values.size))
 
 
-def bulk_effective_size(draws: FloatArray) -> float:
-    """Return the effective sample size of the centre: that of rank-normalised draws.
+def effective_sizes(draws: FloatArray) -> tuple[float, float]:
+    """Return the effective sample sizes of the centre and of the tails.
 
     Parameters
     ----------
@@ -98,37 +98,24 @@ def bulk_effective_size(draws: FloatArray) -> float:
 
     Returns
     -------
-    float
-        It is invariant under increasing transformations of the parameter. [1]
+    centre : float
+        That of rank-normalised draws; invariant under increasing transformations of the parameter. [1]
+    tails : float
+        The smaller one of the indicators of both 2.5 % tails, for the ends of a 95 % interval. [1]
 
     Notes
     -----
-    Rank normalisation (Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021).
+    Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021.
 
     Examples
     --------
     >>> draws = np.random.default_rng(1).normal(size=(4, 100, 20))
-    >>> bulk_effective_size(np.exp(5.0 * draws)) == bulk_effective_size(draws)
+    >>> effective_sizes(np.exp(5.0 * draws)) == effective_sizes(draws)
     True
     """
-    return effective_size(_normal_scores(_checked(draws)))
-
-
-def tail_effective_size(draws: FloatArray) -> float:
-    """Return the smaller effective sample size of the indicators of both 2.5 % tails.
-
-    Parameters
-    ----------
-    draws : array (n_ensembles, n_steps, n_walkers)
-        One parameter along the chains.
-
-    Returns
-    -------
-    float
-        Effective sample size of the ends of a 95 % interval. [1]
-    """
     values = _checked(draws)
-    return min(effective_size((values <= end).astype(np.float64)) for end in np.quantile(values, TAILS))
+    tails = (values <= end for end in np.quantile(values, TAILS))
+    return effective_size(_normal_scores(values)), min(effective_size(1.0 * tail) for tail in tails)
 
 
 def _checked(draws: FloatArray) -> FloatArray:

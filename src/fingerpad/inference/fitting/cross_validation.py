@@ -116,7 +116,7 @@ def cross_validate(problem: Problem, method: Method, memberships: ArrayLike) -> 
 
     Examples
     --------
-    >>> from fingerpad.inference.fitting.methods import ResponseSurface
+    >>> from fingerpad.inference.fitting.response_surface import ResponseSurface
     >>> class Line:
     ...     names, n_observations = ("slope",), 4
     ...     def residuals(self, slope, chosen):

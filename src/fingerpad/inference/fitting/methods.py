@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, IntArray, float_array
-from fingerpad.core.errors import InputError
+from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.inference.fitting.problem import Problem
-from fingerpad.inference.fitting.response_surface import maximise
 
 
 @dataclass(frozen=True)
@@ -108,71 +104,6 @@ def best_of(attempts: tuple[Fit, ...]) -> Fit:
 
 
 @dataclass(frozen=True)
-class ResponseSurface:
-    """The paper's method: response surfaces and steepest ascent from each start; the best result is taken.
-
-    Parameters
-    ----------
-    starts : array_like (n_starts, n_parameters)
-        Start points.
-    increments : array_like (n_parameters,) or (n_starts, n_parameters)
-        One coded unit of each parameter, for all start points or for each.
-    lower_bounds : array_like (n_parameters,), optional
-        Lower limits of all evaluations; -inf for none.
-    smallest_gain : float
-        A gain of at most this much ends a fit.
-    most_iterations : int
-        Largest number of iterations.
-
-    Raises
-    ------
-    InputError
-        If shapes disagree.
-
-    Notes
-    -----
-    Gerling et al. 2014, section 2.2.2; see
-    `fingerpad.inference.fitting.response_surface.maximise`. The method is deterministic.
-    """
-
-    starts: ArrayLike
-    increments: ArrayLike
-    lower_bounds: ArrayLike | None = None
-    smallest_gain: float = 1.0e-4
-    most_iterations: int = 200
-    name: str = "response surface"
-
-    def __post_init__(self) -> None:
-        starts = float_array("starts", self.starts, 2)
-        units = np.array(self.increments, dtype=np.float64)
-        if units.shape not in (starts.shape, starts.shape[1:]):
-            raise InputError(
-                f"increments must match starts {starts.shape} or one row of it: got {units.shape}."
-            )
-        object.__setattr__(self, "starts", starts)
-        object.__setattr__(self, "increments", np.broadcast_to(units, starts.shape))
-
-    def fit(self, problem: Problem, chosen: IntArray) -> Fit:
-        """Fit from every start."""
-
-        def fit_from(start: FloatArray, units: FloatArray) -> Fit:
-            clock = time.perf_counter()
-            found = maximise(
-                lambda parameters: problem.score(parameters, chosen),
-                start,
-                units,
-                self.lower_bounds,
-                self.smallest_gain,
-                self.most_iterations,
-            )
-            steps = tuple(FitStep(row.parameters, row.objective) for row in found.history)
-            return Fit(found.parameters, found.objective, found.n_runs, time.perf_counter() - clock, steps)
-
-        starts, increments = np.asarray(self.starts), np.asarray(self.increments)
-        return best_of(tuple(fit_from(start, units) for start, units in zip(starts, increments, strict=True)))
-
-
-@dataclass(frozen=True)
 class Continued:
     """Two methods in sequence: a cheap one for the start of the second.
 
@@ -195,6 +126,7 @@ class Continued:
     ...         return parameters - 3.0
     ...     def score(self, parameters, chosen):
     ...         return 1.0 - float((parameters[0] - 3.0) ** 2)
+    >>> from fingerpad.inference.fitting.response_surface import ResponseSurface
     >>> wide = ResponseSurface([[0.0]], [0.5])
     >>> narrow = lambda parameters: ResponseSurface([parameters], [0.01])
     >>> Continued(wide, narrow, name="both").fit(Hill(), np.arange(1)).parameters.round(2).tolist()

@@ -25,7 +25,7 @@ from threadpoolctl import threadpool_limits
 
 from fingerpad.core.checks import FloatArray, finite, float_array, positive, whole
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.inference.fitting.convergence import bulk_effective_size, split_r_hat, tail_effective_size
+from fingerpad.inference.fitting.convergence import effective_sizes, split_r_hat
 
 LogDensity = Callable[[FloatArray], FloatArray]
 """From points (n_points, n_parameters) to their log densities up to a constant, -inf outside."""
@@ -81,26 +81,6 @@ class Chains:
     def flat(self) -> FloatArray:
         """All draws (n_draws, n_parameters)."""
         return self.draws.reshape(-1, self.draws.shape[-1])
-
-    @property
-    def mean(self) -> FloatArray:
-        """Mean of the draws (n_parameters,)."""
-        return self.flat.mean(axis=0)
-
-    @property
-    def covariance(self) -> FloatArray:
-        """Covariance of the draws (n_parameters, n_parameters)."""
-        return np.cov(self.flat, rowvar=False).reshape(len(self.names), len(self.names))
-
-    def interval(self, level: float = 0.95) -> FloatArray:
-        """Return the central credible interval of each parameter, (2, n_parameters).
-
-        Parameters
-        ----------
-        level : float, optional
-            Probability within. [0-1]
-        """
-        return credible_band(self.flat, level)
 
     def spread_out(self, n_draws: int) -> FloatArray:
         """Return some of the draws (n_draws, n_parameters), evenly spaced along the chains.
@@ -198,8 +178,10 @@ def sample(
     >>> def normal(points):
     ...     return -0.5 * ((points - [1.0, -2.0]) ** 2).sum(axis=1)
     >>> chains = sample(normal, [0.0, 0.0], [2.0, 2.0], ("a", "b"), seed=1)
-    >>> chains.mean.round(0).tolist(), (chains.interval() - chains.mean).round(0).tolist()
-    ([1.0, -2.0], [[-2.0, -2.0], [2.0, 2.0]])
+    >>> chains.flat.mean(axis=0).round(0).tolist()
+    [1.0, -2.0]
+    >>> (credible_band(chains.flat) - [1.0, -2.0]).round(0).tolist()
+    [[-2.0, -2.0], [2.0, 2.0]]
     """
     labels = tuple(names)
     middle, scale = float_array("centre", centre, 1), float_array("spread", spread, 1)
@@ -223,10 +205,9 @@ def sample(
                 ensemble.run(wanted - done)
         done = wanted
         draws = np.array([ensemble.sampler.get_chain(discard=done // 2) for ensemble in ensembles])
-        r_hat, bulk, tail = (
-            np.array([measure(draws[..., index]) for index in range(len(labels))])
-            for measure in (split_r_hat, bulk_effective_size, tail_effective_size)
-        )
+        each = np.moveaxis(draws, -1, 0)
+        r_hat = np.array([split_r_hat(one) for one in each])
+        bulk, tail = np.array([effective_sizes(one) for one in each]).T
         history.append(
             f"{done} steps: R-hat at most {r_hat.max():.4f}, effective sample size at least {bulk.min():.0f} "
             f"in the middle and {tail.min():.0f} in the tails, of {draws[..., 0].size} draws"

@@ -8,67 +8,22 @@ without gain.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, whole
+from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, not_negative, whole
 from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.inference.fitting.methods import Fit, FitStep, best_of
+from fingerpad.inference.fitting.problem import Problem
 
 Objective = Callable[[FloatArray], float]
 
 _MOST_PARAMETERS = 12
 _MOST_STEPS = 200
-
-
-@dataclass(frozen=True)
-class Iteration:
-    """One iteration of the response surface method.
-
-    Parameters
-    ----------
-    parameters : array (n_parameters,)
-        Parameters at the end of the iteration.
-    objective : float
-        Value of the objective there.
-    slopes : array (n_parameters,)
-        Regression coefficients at the base, gain per coding increment; zeros in the row of the start, which
-        precedes any regression.
-    n_steps : int
-        Steps of the ascent with a gain.
-    n_runs : int
-        Evaluations of the objective at corners, base and steps; 0 in the row of the start.
-    """
-
-    parameters: FloatArray
-    objective: float
-    slopes: FloatArray
-    n_steps: int
-    n_runs: int
-
-
-@dataclass(frozen=True)
-class ResponseSurfaceFit:
-    """Result of the response surface method.
-
-    Parameters
-    ----------
-    parameters : array (n_parameters,)
-        The best parameters.
-    objective : float
-        Value of the objective there.
-    history : tuple of Iteration
-        The start, then one row per iteration with a gain; the last row is the result.
-    n_runs : int
-        Evaluations of the objective, including the last iteration without gain.
-    """
-
-    parameters: FloatArray
-    objective: float
-    history: tuple[Iteration, ...]
-    n_runs: int
 
 
 def factorial_design(n_parameters: int) -> FloatArray:
@@ -166,7 +121,7 @@ def maximise(
     lower_bounds: ArrayLike | None = None,
     smallest_gain: float = 1.0e-4,
     most_iterations: int = 200,
-) -> ResponseSurfaceFit:
+) -> Fit:
     """Maximise `objective` from `start` by the response surface method.
 
     Parameters
@@ -187,7 +142,9 @@ def maximise(
 
     Returns
     -------
-    ResponseSurfaceFit
+    Fit
+        Its history is the start, then one step per iteration with a gain. Evaluations include those of the
+        last iteration, which has none.
 
     Raises
     ------
@@ -213,35 +170,81 @@ def maximise(
     floor = _floor(lower_bounds, base, units)
     not_negative("smallest_gain", smallest_gain)
     whole("most_iterations", most_iterations, at_least=1)
-    design = factorial_design(base.size)
-    history: list[Iteration] = []
-    n_runs = 0
+    clock, design = time.perf_counter(), factorial_design(base.size)
+    history: list[FitStep] = []
+    n_evaluations = 0
     for _ in range(most_iterations):
-        iteration, value_at_base = _iterate(objective, design, base, units, floor)
-        n_runs += iteration.n_runs
+        values = np.array([_value(objective, base + coded * units) for coded in design])
+        at_base = float(values[-1])
         if not history:
-            history.append(
-                Iteration(base, value_at_base, _read_only(np.zeros(base.size)), n_steps=0, n_runs=0)
-            )
-        if iteration.objective - value_at_base <= smallest_gain:
-            return ResponseSurfaceFit(base, value_at_base, tuple(history), n_runs)
-        history.append(iteration)
-        base = iteration.parameters
+            history.append(FitStep(base, at_base))
+        best, highest, n_trials = _ascend(
+            objective, base, at_base, regression_slopes(design, values), units, floor
+        )
+        n_evaluations += len(design) + n_trials
+        if highest - at_base <= smallest_gain:
+            return Fit(base, at_base, n_evaluations, time.perf_counter() - clock, tuple(history))
+        base = _read_only(best)
+        history.append(FitStep(base, highest))
     raise ConvergenceError(
         f"maximise has not converged after {most_iterations} iterations: allow more or larger increments.",
-        tuple(f"iteration {number}: {row.objective:.6g}" for number, row in enumerate(history)),
+        tuple(f"iteration {number}: {step.score:.6g}" for number, step in enumerate(history)),
     )
 
 
-def _iterate(
-    objective: Objective, design: FloatArray, base: FloatArray, units: FloatArray, floor: FloatArray
-) -> tuple[Iteration, float]:
-    """One iteration: factorial runs, regression and steepest ascent; also return the value at the base."""
-    values = np.array([_value(objective, base + coded * units) for coded in design])
-    slopes = regression_slopes(design, values)
-    best, best_value, n_gains, n_trials = _ascend(objective, base, values[-1], slopes, units, floor)
-    iteration = Iteration(_read_only(best), best_value, _read_only(slopes), n_gains, len(design) + n_trials)
-    return iteration, float(values[-1])
+@dataclass(frozen=True)
+class ResponseSurface:
+    """The paper's method: response surfaces and steepest ascent from each start; the best result is taken.
+
+    Parameters
+    ----------
+    starts : array_like (n_starts, n_parameters)
+        Start points.
+    increments : array_like (n_parameters,) or (n_starts, n_parameters)
+        One coded unit of each parameter, for all start points or for each.
+    lower_bounds : array_like (n_parameters,), optional
+        Lower limits of all evaluations; -inf for none.
+    smallest_gain : float
+        A gain of at most this much ends a fit.
+    most_iterations : int
+        Largest number of iterations.
+
+    Raises
+    ------
+    InputError
+        If shapes disagree.
+
+    Notes
+    -----
+    Gerling et al. 2014, section 2.2.2; see `maximise`. The method is deterministic.
+    """
+
+    starts: ArrayLike
+    increments: ArrayLike
+    lower_bounds: ArrayLike | None = None
+    smallest_gain: float = 1.0e-4
+    most_iterations: int = 200
+    name: str = "response surface"
+
+    def __post_init__(self) -> None:
+        starts = float_array("starts", self.starts, 2)
+        units = np.array(self.increments, dtype=np.float64)
+        if units.shape not in (starts.shape, starts.shape[1:]):
+            raise InputError(
+                f"increments must match starts {starts.shape} or one row of it: got {units.shape}."
+            )
+        object.__setattr__(self, "starts", starts)
+        object.__setattr__(self, "increments", np.broadcast_to(units, starts.shape))
+
+    def fit(self, problem: Problem, chosen: IntArray) -> Fit:
+        """Fit from every start."""
+
+        def score(parameters: FloatArray) -> float:
+            return problem.score(parameters, chosen)
+
+        limits = (self.lower_bounds, self.smallest_gain, self.most_iterations)
+        pairs = zip(np.asarray(self.starts), np.asarray(self.increments), strict=True)
+        return best_of(tuple(maximise(score, start, units, *limits) for start, units in pairs))
 
 
 def _ascend(
@@ -251,24 +254,24 @@ def _ascend(
     slopes: FloatArray,
     units: FloatArray,
     floor: FloatArray,
-) -> tuple[FloatArray, float, int, int]:
-    """Best point on the path of steepest ascent, its value, the steps with a gain and all steps."""
-    best, best_value = base, float(value_at_base)
+) -> tuple[FloatArray, float, int]:
+    """Best point on the path of steepest ascent, its value, and the steps that were tried."""
+    best, best_value = base, value_at_base
     steepness = float(np.linalg.norm(slopes))
     if steepness == 0.0:
-        return best, best_value, 0, 0
+        return best, best_value, 0
     direction = slopes / steepness * units
-    step, n_gains = 1.0, 0
+    step = 1.0
     for n_trials in range(1, _MOST_STEPS + 1):
         trial = np.maximum(best + step * direction, floor)
         value = _value(objective, trial)
         if value > best_value:
-            best, best_value, n_gains = trial, value, n_gains + 1
+            best, best_value = trial, value
             step *= 2.0
         elif step > 1.0:
             step /= 2.0
         else:
-            return best, best_value, n_gains, n_trials
+            return best, best_value, n_trials
     raise ConvergenceError(
         f"The ascent has not ended after {_MOST_STEPS} steps: the objective must have a maximum.",
         (f"last point {best.tolist()}: {best_value:.6g}",),
