@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,7 +12,13 @@ from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.report.style import BLACK, BLUE, new_figure, numbers, say_nothing_to_draw, write_png
+from fingerpad.core.signals import ResponseMap
+from fingerpad.report.style import BLACK, BLUE, new_figure, say_nothing_to_draw, write_png
+
+if TYPE_CHECKING:
+    from fingerpad.geometry.indenters import Indenter
+    from fingerpad.skin.sampling import SkinResponse
+    from fingerpad.skin.section import Section
 
 SKIN = LinearSegmentedColormap.from_list(
     "skin", ["#f7ece1", "#f3c9a5", "#e58a5e", "#b8405e", "#5c1a63", "#1d0b33"]
@@ -32,101 +38,8 @@ BONE = "#9a9488"
 """Colour of bone and nail."""
 
 
-class FingerSection(Protocol):
-    """What a `skin.section.Section` knows."""
-
-    @property
-    def corners_mm(self) -> FloatArray:
-        """Corners of the faces, (n_faces, 4, 2). [mm]"""
-
-    @property
-    def elements(self) -> np.ndarray:
-        """The element of each face, (n_faces,)."""
-
-    @property
-    def skin_mm(self) -> FloatArray:
-        """Edges of the outline on free skin, (n_edges, 2, 2). [mm]"""
-
-    @property
-    def nail_mm(self) -> FloatArray:
-        """Edges under the nail, (n_edges, 2, 2). [mm]"""
-
-    @property
-    def bone_mm(self) -> FloatArray:
-        """Edges on the bone, (n_edges, 2, 2). [mm]"""
-
-
-class FingerMesh(Protocol):
-    """What a `geometry.mesh.Mesh` knows."""
-
-    @property
-    def nodes_mm(self) -> FloatArray:
-        """Undeformed nodes, (n_nodes, 3). [mm]"""
-
-    @property
-    def midline_nodes(self) -> np.ndarray:
-        """Nodes of the volar skin at z = 0, x increasing."""
-
-
-class PressedSkin(Protocol):
-    """What a `SkinResponse` knows."""
-
-    @property
-    def mesh(self) -> FingerMesh:
-        """The undeformed finger."""
-
-    @property
-    def times_ms(self) -> FloatArray:
-        """Times, (n_times,). [ms]"""
-
-    @property
-    def depth_mm(self) -> FloatArray:
-        """Depth of the indenter, (n_times,). [mm]"""
-
-    @property
-    def sed_kpa(self) -> FloatArray:
-        """Strain energy density, (n_times, n_elements). [kPa]"""
-
-    @property
-    def axis_x_mm(self) -> float:
-        """Where the indenter's axis meets the midline. [mm]"""
-
-    @property
-    def direction(self) -> FloatArray:
-        """Unit direction of pressing, (3,)."""
-
-    def section(self) -> FingerSection:
-        """Return the deformed middle plane."""
-
-
-class Spikes(Protocol):
-    """What `SpikeTrains` know."""
-
-    def __getitem__(self, afferent: int) -> FloatArray:
-        """Spike times of one afferent. [ms]"""
-
-
-class Response(Protocol):
-    """What a `ResponseMap` knows."""
-
-    @property
-    def positions_mm(self) -> FloatArray:
-        """Places of the receptors, (n, 2) or (n, 3). [mm]"""
-
-    @property
-    def spikes(self) -> Spikes:
-        """One train per receptor."""
-
-
-class PressedBody(Protocol):
-    """A rigid body that knows its face."""
-
-    def front(self, points_mm: FloatArray) -> FloatArray:
-        """Y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
-
-
 def save_figure(
-    path: str | Path, skin: PressedSkin, response: Response, indenter: PressedBody | None = None
+    path: str | Path, skin: SkinResponse, response: ResponseMap, indenter: Indenter | None = None
 ) -> Path:
     """Draw a touch and save the picture: the pressed finger with its energy density, and the spikes.
 
@@ -138,7 +51,7 @@ def save_figure(
         From `indent`.
     response : ResponseMap
         Response of a population to it.
-    indenter : PressedBody, optional
+    indenter : Indenter, optional
         The body that pressed, to be drawn as well; as it stands when it is not spun.
 
     Returns
@@ -165,7 +78,7 @@ def save_figure(
     return write_png(lambda parts: draw(*parts), (skin, response, indenter), Path(path))
 
 
-def draw(skin: PressedSkin, response: Response, indenter: PressedBody | None = None) -> Figure:
+def draw(skin: SkinResponse, response: ResponseMap, indenter: Indenter | None = None) -> Figure:
     """Draw a touch as `save_figure` saves it."""
     figure = new_figure(9.5, 4.0)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0), height_ratios=(1.0, 4.0))
@@ -176,7 +89,7 @@ def draw(skin: PressedSkin, response: Response, indenter: PressedBody | None = N
     return figure
 
 
-def draw_section(axes: Axes, skin: PressedSkin, indenter: PressedBody | None = None) -> None:
+def draw_section(axes: Axes, skin: SkinResponse, indenter: Indenter | None = None) -> None:
     """Draw the middle plane of the pressed finger at the end of the touch, coloured by energy density.
 
     Parameters
@@ -185,11 +98,11 @@ def draw_section(axes: Axes, skin: PressedSkin, indenter: PressedBody | None = N
         An empty panel.
     skin : SkinResponse
         What is drawn.
-    indenter : PressedBody, optional
+    indenter : Indenter, optional
         The body that pressed.
     """
     section = skin.section()
-    sed = numbers(skin.sed_kpa[-1])[section.elements]
+    sed = skin.sed_kpa[-1][section.elements]
     largest = float(sed.max())
     faces = PolyCollection(
         list(section.corners_mm),
@@ -223,11 +136,11 @@ def draw_section(axes: Axes, skin: PressedSkin, indenter: PressedBody | None = N
     bar.ax.yaxis.set_major_formatter("{x:g}")
 
 
-def _draw_indenter(axes: Axes, skin: PressedSkin, section: FingerSection, indenter: PressedBody) -> None:
+def _draw_indenter(axes: Axes, skin: SkinResponse, section: Section, indenter: Indenter) -> None:
     """Draw the body where its face meets the deformed skin."""
-    towards = numbers(skin.direction)[:2]
+    towards = skin.direction[:2]
     along = np.array([towards[1], -towards[0]])
-    middle = numbers(skin.mesh.nodes_mm)[skin.mesh.midline_nodes]
+    middle = skin.mesh.nodes_mm[skin.mesh.midline_nodes]
     foot = np.array([skin.axis_x_mm, np.interp(skin.axis_x_mm, middle[:, 0], middle[:, 1])])
 
     def face(beside: FloatArray) -> FloatArray:
@@ -245,7 +158,7 @@ def _draw_indenter(axes: Axes, skin: PressedSkin, section: FingerSection, indent
     axes.fill(*outline.T, facecolor="#c9d1d8", edgecolor=BLACK, linewidth=1.0)
 
 
-def draw_motion(axes: Axes, skin: PressedSkin) -> None:
+def draw_motion(axes: Axes, skin: SkinResponse) -> None:
     """Draw the depth of the indenter over time."""
     axes.plot(skin.times_ms, skin.depth_mm, color=BLUE)
     axes.set(ylabel="depth\n[mm]", ylim=(0.0, 1.15 * float(skin.depth_mm.max())))
@@ -253,9 +166,9 @@ def draw_motion(axes: Axes, skin: PressedSkin) -> None:
     axes.grid(visible=False)
 
 
-def draw_spikes(axes: Axes, skin: PressedSkin, response: Response) -> None:
+def draw_spikes(axes: Axes, skin: SkinResponse, response: ResponseMap) -> None:
     """Draw the spike trains of the afferents that fire, the nearest to the indenter's axis at the bottom."""
-    plane = numbers(response.positions_mm)[:, [0, -1]] - [skin.axis_x_mm, 0.0]
+    plane = response.positions_mm[:, [0, -1]] - [skin.axis_x_mm, 0.0]
     trains = [response.spikes[afferent] for afferent in np.argsort(np.hypot(*plane.T), kind="stable")]
     firing = [train for train in trains if train.size]
     if not firing:
