@@ -7,7 +7,7 @@ from typing import Any
 import typer
 
 from fingerpad.cli import app
-from fingerpad.report.page import markdown_table as table
+from studies.pages.markdown import markdown_table as table
 
 INTRODUCTION = """# Command line
 

@@ -15,11 +15,11 @@ from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.results import Number, Vector, from_json, read_results, result_class
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.report.formatting import ABSENT, fixed, number
-from fingerpad.report.page import markdown_table as table
 from studies.drive_quantities import DriveResult
 from studies.drive_study import DriveStudy
 from studies.fit_methods import FitMethods, MethodsStudy
 from studies.pages.drive_quantities import QUANTITIES
+from studies.pages.markdown import markdown_table as table
 
 COMMAND = "python -m studies results"
 Kind = TypeVar("Kind")

@@ -15,8 +15,8 @@ from fingerpad.core.files import write_atomically
 from fingerpad.core.results import to_json
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.runner import Runner
-from fingerpad.report.page import write_markdown
 from fingerpad.report.parts import Page
+from studies.pages.markdown import write_markdown
 
 Seed = Annotated[int, typer.Option(parser=to_whole, metavar="INTEGER", help="Seed of all random numbers.")]
 Out = Annotated[Path, typer.Option(help="Folder for page, figures, numbers and stored indentations.")]

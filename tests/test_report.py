@@ -26,11 +26,12 @@ from fingerpad.report import (
     skin_deflection,
 )
 from fingerpad.report import formatting as words
-from fingerpad.report.page import markdown, write_html, write_markdown
+from fingerpad.report.page import write_html
 from fingerpad.report.parts import Chapter, Drawing, Page, Paragraph, Row, Table
 from fingerpad.report.reproduction import reproduction_page, reproduction_summary, write_report
 from fingerpad.report.style import BLUE, GREEN, ORANGE, RESOLUTION_DPI, new_figure
 from sections import CURVATURE_PER_M, discrimination_section, nail_section, typed
+from studies.pages.markdown import markdown, write_markdown
 
 SHIFT_MM = np.linspace(-3.5, 3.5, 36)
 PARAMETERS = {

@@ -1,14 +1,116 @@
-"""Parts of the studies' pages, and shares as they stand in them."""
+"""Pages of the studies as Markdown, their parts, and shares as they stand in them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from fingerpad.report.formatting import fixed
-from fingerpad.report.page import markdown_blocks
-from fingerpad.report.parts import Chapter, Paragraph, Part, Row, Table
+from fingerpad.report.page import images_of, write_beside
+from fingerpad.report.parts import Chapter, Drawing, Page, Paragraph, Part, Row, Table
 
 PERCENT = 100.0
+
+
+def write_markdown(page: Page, path: Path) -> Path:
+    """Write a page as Markdown, its figures into `images/` beside it.
+
+    Parameters
+    ----------
+    page : Page
+        What to write.
+    path : Path
+        The file; as in `fingerpad.report.page.write_html`.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    StoreError
+        If the folder cannot be written.
+    """
+    return write_beside(path, markdown(page), images_of(page), "images")
+
+
+def markdown(page: Page) -> str:
+    """Return a page as Markdown, with links to figures in `images/`.
+
+    Parameters
+    ----------
+    page : Page
+        Headings of tables stand one level below that of their chapter.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> from fingerpad.report.parts import Row
+    >>> meshes = Table("Meshes", ("mesh", "nodes"), [Row(("quick", "6730"))], "Half of the finger.")
+    >>> print(markdown(Page("Skin", "A sphere.", [], [Chapter("", [meshes])])))
+    # Skin
+    <BLANKLINE>
+    A sphere.
+    <BLANKLINE>
+    ## Meshes
+    <BLANKLINE>
+    | mesh | nodes |
+    | --- | --- |
+    | quick | 6730 |
+    <BLANKLINE>
+    Half of the finger.
+    <BLANKLINE>
+    """
+    blocks = [f"# {page.heading}", page.subtitle, *page.paragraphs]
+    for chapter in page.chapters:
+        blocks += markdown_blocks(chapter)
+    return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def markdown_blocks(chapter: Chapter) -> list[str]:
+    """Return a chapter as blocks of Markdown, between which an empty line belongs."""
+    blocks = [f"## {chapter.title}"] if chapter.title else []
+    for part in chapter.parts:
+        blocks += _block(part, "###" if chapter.title else "##")
+    return blocks
+
+
+def _block(part: Part, heading: str) -> list[str]:
+    if isinstance(part, Paragraph):
+        return [part.text]
+    if isinstance(part, Drawing):
+        return [f"![{part.label}](images/{part.name}.png)", part.caption]
+    title = [f"{heading} {part.title}"] if part.title else []
+    return [*title, markdown_table(part.columns, [row.cells for row in part.rows]), part.note]
+
+
+def markdown_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table in Markdown.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        Headings.
+    rows : sequence of sequences of str
+        Finished texts.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> print(markdown_table(("mesh", "nodes"), [("quick", "6730")]))
+    | mesh | nodes |
+    | --- | --- |
+    | quick | 6730 |
+    """
+    lines = [columns, ["---"] * len(columns), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:

@@ -10,10 +10,9 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from fingerpad.report.formatting import fixed
-from fingerpad.report.page import markdown_blocks
 from fingerpad.report.parts import Chapter, Drawing, Page, Part
 from studies.mesh_errors import MeshErrors
-from studies.pages.markdown import share
+from studies.pages.markdown import markdown_blocks, share
 
 ERROR_COLUMNS = (
     "SED, ramp: max", "RMS", "SED, hold: max", "RMS",

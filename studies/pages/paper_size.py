@@ -10,11 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.report.formatting import fixed, joined, number
-from fingerpad.report.page import markdown_table
 from fingerpad.report.parts import Part, Table
 from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure
 from studies.mesh_errors import MeshErrors
-from studies.pages.markdown import PERCENT, parts_of, share, signed, table
+from studies.pages.markdown import PERCENT, markdown_table, parts_of, share, signed, table
 from studies.pages.mesh_comparison import ERROR_COLUMNS, RATES, MeshComparison, error_cells
 from studies.paper_size import (
     REFERENCE,

@@ -23,7 +23,6 @@ from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import start_points
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.transduction import Drive, drive
-from fingerpad.report.page import write_markdown
 from fingerpad.report.style import png
 from studies import drive_depths, drive_fits, drive_quantities, drive_study, dynamic_response
 from studies.drive_fits import BestOf, information, thorough_method
@@ -31,6 +30,7 @@ from studies.drive_quantities import ALONE, APART, CANDIDATES, EXTENDED, PAPER, 
 from studies.dynamic_response import EXPLANATIONS, ExplainedModel, Patch, low_passed
 from studies.pages import drive_quantities as report
 from studies.pages import drive_study as drives_report
+from studies.pages.markdown import write_markdown
 
 TIMES_MS = np.concatenate([np.linspace(0.0, 50.0, 5), [60.0, 100.0, 300.0, 1000.0]])
 SHIFT_MM = np.round(np.linspace(-3.45, 3.45, 24), 2)

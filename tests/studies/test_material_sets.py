@@ -18,7 +18,6 @@ from fingerpad.geometry.grading import Grading
 from fingerpad.mechanics.laws import Hyperfoam, Polynomial
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.afferent import Afferent
-from fingerpad.report.page import markdown, write_markdown
 from fingerpad.skin.sampling import SurfaceProfile
 from fingerpad.skin.store import Store
 from studies import __main__ as command
@@ -43,6 +42,7 @@ from studies.material_sets import (
     touches,
 )
 from studies.material_study import LevelsMet, MaterialStudy, meets
+from studies.pages.markdown import markdown, write_markdown
 from studies.pages.material_sets import materials_page
 from studies.trial_order import Excess, TrialDifference, TrialOrder
 

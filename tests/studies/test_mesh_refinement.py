@@ -19,7 +19,6 @@ from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import neighbour_pairs
-from fingerpad.report.page import markdown
 from fingerpad.skin.indentation import touch_of
 from studies import mesh_refinement
 from studies.mesh_errors import (
@@ -34,6 +33,7 @@ from studies.mesh_errors import (
     read,
 )
 from studies.mesh_refinement import MeshRefinement
+from studies.pages.markdown import markdown
 from studies.pages.mesh_refinement import MESH_REFINEMENT, draw
 
 COARSE = Grading(RECEPTOR_X_MM, 1.0, 1.0, 1.0, 1.0, stratum_corneum=1, dermis=1, subcutis=1)

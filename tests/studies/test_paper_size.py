@@ -15,10 +15,10 @@ from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import block_mesh, finger_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press import PressSettings
-from fingerpad.report.page import markdown
 from fingerpad.skin.indentation import touch_of
 from studies import paper_size
 from studies.mesh_refinement import PEAK_SHIFT
+from studies.pages.markdown import markdown
 from studies.pages.paper_size import PAPER_SIZE, draw, summary
 from studies.paper_size import PaperSize
 

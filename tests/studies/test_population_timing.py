@@ -10,10 +10,10 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.response_maps import resting_response, sheet
 from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.report.page import write_markdown
 from sections import CURVATURE_PER_M, RESTLESS, SENSITIVE, SKINS, SphereSkin, typed
 from studies import population_timing
 from studies.pages import population_timing as page
+from studies.pages.markdown import write_markdown
 from studies.population_timing import PopulationTiming, PopulationTimingStudy
 
 

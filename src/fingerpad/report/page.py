@@ -1,17 +1,17 @@
-"""A page written as HTML that holds its figures, or as Markdown beside its figures."""
+"""A page written as HTML that holds its figures."""
 
 from __future__ import annotations
 
 import base64
 import html
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from fingerpad.core.files import write_atomically
-from fingerpad.report.parts import Chapter, Drawing, Page, Paragraph, Part, Table
+from fingerpad.report.parts import Drawing, Page, Table
 from fingerpad.report.style import png
 
 
@@ -38,12 +38,13 @@ def write_html(page: Page, path: Path) -> Path:
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
+    >>> from fingerpad.report.parts import Chapter, Paragraph
     >>> page = Page("Skin", "A sphere", ["It yields."], [Chapter("Depth", [Paragraph("1 mm.")])])
     >>> with TemporaryDirectory() as folder:
     ...     "<p>1 mm.</p>" in write_html(page, Path(folder) / "skin.html").read_text(encoding="utf-8")
     True
     """
-    images = _images(page)
+    images = images_of(page)
     environment = Environment(
         loader=PackageLoader("fingerpad.report", "."),
         autoescape=True,
@@ -56,115 +57,16 @@ def write_html(page: Page, path: Path) -> Path:
     environment.tests |= {"table": lambda part: isinstance(part, Table)}
     environment.tests |= {"drawing": lambda part: isinstance(part, Drawing)}
     content = environment.get_template("template.html").render(page=page, images=images)
-    return _write(path, content, images, "figures")
+    return write_beside(path, content, images, "figures")
 
 
-def write_markdown(page: Page, path: Path) -> Path:
-    """Write a page as Markdown, its figures into `images/` beside it.
-
-    Parameters
-    ----------
-    page : Page
-        What to write.
-    path : Path
-        The file; as in `write_html`.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    StoreError
-        If the folder cannot be written.
-    """
-    return _write(path, markdown(page), _images(page), "images")
-
-
-def markdown(page: Page) -> str:
-    """Return a page as Markdown, with links to figures in `images/`.
-
-    Parameters
-    ----------
-    page : Page
-        Headings of tables stand one level below that of their chapter.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> from fingerpad.report.parts import Row
-    >>> meshes = Table("Meshes", ("mesh", "nodes"), [Row(("quick", "6730"))], "Half of the finger.")
-    >>> print(markdown(Page("Skin", "A sphere.", [], [Chapter("", [meshes])])))
-    # Skin
-    <BLANKLINE>
-    A sphere.
-    <BLANKLINE>
-    ## Meshes
-    <BLANKLINE>
-    | mesh | nodes |
-    | --- | --- |
-    | quick | 6730 |
-    <BLANKLINE>
-    Half of the finger.
-    <BLANKLINE>
-    """
-    blocks = [f"# {page.heading}", page.subtitle, *page.paragraphs]
-    for chapter in page.chapters:
-        blocks += markdown_blocks(chapter)
-    return "\n\n".join(block for block in blocks if block) + "\n"
-
-
-def markdown_blocks(chapter: Chapter) -> list[str]:
-    """Return a chapter as blocks of Markdown, between which an empty line belongs."""
-    blocks = [f"## {chapter.title}"] if chapter.title else []
-    for part in chapter.parts:
-        blocks += _block(part, "###" if chapter.title else "##")
-    return blocks
-
-
-def _block(part: Part, heading: str) -> list[str]:
-    if isinstance(part, Paragraph):
-        return [part.text]
-    if isinstance(part, Drawing):
-        return [f"![{part.label}](images/{part.name}.png)", part.caption]
-    title = [f"{heading} {part.title}"] if part.title else []
-    return [*title, markdown_table(part.columns, [row.cells for row in part.rows]), part.note]
-
-
-def markdown_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table in Markdown.
-
-    Parameters
-    ----------
-    columns : sequence of str
-        Headings.
-    rows : sequence of sequences of str
-        Finished texts.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> print(markdown_table(("mesh", "nodes"), [("quick", "6730")]))
-    | mesh | nodes |
-    | --- | --- |
-    | quick | 6730 |
-    """
-    lines = [columns, ["---"] * len(columns), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def _images(page: Page) -> dict[str, bytes]:
+def images_of(page: Page) -> dict[str, bytes]:
+    """Draw all figures of a page, as PNG by their names."""
     return {drawing.name: png(drawing.draw) for drawing in page.drawings}
 
 
-def _write(path: Path, content: str, images: dict[str, bytes], folder: str) -> Path:
+def write_beside(path: Path, content: str, images: Mapping[str, bytes], folder: str) -> Path:
+    """Write a page, and before it its images into a folder beside it; each file whole or not at all."""
     path = Path(path)
     for name, image in images.items():
         write_atomically(path.parent / folder / f"{name}.png", image)

@@ -1,4 +1,4 @@
-"""The parts of a page: paragraphs, tables and figures in chapters; `page` writes them as HTML or Markdown."""
+"""The parts of a page: paragraphs, tables and figures in chapters; `page` writes them as HTML."""
 
 from __future__ import annotations
 

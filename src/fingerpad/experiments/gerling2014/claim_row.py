@@ -43,27 +43,6 @@ class ClaimRow:
     note: str = ""
 
 
-def claim_row(
-    quantity: str,
-    published: str,
-    ours: str,
-    difference: str = "",
-    status: str = "",
-    met: bool | None = None,
-    note: str = "",
-) -> ClaimRow:
-    """Return a row from its parts in order."""
-    return ClaimRow(
-        quantity=quantity,
-        paper=published,
-        ours=ours,
-        difference=difference,
-        status=status,
-        met=met,
-        note=note,
-    )
-
-
 def measured_row(
     quantity: str,
     published: Published[float],
@@ -74,14 +53,14 @@ def measured_row(
     note: str = "",
 ) -> ClaimRow:
     """Return the row of a number that the paper prints: met from it on, or close to it."""
-    close = abs(ours - published.value) <= CLOSE * published.value
+    difference = ours - published.value
     judged = "" if at_least else f"judged: within {CLOSE:.0%}"
-    return claim_row(
-        quantity,
-        f"{published.value:g}",
-        f"{ours:.{digits}f}",
-        f"{ours - published.value:+.{digits}f}",
-        status,
-        bool(ours >= published.value if at_least else close),
-        "; ".join(text for text in (judged, note) if text),
+    return ClaimRow(
+        quantity=quantity,
+        paper=f"{published.value:g}",
+        ours=f"{ours:.{digits}f}",
+        difference=f"{difference:+.{digits}f}",
+        status=status,
+        met=bool(difference >= 0.0 if at_least else abs(difference) <= CLOSE * published.value),
+        note="; ".join(text for text in (judged, note) if text),
     )

@@ -1,13 +1,12 @@
-"""Comparison of a reproduction with the numbers of the paper."""
+"""Comparison of a reproduction with the numbers of the paper, statement by statement."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from fingerpad.data import paper
-from fingerpad.data.published import Published
-from fingerpad.experiments.gerling2014.claim_row import MATERIALS, ClaimRow, claim_row, measured_row
-from fingerpad.experiments.gerling2014.curvature_thresholds import CurvatureThresholds, weber_claims
+from fingerpad.experiments.gerling2014.claim_row import MATERIALS, ClaimRow, measured_row
+from fingerpad.experiments.gerling2014.curvature_thresholds import CurvatureThresholds
 from fingerpad.experiments.gerling2014.discrimination_claims import discrimination_claims
 from fingerpad.experiments.gerling2014.nail_border import NailBorder
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
@@ -42,44 +41,38 @@ def comparison(
         *_deflection(skin),
         *_single_unit(unit),
         *discrimination_claims(discrimination),
-        *weber_claims(curvature_thresholds),
-        *_nail(nail),
+        *(weber_claims(curvature_thresholds) if curvature_thresholds else ()),
+        _nail(nail),
     ]
 
 
 def _deflection(found: SkinDeflectionResult) -> list[ClaimRow]:
-    later: Published = paper.LATER_DEFLECTION_R2
-    r2 = found.trial3.cylinder.r2
+    later, third = paper.LATER_DEFLECTION_R2.value, found.trial3
     rows = [
-        claim_row(
-            "Trial 3, deflection under the cylinder, R²",
-            f"matches (figure); laboratory's later model {later.value:g}",
-            f"{r2:.3f}",
-            f"{r2 - later.value:+.3f}",
-            MATERIALS,
-            r2 >= LEAST_R2,
-            f"with the opposite direction of the observations {found.trial3.cylinder.r2_mirrored:.3f}",
+        ClaimRow(
+            quantity="Trial 3, deflection under the cylinder, R²",
+            paper=f"matches (figure); laboratory's later model {later:g}",
+            ours=f"{third.cylinder.r2:.3f}",
+            difference=f"{third.cylinder.r2 - later:+.3f}",
+            status=MATERIALS,
+            met=third.cylinder.r2 >= LEAST_R2,
+            note=f"with the opposite direction of the observations {third.cylinder.r2_mirrored:.3f}",
         )
     ]
-    third = found.trial3
     for number, trial, expected, sign in (
         (1, found.trial1, "overshoots", 1),
         (2, found.trial2, "undershoots", -1),
     ):
-        for indenter, ours, reference in (
-            ("line", trial.line, third.line),
-            ("cylinder", trial.cylinder, third.cylinder),
-        ):
-            excess = _mean_excess(ours, reference)
+        for indenter in ("line", "cylinder"):
+            excess = _mean_excess(getattr(trial, indenter), getattr(third, indenter))
             rows.append(
-                claim_row(
-                    f"Trial {number}, deflection under the {indenter}, against Trial 3",
-                    expected,
-                    f"{'more' if excess > 0 else 'less'} by {abs(excess):.3f} mm on average within 5 mm",
-                    "",
-                    MATERIALS,
-                    sign * excess > 0,
-                    "on a deflection axis that points down this is the paper's order: "
+                ClaimRow(
+                    quantity=f"Trial {number}, deflection under the {indenter}, against Trial 3",
+                    paper=expected,
+                    ours=f"{'more' if excess > 0 else 'less'} by {abs(excess):.3f} mm on average within 5 mm",
+                    status=MATERIALS,
+                    met=sign * excess > 0,
+                    note="on a deflection axis that points down this is the paper's order: "
                     "docs/decisions/order-of-the-trials.md",
                 )
             )
@@ -94,57 +87,65 @@ def _mean_excess(ours: IndenterDeflection, reference: IndenterDeflection) -> flo
 
 def _single_unit(found: SingleUnitResult) -> list[ClaimRow]:
     status = MATERIALS + "; recordings read"
-    rows = [
-        measured_row(
-            "Single unit, FSS out of sample (mean of six folds)",
-            paper.FSS_OUT_OF_SAMPLE,
-            found.fss_out_of_sample,
-            status,
-            at_least=True,
-        ),
-        measured_row(
-            "Single unit, FSS in sample (all 36 shifts)",
-            paper.FOLD_3_FSS_FITTED,
-            found.fss_in_sample,
-            status + "; the paper's value is of fold 3",
-            at_least=True,
-        ),
-    ]
+    of_fold_3 = status + "; the paper's value is of fold 3"
     fold_3 = found.folds[2]
-    rows += [
-        measured_row(
-            "Fold 3, FSS at start point 2", paper.FOLD_3_FSS_START, float(fold_3.fss_start[1]), status
+    dynamic, static = found.modulation.dynamic.ours, found.modulation.static.ours
+    scores = (
+        ("Single unit, FSS out of sample (mean of six folds)", paper.FSS_OUT_OF_SAMPLE,
+         found.fss_out_of_sample, status, True),
+        ("Single unit, FSS in sample (all 36 shifts)", paper.FOLD_3_FSS_FITTED,
+         found.fss_in_sample, of_fold_3, True),
+        ("Fold 3, FSS at start point 2", paper.FOLD_3_FSS_START, fold_3.fss_start[1], status, False),
+        ("Fold 3, FSS of the testing set", paper.FOLD_3_FSS_TEST, fold_3.fss_test, status, True),
+    )  # fmt: skip
+    rates = (
+        ("Dynamic rate, smallest under the flat face", paper.DYNAMIC_RATE_MINIMUM, dynamic.minimum_hz),
+        ("Dynamic rate, largest", paper.DYNAMIC_RATE_MAXIMUM, dynamic.maximum_hz),
+        ("Dynamic rate, difference", paper.DYNAMIC_RATE_DIFFERENCE, dynamic.difference_hz),
+        ("Static rate, difference", paper.STATIC_RATE_DIFFERENCE, static.difference_hz),
+    )
+    return [
+        *(
+            measured_row(quantity, published, ours, inputs, at_least=at_least)
+            for quantity, published, ours, inputs, at_least in scores
         ),
-        measured_row(
-            "Fold 3, FSS of the testing set", paper.FOLD_3_FSS_TEST, fold_3.fss_test, status, at_least=True
+        *(
+            measured_row(f"{quantity} [spikes/s]", published, ours, status, digits=0)
+            for quantity, published, ours in rates
         ),
     ]
-    dynamic, static = found.modulation.dynamic.ours, found.modulation.static.ours
-    for quantity, published, ours in (
-        (
-            "Dynamic rate, smallest under the flat face [spikes/s]",
-            paper.DYNAMIC_RATE_MINIMUM,
-            dynamic.minimum_hz,
-        ),
-        ("Dynamic rate, largest [spikes/s]", paper.DYNAMIC_RATE_MAXIMUM, dynamic.maximum_hz),
-        ("Dynamic rate, difference [spikes/s]", paper.DYNAMIC_RATE_DIFFERENCE, dynamic.difference_hz),
-        ("Static rate, difference [spikes/s]", paper.STATIC_RATE_DIFFERENCE, static.difference_hz),
-    ):
-        rows.append(measured_row(quantity, published, ours, status, digits=0))
+
+
+def weber_claims(found: CurvatureThresholds) -> list[ClaimRow]:
+    """Compare Weber fractions with observed ones, one row per population."""
+    low, high = found.literature.weber_fractions
+    rows = []
+    for population in found.populations:
+        fractions = [threshold.weber_fraction for threshold in population.standards]
+        at = ", ".join(f"{threshold.standard_per_m:g}" for threshold in population.standards)
+        missed = [missing.why_not for missing in population.without_threshold]
+        within = all(low <= round(share, 2) <= high for share in fractions)
+        judged = f"static Gradient Sum, standards {at} /m; judged in whole per cent"
+        rows.append(
+            ClaimRow(
+                quantity=f"Curvature threshold at 75 %, {population.rows} by {population.columns} receptors",
+                paper=f"observed: {low:.0%} to {high:.0%} of the standard",
+                ours=", ".join(f"{fraction:.1%}" for fraction in fractions),
+                status=MATERIALS + "; observed fractions recalled",
+                met=bool(fractions) and not missed and within,
+                note="; ".join([judged, *missed]),
+            )
+        )
     return rows
 
 
-def _nail(found: NailBorder) -> list[ClaimRow]:
+def _nail(found: NailBorder) -> ClaimRow:
     low, high = found.ratio_range
-    return [
-        claim_row(
-            "Von Mises stress of the skin at the border of the nail over that 2 to 3 mm away (Figure 9)",
-            "high concentrations (figure)",
-            f"{found.ratio:.1f} times",
-            "",
-            MATERIALS + "; width of the nail assumed",
-            None,
-            f"{low:.1f} to {high:.1f} over the sections, {found.border_kpa:.2g} kPa at most; energy "
-            f"density in the living epidermis {found.ratio_energy:.1f} times; the paper gives no number",
-        )
-    ]
+    return ClaimRow(
+        quantity="Von Mises stress of the skin at the border of the nail over that 2 to 3 mm away (Figure 9)",
+        paper="high concentrations (figure)",
+        ours=f"{found.ratio:.1f} times",
+        status=MATERIALS + "; width of the nail assumed",
+        note=f"{low:.1f} to {high:.1f} over the sections, {found.border_kpa:.2g} kPa at most; energy "
+        f"density in the living epidermis {found.ratio_energy:.1f} times; the paper gives no number",
+    )

@@ -22,7 +22,6 @@ from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.data import psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
-from fingerpad.experiments.gerling2014.claim_row import MATERIALS, ClaimRow, claim_row
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics import (
@@ -320,40 +319,6 @@ def _fitted_noise(
 
 def _first_line(error: Exception) -> str:
     return str(error).splitlines()[0]
-
-
-def weber_claims(found: CurvatureThresholds | None) -> list[ClaimRow]:
-    """Compare Weber fractions with observed ones, one row per population.
-
-    Parameters
-    ----------
-    found : CurvatureThresholds or None
-        Without it there are no rows.
-
-    Returns
-    -------
-    list of ClaimRow
-    """
-    if found is None:
-        return []
-    low, high = found.literature.weber_fractions
-    rows = []
-    for population in found.populations:
-        fractions = [threshold.weber_fraction for threshold in population.standards]
-        at = ", ".join(f"{threshold.standard_per_m:g}" for threshold in population.standards)
-        missed = [missing.why_not for missing in population.without_threshold]
-        rows.append(
-            claim_row(
-                f"Curvature threshold at 75 %, {population.rows} by {population.columns} receptors",
-                f"observed: {low:.0%} to {high:.0%} of the standard",
-                ", ".join(f"{fraction:.1%}" for fraction in fractions),
-                "",
-                MATERIALS + "; observed fractions recalled",
-                bool(fractions) and not missed and all(low <= round(share, 2) <= high for share in fractions),
-                "; ".join([f"static Gradient Sum, standards {at} /m; judged in whole per cent", *missed]),
-            )
-        )
-    return rows
 
 
 def interpolated(curvature_per_m: FloatArray, table: FloatArray) -> PchipInterpolator:
