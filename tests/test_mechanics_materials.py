@@ -1,5 +1,6 @@
 """Materials as they are made: moduli, tables, refusals. Their answers are in `tests/verification/laws.py`."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -64,3 +65,29 @@ def test_every_named_set_grows_softer_inwards(name):
     shear = [material.shear_modulus_kpa for material in named_tissues(name).layers]
     assert all(outer >= inner for outer, inner in pairwise(shear))
     assert len(shear) == 4
+
+
+def test_the_sets_paper_and_human_have_a_long_term_ratio_of_0_40_and_0_34_at_once():
+    for name in ("paper", "human"):
+        for layer in named_tissues(name).layers:
+            assert layer.poisson == pytest.approx(0.40)
+            instantaneous = replace(
+                layer, law=replace(layer.law, c10=layer.law.c10 * layer.instantaneous_factor)
+            )
+            assert instantaneous.poisson == pytest.approx(0.34, abs=0.003)
+
+
+def test_the_set_paper_is_trial_3_with_another_poissons_ratio():
+    trial, paper = named_tissues("trial3"), named_tissues("paper")
+    for ours, theirs in zip(paper.layers[2:], trial.layers[2:], strict=True):
+        assert ours.shear_modulus_kpa == theirs.shear_modulus_kpa
+    young = [
+        2.0 * (1.0 + tissue.poisson) * tissue.shear_modulus_kpa
+        for tissue in (paper.layers[0], trial.layers[0])
+    ]
+    assert young == pytest.approx([136.0, 136.0])
+
+
+def test_the_set_human_has_a_stratum_corneum_stiffer_than_the_living_epidermis():
+    moduli = [layer.shear_modulus_kpa for layer in named_tissues("human").layers]
+    assert moduli == [54.0, 12.4, 6.9, 1.9]

@@ -17,6 +17,8 @@ INDENTER_CHOICES = {
 """Each with its class."""
 
 MATERIAL_CHOICES = (
+    "human",
+    "paper",
     "trial1",
     "trial2",
     "trial3",

@@ -42,6 +42,12 @@ WU_SUBCUTIS_HYPERFOAM_ALPHA = _WU(
     "hyperfoam exponents alpha_1..3 of subcutis, Wu", (5.511, 6.571, 5.262), "1"
 )
 WU_HYPERFOAM_POISSON = _WU("Poisson's ratio of the hyperfoams, Wu", 0.40, "1")
+LONG_TERM_POISSON = _WU(
+    "long-term Poisson's ratio of every skin layer, sets paper and human; only the deviator relaxes, so that "
+    "it is 0.34 at once",
+    0.40,
+    "1",
+)
 
 _WU_FITTED = Source(
     "fitted by us to Wu's hyperfoam (recalled) at Poisson's ratio 0.48, in uniaxial compression to "
@@ -74,6 +80,18 @@ SOFT_MIX_DERMIS_SHEAR = _IDENTIFIED(
 SOFT_MIX_SUBCUTIS_SHEAR = _IDENTIFIED(
     "neo-Hookean shear modulus of the subcutis, stand-in for Trial 3", 4.75, "kPa"
 )
+
+_HUMAN = Source(
+    "chosen by us to serve deflection under a cylinder, force of a plate, firing under a shifted bar and "
+    "discrimination of spheres at once (docs/decisions/paper-and-human.md)",
+    "assumed",
+)
+HUMAN_STRATUM_CORNEUM_SHEAR = _HUMAN("long-term shear modulus of the stratum corneum, set human", 54.0, "kPa")
+HUMAN_LIVING_EPIDERMIS_SHEAR = _HUMAN(
+    "long-term shear modulus of the living epidermis, set human", 12.4, "kPa"
+)
+HUMAN_DERMIS_SHEAR = _HUMAN("long-term shear modulus of the dermis, set human", 6.9, "kPa")
+HUMAN_SUBCUTIS_SHEAR = _HUMAN("long-term shear modulus of the subcutis, set human", 1.9, "kPa")
 
 STIFFENING_RATIO = Published(
     "C20 over C10 of dermis and subcutis in the stiffening Trial 3",

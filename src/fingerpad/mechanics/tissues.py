@@ -11,6 +11,7 @@ from fingerpad.data.published import Published
 from fingerpad.mechanics.materials import Material, Prony, Tissues
 
 NU = published.POISSON_RATIO.value
+LONG_TERM = published.LONG_TERM_POISSON.value
 
 
 def skin_prony() -> Prony:
@@ -19,12 +20,12 @@ def skin_prony() -> Prony:
     return Prony(published.SKIN_PRONY_SHARES.value, times)
 
 
-def _linear(young: Published) -> Material:
-    return Material.linear_elastic(young.value, NU, skin_prony())
+def _linear(young: Published, poisson: float = NU) -> Material:
+    return Material.linear_elastic(young.value, poisson, skin_prony())
 
 
-def _shear(shear: Published) -> Material:
-    return Material.neo_hooke(shear.value, NU, skin_prony())
+def _shear(shear: Published, poisson: float = NU) -> Material:
+    return Material.neo_hooke(shear.value, poisson, skin_prony())
 
 
 def _foam(moduli: Published, exponents: Published) -> Material:
@@ -79,6 +80,23 @@ def _wu_foams() -> tuple[Material, Material]:
     )
 
 
+def _paper() -> Tissues:
+    """Trial 3 with another Poisson's ratio and nothing else changed."""
+    epidermis = _linear(SOFT, LONG_TERM)
+    inner = (published.SOFT_MIX_DERMIS_SHEAR, published.SOFT_MIX_SUBCUTIS_SHEAR)
+    return Tissues(epidermis, epidermis, *(_shear(shear, LONG_TERM) for shear in inner))
+
+
+def _human() -> Tissues:
+    layers = (
+        published.HUMAN_STRATUM_CORNEUM_SHEAR,
+        published.HUMAN_LIVING_EPIDERMIS_SHEAR,
+        published.HUMAN_DERMIS_SHEAR,
+        published.HUMAN_SUBCUTIS_SHEAR,
+    )
+    return Tissues(*(_shear(shear, LONG_TERM) for shear in layers))
+
+
 def _laboratory() -> Tissues:
     epidermis = _shear(published.LABORATORY_EPIDERMIS_SHEAR)
     inner = (_shear(published.LABORATORY_DERMIS_SHEAR), _shear(published.LABORATORY_SUBCUTIS_SHEAR))
@@ -86,6 +104,10 @@ def _laboratory() -> Tissues:
 
 
 TISSUES: dict[str, Callable[[], Tissues]] = {
+    # One set for deflection, force, firing and percept; compressive stress drives both terms.
+    "human": _human,
+    # Closest to the paper's printed numbers; strain energy density drives both terms.
+    "paper": _paper,
     # All layers linear elastic after Maeno, with a Prony series.
     "trial1": lambda: _layers(SOFT, _maeno()),
     # Stiff epidermis over the hyperelastic dermis and subcutis.
