@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -22,6 +21,7 @@ from fingerpad.report.style import (
     LineStyle,
     new_figure,
     say_nothing_to_draw,
+    shared_legend,
 )
 
 CHANCE = 0.5
@@ -207,12 +207,7 @@ def _label(figure: Figure, grid: np.ndarray, n_panels: int) -> None:
             axes.tick_params(labelbottom=True)
     lowest, highest = grid[0, 0].get_ylim()
     grid[0, 0].set_ylim(min(lowest, 0.4), max(highest, 1.05))
-    handles: dict[str, Artist] = {}
-    for axes in grid.flat:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            handles.setdefault(label, handle)
-    if handles:
-        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=len(handles))
+    shared_legend(figure, grid.flat)
 
 
 def caption_observers(section: SphereDiscrimination) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
 from fingerpad.experiments.discrimination.analysis import TaskResult
@@ -25,7 +24,7 @@ from fingerpad.report.discrimination_task_figures import (
 from fingerpad.report.formatting import ABSENT, fixed, joined, number, whole_percent
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.page import write_html
-from fingerpad.report.parts import Chapter, Drawing, Page, Row, Table
+from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated
 
 _PAGE = "discriminate.html"
 SEVERAL = {"static": "static rates", "dynamic": "dynamic rates", "latency": "first-spike latencies"}
@@ -53,21 +52,19 @@ def write_task_page(results: DiscriminationFile, folder: Path) -> Path:
         The page.
     """
     found = results.discrimination
-    drawings = (
-        ("curves", "Hit rates and psychometric curves", draw_task_curves, caption_task_curves),
-        ("statistics", "Statistics of the codes", draw_task_statistics, caption_task_statistics),
-        ("responses", "Responses of the population", draw_task_responses, caption_task_responses),
+    parts = illustrated(
+        found,
+        task_tables,
+        (1, "curves", "Hit rates and psychometric curves", draw_task_curves, caption_task_curves),
+        (2, "statistics", "Statistics of the codes", draw_task_statistics, caption_task_statistics),
+        (3, "responses", "Responses of the population", draw_task_responses, caption_task_responses),
     )
-    parts = [
-        Drawing(name, title, partial(draw, found), caption(found), number)
-        for number, (name, title, draw, caption) in enumerate(drawings, start=1)
-    ]
     page = Page(
         found.question,
         "A finite-element fingertip, a population of slowly adapting afferents and an observer, "
         f"after Gerling et al. 2014. {edition(results.manifest)}",
         task_summary(found),
-        [Chapter("Results", [*parts, *task_tables(found)]), manifest_chapter(results.manifest)],
+        [Chapter("Results", parts), manifest_chapter(results.manifest)],
     )
     return write_html(page, Path(folder) / _PAGE)
 

@@ -22,6 +22,7 @@ from fingerpad.report.style import (
     PALE,
     new_figure,
     say_nothing_to_draw,
+    shared_legend,
 )
 
 _CHANCE = 0.5
@@ -178,11 +179,7 @@ def draw_task_curves(found: TaskResult) -> Figure:
         _name_axis(axes, found)
         axes.set_ylim(0.4, 1.03)
     grid[0, 0].set_ylabel("hit rate [fraction]")
-    handles: dict[str, Any] = {}
-    for axes in grid[0]:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            handles.setdefault(label, handle)
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=min(4, len(handles)))
+    shared_legend(figure, grid[0], columns=4)
     return figure
 
 

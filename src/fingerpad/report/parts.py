@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from functools import partial
+from typing import Literal, TypeVar
 
 from matplotlib.figure import Figure
 
@@ -100,6 +101,36 @@ class Drawing:
 
 
 Part = Paragraph | Table | Drawing
+_Section = TypeVar("_Section")
+
+
+def illustrated(
+    section: _Section | None,
+    tables: Callable[[_Section], Sequence[Table]] | None,
+    *figures: tuple[int, str, str, Callable[[_Section], Figure], Callable[[_Section], str]],
+) -> list[Part]:
+    """Return the figures of a part of the results, then its tables.
+
+    Parameters
+    ----------
+    section : Any
+        The part; None, for one that was not computed, has neither.
+    tables : callable or None
+        Makes its tables.
+    *figures : tuple
+        Number, file name and title of each figure, and the functions that draw and caption it.
+
+    Returns
+    -------
+    list of Drawing and Table
+    """
+    if section is None:
+        return []
+    drawings = [
+        Drawing(name, title, partial(draw, section), caption(section), figure)
+        for figure, name, title, draw, caption in figures
+    ]
+    return [*drawings, *(tables(section) if tables else ())]
 
 
 @dataclass(frozen=True)

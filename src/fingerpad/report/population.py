@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LogNorm, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
@@ -73,6 +74,14 @@ def round_ticks(scale: Normalize) -> list[float]:
     [5.0, 10.0, 20.0, 50.0]
     """
     return [tick for tick in TICKS_MS if 0.0 <= float(scale(tick, clip=False)) <= 1.0]
+
+
+def with_round_ticks(bar: Colorbar, scale: Normalize) -> None:
+    """Put round numbers beside the colours of a logarithmic scale."""
+    if isinstance(scale, LogNorm):
+        bar.set_ticks(round_ticks(scale))
+        bar.minorticks_off()
+        bar.ax.yaxis.set_major_formatter("{x:g}")
 
 
 def _surface(
@@ -175,11 +184,7 @@ def _map(
     axes.grid(visible=False)
     axes.set_xlabel("along the finger, x [mm]")
     axes.set_ylabel("across, z [mm]")
-    bar = axes.figure.colorbar(picture, ax=axes, label=label, shrink=0.85)
-    if isinstance(scale, LogNorm):
-        bar.set_ticks(round_ticks(scale))
-        bar.minorticks_off()
-        bar.ax.yaxis.set_major_formatter("{x:g}")
+    with_round_ticks(axes.figure.colorbar(picture, ax=axes, label=label, shrink=0.85), scale)
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
 
 

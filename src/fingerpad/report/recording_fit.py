@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +22,7 @@ from fingerpad.report.formatting import (
 )
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.page import write_html
-from fingerpad.report.parts import Chapter, Drawing, Page, Row, Table
+from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated
 from fingerpad.report.recording_extras import (
     caption_offset,
     caption_profiles,
@@ -35,7 +34,7 @@ from fingerpad.report.recording_extras import (
     profile_tables,
     sensitivity_tables,
 )
-from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure
+from fingerpad.report.style import BLUE, GREY, ORANGE, draw_rates, new_figure
 
 _PAGE = "fit.html"
 IDENTIFIABLE = IDENTIFIABLE_SYMBOLS | {"time_constant_ms": "time constant τ"}
@@ -73,26 +72,10 @@ def draw_fit(found: FitResult) -> Figure:
                 linewidth=0.0,
                 label=label,
             )
-        axes.plot(where, rates.fitted_hz[order], color=BLUE, label="fitted to all")
-        axes.plot(
-            where,
-            rates.out_of_sample_hz[order],
-            "x",
-            color=ORANGE,
-            label="predicted without its fold",
-        )
-        axes.plot(
-            where,
-            observed_hz[order],
-            "o",
-            color=BLACK,
-            markerfacecolor="none",
-            markersize=5.0,
-            label="observed",
-        )
+        without = rates.out_of_sample_hz[order]
+        axes.plot(where, without, "x", color=ORANGE, zorder=3, label="predicted without its fold")
+        draw_rates(axes, where, rates.fitted_hz[order], observed_hz[order], "fitted to all")
         axes.set_title(f"{PHASE_LABELS[phase]}, FSS = {rates.fss_in_sample:.2f}")
-        axes.set_ylabel("firing rate [spikes/s]")
-        axes.set_ylim(bottom=0.0)
         _name_places(axes, found)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
@@ -168,40 +151,30 @@ def fit_tables(found: FitResult) -> list[Table]:
 
 def _chapters(found: FitResult) -> list[Chapter]:
     """Return the fit itself, and what was asked for beside it."""
-    chapters = [
-        Chapter(
-            "Fit",
-            [
-                Drawing(
-                    "fit", "Observed and predicted rates", partial(draw_fit, found), caption_fit(found), 1
-                ),
-                Drawing(
-                    "residuals",
-                    "Residuals",
-                    partial(draw_fit_residuals, found),
-                    caption_fit_residuals(found),
-                    2,
-                ),
-                *fit_tables(found),
-            ],
-        )
-    ]
-    if found.profiles:
-        drawing = Drawing(
-            "profiles", "Profile likelihoods", partial(draw_profiles, found), caption_profiles(found), 3
-        )
-        chapters.append(Chapter("Profile likelihoods", [drawing, *profile_tables(found)]))
-    if found.sensitivity:
-        drawing = Drawing(
-            "sensitivity", "Sobol indices", partial(draw_sensitivity, found), caption_sensitivity(found), 4
-        )
-        chapters.append(Chapter("Sensitivity of the fit", [drawing, *sensitivity_tables(found)]))
-    if found.offset:
-        drawing = Drawing(
-            "offset", "FSS by offset of the receptor", partial(draw_offset, found), caption_offset(found), 5
-        )
-        chapters.append(Chapter("Offset of the receptor", [drawing, *offset_tables(found)]))
-    return chapters
+    chapters = {
+        "Fit": illustrated(
+            found,
+            fit_tables,
+            (1, "fit", "Observed and predicted rates", draw_fit, caption_fit),
+            (2, "residuals", "Residuals", draw_fit_residuals, caption_fit_residuals),
+        ),
+        "Profile likelihoods": illustrated(
+            found if found.profiles else None,
+            profile_tables,
+            (3, "profiles", "Profile likelihoods", draw_profiles, caption_profiles),
+        ),
+        "Sensitivity of the fit": illustrated(
+            found if found.sensitivity else None,
+            sensitivity_tables,
+            (4, "sensitivity", "Sobol indices", draw_sensitivity, caption_sensitivity),
+        ),
+        "Offset of the receptor": illustrated(
+            found if found.offset else None,
+            offset_tables,
+            (5, "offset", "FSS by offset of the receptor", draw_offset, caption_offset),
+        ),
+    }
+    return [Chapter(title, parts) for title, parts in chapters.items() if parts]
 
 
 def write_fit_page(results: FitFile, folder: Path) -> Path:

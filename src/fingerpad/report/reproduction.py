@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
-
-from matplotlib.figure import Figure
 
 from fingerpad.data import STATUSES, paper
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow
@@ -29,7 +26,7 @@ from fingerpad.report.formatting import fixed, joined, number, plain, whole_perc
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.nail import caption_nail, draw_nail
 from fingerpad.report.page import write_html
-from fingerpad.report.parts import Chapter, Drawing, Kind, Page, Part, Row, Table
+from fingerpad.report.parts import Chapter, Drawing, Kind, Page, Part, Row, Table, illustrated
 from fingerpad.report.population import caption_population, draw_population
 from fingerpad.report.single_unit import caption_single_unit, draw_single_unit, single_unit_tables
 from fingerpad.report.single_unit_uncertainty import (
@@ -42,9 +39,6 @@ from fingerpad.report.skin_deflection import (
     draw_skin_deflection,
     skin_deflection_tables,
 )
-
-Section = TypeVar("Section")
-"""Part of the results that a figure draws."""
 
 VERDICTS: dict[bool | None, tuple[Kind, str]] = {
     True: ("met", "✓ met"),
@@ -97,61 +91,50 @@ def reproduction_page(result: ReproductionResult) -> Page:
 def _levels(result: ReproductionResult) -> list[Chapter]:
     """Return the chapters of the three levels; numbers of figures up to 9 are the paper's."""
     chapters = {
-        "Level 1: skin": _parts(
+        "Level 1: skin": illustrated(
             result.skin_deflection,
             skin_deflection_tables,
             (4, "skin_deflection", "Deflection of the skin", draw_skin_deflection, caption_skin_deflection),
         ),
-        "Level 2: single afferent": _parts(
+        "Level 2: single afferent": illustrated(
             result.single_unit,
             single_unit_tables,
             (5, "single_unit", "Rates under a bar", draw_single_unit, caption_single_unit),
         ),
-        "Level 2: uncertainty of the fit": _parts(
+        "Level 2: uncertainty of the fit": illustrated(
             result.single_unit_uncertainty,
             uncertainty_tables,
             (10, "uncertainty", "Uncertainty of the fit", draw_uncertainty, caption_uncertainty),
         ),
-        "Level 3: population": _parts(
+        "Level 3: population": illustrated(
             result.population,
             None,
             (6, "population", "Rates and latencies under a sphere", draw_population, caption_population),
         ),
-        "Level 3: discrimination": _parts(
+        "Level 3: discrimination": illustrated(
             result.discrimination,
             discrimination_tables,
             (7, "discrimination", "Discrimination of spheres", draw_observers, caption_observers),
             (8, "varied_criterion", "The same with a varied criterion", draw_criterion, caption_criterion),
             (11, "noise", "Amount of noise", draw_noise, caption_noise),
         ),
-        "Level 3: curvature thresholds": _parts(
+        "Level 3: curvature thresholds": illustrated(
             result.curvature_thresholds,
             threshold_tables,
             (12, "curvature_thresholds", "Thresholds of curvature", draw_thresholds, caption_thresholds),
         ),
-        "The border of the nail": _parts(
-            result.nail, None, (9, "nail", "Stress at the border of the nail", draw_nail, caption_nail)
+        "The border of the nail": illustrated(
+            result.nail,
+            None,
+            (9, "nail", "Stress at the border of the nail", draw_nail, caption_nail),
         ),
     }
-    return [Chapter(title, parts) for title, parts in chapters.items() if parts]
+    return [Chapter(title, [_numbered(part) for part in parts]) for title, parts in chapters.items() if parts]
 
 
-def _parts(
-    section: Section | None,
-    tables: Callable[[Section], Sequence[Table]] | None,
-    *figures: tuple[int, str, str, Callable[[Section], Figure], Callable[[Section], str]],
-) -> list[Part]:
-    """Return the figures and tables of a section, none if it was not run.
-
-    A figure is its number, file name, title, and the functions that draw and caption it.
-    """
-    if section is None:
-        return []
-    drawings = [
-        Drawing(f"figure_{figure}_{name}", title, partial(draw, section), caption(section), figure)
-        for figure, name, title, draw, caption in figures
-    ]
-    return [*drawings, *(tables(section) if tables else ())]
+def _numbered(part: Part) -> Part:
+    """Put the number of a figure before the name of its file."""
+    return replace(part, name=f"figure_{part.number}_{part.name}") if isinstance(part, Drawing) else part
 
 
 def reproduction_summary(result: ReproductionResult) -> list[str]:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import ResponseMap
-from fingerpad.report.population import QUANTITIES, round_ticks
+from fingerpad.report.population import QUANTITIES, with_round_ticks
 from fingerpad.report.style import GREY, new_figure
 
 PANEL_IN = (3.9, 3.3)
@@ -54,10 +54,7 @@ def draw_responses(responses: Mapping[str, ResponseMap]) -> Figure:
             axes.set_title(f"{name}: {phase}" if axes in grid[:, 0] else phase)
             dots = _dots(axes, response, getattr(response, key), colours, scale)
         bar = figure.colorbar(dots, ax=panels.tolist(), label=label, shrink=0.85, fraction=0.05, aspect=30)
-        if isinstance(scale, LogNorm):
-            bar.set_ticks(round_ticks(scale))
-            bar.minorticks_off()
-            bar.ax.yaxis.set_major_formatter("{x:g}")
+        with_round_ticks(bar, scale)
     return figure
 
 

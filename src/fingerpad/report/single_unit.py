@@ -10,7 +10,7 @@ from fingerpad.data import paper, protocol
 from fingerpad.experiments.gerling2014.single_unit import FoldResult, RateModulation, Search, SingleUnitResult
 from fingerpad.report.formatting import PARAMETER_SYMBOLS, fixed, number, spelled
 from fingerpad.report.parts import Row, Table
-from fingerpad.report.style import BLACK, BLUE, new_figure
+from fingerpad.report.style import draw_rates, new_figure
 
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
 PAPER_FOLD, PAPER_START = 3, 2
@@ -36,20 +36,9 @@ def draw_single_unit(section: SingleUnitResult) -> Figure:
     )
     for axes, (title, predicted_hz, observed_hz, fss) in zip(figure.subplots(1, 2), phases, strict=True):
         axes.axvspan(-BAR_HALF_WIDTH_MM, BAR_HALF_WIDTH_MM, color="#f3f1ea", zorder=0)
-        axes.plot(section.shift_mm, predicted_hz, color=BLUE, label="predicted")
-        axes.plot(
-            section.shift_mm,
-            observed_hz,
-            "o",
-            color=BLACK,
-            markerfacecolor="white",
-            markersize=5.0,
-            label="observed",
-        )
+        draw_rates(axes, section.shift_mm, predicted_hz, observed_hz)
         axes.set_title(f"{title}, FSS = {fixed(fss, 2)}")
         axes.set_xlabel("position of the bar, proximal positive [mm]")
-        axes.set_ylabel("firing rate [spikes/s]")
-        axes.set_ylim(bottom=0.0)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
 

@@ -20,7 +20,7 @@ from fingerpad.report.formatting import (
 )
 from fingerpad.report.parts import Row, Table
 from fingerpad.report.rate_uncertainty import draw_profile, profile_ends, sensitivity_table
-from fingerpad.report.style import BLACK, BLUE, PALE, new_figure
+from fingerpad.report.style import BLUE, PALE, draw_rates, new_figure
 
 GAINS = {
     "intercept_ma": ("β", "mA"),
@@ -42,20 +42,9 @@ def draw_uncertainty(section: UncertaintyResult) -> Figure:
             axes.fill_between(
                 section.shift_mm, low, high, color=colour, alpha=alpha, linewidth=0.0, label=label
             )
-        axes.plot(section.shift_mm, rates.median_hz, color=BLUE, label="median")
-        axes.plot(
-            section.shift_mm,
-            rates.observed_hz,
-            "o",
-            label="observed",
-            color=BLACK,
-            markerfacecolor="white",
-            markersize=4.5,
-        )
+        draw_rates(axes, section.shift_mm, rates.median_hz, rates.observed_hz, "median")
         axes.set_title(f"({'ab'[column]}) {PHASE_LABELS[phase]}")
         axes.set_xlabel("position of the bar, proximal positive [mm]")
-        axes.set_ylabel("firing rate [spikes/s]")
-        axes.set_ylim(bottom=0.0)
         if column == 0:
             figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     for column, profile in enumerate(section.profiles):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypedDict
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -107,6 +108,28 @@ def write_png(draw: Callable[[Any], Figure], section: Any, path: Path) -> Path:
     """
     write_atomically(Path(path), png(draw, section))
     return Path(path)
+
+
+def draw_rates(
+    axes: Axes, where: FloatArray, predicted_hz: FloatArray, observed_hz: FloatArray, label: str = "predicted"
+) -> None:
+    """Draw predicted firing rates of an afferent as a line, and the observed ones as open circles."""
+    axes.plot(where, predicted_hz, color=BLUE, label=label)
+    open_circles: Any = {"color": BLACK, "markerfacecolor": "white", "markersize": 5.0}
+    axes.plot(where, observed_hz, "o", label="observed", **open_circles)
+    axes.set_ylabel("firing rate [spikes/s]")
+    axes.set_ylim(bottom=0.0)
+
+
+def shared_legend(figure: Figure, panels: Iterable[Axes], columns: int | None = None) -> None:
+    """Put one legend below all panels, each label once; by default in one row."""
+    handles: dict[str, Artist] = {}
+    for axes in panels:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    if handles:
+        ncols = min(columns or len(handles), len(handles))
+        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=ncols)
 
 
 def say_nothing_to_draw(axes: Axes, text: str) -> None:
