@@ -1,5 +1,10 @@
-"""The longest test files come first, so that no process works alone at the end."""
+"""Order of the test files, and the fixture that runs a command line in this process.
 
+The longest files come first, so that no process works alone at the end.
+"""
+
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -23,6 +28,38 @@ LONGEST = (
 """Files by their processor time, the longest first; all others follow in the order of their names."""
 
 HERE = Path(__file__).parent
+
+
+@pytest.fixture
+def run_program(monkeypatch, capsys, tmp_path) -> Callable[..., tuple[int, str, str]]:
+    """Run a main function with words of a command line in an empty folder: status, output and errors."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(main: Callable[[], None], *words: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", [str(word) for word in words])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capsys.readouterr()
+        return ended.value.code or 0, said.out, said.err
+
+    return run
+
+
+@pytest.fixture
+def is_refused(tmp_path) -> Callable[..., None]:
+    """Check the outcome of a misused command: status 2, one sentence of errors, and no file written."""
+
+    def check(outcome: tuple[int, str, str], program: str, named: str, came: str) -> None:
+        status, said, errors = outcome
+        assert (status, said) == (2, "")
+        assert errors.startswith(f"{program}: ")
+        assert errors.endswith(".\n")
+        assert errors.count("\n") == 1
+        assert named in errors
+        assert came in errors.removeprefix(f"{program}: ")
+        assert list(tmp_path.iterdir()) == []
+
+    return check
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

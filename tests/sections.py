@@ -1,4 +1,4 @@
-"""Sections of results as their JSON holds them, plausible in size: what several tests take for a run."""
+"""Inputs of several test files: sections of results as JSON holds them, and skins given by a formula."""
 
 import json
 from typing import TypeVar
@@ -7,6 +7,7 @@ import numpy as np
 
 from fingerpad.core.results import from_json
 from fingerpad.core.signals import SedTraces
+from fingerpad.geometry.mesh import block_mesh
 from fingerpad.neuron.afferent import Afferent
 
 CURVATURE_PER_M = [287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0]
@@ -15,17 +16,34 @@ Kind = TypeVar("Kind")
 
 
 class SphereSkin:
-    """SED below a ball: the more curved, the higher and narrower."""
+    """SED below a sphere: the more curved, the higher and narrower."""
 
-    def __init__(self, position_mm, curvature_per_m):
+    def __init__(self, position_mm, curvature_per_m, width_mm=2.0, powers=(1.5, 0.5)):
         self.centre = np.array([17.37 + position_mm, 0.0])
         sharpness = curvature_per_m / 287.0
-        self.peak_kpa, self.width_mm = 2.5 * sharpness**1.5, 2.0 / sharpness**0.5
+        self.peak_kpa, self.width_mm = 2.5 * sharpness ** powers[0], width_mm / sharpness ** powers[1]
+
+    @classmethod
+    def wide(cls, curvature_per_m):
+        """A wider field at the receptor that depends less on curvature."""
+        return cls(0.0, curvature_per_m, width_mm=2.5, powers=(1.0, 0.25))
 
     def sed(self, sites):
         squared = np.square(np.asarray(sites)[:, [0, -1]] - self.centre).sum(axis=1)
         peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
         return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.85], peaks), kinks_ms=[50.0])
+
+
+DEPTHS_MM = np.array([0.0, 0.2, 0.371, 0.471, 1.0, 1.624, 5.0])
+LAYER_OF_INTERVAL = [0, 0, 1, 2, 2, 3]
+
+
+def layered_block(centre_mm=0.0, symmetric=True):
+    """A flat block with the layers of the finger, fine about its centre; half of it where symmetric."""
+    lines = np.concatenate([[0.0], np.cumsum(0.25 * 1.1 ** np.arange(8))])
+    both = np.concatenate([-lines[:0:-1], lines])
+    across = lines if symmetric else both
+    return block_mesh(centre_mm + both, DEPTHS_MM, across, LAYER_OF_INTERVAL, symmetric=symmetric)
 
 
 SKINS = {

@@ -1,9 +1,10 @@
-"""The command line as a shell meets it: what it says, where, and with which status."""
+"""The command line: output, errors and exit status."""
 
 import re
 import signal
 import subprocess
 import sys
+from functools import partial
 
 import pytest
 
@@ -24,19 +25,10 @@ COMMAND = [sys.executable, "-W", "error", "-m", "fingerpad"]
 
 
 @pytest.fixture
-def call(monkeypatch, capsys, tmp_path):
-    """Run the command line in this process, in an empty folder; a study would fail the test."""
-    monkeypatch.chdir(tmp_path)
+def call(monkeypatch, run_program):
+    """Run the command line in this process, in an empty folder; a reproduction fails the test."""
     monkeypatch.setattr(gerling2014, "reproduce", pytest.fail)
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["fingerpad", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        said = capsys.readouterr()
-        return ended.value.code or 0, said.out, said.err
-
-    return run
+    return partial(run_program, cli.main, "fingerpad")
 
 
 def test_version_is_that_of_the_package(call):
@@ -100,15 +92,8 @@ def test_without_a_command_the_help_is_shown(call):
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_misuse_is_one_sentence_and_status_2_and_nothing_is_written(call, tmp_path, arguments, named, came):
-    status, said, errors = call(*arguments)
-    assert (status, said) == (2, "")
-    assert errors.startswith("fingerpad: ")
-    assert errors.endswith(".\n")
-    assert errors.count("\n") == 1
-    assert named in errors
-    assert came in errors.removeprefix("fingerpad: ")
-    assert list(tmp_path.iterdir()) == []
+def test_misuse_is_one_sentence_and_status_2_and_nothing_is_written(call, is_refused, arguments, named, came):
+    is_refused(call(*arguments), "fingerpad", named, came)
 
 
 @pytest.mark.parametrize("below", ["", "/deeper", "/deeper/still"])

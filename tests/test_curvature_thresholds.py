@@ -7,7 +7,6 @@ import pytest
 
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import curvature_thresholds as study
 from fingerpad.experiments.gerling2014.comparison import weber_claims
@@ -21,6 +20,7 @@ from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.noise_fit import expected_hit_rates
 from fingerpad.report import curvature_thresholds as page
 from fingerpad.report.style import png
+from sections import SphereSkin
 
 AFFERENT = Afferent(static_gain=1.2e-6)
 POPULATION = Population.grid(rows=3, columns=4, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
@@ -28,20 +28,7 @@ PAIRS = neighbour_pairs(POPULATION.positions_mm, POPULATION.pitch_mm)
 DRAWS = normals(0, 1, 12, Purpose.RESPONSE, 2000)[0].T
 
 
-class BallSkin:
-    """SED below a ball: the more curved, the higher and narrower."""
-
-    def __init__(self, curvature_per_m):
-        sharpness = curvature_per_m / 287.0
-        self.peak_kpa, self.width_mm = 2.5 * sharpness, 2.5 / sharpness**0.25
-
-    def sed(self, sites):
-        squared = np.square(np.asarray(sites) - (RECEPTOR_X_MM, 0.0)).sum(axis=1)
-        peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
-        return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.85], peaks), kinks_ms=[50.0])
-
-
-SKINS = {curvature: BallSkin(curvature) for curvature in (*CURVATURES, *study.PRESSED_PER_M)}
+SKINS = {curvature: SphereSkin.wide(curvature) for curvature in (*CURVATURES, *study.PRESSED_PER_M)}
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +57,7 @@ def test_threshold_is_where_three_quarters_are_told_apart(found):
     population = Population.grid(rows=6, columns=6, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
     pairs = neighbour_pairs(population.positions_mm, population.pitch_mm)
     table = [
-        population.respond(BallSkin(curvature)).static_rate_hz
+        population.respond(SphereSkin.wide(curvature)).static_rate_hz
         for curvature in (287.0, 287.0 + entry.jnd_per_m)
     ]
     draws = normals(0, 1, 36, Purpose.RESPONSE, 4000)[0].T
@@ -85,7 +72,7 @@ def test_second_population_has_the_noise_that_fits_people(found):
     population = found.populations[1]
     at = found.pressed_per_m
     layout = Population.grid(rows=6, columns=6, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
-    table = [layout.respond(BallSkin(curvature)).static_rate_hz for curvature in (287.0, 296.0, 365.0)]
+    table = [layout.respond(SphereSkin.wide(curvature)).static_rate_hz for curvature in (287.0, 296.0, 365.0)]
     pairs = neighbour_pairs(layout.positions_mm, layout.pitch_mm)
     draws = normals(0, 1, 36, Purpose.RESPONSE, 4000)[0].T
     near, far = expected_hit_rates(table, pairs, population.noise_sigma, draws)
@@ -144,7 +131,7 @@ def test_receptors_that_are_silent_under_a_standard_tell_its_threshold_nothing()
 
 
 def test_noise_that_meets_no_person_is_said_where_thresholds_would_stand():
-    same = study.curvature_thresholds(dict.fromkeys(SKINS, BallSkin(287.0)), AFFERENT, 0.06, seed=0)
+    same = study.curvature_thresholds(dict.fromkeys(SKINS, SphereSkin.wide(287.0)), AFFERENT, 0.06, seed=0)
     paper, square = same.populations
     assert len(paper.without_threshold) == 4
     assert np.isnan(square.noise_sigma)

@@ -3,8 +3,8 @@
 import hashlib
 import json
 import re
-import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -357,9 +357,8 @@ def test_noise_is_not_fitted_to_silence():
 
 
 @pytest.fixture
-def call(monkeypatch, capsys, tmp_path):
-    """Run the command in an empty folder; presses take no time."""
-    monkeypatch.chdir(tmp_path)
+def call(monkeypatch, run_program):
+    """Run the command in an empty folder; indentations take no time."""
     monkeypatch.setattr(runner, "solve_missing", lambda *_: None)
 
     def pressed(self, touch):
@@ -370,15 +369,7 @@ def call(monkeypatch, capsys, tmp_path):
         return skin
 
     monkeypatch.setattr(runner.Store, "load", pressed)
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["fingerpad", "discriminate", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        said = capsys.readouterr()
-        return ended.value.code or 0, said.out, said.err
-
-    return run
+    return partial(run_program, cli.main, "fingerpad", "discriminate")
 
 
 def written(folder):

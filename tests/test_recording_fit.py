@@ -7,6 +7,7 @@ import shlex
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -383,20 +384,11 @@ class Pressed:
 
 
 @pytest.fixture
-def call(monkeypatch, capsys, tmp_path):
-    """Run the command in an empty folder; presses take no time."""
-    monkeypatch.chdir(tmp_path)
+def call(monkeypatch, run_program):
+    """Run the command in an empty folder; indentations take no time."""
     monkeypatch.setattr(runner, "solve_missing", lambda *_: None)
     monkeypatch.setattr(runner.Store, "load", lambda self, touch: Pressed(touch))
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["fingerpad", "fit", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        said = capsys.readouterr()
-        return ended.value.code or 0, said.out, said.err
-
-    return run
+    return partial(run_program, cli.main, "fingerpad", "fit")
 
 
 SHIFTS_MM = (-2.0, -1.4, -0.4, 0.2, 1.0, 1.6)

@@ -12,21 +12,14 @@ from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import LAYERS, block_mesh, finger_mesh
 from fingerpad.skin.receptor_sheet import ReceptorSheet
 from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
+from sections import DEPTHS_MM, LAYER_OF_INTERVAL, layered_block
 
 TIMES_MS = np.array([0.0, 50.0, 1000.0])
-DEPTHS_MM = np.array([0.0, 0.2, 0.371, 0.471, 1.0, 1.624, 5.0])
-LAYER_OF_INTERVAL = [0, 0, 1, 2, 2, 3]
 QUICK = finger_mesh(Fingertip(), resolution_grading("quick", 17.37))
 MIDDLE_DEPTH_MM = 0.421
 """Depth of the middles of the living epidermis' elements, whose means are read."""
 
 SITES = np.random.default_rng(0).uniform(-2.0, 2.0, (60, 2))
-
-
-def block(symmetric=True):
-    lines = np.concatenate([[0.0], np.cumsum(0.25 * 1.1 ** np.arange(8))])
-    both = np.concatenate([-lines[:0:-1], lines])
-    return block_mesh(both, DEPTHS_MM, lines if symmetric else both, LAYER_OF_INTERVAL, symmetric=symmetric)
 
 
 def response(mesh, field=None, displacement=None, axis_x_mm=0.0):
@@ -59,7 +52,9 @@ def response(mesh, field=None, displacement=None, axis_x_mm=0.0):
 @pytest.mark.parametrize("symmetric", [True, False])
 def test_linear_field_is_read_exactly_at_every_time(symmetric):
     slope_z = 0.0 if symmetric else -0.4
-    skin = response(block(symmetric), lambda centre: 9.0 + 0.7 * centre[:, 0] + slope_z * centre[:, 2])
+    skin = response(
+        layered_block(symmetric=symmetric), lambda centre: 9.0 + 0.7 * centre[:, 0] + slope_z * centre[:, 2]
+    )
     traces = skin.sed(SITES)
     expected = 9.0 + SITES @ [0.7, slope_z]
     # SciPy estimates the slopes of its cubic to a relative 1e-6.
@@ -70,7 +65,7 @@ def test_linear_field_is_read_exactly_at_every_time(symmetric):
 
 def test_only_the_living_epidermis_is_read():
     """A field that differs from layer to layer: no element of another layer may leak in."""
-    mesh = block()
+    mesh = layered_block()
     values = np.array([100.0, 3.0, 100.0, 100.0])
     skin = response(mesh, lambda centre: values[mesh.layer])
     np.testing.assert_allclose(skin.sed(SITES).sed_kpa[-1], 3.0, rtol=1e-12)
@@ -83,33 +78,33 @@ def bump(centre):
 
 
 def test_half_a_body_is_read_the_same_on_both_sides():
-    skin = response(block(), bump)
+    skin = response(layered_block(), bump)
     left, right = skin.sed(SITES).sed_kpa, skin.sed(SITES * [1.0, -1.0]).sed_kpa
     np.testing.assert_array_equal(left, right)
 
 
 def test_smooth_field_is_read_within_the_error_of_its_mesh():
     for symmetric in (True, False):
-        read = response(block(symmetric), bump).sed(SITES).sed_kpa[-1]
+        read = response(layered_block(symmetric=symmetric), bump).sed(SITES).sed_kpa[-1]
         expected = bump(np.column_stack([SITES[:, 0], np.zeros(len(SITES)), SITES[:, 1]]))
         np.testing.assert_allclose(read, expected, rtol=0, atol=0.01)
 
 
 def test_energy_never_falls_below_zero_beside_a_steep_front():
-    skin = response(block(), lambda centre: np.where(centre[:, 0] > 0.0, 5.0, 0.0))
+    skin = response(layered_block(), lambda centre: np.where(centre[:, 0] > 0.0, 5.0, 0.0))
     assert (skin.sed(SITES).sed_kpa >= 0.0).all()
 
 
 @pytest.mark.parametrize("symmetric", [True, False])
 def test_other_quantities_are_read_like_the_stored_energy(symmetric):
-    skin = response(block(symmetric), bump)
+    skin = response(layered_block(symmetric=symmetric), bump)
     stored = skin.sample("stored", SITES)
     np.testing.assert_array_equal(stored, skin.sed(SITES).sed_kpa)
     np.testing.assert_allclose(skin.sample("von_mises", SITES), 7.0 * stored, rtol=1e-5)
 
 
 def test_energy_comes_with_what_the_dynamic_term_follows():
-    skin = response(block(), bump)
+    skin = response(layered_block(), bump)
     traces = skin.sed(SITES, dynamic_quantity="von_mises")
     np.testing.assert_array_equal(traces.sed_kpa, skin.sed(SITES).sed_kpa)
     np.testing.assert_array_equal(traces.dynamic_kpa, skin.sample("von_mises", SITES))
@@ -132,7 +127,7 @@ def test_another_quantity_may_take_the_place_of_energy_in_the_static_term_or_in_
 @pytest.mark.parametrize("quantity", ["heat", "", "work"])
 def test_quantity_that_the_skin_does_not_know_is_refused(quantity):
     with pytest.raises(InputError, match="quantity must be one of stored, von_mises: got"):
-        response(block()).sample(quantity, SITES)
+        response(layered_block()).sample(quantity, SITES)
 
 
 def test_finger_is_read_on_its_volar_side_only():
@@ -255,7 +250,7 @@ def test_site_beside_the_finger_is_refused(site):
 @pytest.mark.parametrize("sites", [[1.0, 2.0], [[1.0, 2.0, 3.0, 4.0]], [[np.nan, 0.0]], "middle"])
 def test_sites_that_are_no_places_are_refused(sites):
     with pytest.raises(InputError, match="sites"):
-        response(block()).sed(sites)
+        response(layered_block()).sed(sites)
 
 
 def test_body_without_epidermis_has_nothing_to_read():
@@ -266,7 +261,7 @@ def test_body_without_epidermis_has_nothing_to_read():
 
 def test_profile_is_the_deflection_towards_the_bone_along_the_midline():
     """A displacement with a known y component; x and z components must not show."""
-    mesh = block()
+    mesh = layered_block()
     axis_x = 0.5
 
     def dent(nodes):

@@ -1,7 +1,8 @@
-"""`python -m studies NAME` as a shell meets it: what each study is asked for, and what it refuses."""
+"""`python -m studies NAME`: options that reach a study, files that it writes, and refused options."""
 
 import json
 import sys
+from functools import partial
 
 import pytest
 import typer
@@ -15,19 +16,10 @@ from studies.study import Study, command_of
 
 
 @pytest.fixture
-def call(monkeypatch, capsys, tmp_path):
-    """Run a study in this process, in an empty folder; a press would fail the test."""
-    monkeypatch.chdir(tmp_path)
+def call(monkeypatch, run_program):
+    """Run a study in this process, in an empty folder; an indentation fails the test."""
     monkeypatch.setattr(runner, "solve_missing", pytest.fail)
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["studies", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            command.main()
-        said = capsys.readouterr()
-        return ended.value.code or 0, said.out, said.err
-
-    return run
+    return partial(run_program, command.main, "studies")
 
 
 @result_class
@@ -93,11 +85,5 @@ def test_every_study_has_a_command_and_a_line_of_help(call):
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_misuse_is_one_sentence_and_status_2_and_nothing_is_written(call, tmp_path, arguments, named, came):
-    status, said, errors = call(*arguments)
-    assert (status, said) == (2, "")
-    assert errors.startswith("studies: ")
-    assert errors.count("\n") == 1
-    assert named in errors
-    assert came in errors.removeprefix("studies: ")
-    assert list(tmp_path.iterdir()) == []
+def test_misuse_is_one_sentence_and_status_2_and_nothing_is_written(call, is_refused, arguments, named, came):
+    is_refused(call(*arguments), "studies", named, came)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, neighbour_pairs
+from sections import SphereSkin
 from studies import code_efficiency
 from studies.pages import code_efficiency as page
 
@@ -17,22 +17,9 @@ POPULATION = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
 PAIRS = neighbour_pairs(POPULATION.positions_mm, POPULATION.pitch_mm)
 
 
-class BallSkin:
-    """SED below a ball: the more curved, the higher and narrower."""
-
-    def __init__(self, curvature_per_m):
-        sharpness = curvature_per_m / 287.0
-        self.peak_kpa, self.width_mm = 2.5 * sharpness, 2.5 / sharpness**0.25
-
-    def sed(self, sites):
-        squared = np.square(np.asarray(sites) - (RECEPTOR_X_MM, 0.0)).sum(axis=1)
-        peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
-        return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.85], peaks), kinks_ms=[50.0])
-
-
 @pytest.fixture(scope="module")
 def found():
-    answers = [POPULATION.respond(BallSkin(curvature)) for curvature in CURVATURES]
+    answers = [POPULATION.respond(SphereSkin.wide(curvature)) for curvature in CURVATURES]
     tables = {
         name: np.array([read(answer) for answer in answers]) for name, read in RESPONSE_MEASURES.items()
     }

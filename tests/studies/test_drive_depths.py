@@ -10,18 +10,17 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
-from fingerpad.geometry.mesh import LAYERS, block_mesh
+from fingerpad.geometry.mesh import LAYERS
 from fingerpad.inference.identifiable import six_parameters
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.report.style import png
 from fingerpad.skin.sampling import SkinResponse
+from sections import DEPTHS_MM, LAYER_OF_INTERVAL, layered_block
 from studies import drive_depths
 from studies.drive_fits import quick_method
 from studies.pages import drive_study as report
 
-DEPTHS_MM = np.array([0.0, 0.2, 0.371, 0.471, 1.0, 1.624, 5.0])
-TISSUE = [0, 0, 1, 2, 2, 3]
 TRUE_LAYER, OWN_LAYER = 4, 2
 TIMES_MS = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 100.0, 300.0, 1000.0])
 COURSE = np.clip(TIMES_MS / 50.0, 0.0, 1.0) ** 2
@@ -29,13 +28,7 @@ SHIFT_MM = np.linspace(-2.4, 2.4, 12)
 FOUR_TRUE = [0.01, 3.0, 0.03, 50.0]
 
 
-def block():
-    lines = np.concatenate([[0.0], np.cumsum(0.25 * 1.1 ** np.arange(8))])
-    both = RECEPTOR_X_MM + np.concatenate([-lines[:0:-1], lines])
-    return block_mesh(both, DEPTHS_MM, lines, TISSUE, symmetric=True)
-
-
-MESH = block()
+MESH = layered_block(RECEPTOR_X_MM)
 WIDTH_MM = np.array([0.5, 0.5, 0.5, 1.0, 1.6, 3.0])
 """Peaks of energy below the edges of a bar, the wider the deeper."""
 
@@ -104,7 +97,7 @@ def test_what_is_not_kept_there_is_not_made_up():
 
 def test_the_depth_that_made_the_rates_predicts_them_best(found):
     layers = found.layers
-    assert [layer.tissue for layer in layers] == [LAYERS[tissue] for tissue in TISSUE]
+    assert [layer.tissue for layer in layers] == [LAYERS[tissue] for tissue in LAYER_OF_INTERVAL]
     assert found.own_layer == OWN_LAYER
     scores = [layer.fit.fss_out_of_sample for layer in layers]
     assert np.argmax(scores) == TRUE_LAYER
@@ -129,6 +122,6 @@ def test_the_figure_and_the_words_say_where(found):
     assert "between 1.00 and 1.62 mm, in the dermis" in report.caption_depths(section)
     table = report.depth_table(found)
     assert table.title == "Sampling depth"
-    assert [row.cells[0] for row in table.rows] == [LAYERS[tissue] for tissue in TISSUE]
+    assert [row.cells[0] for row in table.rows] == [LAYERS[tissue] for tissue in LAYER_OF_INTERVAL]
     assert table.rows[TRUE_LAYER].cells[5] == f"{found.layers[TRUE_LAYER].fit.fss_out_of_sample:.3f}"
     assert all(len(row.cells) == len(table.columns) for row in table.rows)

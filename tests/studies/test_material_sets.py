@@ -469,7 +469,7 @@ def test_an_unknown_set_is_refused(tmp_path):
 
 
 def test_the_command_hands_over_what_was_asked_and_writes_page_and_numbers(
-    tiny, tmp_path, monkeypatch, capsys
+    tiny, tmp_path, monkeypatch, run_program
 ):
     asked = []
 
@@ -479,26 +479,13 @@ def test_the_command_hands_over_what_was_asked_and_writes_page_and_numbers(
 
     monkeypatch.setattr(material_study, "run", run)
     out = tmp_path / "out"
-    words = [
-        "materials",
-        "--out",
-        str(out),
-        "--name",
-        "Trial 3",
-        "--shifted-bars",
-        "--seed",
-        "5",
-        "--jobs",
-        "1",
-    ]
-    monkeypatch.setattr("sys.argv", ["studies", *words])
-    with pytest.raises(SystemExit) as ended:
-        command.main()
-    assert not ended.value.code
+    words = ("--out", out, "--name", "Trial 3", "--shifted-bars", "--seed", "5", "--jobs", "1")
+    status, said, _ = run_program(command.main, "studies", "materials", *words)
+    assert status == 0
     assert asked == [(("Trial 3",), True, 5, 1)]
     written = from_json(MaterialStudy, (out / "materials.json").read_bytes())
     assert to_json(written) == to_json(replace(tiny.results, shifted_bars=True))
-    assert capsys.readouterr().out.startswith(f"Page: {out / 'materials.md'}")
+    assert said.startswith(f"Page: {out / 'materials.md'}")
     assert "36 indentations of the bar" in (out / "materials.md").read_text(encoding="utf-8")
 
 
