@@ -14,11 +14,15 @@ from typing import TypeVar
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.results import Number, Vector, from_json, read_results, result_class
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
+from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.report.formatting import ABSENT, fixed, number
+from fingerpad.report.parts import Chapter
+from fingerpad.report.single_unit import single_unit_tables
 from studies.drive_quantities import DriveResult
 from studies.drive_study import DriveStudy
 from studies.fit_methods import FitMethods, MethodsStudy
 from studies.pages.drive_quantities import QUANTITIES
+from studies.pages.markdown import markdown_blocks
 from studies.pages.markdown import markdown_table as table
 
 COMMAND = "python -m studies results"
@@ -127,7 +131,10 @@ class Percept:
 
 @result_class
 class Excerpt:
-    """What of a run the pages show; `indentations` counts them by part of the run."""
+    """What of a run the pages show.
+
+    `indentations` counts them by part of the run; `single_unit` is the fit to the rates, fold by fold.
+    """
 
     version: str
     resolution: str
@@ -135,6 +142,7 @@ class Excerpt:
     seed: int
     indentations: dict[str, int]
     comparison: tuple[Compared, ...]
+    single_unit: SingleUnitResult
     methods: tuple[Method, ...]
     models: tuple[Model, ...]
     drives: tuple[Drive, ...]
@@ -199,6 +207,7 @@ def excerpt(
             Compared(quantity=row.quantity, paper=row.paper, ours=row.ours, met=row.met, note=row.note)
             for row in results.comparison
         ),
+        single_unit=results.single_unit,
         methods=tuple(
             Method(
                 method=row.method,
@@ -271,6 +280,9 @@ def results_page(shown: Excerpt) -> str:
                 for row in shown.comparison
             ],
         ),
+        *markdown_blocks(
+            Chapter("One afferent, fitted as in the paper", single_unit_tables(shown.single_unit))
+        ),
         "## FSS by method of fitting",
         "Fractional sum of squares (FSS, Eqs. 12-14) of one afferent under the bar. "
         "Out of sample: mean of six folds. From `python -m studies methods`, on the same recordings. "
@@ -291,7 +303,7 @@ def results_page(shown: Excerpt) -> str:
         "with the static Gradient Sum ([decision](decisions/noise-fitted.md)); all codes use it.",
         _hit_rates(shown.percept),
     ]
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join(part for part in parts if part) + "\n"
 
 
 def _linked(note: str) -> str:

@@ -85,7 +85,12 @@ def _block(part: Part, heading: str) -> list[str]:
     if isinstance(part, Drawing):
         return [f"![{part.label}](images/{part.name}.png)", part.caption]
     title = [f"{heading} {part.title}"] if part.title else []
-    return [*title, markdown_table(part.columns, [row.cells for row in part.rows]), part.note]
+    return [*title, markdown_table(part.columns, [_cells(row) for row in part.rows]), part.note]
+
+
+def _cells(row: Row) -> Sequence[str]:
+    """Cells of a row, bold in a final one."""
+    return [f"**{cell}**" if cell else "" for cell in row.cells] if row.kind == "final" else row.cells
 
 
 def markdown_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
