@@ -113,7 +113,7 @@ def test_energy_comes_with_what_the_dynamic_term_follows():
 
 
 def test_another_quantity_may_take_the_place_of_energy_in_the_static_term_or_in_both():
-    skin = response(block(), bump)
+    skin = response(layered_block(), bump)
     energy, stress = skin.sample("stored", SITES), skin.sample("von_mises", SITES)
     static = skin.sed(SITES, static_quantity="von_mises")
     np.testing.assert_array_equal(static.sed_kpa, stress)

@@ -49,7 +49,6 @@ def markdown(page: Page) -> str:
 
     Examples
     --------
-    >>> from fingerpad.report.parts import Row
     >>> meshes = Table("Meshes", ("mesh", "nodes"), [Row(("quick", "6730"))], "Half of the finger.")
     >>> print(markdown(Page("Skin", "A sphere.", [], [Chapter("", [meshes])])))
     # Skin
