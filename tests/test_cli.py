@@ -16,8 +16,9 @@ from fingerpad.experiments import gerling2014
 from fingerpad.export import formats
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS
-from fingerpad.geometry.indenters import Indenter, Plate, Sphere
+from fingerpad.geometry.indenters import Plate, Sphere
 from fingerpad.geometry.motion import RampAndHold
+from fingerpad.geometry.names import INDENTERS
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.skin.indentation import touch_of
 
@@ -48,7 +49,8 @@ def test_the_help_names_what_the_modules_know():
     assert choices.RESOLUTION_CHOICES == RESOLUTIONS
     assert tuple(TISSUES) == choices.MATERIAL_CHOICES
     assert tuple(formats.FORMATS) == choices.FORMAT_CHOICES
-    assert all(issubclass(getattr(fp, name), Indenter) for name in choices.INDENTER_CHOICES.values())
+    assert tuple(INDENTERS) == choices.INDENTER_CHOICES
+    assert all(getattr(fp, body.__name__) is body for body in INDENTERS.values())
 
 
 def test_without_a_command_the_help_is_shown(call):

@@ -1,4 +1,4 @@
-"""The command line: `reproduce`, `fit`, `discriminate` and `export`."""
+"""The command line: `reproduce`, `fit`, `discriminate`, `validate` and `export`."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from fingerpad.cli.discriminate import discriminate_command
 from fingerpad.cli.export import export_command
 from fingerpad.cli.fit import fit_command
 from fingerpad.cli.reproduce import reproduce_command
+from fingerpad.cli.validate import validate_command
 from fingerpad.core.errors import FingerpadError
 
 # What a command runs is imported where it runs: help and version need none of it and come at once.
@@ -49,6 +50,7 @@ def _options(
 app.command("reproduce")(reproduce_command)
 app.command("fit")(fit_command)
 app.command("discriminate")(discriminate_command)
+app.command("validate")(validate_command)
 app.command("export")(export_command)
 
 

@@ -3,19 +3,7 @@
 from fingerpad.skin.fields import sampled_fields
 
 RESOLUTION_CHOICES = ("quick", "standard", "paper")
-INDENTER_CHOICES = {
-    "sphere": "Sphere",
-    "cylinder": "Cylinder",
-    "bar": "Bar",
-    "line": "Line",
-    "punch": "FlatPunch",
-    "plate": "Plate",
-    "edge": "Edge",
-    "gap": "Gap",
-    "grating": "Grating",
-}
-"""Each with its class."""
-
+INDENTER_CHOICES = ("sphere", "cylinder", "bar", "line", "punch", "plate", "edge", "gap", "grating")
 MATERIAL_CHOICES = (
     "human",
     "paper",
@@ -32,3 +20,5 @@ MATERIAL_CHOICES = (
 FORMAT_CHOICES = ("vtu", "abaqus", "calculix", "febio")
 METHOD_CHOICES = ("least_squares", "response_surface", "closed_form", "cma_es", "likelihood")
 QUANTITY_CHOICES = tuple(sampled_fields())
+KIND_CHOICES = ("force", "deflection", "rate_curvature", "rate_position", "grating")
+LOADING_CHOICES = ("quasi_static", "ramp_and_hold")

@@ -15,7 +15,12 @@ from fingerpad.core.errors import InputError
 
 def export_command(
     folder: Annotated[Path, typer.Argument(help="Folder for the files; it is created if needed.")],
-    indenter: Annotated[str, typer.Option(help=f"One of {', '.join(INDENTER_CHOICES)}.")] = "sphere",
+    indenter: Annotated[
+        str,
+        typer.Option(
+            help=f"One of {', '.join(INDENTER_CHOICES)}, with sizes as in punch:6.35 or sphere:287."
+        ),
+    ] = "sphere",
     curvature: Annotated[
         float | None,
         typer.Option(parser=to_number, metavar="NUMBER", help="Curvature of the sphere. Default: 287. [1/m]"),
@@ -34,19 +39,23 @@ def export_command(
     ] = None,
 ) -> None:
     """Press an indenter into the finger and write the touch for ParaView or another solver."""
-    import fingerpad
     from fingerpad.core.checks import one_of
+    from fingerpad.experiments.indenter_text import indenter_named
     from fingerpad.export.formats import export_touch
     from fingerpad.geometry.fingertip import Fingertip
+    from fingerpad.geometry.indenters import Sphere
     from fingerpad.geometry.motion import RampAndHold
     from fingerpad.skin.indentation import touch_of
 
-    one_of("indenter", indenter, tuple(INDENTER_CHOICES))
+    body = indenter_named(indenter)
     one_of("format", format_name, FORMAT_CHOICES)
-    if curvature is not None and indenter != "sphere":
-        raise InputError(f"--curvature is that of a sphere, and a {indenter} has none: leave it out.")
-    shape = {} if curvature is None else {"curvature_per_m": curvature}
-    body = getattr(fingerpad, INDENTER_CHOICES[indenter])(**shape)
+    if curvature is not None:
+        if indenter != "sphere":
+            raise InputError(
+                f"--curvature is that of a sphere, --indenter sphere without a size: got {indenter}; "
+                "leave it out."
+            )
+        body = Sphere(curvature_per_m=curvature)
     touch = touch_of(Fingertip(), body, RampAndHold(depth_mm=depth), materials, resolution)
     make_writable(folder, "FOLDER")
     try:

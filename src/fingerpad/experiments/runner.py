@@ -17,7 +17,7 @@ from fingerpad.experiments.manifest import Manifest, StageSummary, mesh_summary,
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
-from fingerpad.skin.store import Store, solve_missing
+from fingerpad.skin.store import OnFailed, Store, solve_missing
 
 STORE_FOLDER = "indentations"
 """Folder of finished indentations within the folder of a run."""
@@ -66,7 +66,12 @@ class Runner:
             yield advance
         self._stages.append(StageSummary(name=name, wall_s=round(time.perf_counter() - started, 2)))
 
-    def solve(self, touches: Iterable[Touch], stage: str = "indentations") -> Collection[Path]:
+    def solve(
+        self,
+        touches: Iterable[Touch],
+        stage: str = "indentations",
+        on_failed: OnFailed | None = None,
+    ) -> Collection[Path]:
         """Solve and store the touches that are not stored yet.
 
         Parameters
@@ -75,6 +80,8 @@ class Runner:
             In the order in which they are started: the longest first keeps all processes busy to the end.
         stage : str, optional
             Name under which this is timed and shown.
+        on_failed : callable, optional
+            As of `solve_missing`: called with a touch that cannot be solved and its error.
 
         Returns
         -------
@@ -83,14 +90,14 @@ class Runner:
 
         Raises
         ------
-        ConvergenceError
-            If one cannot be solved; those finished before stay stored.
+        ConvergenceError, InputError
+            Without `on_failed`, if one cannot be solved; those finished before stay stored.
         StoreError
             If the folder cannot be written.
         """
         missing = self.store.missing(touches)
         with self.stage(stage, len(missing)) as advance:
-            solve_missing(missing, self.jobs, lambda seconds: advance())
+            solve_missing(missing, self.jobs, lambda seconds: advance(), on_failed)
         return missing.keys()
 
     def load(self, name: str, touches: Mapping[Key, Touch]) -> dict[Key, SkinResponse]:
@@ -124,13 +131,17 @@ class Runner:
         )
         return responses
 
-    def responses(self, groups: Mapping[str, Mapping[Any, Touch]]) -> dict[str, dict[Any, SkinResponse]]:
+    def responses(
+        self, groups: Mapping[str, Mapping[Any, Touch]], on_failed: OnFailed | None = None
+    ) -> dict[str, dict[Any, SkinResponse]]:
         """Solve what is missing of all groups, then read them group by group.
 
         Parameters
         ----------
         groups : mapping of str to mapping of key to Touch
             Touches of each part of the experiment, by its name.
+        on_failed : callable, optional
+            As of `solve`; the responses lack the touches that failed.
 
         Returns
         -------
@@ -141,9 +152,14 @@ class Runner:
         ConvergenceError, StoreError
             As `solve` and `load`.
         """
-        solved = self.solve(touch for touches in groups.values() for touch in touches.values())
+        solved = self.solve(
+            (touch for touches in groups.values() for touch in touches.values()), on_failed=on_failed
+        )
         responses = {}
-        for name, touches in groups.items():
+        for name, wanted in groups.items():
+            touches = {
+                key: touch for key, touch in wanted.items() if on_failed is None or self.store.holds(touch)
+            }
             responses[name] = self.load(name, touches)
             computed = sum(self.store.path(touch) in solved for touch in touches.values())
             self._stages[-1] = replace(self._stages[-1], computed=computed)

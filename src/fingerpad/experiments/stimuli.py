@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from fingerpad.core.checks import finite, one_of
+from fingerpad.core.checks import finite
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
 from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.geometry.indenters import Bar, Indenter
 from fingerpad.geometry.motion import MOTION_UNITS, ForceRampAndHold, RampAndHold, Stimulus
-from fingerpad.geometry.names import INDENTERS, SIZE_UNITS
+from fingerpad.geometry.names import SIZE_UNITS
 from fingerpad.inference.tables import TableRow, read_csv
 
 PLACE = {"x_mm": "mm", "z_mm": "mm", "tilt_deg": "degrees", "spin_deg": "degrees"}
@@ -163,17 +164,23 @@ def read_stimuli(path: Path) -> ListedStimuli:
 
 def _stimulus(line: TableRow) -> TactileStimulus:
     """Build the stimulus that a line describes."""
-    kind = line.text("indenter")
+    kind, *inline = line.text("indenter").split(":")
     with line.placed():
-        indenter = INDENTERS[one_of("indenter", kind, tuple(INDENTERS))]
-    sizes = tuple(size.name for size in fields(indenter))  # type: ignore[arg-type]
+        indenter = indenter_named(line.text("indenter"))
+    sizes = {size.name: SIZE_UNITS[size.name] for size in fields(indenter)}  # type: ignore[arg-type]
     line.refuse_others(("stimulus", "indenter", *sizes, *MOTION_UNITS, *PLACE), kind)
+    given = _given(line, sizes)
+    if inline and given:
+        raise InputError(
+            f"{line.place}: sizes must stand in indenter or in columns, not in both: leave "
+            f"{next(iter(given))} empty."
+        )
     if line.has("depth_mm") and line.has("force_mn"):
         raise InputError(f"{line.place}: depth_mm and force_mn exclude each other: leave one empty.")
     motion = ForceRampAndHold if line.has("force_mn") else RampAndHold
     with line.placed():
         return TactileStimulus(
-            indenter(**_given(line, {name: SIZE_UNITS[name] for name in sizes})),
+            replace(indenter, **given),  # type: ignore[type-var]
             motion(**_given(line, MOTION_UNITS)),
             **_given(line, PLACE),
         )

@@ -27,6 +27,8 @@ class TableRow:
         File and line, for messages.
     entries : mapping of str to Any
         Texts, or typed values, by column; an absent or empty entry was not given.
+    line : int, optional
+        Line of the file; 0 where there are no lines.
 
     Examples
     --------
@@ -37,6 +39,7 @@ class TableRow:
 
     place: str
     entries: Mapping[str, Any]
+    line: int = 0
 
     def has(self, column: str) -> bool:
         """Whether this row gives a value for `column`."""
@@ -113,8 +116,11 @@ def read_csv(path: Path, known: Sequence[str]) -> list[TableRow]:
     columns = [column.strip() for column in header]
     for column in columns:
         if column not in known:
+            separator = next((each for each in (";", "\t") if each in column), "")
+            hint = f" Separate entries by commas, not by {separator!r}." if separator else ""
             raise InputError(
                 f"{path}, line {header_line}: column {column!r} is unknown, only {', '.join(known)} can be."
+                f"{hint}"
             )
         if columns.count(column) > 1:
             raise InputError(f"{path}, line {header_line}: column {column} is repeated, keep one.")
@@ -124,7 +130,7 @@ def read_csv(path: Path, known: Sequence[str]) -> list[TableRow]:
             raise InputError(
                 f"{path}, line {number}: must have {len(columns)} entries, one per column: got {len(row)}."
             )
-        lines.append(TableRow(f"{path}, line {number}", dict(zip(columns, row, strict=True))))
+        lines.append(TableRow(f"{path}, line {number}", dict(zip(columns, row, strict=True)), number))
     return lines
 
 

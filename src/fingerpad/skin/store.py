@@ -20,6 +20,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import Field, fields, is_dataclass
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ import numpy as np
 
 from fingerpad.core.checks import whole
 from fingerpad.core.compilation import LOGGER, announce_compilation
-from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.errors import ConvergenceError, InputError, StoreError
 from fingerpad.core.files import write_atomically
 from fingerpad.core.threads import available_threads
 from fingerpad.mechanics.kernels import KERNELS
@@ -45,6 +46,9 @@ _SOLUTION = {
     "factorisations": int,
 }
 """Content of the stored array "solution", in this order."""
+
+OnFailed = Callable[[Touch, ConvergenceError | InputError], None]
+"""Told of an indentation that cannot be solved, and why."""
 
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 _LOOK_FOR_PARENT_S = 0.1
@@ -172,7 +176,10 @@ def _compute(touch: Touch, path: Path, threads: int | None = None) -> float:
 
 
 def solve_missing(
-    missing: Mapping[Path, Touch], jobs: int, on_finished: Callable[[float], None] | None = None
+    missing: Mapping[Path, Touch],
+    jobs: int,
+    on_finished: Callable[[float], None] | None = None,
+    on_failed: OnFailed | None = None,
 ) -> None:
     """Compute indentations and store them.
 
@@ -184,25 +191,40 @@ def solve_missing(
         Number of processes; the results do not depend on it.
     on_finished : callable, optional
         Called with the seconds that each indentation took.
+    on_failed : callable, optional
+        Called with an indentation that cannot be solved and with its error; the others are computed then.
 
     Raises
     ------
-    ConvergenceError
-        If one cannot be solved; those finished before remain in the store.
+    ConvergenceError, InputError
+        Without `on_failed`, if one cannot be solved; those finished before remain in the store.
     """
     whole("jobs", jobs, at_least=1)
     in_processes = jobs > 1 and len(missing) > 1
-    for seconds in _in_processes(missing, jobs) if in_processes else _in_turn(missing):
-        if on_finished:
+    for seconds in _in_processes(missing, jobs, on_failed) if in_processes else _in_turn(missing, on_failed):
+        if on_finished and seconds is not None:
             on_finished(seconds)
 
 
-def _in_turn(touches: Mapping[Path, Touch]) -> Iterator[float]:
+def _seconds(compute: Callable[[], float], touch: Touch, on_failed: OnFailed | None) -> float | None:
+    """Seconds that an indentation took; None if it failed, which `on_failed` then knows."""
+    try:
+        return compute()
+    except (ConvergenceError, InputError) as error:
+        if on_failed is None:
+            raise
+        on_failed(touch, error)
+        return None
+
+
+def _in_turn(touches: Mapping[Path, Touch], on_failed: OnFailed | None) -> Iterator[float | None]:
     for path, touch in touches.items():
-        yield _compute(touch, path)
+        yield _seconds(partial(_compute, touch, path), touch, on_failed)
 
 
-def _in_processes(touches: Mapping[Path, Touch], jobs: int) -> Iterator[float]:
+def _in_processes(
+    touches: Mapping[Path, Touch], jobs: int, on_failed: OnFailed | None
+) -> Iterator[float | None]:
     processes = min(jobs, len(touches))
     threads = max(1, available_threads() // processes)
     with (
@@ -210,14 +232,15 @@ def _in_processes(touches: Mapping[Path, Touch], jobs: int) -> Iterator[float]:
         _environment(_ONE_THREAD),
         ProcessPoolExecutor(processes, get_context("spawn"), _begin, (os.getpid(),)) as pool,
     ):
-        waiting: set[Future[float]] = {
-            pool.submit(_compute, touch, path, threads) for path, touch in touches.items()
+        pressed: dict[Future[float], Touch] = {
+            pool.submit(_compute, touch, path, threads): touch for path, touch in touches.items()
         }
+        waiting = set(pressed)
         try:
             while waiting:
                 done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
                 for future in done:
-                    yield future.result()
+                    yield _seconds(future.result, pressed[future], on_failed)
         except BrokenProcessPool as error:
             raise StoreError(
                 "A worker process was ended from outside (out of memory?): run again, perhaps with fewer "

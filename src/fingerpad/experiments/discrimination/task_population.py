@@ -6,10 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from pkgutil import resolve_name
 
-from fingerpad.core.errors import InputError, StoreError
-from fingerpad.core.files import read_text
+from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import PATTERNS
-from fingerpad.experiments import schemas
+from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.discrimination.task import (
     DEFAULT,
@@ -19,7 +18,7 @@ from fingerpad.experiments.discrimination.task import (
     DiscriminationTask,
     PopulationSettings,
 )
-from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population, sensitivities
 
 _OF_LAYOUT = {
@@ -54,23 +53,7 @@ def task_afferent(task: DiscriminationTask, beside: Path = Path()) -> Afferent:
     chosen = task.afferent
     if isinstance(chosen, AfferentSettings):
         return Afferent(**chosen.given)
-    return Afferent() if chosen == DEFAULT else _fitted(Path(beside) / chosen)
-
-
-def _fitted(path: Path) -> Afferent:
-    """Afferent of a file of results: `fit.json`, or `results.json` of a reproduction."""
-    try:
-        read_text(path)  # names a file that cannot be read
-        values = schemas.read(path, "fingerpad fit", "fingerpad reproduction")
-    except (InputError, StoreError) as error:
-        raise InputError(f"afferent: {error}") from error
-    is_fit = "fit" in values
-    parameters = values["fit" if is_fit else "single_unit"]["parameters"]
-    quantities = ("dynamic_quantity", "static_quantity")
-    return Afferent.from_parameters(
-        [parameters[name] for name in PARAMETER_NAMES],
-        **({name: values[name] for name in quantities} if is_fit else {}),
-    )
+    return Afferent() if chosen == DEFAULT else fitted_afferent(Path(beside) / chosen)
 
 
 def task_population(task: DiscriminationTask, beside: Path = Path()) -> Population:

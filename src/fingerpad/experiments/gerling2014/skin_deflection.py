@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fingerpad.core.results import Number, TruthVector, Vector, result_class
 from fingerpad.data import cylinder_deflection
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.experiments.scores import coefficient_of_determination
 from fingerpad.geometry.indenters import Cylinder, Indenter, Line
 from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
 
@@ -114,19 +114,6 @@ def deflection_touches(conditions: Conditions) -> dict[tuple[str, str], Touch]:
         for trial in TRIALS
         for name, indenter in INDENTERS.items()
     }
-
-
-def coefficient_of_determination(observed: ArrayLike, predicted: ArrayLike) -> float:
-    """R² = 1 - sum (observed - predicted)² / sum (observed - mean)².
-
-    Examples
-    --------
-    >>> coefficient_of_determination([0.0, 1.0, 2.0], [0.0, 1.0, 2.0])
-    1.0
-    """
-    observed, predicted = np.asarray(observed, dtype=float), np.asarray(predicted, dtype=float)
-    scatter = ((observed - observed.mean()) ** 2).sum()
-    return float(1.0 - ((observed - predicted) ** 2).sum() / scatter)
 
 
 def deflection_r2(profile: SurfaceProfile, proximal_positive: bool = True) -> float:

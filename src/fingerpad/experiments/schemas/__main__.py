@@ -12,8 +12,9 @@ from fingerpad.experiments.discrimination.run import DiscriminationFile
 from fingerpad.experiments.fit.session import FitFile
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.schemas import file_name
+from fingerpad.experiments.validation.validation import ValidationFile
 
-RESULT_FILES: tuple[type, ...] = (ReproductionResult, FitFile, DiscriminationFile)
+RESULT_FILES: tuple[type, ...] = (ReproductionResult, FitFile, DiscriminationFile, ValidationFile)
 """Classes of results that are written to a file of their own."""
 
 

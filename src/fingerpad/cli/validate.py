@@ -1,0 +1,98 @@
+"""`fingerpad validate`: the model scored against observations of your own."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fingerpad.cli.choices import KIND_CHOICES, LOADING_CHOICES
+from fingerpad.cli.options import Jobs, Materials, Resolution
+from fingerpad.cli.running import Bars, interruptible, make_writable, processes
+from fingerpad.core.errors import InputError
+from fingerpad.core.files import write_atomically
+
+INCOMPLETE = 3
+"""Exit status if some rows have no prediction; all others are scored."""
+
+
+def validate_command(
+    observations: Annotated[
+        Path | None, typer.Argument(help="CSV file (format: docs/validate.md). Not needed with --example.")
+    ] = None,
+    out: Annotated[
+        Path, typer.Option(help="Folder for page, figure, results and stored indentations.")
+    ] = Path("validate"),
+    resolution: Resolution = "standard",
+    materials: Materials = "trial3",
+    afferent: Annotated[
+        Path | None,
+        typer.Option(
+            help="fit.json of a fit, or results.json of a reproduction: the afferent whose rates are "
+            "predicted. Default: that of the package."
+        ),
+    ] = None,
+    loading: Annotated[
+        str,
+        typer.Option(
+            help=f"How a depth of force or deflection is reached, one of {', '.join(LOADING_CHOICES)}: with "
+            "relaxed tissues, or read at the end of the paper's ramp and hold."
+        ),
+    ] = LOADING_CHOICES[0],
+    static_window: Annotated[
+        tuple[float, float], typer.Option(help="Window of the rates: start and end. [ms]")
+    ] = (600.0, 950.0),
+    jobs: Jobs = None,
+    example: Annotated[
+        str | None,
+        typer.Option(help=f"Write an example file, one of {', '.join(KIND_CHOICES)}, into --out, and exit."),
+    ] = None,
+) -> None:
+    """Score the model against your own observations of force, deflection or firing rates."""
+    from rich.console import Console
+
+    from fingerpad.experiments import schemas
+    from fingerpad.experiments.afferent_files import fitted_afferent
+    from fingerpad.experiments.conditions import Conditions
+    from fingerpad.experiments.manifest import sha256
+    from fingerpad.experiments.validation.observations import example_file, read_observations
+    from fingerpad.experiments.validation.predictions import Model
+    from fingerpad.experiments.validation.validation import ValidationRequest, validate
+    from fingerpad.neuron.afferent import Afferent
+    from fingerpad.report.validation import validation_summary, write_validation_page
+
+    if example is not None:
+        content = example_file(example)
+        make_writable(out)
+        write_atomically(out / f"{example}.csv", content.encode())
+        typer.echo(f"Try: fingerpad validate {out / example}.csv --resolution quick")
+        return
+    if observations is None:
+        raise InputError("validate needs a file of observations, or --example KIND: see --help.")
+    model = Model(
+        Conditions(resolution=resolution, materials=materials),
+        Afferent() if afferent is None else fitted_afferent(afferent),
+        loading,
+        static_window,
+    )
+    request = ValidationRequest(read_observations(observations), model, out, processes(jobs))
+    make_writable(out)
+    inputs = [observations, *([] if afferent is None else [afferent])]
+    with interruptible():
+        results = validate(
+            request,
+            Bars(Console(stderr=True)),
+            command=shlex.join(["fingerpad", *sys.argv[1:]]),
+            inputs={str(path): sha256(path) for path in inputs},
+        )
+        page = write_validation_page(results, out)
+        schemas.write(out / "validate.json", results)
+    for paragraph in validation_summary(results):
+        typer.echo(paragraph)
+    typer.echo(f"Report: {page}")
+    typer.echo(f"Results: {out / 'validate.json'}")
+    if results.n_predicted < results.n_rows:
+        raise typer.Exit(INCOMPLETE)

@@ -1,0 +1,41 @@
+"""Afferents whose parameters stand in a file of results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.files import read_text
+from fingerpad.experiments import schemas
+from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
+
+
+def fitted_afferent(path: Path) -> Afferent:
+    """Afferent of a file of results: `fit.json`, or `results.json` of a reproduction.
+
+    Parameters
+    ----------
+    path : Path
+        Written by `fingerpad fit` or `fingerpad reproduce`.
+
+    Returns
+    -------
+    Afferent
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or holds no fitted parameters.
+    """
+    try:
+        read_text(path)  # names a file that cannot be read
+        values = schemas.read(path, "fingerpad fit", "fingerpad reproduction")
+    except (InputError, StoreError) as error:
+        raise InputError(f"afferent: {error}") from error
+    is_fit = "fit" in values
+    parameters = values["fit" if is_fit else "single_unit"]["parameters"]
+    quantities = ("dynamic_quantity", "static_quantity")
+    return Afferent.from_parameters(
+        [parameters[name] for name in PARAMETER_NAMES],
+        **({name: values[name] for name in quantities} if is_fit else {}),
+    )

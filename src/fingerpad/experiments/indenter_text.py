@@ -1,0 +1,49 @@
+"""Indenters as files and options write them: a name with sizes, such as `punch:6.35`."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+from fingerpad.core.checks import finite, one_of
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.indenters import Indenter
+from fingerpad.geometry.names import INDENTERS, SIZE_UNITS
+
+
+def indenter_named(text: str) -> Indenter:
+    """Make an indenter from its name and sizes, `name:size:size`.
+
+    Parameters
+    ----------
+    text : str
+        A name of `INDENTERS`. Sizes follow after colons in the order of the parameters of its class, each in
+        its unit of `SIZE_UNITS`; those that are left out are the paper's.
+
+    Returns
+    -------
+    Indenter
+
+    Raises
+    ------
+    InputError
+        If the name is unknown, a size is no number or cannot be, or there are more sizes than the body has.
+
+    Examples
+    --------
+    >>> indenter_named("punch:6.35")
+    FlatPunch(diameter_mm=6.35, fillet_mm=0.3)
+    >>> indenter_named("sphere:287"), indenter_named("plate")
+    (Sphere(curvature_per_m=287.0), Plate())
+    """
+    name, *given = (part.strip() for part in text.split(":"))
+    body = INDENTERS[one_of("indenter", name, tuple(INDENTERS))]
+    sizes = [size.name for size in fields(body)]  # type: ignore[arg-type]
+    if len(given) > len(sizes):
+        raise InputError(
+            f"indenter must be written {':'.join([name, *sizes])}, sizes from the right may be left out: "
+            f"got {text!r}."
+        )
+    return body(**{
+        size: finite(size, value, SIZE_UNITS[size])  # type: ignore[arg-type]
+        for size, value in zip(sizes, given, strict=False)
+    })  # fmt: skip

@@ -1,0 +1,279 @@
+"""Files of observations: five kinds, each known by its header."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, one_of, positive
+from fingerpad.core.errors import InputError
+from fingerpad.experiments.indenter_text import indenter_named
+from fingerpad.inference.tables import TableRow, read_csv
+
+LARGEST_FILE_MB = 5.0
+"""Files above this are refused: each of their rows would be a press or a reading of one. [MB]"""
+
+_BYTES_PER_MB = 1e6
+
+Value = float | str
+
+
+def not_concave(name: str, value: float, unit: str = "") -> float:
+    """Return a curvature that is not negative, else raise `InputError`."""
+    if finite(name, value, unit) < 0.0:
+        raise InputError(
+            f"{name} must not be negative [{unit}], because indenters are spheres and, at 0, a flat plate: "
+            f"got {value!r}; leave concave surfaces out."
+        )
+    return float(value)
+
+
+COLUMNS: dict[str, tuple[str, Callable[..., float]]] = {
+    "depth_mm": ("mm", not_negative),
+    "distance_mm": ("mm", finite),
+    "position_mm": ("mm", finite),
+    "curvature_per_m": ("1/m", not_concave),
+    "ridge_mm": ("mm", positive),
+    "groove_mm": ("mm", positive),
+    "force_n": ("N", not_negative),
+    "deflection_mm": ("mm", finite),
+    "rate_hz": ("spikes/s", not_negative),
+}
+"""Unit and check of each column of numbers; the other column is the indenter."""
+
+INDENTER = "indenter"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of observation.
+
+    Parameters
+    ----------
+    name : str
+        Name of the kind.
+    conditions : tuple of str
+        Columns that say under what was observed.
+    observed : str
+        Column of what was observed.
+    example : tuple of str
+        Rows of an example file, with made-up numbers.
+    axis : str, optional
+        Condition that is a place along the finger, whose direction a source may leave open.
+    """
+
+    name: str
+    conditions: tuple[str, ...]
+    observed: str
+    example: tuple[str, ...]
+    axis: str = ""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """All columns, in the order of the documented header."""
+        return (*self.conditions, self.observed)
+
+    @property
+    def unit(self) -> str:
+        """Unit of what was observed."""
+        return COLUMNS[self.observed][0]
+
+    @property
+    def is_rate(self) -> bool:
+        """Whether an afferent was observed, not the skin."""
+        return self.observed == "rate_hz"
+
+
+KINDS: dict[str, Kind] = {
+    kind.name: kind
+    for kind in (
+        Kind(
+            "force",
+            (INDENTER, "depth_mm"),
+            "force_n",
+            ("plate,0.5,0.10", "plate,0.5,0.20", "punch:6.35,1,0.25", "sphere:287,0.8,0.05"),
+        ),
+        Kind(
+            "deflection",
+            (INDENTER, "depth_mm", "distance_mm"),
+            "deflection_mm",
+            (
+                "cylinder:3.17,0.5,-4,0.1",
+                "cylinder:3.17,0.5,0,0.5",
+                "cylinder:3.17,0.5,0,0.48",
+                "cylinder:3.17,0.5,4,0.1",
+            ),
+            axis="distance_mm",
+        ),
+        Kind(
+            "rate_curvature",
+            ("force_n", "curvature_per_m"),
+            "rate_hz",
+            ("0.2,0,10", "0.2,287,40", "0.2,287,50"),
+        ),
+        Kind(
+            "rate_position",
+            ("force_n", "curvature_per_m", "position_mm"),
+            "rate_hz",
+            ("0.2,287,0,45", "0.2,287,0,50", "0.2,287,2,10"),
+            axis="position_mm",
+        ),
+        Kind(
+            "grating",
+            ("force_n", "ridge_mm", "groove_mm", "position_mm"),
+            "rate_hz",
+            ("0.2,1.5,1.5,0,30", "0.2,1.5,1.5,0.75,60", "0.2,1.5,1.5,1.5,5"),
+            axis="position_mm",
+        ),
+    )
+}
+"""Kinds by name."""
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One row of a file.
+
+    Parameters
+    ----------
+    line : int
+        Line of the file.
+    condition : tuple of float or str
+        Values of the kind's conditions, in their order; an indenter as it is written.
+    observed : float
+        What was observed. [unit of the kind]
+    """
+
+    line: int
+    condition: tuple[Value, ...]
+    observed: float
+
+
+@dataclass(frozen=True)
+class Observations:
+    """What a file holds.
+
+    Parameters
+    ----------
+    kind : Kind
+        One of `KINDS`.
+    rows : tuple of Observation
+        In the order of the file.
+    source : str
+        Name of the file.
+    """
+
+    kind: Kind
+    rows: tuple[Observation, ...]
+    source: str
+
+    @cached_property
+    def observed(self) -> FloatArray:
+        """What was observed, (n_rows,). [unit of the kind]"""
+        return float_array("observed", [row.observed for row in self.rows], 1)
+
+    @property
+    def conditions(self) -> list[tuple[object, ...]]:
+        """Conditions of the rows, equal where they mean the same: `punch:6.35` and `punch:6.350` are one."""
+        return [
+            tuple(indenter_named(value) if isinstance(value, str) else value for value in row.condition)
+            for row in self.rows
+        ]
+
+
+def read_observations(path: Path) -> Observations:
+    r"""Read a file of observations.
+
+    Parameters
+    ----------
+    path : Path
+        A CSV file in UTF-8, of at most `LARGEST_FILE_MB`. Its header decides the kind; columns may stand in
+        any order, and lines that begin with # are comments.
+
+    Returns
+    -------
+    Observations
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, its columns are those of no kind, or an entry cannot be; with the line,
+        what was expected and what came.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "plate.csv"
+    ...     _ = path.write_text("indenter,depth_mm,force_n\nplate,1,0.11\nplate,1,0.23\n", encoding="utf-8")
+    ...     found = read_observations(path)
+    >>> found.kind.name, found.rows[1].condition, found.observed.tolist()
+    ('force', ('plate', 1.0), [0.11, 0.23])
+    """
+    size_mb = path.stat().st_size / _BYTES_PER_MB if path.is_file() else 0.0
+    if size_mb > LARGEST_FILE_MB:
+        raise InputError(
+            f"{path} must be at most {LARGEST_FILE_MB:g} MB: it has {size_mb:.1f} MB; split it into several."
+        )
+    lines = read_csv(path, (INDENTER, *COLUMNS))
+    kind = _kind(path, tuple(lines[0].entries))
+    return Observations(kind, tuple(_observation(line, kind) for line in lines), str(path))
+
+
+def _kind(path: Path, columns: tuple[str, ...]) -> Kind:
+    """Find the kind that has exactly these columns."""
+
+    def differing(kind: Kind) -> set[str]:
+        return set(kind.columns) ^ set(columns)
+
+    nearest = min(KINDS.values(), key=lambda kind: len(differing(kind)))
+    if not differing(nearest):
+        return nearest
+    lacking = [f"add {column}" for column in nearest.columns if column not in columns]
+    unwanted = [f"leave out {column}" for column in columns if column not in nearest.columns]
+    known = "; ".join(",".join(kind.columns) for kind in KINDS.values())
+    raise InputError(
+        f"{path}, header: must be that of one kind ({known}): got {','.join(columns)}; for the kind "
+        f"{nearest.name}, {' and '.join(lacking + unwanted)}."
+    )
+
+
+def _observation(line: TableRow, kind: Kind) -> Observation:
+    observed = _value(line, kind.observed)
+    assert isinstance(observed, float)
+    return Observation(line.line, tuple(_value(line, column) for column in kind.conditions), observed)
+
+
+def _value(line: TableRow, column: str) -> Value:
+    """Read an entry and check it."""
+    if column != INDENTER:
+        return line.number(column, *COLUMNS[column])
+    text = line.text(column)
+    with line.placed():
+        indenter_named(text)
+    return text
+
+
+def example_file(kind: str) -> str:
+    """Return an example file of a kind, whose numbers are made up.
+
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+
+    Examples
+    --------
+    >>> print(example_file("rate_curvature"))
+    # Made-up numbers that show the format. They are no data.
+    force_n,curvature_per_m,rate_hz
+    0.2,0,10
+    0.2,287,40
+    0.2,287,50
+    <BLANKLINE>
+    """
+    shown = KINDS[one_of("--example", kind, tuple(KINDS))]
+    lines = ["# Made-up numbers that show the format. They are no data.", ",".join(shown.columns)]
+    return "\n".join([*lines, *shown.example, ""])

@@ -1,0 +1,280 @@
+"""What the model predicts under each condition of a file of observations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray, one_of
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.data import protocol
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.indenter_text import indenter_named
+from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.validation.observations import Kind, Observations, Value
+from fingerpad.geometry.edged_indenters import Grating
+from fingerpad.geometry.indenter_grading import grading_about
+from fingerpad.geometry.indenters import Indenter, Plate, Sphere
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.population import Population
+from fingerpad.skin.indentation import Touch, settings_of, touch_of
+from fingerpad.skin.sampling import SkinResponse
+
+MN_PER_N = 1000.0
+
+QUASI_STATIC, RAMP_AND_HOLD = "quasi_static", "ramp_and_hold"
+LOADINGS = (QUASI_STATIC, RAMP_AND_HOLD)
+"""How a depth is reached: with tissues that are relaxed throughout, or by the paper's motion."""
+
+QUASI_STATIC_MS = 1e12
+"""Duration of a quasi-static ramp, after which all Prony terms have relaxed to better than 1 in 10⁶. [ms]"""
+
+
+@dataclass(frozen=True)
+class Model:
+    """What predicts.
+
+    Parameters
+    ----------
+    conditions : Conditions
+        Finger, tissues and accuracy.
+    afferent : Afferent
+        Responds to the touches of rates.
+    loading : {"quasi_static", "ramp_and_hold"}
+        How depths of force and deflection are reached.
+    static_window_ms : (float, float)
+        Window in which rates are counted, within the paper's ramp and hold. [ms]
+    """
+
+    conditions: Conditions
+    afferent: Afferent = field(default_factory=Afferent)
+    loading: str = QUASI_STATIC
+    static_window_ms: tuple[float, ...] = protocol.STATIC_WINDOW.value
+
+    def __post_init__(self) -> None:
+        one_of("loading", self.loading, LOADINGS)
+        start, end = self.static_window_ms
+        end_ms = RampAndHold().end_ms
+        if not 0.0 <= start < end <= end_ms:
+            raise InputError(
+                f"static_window must be a start from 0 on and a later end, at most {end_ms:g} ms, where the "
+                f"hold ends: got {start:g}, {end:g}."
+            )
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How the prediction of one row is obtained.
+
+    Parameters
+    ----------
+    touch : Touch or None
+        What is pressed; None if nothing is, at depth or force 0.
+    of : callable
+        Reads the prediction from the response of the skin, None without a touch.
+    """
+
+    touch: Touch | None
+    of: Callable[[SkinResponse | None], float]
+
+
+@dataclass(frozen=True)
+class Predictions:
+    """Predictions row by row.
+
+    Parameters
+    ----------
+    values : array (n_rows,)
+        In the unit of the observations; NaN where there is none.
+    mirrored : array (n_rows,) or None
+        The same with proximal and distal exchanged, for kinds with an axis.
+    reasons : mapping of int to str
+        Why a row has no prediction.
+    meshed : SkinResponse or None
+        One of the responses, for its mesh.
+    """
+
+    values: FloatArray
+    mirrored: FloatArray | None
+    reasons: Mapping[int, str]
+    meshed: SkinResponse | None
+
+
+def predict(observations: Observations, model: Model, runner: Runner) -> Predictions:
+    """Press what is not stored yet, and read the prediction of every row.
+
+    Parameters
+    ----------
+    observations : Observations
+        From `read_observations`.
+    model : Model
+        Finger, tissues, afferent.
+    runner : Runner
+        Stores the presses.
+
+    Returns
+    -------
+    Predictions
+        A row whose touch cannot be pressed or does not converge has a reason instead of a value.
+    """
+    kind, conditions = observations.kind, [row.condition for row in observations.rows]
+    reasons: dict[int, str] = {}
+    readings: dict[int, Reading] = {}
+    for row, condition in enumerate(conditions):
+        try:
+            readings[row] = _READING[kind.observed](dict(zip(kind.conditions, condition, strict=True)), model)
+        except InputError as error:
+            reasons[row] = error.args[0]
+    failed: dict[Touch, str] = {}
+    touches = list(dict.fromkeys(reading.touch for reading in readings.values() if reading.touch))
+    skins = runner.responses(
+        {kind.name: {touch: touch for touch in touches}},
+        on_failed=lambda touch, error: failed.update({touch: error.args[0]}),
+    )[kind.name]
+    values = np.full(len(conditions), np.nan)
+    for row, reading in readings.items():
+        if reading.touch in failed:
+            reasons[row] = failed[reading.touch]
+            continue
+        try:
+            values[row] = reading.of(skins[reading.touch] if reading.touch else None)
+        except InputError as error:
+            reasons[row] = error.args[0]
+    mirrored = _mirrored(kind, conditions, readings, model, skins) if kind.axis else None
+    return Predictions(values, mirrored, reasons, next(iter(skins.values()), None))
+
+
+def _mirrored(
+    kind: Kind,
+    conditions: Sequence[tuple[Value, ...]],
+    readings: Mapping[int, Reading],
+    model: Model,
+    skins: Mapping[Touch, SkinResponse],
+) -> FloatArray:
+    """Read the same presses with the axis of the file reversed."""
+    values = np.full(len(conditions), np.nan)
+    for row, reading in readings.items():
+        if reading.touch is not None and reading.touch not in skins:
+            continue
+        given = dict(zip(kind.conditions, conditions[row], strict=True))
+        try:
+            other = _READING[kind.observed](given | {kind.axis: -_number(given[kind.axis])}, model)
+            values[row] = other.of(skins[other.touch] if other.touch else None)
+        except InputError:
+            continue
+    return values
+
+
+def _number(value: Value) -> float:
+    assert isinstance(value, float)
+    return value
+
+
+def _pressed_to(given: Mapping[str, Value], model: Model) -> Touch | None:
+    """Touch that reaches a depth, perpendicular to the long axis of the finger; None at depth 0."""
+    indenter, depth_mm = indenter_named(str(given["indenter"])), _number(given["depth_mm"])
+    if depth_mm == 0.0:
+        return None
+    conditions = model.conditions
+    motion, settings = RampAndHold(depth_mm=depth_mm), settings_of(conditions.resolution)
+    if model.loading == QUASI_STATIC:
+        motion = replace(motion, ramp_ms=QUASI_STATIC_MS)
+        settings = replace(settings, hold_steps=1)
+    return touch_of(
+        conditions.finger,
+        indenter,
+        motion,
+        conditions.materials,
+        conditions.resolution,
+        settings=settings,
+    )
+
+
+def _force(given: Mapping[str, Value], model: Model) -> Reading:
+    """Force at a depth. [N]"""
+    return Reading(
+        _pressed_to(given, model), lambda skin: float(skin.force_mn[-1]) / MN_PER_N if skin else 0.0
+    )
+
+
+def _deflection(given: Mapping[str, Value], model: Model) -> Reading:
+    """Deflection of the skin at a distance from the indenter's axis, proximal positive. [mm]"""
+    distance_mm = _number(given["distance_mm"])
+
+    def read(skin: SkinResponse | None) -> float:
+        if skin is None:
+            return 0.0
+        profile = skin.surface_profile()
+        first, last = -profile.distance_mm[-1], -profile.distance_mm[0]
+        if not first <= distance_mm <= last:
+            raise InputError(
+                f"distance_mm must lie on the finger, from {first:.1f} to {last:.1f} mm: got "
+                f"{distance_mm:g} mm."
+            )
+        return float(profile.at(-distance_mm))
+
+    return Reading(_pressed_to(given, model), read)
+
+
+def _rate(given: Mapping[str, Value], model: Model) -> Reading:
+    """Rate of an afferent at a position from the middle of a touch by force, proximal positive. [spikes/s]"""
+    conditions, force_n = model.conditions, _number(given["force_n"])
+    position_mm = _number(given.get("position_mm", 0.0))
+    body: Indenter
+    if "ridge_mm" in given:
+        ridge_mm, groove_mm = _number(given["ridge_mm"]), _number(given["groove_mm"])
+        body = Grating(ridge_mm, groove_mm, min(protocol.LIP_RADIUS.value, ridge_mm / 2))
+        position_mm -= body.period_mm * round(position_mm / body.period_mm)
+        grading = None
+    else:
+        curvature = _number(given["curvature_per_m"])
+        body = Sphere(curvature) if curvature > 0.0 else Plate()
+        # One mesh for all curvatures, so that no difference between them is one between meshes.
+        grading = grading_about(Plate(), conditions.resolution, RECEPTOR_X_MM)
+    along = np.cos(np.deg2rad(conditions.skin_tilt_deg))
+    site = (RECEPTOR_X_MM - position_mm * along, 0.0)
+    conditions.finger.skin_point(*site)
+    if force_n == 0.0:
+        return Reading(None, lambda _: _resting_rate(model))
+    touch = touch_of(
+        conditions.finger,
+        body,
+        ForceRampAndHold(force_mn=MN_PER_N * force_n),
+        conditions.materials,
+        conditions.resolution,
+        grading=grading,
+        tilt_deg=conditions.skin_tilt_deg,
+    )
+    receptor = Population(np.array([site]), 1.0, model.afferent)
+
+    def read(skin: SkinResponse | None) -> float:
+        assert skin is not None
+        return float(receptor.respond(skin, static_window_ms=model.static_window_ms).static_rate_hz[0])
+
+    return Reading(touch, read)
+
+
+def _resting_rate(model: Model) -> float:
+    """Rate of the afferent without any touch. [spikes/s]"""
+    rest, afferent = np.zeros((2, 1)), model.afferent
+    dynamic, static = afferent.dynamic_quantity, afferent.static_quantity
+    traces = SedTraces(
+        np.array([0.0, RampAndHold().end_ms]),
+        rest,
+        dynamic_kpa=None if dynamic == static else rest,
+        dynamic_quantity=dynamic,
+        static_quantity=static,
+    )
+    return float(afferent.rates(traces, static_window_ms=model.static_window_ms)[1][0])
+
+
+_READING: Mapping[str, Callable[[Mapping[str, Value], Model], Reading]] = {
+    "force_n": _force,
+    "deflection_mm": _deflection,
+    "rate_hz": _rate,
+}
+"""By what was observed."""

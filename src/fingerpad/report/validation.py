@@ -1,0 +1,185 @@
+"""The page of a validation: observed against predicted values, scores, and every condition."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from fingerpad.experiments.validation.observations import COLUMNS, KINDS
+from fingerpad.experiments.validation.validation import Prediction, ValidationFile
+from fingerpad.report.formatting import ABSENT, fixed, number, plain
+from fingerpad.report.manifest import edition, facts_table, manifest_chapter
+from fingerpad.report.page import write_html
+from fingerpad.report.parts import Chapter, Drawing, Page, Part, Row, Table
+from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, say_nothing_to_draw
+
+_PAGE = "validate.html"
+LONGEST_TABLE = 200
+"""Conditions that the page lists; validate.json has all rows."""
+
+QUANTITIES = {"N": "force", "mm": "deflection", "spikes/s": "firing rate"}
+"""What was observed, by its unit."""
+
+
+def draw_validation(results: ValidationFile) -> Figure:
+    """Draw the observed values and their range over the prediction of each condition.
+
+    Parameters
+    ----------
+    results : ValidationFile
+        From `validate`.
+
+    Returns
+    -------
+    Figure
+    """
+    figure = new_figure(6.5, 5.5)
+    axes = figure.subplots()
+    shown = [row for row in results.predictions if np.isfinite(row.predicted)]
+    if not shown:
+        say_nothing_to_draw(axes, "no prediction")
+        return figure
+    quantity = QUANTITIES[results.unit]
+    predicted = np.array([row.predicted for row in shown])
+    low, high = (np.array([getattr(row, f"observed_{end}") for row in shown]) for end in ("low", "high"))
+    outside = np.array([row.inside_range is False for row in shown])
+    axes.axline((0.0, 0.0), slope=1.0, color=GREY, linewidth=1.0, label="observed as predicted")
+    if np.isfinite(results.gain):
+        axes.axline((0.0, 0.0), slope=results.gain, color=GREY, linestyle=":", label="after the gain")
+    for rows, colour, label in (
+        (~outside, BLUE, "range of a condition"),
+        (outside, ORANGE, "range without its prediction"),
+    ):
+        if (high - low)[rows].any():
+            axes.vlines(predicted[rows], low[rows], high[rows], color=colour, label=label)
+    observed = [row.observed for row in shown]
+    axes.plot(predicted, observed, "o", color=BLACK, markerfacecolor="none", markersize=5, label="observed")
+    ends = np.array([*predicted, *low, *high])
+    margin = 0.05 * (float(np.ptp(ends)) or 1.0)
+    axes.set(xlim=(ends.min() - margin, ends.max() + margin), ylim=(ends.min() - margin, ends.max() + margin))
+    axes.set_xlabel(f"predicted {quantity} [{results.unit}]")
+    axes.set_ylabel(f"observed {quantity} [{results.unit}]")
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
+
+
+def caption_validation(results: ValidationFile) -> str:
+    """Caption of the figure."""
+    left_out = results.n_rows - results.n_predicted
+    return (
+        "Each observation over the prediction for its condition. Lines join the lowest and the highest "
+        "observation of a condition. R² is computed about the solid line."
+        + (f" {left_out} row(s) without a prediction are not drawn." if left_out else "")
+    )
+
+
+def write_validation_page(results: ValidationFile, folder: Path) -> Path:
+    """Write the page of a validation, `validate.html`, and its figure.
+
+    Parameters
+    ----------
+    results : ValidationFile
+        From `validate`.
+    folder : Path
+        Where; made if needed.
+
+    Returns
+    -------
+    Path
+        The page.
+    """
+    quantity = QUANTITIES[results.unit]
+    drawing = Drawing(
+        "validation",
+        f"Observed and predicted {quantity}",
+        partial(draw_validation, results),
+        caption_validation(results),
+        1,
+    )
+    parts: list[Part] = [
+        drawing,
+        _scores(results),
+        _conditions(results),
+        facts_table("Assumptions", _assumed(results)),
+    ]
+    page = Page(
+        f"Observed and predicted {quantity}",
+        f"Observations of the kind {results.kind}, predicted by a finite-element fingertip with the tissues "
+        f"{results.tissues}. {edition(results.manifest)}",
+        validation_summary(results),
+        [Chapter("Scores", parts), manifest_chapter(results.manifest)],
+    )
+    return write_html(page, Path(folder) / _PAGE)
+
+
+def validation_summary(results: ValidationFile) -> list[str]:
+    """Summarise a validation in a few sentences."""
+    said = [
+        f"{results.kind}, {results.n_predicted} of {results.n_rows} rows predicted: R² "
+        f"{fixed(results.r2, 3)}, {fixed(results.r2_after_gain, 3)} after a gain of {number(results.gain)}, "
+        f"correlation {fixed(results.correlation, 3)}."
+    ]
+    if results.n_judged:
+        count = round(results.share_inside * results.n_judged)
+        said.append(f"Inside the observed range: {count} of {results.n_judged} conditions.")
+    else:
+        said.append("No condition has two observations, so no range can judge.")
+    reasons = dict.fromkeys(row.reason for row in results.predictions if row.reason)
+    if reasons:
+        failed = results.n_rows - results.n_predicted
+        said.append(f"{failed} row(s) have no prediction. The first reason: {next(iter(reasons))}")
+    return said
+
+
+def _scores(results: ValidationFile) -> Table:
+    values = {
+        "R² of the predictions": results.r2,
+        "R² after the gain": results.r2_after_gain,
+        "R² with the other direction along the finger": results.r2_mirrored,
+        "correlation": results.correlation,
+        "gain": results.gain,
+        "share of conditions inside their observed range": results.share_inside,
+    }
+    rows = [Row((name, number(value))) for name, value in values.items() if np.isfinite(value)]
+    return Table("Scores", ("", ""), rows)
+
+
+def _conditions(results: ValidationFile) -> Table:
+    conditions = KINDS[results.kind].conditions
+    unique: dict[tuple[object, ...], list[Prediction]] = {}
+    for row in results.predictions:
+        unique.setdefault(tuple(getattr(row, column) for column in conditions), []).append(row)
+    rows = [
+        Row(
+            (
+                *(plain(value) for value in condition),
+                plain(len(same)),
+                f"{number(same[0].observed_low)} … {number(same[0].observed_high)}",
+                number(same[0].predicted),
+                ABSENT if same[0].inside_range is None else plain(same[0].inside_range),
+                same[0].reason or "",
+            )
+        )
+        for condition, same in list(unique.items())[:LONGEST_TABLE]
+    ]
+    headings = [
+        f"{column.rsplit('_', 2 if column.endswith('per_m') else 1)[0]} [{COLUMNS[column][0]}]"
+        if column in COLUMNS
+        else column
+        for column in conditions
+    ]
+    left = len(unique) - len(rows)
+    return Table(
+        f"Conditions [{results.unit}]",
+        (*headings, "observations", "observed", "predicted", "inside", "why not predicted"),
+        rows,
+        f"{left} more are in validate.json." if left else "",
+    )
+
+
+def _assumed(results: ValidationFile) -> dict[str, object]:
+    names = ("loading", "ramp_ms", "hold_ms", "static_window_ms", "receptor_depth_mm", "afferent")
+    return {name: getattr(results, name) for name in names}

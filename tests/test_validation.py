@@ -1,0 +1,522 @@
+"""Observations that users bring: reading them, scoring them, and the command as a shell meets it."""
+
+import json
+import re
+import shlex
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fingerpad import cli
+from fingerpad.cli import choices
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.data import cylinder_deflection, protocol
+from fingerpad.experiments import scores
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.gerling2014.skin_deflection import deflection_r2, deflection_touches
+from fingerpad.experiments.indenter_text import indenter_named
+from fingerpad.experiments.runner import STORE_FOLDER, Runner
+from fingerpad.experiments.schemas import read
+from fingerpad.experiments.validation import predictions
+from fingerpad.experiments.validation.observations import (
+    COLUMNS,
+    KINDS,
+    LARGEST_FILE_MB,
+    example_file,
+    read_observations,
+)
+from fingerpad.experiments.validation.predictions import LOADINGS, Model, predict
+from fingerpad.experiments.validation.validation import ValidationRequest, validate
+from fingerpad.geometry.edged_indenters import Gap, Grating
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Plate, Sphere
+from fingerpad.geometry.motion import RampAndHold
+from fingerpad.mechanics.materials import Prony, Tissues
+from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.report.validation import draw_validation, validation_summary
+from fingerpad.skin.indentation import Touch
+from fingerpad.skin.store import Store
+
+ROOT = Path(__file__).parents[1]
+PUBLISHED = sorted((ROOT / "studies" / "observations").glob("*.csv"))
+QUICK = Model(Conditions(resolution="quick"))
+FORCE = "indenter,depth_mm,force_n\n"
+RATE = "force_n,curvature_per_m,rate_hz\n"
+
+
+def written(folder, content, name="mine.csv"):
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+# Indenters as text
+
+
+@pytest.mark.parametrize(
+    ("text", "body"),
+    [
+        ("plate", Plate()),
+        ("punch:6.35", FlatPunch(6.35)),
+        ("punch", FlatPunch()),
+        ("cylinder:3.17", Cylinder(3.17)),
+        (" sphere : 287 ", Sphere(287.0)),
+        ("bar:3:0.2", Bar(3.0, 0.2)),
+        ("gap:1.2", Gap(1.2)),
+        ("grating:1.5:0.75", Grating(1.5, 0.75)),
+    ],
+)
+def test_an_indenter_is_its_name_and_its_sizes(text, body):
+    assert indenter_named(text) == body
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("cone", "indenter must be one of sphere, cylinder"),
+        ("", "indenter must be one of sphere, cylinder"),
+        ("plate:3", "indenter must be written plate, sizes from the right may be left out: got 'plate:3'"),
+        ("sphere:287:1", "indenter must be written sphere:curvature_per_m"),
+        ("punch:wide", "diameter_mm must be a finite number [mm]: got 'wide'"),
+        ("punch:", "diameter_mm must be a finite number [mm]: got ''"),
+        ("cylinder:-1", "diameter_mm must be greater than 0"),
+        ("sphere:nan", "curvature_per_m must be a finite number"),
+        ("punch:0.4", "fillet_mm must not exceed half of diameter_mm, 0.2 mm"),
+    ],
+)
+def test_an_indenter_that_cannot_be_is_refused(text, said):
+    with pytest.raises(InputError, match=re.escape(said)):
+        indenter_named(text)
+
+
+# Reading
+
+
+def test_columns_stand_in_any_order_and_lines_keep_their_numbers(tmp_path):
+    path = written(
+        tmp_path,
+        "\ufeff# four subjects\r\nforce_n, depth_mm ,indenter\r\n\r\n"
+        "0.11,1,plate\r\n# and\r\n0.2,1.0, punch:6.350\r\n0.3,1e0,punch:6.35\r\n",
+    )
+    found = read_observations(path)
+    assert (found.kind.name, found.kind.unit) == ("force", "N")
+    assert [row.line for row in found.rows] == [4, 6, 7]
+    assert [row.condition for row in found.rows] == [
+        ("plate", 1.0),
+        ("punch:6.350", 1.0),
+        ("punch:6.35", 1.0),
+    ]
+    assert found.observed.tolist() == [0.11, 0.2, 0.3]
+    assert found.conditions[1] == found.conditions[2] != found.conditions[0]
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=lambda kind: kind.name)
+def test_the_header_decides_the_kind_and_every_example_is_read(tmp_path, kind):
+    text = example_file(kind.name)
+    assert text.startswith("# Made-up numbers")
+    found = read_observations(written(tmp_path, text))
+    assert (found.kind, len(found.rows)) == (kind, len(kind.example))
+    assert len(set(found.conditions)) < len(found.rows) or kind.name == "grating"
+    assert set(kind.columns) <= {"indenter", *COLUMNS}
+
+
+def test_headers_are_those_of_the_documented_format():
+    assert {name: ",".join(kind.columns) for name, kind in KINDS.items()} == {
+        "force": "indenter,depth_mm,force_n",
+        "deflection": "indenter,depth_mm,distance_mm,deflection_mm",
+        "rate_curvature": "force_n,curvature_per_m,rate_hz",
+        "rate_position": "force_n,curvature_per_m,position_mm,rate_hz",
+        "grating": "force_n,ridge_mm,groove_mm,position_mm,rate_hz",
+    }
+
+
+UNFIT = [
+    ("", "mine.csv must hold a header and at least one row: it has 0 of them."),
+    (FORCE, "mine.csv must hold a header and at least one row: it has 1 of them."),
+    (
+        "indenter,depth_mm\nplate,1\n",
+        "mine.csv, header: must be that of one kind (indenter,depth_mm,force_n;",
+    ),
+    ("indenter,depth_mm\nplate,1\n", "got indenter,depth_mm; for the kind force, add force_n."),
+    (
+        "indenter,depth_mm,position_mm,force_n\nplate,1,0,1\n",
+        "for the kind force, leave out position_mm.",
+    ),
+    ("indenter;depth_mm;force_n\nplate;1;2\n", "line 1: column 'indenter;depth_mm;force_n' is unknown"),
+    ("indenter;depth_mm;force_n\nplate;1;2\n", "Separate entries by commas, not by ';'."),
+    ("indenter,depth,force_n\nplate,1,1\n", "mine.csv, line 1: column 'depth' is unknown"),
+    ("force_n,indenter,depth_mm,force_n\n1,plate,1,1\n", "mine.csv, line 1: column force_n is repeated"),
+    (FORCE + "plate,1\n", "mine.csv, line 2: must have 3 entries, one per column: got 2."),
+    (FORCE + "plate,deep,1\n", "mine.csv, line 2: depth_mm must be a finite number [mm]: got 'deep'."),
+    (FORCE + "plate,1,1\nplate,-1,1\n", "mine.csv, line 3: depth_mm must not be negative [mm]: got '-1'."),
+    (FORCE + "plate,nan,1\n", "mine.csv, line 2: depth_mm must be a finite number"),
+    (FORCE + "plate,1,inf\n", "mine.csv, line 2: force_n must be a finite number"),
+    (FORCE + "plate,1,\n", "mine.csv, line 2: force_n must be given"),
+    (FORCE + ",1,1\n", "mine.csv, line 2: indenter must be given"),
+    (FORCE + "cone:3,1,1\n", "mine.csv, line 2: indenter must be one of sphere, cylinder"),
+    (FORCE + "punch:x,1,1\n", "mine.csv, line 2: diameter_mm must be a finite number"),
+    (RATE + "0.2,-30,1\n", "mine.csv, line 2: curvature_per_m must not be negative [1/m], because"),
+    (RATE + "-0.2,30,1\n", "mine.csv, line 2: force_n must not be negative [N]"),
+    (RATE + "0.2,30,-1\n", "mine.csv, line 2: rate_hz must not be negative [spikes/s]"),
+    (b"\xff\xfef\x00o\x00", "mine.csv must be text in UTF-8"),
+    (FORCE + "plate,1,1\n" * 1_100_000, "mine.csv must be at most 5 MB: it has 11.0 MB; split it"),
+]
+
+
+@pytest.mark.parametrize(("content", "said"), UNFIT, ids=[said[-40:] for _, said in UNFIT])
+def test_unfit_files_are_one_sentence_with_file_and_line(tmp_path, monkeypatch, content, said):
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, content)
+    with pytest.raises(InputError) as refused:
+        read_observations(Path("mine.csv"))
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_file_just_below_the_limit_is_read(tmp_path):
+    found = read_observations(written(tmp_path, FORCE + "plate,1,1\n" * int(LARGEST_FILE_MB * 1e5 - 10)))
+    assert len(found.rows) == LARGEST_FILE_MB * 1e5 - 10
+
+
+ENTRY = st.one_of(
+    st.sampled_from(["plate", "punch:6.35", "sphere:1e3", "1", "-1", "nan", "", " 0 ", '"', "1,2", "#", "é"]),
+    st.text(max_size=6),
+    st.floats().map(str),
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.sampled_from([",".join(kind.columns) for kind in KINDS.values()]),
+    st.lists(st.lists(ENTRY, min_size=2, max_size=5).map(",".join), max_size=3),
+)
+def test_any_text_is_read_or_refused_in_a_sentence(tmp_path_factory, header, rows):
+    path = tmp_path_factory.getbasetemp() / "any.csv"
+    path.write_bytes("\n".join([header, *rows]).encode("utf-8", "surrogatepass"))
+    try:
+        found = read_observations(path)
+    except InputError as error:
+        found = None
+        said = str(error)
+    if found is None:
+        assert "any.csv" in said
+        return
+    assert len(found.rows) <= len(rows)
+    assert np.isfinite(found.observed).all()
+
+
+# Scores
+
+
+def test_scores_have_their_definitions():
+    observed, predicted = np.array([1.0, 2.0, 4.0]), np.array([1.0, 1.0, 3.0])
+    # mean 7/3, scatter 42/9; residuals 0, 1, 1; sum o p = 15, sum p p = 11
+    assert scores.coefficient_of_determination(observed, predicted) == pytest.approx(1 - 2 / (42 / 9))
+    assert scores.gain_through_origin(observed, predicted) == pytest.approx(15 / 11)
+    fitted = np.linalg.lstsq(predicted[:, None], observed, rcond=None)[0][0]
+    assert scores.gain_through_origin(observed, predicted) == pytest.approx(fitted)
+    assert scores.correlation(observed, predicted) == pytest.approx(np.corrcoef(observed, predicted)[0, 1])
+
+
+@pytest.mark.parametrize(
+    ("observed", "predicted", "undefined"),
+    [
+        ([], [], ["coefficient_of_determination", "gain_through_origin", "correlation"]),
+        ([1.0], [2.0], ["coefficient_of_determination", "correlation"]),
+        ([0.1, 0.1, 0.1], [0.1, 0.2, 0.3], ["coefficient_of_determination", "correlation"]),
+        ([1.0, 2.0], [0.3, 0.3], ["correlation"]),
+        ([1.0, 2.0], [0.0, 0.0], ["correlation", "gain_through_origin"]),
+    ],
+)
+def test_scores_that_do_not_exist_are_nan(observed, predicted, undefined):
+    for name in ("coefficient_of_determination", "gain_through_origin", "correlation"):
+        assert np.isnan(getattr(scores, name)(observed, predicted)) == (name in undefined), name
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.floats(-1e3, 1e3)), min_size=1, max_size=12))
+def test_ranges_are_those_of_equal_conditions(rows):
+    conditions, observed = zip(*rows, strict=True)
+    ranges = scores.observed_ranges(conditions, observed)
+    inside = ranges.inside(np.array(observed))
+    for row, condition in enumerate(conditions):
+        same = [value for other, value in rows if other == condition]
+        assert (ranges.low[row], ranges.high[row]) == (min(same), max(same))
+        assert inside[row] == (True if len(same) > 1 else None)
+    assert [conditions[row] for row in ranges.first] == list(dict.fromkeys(conditions))
+
+
+# Predictions
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder that keeps the presses of this file."""
+    return tmp_path_factory.mktemp("validation")
+
+
+def result_of(folder, content, model=QUICK, name="mine.csv"):
+    found = read_observations(written(folder, content, name))
+    return validate(ValidationRequest(found, model, folder))
+
+
+def test_force_at_depth_0_is_0_and_grows_with_depth(folder):
+    found = result_of(folder, FORCE + "plate,0,0\nplate,0.2,0.01\nplate,0.4,0.5\nplate,0.2,0.03\n")
+    nothing, low, high, again = (row.predicted for row in found.predictions)
+    assert nothing == 0.0 < low < high
+    assert low == again
+    assert [(row.observed_low, row.observed_high) for row in found.predictions] == [
+        (0.0, 0.0),
+        (0.01, 0.03),
+        (0.5, 0.5),
+        (0.01, 0.03),
+    ]
+    assert found.n_judged == 1
+    assert found.predictions[1].inside_range == (0.01 <= low <= 0.03)
+    assert found.predictions[2].inside_range is None
+    assert found.afferent is None
+    assert found.loading == "quasi_static"
+
+
+def test_quasi_static_force_is_that_of_relaxed_tissues(folder):
+    """Tissues whose Prony series is left out have the long-term moduli at all times."""
+    tissues = QUICK.conditions.materials
+    relaxed = Tissues(*(layer.with_prony(Prony()) for layer in named_tissues(tissues).layers))
+    elastic = Model(Conditions(resolution="quick", materials=relaxed), loading="ramp_and_hold")
+    fast = replace(QUICK, loading="ramp_and_hold")
+    of_slow, of_elastic, of_fast = (
+        result_of(folder, FORCE + "plate,0.4,0.1\n", model).predictions[0].predicted
+        for model in (QUICK, elastic, fast)
+    )
+    assert of_slow == pytest.approx(of_elastic, rel=1e-5)
+    assert of_fast > 1.3 * of_slow
+
+
+RATES = RATE + "0.1,287,30\n0,287,0\n0.1,0,5\n"
+
+
+def test_predictions_put_in_as_observations_score_1(folder):
+    first = result_of(folder, RATES)
+    exact = [repr(row.predicted) for row in first.predictions]
+    conditions = [f"{row.force_n!r},{row.curvature_per_m!r}" for row in first.predictions]
+    rows = [f"{condition},{rate}" for condition, rate in zip(conditions, exact, strict=True)]
+    again = result_of(folder, RATE + "\n".join(2 * rows))
+    assert (again.r2, again.r2_after_gain, again.gain) == (1.0, 1.0, 1.0)
+    assert again.correlation == pytest.approx(1.0, abs=1e-12)
+    assert (again.inside_range, again.share_inside, again.n_judged) == (True, 1.0, 3)
+    assert np.isnan(again.r2_mirrored)
+    assert again.static_window_ms == protocol.STATIC_WINDOW.value
+    assert again.receptor_depth_mm == 0.471
+    sphere, rest, plate = (row.predicted for row in first.predictions)
+    assert sphere > plate >= rest
+
+
+def test_a_receptor_beside_the_contact_fires_less_and_0_is_the_middle(folder):
+    middle = result_of(folder, RATES).predictions[0].predicted
+    header = "force_n,curvature_per_m,position_mm,rate_hz\n"
+    found = result_of(folder, header + "0.1,287,0,30\n0.1,287,3,1\n0.1,287,-3,2\n0.1,287,40,2\n")
+    centre, proximal, distal, beyond = found.predictions
+    assert centre.predicted == middle > max(proximal.predicted, distal.predicted)
+    assert np.isnan(beyond.predicted)
+    assert "beside the finger" in beyond.reason or "must" in beyond.reason
+    assert found.n_predicted == 3
+    # With the axis reversed, 3 and -3 mm change places.
+    observed, mirrored = np.array([30.0, 1.0, 2.0]), [middle, distal.predicted, proximal.predicted]
+    assert found.r2_mirrored == pytest.approx(scores.coefficient_of_determination(observed, mirrored))
+
+
+def test_positions_on_a_grating_repeat_with_its_period(monkeypatch, tmp_path):
+    pressed = []
+    monkeypatch.setattr(Runner, "solve", lambda self, touches, on_failed: pressed.extend(touches))
+    monkeypatch.setattr(Runner, "load", lambda self, name, touches: dict.fromkeys(touches, "skin"))
+    sites = []
+
+    class Receptor:
+        def __init__(self, positions, pitch, afferent):
+            sites.append(positions[0])
+
+        def respond(self, skin, static_window_ms):
+            return type("Response", (), {"static_rate_hz": [7.0]})
+
+    monkeypatch.setattr(predictions, "Population", Receptor)
+    header = "force_n,ridge_mm,groove_mm,position_mm,rate_hz\n"
+    found = read_observations(written(tmp_path, header + "0.2,1,2,0.5,3\n0.2,1,2,-2.5,3\n0.2,0.3,2,0,3\n"))
+    assert predict(found, QUICK, Runner(tmp_path)).values.tolist() == [7.0, 7.0, 7.0]
+    assert [touch.indenter for touch in pressed] == [Grating(1.0, 2.0), Grating(0.3, 2.0, 0.15)]
+    along = np.cos(np.deg2rad(QUICK.conditions.skin_tilt_deg))
+    assert np.array(sites)[:3] == pytest.approx(
+        np.array([[RECEPTOR_X_MM - 0.5 * along, 0.0]] * 2 + [[RECEPTOR_X_MM, 0.0]])
+    )
+    assert pressed[0].stimulus.force_mn == 200.0
+
+
+@pytest.mark.parametrize("window", [(600.0, 1100.0), (600.0, 500.0), (-1.0, 50.0)])
+def test_windows_lie_within_the_touch(window):
+    with pytest.raises(InputError, match="static_window must be a start from 0 on and a later end, at most"):
+        Model(Conditions(), static_window_ms=window)
+
+
+def test_what_cannot_be_pressed_has_a_reason_and_the_rest_is_scored(folder, monkeypatch):
+    solve = Touch.solve
+
+    def limited(touch, threads=None):
+        if isinstance(touch.stimulus, RampAndHold) and touch.stimulus.depth_mm == 0.3:
+            raise ConvergenceError("The press stopped.", ("at 3 ms",))
+        return solve(touch, threads)
+
+    monkeypatch.setattr(Touch, "solve", limited)
+    rows = "plate,0.3,1\nplate,0.2,0.01\nplate,9,3\nplate,0.4,0.04\nplate,0.3,2\n"
+    found = result_of(folder, FORCE + rows)
+    assert [np.isfinite(row.predicted) for row in found.predictions] == [False, True, False, True, False]
+    assert found.predictions[0].reason == found.predictions[4].reason == "The press stopped."
+    assert "because of the bone" in found.predictions[2].reason
+    assert (found.n_rows, found.n_predicted, found.n_judged, found.inside_range) == (5, 2, 0, None)
+    kept = found.predictions[1], found.predictions[3]
+    assert found.r2 == pytest.approx(
+        scores.coefficient_of_determination([row.observed for row in kept], [row.predicted for row in kept])
+    )
+    assert "3 row(s) have no prediction. The first reason: The press stopped." in validation_summary(found)
+    nothing = result_of(folder, FORCE + "plate,0.3,1\n")
+    assert nothing.n_predicted == 0
+    assert np.isnan([nothing.r2, nothing.gain, nothing.correlation, nothing.share_inside]).all()
+    draw_validation(nothing)
+
+
+def test_a_failed_touch_of_several_processes_leaves_the_others(tmp_path):
+    found = read_observations(written(tmp_path, RATE + "0.05,287,10\n300,287,10\n0.05,1000,10\n"))
+    result = validate(ValidationRequest(found, QUICK, tmp_path, jobs=2))
+    assert [np.isfinite(row.predicted) for row in result.predictions] == [True, False, True]
+    assert len(list((tmp_path / STORE_FOLDER).glob("*.npz"))) == 2
+
+
+def test_a_second_run_presses_nothing(folder, monkeypatch):
+    first = result_of(folder, RATES)
+    monkeypatch.setattr(Touch, "solve", lambda *_: pytest.fail("pressed again"))
+    again = result_of(folder, RATES)
+    assert again.predictions == first.predictions
+
+
+# Published observations
+
+
+@pytest.mark.parametrize("path", PUBLISHED, ids=lambda path: path.stem)
+def test_published_files_name_source_and_status(path):
+    text = path.read_text(encoding="utf-8")
+    assert re.search(r"^# source: \S.+$", text, re.MULTILINE)
+    assert re.search(r"^# status: (paper|read)$", text, re.MULTILINE)
+    assert read_observations(path).rows
+
+
+def test_the_published_deflection_scores_as_in_the_reproduction(folder):
+    [path] = [path for path in PUBLISHED if path.stem == "cylinder_deflection"]
+    found, table = read_observations(path), cylinder_deflection()
+    assert found.observed.tolist() == table.deflection_mm[~table.is_artefact].tolist()
+    assert [row.condition[2] for row in found.rows] == table.distance_mm[~table.is_artefact].tolist()
+    scored = validate(ValidationRequest(found, replace(QUICK, loading="ramp_and_hold"), folder))
+    touch = deflection_touches(QUICK.conditions)["trial3", "cylinder"]
+    profile = Store(folder / STORE_FOLDER).load(touch).surface_profile()
+    assert scored.r2 == pytest.approx(deflection_r2(profile), abs=1e-12)
+    assert scored.r2_mirrored == pytest.approx(deflection_r2(profile, proximal_positive=False), abs=1e-12)
+
+
+# The command
+
+
+@pytest.fixture
+def call(monkeypatch, capsys, tmp_path):
+    """Run `fingerpad validate` in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["fingerpad", "validate", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        said = capsys.readouterr()
+        return ended.value.code or 0, said.out, said.err
+
+    return run
+
+
+def test_the_command_writes_page_figure_and_results(call, tmp_path):
+    written(tmp_path, FORCE + "plate,0.2,0.01\nplate,0.2,0.03\nplate,0.3,0.05\nplate,9,1\n")
+    status, said, _ = call("mine.csv", "--resolution", "quick", "--jobs", "1")
+    assert status == 3
+    assert "force, 3 of 4 rows predicted: R²" in said
+    assert "1 row(s) have no prediction. The first reason: depth_mm must stay below" in said
+    results = json.loads((tmp_path / "validate" / "validate.json").read_text())
+    assert results == read(tmp_path / "validate" / "validate.json", "fingerpad validation")
+    assert {"r2", "correlation", "gain", "inside_range", "predictions"} <= set(results)
+    assert (results["format"], results["format_version"]) == ("fingerpad validation", 1)
+    assert [row["predicted"] is None for row in results["predictions"]] == [False, False, False, True]
+    assert list(results["manifest"]["inputs"]) == ["mine.csv"]
+    page = (tmp_path / "validate" / "validate.html").read_text(encoding="utf-8")
+    assert "observed" in page
+    assert "because of the bone" in page
+    assert (tmp_path / "validate" / "figures" / "validation.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_example_can_be_tried_as_it_says(call, tmp_path, kind):
+    status, said, errors = call("--example", kind, "--out", "try")
+    assert (status, errors) == (0, "")
+    assert said == f"Try: fingerpad validate try/{kind}.csv --resolution quick\n"
+    assert read_observations(tmp_path / "try" / f"{kind}.csv").kind.name == kind
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "validate needs a file of observations, or --example KIND"),
+        (["none.csv"], "none.csv must be a file that can be read"),
+        (["."], ". must be a file that can be read"),
+        (["mine.csv", "--loading", "slow"], "loading must be one of quasi_static, ramp_and_hold: got 'slow'"),
+        (["mine.csv", "--materials", "wood"], "materials must be one of"),
+        (["mine.csv", "--resolution", "high"], "resolution must be one of"),
+        (["mine.csv", "--jobs", "0"], "jobs must be a whole number of at least 1"),
+        (["mine.csv", "--afferent", "fit.json"], "afferent: fit.json must be a file that can be read"),
+        (["mine.csv", "--static-window", "600", "500"], "static_window must be a start"),
+        (["mine.csv"], "mine.csv, line 2: depth_mm must not be negative"),
+        (["--example", "noise"], "--example must be one of force, deflection"),
+    ],
+    ids=" ".join,
+)
+def test_misuse_is_one_sentence_and_status_2_and_nothing_is_written(call, tmp_path, arguments, said):
+    content = "plate,1,1\n" if len(arguments) > 1 else "plate,-1,1\n"
+    written(tmp_path, FORCE + content)
+    status, out, errors = call(*arguments)
+    assert (status, out) == (2, "")
+    assert errors.startswith("fingerpad: ")
+    assert said in errors
+    assert errors.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.csv"]
+
+
+def command():
+    return typer.main.get_command(cli.app).commands["validate"]
+
+
+def test_options_and_their_defaults_are_those_of_the_modules():
+    assert tuple(KINDS) == choices.KIND_CHOICES
+    assert LOADINGS == choices.LOADING_CHOICES
+    defaults = {option.name: option.default for option in command().params}
+    assert defaults["loading"] == Model(Conditions()).loading
+    assert defaults["static_window"] == protocol.STATIC_WINDOW.value
+    assert defaults["materials"] == Conditions().materials
+    assert Model(Conditions()).afferent == Afferent()
+
+
+def test_the_page_of_the_format_names_every_option_and_kind_and_shows_commands_that_parse():
+    page = (ROOT / "docs" / "validate.md").read_text(encoding="utf-8")
+    options = {name for option in command().params for name in option.opts if name.startswith("--")}
+    rows = re.findall(r"^\| (`--.*?) \|", page, re.MULTILINE)
+    assert {name for row in rows for name in re.findall(r"--[\w-]+", row)} == options - {"--help"}
+    for kind in KINDS.values():
+        assert f"| `{kind.name}` | `{','.join(kind.columns)}` |" in page
+    for line in (shown := re.findall(r"^fingerpad validate (.+)$", page, re.MULTILINE)):
+        command().make_context("validate", shlex.split(line))
+    assert shown
