@@ -83,6 +83,8 @@ def test_without_a_command_the_help_is_shown(call):
             "--curvature is that of a sphere",
             "bar",
         ),
+        (["export", "out", "--indenter", "sphere:3", "--curvature", "287"], "without a size", "sphere:3"),
+        (["export", "out", "--indenter", "punch:wide"], "diameter_mm must be a finite number", "'wide'"),
         (["export", "out", "--curvature", "round"], "'--curvature': must be a number", "'round'"),
         (["export", "out", "--depth", "-1"], "depth_mm must be greater than 0", "-1"),
         (["export", "out", "--materials", "steel"], "materials must be one of", "'steel'"),

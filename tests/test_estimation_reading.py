@@ -165,6 +165,8 @@ def test_stimuli_are_the_same_from_csv_and_yaml(written, name, content):
         ("a.csv", "stimulus,indenter,width_mm\ntip,sphere,1\n", "line 2: a sphere has no width_mm"),
         ("a.csv", "stimulus,indenter,width_mm\ntip,bar,0\n", "line 2: width_mm must be greater than 0 [mm]"),
         ("a.csv", "stimulus,indenter,width_mm,fillet_mm\ntip,bar,1,1\n", "line 2: fillet_mm must not exceed"),
+        ("a.csv", "stimulus,indenter\ntip,plate:3\n", "line 2: indenter must be written plate, sizes from"),
+        ("a.csv", "stimulus,indenter,width_mm\ntip,bar:2,1\n", "line 2: sizes must stand in indenter or in"),
         ("a.csv", "stimulus,indenter,depth_mm\ntip,bar,deep\n", "line 2: depth_mm must be a finite number"),
         ("a.csv", "stimulus,indenter,depth_mm,force_mn\ntip,bar,1,1\n", "exclude each other"),
         ("a.yaml", "", "a.yaml must be a list of stimuli, each a mapping: got NoneType."),

@@ -483,6 +483,16 @@ def test_what_does_not_converge_raises_and_is_not_stored(tmp_path, skin, jobs):
     assert not store.missing([TINY])
 
 
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_what_does_not_converge_is_told_and_the_others_are_stored(tmp_path, jobs):
+    store, failed, seconds = Store(tmp_path), {}, []
+    solve_missing(store.missing([HOPELESS, TINY]), jobs, seconds.append, failed.__setitem__)
+    assert list(failed) == [HOPELESS]
+    assert failed[HOPELESS].history
+    assert os.listdir(tmp_path) == [store.path(TINY).name]
+    assert len(seconds) == 1
+
+
 SCRIPT = """
 import pickle, sys
 from pathlib import Path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import lru_cache
 
 from fingerpad.core.checks import finite, one_of
 from fingerpad.core.errors import InputError
@@ -10,6 +11,7 @@ from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.names import INDENTERS, SIZE_UNITS
 
 
+@lru_cache(maxsize=1024)
 def indenter_named(text: str) -> Indenter:
     """Make an indenter from its name and sizes, `name:size:size`.
 

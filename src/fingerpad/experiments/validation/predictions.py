@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, one_of
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
@@ -82,6 +82,12 @@ class Reading:
     of: Callable[[SkinResponse | None], float]
 
 
+Plan = Reading | InputError
+"""How a condition is predicted, or why it cannot be pressed."""
+
+Condition = tuple[Value, ...]
+
+
 @dataclass(frozen=True)
 class Predictions:
     """Predictions row by row.
@@ -121,52 +127,58 @@ def predict(observations: Observations, model: Model, runner: Runner) -> Predict
     Predictions
         A row whose touch cannot be pressed or does not converge has a reason instead of a value.
     """
-    kind, conditions = observations.kind, [row.condition for row in observations.rows]
-    reasons: dict[int, str] = {}
-    readings: dict[int, Reading] = {}
-    for row, condition in enumerate(conditions):
-        try:
-            readings[row] = _READING[kind.observed](dict(zip(kind.conditions, condition, strict=True)), model)
-        except InputError as error:
-            reasons[row] = error.args[0]
-    failed: dict[Touch, str] = {}
-    touches = list(dict.fromkeys(reading.touch for reading in readings.values() if reading.touch))
+    kind, axis = observations.kind, observations.kind.axis
+    given = {
+        row.condition: dict(zip(kind.conditions, row.condition, strict=True)) for row in observations.rows
+    }
+    plans = {condition: _plan(kind, values, model) for condition, values in given.items()}
+    touches = [plan.touch for plan in plans.values() if isinstance(plan, Reading) and plan.touch]
+    failed: dict[Touch, ConvergenceError | InputError] = {}
     skins = runner.responses(
-        {kind.name: {touch: touch for touch in touches}},
-        on_failed=lambda touch, error: failed.update({touch: error.args[0]}),
-    )[kind.name]
-    values = np.full(len(conditions), np.nan)
-    for row, reading in readings.items():
-        if reading.touch in failed:
-            reasons[row] = failed[reading.touch]
-            continue
-        try:
-            values[row] = reading.of(skins[reading.touch] if reading.touch else None)
-        except InputError as error:
-            reasons[row] = error.args[0]
-    mirrored = _mirrored(kind, conditions, readings, model, skins) if kind.axis else None
+        {kind.name: {touch: touch for touch in touches}}, on_failed=failed.__setitem__
+    )[kind.name]  # fmt: skip
+
+    def read(plans: Mapping[Condition, Plan]) -> tuple[FloatArray, dict[int, str]]:
+        found = {condition: _value(plan, skins, failed) for condition, plan in plans.items()}
+        rows = [found[row.condition] for row in observations.rows]
+        return (
+            np.array([value for value, _ in rows]),
+            {row: reason for row, (_, reason) in enumerate(rows) if reason},
+        )
+
+    values, reasons = read(plans)
+    mirrored = None
+    if axis:
+        turned = {
+            condition: _plan(kind, each | {axis: -_number(each[axis])}, model)
+            for condition, each in given.items()
+        }
+        mirrored, _ = read(turned)
     return Predictions(values, mirrored, reasons, next(iter(skins.values()), None))
 
 
-def _mirrored(
-    kind: Kind,
-    conditions: Sequence[tuple[Value, ...]],
-    readings: Mapping[int, Reading],
-    model: Model,
+def _plan(kind: Kind, given: Mapping[str, Value], model: Model) -> Plan:
+    """How a condition is predicted, or why it cannot be pressed."""
+    try:
+        return _READING[kind.observed](given, model)
+    except InputError as error:
+        return error
+
+
+def _value(
+    plan: Plan,
     skins: Mapping[Touch, SkinResponse],
-) -> FloatArray:
-    """Read the same presses with the axis of the file reversed."""
-    values = np.full(len(conditions), np.nan)
-    for row, reading in readings.items():
-        if reading.touch is not None and reading.touch not in skins:
-            continue
-        given = dict(zip(kind.conditions, conditions[row], strict=True))
-        try:
-            other = _READING[kind.observed](given | {kind.axis: -_number(given[kind.axis])}, model)
-            values[row] = other.of(skins[other.touch] if other.touch else None)
-        except InputError:
-            continue
-    return values
+    failed: Mapping[Touch, ConvergenceError | InputError],
+) -> tuple[float, str | None]:
+    """Prediction of a condition; NaN and why where there is none."""
+    try:
+        if isinstance(plan, InputError):
+            raise plan
+        if plan.touch is not None and plan.touch in failed:
+            raise failed[plan.touch]
+        return plan.of(skins[plan.touch] if plan.touch else None), None
+    except (ConvergenceError, InputError) as error:
+        return np.nan, error.args[0]
 
 
 def _number(value: Value) -> float:
