@@ -4,7 +4,6 @@ import json
 import re
 import shlex
 import shutil
-import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -445,18 +444,9 @@ def test_the_published_deflection_scores_as_in_the_reproduction(folder):
 
 
 @pytest.fixture
-def call(monkeypatch, capsys, tmp_path):
+def call(run_program):
     """Run `fingerpad validate` in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["fingerpad", "validate", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        said = capsys.readouterr()
-        return ended.value.code or 0, said.out, said.err
-
-    return run
+    return lambda *arguments: run_program(cli.main, "fingerpad", "validate", *arguments)
 
 
 def test_the_command_writes_page_figure_and_results(call, folder, tmp_path):
