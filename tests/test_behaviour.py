@@ -1,4 +1,4 @@
-"""The hash of the mechanical sources moves with what they compute, and with nothing else."""
+"""The hash of the mechanical sources changes with what they compute and with nothing else."""
 
 import ast
 import re

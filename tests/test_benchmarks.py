@@ -1,4 +1,4 @@
-"""The tables of benchmarks/README.md are what the scripts measured; people run the scripts."""
+"""The tables of benchmarks/README.md agree with the stored measurements, and scripts run on small jobs."""
 
 import importlib
 import re
@@ -91,7 +91,7 @@ def test_a_job_runs_with_the_threads_it_is_given():
     assert run_job("measuring", "doubled", threads=1, number=4).answer == {"doubled": 8}
 
 
-def test_a_failed_run_says_what_failed():
+def test_a_failed_run_names_the_failure():
     with pytest.raises(FailedRunError, match=r"status 1:\n(.|\n)*ZeroDivisionError"):
         run_command([sys.executable, "-c", "1 / 0"], threads=1)
 
@@ -127,7 +127,7 @@ def test_exponent_of_growth_is_that_of_a_power_law_through_noise():
     assert growth.exponent(nodes, 3.0 * nodes**1.1 * [1.01, 0.99, 0.99, 1.01]) == pytest.approx(1.1, abs=0.01)
 
 
-def test_a_press_tells_its_time_size_and_result():
+def test_a_press_reports_time_size_and_result():
     found = run_job("pressing", "press", threads=2, resolution="quick")
     expected = {"nodes": 8290, "elements": 7128, "steps": 10}
     assert {name: found.answer[name] for name in expected} == expected

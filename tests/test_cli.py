@@ -121,7 +121,7 @@ def test_a_folder_that_cannot_be_is_named_and_what_is_there_stays(call, tmp_path
     ],
     ids=lambda failure: type(failure).__name__,
 )
-def test_failures_of_a_run_are_said_without_a_traceback(call, monkeypatch, tmp_path, failure):
+def test_failures_of_a_run_are_reported_without_a_traceback(call, monkeypatch, tmp_path, failure):
     def fail(*_):
         raise failure
 
@@ -131,7 +131,7 @@ def test_failures_of_a_run_are_said_without_a_traceback(call, monkeypatch, tmp_p
     assert list((tmp_path / "run").iterdir()) == []
 
 
-def test_an_interrupted_run_says_how_it_goes_on(call, monkeypatch):
+def test_an_interrupted_run_reports_how_to_continue(call, monkeypatch):
     def stop(*_):
         raise KeyboardInterrupt
 
@@ -181,7 +181,7 @@ def test_options_reach_the_export(call, monkeypatch, tmp_path):
     assert default == touch_of(Fingertip(), Plate(), RampAndHold(depth_mm=1.0), "trial3", "quick")
 
 
-def test_the_shell_sees_the_same_without_a_warning(tmp_path):
+def test_a_subprocess_has_the_same_output_and_no_warning(tmp_path):
     done = subprocess.run(
         [*COMMAND, "reproduce", "--seed", "abc"], cwd=tmp_path, capture_output=True, text=True, check=False
     )

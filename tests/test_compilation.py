@@ -1,4 +1,4 @@
-"""What a first run says before it compiles: only if it will, once, and in the terminal's own way."""
+"""First run that compiles: shown once, only if kernels are compiled, and suited to the terminal."""
 
 import os
 import subprocess
@@ -61,7 +61,7 @@ def test_a_kernel_is_compiled_once_per_source(say, tmp_path):
     assert say(LOOK)[0] == ["False", "2", "True"]
 
 
-def test_where_nothing_is_compiled_nothing_is_said(say):
+def test_without_compilation_there_is_no_message(say):
     assert say(LOOK, NUMBA_DISABLE_JIT="1") == (["True", "2", "True"], "")
 
 
@@ -94,7 +94,7 @@ PRESS = """
     ],
     ids=["as it comes", "silenced"],
 )
-def test_a_first_press_says_so_once(say, set_up, said):
+def test_a_first_press_reports_compilation_once(say, set_up, said):
     assert say(PRESS.format(set_up=set_up)) == (["pressed", "pressed"], said)
 
 

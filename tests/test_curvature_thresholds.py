@@ -51,7 +51,7 @@ def test_rates_that_scale_with_curvature_obey_webers_law():
     assert steeper == pytest.approx((1.0 + fractions[1]) ** 0.5 - 1.0, rel=2e-3)
 
 
-def test_threshold_is_where_three_quarters_are_told_apart(found):
+def test_threshold_is_at_a_hit_rate_of_three_quarters(found):
     entry = found.populations[1].standards[2]
     assert entry.standard_per_m == 287.0
     population = Population.grid(rows=6, columns=6, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
@@ -104,7 +104,7 @@ def test_ideal_threshold_is_fishers(found):
     assert yes_no(float(d)) == pytest.approx(0.75, abs=1e-3)
 
 
-def test_a_threshold_out_of_reach_is_said_and_costs_only_its_own_row(found):
+def test_a_threshold_out_of_range_is_reported_and_affects_only_its_row(found):
     noisy = study.Observer(proportional(0.1).rates, PAIRS, 0.5, DRAWS)
     with pytest.raises(ConvergenceError, match="No sphere up to 700 /m is discriminated from 287 /m in 75%"):
         study.threshold_at(noisy, 287.0)
@@ -119,7 +119,7 @@ def test_a_threshold_out_of_reach_is_said_and_costs_only_its_own_row(found):
     assert "No sphere" in page.threshold_tables(loud)[0].note
 
 
-def test_receptors_that_are_silent_under_a_standard_tell_its_threshold_nothing():
+def test_receptors_that_are_silent_under_a_standard_do_not_change_its_threshold():
     at = np.geomspace(100.0, 700.0, 200)
     rates = np.outer((at / 287.0) ** 0.7, POPULATION.positions_mm[:, 1] ** 2 + 20.0)
     with_silent = np.hstack([rates, np.zeros((200, 1))])
@@ -130,7 +130,7 @@ def test_receptors_that_are_silent_under_a_standard_tell_its_threshold_nothing()
     assert found.jnd_per_m == pytest.approx(expected.jnd_per_m, rel=1e-9)
 
 
-def test_noise_that_meets_no_person_is_said_where_thresholds_would_stand():
+def test_noise_that_cannot_be_fitted_is_reported_in_place_of_thresholds():
     same = study.curvature_thresholds(dict.fromkeys(SKINS, SphereSkin.wide(287.0)), AFFERENT, 0.06, seed=0)
     paper, square = same.populations
     assert len(paper.without_threshold) == 4

@@ -269,13 +269,13 @@ def test_the_criterion_moves_the_decision_point(criterion):
     assert_allclose(sampled.hit_rate, ndtr(margin), atol=0.01)
 
 
-def test_equal_spheres_are_told_apart_by_chance_only():
+def test_equal_spheres_are_discriminated_by_chance_only():
     values = np.repeat(bumps([287.0]), 3, axis=0)
     assert_allclose(discriminate_gradient_sum(values, PAIRS, 0.05, 0).hit_rate, 0.5, atol=0.02)
     assert_allclose(discriminate_euclidean(values, 0.05, 0).hit_rate, 0.5, atol=0.03)
 
 
-def test_very_different_spheres_are_always_told_apart():
+def test_very_different_spheres_are_always_discriminated():
     values = bumps([287.0, 2000.0])
     assert discriminate_gradient_sum(values, PAIRS, 0.05, 0).hit_rate[0] > 0.999
     assert discriminate_euclidean(values, 0.05, 0).hit_rate[0] > 0.999
@@ -320,7 +320,7 @@ def test_fewer_presentations_widen_the_error_bars():
     assert (few.hit_rate_sd[:4] > 2.0 * many.hit_rate_sd[:4]).all()
 
 
-def test_without_noise_every_difference_is_seen_and_no_difference_is_a_coin_flip():
+def test_without_noise_hit_rates_are_1_or_at_chance_for_equal_stimuli():
     values = bumps([287.0, 287.0, 288.0])
     for rates in (
         discriminate_gradient_sum(values, PAIRS, 0.0, 0, SMALL),

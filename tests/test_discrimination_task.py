@@ -1,4 +1,4 @@
-"""A question of one's own, answered: what codes make of known skins, what is refused, what is written."""
+"""Discrimination tasks of a user: hit rates of codes on known skins, refused tasks, and written files."""
 
 import hashlib
 import json
@@ -121,7 +121,7 @@ def test_every_code_reads_every_measure_in_the_order_of_the_question(answered):
         assert len(one.statistic.mean) == 5
 
 
-def test_the_statistic_rises_with_what_is_told_apart_and_distances_begin_above_zero(answered):
+def test_the_statistic_increases_with_curvature_and_distances_are_above_zero(answered):
     sums = decoding(answered, "gradient_sum", "static").statistic
     distances = decoding(answered, "euclidean", "static").statistic
     for statistic in (sums, distances):
@@ -130,7 +130,7 @@ def test_the_statistic_rises_with_what_is_told_apart_and_distances_begin_above_z
     assert distances.mean[0] > 0.0
 
 
-def test_an_observer_who_waits_counts_later_spikes_as_the_end_of_his_patience():
+def test_spikes_after_the_waiting_time_count_as_the_waiting_time():
     def latest_ms(patience_ms):
         question = asked(measure="latency", code="gradient_sum", windows_ms={"latency": patience_ms})
         return np.max(analyse(question, bumps(question, peak_kpa=0.3)).responses["latency"])
@@ -155,7 +155,7 @@ def test_who_is_silent_under_one_stimulus_has_no_latency_under_any():
     assert (inner < all_of_them).all()  # the outer ones, which fire late, are left out
 
 
-def test_without_noise_every_difference_is_seen():
+def test_without_noise_every_difference_is_detected():
     question = asked(noise=0)
     found = analyse(question, bumps(question))
     assert all((np.array(one.hit_rate) == 1.0).all() for one in found.decodings)
@@ -231,7 +231,7 @@ def test_more_trials_narrow_the_interval_as_their_root():
     assert few.over_standard is None  # of nothing
 
 
-def test_where_there_is_no_curve_it_says_why():
+def test_a_missing_curve_has_its_reason():
     (one,) = side_curves([1.0, 2.0], np.array([0.8]), 100, CurveSettings(), seed=1)
     assert one.why_not == "A curve needs two comparisons on a side of the standard or more: got 1."
     (low,) = side_curves([0.0, 1.0, 2.0], np.array([0.5, 0.5]), 100, CurveSettings(), seed=1)

@@ -1,4 +1,4 @@
-"""A soft threshold: its spikes rescale to a Poisson process, and harden into the exact ones."""
+"""Soft threshold: rescaled intervals are Poisson, and a narrow threshold gives the exact spikes."""
 
 import math
 from itertools import pairwise

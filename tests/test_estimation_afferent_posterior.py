@@ -156,12 +156,12 @@ def calibrated(found: np.ndarray) -> tuple[bool, bool]:
     )
 
 
-def test_truths_take_every_rank_and_lie_within_their_intervals_as_often_as_they_say(places) -> None:
+def test_ranks_of_truths_are_uniform_and_intervals_have_their_nominal_coverage(places) -> None:
     assert calibrated(ranks(places, n_recordings=300)) == (True, True)
 
 
 @pytest.mark.parametrize(("width", "noise"), [(2.0, 1.0), (0.4, 1.0), (1.0, 1.5), (1.0, 1.0 / 1.5)])
-def test_calibration_sees_what_is_too_narrow_and_what_is_too_wide(places, width, noise) -> None:
+def test_calibration_detects_intervals_that_are_too_narrow_or_too_wide(places, width, noise) -> None:
     assert calibrated(ranks(places, 100, width, noise)) == (False, False)
 
 

@@ -1,4 +1,4 @@
-"""Four numbers out of six: they fix the spikes, and nothing else is lost."""
+"""Four identifiable parameters determine the spikes and can be converted to six and back."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The likelihood of rates is the integral that it claims to be."""
+"""Likelihood of rates against numerical integration."""
 
 import numpy as np
 import pytest

@@ -199,7 +199,7 @@ def offset_model() -> ReceptorOffset:
     return ReceptorOffset.of_traces({offset: traces(offset) for offset in OFFSETS_MM})
 
 
-def test_at_a_sampled_place_the_receptor_feels_what_was_sampled():
+def test_at_a_sampled_position_the_drive_is_the_sampled_one():
     model = offset_model()
     six = Afferent().parameters
     for offset in OFFSETS_MM:

@@ -1,4 +1,4 @@
-"""Tables of stimuli and recordings: what they mean, and what is said of those that cannot be."""
+"""Files of stimuli and recordings: their meaning, and errors of invalid ones."""
 
 import warnings
 from datetime import UTC, datetime

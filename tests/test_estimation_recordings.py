@@ -1,4 +1,4 @@
-"""The hand-over types of recordings: what they hold, and what they refuse."""
+"""Types of recordings: contents and refused values."""
 
 import numpy as np
 import pytest

@@ -237,7 +237,7 @@ def forty_fits():
 
 
 @pytest.mark.parametrize("level", [0.5, 0.8, 0.95])
-def test_intervals_hold_the_truth_as_often_as_they_say(level):
+def test_intervals_have_their_nominal_coverage(level):
     """Recovery: how many of forty data sets hold each true parameter is a binomial number."""
     intervals = np.array([interval(fit, level) for fit in forty_fits()])
     holds = ((intervals[:, :, 0] < TRUTH) & (intervals[:, :, 1] > TRUTH)).sum(axis=0)
@@ -245,7 +245,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(level):
     assert np.all((fewest <= holds) & (holds <= most)), dict(zip(SPIKE_PARAMETER_NAMES, holds, strict=True))
 
 
-def test_estimates_scatter_as_their_standard_errors_say():
+def test_estimates_scatter_by_their_standard_errors():
     """Mean and spread of (estimate - truth)/error: 0 and 1, within what forty fits can tell."""
     scores = np.array([(fit.parameters - TRUTH) / fit.standard_errors for fit in forty_fits()])
     assert np.all(np.abs(scores.mean(axis=0)) < 3.5 / math.sqrt(40))
@@ -273,7 +273,7 @@ def test_a_clock_has_no_width():
         fit_spikes(exact, START)
 
 
-def test_one_strength_without_a_ramp_tells_no_gains_apart():
+def test_one_strength_without_a_ramp_does_not_determine_both_gains():
     held = Drive([0.0, 1e4], [[1.0], [1.0]], [[0.0], [0.0]])
     spikes = EscapeRate(Afferent().membrane, 0.2).spikes(Afferent().transduction.current(held), 1)
     with pytest.raises(ConvergenceError, match="determine all parameters: these do not"):
@@ -317,7 +317,7 @@ def test_recordings_that_make_no_sense_are_refused(change, said):
         (lambda data: fit_spikes(recorded(), [10.0, 0.0, 0.0, 40.0, 1e-3]), "take a wider threshold"),
     ],
 )
-def test_what_cannot_be_computed_is_said(call, said):
+def test_uncomputable_likelihoods_are_an_error(call, said):
     silent = SpikeLikelihood(touched(), SpikeTrains.from_lists([[]]))
     with pytest.raises(InputError, match=said):
         call(silent)

@@ -263,7 +263,7 @@ LAWS = [
 
 
 @pytest.mark.parametrize("write", [abaqus_deck, calculix_deck], ids=["abaqus", "calculix"])
-def test_every_line_is_one_that_the_manual_knows(write):
+def test_every_line_is_in_the_manual(write):
     known = ABAQUS if write is abaqus_deck else CALCULIX
     relaxing = NEO_HOOKE.with_prony(PRONY) if write is abaqus_deck else NEO_HOOKE
     jobs = [block_job(indenter) for indenter in [*INDENTERS, Line(2.5)]]
@@ -576,7 +576,7 @@ def curve(root, number):
     )
 
 
-def test_febio_knows_every_parameter():
+def test_every_parameter_exists_in_febio():
     materials = [
         law for law in LAWS if not isinstance(law.law, Hyperfoam) and not getattr(law.law, "bulk_cubic", 0)
     ]
@@ -750,7 +750,7 @@ def test_febio_refuses_what_it_would_change():
         febio_deck(block_job(material=NEO_HOOKE.with_prony(many)))
 
 
-def test_a_job_says_what_is_wrong_with_it():
+def test_an_invalid_job_is_refused_with_its_reason():
     job = block_job()
     with pytest.raises(InputError, match="must begin with 0 and have one length"):
         replace(job, depths_mm=DEPTHS[:-1])

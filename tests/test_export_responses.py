@@ -83,7 +83,7 @@ def test_a_session_is_read_back_as_recordings_of_every_receptor(tmp_path):
     np.testing.assert_allclose(recorded.duration_ms, 1000.0, rtol=1e-12)
 
 
-def test_a_session_knows_where_its_receptors_lie(tmp_path):
+def test_a_session_holds_the_positions_of_its_receptors(tmp_path):
     responses = responses_to_two_touches()
     started = datetime(2026, 3, 1, 12, tzinfo=UTC)
     path = write_responses_nwb(responses, tmp_path / "session.nwb", started=started)

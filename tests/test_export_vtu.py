@@ -1,4 +1,4 @@
-"""What ParaView would see: files read back by VTK's own reader."""
+"""Files for ParaView, read back by VTK's own reader."""
 
 import sys
 import xml.etree.ElementTree as xml
@@ -141,7 +141,7 @@ def test_element_that_is_neither_brick_nor_wedge_is_named():
         cells_of(Mesh(**(parts | {"elements": elements})))
 
 
-def test_without_vtk_a_sentence_says_how_to_get_it(done, tmp_path, monkeypatch):
+def test_without_vtk_the_error_names_the_extra(done, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "vtkmodules.vtkIOXML", None)
     with pytest.raises(InputError, match=r"pip install 'fingerpad\[vtk\]'"):
         write_vtu_series(tmp_path / "a.pvd", done, TOUCH.mesh)

@@ -54,7 +54,7 @@ def test_normals_and_level_of_a_paraboloid_are_its_own(paraboloid):
     np.testing.assert_allclose(np.linalg.norm(paraboloid.skin_normal(points), axis=1), 1.0)
 
 
-def test_rays_meet_a_paraboloid_where_the_quadratic_says(paraboloid):
+def test_rays_meet_a_paraboloid_at_the_roots_of_the_quadratic(paraboloid):
     generator = np.random.default_rng(3)
     directions = generator.normal(size=(200, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]

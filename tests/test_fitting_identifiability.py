@@ -1,4 +1,4 @@
-"""What cannot be told is found: directions along which nothing observed changes."""
+"""Directions in parameter space that no observation determines are found."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def rates(six: np.ndarray) -> np.ndarray:
     return np.concatenate(MODEL.evaluate(six))
 
 
-def test_rates_tell_four_of_six_parameters_and_two_scalings_are_silent() -> None:
+def test_rates_determine_four_of_six_parameters_and_not_two_scalings() -> None:
     found = identifiability(rates, Afferent().parameters, PARAMETER_NAMES)
     assert found.rank == 4
     assert found.singular_values[4] < 1e-6 * found.singular_values[0]
@@ -33,7 +33,7 @@ def test_rates_tell_four_of_six_parameters_and_two_scalings_are_silent() -> None
         )
 
 
-def test_rates_tell_all_of_the_four_numbers() -> None:
+def test_rates_determine_all_four_parameters() -> None:
     four = identifiable(Afferent().parameters)
     found = identifiability(lambda numbers: rates(six_parameters(numbers)), four, IDENTIFIABLE_NAMES)
     assert found.rank == 4

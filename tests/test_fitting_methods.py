@@ -1,4 +1,4 @@
-"""Methods of fitting: each finds a known optimum, minds its bounds, counts its runs and repeats itself."""
+"""Methods of fitting: each finds a known optimum, respects bounds, counts its runs and is repeatable."""
 
 from dataclasses import dataclass, field, replace
 
@@ -85,7 +85,7 @@ def test_bounds_are_kept_and_the_best_place_within_is_found(method) -> None:
     assert fit.score >= max(tried) - 1e-6
 
 
-def test_large_differences_see_past_jumps_that_blind_small_ones() -> None:
+def test_large_differences_pass_jumps_that_stop_small_ones() -> None:
     rounded = Decay(rounding=0.1)
     wide = LeastSquares([START], SCALES, difference_steps=(0.3, 0.1)).fit(rounded, ALL)
     narrow = LeastSquares([START], SCALES, difference_steps=(1e-7,)).fit(rounded, ALL)

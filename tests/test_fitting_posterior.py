@@ -54,7 +54,7 @@ def test_two_lumps_keep_their_shares() -> None:
     assert chains.flat[chains.flat < 0.0].std() == pytest.approx(0.5, rel=0.15)
 
 
-def test_a_border_is_kept_and_its_density_told() -> None:
+def test_samples_at_a_bound_have_the_right_density() -> None:
     """An exponential density has its largest value at its border."""
     chains = sample(
         lambda points: np.where(points[:, 0] >= 0.0, -points[:, 0], -np.inf), [1.0], [1.0], ("x",), seed=3
@@ -84,7 +84,7 @@ def test_draws_that_have_not_converged_are_never_returned() -> None:
         from_normal(1, n_steps=8, most_steps=8, largest_r_hat=2.0, smallest_effective_size=1e6)
 
 
-def test_r_hat_sees_ensembles_that_differ_in_place_or_width() -> None:
+def test_r_hat_detects_ensembles_that_differ_in_location_or_width() -> None:
     same = np.random.default_rng(1).normal(size=(4, 60, 20))
     assert split_r_hat(same) < 1.005
     assert split_r_hat(same + np.array([0.6, 0.0, 0.0, 0.0])[:, None, None]) > 1.02

@@ -1,4 +1,4 @@
-"""Profiles of likelihoods that are known in closed form; open sides are called open."""
+"""Profiles of likelihoods known in closed form; an end that is not reached is reported as open."""
 
 import numpy as np
 import pytest

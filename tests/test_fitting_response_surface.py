@@ -1,4 +1,4 @@
-"""Response surface method: exact on planes, close on bowls, honest when it fails."""
+"""Response-surface method: exact on planes, close on paraboloids, an error where it cannot continue."""
 
 import itertools
 

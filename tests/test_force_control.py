@@ -1,4 +1,4 @@
-"""A given force: the depth is found, it is the one that depth control knows, and it creeps as it should."""
+"""Force control: the depth that is found agrees with depth control, and the skin creeps."""
 
 import numpy as np
 import pytest
@@ -138,7 +138,7 @@ def test_force_that_reaches_the_bone_is_refused_while_solving():
     assert 1.5 < finger.deepest_mm < Fingertip().depth_available_mm(17.37, 0.0)
 
 
-def test_force_beyond_what_the_mesh_can_bear_is_an_error_that_says_less_force():
+def test_force_beyond_the_limit_of_the_mesh_is_an_error_that_advises_less_force():
     with pytest.raises(ConvergenceError, match="try a smaller force") as failure:
         pressed(block(), ForceRampAndHold(1e6, 50.0, 100.0), settings=PressSettings(1, 1))
     assert len(failure.value.history) >= 6

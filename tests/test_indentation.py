@@ -1,4 +1,4 @@
-"""One touch from arguments to skin: what it must obey, and what it refuses."""
+"""One touch from its arguments to the skin response: properties and refused arguments."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What the check of the wheel takes from the README, measures and reports."""
+"""The check of the wheel: code taken from the README, measurements and report."""
 
 import os
 import sys

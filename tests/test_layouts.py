@@ -1,4 +1,4 @@
-"""Layouts: pitches and densities in closed form, distances, and chance that looks like chance."""
+"""Layouts: pitches and densities in closed form, distances, and statistics of random ones."""
 
 import math
 
@@ -30,7 +30,7 @@ def nearest_mm(layout, k=1):
     return cKDTree(layout.places_mm).query(layout.places_mm, k=k + 1)[0][:, 1:]
 
 
-def test_every_pattern_has_a_maker_that_says_its_name():
+def test_every_pattern_has_a_function_of_its_name():
     assert tuple(MAKERS) == PATTERNS
     for pattern, make in MAKERS.items():
         assert make(PAD, 70.0).pattern == pattern

@@ -1,4 +1,4 @@
-"""Where the work of the indenter goes: closed forms for one element, and whole presses that add up."""
+"""Energy balance: closed forms for one element, and the balance of whole indentations."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Formulas of strain energies: derivatives against complex steps, and what cannot be a law."""
+"""Formulas of strain energies: derivatives against complex steps, and refused formulas."""
 
 import re
 import warnings
@@ -99,7 +99,7 @@ def test_moduli_of_a_law_are_those_of_its_formula(law):
     assert law.energy.is_coupled == isinstance(law, Hyperfoam)
 
 
-def test_foam_does_not_thicken_more_than_its_poissons_ratio_says():
+def test_foam_does_not_expand_more_than_its_poissons_ratio():
     """Uniaxial Storakers foam of one term: lateral stretch = stretch^-nu, whatever the stretch."""
     foam, stretch = Hyperfoam((3.0,), (6.0,), poisson=0.4).energy, 0.6
     sides = -0.4 * np.log(stretch)

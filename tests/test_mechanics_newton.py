@@ -1,4 +1,4 @@
-"""What an equilibrium must obey before it is returned: the supports take what the indenter gives."""
+"""Conditions that an equilibrium meets before it is returned: supports balance the force of the indenter."""
 
 from dataclasses import replace
 

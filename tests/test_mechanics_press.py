@@ -170,7 +170,7 @@ def test_tolerance_of_sed_is_a_small_positive_number(tolerance):
         PressSettings(sed_tolerance=tolerance)
 
 
-def test_adaptive_press_that_cannot_go_on_is_an_error_that_tells_its_history():
+def test_adaptive_press_that_does_not_converge_is_an_error_with_its_history():
     settings = PressSettings(sed_tolerance=0.1, newton=NewtonSettings(most_iterations=1))
     with pytest.raises(ConvergenceError, match=r"The press stopped at 0 ms.* try a smaller depth") as failure:
         pressed(coarse_block(), settings=settings)
@@ -286,7 +286,7 @@ def test_step_that_fails_is_cut_and_the_answer_stays():
     ],
     ids=["too few iterations", "nearly through the block"],
 )
-def test_hopeless_press_is_an_error_that_tells_its_history(indenter, depth_mm, settings):
+def test_press_that_does_not_converge_is_an_error_with_its_history(indenter, depth_mm, settings):
     with pytest.raises(ConvergenceError, match=r"The press stopped at .* try a smaller depth") as failure:
         pressed(block(), indenter=indenter, motion=RampAndHold(depth_mm, 50.0, 100.0), settings=settings)
     assert len(failure.value.history) >= 6  # the whole step and its cuts down to 1/32

@@ -1,4 +1,4 @@
-"""Every way in which a mesh can be unfit, and the sentence that says so."""
+"""Unusable meshes are refused, each with its reason."""
 
 import re
 from dataclasses import replace

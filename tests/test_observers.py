@@ -117,7 +117,7 @@ def test_corrections_keep_d_prime_finite_and_are_as_stated():
         sensitivity(11, 10, 3, 10)
 
 
-def test_discriminability_is_the_share_of_all_pairs_and_knows_its_error():
+def test_discriminability_is_the_share_of_all_pairs_with_its_error():
     draw = np.random.default_rng(7)
     standard, comparison = draw.integers(0, 6, 60), draw.integers(1, 8, 50)
     found = discriminability(standard, comparison)
@@ -163,7 +163,7 @@ def test_ideal_observer_of_equal_covariance_has_the_closed_form():
     assert (present(standard, comparison, 2, 100, session=1).standard != shown.standard[:100]).any()
 
 
-def test_ideal_observer_hears_a_change_of_spread_alone():
+def test_ideal_observer_detects_a_change_of_spread_alone():
     standard, comparison = GaussianResponses([0.0], [[1.0]]), GaussianResponses([0.0], [[4.0]])
     shown = present(standard, comparison, seed=3, n_trials=20_000)
     # |r| is the likelihood ratio here: of two looks the one of greater spread is the farther out,

@@ -1,4 +1,4 @@
-"""The package as a user meets it: what it exports, explains and weighs at import."""
+"""The package for a user: exported names, docstrings, and time of import."""
 
 import ast
 import dataclasses
@@ -22,7 +22,7 @@ MODULES = sorted(
 )
 
 
-def test_everything_promised_can_be_imported_by_star() -> None:
+def test_every_public_name_can_be_imported_by_star() -> None:
     namespace: dict[str, object] = {}
     exec("from fingerpad import *", namespace)
     assert fingerpad.__all__
@@ -50,7 +50,7 @@ def test_a_dataclass_without_words_does_not_count_as_explained() -> None:
 
 
 @pytest.mark.parametrize("name", MODULES)
-def test_every_module_says_what_it_is_for_and_keeps_its_promises(name: str) -> None:
+def test_every_module_has_a_docstring_and_its_exported_names(name: str) -> None:
     module = importlib.import_module(name)
     assert module.__doc__
     assert all(hasattr(module, promised) for promised in getattr(module, "__all__", ()))

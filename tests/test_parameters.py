@@ -1,4 +1,4 @@
-"""Published numbers: each has its story, and they agree with each other."""
+"""Published numbers: each has a source and a status, and they agree with each other."""
 
 from dataclasses import FrozenInstanceError
 
@@ -107,7 +107,7 @@ def test_layers_soften_inwards_in_every_material_set() -> None:
     assert tissues.WU_EPIDERMIS_YOUNG.value > tissues.MAENO_EPIDERMIS_YOUNG.value
 
 
-def test_hyperfoams_are_stable_at_rest_and_as_soft_as_their_source_says() -> None:
+def test_hyperfoams_are_stable_at_rest_and_as_soft_as_published() -> None:
     for mu, expected_young_kpa in (
         (tissues.WU_SKIN_HYPERFOAM_MU, 3.25),
         (tissues.WU_SUBCUTIS_HYPERFOAM_MU, 1.6),

@@ -1,4 +1,4 @@
-"""The percept: what is known of people, statistics of sessions, other readings, noise of the mesh."""
+"""The percept: observed hit rates, statistics of sessions, other decodings, mesh noise."""
 
 import math
 
@@ -139,7 +139,7 @@ def test_the_mean_of_ten_hit_rates_is_unsteadier_by_the_root_of_ten(sessions):
     assert_allclose(few / many, math.sqrt(10.0), rtol=0.25)
 
 
-def test_one_session_tells_no_error_and_pairs_without_an_answer_no_gradient():
+def test_one_session_has_no_error_and_pairs_without_latency_no_gradient():
     measures = {"static": [Measured(bumps(), PAIRS)]}
     with pytest.raises(InputError, match="sessions must be a whole number of at least 2"):
         observe(measures, 0.06, seed=4, sessions=1)
@@ -220,7 +220,7 @@ def test_noise_of_sessions_stands_in_the_errors():
 # Interpretations of the steps
 
 
-def test_the_distance_of_many_receptors_is_judged_as_the_closed_form_says():
+def test_hit_rates_of_distances_of_many_receptors_agree_with_the_closed_form():
     """Independent folded normals add up; with 200 receptors their sum is normal."""
     generator = np.random.default_rng(2)
     values = generator.uniform(20.0, 60.0, 200) * np.array([[1.0], [1.0], [1.0]])
@@ -308,7 +308,7 @@ def test_the_analysis_names_every_interpretation_and_the_noise_that_fits_it():
     assert (fraction < 0.2 * point).all()
 
 
-def test_the_patience_reading_has_nobody_wait_beyond_the_ramp():
+def test_the_decoding_with_a_waiting_time_ends_with_the_ramp():
     late = np.where(bumps() > 20.0, 80.0 - bumps(), np.nan)
     found = discrepancy._interpretations(
         {"static": [Measured(bumps(), PAIRS)]}, [late], GRID.positions_mm, 1.0

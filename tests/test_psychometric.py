@@ -82,7 +82,7 @@ def test_level_at_undoes_predict_and_slope_is_its_derivative(name, threshold, wi
         assert function.slope(wanted) == pytest.approx(rise, rel=1e-3)
 
 
-def test_counts_are_as_probable_as_the_distributions_say():
+def test_counts_have_the_probabilities_of_the_distributions():
     n, p, rho = 12, 0.7, 0.2
     k = np.arange(n + 1)
     v = (1.0 - rho) / rho
@@ -191,12 +191,12 @@ def held(cloud: FunctionCloud) -> tuple[bool, bool, bool]:
     )
 
 
-def test_posterior_intervals_hold_the_truth_as_often_as_they_say(fits):
+def test_posterior_intervals_have_their_nominal_coverage(fits):
     covered = np.mean([held(posterior(fit)) for fit in fits], axis=0)
     assert ((covered >= 0.90) & (covered <= 0.98)).all(), covered
 
 
-def test_bootstrap_intervals_hold_the_truth_as_often_as_they_say():
+def test_bootstrap_intervals_have_their_nominal_coverage():
     covered = np.mean(
         [
             held(bootstrap(fit_psychometric(LEVELS, counts, [TRIALS] * 7, lapse=0.02), seed, 120))
@@ -314,7 +314,7 @@ def test_other_bad_input_is_refused():
     assert JudgementCounts([1.0], [1], [2]).proportion.tolist() == [0.5]
 
 
-def test_levels_that_miss_the_threshold_are_said_to():
+def test_levels_that_do_not_contain_the_threshold_are_an_error():
     with pytest.raises(ConvergenceError, match=r"outside of the levels 1 \.\.\. 4"):
         fit_psychometric([1, 2, 3, 4], [500, 505, 520, 560], [1000] * 4, lapse=0.0)
     with pytest.raises(ConvergenceError, match="One proportion"):
@@ -323,7 +323,7 @@ def test_levels_that_miss_the_threshold_are_said_to():
         fit_psychometric([1, 2, 3, 4], [100] * 4, [100] * 4)
 
 
-def test_a_step_is_fitted_and_its_width_is_said_to_lie_on_the_bound():
+def test_a_step_is_fitted_and_its_width_is_reported_on_the_bound():
     step = fit_psychometric([1, 2, 3, 4], [50, 50, 100, 100], [100] * 4, lapse=0.0)
     assert step.at_bounds == ("width",)
     assert 2.0 < step.threshold(0.75) < 3.0

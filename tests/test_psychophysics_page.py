@@ -1,4 +1,4 @@
-"""docs/psychophysics.md prints what it says it prints."""
+"""The examples on docs/psychophysics.md print the numbers in their comments."""
 
 import re
 from pathlib import Path

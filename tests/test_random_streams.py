@@ -1,4 +1,4 @@
-"""Numbers by key: known answers, agreement with NumPy, and no trace of order, threads or neighbours."""
+"""Keyed random numbers: known answers, agreement with NumPy, independence of order and threads."""
 
 from concurrent.futures import ThreadPoolExecutor
 

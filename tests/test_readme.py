@@ -1,4 +1,4 @@
-"""What the pages of the repository show is run, linked and named as it is."""
+"""Code, links and names on the pages of the repository are run and checked."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""End organs below any point of the skin: where they lie, what they read, and no seam anywhere."""
+"""Receptors below any point of the skin: positions, sampled values, and continuity around the finger."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What a fit to recordings tells beside itself: the receptor's place, profiles, and sensitivity."""
+"""Optional analyses of a fit to recordings: receptor offset, profiles, and sensitivity."""
 
 from dataclasses import replace
 
@@ -73,7 +73,7 @@ def test_between_two_places_the_drive_is_linear_and_at_a_place_it_is_that_of_the
         TRUTH.at(0.5)
 
 
-def test_stimuli_that_move_in_their_own_time_are_felt_beside_as_well():
+def test_stimuli_with_different_motions_can_be_sampled_at_an_offset():
     slow_ms = np.append(TIMES_MS[:-1], 1500.0)
     mixed = [AfferentModel.of_traces([felt(place), felt(place, slow_ms)]) for place in (-0.2, 0.2)]
     dynamic, _ = ReceptorOffset(np.array([-0.2, 0.2]), mixed).evaluate(np.append(KNOWN, 0.2))

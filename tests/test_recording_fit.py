@@ -1,4 +1,4 @@
-"""A fit to recordings of one's own: recovery first, then what a fit says, refuses and writes."""
+"""Fit to recordings of a user: recovery of known parameters, then reports, errors and files."""
 
 import json
 import math
@@ -116,7 +116,7 @@ def test_spikes_of_a_known_afferent_give_the_fit_of_their_rates(recovered):
     assert to_json(replace(fitted, **clocks)) == to_json(replace(recovered, **clocks))
 
 
-def test_one_phase_is_enough_for_a_fit_and_the_other_is_said_to_be_missing():
+def test_one_phase_is_enough_for_a_fit_and_the_other_is_reported_missing():
     fitted = study.fit_recordings(SED, RateRecordings(NAMES, None, RATES.static_rate_hz), np.arange(8) % 2)
     assert fitted.fss_in_sample == fitted.phases["static"].fss_in_sample > 0.99
     assert fitted.phases["dynamic"].observed_hz is None
@@ -320,7 +320,7 @@ def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
     assert [float(name) for name in recorded.stimuli] == observed.shift_mm.tolist()
 
 
-def test_stimuli_are_pressed_where_and_how_they_say():
+def test_stimuli_are_indented_at_their_position_with_their_motion():
     conditions = Conditions("quick")
     pressed = session.stimulus_touches(
         {
@@ -397,7 +397,7 @@ ROWS = "shift_mm,dynamic_rate_hz,static_rate_hz\n" + "".join(
 )
 
 
-def test_a_fit_writes_page_figures_and_numbers_and_says_where_they_came_from(call, tmp_path):
+def test_a_fit_writes_page_figures_numbers_and_their_origin(call, tmp_path):
     (tmp_path / "mine.csv").write_text(ROWS)
     arguments = ("mine.csv", "--stimulus", "bar", "--folds", "2", "--resolution", "quick", "--seed", "3")
     status, said, errors = call(*arguments)
@@ -583,7 +583,7 @@ def test_bad_input_is_one_sentence_and_status_2_and_nothing_is_written(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["list.csv", "mine.csv"]
 
 
-def test_the_example_can_be_tried_as_it_says(call, tmp_path):
+def test_the_example_prints_its_command_and_writes_recordings(call, tmp_path):
     status, said, errors = call("--example", "try")
     assert (status, errors) == (0, "")
     assert said == "Try: fingerpad fit try/bar.csv --stimulus bar --resolution quick\n"
@@ -632,7 +632,7 @@ def test_figures_show_what_was_recorded_and_nothing_else(recovered):
     np.testing.assert_allclose(points.get_ydata(), missed[::-1], rtol=0, atol=1e-9)
 
 
-def test_what_is_not_determined_is_said(recovered):
+def test_undetermined_parameters_are_reported(recovered):
     nothing = dict.fromkeys(IDENTIFIABLE_NAMES, np.nan)
     undetermined = replace(recovered, identifiable_covariance=None, identifiable_standard_error=nothing)
     assert "need five folds or more" in report.fit_summary(undetermined)[1]

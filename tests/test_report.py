@@ -1,4 +1,4 @@
-"""The report draws finished numbers: all of them, escaped, and whole or not at all."""
+"""The report draws finished numbers: all of them, escaped, in files that are whole or absent."""
 
 import base64
 import re
@@ -359,7 +359,7 @@ def test_one_picture_per_figure_of_the_paper_at_its_resolution(report):
         assert pixels_per_metre(picture.read_bytes()) == round(RESOLUTION_DPI / 0.0254)
 
 
-def test_the_page_holds_the_pictures_themselves_and_asks_for_nothing_else(report):
+def test_the_page_holds_its_figures_and_loads_no_other_file(report):
     text = report.read_text(encoding="utf-8")
     inside = [base64.b64decode(code) for code in re.findall(r"data:image/png;base64,([^\"]+)", text)]
     names = [drawing.name for drawing in DRAWINGS]
@@ -670,7 +670,7 @@ def test_figure_6_colours_the_finger_where_afferents_fire_and_mirrors_half_of_it
     assert right == -left != 0.0
 
 
-def test_captions_say_what_afferents_do_without_a_touch():
+def test_captions_report_the_rate_without_a_touch():
     section = typed(PopulationMaps, _population())
     assert "also fires without touch, 4 spikes/s from 251 ms on" in population.caption_population(section)
     silent = replace(section, at_rest=replace(section.at_rest, first_spike_latency_ms=np.nan))
@@ -742,7 +742,7 @@ def test_figure_7_shows_rates_far_below_chance():
     assert discrimination.draw_observers(typed(SphereDiscrimination, section)).axes[0].get_ylim()[0] < 0.1
 
 
-def test_figure_9_shows_each_place_from_the_side_it_is_seen_from():
+def test_figure_9_shows_each_place_from_its_own_side():
     section = typed(NailBorder, nail_section())
     below, side, middle, above, across, profile = nail.draw_nail(section).axes[:6]
     half = 19 * 15

@@ -1,4 +1,4 @@
-"""Figures of any population show every receptor once, in the place and colour of its answer."""
+"""Figures of any population show every receptor once, at its position, coloured by its response."""
 
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ def test_a_column_has_one_scale():
     assert [panel.collections[1].get_clim() for panel in panels] == [(0.0, 77.0)] * 2
 
 
-def test_receptors_in_space_are_seen_from_below_and_dorsal_ones_are_squares():
+def test_receptors_in_space_are_drawn_from_below_and_dorsal_ones_are_squares():
     answer = response(columns=3)
     axes = responses.draw_responses({"mine": answer}).axes[0]
     answers = answer.dynamic_rate_hz > 0.0

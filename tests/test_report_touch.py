@@ -106,7 +106,7 @@ def test_trains_stand_in_the_order_of_their_distance_and_silent_ones_are_counted
     assert axes.get_ylabel().startswith("3 of 4 afferents")
 
 
-def test_a_silent_population_is_said_to_be_silent(skin):
+def test_a_silent_population_is_reported_silent(skin):
     response = SimpleNamespace(positions_mm=np.zeros((1, 2)), spikes=[np.empty(0)])
     axes = new_figure(4.0, 3.0).subplots()
     touch_figure.draw_spikes(axes, skin, response)

@@ -1,4 +1,4 @@
-"""The whole paper by the command line, once from nothing, and what a reader may then rely on."""
+"""The whole reproduction by its command, from an empty folder, and the files that it writes."""
 
 import json
 import math
@@ -154,7 +154,7 @@ def test_a_run_has_the_numbers_that_the_pages_show(first):
     assert shown.percept.codes[0].hit_rate.size == shown.percept.curvature_per_m.size == 6
 
 
-def test_it_ends_well_and_says_where_the_results_are_and_what_was_missed(first):
+def test_a_run_ends_with_status_0_and_names_results_and_missed_criteria(first):
     assert first.status == 0
     # The kernels may be compiled only now.
     assert all(line.startswith(SUBJECT) for line in first.errors.splitlines())
@@ -303,7 +303,7 @@ def test_population_and_nail_are_maps(first):
     assert 1.3 < low <= nail["ratio"] <= high
 
 
-def test_the_manifest_says_how_to_repeat_it(first):
+def test_the_manifest_holds_the_command_that_repeats_the_run(first):
     manifest = first.results["manifest"]
     assert (manifest["version"], manifest["seed"], manifest["resolution"]) == (__version__, 0, "quick")
     assert all(mesh["nodes"] > mesh["elements"] > 1000 for mesh in manifest["meshes"].values())

@@ -1,4 +1,4 @@
-"""Recruitment and population rate: against loops over all spikes and pairs, and against what must be kept."""
+"""Recruitment and population rate against loops over all spikes and pairs, and conserved quantities."""
 
 import itertools
 
@@ -51,7 +51,7 @@ def test_evoked_is_what_comes_in_half_the_time_at_rest_or_less(latency_ms, resti
 
 
 @given(st.lists(st.tuples(*[st.one_of(st.just(np.nan), st.integers(1, 6).map(float))] * 2), max_size=10))
-def test_order_change_is_what_all_pairs_say_one_by_one(pairs):
+def test_order_change_agrees_with_counting_all_pairs(pairs):
     first, second = np.array(pairs).reshape(-1, 2).T
     found = order_change(first, second)
     both = [(a, b) for a, b in pairs if not (np.isnan(a) or np.isnan(b))]
@@ -73,7 +73,7 @@ def test_the_same_order_at_other_times_is_no_change_and_the_reverse_is_all_of_it
     assert_allclose([backwards.rank_correlation, backwards.swapped], [-1.0, 1.0], rtol=0, atol=1e-12)
 
 
-def test_orders_that_know_nothing_of_each_other_swap_half_of_their_pairs():
+def test_independent_orders_swap_half_of_their_pairs():
     """Of n independent ranks Kendall's tau has variance 2 (2n + 5) / (9 n (n - 1)), Spearman's 1/(n - 1)."""
     n = 2500
     found = order_change(*np.random.default_rng(1).permuted(np.tile(np.arange(n), (2, 1)), axis=1))
@@ -148,7 +148,7 @@ def test_rate_of_a_patch_is_the_rate_per_afferent_times_the_density():
     assert_array_equal(found.active_fraction, [[1.0, 1.0]])
 
 
-def test_a_population_of_nobody_has_no_rate_and_a_silent_one_has_rate_0():
+def test_an_empty_population_has_no_rate_and_a_silent_one_has_rate_0():
     nobody = population_rate(SpikeTrains.from_lists([]), [0.0, 1.0])
     assert np.isnan(nobody.rate_hz).all()
     assert_array_equal(population_rate(SpikeTrains.from_lists([[], []]), [0.0, 1.0]).rate_hz, [[0.0]])

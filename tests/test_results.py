@@ -1,4 +1,4 @@
-"""Typed results: what is checked on construction, what a file holds, what a reader refuses."""
+"""Typed results: checks on construction, contents of files, and refused files."""
 
 from __future__ import annotations
 

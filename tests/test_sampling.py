@@ -1,4 +1,4 @@
-"""What is read from the skin: exact for linear fields, mirrored in z, refused beside the finger."""
+"""Sampling of the skin: exact for linear fields, mirrored in z, refused beside the finger."""
 
 from dataclasses import replace
 
@@ -125,7 +125,7 @@ def test_another_quantity_may_take_the_place_of_energy_in_the_static_term_or_in_
 
 
 @pytest.mark.parametrize("quantity", ["heat", "", "work"])
-def test_quantity_that_the_skin_does_not_know_is_refused(quantity):
+def test_unknown_quantity_is_refused(quantity):
     with pytest.raises(InputError, match="quantity must be one of stored, von_mises: got"):
         response(layered_block()).sample(quantity, SITES)
 

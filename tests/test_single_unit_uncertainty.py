@@ -64,7 +64,7 @@ def test_both_forms_are_the_same_draws(section: UncertaintyResult) -> None:
     assert section.posterior["resting_share"].high < 1.0
 
 
-def test_four_of_six_directions_are_seen(section: UncertaintyResult) -> None:
+def test_four_of_six_directions_are_identified(section: UncertaintyResult) -> None:
     found = section.identifiability
     assert found.rank == 4
     assert len(found.silent_directions) == 2
@@ -84,7 +84,7 @@ def test_bands_hold_most_of_what_was_observed(section: UncertaintyResult) -> Non
     assert section.evidence_for_alike_residuals < 3.0
 
 
-def test_convergence_and_sensitivity_are_told(section: UncertaintyResult) -> None:
+def test_convergence_and_sensitivity_are_reported(section: UncertaintyResult) -> None:
     assert section.convergence.r_hat <= 1.02
     assert section.convergence.effective_draws >= 100.0
     found = section.sensitivity

@@ -1,4 +1,4 @@
-"""Finished touches are found again by all that determines them, and survive any kill."""
+"""Stored touches are found by everything that determines them, and survive an interruption at any time."""
 
 import os
 import pickle
@@ -391,7 +391,7 @@ def test_any_byte_changed_is_noticed_or_harmless(stored):
     assert noticed > len(places) // 4
 
 
-def test_a_store_that_cannot_be_written_says_so(tmp_path, skin):
+def test_a_store_that_cannot_be_written_is_an_error(tmp_path, skin):
     (tmp_path / "file").write_text("in the way")
     store = Store(tmp_path / "file" / "store")
     assert not store.holds(TINY)

@@ -1,4 +1,4 @@
-"""The studies press what the paper pressed and read from it what they say, miss or no miss."""
+"""The levels of the reproduction: indentations as in the paper, and statements about their results."""
 
 from dataclasses import asdict, replace
 
@@ -176,7 +176,7 @@ def test_deflection_r2_reads_the_observations_in_the_direction_asked_for(directi
     assert skin_deflection.deflection_r2(profile, not proximal_positive) < 0.999
 
 
-def test_deflection_r2_reads_proximal_as_positive_unless_told_otherwise():
+def test_deflection_r2_takes_proximal_as_positive_by_default():
     assert skin_deflection.deflection_r2(observed_profile(-1.0)) == 1.0
 
 
@@ -364,7 +364,7 @@ def test_every_strategy_measure_and_variant_has_six_hit_rates_at_both_positions(
         assert np.shape(sums) == (2, 7)
 
 
-def test_more_noise_makes_spheres_harder_to_tell(discrimination):
+def test_more_noise_lowers_the_hit_rates(discrimination):
     variants = discrimination.variants
     rates = [np.mean(variants[f"sigma_{sigma}"].hit_rate) for sigma in ("0.025", "0.055", "0.085")]
     assert rates[0] > rates[1] > rates[2]

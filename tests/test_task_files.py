@@ -1,4 +1,4 @@
-"""A question of one's own as a file: what it may say, what it means, and how it is refused."""
+"""Files of discrimination tasks: accepted keys, their meaning, and refused files."""
 
 import json
 import re
@@ -72,7 +72,7 @@ def test_what_varies_makes_one_stimulus_per_value_and_the_standard_comes_first()
     assert {stimulus.motion for stimulus in stimuli} == {RampAndHold()}
 
 
-def test_listed_stimuli_say_what_they_do_not_share():
+def test_listed_stimuli_have_parameters_of_their_own():
     wide, narrow, deep = task_stimuli(parse_task(BARS))
     assert (wide.name, wide.level, wide.indenter) == ("wide", None, Bar(4.0, 0.2))
     assert (wide.motion, wide.offset_mm) == (ForceRampAndHold(150.0), (0.5, 0.0))
@@ -415,7 +415,7 @@ LINES = REFUSALS.strip().splitlines()
 
 
 @pytest.mark.parametrize(("parts", "said"), list(zip(LINES[::2], LINES[1::2], strict=True)))
-def test_what_cannot_be_is_refused_in_one_sentence_that_says_where(parts, said):
+def test_invalid_values_are_refused_in_one_sentence_with_their_position(parts, said):
     assert said.strip() in refused(changed(SPHERES, **read_yaml(parts, "part")))
 
 

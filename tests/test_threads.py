@@ -1,4 +1,4 @@
-"""The number of threads: who sets it, who gets it back, and what happens where several callers want them."""
+"""Number of threads: setting, restoring, and several callers at the same time."""
 
 import os
 import subprocess

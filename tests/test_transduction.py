@@ -103,7 +103,7 @@ def test_the_printed_difference_gives_the_same_spikes_as_the_derivative():
     assert_allclose(exact.times_ms, printed.times_ms, rtol=0.0, atol=0.01)
 
 
-def test_twice_as_many_pieces_move_no_spike_by_more_than_the_docstring_says():
+def test_twice_as_many_pieces_move_no_spike_by_more_than_the_documented_bound():
     sed, gains = ramp_and_hold(np.linspace(0.3, 3.0, 20)), Transduction(0.0, 2e-4, 1e-6)
     neuron = LeakyIntegrateAndFire(68.0, 1e-6, 50.0, 1.0)
     default = neuron.spikes(gains.current(sed))

@@ -1,4 +1,4 @@
-"""Indenters turned about their direction of pressing: what stays, what changes, and what is refused."""
+"""Indenters rotated about their direction of indentation: invariants, differences, and refused ones."""
 
 from dataclasses import dataclass, replace
 
@@ -68,7 +68,7 @@ def test_cosine_and_sine_are_those_of_the_angle_and_exact_at_quarter_turns(spin_
 
 @pytest.mark.parametrize("indenter", ALL, ids=lambda body: type(body).__name__)
 @pytest.mark.parametrize("spin_deg", [0.0, 30.0, 90.0, -90.0, 135.0, 180.0])
-def test_a_body_says_whether_it_is_its_own_mirror_image(indenter, spin_deg):
+def test_a_body_reports_its_mirror_symmetry(indenter, spin_deg):
     """Gaps at points and their mirror images, in the frame of the finger."""
     points = np.random.default_rng(6).uniform([-5.0, -1.0, -5.0], [5.0, 0.5, 5.0], (200, 3))
     cosine, sine = cosine_and_sine(spin_deg)

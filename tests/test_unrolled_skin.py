@@ -1,4 +1,4 @@
-"""The unrolled skin: true to area, there and back, and layouts that keep their densities on the finger."""
+"""Unrolled skin: areas are preserved, the map can be inverted, and layouts keep their density."""
 
 import numpy as np
 import pytest
@@ -83,7 +83,7 @@ def test_around_is_an_arc_where_the_finger_is_round():
     )
 
 
-def test_lengths_are_stretched_by_no_more_than_is_said():
+def test_lengths_are_stretched_by_no_more_than_documented():
     inside = random_places(4000, 2)
     inside = inside[PAD.contains(inside)]
     near = np.abs(inside).max(axis=1) < 3.0

@@ -1,4 +1,4 @@
-"""How deep the end organ lies: layers of a block, a truth that lies in one of them, and what is said."""
+"""Depth of the receptor: layers of a block, recovery of a true layer, and its figure and tables."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -109,7 +109,7 @@ def test_the_depth_that_made_the_rates_predicts_them_best(found):
     assert layers[5].largest_sed_kpa == pytest.approx(felt_kpa(5, SHIFT_MM).max(), rel=1e-6)
 
 
-def test_the_figure_and_the_words_say_where(found):
+def test_the_figure_and_the_text_name_the_depth(found):
     section = SimpleNamespace(depths=found)
     (axes,) = report.draw_depths(section).axes
     lines = {line.get_label(): line for line in axes.lines}

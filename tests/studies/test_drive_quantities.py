@@ -1,4 +1,4 @@
-"""Which quantity drives the afferent: fits of synthetic truth, scales, tables that say what was fitted."""
+"""Quantities that drive the afferent: fits of synthetic truth, scales, and tables of the results."""
 
 import json
 from dataclasses import replace
@@ -205,7 +205,7 @@ class Noting:
         return Fit(relative, asked.score(relative, chosen), 3, 0.0, ())
 
 
-def test_what_is_left_out_is_predicted_by_the_fold_that_did_not_know_it():
+def test_left_out_stimuli_are_predicted_by_the_fold_without_them():
     asked, _ = problem(EXTENDED)
     method, folds = Noting(), interleaved_folds(24)
     judged = drive_fits.judge(asked, method)
@@ -469,7 +469,7 @@ def test_the_last_drive_is_kept_and_no_other_taken_for_it():
         assert_array_equal(rates, ExplainedModel.from_start(explanation, PATCH).evaluate(np.array(place)))
 
 
-def test_explanations_are_judged_alike_and_told_by_what_they_add(monkeypatch):
+def test_explanations_are_scored_alike_and_listed_with_added_parameters(monkeypatch):
     def short(seed, n_added):
         return replace(drive_fits.quick_method(n_added), n_refined=1, difference_steps=(0.1,))
 
@@ -559,7 +559,7 @@ def explained(section, tmp_path):
     )
 
 
-def test_the_page_tells_every_explanation_and_both_methods(section, tmp_path):
+def test_the_page_shows_every_explanation_and_both_methods(section, tmp_path):
     result = explained(section, tmp_path)
     page = drives_report.drives_page(result)
     text = write_markdown(page, tmp_path / "drives.md").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Starts, units, methods and limits of the single-unit fit: each number is what its words say."""
+"""Starts, units, methods and limits of the single-unit fit: numbers against direct computation."""
 
 from dataclasses import replace
 
@@ -90,7 +90,7 @@ def test_the_map_of_scales_holds_the_score_of_each(starts, recordings):
     assert scales.fss_start_1[row, column] == pytest.approx(problem.score(six, EVERYTHING), rel=1e-9)
 
 
-def test_the_papers_session_leaves_its_fold_out_and_begins_where_it_says(starts, recordings):
+def test_the_papers_session_leaves_its_fold_out_and_begins_at_its_start(starts, recordings):
     problem = replace(single_unit.rate_problem(traces(scale=0.6)), recordings=recordings)
     training = np.flatnonzero(interleaved_folds(36) != 2)
     printed, second, ours = starts.sessions

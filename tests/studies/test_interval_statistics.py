@@ -52,7 +52,7 @@ def test_a_clock_does_not_vary_and_a_poisson_process_varies_by_one():
     )
 
 
-def test_local_variation_hardly_sees_a_slow_change_of_rate():
+def test_local_variation_hardly_depends_on_a_slow_change_of_rate():
     slowing = SpikeTrains.from_lists([np.cumsum(np.linspace(5.0, 50.0, 200))])
     found = interval_statistics(slowing, (0.0, 1e9))
     assert found.coefficient_of_variation[0] > 0.4

@@ -126,7 +126,7 @@ def test_unusable_laws_are_refused(call, said):
 # Candidates and their presses
 
 
-def test_candidates_have_names_of_their_own_and_say_where_they_come_from():
+def test_candidates_have_different_names_and_a_source():
     every = (*candidates(), *deflection_candidates())
     assert len({candidate.name for candidate in every}) == len(every) >= 30
     statuses = ("assumed", "recalled", "read")
@@ -215,7 +215,7 @@ def test_the_search_finds_an_afferent_that_answers_like_the_one_that_made_the_ra
     assert levels.evaluated(found).fss == levels.fss(found)
 
 
-def test_stiffness_of_all_layers_at_once_says_nothing_to_an_afferent():
+def test_a_common_factor_on_all_moduli_does_not_change_the_fit():
     soft, stiff = synthetic_levels(1.0), synthetic_levels(8.0)
     found = [levels.search(Effort(generations=3, population=4), 0.0) for levels in (soft, stiff)]
     assert soft.fss(found[0]) == pytest.approx(stiff.fss(found[1]), abs=1e-9)
@@ -223,14 +223,14 @@ def test_stiffness_of_all_layers_at_once_says_nothing_to_an_afferent():
     assert soft.hit_rates(found[0], 0.1) == pytest.approx(stiff.hit_rates(found[1], 0.1), abs=1e-9)
 
 
-def test_the_joint_search_gives_up_firing_for_hit_rates_only():
+def test_the_joint_search_trades_fss_for_hit_rates_only():
     levels = synthetic_levels()
     alone, joint = (levels.search(EFFORT, weight) for weight in (0.0, 1.0))
     assert levels.percept_error(joint) < levels.percept_error(alone)
     assert levels.fss(joint) < levels.fss(alone) + 1e-3
 
 
-def test_spheres_that_feel_alike_leave_no_noise_to_fit():
+def test_no_noise_is_fitted_to_equal_responses():
     levels = synthetic_levels()
     levels.spheres = [levels.spheres[0]] * 3
     found = levels.evaluated(TRUTH)
@@ -351,7 +351,7 @@ def test_a_force_beyond_the_ramp_is_refused():
         trial_order.profile_at_force(press([0.0, 0.5, 1.0, 1.0], [0.0, 10.0, 30.0, 40.0]), 31.0)
 
 
-def test_excess_is_told_for_each_region():
+def test_excess_is_computed_for_each_region():
     distance = np.linspace(-10.0, 10.0, 2001)
     deeper = SurfaceProfile(distance, np.where(np.abs(distance) <= 0.52, 0.3, 0.1))
     flat = SurfaceProfile(distance, np.zeros(2001))
@@ -431,14 +431,14 @@ def test_a_stiff_epidermis_spreads_the_deflection_at_equal_depth(tiny):
         assert found.force_ratio > 1.0
 
 
-def test_a_second_run_presses_nothing_and_says_the_same(tiny, monkeypatch):
+def test_a_second_run_solves_nothing_and_has_the_same_results(tiny, monkeypatch):
     monkeypatch.setattr("fingerpad.skin.store._compute", pytest.fail)
     use_few(monkeypatch)
     again = replace(tiny.run(), manifest=tiny.results.manifest)
     assert to_json(from_json(MaterialStudy, to_json(again))) == to_json(again) == to_json(tiny.results)
 
 
-def test_the_page_tells_every_set_and_its_numbers(tiny, tmp_path):
+def test_the_page_shows_every_set_and_its_numbers(tiny, tmp_path):
     text = write_markdown(materials_page(tiny.results), tmp_path / "materials.md").read_text(encoding="utf-8")
     assert (tmp_path / "images" / "material_sets.png").read_bytes().startswith(b"\x89PNG")
     for number, found in enumerate(tiny.results.sets, start=1):
@@ -450,7 +450,7 @@ def test_the_page_tells_every_set_and_its_numbers(tiny, tmp_path):
     assert tiny.results.manifest.started[:10] in text
 
 
-def test_the_page_says_what_was_not_solved_and_which_sets_meet_everything(tiny):
+def test_the_page_names_unsolved_sets_and_those_that_meet_all_levels(tiny):
     good = tiny.results.sets[0]
     met = {good.name: LevelsMet(deflection=True, firing=True, discrimination=True)}
     unsolved = UnsolvedSet(name="odd", basis="assumed", unsolved="It folded.")

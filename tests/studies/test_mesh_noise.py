@@ -1,4 +1,4 @@
-"""Noise of the mesh: the step between the nearest spheres on meshes whose lines lie elsewhere."""
+"""Mesh noise: the step between the nearest spheres on meshes with shifted element boundaries."""
 
 import math
 from dataclasses import replace
@@ -84,5 +84,5 @@ def test_steps_on_other_meshes_are_shares_of_the_first():
 
 
 @pytest.mark.parametrize(("difference", "verdict"), [(0.099, "10 % is met"), (0.101, "10 % is exceeded")])
-def test_the_page_says_whether_the_steps_agree(difference, verdict):
+def test_the_page_reports_whether_the_steps_agree(difference, verdict):
     assert verdict in page.verdict(replace(five_percent_apart(), largest_difference=difference))

@@ -287,7 +287,7 @@ def test_a_run_presses_every_mesh_and_finds_the_known_error_and_order(results):
     assert found.steps["bar"].sed["ramp"].max == 0.0
 
 
-def test_pages_say_every_mesh_with_its_errors(results):
+def test_pages_show_the_errors_of_every_mesh(results):
     found = results[0]
     assert to_json(from_json(MeshRefinement, to_json(found))) == to_json(found)
     made = MESH_REFINEMENT.page(found)

@@ -1,4 +1,4 @@
-"""Noisy membranes against the exact ones under the same noise, written out, and against closed forms."""
+"""Noisy membranes against exact ones with the same noise written out, and against closed forms."""
 
 import math
 

@@ -186,14 +186,14 @@ def test_hit_rates_are_at_every_position_and_share_their_random_numbers(results)
     assert spheres.position_mm.tolist().count(0.2) == len(paper_size.CURVATURES)
 
 
-def test_sizes_tell_the_wire_from_the_rest(results):
+def test_the_mesh_of_the_wire_is_finer_than_the_others(results):
     sizes = results[0].meshes
     assert {size["line"].size_x_mm for size in sizes.values()} == {0.025}
     nodes = {kind: size.nodes for kind, size in sizes["paper"].items()}
     assert nodes["line"] > nodes["cylinder"] == nodes["bar"] == nodes["sphere"]
 
 
-def test_pages_say_every_mesh_with_its_errors(results):
+def test_pages_show_the_errors_of_every_mesh(results):
     found = results[0]
     assert to_json(from_json(PaperSize, to_json(found))) == to_json(found)
     page = markdown(PAPER_SIZE.page(found))

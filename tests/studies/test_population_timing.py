@@ -1,4 +1,4 @@
-"""Order of first spikes and population rate: who is counted when, and what the figures show."""
+"""Order of first spikes and population rate: counted afferents and contents of the figures."""
 
 from dataclasses import replace
 
@@ -63,7 +63,7 @@ def test_rings_about_the_sphere_hold_all_spikes_near_it(sheet_answers):
         assert touch.active_fraction[1, 50] == np.mean(firing)
 
 
-def test_timing_asks_every_sphere_over_the_middle_and_the_standard_beside_it():
+def test_timing_uses_every_sphere_over_the_middle_and_the_standard_beside_it():
     found = population_timing.population_timing(SKINS, SENSITIVE)
     names = [touch.name for touch in found.recruitment.touches]
     assert names == [*(f"{curvature:g} /m" for curvature in CURVATURE_PER_M), "287 /m, 0.2 mm away"]
@@ -90,7 +90,7 @@ def test_the_disc_has_its_density_on_the_skin_itself():
     assert np.abs(z).max() < 0.97 * np.abs(around).max()
 
 
-def test_spikes_that_come_without_a_touch_recruit_nobody():
+def test_spikes_without_a_touch_recruit_no_afferent():
     latency = resting_response(RESTLESS).first_spike_latency_ms
     answer = sheet(RESTLESS).respond(SphereSkin(0.0, 287.0))
     assert np.isfinite(answer.first_spike_latency_ms).all()
@@ -176,7 +176,7 @@ def lines(axes):
     return {line.get_label(): line for line in axes.get_lines()}
 
 
-def test_captions_say_what_afferents_do_without_a_touch():
+def test_captions_report_the_rate_without_a_touch():
     timing = typed(PopulationTiming, timing_section())
     assert "first fire at 251 ms. All start" in page.caption_population_rate(timing.rates)
     assert "Without touch" not in page.caption_recruitment(timing.recruitment)
@@ -203,7 +203,7 @@ def test_the_figure_of_the_order_ranks_every_afferent_that_fires_and_counts_skin
     np.testing.assert_array_equal(beside[fires], np.stack([latency[fires], 1.5 * latency[fires]], axis=1))
 
 
-def test_the_figure_of_the_order_and_its_table_say_how_much_the_order_changes():
+def test_the_figure_of_the_order_and_its_table_show_how_much_the_order_changes():
     section = typed(PopulationTiming, timing_section()).recruitment
     assert "365 /m: rank correlation 0.987, 3.1 % of the pairs in reversed order" in page.caption_recruitment(
         section

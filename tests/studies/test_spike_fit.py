@@ -1,4 +1,4 @@
-"""The study of spike trains: noise and irregularity, and the afferent found again in its spikes."""
+"""The study of spike trains: noise, irregularity, and recovery of the afferent from its spikes."""
 
 import math
 from dataclasses import replace
@@ -106,7 +106,7 @@ def test_the_truth_is_the_afferent_with_its_gains_rescaled(found):
     assert (true[3], true[4]) == (AFFERENT.time_constant_ms, spike_fit.WIDTH)
 
 
-def test_spikes_of_other_noise_are_told_from_those_of_a_soft_threshold(found):
+def test_spikes_of_other_noise_are_distinguished_from_those_of_a_soft_threshold(found):
     assert len(found.other_noise) == 3
     for row in found.other_noise:
         assert row.distance > row.limit
@@ -158,7 +158,7 @@ def test_spikes_that_cannot_be_fitted_have_a_row_without_an_estimate(found):
     assert others.rows[-1].cells[3:8] == ("–",) * 5
 
 
-def test_the_figure_and_the_tables_say_what_was_found(found):
+def test_the_figure_and_the_tables_show_the_results(found):
     section = found
     assert png(report.draw, section).startswith(b"\x89PNG")
     recovery, others, sources = report.table(section)

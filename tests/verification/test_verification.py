@@ -115,7 +115,7 @@ def test_judgement_of_a_row(row, holds):
     assert row.passes is holds
 
 
-def test_a_failure_is_seen_on_a_page():
+def test_a_failure_is_marked_on_the_page():
     failing = replace(FAST[0], measure=lambda: [near("a", 1.0, 2.0, relative=0.1)])
     shown = rows_shown(page_text([failing], {}, ""))
     assert shown == {failing.name: [["a", "", "1", "2", "+100.00 %", "10 %", "**fails**"]]}
