@@ -592,7 +592,7 @@ def test_the_example_prints_its_command_and_writes_recordings(call, tmp_path):
 
 
 def test_options_and_their_defaults_are_those_of_the_modules():
-    assert tuple(METHODS) == choices.METHOD_CHOICES
+    assert METHODS == choices.METHOD_CHOICES
     assert set(INDENTERS) == set(choices.INDENTER_CHOICES)
     defaults = {option.name: option.default for option in command().params}
     assert defaults["dynamic_window"] == protocol.DYNAMIC_WINDOW.value

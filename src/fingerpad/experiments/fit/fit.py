@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, IntArray, one_of, whole
+from fingerpad.core.checks import FloatArray, IntArray, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
-from fingerpad.experiments.fit.methods import METHODS, Prepared, four_number_problem
+from fingerpad.experiments.fit.methods import Prepared, four_number_problem, prepare
 from fingerpad.experiments.fit.offset import Beside, check_beside, fit_offset
 from fingerpad.experiments.fit.results import FitResult, FittedFold, PhaseRates
 from fingerpad.inference.fitting.cross_validation import CrossValidation, cross_validate, interleaved_folds
@@ -69,7 +69,7 @@ def fit_recordings(
         Fold of each stimulus from 0; by default assigned in turn to six folds, or to one per stimulus where
         there are fewer.
     method : str, optional
-        One of `METHODS`.
+        One of `fingerpad.experiments.fit.methods.METHODS`.
     windows_ms : ((float, float), (float, float)), optional
         Windows of the dynamic and of the static rate; the paper's by default. [ms]
     seed : int, optional
@@ -118,7 +118,7 @@ def fit_recordings(
     folds = folds_in_turn(len(rates.stimuli)) if memberships is None else np.asarray(memberships)
     check_enough(rates, folds, len(IDENTIFIABLE_NAMES) + (beside is not None))
     model = AfferentModel.of_traces(sed, windows_ms)
-    prepared = METHODS[one_of("method", method, tuple(METHODS))](model, recordings, rates, seed)
+    prepared = prepare(method, model, recordings, rates, seed)
     best = prepared.method.fit(prepared.problem, np.arange(len(rates.stimuli)))
     validation = cross_validate(prepared.problem, prepared.method, folds)
     four = identifiable(prepared.six(best.parameters))

@@ -8,7 +8,7 @@ from pkgutil import resolve_name
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checks import FloatArray, one_of
 from fingerpad.core.errors import InputError
 from fingerpad.data import neuron
 from fingerpad.experiments.fit.results import SpikeFitSummary
@@ -31,7 +31,8 @@ from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_NAMES
 from fingerpad.inference.start_points import response_surface
 
-MethodOf = Callable[[RateProblem, Bounds], Method]
+Recordings = RateRecordings | SpikeRecordings
+MethodOf = Callable[[AfferentModel, RateProblem, Bounds, int], Method]
 
 
 @dataclass(frozen=True)
@@ -46,20 +47,22 @@ class Prepared:
         How.
     six : callable
         From those parameters to the paper's six.
-    covariance : callable
-        From the fit to all and the folds to the covariance (4, 4) of the identifiable numbers, or None.
-    spikes : callable
-        From the fit to all and the folds to the summary of a fit to spikes; None for rates.
     """
 
     problem: RateProblem
     method: Method
     six: Callable[[FloatArray], FloatArray]
-    covariance: Callable[[Fit, CrossValidation], FloatArray | None]
-    spikes: Callable[[Fit, CrossValidation], SpikeFitSummary | None] = lambda fit, folds: None
+
+    def covariance(self, fit: Fit, folds: CrossValidation) -> FloatArray | None:
+        """Covariance (4, 4) of the identifiable numbers, from the fits of the folds; None for few folds."""
+        return jackknife_covariance([identifiable(self.six(fold.fit.parameters)) for fold in folds.folds])
+
+    def spikes(self, fit: Fit, folds: CrossValidation) -> SpikeFitSummary | None:
+        """Summary of a fit to spikes; None for a fit to rates."""
+        return None
 
 
-def check_spikes(recordings: RateRecordings | SpikeRecordings, n_motions: int) -> SpikeRecordings:
+def check_spikes(recordings: Recordings, n_motions: int) -> SpikeRecordings:
     """Return the recordings if the likelihood of their spikes is defined, else raise `InputError`.
 
     Parameters
@@ -93,86 +96,62 @@ def check_spikes(recordings: RateRecordings | SpikeRecordings, n_motions: int) -
     return recordings
 
 
-def _response_surface(
-    model: AfferentModel, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
-) -> Prepared:
-    """Prepare the paper's method in its six parameters."""
-    return Prepared(
-        RateProblem(model, rates),
-        response_surface(),
-        lambda six: six,
-        _scatter_of(lambda six: six),
+def _evolution(model: AfferentModel, problem: RateProblem, bounds: Bounds, seed: int) -> Method:
+    """CMA-ES from where the slopes in closed form lead."""
+    return Continued(
+        along_slopes(ClosedFormModel(model), problem, bounds),
+        lambda begun: search_from(begun, bounds, seed),
+        name="CMA-ES",
     )
 
 
-def _scatter_of(
-    six: Callable[[FloatArray], FloatArray],
-) -> Callable[[Fit, CrossValidation], FloatArray | None]:
-    """Return what finds the covariance of the four numbers in the fits of the folds."""
-    return lambda fit, folds: jackknife_covariance(
-        [identifiable(six(fold.fit.parameters)) for fold in folds.folds]
-    )
-
-
-def _four_numbers(model: AfferentModel, rates: RateRecordings, method_of: MethodOf) -> Prepared:
-    """Prepare a method for the four identifiable parameters."""
-    problem = four_number_problem(model, rates)
-    return Prepared(
-        problem,
-        method_of(problem, bounds_of(*model.drives)),
-        six_parameters,
-        _scatter_of(six_parameters),
-    )
-
-
-def _least_squares(
-    model: AfferentModel, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
-) -> Prepared:
-    """Prepare least squares by differences, from starts all over the range."""
-    return _four_numbers(model, rates, lambda problem, bounds: by_differences(bounds))
-
-
-def _closed_form(
-    model: AfferentModel, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
-) -> Prepared:
-    """Prepare least squares along the slopes of the rate in closed form."""
-    return _four_numbers(
-        model, rates, lambda problem, bounds: along_slopes(ClosedFormModel(model), problem, bounds)
-    )
-
-
-def _evolution(
-    model: AfferentModel, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
-) -> Prepared:
-    """Prepare CMA-ES from where the slopes in closed form lead."""
-
-    def method_of(problem: RateProblem, bounds: Bounds) -> Method:
-        return Continued(
-            along_slopes(ClosedFormModel(model), problem, bounds),
-            lambda begun: search_from(begun, bounds, seed),
-            name="CMA-ES",
-        )
-
-    return _four_numbers(model, rates, method_of)
-
-
-def _likelihood(
-    model: AfferentModel, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
-) -> Prepared:
-    """Prepare maximum likelihood of spike trains, whose module and kernels only this method loads."""
-    prepare = resolve_name("fingerpad.experiments.fit.spike_method:prepare")
-    prepared: Prepared = prepare(model, recordings, rates, seed)
-    return prepared
-
-
-METHODS: dict[
-    str, Callable[[AfferentModel, RateRecordings | SpikeRecordings, RateRecordings, int], Prepared]
-] = {
-    "least_squares": _least_squares,
-    "response_surface": _response_surface,
-    "closed_form": _closed_form,
+FOUR_NUMBER_METHODS: dict[str, MethodOf] = {
+    "least_squares": lambda model, problem, bounds, seed: by_differences(bounds),
+    "closed_form": lambda model, problem, bounds, seed: along_slopes(ClosedFormModel(model), problem, bounds),
     "cma_es": _evolution,
-    "likelihood": _likelihood,
 }
-"""What fits recordings, by the names that the command line gives: from the model under the stimuli, what was
-recorded, its rates, and a seed."""
+"""Methods that fit the four identifiable parameters, by name."""
+
+METHODS = ("least_squares", "response_surface", "closed_form", "cma_es", "likelihood")
+"""Methods that fit recordings, by the names that the command line gives."""
+
+
+def prepare(
+    method: str, model: AfferentModel, recordings: Recordings, rates: RateRecordings, seed: int
+) -> Prepared:
+    """Prepare a method of fitting recordings.
+
+    Parameters
+    ----------
+    method : str
+        One of `METHODS`.
+    model : AfferentModel
+        The afferent under all stimuli.
+    recordings : RateRecordings or SpikeRecordings
+        What was recorded.
+    rates : RateRecordings
+        Its rates.
+    seed : int
+        Of methods that draw.
+
+    Returns
+    -------
+    Prepared
+
+    Raises
+    ------
+    InputError
+        If the method is unknown, or as `check_spikes` for "likelihood".
+    """
+    one_of("method", method, METHODS)
+    if method == "likelihood":
+        # Only this method loads the module and its kernels.
+        prepared: Prepared = resolve_name("fingerpad.experiments.fit.spike_method:prepare_spikes")(
+            model, recordings, rates, seed
+        )
+        return prepared
+    if method == "response_surface":
+        return Prepared(RateProblem(model, rates), response_surface(), lambda six: six)
+    problem = four_number_problem(model, rates)
+    fitting = FOUR_NUMBER_METHODS[method](model, problem, bounds_of(*model.drives), seed)
+    return Prepared(problem, fitting, six_parameters)

@@ -6,25 +6,21 @@ that reading explains.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray, one_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
-from fingerpad.experiments.fit.methods import METHODS
+from fingerpad.experiments.fit.methods import FOUR_NUMBER_METHODS, prepare
 from fingerpad.experiments.fit.results import HeldOffset, OffsetFit
 from fingerpad.inference.afferent_methods import (
-    Bounds,
-    along_slopes,
     bounds_of,
-    by_differences,
     five_number_problem,
     four_number_problem,
     search_from,
 )
-from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.fitting.covariance import jackknife_covariance
 from fingerpad.inference.fitting.cross_validation import cross_validate
 from fingerpad.inference.fitting.least_squares import LeastSquares
@@ -105,13 +101,13 @@ def fit_offset(
     beside_mm = check_beside(beside)
     roving = ReceptorOffset.of_traces({offset: beside[offset] for offset in beside_mm}, windows_ms)
     problem, everything = five_number_problem(roving, rates), np.arange(roving.n_stimuli)
-    searching = OFFSET_METHODS[one_of("method", method, tuple(OFFSET_METHODS))](roving, rates, seed)
+    searching = _continued(roving, rates, one_of("method", method, tuple(OFFSET_METHODS)), seed)
     best = searching.fit(problem, everything)
     crossed = cross_validate(problem, searching, memberships)
     *four, offset_mm = best.parameters.tolist()
     folds_mm = [float(fold.fit.parameters[-1]) for fold in crossed.folds]
     error = jackknife_covariance(np.reshape(folds_mm, (-1, 1)))
-    held = [METHODS[method](place, rates, rates, seed) for place in roving.models]
+    held = [prepare(method, place, rates, rates, seed) for place in roving.models]
     return OffsetFit(
         offset_mm=offset_mm,
         standard_error_mm=np.nan if error is None else np.sqrt(error[0, 0]),
@@ -129,46 +125,22 @@ def fit_offset(
     )
 
 
-def _least_squares(roving: ReceptorOffset, rates: RateRecordings, seed: int) -> Method:
-    """Least squares from the best fit of a receptor in its place, which it can only gain on."""
-    bounds = _bounds(roving)
-    begin_mm = sorted({0.0, *roving.offsets_mm[1:-1].tolist()})
+def _continued(roving: ReceptorOffset, rates: RateRecordings, method: str, seed: int) -> Continued:
+    """Fit a receptor in its place, then let it move from the best fit, which it can only improve."""
+    centre = roving.at(0.0)
+    problem, of_four = four_number_problem(centre, rates), bounds_of(*centre.drives)
+    low_mm, *inner_mm, high_mm = roving.offsets_mm.tolist()
+    bounds = of_four.and_offset(low_mm, high_mm)
 
-    def beside(begun: FloatArray) -> Method:
-        starts = [np.append(begun, offset) for offset in begin_mm]
+    def moving(begun: FloatArray) -> Method:
+        if method == "cma_es":
+            return search_from(np.append(begun, 0.0), bounds, seed)
+        starts = [np.append(begun, offset) for offset in sorted({0.0, *inner_mm})]
         return LeastSquares(starts, bounds.scales, bounds.low, bounds.high, n_refined=2)
 
-    return _continued(roving, rates, by_differences, beside)
+    in_place = FOUR_NUMBER_METHODS[OFFSET_METHODS[method]](centre, problem, of_four, seed)
+    return Continued(in_place, moving, problem)
 
 
-def _evolution(roving: ReceptorOffset, rates: RateRecordings, seed: int) -> Method:
-    """CMA-ES from where the slopes in closed form lead with the receptor in its place."""
-    bounds, centre = _bounds(roving), roving.at(0.0)
-
-    def quick(of_four: Bounds) -> Method:
-        return along_slopes(ClosedFormModel(centre), four_number_problem(centre, rates), of_four)
-
-    return _continued(roving, rates, quick, lambda begun: search_from(np.append(begun, 0.0), bounds, seed))
-
-
-def _continued(
-    roving: ReceptorOffset,
-    rates: RateRecordings,
-    first: Callable[[Bounds], Method],
-    second: Callable[[FloatArray], Method],
-) -> Continued:
-    """Fit a receptor in its place, then let it move."""
-    centre = roving.at(0.0)
-    return Continued(first(bounds_of(*centre.drives)), second, four_number_problem(centre, rates))
-
-
-def _bounds(roving: ReceptorOffset) -> Bounds:
-    low_mm, *_, high_mm = roving.offsets_mm.tolist()
-    return bounds_of(*roving.at(0.0).drives).and_offset(low_mm, high_mm)
-
-
-OFFSET_METHODS: dict[str, Callable[[ReceptorOffset, RateRecordings, int], Method]] = {
-    "least_squares": _least_squares,
-    "cma_es": _evolution,
-}
-"""Methods of `fingerpad.experiments.fit.methods.METHODS` that an offset can be added to."""
+OFFSET_METHODS = {"least_squares": "least_squares", "cma_es": "closed_form"}
+"""Methods that an offset can be added to, each with the method that first fits a receptor in its place."""

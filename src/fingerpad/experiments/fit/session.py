@@ -120,7 +120,7 @@ class FitRequest:
     with_offset: bool = False
 
     def __post_init__(self) -> None:
-        one_of("method", self.method, tuple(METHODS))
+        one_of("method", self.method, METHODS)
         one_of("dynamic_quantity", self.dynamic_quantity, tuple(sampled_fields()))
         one_of("static_quantity", self.static_quantity, tuple(sampled_fields()))
         whole("jobs", self.jobs, at_least=1)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.signals import SpikeTrains
-from fingerpad.experiments.fit.methods import Prepared, check_spikes
+from fingerpad.experiments.fit.methods import Prepared, Recordings, check_spikes
 from fingerpad.experiments.fit.results import SpikeFitSummary
 from fingerpad.inference.fitting.cross_validation import CrossValidation
 from fingerpad.inference.fitting.methods import Fit
@@ -59,9 +59,46 @@ class MaximumLikelihood:
         return Fit(found.parameters, score, len(found.history), seconds, ())
 
 
-def prepare(
-    model: AfferentModel, recordings: RateRecordings | SpikeRecordings, rates: RateRecordings, seed: int
-) -> Prepared:
+@dataclass(frozen=True)
+class PreparedSpikes(Prepared):
+    """The likelihood of spikes, the method that maximises it, and the meaning of its parameters.
+
+    Parameters
+    ----------
+    method : MaximumLikelihood
+        How.
+    everything : SpikeLikelihood
+        Likelihood of all spikes.
+    """
+
+    method: MaximumLikelihood
+    everything: SpikeLikelihood
+
+    def covariance(self, fit: Fit, folds: CrossValidation) -> FloatArray:
+        """Covariance (4, 4) of the identifiable numbers: part of the inverse of the Fisher information."""
+        return self._covariance(fit)[:4, :4]
+
+    def spikes(self, fit: Fit, folds: CrossValidation) -> SpikeFitSummary:
+        """Summary of the fit."""
+        left_out = [(self.method.of(fold.testing), fold.fit.parameters) for fold in folds.folds]
+        test = time_rescaling(self.everything, fit.parameters)
+        return SpikeFitSummary(
+            n_spikes=self.everything.n_spikes,
+            log_likelihood=self.everything.log_likelihood(fit.parameters),
+            log_likelihood_out_of_sample=sum(part.log_likelihood(five) for part, five in left_out),
+            escape_width=fit.parameters[4],
+            escape_width_standard_error=np.sqrt(self._covariance(fit)[4, 4]),
+            time_rescaling_distance=test.statistic,
+            time_rescaling_p_value=test.p_value,
+        )
+
+    def _covariance(self, fit: Fit) -> FloatArray:
+        return np.linalg.inv(self.everything.derivatives(fit.parameters)[2]).astype(np.float64)
+
+
+def prepare_spikes(
+    model: AfferentModel, recordings: Recordings, rates: RateRecordings, seed: int
+) -> PreparedSpikes:
     """Prepare maximum likelihood of spike trains under a soft threshold.
 
     Parameters
@@ -77,7 +114,7 @@ def prepare(
 
     Returns
     -------
-    Prepared
+    PreparedSpikes
 
     Raises
     ------
@@ -87,28 +124,9 @@ def prepare(
     trains, (drive,) = check_spikes(recordings, len(model.drives)), model.drives
     sites = np.array([rates.stimuli.index(name) for name in trains.stimuli], dtype=np.int64)
     method = MaximumLikelihood(drive, trains, sites)
-    everything = method.of(np.arange(drive.n_sites))
-
-    def covariance(five: FloatArray) -> FloatArray:
-        return np.linalg.inv(everything.derivatives(five)[2]).astype(np.float64)
-
-    def summary(fit: Fit, folds: CrossValidation) -> SpikeFitSummary:
-        left_out = [(method.of(fold.testing), fold.fit.parameters) for fold in folds.folds]
-        test = time_rescaling(everything, fit.parameters)
-        return SpikeFitSummary(
-            n_spikes=everything.n_spikes,
-            log_likelihood=everything.log_likelihood(fit.parameters),
-            log_likelihood_out_of_sample=sum(part.log_likelihood(five) for part, five in left_out),
-            escape_width=fit.parameters[4],
-            escape_width_standard_error=np.sqrt(covariance(fit.parameters)[4, 4]),
-            time_rescaling_distance=test.statistic,
-            time_rescaling_p_value=test.p_value,
-        )
-
-    return Prepared(
+    return PreparedSpikes(
         RateProblem(SoftAfferent(drive, model.windows_ms, seed), rates),
         method,
         lambda five: six_parameters(five[:4]),
-        lambda fit, folds: covariance(fit.parameters)[:4, :4],
-        summary,
+        method.of(np.arange(drive.n_sites)),
     )
