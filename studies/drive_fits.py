@@ -14,6 +14,7 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, IntArray, whole
 from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.data import protocol
+from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
 from fingerpad.inference.fitting.least_squares import LeastSquares
@@ -129,7 +130,7 @@ def quick_method(n_added: int = 0) -> LeastSquares:
     Method
     """
     starts = np.hstack([START_GRID, np.zeros((len(START_GRID), n_added))])
-    return LeastSquares(starts, np.ones(starts.shape[1]), n_refined=2, difference_steps=(0.1, 0.03))
+    return LeastSquares(starts, Bounds(np.ones(starts.shape[1])), n_refined=2, difference_steps=(0.1, 0.03))
 
 
 @dataclass(frozen=True)
@@ -171,7 +172,7 @@ def thorough_method(seed: int, n_added: int = 0) -> Method:
     return BestOf(
         (
             replace(quick, n_refined=4),
-            CovarianceAdaptation(start, np.ones(start.size), most_evaluations=800, seed=seed),
+            CovarianceAdaptation(start, Bounds(np.ones(start.size)), most_evaluations=800, seed=seed),
         ),
         "least squares and CMA-ES, the better",
     )

@@ -22,6 +22,7 @@ from fingerpad.experiments.runner import Runner
 from fingerpad.inference.afferent_methods import (
     OFFSETS_MM,
     along_slopes,
+    and_offset,
     bounds_of,
     by_differences,
     five_number_problem,
@@ -181,7 +182,7 @@ def evolution(problem: RateProblem, driven: Drive, offset: bool = False) -> Cont
 
     def search(begun: FloatArray) -> CovarianceAdaptation:
         return (
-            search_from(np.append(begun, 0.0), bounds.and_offset()) if offset else search_from(begun, bounds)
+            search_from(np.append(begun, 0.0), and_offset(bounds)) if offset else search_from(begun, bounds)
         )
 
     return Continued(by_formula(problem, driven), search, problem, name="CMA-ES")

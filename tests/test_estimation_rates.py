@@ -9,6 +9,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import CurrentTraces, SedTraces
 from fingerpad.experiments.gerling2014.single_unit import bar_recordings
 from fingerpad.inference.closed_form import ClosedFormModel, constant_drive_rate
+from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
 from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
@@ -184,7 +185,7 @@ def test_the_truth_is_recovered_from_simulated_rates(four_numbers, by_formula):
     jacobian = (
         four_numbers.jacobian_of(ClosedFormModel(AfferentModel.of_traces(traces()))) if by_formula else None
     )
-    method = LeastSquares(starts, 0.3 * FOUR, 0.0 * FOUR, 10.0 * FOUR, jacobian=jacobian)
+    method = LeastSquares(starts, Bounds(0.3 * FOUR, 0.0 * FOUR, 10.0 * FOUR), jacobian=jacobian)
     fit = method.fit(four_numbers, EVERYTHING)
     assert fit.score > 0.995
     np.testing.assert_allclose(fit.parameters[1:3], FOUR[1:3], rtol=0.1)
@@ -227,7 +228,7 @@ def test_a_hidden_offset_is_recovered():
         ),
     )
     start, scales = np.append(1.2 * FOUR, -0.05), np.append(0.3 * FOUR, 0.1)
-    method = LeastSquares([start], scales, [*(0.0 * FOUR), -0.4], [*(10.0 * FOUR), 0.4])
+    method = LeastSquares([start], Bounds(scales, [*(0.0 * FOUR), -0.4], [*(10.0 * FOUR), 0.4]))
     fit = method.fit(free, EVERYTHING)
     assert fit.parameters[-1] == pytest.approx(0.13, abs=0.02)
     blind = replace(hidden, model=AfferentModel.of_traces(traces()))

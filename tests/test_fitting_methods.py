@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
+from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.fitting.methods import Fit, FitStep, best_of
 
 TIMES = np.linspace(0.0, 4.0, 24)
 TRUTH = np.array([2.0, 0.8])
-START, SCALES = np.array([1.0, 2.0]), np.array([0.5, 0.4])
+START, FREE = np.array([1.0, 2.0]), Bounds([0.5, 0.4])
 ALL = np.arange(24)
 
 
@@ -46,9 +47,9 @@ class Decay:
 
 
 METHODS = [
-    LeastSquares([START], SCALES),
-    LeastSquares([START], SCALES, jacobian=Decay().jacobian),
-    CovarianceAdaptation(START, SCALES),
+    LeastSquares([START], FREE),
+    LeastSquares([START], FREE, jacobian=Decay().jacobian),
+    CovarianceAdaptation(START, FREE),
 ]
 
 
@@ -75,7 +76,7 @@ def test_the_same_input_gives_the_same_bits_and_leaves_the_global_random_state_a
 @pytest.mark.parametrize("method", METHODS, ids=["least squares", "with slopes", "CMA-ES"])
 def test_bounds_are_kept_and_the_best_place_within_is_found(method) -> None:
     problem = Decay()
-    bounded = replace(method, lower_bounds=[0.0, 0.0], upper_bounds=[1.5, 10.0])
+    bounded = replace(method, bounds=Bounds(FREE.scales, [0.0, 0.0], [1.5, 10.0]))
     fit = bounded.fit(problem, ALL)
     assert fit.parameters[0] == pytest.approx(1.5, rel=1e-3)
     asked = np.array(problem.asked)
@@ -87,21 +88,21 @@ def test_bounds_are_kept_and_the_best_place_within_is_found(method) -> None:
 
 def test_large_differences_pass_jumps_that_stop_small_ones() -> None:
     rounded = Decay(rounding=0.1)
-    wide = LeastSquares([START], SCALES, difference_steps=(0.3, 0.1)).fit(rounded, ALL)
-    narrow = LeastSquares([START], SCALES, difference_steps=(1e-7,)).fit(rounded, ALL)
+    wide = LeastSquares([START], FREE, difference_steps=(0.3, 0.1)).fit(rounded, ALL)
+    narrow = LeastSquares([START], FREE, difference_steps=(1e-7,)).fit(rounded, ALL)
     assert wide.score > 0.995
     assert narrow.score < wide.score - 0.05
 
 
 def test_exact_slopes_lead_there_in_a_few_steps() -> None:
     """Slopes in other units than the steps' would need four times as many."""
-    assert LeastSquares([START], SCALES, jacobian=Decay().jacobian).fit(Decay(), ALL).n_evaluations <= 12
+    assert LeastSquares([START], FREE, jacobian=Decay().jacobian).fit(Decay(), ALL).n_evaluations <= 12
 
 
 def test_only_the_most_promising_starts_are_refined_and_the_best_is_kept() -> None:
     starts = np.array([[9.0, 4.0], [1.9, 0.7], [9.0, 9.0], [2.5, 1.0]])
     problem = Decay()
-    fit = LeastSquares(starts, SCALES, n_refined=2).fit(problem, ALL)
+    fit = LeastSquares(starts, FREE, n_refined=2).fit(problem, ALL)
     refined = fit.attempts[:-1]
     assert [attempt.history[0].parameters.tolist() for attempt in refined] == [[1.9, 0.7], [2.5, 1.0]]
     assert fit.score == max(attempt.score for attempt in fit.attempts)
@@ -110,8 +111,7 @@ def test_only_the_most_promising_starts_are_refined_and_the_best_is_kept() -> No
 
 def test_a_seed_decides_what_the_search_tries() -> None:
     fits = [
-        CovarianceAdaptation(START, SCALES, seed=seed, most_evaluations=30).fit(Decay(), ALL)
-        for seed in (0, 1)
+        CovarianceAdaptation(START, FREE, seed=seed, most_evaluations=30).fit(Decay(), ALL) for seed in (0, 1)
     ]
     assert fits[0].parameters.tolist() != fits[1].parameters.tolist()
     assert all(fit.n_evaluations < 30 + 8 for fit in fits)
@@ -136,17 +136,18 @@ def test_the_first_of_equal_attempts_is_taken() -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: LeastSquares([[1.0, 2.0]], [1.0]), "scales needs one number above 0 per parameter"),
-        (lambda: LeastSquares([[1.0]], [0.0]), "scales needs one number above 0 per parameter"),
-        (lambda: LeastSquares([[1.0]], [1.0], difference_steps=(0.0,)), "difference_steps must be greater"),
-        (lambda: LeastSquares([[1.0], [3.0]], [1.0], upper_bounds=[2.0]), "between the bounds: row 1"),
-        (lambda: LeastSquares([[1.0]], [1.0], n_refined=0), "n_refined must be a whole number"),
-        (lambda: CovarianceAdaptation([1.0, 2.0], [1.0]), "scales needs one number above 0 per parameter"),
+        (lambda: Bounds([1.0, 0.0]), "Bounds need scales above 0"),
+        (lambda: Bounds([1.0], [2.0], [2.0]), "lower limits below the upper ones"),
         (
-            lambda: CovarianceAdaptation([1.0, 2.0], [1.0, 1.0], first_spread=0.0),
-            "first_spread must be greater",
+            lambda: LeastSquares([[1.0, 2.0]], Bounds([1.0])),
+            "starts must have one entry per scale: got 2 for 1",
         ),
-        (lambda: CovarianceAdaptation([1.0, 2.0], [1.0, 1.0], seed=-1), "seed must be a whole number"),
+        (lambda: LeastSquares([START], FREE, difference_steps=(0.0,)), "difference_steps must be greater"),
+        (lambda: LeastSquares([[1.0], [3.0]], Bounds([1.0], high=[2.0])), "between the bounds: row 1"),
+        (lambda: LeastSquares([START], FREE, n_refined=0), "n_refined must be a whole number"),
+        (lambda: CovarianceAdaptation([1.0, 2.0], Bounds([1.0])), "start must have one entry per scale"),
+        (lambda: CovarianceAdaptation(START, FREE, first_spread=0.0), "first_spread must be greater"),
+        (lambda: CovarianceAdaptation(START, FREE, seed=-1), "seed must be a whole number"),
     ],
 )
 def test_wrong_settings_are_refused(make, words) -> None:

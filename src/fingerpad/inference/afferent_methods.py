@@ -6,12 +6,12 @@ parameters, optionally with the offset of the receptor along the finger, within 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from scipy.stats import qmc
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
@@ -37,8 +37,8 @@ OFFSET_SCALE_MM = 0.1
 N_STARTS, N_REFINED = 32, 2
 """Starts that are scored, and starts from which least squares continues."""
 
-FIRST_SPREAD, MOST_EVALUATIONS = 0.5, 600
-"""CMA-ES: standard deviation of the first generation in units of the scales, and most evaluations."""
+MOST_EVALUATIONS = 600
+"""Most evaluations of CMA-ES."""
 
 
 def four_number_problem(model: RateModel, recordings: RateRecordings) -> RateProblem:
@@ -71,32 +71,6 @@ def five_number_problem(model: RateModel, recordings: RateRecordings) -> RatePro
     return RateProblem(Reparametrised(model, (*IDENTIFIABLE_NAMES, OFFSET_NAME), seven), recordings)
 
 
-@dataclass(frozen=True)
-class Bounds:
-    """Bounds and scales of the parameters of a fit.
-
-    Parameters
-    ----------
-    low, high, scales : array (n_parameters,)
-        Bounds and scales.
-    """
-
-    low: FloatArray
-    high: FloatArray
-    scales: FloatArray
-
-    def and_offset(self, low_mm: float = OFFSETS_MM[0], high_mm: float = OFFSETS_MM[-1]) -> Bounds:
-        """Return the bounds of the same parameters and the offset of the receptor. [mm]"""
-        offset = (low_mm, high_mm, OFFSET_SCALE_MM)
-        sides = (self.low, self.high, self.scales)
-        return Bounds(*(np.append(side, entry) for side, entry in zip(sides, offset, strict=True)))
-
-    def spread(self, number: int) -> FloatArray:
-        """Points of a Halton sequence between the bounds, (number, n_parameters); deterministic."""
-        shares = qmc.Halton(self.low.size, scramble=False).random(number + 1)[1:]  # the first is a corner
-        return self.low + shares * (self.high - self.low)
-
-
 def bounds_of(*drives: Drive) -> Bounds:
     """Bounds of the four identifiable parameters: those of `LOWEST`, `HIGHEST` and `SCALES`.
 
@@ -116,13 +90,17 @@ def bounds_of(*drives: Drive) -> Bounds:
         for name in ("rate_kpa_per_ms", "sed_kpa")
     )
     strongest = np.array([1.0, rate, sed, 1.0])
-    return Bounds(*(np.array(terms) / strongest for terms in (LOWEST, HIGHEST, SCALES)))
+    return Bounds(*(np.array(terms) / strongest for terms in (SCALES, LOWEST, HIGHEST)))
+
+
+def and_offset(bounds: Bounds, low_mm: float = OFFSETS_MM[0], high_mm: float = OFFSETS_MM[-1]) -> Bounds:
+    """Return the bounds of the same parameters and the offset of the receptor. [mm]"""
+    return bounds.and_one(OFFSET_SCALE_MM, low_mm, high_mm)
 
 
 def by_differences(bounds: Bounds) -> LeastSquares:
     """Make the method of least squares from starts within the bounds, with differences."""
-    starts = bounds.spread(N_STARTS)
-    return LeastSquares(starts, bounds.scales, bounds.low, bounds.high, n_refined=N_REFINED)
+    return LeastSquares(bounds.spread(N_STARTS), bounds, n_refined=N_REFINED)
 
 
 def along_slopes(smooth: SmoothRateModel, problem: RateProblem, bounds: Bounds) -> LeastSquares:
@@ -153,12 +131,4 @@ def search_from(begun: FloatArray, bounds: Bounds, seed: int = 0) -> CovarianceA
     seed : int, optional
         Seed of the random numbers.
     """
-    return CovarianceAdaptation(
-        begun,
-        bounds.scales,
-        bounds.low,
-        bounds.high,
-        first_spread=FIRST_SPREAD,
-        most_evaluations=MOST_EVALUATIONS,
-        seed=seed,
-    )
+    return CovarianceAdaptation(begun, bounds, most_evaluations=MOST_EVALUATIONS, seed=seed)

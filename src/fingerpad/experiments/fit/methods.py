@@ -13,7 +13,6 @@ from fingerpad.core.errors import InputError
 from fingerpad.data import neuron
 from fingerpad.experiments.fit.results import SpikeFitSummary
 from fingerpad.inference.afferent_methods import (
-    Bounds,
     along_slopes,
     bounds_of,
     by_differences,
@@ -21,6 +20,7 @@ from fingerpad.inference.afferent_methods import (
     search_from,
 )
 from fingerpad.inference.closed_form import ClosedFormModel
+from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.covariance import jackknife_covariance
 from fingerpad.inference.fitting.cross_validation import CrossValidation
 from fingerpad.inference.fitting.methods import Continued, Fit, Method

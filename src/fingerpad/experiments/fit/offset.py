@@ -16,6 +16,7 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.fit.methods import FOUR_NUMBER_METHODS, prepare
 from fingerpad.experiments.fit.results import HeldOffset, OffsetFit
 from fingerpad.inference.afferent_methods import (
+    and_offset,
     bounds_of,
     five_number_problem,
     four_number_problem,
@@ -130,13 +131,13 @@ def _continued(roving: ReceptorOffset, rates: RateRecordings, method: str, seed:
     centre = roving.at(0.0)
     problem, of_four = four_number_problem(centre, rates), bounds_of(*centre.drives)
     low_mm, *inner_mm, high_mm = roving.offsets_mm.tolist()
-    bounds = of_four.and_offset(low_mm, high_mm)
+    bounds = and_offset(of_four, low_mm, high_mm)
 
     def moving(begun: FloatArray) -> Method:
         if method == "cma_es":
             return search_from(np.append(begun, 0.0), bounds, seed)
         starts = [np.append(begun, offset) for offset in sorted({0.0, *inner_mm})]
-        return LeastSquares(starts, bounds.scales, bounds.low, bounds.high, n_refined=2)
+        return LeastSquares(starts, bounds, n_refined=2)
 
     in_place = FOUR_NUMBER_METHODS[OFFSET_METHODS[method]](centre, problem, of_four, seed)
     return Continued(in_place, moving, problem)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import IntArray, float_array, positive, whole
-from fingerpad.core.errors import InputError
+from fingerpad.core.checks import IntArray, positive, whole
+from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.methods import Fit, FitStep
 from fingerpad.inference.fitting.problem import Problem
 
@@ -22,12 +22,10 @@ class CovarianceAdaptation:
     ----------
     start : array_like (n_parameters,)
         Mean of the first generation.
-    scales : array_like (n_parameters,)
-        Typical changes of the parameters, which set their units in the search.
-    lower_bounds, upper_bounds : array_like (n_parameters,)
-        Limits; -inf and inf for none.
+    bounds : Bounds
+        Limits of the parameters, and the scales that set their units in the search.
     first_spread : float
-        Standard deviation of the first generation, in units of `scales`.
+        Standard deviation of the first generation, in units of the scales.
     most_evaluations : int
         The search ends with the generation that reaches this number, or when it has converged.
     seed : int
@@ -36,7 +34,7 @@ class CovarianceAdaptation:
     Raises
     ------
     InputError
-        If shapes disagree, or a scale or the spread is not positive.
+        If shapes disagree or the spread is not positive.
 
     Notes
     -----
@@ -50,46 +48,35 @@ class CovarianceAdaptation:
     ...         return parameters - [3.0, -1.0]
     ...     def score(self, parameters, chosen):
     ...         return 1.0 - float((self.residuals(parameters, chosen) ** 2).sum())
-    >>> CovarianceAdaptation([0.0, 0.0], [1.0, 1.0]).fit(Hill(), np.arange(1)).parameters.round(3).tolist()
+    >>> search = CovarianceAdaptation([0.0, 0.0], Bounds([1.0, 1.0]))
+    >>> search.fit(Hill(), np.arange(1)).parameters.round(3).tolist()
     [3.0, -1.0]
     """
 
     start: ArrayLike
-    scales: ArrayLike
-    lower_bounds: ArrayLike = -np.inf
-    upper_bounds: ArrayLike = np.inf
+    bounds: Bounds
     first_spread: float = 0.5
     most_evaluations: int = 2000
     seed: int = 0
     name: str = "CMA-ES"
 
     def __post_init__(self) -> None:
-        start, scales = float_array("start", self.start, 1), float_array("scales", self.scales, 1)
-        if scales.shape != start.shape or (scales <= 0.0).any():
-            raise InputError(
-                f"scales needs one number above 0 per parameter: got {scales.tolist()} for {start.size}."
-            )
+        object.__setattr__(self, "start", self.bounds.rows("start", np.atleast_2d(self.start))[0])
         positive("first_spread", self.first_spread)
         whole("most_evaluations", self.most_evaluations, at_least=1)
         whole("seed", self.seed, at_least=0)
-        for name, value in (("start", start), ("scales", scales)):
-            object.__setattr__(self, name, value)
-        for name in ("lower_bounds", "upper_bounds"):
-            object.__setattr__(self, name, np.broadcast_to(getattr(self, name), start.shape))
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Search until convergence; the result is the best of all evaluated points."""
         from cma import CMAEvolutionStrategy  # takes a second to load
 
-        clock, scales = time.perf_counter(), np.asarray(self.scales)
+        clock, scales = time.perf_counter(), self.bounds.scales
         generator = np.random.default_rng(self.seed)
         search = CMAEvolutionStrategy(
             np.asarray(self.start) / scales,
             self.first_spread,
             {
-                "bounds": [
-                    list(np.asarray(side) / scales) for side in (self.lower_bounds, self.upper_bounds)
-                ],
+                "bounds": [list(side / scales) for side in (self.bounds.low, self.bounds.high)],
                 "maxfevals": self.most_evaluations,
                 # By default cma draws from NumPy's global state.
                 "seed": np.nan,

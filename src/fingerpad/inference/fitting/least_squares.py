@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
-from fingerpad.core.checks import FloatArray, IntArray, float_array, positive, whole
+from fingerpad.core.checks import FloatArray, IntArray, positive, whole
 from fingerpad.core.errors import InputError
+from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.methods import Fit, FitStep, best_of
 from fingerpad.inference.fitting.problem import Problem
 
@@ -31,14 +32,12 @@ class LeastSquares:
     ----------
     starts : array_like (n_starts, n_parameters)
         Start points; all are scored.
-    scales : array_like (n_parameters,)
-        Typical changes of the parameters, the units of the steps.
-    lower_bounds, upper_bounds : array_like (n_parameters,)
-        Limits; -inf and inf for none.
+    bounds : Bounds
+        Limits of the parameters, and the scales in which steps are taken.
     n_refined : int
         Number of starts, the best ones, from which a fit is made.
     difference_steps : tuple of float
-        Half widths of the central differences, round by round, in units of `scales`.
+        Half widths of the central differences, round by round, in units of the scales.
     jacobian : callable, optional
         `jacobian(parameters, chosen)`: derivatives of the residuals, instead of differences.
     most_iterations : int
@@ -47,7 +46,7 @@ class LeastSquares:
     Raises
     ------
     InputError
-        If shapes disagree, a scale or step is not positive, or a start lies outside of the bounds.
+        If shapes disagree, a step is not positive, or a start lies outside of the bounds.
 
     Notes
     -----
@@ -64,14 +63,12 @@ class LeastSquares:
     ...     def score(self, parameters, chosen):
     ...         residuals = self.residuals(parameters, chosen)
     ...         return 1.0 - residuals @ residuals
-    >>> LeastSquares([[1.0, 0.0]], [1.0, 1.0]).fit(Line(), np.arange(3)).parameters.round(6).tolist()
+    >>> LeastSquares([[1.0, 0.0]], Bounds([1.0, 1.0])).fit(Line(), np.arange(3)).parameters.round(6).tolist()
     [2.0, 1.0]
     """
 
     starts: ArrayLike
-    scales: ArrayLike
-    lower_bounds: ArrayLike = -np.inf
-    upper_bounds: ArrayLike = np.inf
+    bounds: Bounds
     n_refined: int = 4
     difference_steps: tuple[float, ...] = (0.1, 0.03, 0.01)
     jacobian: Jacobian | None = None
@@ -79,27 +76,16 @@ class LeastSquares:
     name: str = "least squares"
 
     def __post_init__(self) -> None:
-        starts = float_array("starts", self.starts, 2)
-        scales = float_array("scales", self.scales, 1)
-        if scales.shape != starts.shape[1:] or (scales <= 0.0).any():
-            raise InputError(
-                f"scales needs one number above 0 per parameter: got {scales.tolist()} for {starts.shape[1]}."
-            )
+        starts = self.bounds.rows("starts", self.starts)
+        outside = np.flatnonzero(((starts <= self.bounds.low) | (starts >= self.bounds.high)).any(axis=1))
+        if outside.size:
+            row = int(outside[0])
+            raise InputError(f"starts must lie between the bounds: row {row} is {starts[row].tolist()}.")
+        object.__setattr__(self, "starts", starts)
         for step in self.difference_steps:
             positive("difference_steps", step)
         whole("n_refined", self.n_refined, at_least=1)
         whole("most_iterations", self.most_iterations, at_least=1)
-        bounds = np.array(
-            [np.broadcast_to(side, scales.shape) for side in (self.lower_bounds, self.upper_bounds)]
-        )
-        outside = np.flatnonzero(((starts <= bounds[0]) | (starts >= bounds[1])).any(axis=1))
-        if outside.size:
-            row = int(outside[0])
-            raise InputError(f"starts must lie between the bounds: row {row} is {starts[row].tolist()}.")
-        for name, value in (("starts", starts), ("scales", scales)):
-            object.__setattr__(self, name, value)
-        object.__setattr__(self, "lower_bounds", bounds[0])
-        object.__setattr__(self, "upper_bounds", bounds[1])
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Score all starts, fit from the best of them, and keep the best fit."""
@@ -111,7 +97,7 @@ class LeastSquares:
 
     def _refined(self, problem: Problem, chosen: IntArray, start: FloatArray) -> Fit:
         """Fit from one start, in units of the scales."""
-        clock, scales = time.perf_counter(), np.asarray(self.scales)
+        clock, scales = time.perf_counter(), self.bounds.scales
         visited = _Visited(problem, chosen, scales)
         visited.residuals(start / scales)
         steps = [visited.best]
@@ -120,7 +106,7 @@ class LeastSquares:
                 visited.residuals,
                 visited.best.parameters / scales,
                 self._slopes(visited, difference),
-                bounds=(np.asarray(self.lower_bounds) / scales, np.asarray(self.upper_bounds) / scales),
+                bounds=(self.bounds.low / scales, self.bounds.high / scales),
                 max_nfev=self.most_iterations,
             )
             steps.append(visited.best)
@@ -129,11 +115,11 @@ class LeastSquares:
 
     def _slopes(self, visited: _Visited, difference: float) -> Callable[[FloatArray], FloatArray]:
         """Return the derivatives of the residuals as a function of a point, in units of the scales."""
-        scales = np.asarray(self.scales)
+        scales = self.bounds.scales
         if self.jacobian is not None:
             jacobian = self.jacobian
             return lambda place: jacobian(place * scales, visited.chosen) * scales
-        low, high = np.asarray(self.lower_bounds) / scales, np.asarray(self.upper_bounds) / scales
+        low, high = self.bounds.low / scales, self.bounds.high / scales
 
         def central(place: FloatArray) -> FloatArray:
             before = np.maximum(place - difference, low)

@@ -1,0 +1,69 @@
+"""Bounds and scales of the parameters of a fit, and points spread between the bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import qmc
+
+from fingerpad.core.checks import FloatArray, float_array
+from fingerpad.core.errors import InputError
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Bounds and scales of the parameters of a fit.
+
+    Parameters
+    ----------
+    scales : array_like (n_parameters,)
+        Typical changes of the parameters, the units of the steps of a method.
+    low, high : array_like (n_parameters,) or float, optional
+        Limits; -inf and inf for none.
+
+    Raises
+    ------
+    InputError
+        If a scale is not positive, or a lower limit is not below the upper one.
+
+    Examples
+    --------
+    >>> Bounds([0.1, 10.0], [0.0, 0.0], [1.0, 90.0]).spread(3).tolist()
+    [[0.5, 30.0], [0.25, 60.0], [0.75, 10.0]]
+    """
+
+    scales: FloatArray
+    low: FloatArray = -np.inf  # type: ignore[assignment]
+    high: FloatArray = np.inf  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        scales = float_array("scales", self.scales, 1)
+        low, high = (np.broadcast_to(side, scales.shape) for side in (self.low, self.high))
+        if (scales <= 0.0).any() or not (low < high).all():
+            raise InputError(
+                "Bounds need scales above 0 and lower limits below the upper ones: "
+                f"got scales {scales.tolist()}, limits {low.tolist()} and {high.tolist()}."
+            )
+        for name, value in (("scales", scales), ("low", low), ("high", high)):
+            object.__setattr__(self, name, value)
+
+    def and_one(self, scale: float, low: float, high: float) -> Bounds:
+        """Return the bounds of the same parameters and one more."""
+        further = ((self.scales, scale), (self.low, low), (self.high, high))
+        return Bounds(*(np.append(side, entry) for side, entry in further))
+
+    def spread(self, number: int) -> FloatArray:
+        """Points of a Halton sequence between the bounds, (number, n_parameters); deterministic."""
+        shares = qmc.Halton(self.scales.size, scramble=False).random(number + 1)[1:]  # the first is a corner
+        return self.low + shares * (self.high - self.low)
+
+    def rows(self, name: str, points: ArrayLike) -> FloatArray:
+        """Return points (n_points, n_parameters), or raise `InputError` if they have other parameters."""
+        rows = float_array(name, points, 2)
+        if rows.shape[1:] != self.scales.shape:
+            raise InputError(
+                f"{name} must have one entry per scale: got {rows.shape[1]} for {self.scales.size}."
+            )
+        return rows
