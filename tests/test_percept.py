@@ -11,7 +11,6 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.experiments.gerling2014 import discrepancy, goodwin
 from fingerpad.experiments.gerling2014.discrepancy import (
-    answering_latencies,
     discrepancy_analysis,
     expected_of_measure,
     rise_needed,
@@ -35,7 +34,7 @@ from fingerpad.psychophysics.discrimination import (
     discriminate_euclidean,
     discriminate_gradient_sum,
 )
-from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
+from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
 
 CURVATURES = (287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0)
@@ -239,7 +238,7 @@ def test_a_receptor_silent_under_both_spheres_changes_no_distance():
 def test_receptors_that_are_silent_once_take_no_part_in_latencies():
     latency_ms = 60.0 - bumps()
     latency_ms[3, [0, 5]] = np.nan
-    measured = answering_latencies(latency_ms, PAIRS)
+    measured = Measured(*taking_part(latency_ms, PAIRS))
     assert not np.isin(measured.neighbours, [0, 5]).any()
     assert len(measured.neighbours) == len(PAIRS) - 6  # two corners of the grid, three neighbours each
     without = np.delete(np.arange(18), [0, 5])
@@ -248,7 +247,7 @@ def test_receptors_that_are_silent_once_take_no_part_in_latencies():
         gradient_sum(measured.responses, measured.neighbours), gradient_sum(latency_ms[:, without], fewer)
     )
     with pytest.raises(InputError, match="so there is no hit rate"):
-        answering_latencies(np.full((7, 18), np.nan), PAIRS)
+        Measured(*taking_part(np.full((7, 18), np.nan), PAIRS))
 
 
 def test_one_noise_for_two_positions_is_that_of_equal_ones():
@@ -286,7 +285,7 @@ def test_the_analysis_names_every_interpretation_and_the_noise_that_fits_it():
     measures = {
         "static": static,
         "dynamic": static,
-        "latency": [answering_latencies(latency, PAIRS) for latency in latency_ms],
+        "latency": [Measured(*taking_part(latency, PAIRS)) for latency in latency_ms],
     }
     draws = normals(0, 1, 18, Purpose.RESPONSE, 1000)[0].T
     found = discrepancy_analysis(

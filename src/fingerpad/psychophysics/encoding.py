@@ -169,42 +169,11 @@ def _in_order(pairs: np.ndarray) -> np.ndarray:
     return ordered[np.lexsort((ordered[:, 1], ordered[:, 0]))]
 
 
-def answering_neighbours(responses: ArrayLike, neighbours: np.ndarray) -> np.ndarray:
-    """Return the pairs of neighbours that both respond to every stimulus.
+def taking_part(responses: ArrayLike, neighbours: np.ndarray) -> tuple[FloatArray, np.ndarray]:
+    """Leave out the receptors that are silent under one stimulus (docs/decisions/silent-receptors.md).
 
     A receptor that is silent under one stimulus has no latency to compare with its neighbours'. It is left
     out under every stimulus, so that silence itself does not discriminate two stimuli.
-
-    Parameters
-    ----------
-    responses : array_like (..., n_receptors)
-        Response measure of every receptor to each stimulus; NaN without a response. [any unit]
-    neighbours : int array (n_pairs, 2)
-        From `neighbour_pairs`.
-
-    Returns
-    -------
-    int array (n_answering_pairs, 2)
-
-    Raises
-    ------
-    InputError
-        If a pair contains an index outside the population.
-
-    Examples
-    --------
-    >>> in_a_row = neighbour_pairs([[0.0, 0.0], [0.0, 1.0], [0.0, 2.0]], 1.0)
-    >>> answering_neighbours([[20.0, 25.0, np.nan], [20.0, 24.0, 90.0]], in_a_row).tolist()
-    [[0, 1]]
-    """
-    table = np.asarray(responses, dtype=np.float64)
-    pairs = check_neighbours(neighbours, table.shape[-1] if table.ndim else 0)
-    silent = np.flatnonzero(np.isnan(table).reshape(-1, table.shape[-1]).any(axis=0))
-    return pairs[~np.isin(pairs, silent).any(axis=1)]
-
-
-def taking_part(responses: ArrayLike, neighbours: np.ndarray) -> tuple[FloatArray, np.ndarray]:
-    """Leave out the receptors that are silent under one stimulus (docs/decisions/silent-receptors.md).
 
     Parameters
     ----------
@@ -218,6 +187,11 @@ def taking_part(responses: ArrayLike, neighbours: np.ndarray) -> tuple[FloatArra
     (array (n_stimuli, n_receptors), int array (n_pairs, 2))
         Responses with zeros for receptors that are left out, and the pairs without them.
 
+    Raises
+    ------
+    InputError
+        If a pair contains an index outside the population.
+
     Examples
     --------
     >>> table, pairs = taking_part([[20.0, 25.0, np.nan], [20.0, 24.0, 90.0]], np.array([[0, 1], [1, 2]]))
@@ -225,7 +199,9 @@ def taking_part(responses: ArrayLike, neighbours: np.ndarray) -> tuple[FloatArra
     ([[20.0, 25.0, 0.0], [20.0, 24.0, 0.0]], [[0, 1]])
     """
     table = np.asarray(responses, dtype=np.float64)
-    return np.where(np.isnan(table).any(axis=0), 0.0, table), answering_neighbours(table, neighbours)
+    pairs = check_neighbours(neighbours, table.shape[-1] if table.ndim else 0)
+    silent = np.asarray(np.isnan(table).any(axis=0))
+    return np.where(silent, 0.0, table), pairs[~silent[pairs].any(axis=1)]
 
 
 def gradient_sum(values: ArrayLike, neighbours: np.ndarray) -> FloatArray:

@@ -166,28 +166,6 @@ def expected_of_measure(
     )
 
 
-def answering_latencies(latency_ms: FloatArray, neighbours: np.ndarray) -> Measured:
-    """Latencies of the receptors that fire under every sphere; the others are left out.
-
-    Parameters
-    ----------
-    latency_ms : array (n_spheres, n_receptors)
-        First spikes; NaN without one. [ms]
-    neighbours : int array (n_pairs, 2)
-        From `fingerpad.psychophysics.encoding.neighbour_pairs`.
-
-    Returns
-    -------
-    Measured
-
-    Raises
-    ------
-    InputError
-        If no receptor ever fires.
-    """
-    return Measured(*taking_part(latency_ms, neighbours))
-
-
 def discrepancy_analysis(
     measures: Mapping[str, Sequence[Measured]],
     latency_ms: Sequence[FloatArray],
@@ -325,7 +303,7 @@ def _interpretations(
         "dynamic, eight neighbours (used)": list(measures.get("dynamic", [])),
         "latency of receptors that fire under every sphere (used)": list(measures.get("latency", [])),
         "latency of receptors that fire within the ramp under every sphere": [
-            answering_latencies(latency, eight) for latency in early if np.isfinite(latency).any()
+            Measured(*taking_part(latency, eight)) for latency in early if np.isfinite(latency).any()
         ],
         "latency, waiting until the ramp ends": [
             Measured(np.fmin(latency, PATIENCE_MS), eight) for latency in latency_ms

@@ -123,15 +123,10 @@ def population_maps(standard: SkinResponse, afferent: Afferent) -> PopulationMap
     -------
     PopulationMaps
     """
-    sheet_maps = response_sheet(sheet(afferent).respond(standard))
     return PopulationMaps(
         curvature_per_m=protocol.STANDARD_CURVATURE.value,
         at_rest=resting_response(afferent),
-        x_mm=sheet_maps.x_mm,
-        z_mm=sheet_maps.z_mm,
-        dynamic_rate_hz=sheet_maps.dynamic_rate_hz,
-        static_rate_hz=sheet_maps.static_rate_hz,
-        first_spike_latency_ms=sheet_maps.first_spike_latency_ms,
+        **vars(response_sheet(sheet(afferent).respond(standard))),
         receptors_mm=Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0)).positions_mm,
         finger=finger_map(standard, afferent),
     )

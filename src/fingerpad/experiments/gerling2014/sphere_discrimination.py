@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.results import Matrix, Vector, result_class
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014.discrepancy import (
     DiscrepancyAnalysis,
-    answering_latencies,
     discrepancy_analysis,
     expected_of_measure,
 )
@@ -31,9 +27,9 @@ from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import (
     RESPONSE_MEASURES,
-    answering_neighbours,
     gradient_sum,
     neighbour_pairs,
+    taking_part,
 )
 from fingerpad.psychophysics.noise_fit import NOISE_DRAWS
 from fingerpad.skin.sampling import SkinResponse
@@ -148,10 +144,12 @@ def discriminate_spheres(
         ]
         for name, read in RESPONSE_MEASURES.items()
     }
+    encoded = {name: [taking_part(table, neighbours) for table in both] for name, both in tables.items()}
+    # A measure without responses has no hit rate and is left out.
     measures = {
-        name: _measured(name, both, neighbours)
-        for name, both in tables.items()
-        if name == "static" or _responds(name, both, neighbours)
+        name: [Measured(*one) for one in both]
+        for name, both in encoded.items()
+        if name == "static" or all(len(pairs) and table.any() for table, pairs in both)
     }
     draws = normals(seed, 1, len(population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
     noise = fit_noise_to_goodwin(
@@ -188,20 +186,6 @@ def discriminate_spheres(
             seed,
         ),
     )
-
-
-def _responds(name: str, tables: Sequence[FloatArray], neighbours: np.ndarray) -> bool:
-    """Whether receptors respond. A measure without responses has no hit rate and is left out."""
-    if name == "latency":
-        return all(len(answering_neighbours(table, neighbours)) > 0 for table in tables)
-    return all(table.any() for table in tables)
-
-
-def _measured(name: str, tables: Sequence[FloatArray], neighbours: np.ndarray) -> list[Measured]:
-    """Combine a measure with the pairs of receptors of its Gradient Sum, position by position."""
-    if name == "latency":
-        return [answering_latencies(table, neighbours) for table in tables]
-    return [Measured(table, neighbours) for table in tables]
 
 
 def _first_session(observers: Observers, name: str) -> ObserverHitRates:
