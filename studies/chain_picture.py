@@ -42,7 +42,7 @@ def draw(skin: SkinResponse, response: ResponseMap, percept: Percept) -> Figure:
     skin : SkinResponse
         Under the standard sphere.
     response : ResponseMap
-        What a population answers to it.
+        Responses of a population to it.
     percept : Percept
         Hit rates of a run.
 

@@ -99,7 +99,7 @@ def read_in(skin: SkinResponse, layer: int) -> SkinResponse:
     Returns
     -------
     SkinResponse
-        It knows the stored energy density alone.
+        It holds the stored energy density only.
 
     Raises
     ------

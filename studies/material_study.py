@@ -39,7 +39,7 @@ COMPRESSIONS = (0.3, 0.5)
 
 @result_class
 class Polynomial:
-    """A polynomial that stands for one of Wu's hyperfoams.
+    """A polynomial fitted to one of Wu's hyperfoams.
 
     Parameters
     ----------

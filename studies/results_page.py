@@ -1,6 +1,6 @@
 """The numbers of a reproduction that pages show: docs/results.md and the table of the README.
 
-A number that stands on several pages stands in these tables, and the other pages link to them.
+A number that several pages need is in these tables only; the other pages link to them.
 """
 
 from __future__ import annotations

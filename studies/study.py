@@ -1,4 +1,4 @@
-"""A study and the command that runs it: press what is missing, compute, write numbers and a page."""
+"""A study and the command that runs it: solve missing indentations, compute, write numbers and a page."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def command_of(study: Study) -> Callable[..., None]:
 
 
 def execute(study: Study, conditions: Conditions, out: Path, jobs: int | None) -> None:
-    """Run a study from the command line, with bars on a terminal, and say where its files are."""
+    """Run a study from the command line, with bars on a terminal, and print the paths of its files."""
     from rich.console import Console
 
     runner = Runner(out, processes(jobs), Bars(Console(stderr=True)))

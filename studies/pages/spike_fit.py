@@ -243,9 +243,10 @@ def _other_noise(section: SpikeFits) -> Table:
         for found in section.other_noise
     ]
     note = (
-        "Fitted with a soft threshold, which did not make them. Distance: of the rescaled intervals from "
-        "uniform; one above what chance allows says that the model did not make the spikes: its time "
-        "constant and intercept are not to be trusted then. Errors: root mean square over the positions."
+        "The fitted model has a soft threshold; the simulated afferents do not. Distance: of the rescaled "
+        "intervals from a uniform distribution. A distance above the value expected by chance shows that the "
+        "spikes do not come from the model; time constant and intercept are then unreliable. Errors: root "
+        "mean square over the positions."
     )
     return Table("Spikes of other noise", columns, rows, note)
 
