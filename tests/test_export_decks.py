@@ -251,7 +251,7 @@ CALCULIX = {  # CalculiX CrunchiX User's Manual 2.20
 }  # fmt: skip
 LAWS = [
     NEO_HOOKE,
-    Material.mooney_rivlin(6.0, 4.0, 0.45),
+    Material.polynomial(6.0, 4.0, 0.0, 0.0, 0.0, 0.45),
     Material(Polynomial(6.0, 4.0, 2.0, 1.0, 0.5, bulk_linear=90.0)),
     Material(Polynomial(6.0, 4.0, 2.0, 1.0, 0.5, bulk_linear=90.0, bulk_cubic=40.0)),
     Material.ogden((8.0,), (3.0,), 0.45),

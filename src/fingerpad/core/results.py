@@ -88,12 +88,8 @@ Stack = Annotated[FloatArray, _array(np.float64, 3, _NUMBER)]
 """Float array (n, m, k)."""
 WholeVector = Annotated[NDArray[np.int64], _array(np.int64, 1, _WHOLE)]
 """Integer array (n,)."""
-WholeMatrix = Annotated[NDArray[np.int64], _array(np.int64, 2, _WHOLE)]
-"""Integer array (n, m)."""
 TruthVector = Annotated[NDArray[np.bool_], _array(np.bool_, 1, _TRUTH)]
 """Boolean array (n,)."""
-TruthMatrix = Annotated[NDArray[np.bool_], _array(np.bool_, 2, _TRUTH)]
-"""Boolean array (n, m)."""
 Number = Annotated[
     float,
     BeforeValidator(lambda value: np.nan if value is None else value),

@@ -7,7 +7,6 @@ kPa is energy per volume), and 1 mF mV/ms = 1 mA, so no factor appears in any eq
 import math
 
 MS_PER_S = 1000.0
-KPA_PER_MPA = 1000.0
 MM_PER_M = 1000.0
 
 

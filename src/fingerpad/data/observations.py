@@ -92,14 +92,7 @@ def bar_firing_rates() -> BarObservations:
     (36, np.float64(210.0), np.float64(61.0))
     """
     table = packaged_table("bar_firing_rates")
-    columns = table.columns
-    return BarObservations(
-        shift_mm=columns["shift_mm"],
-        dynamic_rate_hz=columns["dynamic_rate_hz"],
-        static_rate_hz=columns["static_rate_hz"],
-        source=table.source,
-        status=table.status,
-    )
+    return BarObservations(**table.columns, source=table.source, status=table.status)
 
 
 def cylinder_deflection() -> DeflectionObservations:
@@ -118,16 +111,10 @@ def cylinder_deflection() -> DeflectionObservations:
     [-9.25]
     """
     table = packaged_table("cylinder_deflection")
-    columns = table.columns
-    is_artefact = columns["is_artefact"] == 1.0
+    is_artefact = table.columns["is_artefact"] == 1.0
     is_artefact.setflags(write=False)
-    return DeflectionObservations(
-        distance_mm=columns["distance_mm"],
-        deflection_mm=columns["deflection_mm"],
-        is_artefact=is_artefact,
-        source=table.source,
-        status=table.status,
-    )
+    columns = table.columns | {"is_artefact": is_artefact}
+    return DeflectionObservations(**columns, source=table.source, status=table.status)
 
 
 def goodwin_hit_rates() -> HitRateObservations:
@@ -143,11 +130,7 @@ def goodwin_hit_rates() -> HitRateObservations:
     [0.58, 0.95]
     """
     table = packaged_table("goodwin_hit_rates")
-    columns = table.columns
-    return HitRateObservations(
-        standard_per_m=float(columns["standard_per_m"][0]),
-        curvature_per_m=columns["curvature_per_m"],
-        hit_rate=columns["hit_rate"],
-        source=table.source,
-        status=table.status,
+    standard, curvature, hit_rate = (
+        table.columns[name] for name in ("standard_per_m", "curvature_per_m", "hit_rate")
     )
+    return HitRateObservations(float(standard[0]), curvature, hit_rate, table.source, table.status)

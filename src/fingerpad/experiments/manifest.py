@@ -6,7 +6,7 @@ import hashlib
 import platform
 import resource
 import sys
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -128,7 +128,7 @@ def software() -> dict[str, Any]:
         "code_hash": code_hash(),
         "python": platform.python_version(),
         "platform": platform.platform(),
-        "packages": {name: version(name) for name in PACKAGES if _installed(name)},
+        "packages": {name: version(name) for name in PACKAGES},
     }
 
 
@@ -152,11 +152,3 @@ def peak_memory_mb() -> float:
     unit = 1 if sys.platform == "darwin" else _BYTES_PER_KIB
     peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return round(peak * unit / 1e6, 1)
-
-
-def _installed(package: str) -> bool:
-    try:
-        version(package)
-    except PackageNotFoundError:
-        return False
-    return True

@@ -30,20 +30,8 @@ MODULI = ("long_term", "instantaneous")
 SLOWEST_SHARE = 1.0 / 64
 """Smallest increment that CalculiX may choose, as a share of the increment of the indentation."""
 
-_BRICK_EDGES = (
-    (0, 1),
-    (1, 2),
-    (2, 3),
-    (3, 0),
-    (4, 5),
-    (5, 6),
-    (6, 7),
-    (7, 4),
-    (0, 4),
-    (1, 5),
-    (2, 6),
-    (3, 7),
-)
+_FACE_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0))
+_BRICK_EDGES = (*_FACE_EDGES, *((a + 4, b + 4) for a, b in _FACE_EDGES), *((a, a + 4) for a in range(4)))
 _WEDGE_EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -86,8 +87,7 @@ class EnergyBalance:
         )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """State and energies at the end of one step; the first is the unloaded body.
 
     Parameters
@@ -123,9 +123,7 @@ def energy_balance(entries: Sequence[Entry], kinks_ms: Sequence[float]) -> Energ
     EnergyBalance
         One row per entry.
     """
-    times, depth, force, stored, dissipated, contact = np.array(
-        [(e.time_ms, e.depth_mm, e.force_mn, e.stored_uj, e.dissipated_uj, e.contact_uj) for e in entries]
-    ).T
+    times, depth, force, stored, dissipated, contact = np.array(entries).T
     return EnergyBalance(times, indenter_work(times, depth, force, kinks_ms), stored, dissipated, contact)
 
 

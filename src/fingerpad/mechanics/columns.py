@@ -34,7 +34,6 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_single_array
 
 SingleArray = NDArray[np.float32]
-RoundedArray = NDArray[np.int16]
 
 LARGEST = 32767
 """The diagonal of Q: the largest number of 16 bits."""

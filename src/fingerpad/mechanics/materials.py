@@ -154,13 +154,6 @@ class Material:
         return cls(Hencky(shear, bulk_modulus(shear, poisson)), prony, moduli)
 
     @classmethod
-    def mooney_rivlin(
-        cls, c10: float, c01: float, poisson: float, prony: Prony = Prony(), moduli: str = "long_term"
-    ) -> Material:
-        """Mooney-Rivlin whose bulk modulus follows from the initial shear modulus. [kPa]"""
-        return cls.polynomial(c10, c01, 0.0, 0.0, 0.0, poisson, prony, moduli)
-
-    @classmethod
     def polynomial(
         cls,
         c10: float,
@@ -172,7 +165,7 @@ class Material:
         prony: Prony = Prony(),
         moduli: str = "long_term",
     ) -> Material:
-        """Polynomial N = 2 whose bulk modulus follows from the initial shear modulus. [kPa]"""
+        """Polynomial N = 2, with two terms Mooney-Rivlin, whose bulk modulus follows from its moduli. [kPa]"""
         bulk = bulk_modulus(positive("2 (c10 + c01)", 2 * (c10 + c01), "kPa"), poisson)
         return cls(Polynomial(c10, c01, c20, c11, c02, bulk_linear=bulk / 2), prony, moduli)
 

@@ -353,13 +353,7 @@ class Multigrid:
     patience = 3
     number_type = np.float32
 
-    def __init__(
-        self,
-        sparsity: Sparsity,
-        free: np.ndarray,
-        nodes_mm: FloatArray,
-        grid: np.ndarray,
-    ):
+    def __init__(self, sparsity: Sparsity, free: np.ndarray, nodes_mm: FloatArray, grid: np.ndarray):
         self._sparsity, self._free, self._depth = sparsity, free, grid.shape[2]
         depth, skin = self._depth, nodes_mm[grid[:, :, 0]]
         columns = ColumnGrid(
@@ -420,15 +414,8 @@ class Multigrid:
                 _restrict, 0, len(coarse.matrix), transfer.part_start, transfer.part, transfer.part_weight,
                 _rows(fine.matrix), _rows(coarse.matrix),
             )  # fmt: skip
-            _share(
-                _hold,
-                0,
-                coarse.n_columns,
-                coarse.graph.start,
-                coarse.graph.neighbour,
-                coarse.free,
-                coarse.matrix,
-            )
+            pairs = coarse.graph.start, coarse.graph.neighbour
+            _share(_hold, 0, coarse.n_columns, *pairs, coarse.free, coarse.matrix)
             if coarse is not self._levels[-1]:
                 coarse.prepare_sweeps()
         self._factor.renew(self._levels[-1].matrix)
@@ -447,17 +434,9 @@ class Multigrid:
     def multiply(self, direction: SingleArray) -> SingleArray:
         """Product of the tangent last taken and a flat vector."""
         finest = self._levels[0]
-        product = np.zeros_like(finest.x)
-        _share(
-            multiply,
-            0,
-            finest.n_columns,
-            finest.graph.start,
-            finest.graph.neighbour,
-            finest.matrix,
-            direction.reshape(finest.x.shape),
-            product,
-        )
+        product, x = np.zeros_like(finest.x), direction.reshape(finest.x.shape)
+        pairs = finest.graph.start, finest.graph.neighbour
+        _share(multiply, 0, finest.n_columns, *pairs, finest.matrix, x, product)
         return product.ravel()
 
     def apply(self, residual: SingleArray) -> SingleArray:

@@ -172,15 +172,8 @@ class _Search:
     def run(self, guess_mm: FloatArray, settings: NewtonSettings) -> Equilibrium:
         """Repeat Newton steps, and renew what lags behind whenever the body is at rest."""
         load, rubs = self.load, self.load.anchors is not None
-        now = evaluate(
-            self.body,
-            load,
-            guess_mm,
-            load.depth_mm,
-            self.lagging,
-            self.blocks,
-            pressure_kpa=load.pressure_kpa,
-        )
+        where = guess_mm, load.depth_mm
+        now = evaluate(self.body, load, *where, self.lagging, self.blocks, pressure_kpa=load.pressure_kpa)
         if not now.whole:
             raise ConvergenceError(f"The starting guess turns {self.folded(guess_mm)} inside out.")
         potentials = [now.potential_uj]

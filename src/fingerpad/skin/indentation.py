@@ -202,16 +202,9 @@ class Touch:
         # Libraries get one thread, since their sums depend on the number of threads; our loops' do not.
         with announce_compilation(KERNELS), compiled_threads(threads), threadpool_limits(limits=1):
             return press(
-                self.mesh,
-                self.tissues.layers,
-                self.indenter,
-                self.placement,
-                self.stimulus,
-                self.settings,
-                self.deepest_mm,
-                watched,
-                self.friction,
-            )
+                self.mesh, self.tissues.layers, self.indenter, self.placement, self.stimulus, self.settings,
+                self.deepest_mm, watched, self.friction,
+            )  # fmt: skip
 
     @property
     def placement(self) -> Placement:
