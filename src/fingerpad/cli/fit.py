@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fingerpad.cli.choices import METHOD_CHOICES, QUANTITY_CHOICES
-from fingerpad.cli.options import Jobs, Materials, Resolution, to_number, to_whole
+from fingerpad.cli.options import Jobs, Materials, Resolution, Seed, integer, number
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
@@ -33,24 +33,10 @@ def fit_command(
     stimulus_column: Annotated[
         str | None, typer.Option(help="Column with the name of the stimulus. Default: shift_mm or stimulus.")
     ] = None,
-    unit: Annotated[
-        int | None,
-        typer.Option(parser=to_whole, metavar="INTEGER", help="Id of the spike unit of an NWB file."),
-    ] = None,
-    width: Annotated[
-        float | None,
-        typer.Option(parser=to_number, metavar="NUMBER", help="Width of the bar. Default: 3. [mm]"),
-    ] = None,
-    fillet: Annotated[
-        float | None,
-        typer.Option(
-            parser=to_number, metavar="NUMBER", help="Radius of the edges of the bar. Default: 0.3. [mm]"
-        ),
-    ] = None,
-    depth: Annotated[
-        float | None,
-        typer.Option(parser=to_number, metavar="NUMBER", help="Depth of the hold. Default: 1. [mm]"),
-    ] = None,
+    unit: Annotated[int | None, integer("Id of the spike unit of an NWB file.")] = None,
+    width: Annotated[float | None, number("Width of the bar. Default: 3. [mm]")] = None,
+    fillet: Annotated[float | None, number("Radius of the edges of the bar. Default: 0.3. [mm]")] = None,
+    depth: Annotated[float | None, number("Depth of the hold. Default: 1. [mm]")] = None,
     dynamic_window: Annotated[
         tuple[float, float], typer.Option(help="Window of the dynamic rate: start and end. [ms]")
     ] = (30.0, 50.0),
@@ -84,12 +70,7 @@ def fit_command(
         bool, typer.Option("--offset", help="Also fit the position of the receptor along the finger.")
     ] = False,
     folds: Annotated[
-        int | None,
-        typer.Option(
-            parser=to_whole,
-            metavar="INTEGER",
-            help="Number of interleaved folds. Default: 6, or the column fold of the recordings.",
-        ),
+        int | None, integer("Number of interleaved folds. Default: 6, or the column fold of the recordings.")
     ] = None,
     out: Annotated[
         Path,
@@ -98,9 +79,7 @@ def fit_command(
     resolution: Resolution = "standard",
     materials: Materials = "trial3",
     jobs: Jobs = None,
-    seed: Annotated[
-        int, typer.Option(parser=to_whole, metavar="INTEGER", help="Seed of the random numbers.")
-    ] = 0,
+    seed: Seed = 0,
     example: Annotated[
         Path | None, typer.Option(help="Write example recordings into this folder, and exit.")
     ] = None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -25,9 +25,17 @@ def to_number(text: str) -> float:
         raise typer.BadParameter(f"must be a number: got {text!r}.") from error
 
 
+def number(help_text: str) -> Any:
+    """Make an option that takes a number."""
+    return typer.Option(parser=to_number, metavar="NUMBER", help=help_text)
+
+
+def integer(help_text: str) -> Any:
+    """Make an option that takes a whole number."""
+    return typer.Option(parser=to_whole, metavar="INTEGER", help=help_text)
+
+
 Resolution = Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTION_CHOICES)}.")]
 Materials = Annotated[str, typer.Option(help=f"One of {', '.join(MATERIAL_CHOICES)}.")]
-Jobs = Annotated[
-    int | None,
-    typer.Option(parser=to_whole, metavar="INTEGER", help="Number of processes. Default: one per core."),
-]
+Jobs = Annotated[int | None, integer("Number of processes. Default: one per core.")]
+Seed = Annotated[int, integer("Seed of the random numbers.")]

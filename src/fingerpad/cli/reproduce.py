@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.options import Jobs, Resolution, to_whole
+from fingerpad.cli.options import Jobs, Resolution, Seed
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 
 EXPECTED_TIME = {"quick": "a minute and a half", "standard": "about 6 minutes", "paper": "some hours"}
@@ -21,9 +21,7 @@ def reproduce_command(
         typer.Option(help="Folder for the report, the figures, the results and the stored indentations."),
     ] = Path("reproduction"),
     jobs: Jobs = None,
-    seed: Annotated[
-        int, typer.Option(parser=to_whole, metavar="INTEGER", help="Seed of the random numbers.")
-    ] = 0,
+    seed: Seed = 0,
     extended: Annotated[
         bool | None,
         typer.Option(

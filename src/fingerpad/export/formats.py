@@ -12,7 +12,7 @@ from fingerpad.export.abaqus import abaqus_deck
 from fingerpad.export.calculix import calculix_deck
 from fingerpad.export.febio import febio_deck
 from fingerpad.export.job import Job, job_of
-from fingerpad.export.vtu import load_vtk, write_vtu_series
+from fingerpad.export.vtu import require_vtk, write_vtu_series
 from fingerpad.skin.indentation import Touch
 
 DECKS: dict[str, tuple[str, Callable[[Job], str]]] = {
@@ -57,7 +57,7 @@ def export_touch(
             f"elastic_moduli is for calculix, which has no relaxation, not for {format_name}: leave it out."
         )
     if format_name == "vtu":
-        load_vtk()  # first, since solving takes its time
+        require_vtk()  # first, since solving takes its time
         return write_vtu_series(Path(folder) / "touch.pvd", touch.deform(), touch.mesh)
     name, deck = DECKS[format_name]
     job, path = job_of(touch), Path(folder) / name

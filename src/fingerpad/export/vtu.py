@@ -8,7 +8,6 @@ VTK_HEXAHEDRON, collapsed ones VTK_WEDGE. The package `vtk`, of the extra `finge
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
@@ -71,7 +70,7 @@ def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[
     ...     [file.name for file in written]
     ['touch.pvd', 'touch_0000.vtu', 'touch_0001.vtu', 'touch_0002.vtu']
     """
-    vtk = load_vtk()
+    require_vtk()
     path = Path(path)
     if len(deformation.fields.elements) != len(mesh.elements):
         raise InputError(
@@ -79,44 +78,27 @@ def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[
             f"those of {len(deformation.fields.elements)}; use Touch.deform()."
         )
     names = [f"{path.stem}_{number:04d}.vtu" for number in range(deformation.times_ms.size)]
-    grid = _grid(vtk, mesh)
-    _add(vtk, grid.GetCellData(), {"layer": mesh.layer.astype(np.int32)})
-    _add(vtk, grid.GetPointData(), _node_sets(mesh))
+    grid = _grid(mesh)
+    _add(grid.GetCellData(), {"layer": mesh.layer.astype(np.int32)})
+    _add(grid.GetPointData(), _node_sets(mesh))
     overall, points, cells = _exported(deformation, mesh)
     for number, name in enumerate(names):  # an array replaces the one of its name
-        _add(vtk, grid.GetCellData(), {key: values[number] for key, values in cells.items()})
-        _add(vtk, grid.GetPointData(), {key: values[number] for key, values in points.items()})
-        _add(vtk, grid.GetFieldData(), {key: values[[number]] for key, values in overall.items()})
-        write_atomically(path.with_name(name), _xml(vtk, grid))
+        _add(grid.GetCellData(), {key: values[number] for key, values in cells.items()})
+        _add(grid.GetPointData(), {key: values[number] for key, values in points.items()})
+        _add(grid.GetFieldData(), {key: values[[number]] for key, values in overall.items()})
+        write_atomically(path.with_name(name), _xml(grid))
     write_atomically(path, _index(names, deformation))
     return path, *(path.with_name(name) for name in names)
 
 
-def load_vtk() -> Any:
-    """Return the parts of VTK that write files; none of them draws.
-
-    Raises
-    ------
-    InputError
-        If VTK is not installed.
-    """
+def require_vtk() -> None:
+    """Raise `InputError` if VTK is not installed; the parts that are used write files, none of them draws."""
     try:
-        from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-        from vtkmodules.vtkCommonCore import vtkPoints
-        from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkUnstructuredGrid
-        from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+        import vtkmodules.vtkIOXML  # noqa: F401
     except ImportError as error:
         raise InputError(
             "VTU files need the package vtk, which is not installed: pip install 'fingerpad[vtk]'."
         ) from error
-    return SimpleNamespace(
-        array=numpy_to_vtk,
-        ids=numpy_to_vtkIdTypeArray,
-        points=vtkPoints,
-        cells=vtkCellArray,
-        grid=vtkUnstructuredGrid,
-        writer=vtkXMLUnstructuredGridWriter,
-    )
 
 
 def _exported(deformation: Deformation, mesh: Mesh) -> tuple[dict[str, np.ndarray], ...]:
@@ -190,22 +172,28 @@ def cells_of(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return offsets, nodes[used], np.where(is_wedge, WEDGE, HEXAHEDRON).astype(np.uint8)
 
 
-def _grid(vtk: Any, mesh: Mesh) -> Any:
+def _grid(mesh: Mesh) -> Any:
     """Undeformed points and cells."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkUnstructuredGrid
+
     offsets, nodes, kinds = cells_of(mesh)
-    points, cells, grid = vtk.points(), vtk.cells(), vtk.grid()
-    points.SetData(vtk.array(np.ascontiguousarray(mesh.nodes_mm), deep=True))
-    cells.SetData(vtk.ids(offsets, deep=True), vtk.ids(nodes, deep=True))
+    points, cells, grid = vtkPoints(), vtkCellArray(), vtkUnstructuredGrid()
+    points.SetData(numpy_to_vtk(np.ascontiguousarray(mesh.nodes_mm), deep=True))
+    cells.SetData(numpy_to_vtkIdTypeArray(offsets, deep=True), numpy_to_vtkIdTypeArray(nodes, deep=True))
     grid.SetPoints(points)
-    grid.SetCells(vtk.array(kinds, deep=True), cells)
+    grid.SetCells(numpy_to_vtk(kinds, deep=True), cells)
     return grid
 
 
-def _add(vtk: Any, data: Any, fields: dict[str, np.ndarray]) -> None:
+def _add(data: Any, fields: dict[str, np.ndarray]) -> None:
     """Attach arrays by name; numbers with a fraction go in single precision."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+
     for name, values in fields.items():
         fraction = np.issubdtype(values.dtype, np.floating) and name != "TimeValue"
-        array = vtk.array(np.ascontiguousarray(values, dtype=np.float32 if fraction else None), deep=True)
+        array = numpy_to_vtk(np.ascontiguousarray(values, dtype=np.float32 if fraction else None), deep=True)
         array.SetName(name)
         if array.GetNumberOfComponents() == len(AXES):
             for component, axis in enumerate(AXES):
@@ -213,9 +201,11 @@ def _add(vtk: Any, data: Any, fields: dict[str, np.ndarray]) -> None:
         data.AddArray(array)
 
 
-def _xml(vtk: Any, grid: Any) -> bytes:
+def _xml(grid: Any) -> bytes:
     """Content of a VTU file: XML with compressed, base64-encoded numbers."""
-    writer = vtk.writer()
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+    writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(grid)
     writer.SetDataModeToBinary()
     writer.WriteToOutputStringOn()

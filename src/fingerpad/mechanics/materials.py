@@ -165,7 +165,7 @@ class Material:
         prony: Prony = Prony(),
         moduli: str = "long_term",
     ) -> Material:
-        """Polynomial N = 2, with two terms Mooney-Rivlin, whose bulk modulus follows from its moduli. [kPa]"""
+        """Polynomial N = 2 (Mooney-Rivlin if c20 = c11 = c02 = 0) of a given Poisson's ratio. [kPa]"""
         bulk = bulk_modulus(positive("2 (c10 + c01)", 2 * (c10 + c01), "kPa"), poisson)
         return cls(Polynomial(c10, c01, c20, c11, c02, bulk_linear=bulk / 2), prony, moduli)
 
