@@ -96,7 +96,7 @@ def test_the_nail_takes_its_share_of_the_reaction():
     sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
     force, blocks = np.empty_like(mesh.nodes_mm), np.empty((sparsity.column.size, 3, 3))
     assemble(
-        mesh.nodes_mm, mesh.elements, done.displacement_mm[-1], mesh.layer, table.law, np.ones(4),
+        mesh, done.displacement_mm[-1], table.law, np.ones(4),
         np.zeros((len(mesh.elements), 8, 6)), sparsity, False, force, blocks,
     )  # fmt: skip
     expected = [-2.0, -2.0, 0.0] * force[mesh.nail_nodes].sum(axis=0)  # both halves, whose z cancels

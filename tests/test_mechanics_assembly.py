@@ -51,7 +51,7 @@ def assembled(name, displacement, history, precision=np.float64):
     force = np.full_like(displacement, 7.0)
     blocks = np.full((sparsity.column.size, 3, 3), 7.0, dtype=precision)
     potential = assemble(
-        body.nodes_mm, body.elements, displacement, body.layer, TABLE.law, S, history, sparsity, True,
+        body, displacement, TABLE.law, S, history, sparsity, True,
         force, blocks,
     )  # fmt: skip
     return potential, force, sparsity.matrix(blocks)

@@ -107,7 +107,7 @@ def spent(material, times_ms, displacements, mesh=CUBE):
     total, before, sums = 0.0, 0.0, []
     for time, displacement in zip(times_ms, displacements, strict=True):
         step = StepCoefficients.of(table, time - before)
-        state = mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table
+        state = mesh, displacement, table
         now = instantaneous_state(*state)
         total += dissipated_energy(*state, time - before, history, now)
         history, before = history.advanced(step, mesh.layer, now.stress_kpa), time
@@ -153,7 +153,7 @@ def test_spent_energy_is_that_of_a_slow_look_at_every_point():
     for material in (RELAXING, foam):
         table = MaterialTable.of([material])
         history = StressHistory(rng.normal(size=(2, 8, 6)), 0.2 * rng.normal(size=(2, 2, 8, 6)))
-        state = mesh.nodes_mm, mesh.elements, moved, mesh.layer, table
+        state = mesh, moved, table
         now = instantaneous_state(*state)
         instantaneous, energies = now.stress_kpa, now.energies
         found = dissipated_energy(*state, 25.0, history, now)

@@ -61,16 +61,16 @@ def marched(material, displacements, times_ms, mesh=MESH):
     for displacement, step_ms in zip(displacements, np.diff(times_ms, prepend=0.0), strict=True):
         step = StepCoefficients.of(table, step_ms)
         assemble(
-            mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table.law, step.s,
+            mesh, displacement, table.law, step.s,
             history.carried(step, mesh.layer), sparsity, False, force, blocks,
         )  # fmt: skip
-        state = mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table
+        state = mesh, displacement, table
         now = instantaneous_state(*state)
         history = history.advanced(step, mesh.layer, now.stress_kpa)
         stored = stored_energy_density(*state, history, now)
         moment = watched.after(moment, displacement, history, now, stored)
         fields.append(moment.values)
-    return fields_over_time(everything, fields), force, cauchy_stress(mesh, table, displacement, history)
+    return fields_over_time(everything, fields), force, cauchy_stress(mesh, displacement, table, history)
 
 
 def shaken(size, seed=0):

@@ -30,7 +30,7 @@ def tangent(shift=0.0, poisson=0.45, mesh=BLOCK, sparsity=SPARSITY):
     nothing = np.zeros_like(mesh.nodes_mm)
     blocks, force = np.empty((sparsity.column.size, 3, 3)), np.empty_like(nothing)
     assemble(
-        mesh.nodes_mm, mesh.elements, nothing, mesh.layer, table.law, np.ones(4),
+        mesh, nothing, table.law, np.ones(4),
         np.zeros((len(mesh.elements), 8, 6)), sparsity, True, force, blocks,
     )  # fmt: skip
     blocks[sparsity.diagonal] -= shift * np.eye(3)

@@ -24,7 +24,7 @@ BLOCK = block_mesh([0.0, 1.0, 2.2], [0.0, 0.7, 1.9], [0.0, 1.3], layers=[0, 1])
 
 def pressures(displacement, materials, mesh=BLOCK):
     law = MaterialTable.of(materials).law
-    return Pressures.of(mesh.nodes_mm, mesh.elements, displacement, mesh.layer, law)
+    return Pressures.of(mesh, displacement, law)
 
 
 def crumpled(seed=3):
@@ -73,7 +73,7 @@ def test_exchanged_pressure_acts_on_the_second_derivative_of_volume():
     displacement, step, change = crumpled(), 1e-5 * crumpled(seed=4), np.array([2.0, -3.0, 5.0, 0.0])
     sparsity = Sparsity.of(BLOCK.elements, len(BLOCK.nodes_mm))
     blocks = np.zeros((sparsity.column.size, 3, 3))
-    exchange_pressure(BLOCK.nodes_mm, BLOCK.elements, displacement, change, sparsity, blocks)
+    exchange_pressure(BLOCK, displacement, change, sparsity, blocks)
     force = np.zeros_like(displacement)
     for sign in (1.0, -1.0):
         volume_slope = (

@@ -40,7 +40,7 @@ def system(mesh, poisson=0.45, stretch=0.02):
     displacement = stretch * np.sin(mesh.nodes_mm[:, ::-1])
     blocks, force = np.empty((sparsity.column.size, 3, 3)), np.empty_like(displacement)
     assemble(
-        mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table.law, np.ones(4),
+        mesh, displacement, table.law, np.ones(4),
         np.zeros((len(mesh.elements), 8, 6)), sparsity, True, force, blocks,
     )  # fmt: skip
     return sparsity, free, blocks

@@ -37,10 +37,10 @@ def march(times_ms, displacements, table=TABLE):
         step = StepCoefficients.of(table, time - before)
         force = np.empty_like(displacement)
         assemble(
-            CUBE.nodes_mm, CUBE.elements, displacement, CUBE.layer, table.law, step.s,
+            CUBE, displacement, table.law, step.s,
             history.carried(step, CUBE.layer), sparsity, False, force, blocks,
         )  # fmt: skip
-        where = CUBE.nodes_mm, CUBE.elements, displacement, CUBE.layer, table
+        where = CUBE, displacement, table
         now = instantaneous_state(*where)
         history = history.advanced(step, CUBE.layer, now.stress_kpa)
         energy = stored_energy_density(*where, history, now)

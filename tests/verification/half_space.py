@@ -162,7 +162,7 @@ def pressed_slice(mesh, indenter, depth_mm, poisson) -> Pressed:
         Body(mesh, solid.table, solid.sparsity, free), load, solver, np.zeros_like(mesh.nodes_mm),
         np.zeros(contact.nodes.size), TIGHT,
     )  # fmt: skip
-    where = mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, solid.table
+    where = mesh, found.displacement_mm, solid.table
     now = instantaneous_state(*where)
     history = replace(history, instantaneous=now.stress_kpa)
     on_skin = np.zeros((1, len(skin)))
@@ -173,7 +173,7 @@ def pressed_slice(mesh, indenter, depth_mm, poisson) -> Pressed:
         depth_mm=depth_mm,
         force_mn=found.contact.pressed_mn.sum(),
         sed_kpa=stored_energy_density(*where, history, now),
-        stress_kpa=cauchy_stress(mesh, solid.table, found.displacement_mm, history),
+        stress_kpa=cauchy_stress(mesh, found.displacement_mm, solid.table, history),
         pressure_kpa=skin_contact(mesh, found.displacement_mm[None], on_skin).pressure_kpa[0],
     )
 

@@ -107,7 +107,7 @@ def two_steps(solid, first, last):
     for step_ms, displacement in ((20.0, first), (30.0, last)):
         step = StepCoefficients.of(solid.table, step_ms)
         _, force, _ = solid.evaluate(displacement, step=step, history=history)
-        stress = instantaneous_state(mesh.nodes_mm, mesh.elements, displacement, mesh.layer, solid.table)[0]
+        stress = instantaneous_state(mesh, displacement, solid.table)[0]
         history = history.advanced(step, mesh.layer, stress)
     return force
 

@@ -127,7 +127,7 @@ def errors(n, poisson):
     exact_stress = cauchy(piola(exact_f, bulk), exact_f)
     at_points_error = norm(stress - exact_stress, volume) / norm(exact_stress, volume)
 
-    mean_stress = cauchy_stress(mesh, solid.table, found, at_rest_from(solid, found))[:, INDEX]
+    mean_stress = cauchy_stress(mesh, found, solid.table, at_rest_from(solid, found))[:, INDEX]
     weight = volume * j
     exact_mean = np.einsum("eq,eqij->eij", weight, exact_stress) / weight.sum(axis=1)[:, None, None]
     size = weight.sum(axis=1)[:, None]
@@ -138,7 +138,7 @@ def errors(n, poisson):
 def at_rest_from(solid, displacement):
     """History of a body that was brought to its place at once and has not relaxed."""
     mesh = solid.mesh
-    now = instantaneous_state(mesh.nodes_mm, mesh.elements, displacement, mesh.layer, solid.table)
+    now = instantaneous_state(mesh, displacement, solid.table)
     return replace(
         StressHistory.unloaded(len(mesh.elements), solid.table.shares.shape[1]), instantaneous=now.stress_kpa
     )

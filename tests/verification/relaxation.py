@@ -49,7 +49,7 @@ def march(material, times_ms, displacements):
     for time, displacement in zip(times_ms, displacements, strict=True):
         step = StepCoefficients.of(solid.table, time - before)
         forces.append(solid.evaluate(displacement, step=step, history=history)[1])
-        place_of = CUBE.nodes_mm, CUBE.elements, displacement, CUBE.layer, solid.table
+        place_of = CUBE, displacement, solid.table
         now = instantaneous_state(*place_of)
         history, before = history.advanced(step, CUBE.layer, now.stress_kpa), time
         energies.append(stored_energy_density(*place_of, history, now)[0])

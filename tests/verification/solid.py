@@ -56,7 +56,7 @@ class Solid:
         force = np.empty_like(mesh.nodes_mm)
         blocks = np.empty((self.sparsity.column.size, 3, 3))
         potential = assemble(
-            mesh.nodes_mm, mesh.elements, displacement, mesh.layer, self.table.law, step.s,
+            mesh, displacement, self.table.law, step.s,
             history.carried(step, mesh.layer), self.sparsity, with_tangent, force, blocks,
         )  # fmt: skip
         return potential, force, blocks

@@ -17,6 +17,7 @@ from scipy import sparse
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import Chunk, even_chunks, in_chunks
+from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.element import N_NODES, element_system, take_nodes
 from fingerpad.mechanics.materials import has_formulas
 
@@ -125,10 +126,8 @@ def _find_positions(elements, row_start, column, position):  # type: ignore[no-u
 
 
 def assemble(
-    nodes: FloatArray,
-    elements: np.ndarray,
+    mesh: Mesh,
     displacement: FloatArray,
-    layer: np.ndarray,
     law: FloatArray,
     s: FloatArray,
     history: FloatArray,
@@ -141,10 +140,10 @@ def assemble(
 
     Parameters
     ----------
-    nodes, displacement : array (n_nodes, 3)
-        Reference nodes and displacements. [mm]
-    elements, layer : int array (n_elements, 8), (n_elements,)
-        Connectivity and row of the material table.
+    mesh : Mesh
+        The undeformed body.
+    displacement : array (n_nodes, 3)
+        Displacements. [mm]
     law : array (n_layers, n)
         `MaterialTable.law`.
     s : array (n_layers,)
@@ -171,8 +170,8 @@ def assemble(
 
     def add(first: int, last: int) -> float:
         return _add_chunk(
-            nodes, elements, displacement, layer, law, s, history, sparsity.position, with_tangent,
-            force, blocks, formulas, first, last,
+            mesh.nodes_mm, mesh.elements, displacement, mesh.layer, law, s, history, sparsity.position,
+            with_tangent, force, blocks, formulas, first, last,
         )  # fmt: skip
 
     formulas = has_formulas(law)

@@ -25,6 +25,7 @@ from scipy.interpolate import CubicSpline
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import run_kernel
+from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.element import N_NODES, N_POINTS, frame_scale, gradients_at_points, take_nodes
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
 from fingerpad.mechanics.tensors import invert, push_forward
@@ -287,10 +288,8 @@ def _dissipated(  # type: ignore[no-untyped-def]
 
 
 def dissipated_energy(
-    nodes: FloatArray,
-    elements: np.ndarray,
+    mesh: Mesh,
     displacement: FloatArray,
-    layer: np.ndarray,
     table: MaterialTable,
     step_ms: float,
     before: StressHistory,
@@ -305,10 +304,10 @@ def dissipated_energy(
 
     Parameters
     ----------
-    nodes, displacement : array (n_nodes, 3)
-        Reference nodes, and displacements at the end of the step. [mm]
-    elements, layer : int array (n_elements, 8), (n_elements,)
-        Connectivity and row of the material table.
+    mesh : Mesh
+        The undeformed body.
+    displacement : array (n_nodes, 3)
+        Displacements at the end of the step. [mm]
     table : MaterialTable
         Laws.
     step_ms : float
@@ -325,6 +324,7 @@ def dissipated_energy(
     """
     c = DissipationCoefficients.of(table, step_ms)
     return sum(run_kernel(
-        _dissipated, len(elements), nodes, elements, displacement, layer, table.law, table.shares, c.before,
-        c.mixed, c.increment, before.instantaneous, before.relaxed, now.stress_kpa, now.energies,
+        _dissipated, len(mesh.elements), mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table.law,
+        table.shares, c.before, c.mixed, c.increment, before.instantaneous, before.relaxed, now.stress_kpa,
+        now.energies,
     ))  # fmt: skip

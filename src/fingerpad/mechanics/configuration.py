@@ -230,16 +230,15 @@ def evaluate(
     mesh, contact = body.mesh, load.contact
     force, has_tangent = np.empty_like(displacement_mm), blocks.size > 0
     internal = assemble(
-        mesh.nodes_mm, mesh.elements, displacement_mm, mesh.layer, body.table.law, load.step.s, load.carried,
-        body.sparsity, has_tangent, force, blocks,
+        mesh, displacement_mm, body.table.law, load.step.s, load.carried, body.sparsity, has_tangent, force,
+        blocks,
     )  # fmt: skip
     pressures = None
     if body.is_mixed and not np.isnan(internal):
-        where = (mesh.nodes_mm, mesh.elements, displacement_mm)
-        pressures = Pressures.of(*where, mesh.layer, body.table.law)
+        pressures = Pressures.of(mesh, displacement_mm, body.table.law)
         if pressure_kpa is not None and has_tangent:
             change = pressure_kpa - pressures.pressure_kpa
-            exchange_pressure(*where, change, body.sparsity, blocks)
+            exchange_pressure(mesh, displacement_mm, change, body.sparsity, blocks)
     positions = mesh.nodes_mm[contact.nodes] + displacement_mm[contact.nodes]
     touch = contact.state(positions, depth_mm, lagging.multipliers_mn, lagging.anchors, before)
     np.negative(force, out=force)

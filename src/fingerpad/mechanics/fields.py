@@ -244,7 +244,7 @@ class Watched:
 
 
 def cauchy_stress(
-    mesh: Mesh, table: MaterialTable, displacement_mm: FloatArray, history: StressHistory
+    mesh: Mesh, displacement_mm: FloatArray, table: MaterialTable, history: StressHistory
 ) -> FloatArray:
     """Mean Cauchy stress of all elements of a mesh.
 
@@ -252,10 +252,10 @@ def cauchy_stress(
     ----------
     mesh : Mesh
         The undeformed body.
-    table : MaterialTable
-        Laws.
     displacement_mm : array (n_nodes, 3)
         Displacements. [mm]
+    table : MaterialTable
+        Laws.
     history : StressHistory
         State of relaxation.
 
@@ -269,7 +269,7 @@ def cauchy_stress(
     # Writable copies, as those of `Watched`: Numba then compiles one signature for both.
     corners, layer = mesh.elements.copy(), mesh.layer.copy()
     convected = history.instantaneous - history.relaxed.sum(axis=0)
-    now = instantaneous_state(mesh.nodes_mm, mesh.elements, displacement_mm, mesh.layer, table)
+    now = instantaneous_state(mesh, displacement_mm, table)
     run_kernel(
         _mean_fields, n, mesh.nodes_mm, corners, displacement_mm, layer, table.law, convected,
         now.pressure_kpa, now.dilatation, gradient, stress,

@@ -27,6 +27,7 @@ from numba import njit
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import in_chunks, run_kernel
+from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.element import N_NODES, N_POINTS, gradients_at_points, take_nodes
 from fingerpad.mechanics.energy import CARRIED, differentiate
@@ -54,18 +55,12 @@ class Pressures:
     slope_kpa_per_mm: FloatArray
 
     @classmethod
-    def of(
-        cls,
-        nodes: FloatArray,
-        elements: np.ndarray,
-        displacement: FloatArray,
-        layer: np.ndarray,
-        law: FloatArray,
-    ) -> Pressures:
+    def of(cls, mesh: Mesh, displacement: FloatArray, law: FloatArray) -> Pressures:
         """Pressures of a mesh at its displacements; `law` is that of `MaterialTable`."""
-        n = len(elements)
+        n = len(mesh.elements)
         pressure, slope = np.empty(n), np.empty((n, N_NODES, 3))
-        run_kernel(_pressures, n, nodes, elements, displacement, layer, law, pressure, slope)
+        where = mesh.nodes_mm, mesh.elements, displacement, mesh.layer
+        run_kernel(_pressures, n, *where, law, pressure, slope)
         return cls(pressure, slope)
 
     def after(self, elements: np.ndarray, step_mm: FloatArray) -> FloatArray:
@@ -126,12 +121,7 @@ def _pressures(nodes, elements, displacement, layer, law, pressure, slope, first
 
 
 def exchange_pressure(
-    nodes: FloatArray,
-    elements: np.ndarray,
-    displacement: FloatArray,
-    change: FloatArray,
-    sparsity: Sparsity,
-    blocks: np.ndarray,
+    mesh: Mesh, displacement: FloatArray, change: FloatArray, sparsity: Sparsity, blocks: np.ndarray
 ) -> None:
     """Add (change of p) d²v of every element to a tangent.
 
@@ -139,10 +129,10 @@ def exchange_pressure(
 
     Parameters
     ----------
-    nodes, displacement : array (n_nodes, 3)
-        Reference nodes and displacements. [mm]
-    elements : int array (n_elements, 8)
-        Connectivity.
+    mesh : Mesh
+        The undeformed body.
+    displacement : array (n_nodes, 3)
+        Displacements. [mm]
     change : array (n_elements,)
         Pressure wanted minus pressure in the tangent. [kPa]
     sparsity : Sparsity
@@ -152,7 +142,8 @@ def exchange_pressure(
     """
 
     def exchange(first: int, last: int) -> None:
-        _exchange_chunk(nodes, elements, displacement, change, sparsity.position, blocks, first, last)
+        where = mesh.nodes_mm, mesh.elements, displacement
+        _exchange_chunk(*where, change, sparsity.position, blocks, first, last)
 
     for chunks in sparsity.colours:
         in_chunks(exchange, chunks)

@@ -198,7 +198,7 @@ class _Press:
         guess = start.found.displacement_mm + (step_ms * start.velocity_mm_per_ms if ramps else 0.0)
         found = find_equilibrium(self.body, load, self.solver, guess, start.found.multipliers_mn, self.newton)
         self.newton_steps += found.iterations
-        where = mesh.nodes_mm, mesh.elements, found.displacement_mm, mesh.layer, table
+        where = mesh, found.displacement_mm, table
         now = instantaneous_state(*where)
         spent = dissipated_energy(*where, step_ms, start.history, now)
         history = start.history.advanced(load.step, mesh.layer, now.stress_kpa)
@@ -359,7 +359,7 @@ def press(
         reaction_mn=_from_rest(both_halves * each.balance.reaction_mn for each in found),
         nail_reaction_mn=_from_rest(both_halves * each.balance.nail_mn for each in found),
         force_imbalance=max(each.balance.imbalance for each in found),
-        stress_kpa=cauchy_stress(mesh, table, displacement[-1], moment.history),
+        stress_kpa=cauchy_stress(mesh, displacement[-1], table, moment.history),
         fields=fields_over_time(chosen, values),
         contact=skin_contact(mesh, displacement, pressed),
         energy=energy_balance(moment.ledger, kinks_ms=(stimulus.ramp_ms,)).at(times),

@@ -21,6 +21,7 @@ from numba import njit
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import run_kernel
+from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.element import N_NODES, N_POINTS, element_state, relaxing_norms, take_nodes
 from fingerpad.mechanics.materials import MaterialTable, has_formulas
 
@@ -179,24 +180,22 @@ class InstantaneousState(NamedTuple):
     dilatation: FloatArray
 
 
-def instantaneous_state(
-    nodes: FloatArray, elements: np.ndarray, displacement: FloatArray, layer: np.ndarray, table: MaterialTable
-) -> InstantaneousState:
+def instantaneous_state(mesh: Mesh, displacement: FloatArray, table: MaterialTable) -> InstantaneousState:
     """State of all elements at given displacements (n_nodes, 3). [mm]"""
-    n = len(elements)
+    n = len(mesh.elements)
     state = InstantaneousState(
         np.empty((n, N_POINTS, 6)), np.empty((n, N_POINTS, 2)), np.empty(n), np.empty(n), np.empty(n)
     )
     formulas = has_formulas(table.law)
-    run_kernel(_states, n, nodes, elements, displacement, layer, table.law, formulas, *state)
+    run_kernel(
+        _states, n, mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table.law, formulas, *state
+    )
     return state
 
 
 def stored_energy_density(
-    nodes: FloatArray,
-    elements: np.ndarray,
+    mesh: Mesh,
     displacement: FloatArray,
-    layer: np.ndarray,
     table: MaterialTable,
     history: StressHistory,
     now: InstantaneousState,
@@ -215,9 +214,9 @@ def stored_energy_density(
     array (n_elements,)
         Stored energy per reference volume. [kPa = µJ/mm³]
     """
-    stored = np.empty(len(elements))
+    stored = np.empty(len(mesh.elements))
     run_kernel(
-        _stored_energy, len(elements), nodes, elements, displacement, layer, table.law, table.shares,
-        history.instantaneous, history.relaxed, now.energies, now.volumetric_kpa, stored,
+        _stored_energy, stored.size, mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table.law,
+        table.shares, history.instantaneous, history.relaxed, now.energies, now.volumetric_kpa, stored,
     )  # fmt: skip
     return stored
