@@ -372,8 +372,8 @@ def press(
 
 def _from_rest(values: Iterable[FloatArray | float]) -> FloatArray:
     """Values over time, (n_times, ...), from the unloaded state, in which they are 0."""
-    later = np.array(list(values), dtype=np.float64)
-    return np.concatenate([np.zeros((1, *later.shape[1:])), later])
+    later = [np.asarray(value, dtype=np.float64) for value in values]
+    return np.stack([np.zeros_like(later[0]), *later])
 
 
 def _check_depth(mesh: Mesh, indenter: Indenter, placement: Placement, depth_mm: float) -> None:
