@@ -18,6 +18,8 @@ PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder
 PAGES := tests/test_readme.py
 
 bin := .venv/bin
+# Modules are compiled when they are first imported: most of an environment never is.
+install := $(bin)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable
 # Nothing but the environment's own packages may answer an import.
 export PYTHONNOUSERSITE := 1
 unexport PYTHONPATH
@@ -59,11 +61,11 @@ benchmarks: .venv/installed-for-tests
 	$(bin)/python -m benchmarks $(ARGS)
 
 .venv/installed: pyproject.toml | $(bin)/python
-	$(bin)/python -m pip install --quiet --disable-pip-version-check --editable .
+	$(install) .
 	touch $@
 
 .venv/installed-for-tests: pyproject.toml | $(bin)/python
-	$(bin)/python -m pip install --quiet --disable-pip-version-check --editable ".[test]"
+	$(install) ".[test]"
 	touch $@ .venv/installed
 
 $(bin)/python:
