@@ -165,7 +165,7 @@ UNFIT = [
     (RATE + "-0.2,30,1\n", "mine.csv, line 2: force_n must not be negative [N]"),
     (RATE + "0.2,30,-1\n", "mine.csv, line 2: rate_hz must not be negative [spikes/s]"),
     (b"\xff\xfef\x00o\x00", "mine.csv must be text in UTF-8"),
-    (FORCE + "plate,1,1\n" * 1_100_000, "mine.csv must be at most 5 MB: it has 11.0 MB; split it"),
+    (FORCE + "plate,1,1\n" * 1_000_000, "mine.csv must be at most 1 MB: it has 10.0 MB; split it"),
 ]
 
 

@@ -157,7 +157,7 @@ def _conditions(results: ValidationFile) -> Table:
             (
                 *(plain(value) for value in condition),
                 plain(len(same)),
-                f"{number(same[0].observed_low)} … {number(same[0].observed_high)}",
+                " … ".join(dict.fromkeys((number(same[0].observed_low), number(same[0].observed_high)))),
                 number(same[0].predicted),
                 ABSENT if same[0].inside_range is None else plain(same[0].inside_range),
                 same[0].reason or "",

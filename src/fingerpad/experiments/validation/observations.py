@@ -12,8 +12,8 @@ from fingerpad.core.errors import InputError
 from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.inference.tables import TableRow, read_csv
 
-LARGEST_FILE_MB = 5.0
-"""Files above this are refused: each of their rows would be a press or a reading of one. [MB]"""
+LARGEST_FILE_MB = 1.0
+"""Larger files are refused: they hold no published table but, for example, a recording over time. [MB]"""
 
 _BYTES_PER_MB = 1e6
 
