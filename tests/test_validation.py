@@ -357,9 +357,9 @@ def pressed(monkeypatch):
 
 def test_curvature_0_is_a_plate_on_the_mesh_of_all_spheres(pressed, tmp_path):
     touches, sites = pressed
-    found = read_observations(written(tmp_path, RATE + "0.2,0,3\n0.2,80,3\n0.8,80,3\n0.2,80,4\n"))
+    found = read_observations(written(tmp_path, RATE + "0.2,0,3\n0.2,900,3\n0.8,80,3\n0.2,900,4\n"))
     predict(found, QUICK, Runner(tmp_path))
-    assert [touch.indenter for touch in touches] == [Plate(), Sphere(80.0), Sphere(80.0)]
+    assert [touch.indenter for touch in touches] == [Plate(), Sphere(900.0), Sphere(80.0)]
     assert [touch.stimulus.force_mn for touch in touches] == [200.0, 200.0, 800.0]
     assert len({touch.grading for touch in touches}) == 1
     assert {touch.tilt_deg for touch in touches} == {QUICK.conditions.skin_tilt_deg}
@@ -468,6 +468,37 @@ def test_the_command_writes_page_figure_and_results(call, folder, tmp_path):
     assert "observed" in page
     assert "because of the bone" in page
     assert (tmp_path / "validate" / "figures" / "validation.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_an_interrupted_run_keeps_what_is_finished_and_goes_on(call, folder, tmp_path, monkeypatch):
+    rows = "plate,0.2,0.01\nplate,0.4,0.05\n"
+    expected = result_of(folder, FORCE + rows)
+    source, target = Store(folder / STORE_FOLDER), Store(tmp_path / "validate" / STORE_FOLDER)
+    pressed = {}
+
+    def press_until_stopped(touch, threads=None):
+        if pressed and not is_resumed:
+            raise KeyboardInterrupt
+        pressed[touch] = True
+        return source.load(touch)
+
+    is_resumed = False
+    monkeypatch.setattr(Touch, "solve", press_until_stopped)
+    written(tmp_path, FORCE + rows)
+    status, said, errors = call("mine.csv", "--resolution", "quick", "--jobs", "1")
+    assert (status, said) == (130, "")
+    assert "The same command continues after the last finished indentation" in errors
+    assert [target.holds(touch) for touch in pressed] == [True]
+    assert not (tmp_path / "validate" / "validate.json").exists()
+    first, is_resumed = set(pressed), True
+    pressed.clear()
+    assert call("mine.csv", "--resolution", "quick", "--jobs", "1")[0] == 0
+    assert len(pressed) == 1
+    assert not first & pressed.keys()
+    results = json.loads((tmp_path / "validate" / "validate.json").read_text())
+    assert [row["predicted"] for row in results["predictions"]] == [
+        row.predicted for row in expected.predictions
+    ]
 
 
 @pytest.mark.parametrize("kind", KINDS)
