@@ -24,6 +24,7 @@ LONGEST = (
     "studies/test_material_sets.py",
     "test_recording_extras.py",
     "test_single_unit_uncertainty.py",
+    "test_validation.py",
 )
 """Files by their processor time, the longest first; all others follow in the order of their names."""
 
