@@ -8,7 +8,9 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.inference.identifiable import (
     IDENTIFIABLE_NAMES,
     IDENTIFIABLE_UNITS,
+    LARGEST_RESTING_SHARE,
     identifiable,
+    silent_at_rest,
     six_parameters,
 )
 from fingerpad.neuron.afferent import Afferent
@@ -62,3 +64,14 @@ def test_rows_are_turned_one_by_one() -> None:
 def test_what_are_not_such_numbers_is_refused(call, words: str) -> None:
     with pytest.raises(InputError, match=words):
         call()
+
+
+def test_an_afferent_at_rest_is_lowered_to_the_bound_and_another_one_is_kept():
+    firing, quiet = [1.2e-6, 2e-4, 7e-7, 50.0, 1e-6, 50.0], [4e-7, 2e-4, 7e-7, 50.0, 1e-6, 50.0]
+    lowered = silent_at_rest([firing, quiet])
+    np.testing.assert_array_equal(lowered[1], quiet)
+    np.testing.assert_array_equal(lowered[0, 1:], firing[1:])
+    assert identifiable(lowered[0])[0] * 50.0 == pytest.approx(LARGEST_RESTING_SHARE)
+    untouched = SedTraces([0.0, 2000.0], [[0.0], [0.0]])
+    assert Afferent.from_parameters(lowered[0]).spikes(untouched).times_ms.size == 0
+    assert Afferent.from_parameters(firing).spikes(untouched).times_ms.size > 0

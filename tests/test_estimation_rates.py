@@ -8,6 +8,13 @@ import pytest
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import CurrentTraces, SedTraces
 from fingerpad.experiments.gerling2014.single_unit import bar_recordings
+from fingerpad.inference.afferent_methods import (
+    along_slopes,
+    bounds_of,
+    fitted_four,
+    fitted_six,
+    four_number_problem,
+)
 from fingerpad.inference.closed_form import ClosedFormModel, constant_drive_rate
 from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
@@ -161,7 +168,7 @@ def test_the_bend_lets_a_rate_set_in_gently_and_vanishes_with_its_width():
 
 def test_slopes_of_the_model_are_those_of_its_residuals(four_numbers):
     smooth = replace(four_numbers, model=ClosedFormModel(AfferentModel.of_traces(traces())))
-    slopes = smooth.jacobian_of(smooth.model)(FOUR, EVERYTHING)
+    slopes = smooth.jacobian_of(smooth.model.slopes)(FOUR, EVERYTHING)
     steps = np.diag(1e-6 * FOUR)
     differences = [
         (smooth.residuals(FOUR + step, EVERYTHING) - smooth.residuals(FOUR - step, EVERYTHING))
@@ -183,7 +190,9 @@ def test_static_rates_of_the_formula_are_near_those_of_spikes(four_numbers):
 def test_the_truth_is_recovered_from_simulated_rates(four_numbers, by_formula):
     starts = FOUR * np.array([[0.3, 0.5, 1.6, 1.7], [1.5, 2.0, 0.5, 0.5]])
     jacobian = (
-        four_numbers.jacobian_of(ClosedFormModel(AfferentModel.of_traces(traces()))) if by_formula else None
+        four_numbers.jacobian_of(ClosedFormModel(AfferentModel.of_traces(traces())).slopes)
+        if by_formula
+        else None
     )
     method = LeastSquares(starts, Bounds(0.3 * FOUR, 0.0 * FOUR, 10.0 * FOUR), jacobian=jacobian)
     fit = method.fit(four_numbers, EVERYTHING)
@@ -244,3 +253,36 @@ def test_places_that_were_not_sampled_are_refused():
         ReceptorOffset.of_traces({0.0: traces(), 0.1: SedTraces([0.0, 1000.0], [[0.0], [1.0]])})
     with pytest.raises(InputError, match="offsets_mm must increase strictly"):
         ReceptorOffset.of_traces({0.1: traces(), 0.0: traces()})
+
+
+# The four numbers of a fit
+
+
+def test_slopes_along_the_numbers_of_a_fit_are_the_limits_of_differences(four_numbers):
+    model = ClosedFormModel(AfferentModel.of_traces(traces()))
+    fitted = four_number_problem(AfferentModel.of_traces(traces()), four_numbers.recordings)
+    numbers = np.array([FOUR[0] * FOUR[3], *FOUR[1:]])
+    np.testing.assert_allclose(
+        fitted.residuals(numbers, EVERYTHING), four_numbers.residuals(FOUR, EVERYTHING)
+    )
+    bounds = bounds_of(*fitted.model.model.drives)
+    method = along_slopes(model, fitted, bounds)
+    smooth = RateProblem(model, four_numbers.recordings)
+    step = 1e-4 * numbers
+    differences = [
+        (
+            smooth.residuals(fitted_four(numbers + change), EVERYTHING)
+            - smooth.residuals(fitted_four(numbers - change), EVERYTHING)
+        )
+        / (2.0 * change.sum())
+        for change in np.diag(step)
+    ]
+    found = method.jacobian(numbers, EVERYTHING)
+    np.testing.assert_allclose(found, np.column_stack(differences), rtol=1e-3, atol=1e-5 * abs(found).max())
+
+
+def test_no_fit_within_the_bounds_fires_at_rest(four_numbers):
+    bounds = bounds_of(*AfferentModel.of_traces(traces()).drives)
+    highest = np.array([bounds.high[0], 0.0, 0.0, 40.0])
+    untouched = SedTraces([0.0, 3000.0], [[0.0], [0.0]])
+    assert Afferent.from_parameters(fitted_six(highest)).spikes(untouched).times_ms.size == 0

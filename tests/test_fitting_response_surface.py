@@ -134,6 +134,17 @@ def test_no_run_goes_below_a_bound_and_the_free_parameter_still_climbs() -> None
     np.testing.assert_allclose(fit.parameters, [0.6, 4.0], atol=0.1)
 
 
+def test_a_restriction_keeps_the_climb_within_it_and_the_free_parameter_still_climbs() -> None:
+    def objective(parameters: np.ndarray) -> float:
+        return float(-((parameters[0] - 3.0) ** 2) - (parameters[1] + 1.0) ** 2)
+
+    fit = maximise(
+        objective, [0.0, 0.0], [0.01, 0.01], restrict=lambda point: np.minimum(point, [1.5, np.inf])
+    )
+    assert max(step.parameters[0] for step in fit.history) <= 1.5
+    np.testing.assert_allclose(fit.parameters, [1.5, -1.0], atol=0.02)
+
+
 def test_increments_are_a_share_of_the_base_and_a_zero_needs_its_own() -> None:
     np.testing.assert_allclose(coding_increments([-2.0, 50.0], 0.01), [0.02, 0.5])
     with pytest.raises(InputError, match="increments must be greater than 0"):

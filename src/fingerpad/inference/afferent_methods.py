@@ -1,7 +1,9 @@
 """Methods that fit one afferent to firing rates: bounds, scales, starts and parameters.
 
-All but the paper's method (`fingerpad.inference.start_points.response_surface`) fit the four identifiable
-parameters, optionally with the offset of the receptor along the finger, within the same bounds.
+All but the paper's method (`fingerpad.inference.start_points.response_surface`) fit four numbers, optionally
+with the offset of the receptor along the finger, within the same bounds. The four are the identifiable ones
+with the potential at rest over the threshold, beta tau/(C v), in the place of beta/(C v): its bound keeps the
+afferent silent at rest (docs/decisions/silent-at-rest.md).
 """
 
 from __future__ import annotations
@@ -14,8 +16,8 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.least_squares import LeastSquares
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
-from fingerpad.inference.rate_model import RateModel, Reparametrised, SmoothRateModel, four_number_model
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, LARGEST_RESTING_SHARE, six_parameters
+from fingerpad.inference.rate_model import RateModel, Rates, Reparametrised, SmoothRateModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.receptor_offset import OFFSET_NAME
 from fingerpad.inference.recordings import RateRecordings
@@ -24,12 +26,15 @@ from fingerpad.neuron.transduction import Drive
 OFFSETS_MM = (-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
 """Offsets from the receptor at which the drive is sampled. The paper's bar moves in steps of 0.2 mm. [mm]"""
 
-LOWEST = (-0.05, 0.0, 0.0, 3.0)
-HIGHEST = (0.05, 0.6, 0.2, 300.0)
-SCALES = (0.01, 0.05, 0.02, 20.0)
-"""Bounds and scales of a fit: the intercept [1/ms], the largest values of the dynamic and the static term
-under all stimuli [1/ms], and tau [ms]. A drive of 0.2/ms elicits up to 200 spikes/s, three times the largest
-static rate."""
+FITTED_NAMES = ("resting_share", *IDENTIFIABLE_NAMES[1:])
+"""The four numbers of a fit: beta tau/(C v) [1], k_d/(C v), k_s/(C v) and tau."""
+
+LOWEST = (-3.0, 0.0, 0.0, 3.0)
+HIGHEST = (LARGEST_RESTING_SHARE, 0.6, 0.2, 300.0)
+SCALES = (0.5, 0.05, 0.02, 20.0)
+"""Bounds and scales of a fit: the potential at rest over the threshold [1], the largest values of the dynamic
+and the static term under all stimuli [1/ms], and tau [ms]. A drive of 0.2/ms elicits up to 200 spikes/s,
+three times the largest static rate."""
 
 OFFSET_SCALE_MM = 0.1
 """Scale of the offset of the receptor. [mm]"""
@@ -41,8 +46,24 @@ MOST_EVALUATIONS = 600
 """Most evaluations of CMA-ES."""
 
 
+def fitted_four(numbers: FloatArray) -> FloatArray:
+    """Return the four identifiable parameters of the four numbers of a fit.
+
+    Examples
+    --------
+    >>> fitted_four(np.array([0.5, 4.0, 0.02, 50.0])).tolist()
+    [0.01, 4.0, 0.02, 50.0]
+    """
+    return np.array([numbers[0] / numbers[3], *numbers[1:]])
+
+
+def fitted_six(numbers: FloatArray) -> FloatArray:
+    """Return the six parameters of the four numbers of a fit."""
+    return six_parameters(fitted_four(numbers))
+
+
 def four_number_problem(model: RateModel, recordings: RateRecordings) -> RateProblem:
-    """Make the problem of fitting recorded rates in the four identifiable parameters.
+    """Make the problem of fitting recorded rates in the four numbers of `FITTED_NAMES`.
 
     Parameters
     ----------
@@ -51,11 +72,11 @@ def four_number_problem(model: RateModel, recordings: RateRecordings) -> RatePro
     recordings : RateRecordings
         Observed rates.
     """
-    return RateProblem(four_number_model(model), recordings)
+    return RateProblem(Reparametrised(model, FITTED_NAMES, fitted_six), recordings)
 
 
 def five_number_problem(model: RateModel, recordings: RateRecordings) -> RateProblem:
-    """Make the problem of fitting recorded rates in the four identifiable parameters and the offset.
+    """Make the problem of fitting recorded rates in the four numbers of `FITTED_NAMES` and the offset.
 
     Parameters
     ----------
@@ -66,13 +87,13 @@ def five_number_problem(model: RateModel, recordings: RateRecordings) -> RatePro
     """
 
     def seven(numbers: FloatArray) -> FloatArray:
-        return np.append(six_parameters(numbers[:4]), numbers[4])
+        return np.append(fitted_six(numbers[:4]), numbers[4])
 
-    return RateProblem(Reparametrised(model, (*IDENTIFIABLE_NAMES, OFFSET_NAME), seven), recordings)
+    return RateProblem(Reparametrised(model, (*FITTED_NAMES, OFFSET_NAME), seven), recordings)
 
 
 def bounds_of(*drives: Drive) -> Bounds:
-    """Bounds of the four identifiable parameters: those of `LOWEST`, `HIGHEST` and `SCALES`.
+    """Bounds of the four numbers of a fit: those of `LOWEST`, `HIGHEST` and `SCALES`.
 
     Parameters
     ----------
@@ -83,7 +104,7 @@ def bounds_of(*drives: Drive) -> Bounds:
     --------
     >>> driven = Drive([0.0, 1.0], [[0.0], [2.0]], [[4.0], [4.0]])
     >>> bounds_of(driven).high.tolist()
-    [0.05, 0.15, 0.1, 300.0]
+    [0.95, 0.15, 0.1, 300.0]
     """
     rate, sed = (
         max(float(getattr(driven, name).max()) for driven in drives)
@@ -109,14 +130,23 @@ def along_slopes(smooth: SmoothRateModel, problem: RateProblem, bounds: Bounds) 
     Parameters
     ----------
     smooth : SmoothRateModel
-        The model of the problem in the closed form of constant drive.
+        The model of the four identifiable parameters in the closed form of constant drive.
     problem : RateProblem
         From `four_number_problem`.
     bounds : Bounds
         Of the four parameters.
     """
-    slopes = problem.jacobian_of(smooth)
-    return replace(by_differences(bounds), jacobian=slopes, name="slopes in closed form")
+
+    def slopes(numbers: FloatArray) -> Rates:
+        # By the chain rule: beta/(C v) is the first number over the last, tau.
+        share, _, _, tau = numbers
+        four_by_numbers = np.diag([1.0 / tau, 1.0, 1.0, 1.0])
+        four_by_numbers[0, 3] = -share / tau**2
+        dynamic, static = smooth.slopes(fitted_four(numbers))
+        return dynamic @ four_by_numbers, static @ four_by_numbers
+
+    jacobian = problem.jacobian_of(slopes)
+    return replace(by_differences(bounds), jacobian=jacobian, name="slopes in closed form")
 
 
 def search_from(begun: FloatArray, bounds: Bounds, seed: int = 0) -> CovarianceAdaptation:

@@ -27,6 +27,9 @@ IDENTIFIABLE_NAMES = (
 )
 """The four parameters in the paper's order: beta/(C v), k_d/(C v), k_s/(C v), tau."""
 
+LARGEST_RESTING_SHARE = 0.95
+"""Largest potential at rest over the threshold in fits, beta tau/(C v): docs/decisions/silent-at-rest.md."""
+
 IDENTIFIABLE_UNITS = ("1/ms", "1/kPa", "1/(kPa ms)", "ms")
 """Units of the four parameters."""
 
@@ -98,6 +101,37 @@ def six_parameters(
     threshold = positive("threshold_mv", threshold_mv, "mV")
     kept = np.broadcast_to([capacitance, threshold], (*numbers.shape[:-1], 2))
     return np.concatenate([numbers[..., :3] * (capacitance * threshold), numbers[..., 3:], kept], axis=-1)
+
+
+def silent_at_rest(parameters: ArrayLike) -> FloatArray:
+    """Lower the intercept of afferents that would spike, or almost spike, without a stimulus.
+
+    Without a stimulus the potential tends to beta tau/C. SAI afferents are silent at rest, so every fit keeps
+    beta tau/(C v) at most at `LARGEST_RESTING_SHARE`.
+
+    Parameters
+    ----------
+    parameters : array_like (..., 6)
+        In the order of `fingerpad.neuron.afferent.PARAMETER_NAMES`.
+
+    Returns
+    -------
+    array (..., 6)
+        The same, with the intercept lowered to the bound where it was above.
+
+    Raises
+    ------
+    InputError
+        If there are not six finite numbers.
+
+    Examples
+    --------
+    >>> [f"{value:.3g}" for value in silent_at_rest([1e-6, 2e-4, 7e-7, 50.0, 1e-6, 50.0])]
+    ['9.5e-07', '0.0002', '7e-07', '50', '1e-06', '50']
+    """
+    six = _rows("parameters", parameters, PARAMETER_NAMES)
+    rheobase = six[..., 4:5] * six[..., 5:6] / six[..., 3:4]
+    return np.concatenate([np.minimum(six[..., :1], LARGEST_RESTING_SHARE * rheobase), six[..., 1:]], axis=-1)
 
 
 def _rows(name: str, values: ArrayLike, names: tuple[str, ...]) -> FloatArray:

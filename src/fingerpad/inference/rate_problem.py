@@ -11,7 +11,7 @@ from fingerpad.core.checks import FloatArray, IntArray, not_negative
 from fingerpad.core.errors import InputError
 from fingerpad.data import protocol
 from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
-from fingerpad.inference.rate_model import RateModel, Rates, SmoothRateModel
+from fingerpad.inference.rate_model import RateModel, Rates
 from fingerpad.inference.recordings import RateRecordings
 
 
@@ -86,8 +86,10 @@ class RateProblem:
             ]
         )
 
-    def jacobian_of(self, model: SmoothRateModel) -> Callable[[FloatArray, IntArray], FloatArray]:
-        """Return a function for the Jacobian of the residuals with the derivatives of `model`.
+    def jacobian_of(
+        self, slopes: Callable[[FloatArray], Rates]
+    ) -> Callable[[FloatArray, IntArray], FloatArray]:
+        """Return a function for the Jacobian of the residuals, from derivatives of the rates.
 
         Its result has the shape (n_residuals, n_parameters).
         """
@@ -95,8 +97,8 @@ class RateProblem:
         def jacobian(parameters: FloatArray, chosen: IntArray) -> FloatArray:
             return np.concatenate(
                 [
-                    -np.sqrt(weight / (observed @ observed)) * slopes[chosen]
-                    for weight, observed, slopes in self._recorded(chosen, model.slopes(parameters))
+                    -np.sqrt(weight / (observed @ observed)) * derivatives[chosen]
+                    for weight, observed, derivatives in self._recorded(chosen, slopes(parameters))
                 ]
             )
 

@@ -7,7 +7,7 @@ import numpy as np
 from fingerpad.core.checks import FloatArray
 from fingerpad.data import neuron
 from fingerpad.inference.fitting.response_surface import ResponseSurface, coding_increments
-from fingerpad.inference.identifiable import identifiable
+from fingerpad.inference.identifiable import identifiable, silent_at_rest
 
 INCREMENT = 0.01
 """Coding increment over the start value; the paper's are "typically two orders of magnitude smaller"."""
@@ -73,7 +73,7 @@ def increments(starts: FloatArray) -> FloatArray:
 
 
 def response_surface(starts: FloatArray | None = None) -> ResponseSurface:
-    """Return the paper's method, with gains and parameters of the membrane bounded below.
+    """Return the paper's method, silent at rest, with gains and parameters of the membrane bounded below.
 
     Parameters
     ----------
@@ -82,4 +82,4 @@ def response_surface(starts: FloatArray | None = None) -> ResponseSurface:
     """
     starts = start_points() if starts is None else starts
     bounds = np.array([-np.inf, 0.0, 0.0, *(LOWEST_SHARE * starts[0, 3:])])
-    return ResponseSurface(starts, increments(starts), bounds)
+    return ResponseSurface(starts, increments(starts), bounds, restrict=silent_at_rest)

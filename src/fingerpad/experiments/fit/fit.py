@@ -13,7 +13,7 @@ from fingerpad.core.checks import FloatArray, IntArray, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
-from fingerpad.experiments.fit.methods import Prepared, four_number_problem, prepare
+from fingerpad.experiments.fit.methods import Prepared, prepare
 from fingerpad.experiments.fit.offset import Beside, check_beside, fit_offset
 from fingerpad.experiments.fit.results import FitResult, FittedFold, PhaseRates
 from fingerpad.inference.fitting.cross_validation import CrossValidation, cross_validate, interleaved_folds
@@ -23,7 +23,7 @@ from fingerpad.inference.identifiable import (
     IDENTIFIABLE_UNITS,
     identifiable,
 )
-from fingerpad.inference.rate_model import WINDOWS_MS, AfferentModel, Windows
+from fingerpad.inference.rate_model import WINDOWS_MS, AfferentModel, Windows, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
@@ -146,7 +146,9 @@ def fit_recordings(
         posterior=_part("posterior")(model, rates, four, seed, positions_mm) if with_posterior else None,
         profiles=_part("profiles")(model, rates, four, positions_mm) if with_profiles else None,
         sensitivity=(
-            _part("sensitivity")(four_number_problem(model, rates), four, seed) if with_sensitivity else None
+            _part("sensitivity")(RateProblem(four_number_model(model), rates), four, seed)
+            if with_sensitivity
+            else None
         ),
         offset=None if beside is None else fit_offset(beside, rates, folds, method, windows_ms, seed),
     )

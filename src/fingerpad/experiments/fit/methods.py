@@ -16,6 +16,7 @@ from fingerpad.inference.afferent_methods import (
     along_slopes,
     bounds_of,
     by_differences,
+    fitted_six,
     four_number_problem,
     search_from,
 )
@@ -24,7 +25,7 @@ from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.covariance import jackknife_covariance
 from fingerpad.inference.fitting.cross_validation import CrossValidation
 from fingerpad.inference.fitting.methods import Continued, Fit, Method
-from fingerpad.inference.identifiable import identifiable, six_parameters
+from fingerpad.inference.identifiable import identifiable
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
@@ -110,7 +111,7 @@ FOUR_NUMBER_METHODS: dict[str, MethodOf] = {
     "closed_form": lambda model, problem, bounds, seed: along_slopes(ClosedFormModel(model), problem, bounds),
     "cma_es": _evolution,
 }
-"""Methods that fit the four identifiable parameters, by name."""
+"""Methods that fit four numbers, by name."""
 
 METHODS = ("least_squares", "response_surface", "closed_form", "cma_es", "likelihood")
 """Methods that fit recordings, by the names that the command line gives."""
@@ -154,4 +155,4 @@ def prepare(
         return Prepared(RateProblem(model, rates), response_surface(), lambda six: six)
     problem = four_number_problem(model, rates)
     fitting = FOUR_NUMBER_METHODS[method](model, problem, bounds_of(*model.drives), seed)
-    return Prepared(problem, fitting, six_parameters)
+    return Prepared(problem, fitting, fitted_six)

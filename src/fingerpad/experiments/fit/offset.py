@@ -18,6 +18,7 @@ from fingerpad.experiments.fit.results import HeldOffset, OffsetFit
 from fingerpad.inference.afferent_methods import (
     and_offset,
     bounds_of,
+    fitted_four,
     five_number_problem,
     four_number_problem,
     search_from,
@@ -105,7 +106,7 @@ def fit_offset(
     searching = _continued(roving, rates, one_of("method", method, tuple(OFFSET_METHODS)), seed)
     best = searching.fit(problem, everything)
     crossed = cross_validate(problem, searching, memberships)
-    *four, offset_mm = best.parameters.tolist()
+    four, offset_mm = fitted_four(best.parameters[:4]).tolist(), float(best.parameters[-1])
     folds_mm = [float(fold.fit.parameters[-1]) for fold in crossed.folds]
     error = jackknife_covariance(np.reshape(folds_mm, (-1, 1)))
     held = [prepare(method, place, rates, rates, seed) for place in roving.models]

@@ -21,6 +21,7 @@ from fingerpad.inference.fitting.methods import Fit, FitStep, best_of
 from fingerpad.inference.fitting.problem import Problem
 
 Objective = Callable[[FloatArray], float]
+Restriction = Callable[[FloatArray], FloatArray]
 
 _MOST_PARAMETERS = 12
 _MOST_STEPS = 200
@@ -121,6 +122,7 @@ def maximise(
     lower_bounds: ArrayLike | None = None,
     smallest_gain: float = 1.0e-4,
     most_iterations: int = 200,
+    restrict: Restriction | None = None,
 ) -> Fit:
     """Maximise `objective` from `start` by the response surface method.
 
@@ -139,6 +141,9 @@ def maximise(
         An iteration with a gain of at most this much is rejected and ends the fit.
     most_iterations : int
         Largest number of iterations.
+    restrict : callable, optional
+        Moves a point of the ascent to the nearest one that is allowed. Corners of a design may lie one
+        increment beyond.
 
     Returns
     -------
@@ -170,6 +175,11 @@ def maximise(
     floor = _floor(lower_bounds, base, units)
     not_negative("smallest_gain", smallest_gain)
     whole("most_iterations", most_iterations, at_least=1)
+
+    def allowed(point: FloatArray) -> FloatArray:
+        above = np.maximum(point, floor)
+        return above if restrict is None else restrict(above)
+
     clock, design = time.perf_counter(), factorial_design(base.size)
     history: list[FitStep] = []
     n_evaluations = 0
@@ -179,7 +189,7 @@ def maximise(
         if not history:
             history.append(FitStep(base, at_base))
         best, highest, n_trials = _ascend(
-            objective, base, at_base, regression_slopes(design, values), units, floor
+            objective, base, at_base, regression_slopes(design, values), units, allowed
         )
         n_evaluations += len(design) + n_trials
         if highest - at_base <= smallest_gain:
@@ -208,6 +218,8 @@ class ResponseSurface:
         A gain of at most this much ends a fit.
     most_iterations : int
         Largest number of iterations.
+    restrict : callable, optional
+        As of `maximise`.
 
     Raises
     ------
@@ -225,6 +237,7 @@ class ResponseSurface:
     smallest_gain: float = 1.0e-4
     most_iterations: int = 200
     name: str = "response surface"
+    restrict: Restriction | None = None
 
     def __post_init__(self) -> None:
         starts = float_array("starts", self.starts, 2)
@@ -242,7 +255,7 @@ class ResponseSurface:
         def score(parameters: FloatArray) -> float:
             return problem.score(parameters, chosen)
 
-        limits = (self.lower_bounds, self.smallest_gain, self.most_iterations)
+        limits = (self.lower_bounds, self.smallest_gain, self.most_iterations, self.restrict)
         pairs = zip(np.asarray(self.starts), np.asarray(self.increments), strict=True)
         return best_of(tuple(maximise(score, start, units, *limits) for start, units in pairs))
 
@@ -253,7 +266,7 @@ def _ascend(
     value_at_base: float,
     slopes: FloatArray,
     units: FloatArray,
-    floor: FloatArray,
+    allowed: Restriction,
 ) -> tuple[FloatArray, float, int]:
     """Best point on the path of steepest ascent, its value, and the steps that were tried."""
     best, best_value = base, value_at_base
@@ -263,7 +276,7 @@ def _ascend(
     direction = slopes / steepness * units
     step = 1.0
     for n_trials in range(1, _MOST_STEPS + 1):
-        trial = np.maximum(best + step * direction, floor)
+        trial = allowed(best + step * direction)
         value = _value(objective, trial)
         if value > best_value:
             best, best_value = trial, value
