@@ -29,9 +29,9 @@ OFFSETS_MM = (-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
 FITTED_NAMES = ("resting_share", *IDENTIFIABLE_NAMES[1:])
 """The four numbers of a fit: beta tau/(C v) [1], k_d/(C v), k_s/(C v) and tau."""
 
-LOWEST = (-3.0, 0.0, 0.0, 3.0)
+LOWEST = (-1.5, 0.0, 0.0, 3.0)
 HIGHEST = (LARGEST_RESTING_SHARE, 0.6, 0.2, 300.0)
-SCALES = (0.5, 0.05, 0.02, 20.0)
+SCALES = (0.3, 0.05, 0.02, 20.0)
 """Bounds and scales of a fit: the potential at rest over the threshold [1], the largest values of the dynamic
 and the static term under all stimuli [1/ms], and tau [ms]. A drive of 0.2/ms elicits up to 200 spikes/s,
 three times the largest static rate."""

@@ -137,7 +137,8 @@ def _continued(roving: ReceptorOffset, rates: RateRecordings, method: str, seed:
     def moving(begun: FloatArray) -> Method:
         if method == "cma_es":
             return search_from(np.append(begun, 0.0), bounds, seed)
-        starts = [np.append(begun, offset) for offset in sorted({0.0, *inner_mm})]
+        within = np.clip(begun, of_four.low, of_four.high)  # round-off at a bound
+        starts = [np.append(within, offset) for offset in sorted({0.0, *inner_mm})]
         return LeastSquares(starts, bounds, n_refined=2)
 
     in_place = FOUR_NUMBER_METHODS[OFFSET_METHODS[method]](centre, problem, of_four, seed)

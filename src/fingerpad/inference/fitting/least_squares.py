@@ -77,7 +77,7 @@ class LeastSquares:
 
     def __post_init__(self) -> None:
         starts = self.bounds.rows("starts", self.starts)
-        outside = np.flatnonzero(((starts <= self.bounds.low) | (starts >= self.bounds.high)).any(axis=1))
+        outside = np.flatnonzero(((starts < self.bounds.low) | (starts > self.bounds.high)).any(axis=1))
         if outside.size:
             row = int(outside[0])
             raise InputError(f"starts must lie between the bounds: row {row} is {starts[row].tolist()}.")
@@ -98,15 +98,16 @@ class LeastSquares:
     def _refined(self, problem: Problem, chosen: IntArray, start: FloatArray) -> Fit:
         """Fit from one start, in units of the scales."""
         clock, scales = time.perf_counter(), self.bounds.scales
+        low, high = self.bounds.low / scales, self.bounds.high / scales
         visited = _Visited(problem, chosen, scales)
         visited.residuals(start / scales)
         steps = [visited.best]
         for difference in self.difference_steps if self.jacobian is None else self.difference_steps[:1]:
             least_squares(
                 visited.residuals,
-                visited.best.parameters / scales,
+                np.clip(visited.best.parameters / scales, low, high),  # round-off at a bound
                 self._slopes(visited, difference),
-                bounds=(self.bounds.low / scales, self.bounds.high / scales),
+                bounds=(low, high),
                 max_nfev=self.most_iterations,
             )
             steps.append(visited.best)
