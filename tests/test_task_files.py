@@ -327,7 +327,7 @@ common: {indenter: sphere, offset_mm: [90, 0]}
 common: {indenter: sphere, tilt_deg: 80}
     tilt_deg must lie within 45 degrees
 skin: {materials: wood}
-    skin.materials must be one of trial1
+    skin.materials must be one of human
 skin: {resolution: high}
     skin.resolution must be one of quick, standard, paper: got 'high'.
 skin: 3

@@ -31,7 +31,7 @@ from fingerpad.experiments.validation.observations import (
     example_file,
     read_observations,
 )
-from fingerpad.experiments.validation.predictions import LOADINGS, Model, predict
+from fingerpad.experiments.validation.predictions import LOADINGS, FingertipModel, predict
 from fingerpad.experiments.validation.validation import ValidationRequest, validate
 from fingerpad.geometry.edged_indenters import Gap, Grating
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Plate, Sphere
@@ -45,7 +45,7 @@ from fingerpad.skin.store import Store
 
 ROOT = Path(__file__).parents[1]
 PUBLISHED = sorted((ROOT / "studies" / "observations").glob("*.csv"))
-QUICK = Model(Conditions(resolution="quick"))
+QUICK = FingertipModel(Conditions(resolution="quick"))
 FORCE = "indenter,depth_mm,force_n\n"
 RATE = "force_n,curvature_per_m,rate_hz\n"
 
@@ -283,18 +283,18 @@ def test_force_at_depth_0_is_0_and_grows_with_depth(folder):
     assert found.predictions[1].inside_range == (0.01 <= low <= 0.03)
     assert found.predictions[2].inside_range is None
     assert found.afferent is None
-    assert found.loading == "quasi_static"
+    assert found.loading == "ramp_and_hold"
 
 
 def test_quasi_static_force_is_that_of_relaxed_tissues(folder):
     """Tissues whose Prony series is left out have the long-term moduli at all times."""
     tissues = QUICK.conditions.materials
     relaxed = Tissues(*(layer.with_prony(Prony()) for layer in named_tissues(tissues).layers))
-    elastic = Model(Conditions(resolution="quick", materials=relaxed), loading="ramp_and_hold")
-    fast = replace(QUICK, loading="ramp_and_hold")
-    of_slow, of_elastic, of_fast = (
+    elastic = FingertipModel(Conditions(resolution="quick", materials=relaxed))
+    slow = replace(QUICK, loading="quasi_static")
+    of_fast, of_elastic, of_slow = (
         result_of(folder, FORCE + "plate,0.4,0.1\n", model).predictions[0].predicted
-        for model in (QUICK, elastic, fast)
+        for model in (QUICK, elastic, slow)
     )
     assert of_slow == pytest.approx(of_elastic, rel=1e-5)
     assert of_fast > 1.3 * of_slow
@@ -381,7 +381,7 @@ def test_positions_on_a_grating_repeat_with_its_period(pressed, tmp_path):
 @pytest.mark.parametrize("window", [(600.0, 1100.0), (600.0, 500.0), (-1.0, 50.0)])
 def test_windows_lie_within_the_touch(window):
     with pytest.raises(InputError, match="static_window must be a start from 0 on and a later end, at most"):
-        Model(Conditions(), static_window_ms=window)
+        FingertipModel(Conditions(), static_window_ms=window)
 
 
 def test_what_cannot_be_pressed_has_a_reason_and_the_rest_is_scored(folder, monkeypatch):
@@ -433,7 +433,7 @@ def test_the_published_deflection_scores_as_in_the_reproduction(folder):
     found, table = read_observations(path), cylinder_deflection()
     assert found.observed.tolist() == table.deflection_mm[~table.is_artefact].tolist()
     assert [row.condition[2] for row in found.rows] == table.distance_mm[~table.is_artefact].tolist()
-    scored = validate(ValidationRequest(found, replace(QUICK, loading="ramp_and_hold"), folder))
+    scored = validate(ValidationRequest(found, QUICK, folder))
     touch = deflection_touches(QUICK.conditions)["trial3", "cylinder"]
     profile = Store(folder / STORE_FOLDER).load(touch).surface_profile()
     assert scored.r2 == pytest.approx(deflection_r2(profile), abs=1e-12)
@@ -515,7 +515,7 @@ def test_an_example_can_be_tried_as_it_says(call, tmp_path, kind):
         ([], "validate needs a file of observations, or --example KIND"),
         (["none.csv"], "none.csv must be a file that can be read"),
         (["."], ". must be a file that can be read"),
-        (["mine.csv", "--loading", "slow"], "loading must be one of quasi_static, ramp_and_hold: got 'slow'"),
+        (["mine.csv", "--loading", "slow"], "loading must be one of ramp_and_hold, quasi_static: got 'slow'"),
         (["mine.csv", "--materials", "wood"], "materials must be one of"),
         (["mine.csv", "--resolution", "high"], "resolution must be one of"),
         (["mine.csv", "--jobs", "0"], "jobs must be a whole number of at least 1"),
@@ -545,10 +545,10 @@ def test_options_and_their_defaults_are_those_of_the_modules():
     assert tuple(KINDS) == choices.KIND_CHOICES
     assert LOADINGS == choices.LOADING_CHOICES
     defaults = {option.name: option.default for option in command().params}
-    assert defaults["loading"] == Model(Conditions()).loading
+    assert defaults["loading"] == FingertipModel(Conditions()).loading
     assert defaults["static_window"] == protocol.STATIC_WINDOW.value
     assert defaults["materials"] == Conditions().materials
-    assert Model(Conditions()).afferent == Afferent()
+    assert FingertipModel(Conditions()).afferent == Afferent()
 
 
 def test_the_page_of_the_format_names_every_option_and_kind_and_shows_commands_that_parse():

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from fingerpad.cli.choices import FORMAT_CHOICES, INDENTER_CHOICES
-from fingerpad.cli.options import Materials, Resolution, number
+from fingerpad.cli.options import Materials, Resolution, number_option
 from fingerpad.cli.running import INTERRUPTED, make_writable
 from fingerpad.core.errors import InputError
 
@@ -21,8 +21,8 @@ def export_command(
             help=f"One of {', '.join(INDENTER_CHOICES)}, with sizes as in punch:6.35 or sphere:287."
         ),
     ] = "sphere",
-    curvature: Annotated[float | None, number("Curvature of the sphere. Default: 287. [1/m]")] = None,
-    depth: Annotated[float, number("Depth of the hold. [mm]")] = 1.0,
+    curvature: Annotated[float | None, number_option("Curvature of the sphere. Default: 287. [1/m]")] = None,
+    depth: Annotated[float, number_option("Depth of the hold. [mm]")] = 1.0,
     materials: Materials = "trial3",
     resolution: Resolution = "quick",
     format_name: Annotated[

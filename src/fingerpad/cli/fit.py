@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fingerpad.cli.choices import METHOD_CHOICES, QUANTITY_CHOICES
-from fingerpad.cli.options import Jobs, Materials, Resolution, Seed, integer, number
+from fingerpad.cli.options import Jobs, Materials, Resolution, Seed, integer_option, number_option
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
@@ -33,10 +33,12 @@ def fit_command(
     stimulus_column: Annotated[
         str | None, typer.Option(help="Column with the name of the stimulus. Default: shift_mm or stimulus.")
     ] = None,
-    unit: Annotated[int | None, integer("Id of the spike unit of an NWB file.")] = None,
-    width: Annotated[float | None, number("Width of the bar. Default: 3. [mm]")] = None,
-    fillet: Annotated[float | None, number("Radius of the edges of the bar. Default: 0.3. [mm]")] = None,
-    depth: Annotated[float | None, number("Depth of the hold. Default: 1. [mm]")] = None,
+    unit: Annotated[int | None, integer_option("Id of the spike unit of an NWB file.")] = None,
+    width: Annotated[float | None, number_option("Width of the bar. Default: 3. [mm]")] = None,
+    fillet: Annotated[
+        float | None, number_option("Radius of the edges of the bar. Default: 0.3. [mm]")
+    ] = None,
+    depth: Annotated[float | None, number_option("Depth of the hold. Default: 1. [mm]")] = None,
     dynamic_window: Annotated[
         tuple[float, float], typer.Option(help="Window of the dynamic rate: start and end. [ms]")
     ] = (30.0, 50.0),
@@ -70,7 +72,8 @@ def fit_command(
         bool, typer.Option("--offset", help="Also fit the position of the receptor along the finger.")
     ] = False,
     folds: Annotated[
-        int | None, integer("Number of interleaved folds. Default: 6, or the column fold of the recordings.")
+        int | None,
+        integer_option("Number of interleaved folds. Default: 6, or the column fold of the recordings."),
     ] = None,
     out: Annotated[
         Path,

@@ -25,17 +25,17 @@ def to_number(text: str) -> float:
         raise typer.BadParameter(f"must be a number: got {text!r}.") from error
 
 
-def number(help_text: str) -> Any:
+def number_option(help_text: str) -> Any:
     """Make an option that takes a number."""
     return typer.Option(parser=to_number, metavar="NUMBER", help=help_text)
 
 
-def integer(help_text: str) -> Any:
+def integer_option(help_text: str) -> Any:
     """Make an option that takes a whole number."""
     return typer.Option(parser=to_whole, metavar="INTEGER", help=help_text)
 
 
 Resolution = Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTION_CHOICES)}.")]
 Materials = Annotated[str, typer.Option(help=f"One of {', '.join(MATERIAL_CHOICES)}.")]
-Jobs = Annotated[int | None, integer("Number of processes. Default: one per core.")]
-Seed = Annotated[int, integer("Seed of the random numbers.")]
+Jobs = Annotated[int | None, integer_option("Number of processes. Default: one per core.")]
+Seed = Annotated[int, integer_option("Seed of the random numbers.")]

@@ -38,8 +38,8 @@ def validate_command(
     loading: Annotated[
         str,
         typer.Option(
-            help=f"How a depth of force or deflection is reached, one of {', '.join(LOADING_CHOICES)}: with "
-            "relaxed tissues, or read at the end of the paper's ramp and hold."
+            help=f"How a depth of force or deflection is reached, one of {', '.join(LOADING_CHOICES)}: "
+            "read at the end of the paper's ramp and hold, or with relaxed tissues."
         ),
     ] = LOADING_CHOICES[0],
     static_window: Annotated[
@@ -59,7 +59,7 @@ def validate_command(
     from fingerpad.experiments.conditions import Conditions
     from fingerpad.experiments.manifest import sha256
     from fingerpad.experiments.validation.observations import example_file, read_observations
-    from fingerpad.experiments.validation.predictions import Model
+    from fingerpad.experiments.validation.predictions import FingertipModel
     from fingerpad.experiments.validation.validation import ValidationRequest, validate
     from fingerpad.neuron.afferent import Afferent
     from fingerpad.report.validation import validation_summary, write_validation_page
@@ -72,7 +72,7 @@ def validate_command(
         return
     if observations is None:
         raise InputError("validate needs a file of observations, or --example KIND: see --help.")
-    model = Model(
+    model = FingertipModel(
         Conditions(resolution=resolution, materials=materials),
         Afferent() if afferent is None else fitted_afferent(afferent),
         loading,

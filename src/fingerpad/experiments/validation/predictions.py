@@ -26,17 +26,17 @@ from fingerpad.skin.sampling import SkinResponse
 
 MN_PER_N = 1000.0
 
-QUASI_STATIC, RAMP_AND_HOLD = "quasi_static", "ramp_and_hold"
-LOADINGS = (QUASI_STATIC, RAMP_AND_HOLD)
-"""How a depth is reached: with tissues that are relaxed throughout, or by the paper's motion."""
+RAMP_AND_HOLD, QUASI_STATIC = "ramp_and_hold", "quasi_static"
+LOADINGS = (RAMP_AND_HOLD, QUASI_STATIC)
+"""How a depth is reached: by the paper's motion, read at the end of its hold, or with relaxed tissues."""
 
 QUASI_STATIC_MS = 1e12
 """Duration of a quasi-static ramp, after which all Prony terms have relaxed to better than 1 in 10⁶. [ms]"""
 
 
 @dataclass(frozen=True)
-class Model:
-    """What predicts.
+class FingertipModel:
+    """The fingertip, its afferent and the loading whose predictions are scored.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Model:
         Finger, tissues and accuracy.
     afferent : Afferent
         Responds to the touches of rates.
-    loading : {"quasi_static", "ramp_and_hold"}
+    loading : {"ramp_and_hold", "quasi_static"}
         How depths of force and deflection are reached.
     static_window_ms : (float, float)
         Window in which rates are counted, within the paper's ramp and hold. [ms]
@@ -52,7 +52,7 @@ class Model:
 
     conditions: Conditions
     afferent: Afferent = field(default_factory=Afferent)
-    loading: str = QUASI_STATIC
+    loading: str = RAMP_AND_HOLD
     static_window_ms: tuple[float, ...] = protocol.STATIC_WINDOW.value
 
     def __post_init__(self) -> None:
@@ -110,14 +110,14 @@ class Predictions:
     meshed: SkinResponse | None
 
 
-def predict(observations: Observations, model: Model, runner: Runner) -> Predictions:
+def predict(observations: Observations, model: FingertipModel, runner: Runner) -> Predictions:
     """Press what is not stored yet, and read the prediction of every row.
 
     Parameters
     ----------
     observations : Observations
         From `read_observations`.
-    model : Model
+    model : FingertipModel
         Finger, tissues, afferent.
     runner : Runner
         Stores the presses.
@@ -157,7 +157,7 @@ def predict(observations: Observations, model: Model, runner: Runner) -> Predict
     return Predictions(values, mirrored, reasons, next(iter(skins.values()), None))
 
 
-def _plan(kind: Kind, given: Mapping[str, Value], model: Model) -> Plan:
+def _plan(kind: Kind, given: Mapping[str, Value], model: FingertipModel) -> Plan:
     """How a condition is predicted, or why it cannot be pressed."""
     try:
         return _READING[kind.observed](given, model)
@@ -186,7 +186,7 @@ def _number(value: Value) -> float:
     return value
 
 
-def _pressed_to(given: Mapping[str, Value], model: Model) -> Touch | None:
+def _pressed_to(given: Mapping[str, Value], model: FingertipModel) -> Touch | None:
     """Touch that reaches a depth, perpendicular to the long axis of the finger; None at depth 0."""
     indenter, depth_mm = indenter_named(str(given["indenter"])), _number(given["depth_mm"])
     if depth_mm == 0.0:
@@ -206,14 +206,14 @@ def _pressed_to(given: Mapping[str, Value], model: Model) -> Touch | None:
     )
 
 
-def _force(given: Mapping[str, Value], model: Model) -> Reading:
+def _force(given: Mapping[str, Value], model: FingertipModel) -> Reading:
     """Force at a depth. [N]"""
     return Reading(
         _pressed_to(given, model), lambda skin: float(skin.force_mn[-1]) / MN_PER_N if skin else 0.0
     )
 
 
-def _deflection(given: Mapping[str, Value], model: Model) -> Reading:
+def _deflection(given: Mapping[str, Value], model: FingertipModel) -> Reading:
     """Deflection of the skin at a distance from the indenter's axis, proximal positive. [mm]"""
     distance_mm = _number(given["distance_mm"])
 
@@ -232,7 +232,7 @@ def _deflection(given: Mapping[str, Value], model: Model) -> Reading:
     return Reading(_pressed_to(given, model), read)
 
 
-def _rate(given: Mapping[str, Value], model: Model) -> Reading:
+def _rate(given: Mapping[str, Value], model: FingertipModel) -> Reading:
     """Rate of an afferent at a position from the middle of a touch by force, proximal positive. [spikes/s]"""
     conditions, force_n = model.conditions, _number(given["force_n"])
     position_mm = _number(given.get("position_mm", 0.0))
@@ -270,7 +270,7 @@ def _rate(given: Mapping[str, Value], model: Model) -> Reading:
     return Reading(touch, read)
 
 
-def _resting_rate(model: Model) -> float:
+def _resting_rate(model: FingertipModel) -> float:
     """Rate of the afferent without any touch. [spikes/s]"""
     rest, afferent = np.zeros((2, 1)), model.afferent
     dynamic, static = afferent.dynamic_quantity, afferent.static_quantity
@@ -284,7 +284,7 @@ def _resting_rate(model: Model) -> float:
     return float(afferent.rates(traces, static_window_ms=model.static_window_ms)[1][0])
 
 
-_READING: Mapping[str, Callable[[Mapping[str, Value], Model], Reading]] = {
+_READING: Mapping[str, Callable[[Mapping[str, Value], FingertipModel], Reading]] = {
     "force_n": _force,
     "deflection_mm": _deflection,
     "rate_hz": _rate,

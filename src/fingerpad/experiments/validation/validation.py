@@ -22,7 +22,7 @@ from fingerpad.experiments.scores import (
     observed_ranges,
 )
 from fingerpad.experiments.validation.observations import Observations
-from fingerpad.experiments.validation.predictions import Model, predict
+from fingerpad.experiments.validation.predictions import FingertipModel, predict
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.tissues import named_tissues
 
@@ -154,7 +154,7 @@ class ValidationRequest:
     ----------
     observations : Observations
         From `read_observations`.
-    model : Model
+    model : FingertipModel
         Finger, tissues, afferent, loading.
     folder : Path
         Where finished indentations are stored.
@@ -168,7 +168,7 @@ class ValidationRequest:
     """
 
     observations: Observations
-    model: Model
+    model: FingertipModel
     folder: Path
     jobs: int = 1
 
