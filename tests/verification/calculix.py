@@ -37,7 +37,8 @@ class Found:
 def run(deck: str, folder: Path, n_elements: int, sets: tuple[str, ...]) -> Found:
     """Solve a deck in `folder` and read what it printed for sets of elements."""
     (folder / "job.inp").write_text(deck)
-    environment = {**os.environ, "OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", "2")}
+    # One thread: of two, each waits in a loop for the other wherever another process has its core.
+    environment = {**os.environ, "OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", "1")}
     done = subprocess.run(
         [PROGRAM or "ccx", "-i", "job"],
         cwd=folder,
