@@ -8,6 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# An example may take long while other processes have the cores: that is no failure.
+settings.register_profile("fingerpad", deadline=None)
+settings.load_profile("fingerpad")
 
 LONGEST = (
     "test_reproduction.py",
