@@ -1,5 +1,6 @@
 """Values of options, for the help. The modules behind the commands check them."""
 
+from fingerpad.data.tissues import DEFAULT_TISSUES as DEFAULT_TISSUES
 from fingerpad.skin.fields import sampled_fields
 
 RESOLUTION_CHOICES = ("quick", "standard", "paper")

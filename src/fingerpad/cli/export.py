@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.choices import FORMAT_CHOICES, INDENTER_CHOICES
+from fingerpad.cli.choices import DEFAULT_TISSUES, FORMAT_CHOICES, INDENTER_CHOICES
 from fingerpad.cli.options import Materials, Resolution, number_option
 from fingerpad.cli.running import INTERRUPTED, make_writable
 from fingerpad.core.errors import InputError
@@ -23,7 +23,7 @@ def export_command(
     ] = "sphere",
     curvature: Annotated[float | None, number_option("Curvature of the sphere. Default: 287. [1/m]")] = None,
     depth: Annotated[float, number_option("Depth of the hold. [mm]")] = 1.0,
-    materials: Materials = "trial3",
+    materials: Materials = DEFAULT_TISSUES,
     resolution: Resolution = "quick",
     format_name: Annotated[
         str, typer.Option("--format", help=f"One of {', '.join(FORMAT_CHOICES)}.")

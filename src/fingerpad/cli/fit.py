@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fingerpad.cli.choices import METHOD_CHOICES, QUANTITY_CHOICES
+from fingerpad.cli.choices import DEFAULT_TISSUES, METHOD_CHOICES, QUANTITY_CHOICES
 from fingerpad.cli.options import Jobs, Materials, Resolution, Seed, integer_option, number_option
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.core.errors import InputError
@@ -46,15 +46,16 @@ def fit_command(
         tuple[float, float], typer.Option(help="Window of the static rate: start and end. [ms]")
     ] = (600.0, 950.0),
     dynamic_quantity: Annotated[
-        str,
+        str | None,
         typer.Option(
             help=f"Quantity whose rate drives the dynamic term: {QUANTITY_CHOICES[0]} (the paper's SED), or, "
-            f"as an extension, {', '.join(QUANTITY_CHOICES[1:])}."
+            f"as an extension, {', '.join(QUANTITY_CHOICES[1:])}. Default: compressive_stress with the "
+            "tissues human, stored with all others."
         ),
-    ] = "stored",
+    ] = None,
     static_quantity: Annotated[
-        str, typer.Option(help="Quantity that drives the static term; choices as for the dynamic term.")
-    ] = "stored",
+        str | None, typer.Option(help="Quantity that drives the static term; choices and default as above.")
+    ] = None,
     method: Annotated[str, typer.Option(help=f"One of {', '.join(METHOD_CHOICES)}.")] = "least_squares",
     posterior: Annotated[
         bool,
@@ -80,7 +81,7 @@ def fit_command(
         typer.Option(help="Folder for the report, the figures, the results and the stored indentations."),
     ] = Path("fit"),
     resolution: Resolution = "standard",
-    materials: Materials = "trial3",
+    materials: Materials = DEFAULT_TISSUES,
     jobs: Jobs = None,
     seed: Seed = 0,
     example: Annotated[

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.options import Jobs, Resolution, Seed
+from fingerpad.cli.choices import DEFAULT_TISSUES
+from fingerpad.cli.options import Jobs, Materials, Resolution, Seed
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 
 EXPECTED_TIME = {"quick": "a minute and a half", "standard": "about 6 minutes", "paper": "some hours"}
@@ -22,6 +23,7 @@ def reproduce_command(
     ] = Path("reproduction"),
     jobs: Jobs = None,
     seed: Seed = 0,
+    materials: Materials = DEFAULT_TISSUES,
     extended: Annotated[
         bool | None,
         typer.Option(
@@ -39,7 +41,7 @@ def reproduce_command(
     from fingerpad.experiments.schemas import write
     from fingerpad.report.reproduction import write_report
 
-    conditions = Conditions(resolution=resolution, seed=seed)
+    conditions = Conditions(resolution=resolution, seed=seed, materials=materials)
     run = Reproduction(conditions, out, processes(jobs), extended)
     make_writable(out)
     console = Console(stderr=True)

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.choices import KIND_CHOICES, LOADING_CHOICES
+from fingerpad.cli.choices import DEFAULT_TISSUES, KIND_CHOICES, LOADING_CHOICES
 from fingerpad.cli.options import Jobs, Materials, Resolution
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.core.errors import InputError
@@ -27,7 +27,7 @@ def validate_command(
         Path, typer.Option(help="Folder for page, figure, results and stored indentations.")
     ] = Path("validate"),
     resolution: Resolution = "standard",
-    materials: Materials = "trial3",
+    materials: Materials = DEFAULT_TISSUES,
     afferent: Annotated[
         Path | None,
         typer.Option(
@@ -74,7 +74,7 @@ def validate_command(
         raise InputError("validate needs a file of observations, or --example KIND: see --help.")
     model = FingertipModel(
         Conditions(resolution=resolution, materials=materials),
-        Afferent() if afferent is None else fitted_afferent(afferent),
+        Afferent.for_tissues(materials) if afferent is None else fitted_afferent(afferent),
         loading,
         static_window,
     )

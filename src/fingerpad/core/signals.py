@@ -118,6 +118,23 @@ class SedTraces:
                 )
             _freeze(self, dynamic_kpa=dynamic)
 
+    @classmethod
+    def joined(cls, traces: Sequence[SedTraces]) -> SedTraces:
+        """Traces of several stimuli with the same times and quantities, one after the other as columns.
+
+        Examples
+        --------
+        >>> halves = [SedTraces([0.0, 50.0], [[0.0], [height]]) for height in (1.0, 2.0)]
+        >>> SedTraces.joined(halves).sed_kpa.tolist()
+        [[0.0, 0.0], [1.0, 2.0]]
+        """
+        dynamic = [trace.dynamic_kpa for trace in traces if trace.dynamic_kpa is not None]
+        return replace(
+            traces[0],
+            sed_kpa=np.hstack([trace.sed_kpa for trace in traces]),
+            dynamic_kpa=np.hstack(dynamic) if dynamic else None,
+        )
+
     @property
     def n_sites(self) -> int:
         """Number of receptor sites."""

@@ -8,6 +8,7 @@ import math
 
 MS_PER_S = 1000.0
 MM_PER_M = 1000.0
+MN_PER_N = 1000.0
 
 
 def radius_mm(curvature_per_m: float) -> float:

@@ -93,6 +93,19 @@ HUMAN_LIVING_EPIDERMIS_SHEAR = _HUMAN(
 HUMAN_DERMIS_SHEAR = _HUMAN("long-term shear modulus of the dermis, set human", 6.9, "kPa")
 HUMAN_SUBCUTIS_SHEAR = _HUMAN("long-term shear modulus of the subcutis, set human", 1.9, "kPa")
 
+_DANDEKAR = Source(
+    "Dandekar 1995, living fingertips, quasi-static; as quoted in later public material", "read"
+)
+PLATE_FORCE_1MM = _DANDEKAR(
+    "force of a flat plate 1.0 mm deep, lowest and highest of four subjects", (0.11, 0.23), "N"
+)
+PLATE_FORCE_2MM = _DANDEKAR(
+    "force of a flat plate 2.0 mm deep, lowest and highest of four subjects", (0.50, 1.04), "N"
+)
+
+DEFAULT_TISSUES = "human"
+"""Name of the set of tissues that is used unless another one is asked for."""
+
 STIFFENING_RATIO = Published(
     "C20 over C10 of dermis and subcutis in the stiffening Trial 3",
     5.0,

@@ -32,10 +32,9 @@ def fitted_afferent(path: Path) -> Afferent:
         values = schemas.read(path, "fingerpad fit", "fingerpad reproduction")
     except (InputError, StoreError) as error:
         raise InputError(f"afferent: {error}") from error
-    is_fit = "fit" in values
-    parameters = values["fit" if is_fit else "single_unit"]["parameters"]
-    quantities = ("dynamic_quantity", "static_quantity")
+    fitted = values["fit" if "fit" in values else "single_unit"]
+    named = values if "fit" in values else fitted
     return Afferent.from_parameters(
-        [parameters[name] for name in PARAMETER_NAMES],
-        **({name: values[name] for name in quantities} if is_fit else {}),
+        [fitted["parameters"][name] for name in PARAMETER_NAMES],
+        **{name: named[name] for name in ("dynamic_quantity", "static_quantity")},
     )

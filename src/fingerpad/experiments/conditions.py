@@ -7,6 +7,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fingerpad.core.checks import one_of, whole
+from fingerpad.core.signals import STORED_ENERGY
+from fingerpad.data import neuron
+from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.geometry.indenter_grading import grading_about
@@ -40,19 +43,28 @@ class Conditions:
     seed : int
         Seed of the observer's noise.
     materials : str or Tissues
-        Tissues of the single-unit and the population study: a name, see `mechanics.tissues`, or your own.
+        Tissues of all but the paper's three trials: a name, see `mechanics.tissues`, or your own.
     finger : Fingertip
         The finger.
     """
 
     resolution: str = "standard"
     seed: int = 0
-    materials: str | Tissues = "trial3"
+    materials: str | Tissues = DEFAULT_TISSUES
     finger: Fingertip = field(default_factory=Fingertip)
 
     def __post_init__(self) -> None:
         one_of("resolution", self.resolution, RESOLUTIONS)
         whole("seed", self.seed, at_least=0)
+
+    @property
+    def quantity(self) -> str:
+        """Quantity that drives both terms of the current: SED, unless another one belongs to the tissues."""
+        return (
+            neuron.DRIVEN_BY.get(self.materials, STORED_ENERGY)
+            if isinstance(self.materials, str)
+            else STORED_ENERGY
+        )
 
     @property
     def skin_tilt_deg(self) -> float:

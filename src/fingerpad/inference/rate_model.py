@@ -8,7 +8,7 @@ with derivatives, `fingerpad.inference.receptor_offset` a model whose receptor p
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -141,7 +141,7 @@ class AfferentModel:
     >>> model = AfferentModel.of_traces([short, longer, short])
     >>> [drive.n_sites for drive in model.drives]
     [2, 1]
-    >>> model.evaluate(Afferent().parameters)[1].round().tolist()
+    >>> model.evaluate(Afferent.for_tissues("paper").parameters)[1].round().tolist()
     [63.0, 63.0, 63.0]
     """
 
@@ -211,7 +211,7 @@ class AfferentModel:
             groups.setdefault((trace.times_ms.tobytes(), trace.kinks_ms.tobytes()), []).append((first, trace))
             first += trace.n_sites
         return cls(
-            tuple(drive(_side_by_side([trace for _, trace in group])) for group in groups.values()),
+            tuple(drive(SedTraces.joined([trace for _, trace in group])) for group in groups.values()),
             tuple(
                 np.concatenate([start + np.arange(trace.n_sites) for start, trace in group])
                 for group in groups.values()
@@ -335,13 +335,3 @@ def _evaluator_of(driven: Drive, refractory_ms: float, windows_ms: Windows) -> E
         return dynamic, static
 
     return evaluate
-
-
-def _side_by_side(traces: Sequence[SedTraces]) -> SedTraces:
-    """Join traces with the same times into one."""
-    dynamic = [trace.dynamic_kpa for trace in traces if trace.dynamic_kpa is not None]
-    return replace(
-        traces[0],
-        sed_kpa=np.hstack([trace.sed_kpa for trace in traces]),
-        dynamic_kpa=np.hstack(dynamic) if dynamic else None,
-    )

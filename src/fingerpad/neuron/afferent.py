@@ -33,8 +33,9 @@ PARAMETER_UNITS = ("mA", "mA ms/kPa", "mA/kPa", "ms", "mF", "mV")
 class Afferent:
     """A slowly adapting type I (SAI) afferent.
 
-    The defaults are the fit to the recordings under the shifted bar (`fingerpad.data.neuron`, names
-    ending in FITTED). They hold for the finger and tissues with which they were fitted.
+    The defaults are the fit to the recordings under the shifted bar with the tissues `human`
+    (`fingerpad.data.neuron`, names that begin with HUMAN): compressive stress drives both terms. They hold
+    for the finger and tissues with which they were fitted; `for_tissues` has those of the others.
 
     Parameters
     ----------
@@ -66,24 +67,55 @@ class Afferent:
     SED rises to 2 kPa in 50 ms and stays: the rate is high in the ramp and low in the hold.
 
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-    >>> dynamic_hz, static_hz = Afferent().rates(sed)
+    >>> dynamic_hz, static_hz = Afferent.for_tissues("paper").rates(sed)
     >>> dynamic_hz.round().tolist(), static_hz.round().tolist()
     ([217.0], [63.0])
     """
 
-    intercept_ma: float = neuron.INTERCEPT_FITTED.value
-    dynamic_gain: float = neuron.DYNAMIC_GAIN_FITTED.value
-    static_gain: float = neuron.STATIC_GAIN_FITTED.value
-    time_constant_ms: float = neuron.TIME_CONSTANT_FITTED.value
-    capacitance_mf: float = neuron.CAPACITANCE_FITTED.value
-    threshold_mv: float = neuron.THRESHOLD_FITTED.value
+    intercept_ma: float = neuron.HUMAN_INTERCEPT.value
+    dynamic_gain: float = neuron.HUMAN_DYNAMIC_GAIN.value
+    static_gain: float = neuron.HUMAN_STATIC_GAIN.value
+    time_constant_ms: float = neuron.HUMAN_TIME_CONSTANT.value
+    capacitance_mf: float = neuron.CAPACITANCE.value
+    threshold_mv: float = neuron.THRESHOLD.value
     refractory_ms: float = neuron.REFRACTORY.value
-    dynamic_quantity: str = STORED_ENERGY
-    static_quantity: str = STORED_ENERGY
+    dynamic_quantity: str = neuron.DRIVEN_BY["human"]
+    static_quantity: str = neuron.DRIVEN_BY["human"]
 
     def __post_init__(self) -> None:
         # Both stages check their parameters when they are made.
         self.transduction, self.membrane  # noqa: B018
+
+    @classmethod
+    def for_tissues(cls, tissues: str) -> Afferent:
+        """Afferent that was fitted with a named set of tissues.
+
+        Parameters
+        ----------
+        tissues : str
+            "human", or any other name: the fit with the set `paper`, driven by strain energy density (SED).
+
+        Returns
+        -------
+        Afferent
+
+        Examples
+        --------
+        >>> Afferent.for_tissues("human") == Afferent(), Afferent.for_tissues("paper").static_quantity
+        (True, 'stored')
+        """
+        if tissues in neuron.DRIVEN_BY:
+            return cls()
+        return cls(
+            neuron.PAPER_INTERCEPT.value,
+            neuron.PAPER_DYNAMIC_GAIN.value,
+            neuron.PAPER_STATIC_GAIN.value,
+            neuron.PAPER_TIME_CONSTANT.value,
+            neuron.PAPER_CAPACITANCE.value,
+            neuron.PAPER_THRESHOLD.value,
+            dynamic_quantity=STORED_ENERGY,
+            static_quantity=STORED_ENERGY,
+        )
 
     @classmethod
     def from_parameters(

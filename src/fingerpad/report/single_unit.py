@@ -58,7 +58,7 @@ def caption_single_unit(section: SingleUnitResult) -> str:
 
 def single_unit_tables(section: SingleUnitResult) -> list[Table]:
     """Return scores, parameters, folds, the steps of one search, and modulation."""
-    paper_search = section.folds[PAPER_FOLD - 1].climbs[PAPER_START - 1]
+    paper_search = section.folds[PAPER_FOLD - 1].climbs[-1]
     return [
         _scores(section),
         _parameters(section),

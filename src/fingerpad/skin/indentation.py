@@ -16,6 +16,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.threads import compiled_threads
 from fingerpad.core.units import cosine_and_sine
 from fingerpad.data import fingertip as published
+from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
 from fingerpad.geometry.indenter_grading import FEWEST_ACROSS_GROOVE, grading_about, sizes_across
@@ -241,7 +242,7 @@ def touch_of(
     finger: Fingertip,
     indenter: Indenter,
     stimulus: Stimulus | None = None,
-    materials: str | Tissues = "trial3",
+    materials: str | Tissues = DEFAULT_TISSUES,
     resolution: str = "quick",
     at_mm: Sequence[float] = CONTACT_POINT_MM,
     grading: Grading | None = None,
@@ -292,7 +293,7 @@ def indent(
     finger: Fingertip,
     indenter: Indenter,
     stimulus: Stimulus | None = None,
-    materials: str | Tissues = "trial3",
+    materials: str | Tissues = DEFAULT_TISSUES,
     resolution: str = "quick",
     at_mm: Sequence[float] = CONTACT_POINT_MM,
     settings: PressSettings | None = None,
@@ -308,8 +309,9 @@ def indent(
     stimulus : RampAndHold or ForceRampAndHold, optional
         The motion, by depth or by force; the paper's by default.
     materials : str or Tissues
-        "trial1", "trial2", "trial3" (paper, section 2.2.1), "trial2_wu", "trial3_wu", "trial3_stiffening",
-        "maeno1998", "wu2007", "gerling2014_fit", or tissues of your own.
+        "human" (default: one set for deflection, force, firing and percept), "paper" (closest to the paper's
+        numbers), "trial1", "trial2", "trial3" (paper, section 2.2.1), "trial2_wu", "trial3_wu",
+        "trial3_stiffening", "maeno1998", "wu2007", "gerling2014_fit", or tissues of your own.
     resolution : {"quick", "standard", "paper"}
         How fine the mesh and the steps are.
     at_mm : (float, float)

@@ -10,8 +10,8 @@ from typing import Annotated
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 
 from fingerpad.core.layouts import PATTERNS
-from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.data import protocol, psychophysics
+from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments.discrimination.task_types import (
     Count,
     FiniteNumber,
@@ -75,7 +75,7 @@ class SkinSettings(TaskPart):
         it, as far as the indenters need. [mm]
     """
 
-    materials: Annotated[str, choice_of(TISSUES)] = "trial3"
+    materials: Annotated[str, choice_of(TISSUES)] = DEFAULT_TISSUES
     resolution: Annotated[str, choice_of(RESOLUTIONS)] = "standard"
     reach_mm: Positive | None = None
 
@@ -215,7 +215,7 @@ class AfferentSettings(TaskPart):
     refractory_ms : float
         Rest after each spike. [ms]
     dynamic_quantity, static_quantity : str
-        What the two terms follow.
+        What the two terms follow; default: as the afferent of the tissues.
     """
 
     intercept_ma: FiniteNumber | None = None
@@ -225,8 +225,8 @@ class AfferentSettings(TaskPart):
     capacitance_mf: Positive | None = None
     threshold_mv: Positive | None = None
     refractory_ms: NotNegative | None = None
-    dynamic_quantity: Annotated[str, choice_of(sampled_fields())] = STORED_ENERGY
-    static_quantity: Annotated[str, choice_of(sampled_fields())] = STORED_ENERGY
+    dynamic_quantity: Annotated[str, choice_of(sampled_fields())] | None = None
+    static_quantity: Annotated[str, choice_of(sampled_fields())] | None = None
 
 
 class WindowSettings(TaskPart):

@@ -50,10 +50,10 @@ def task_afferent(task: DiscriminationTask, beside: Path = Path()) -> Afferent:
     InputError
         If the file cannot be read or holds no fitted parameters.
     """
-    chosen = task.afferent
+    chosen, fitted = task.afferent, Afferent.for_tissues(task.skin.materials)
     if isinstance(chosen, AfferentSettings):
-        return Afferent(**chosen.given)
-    return Afferent() if chosen == DEFAULT else fitted_afferent(Path(beside) / chosen)
+        return replace(fitted, **chosen.given)
+    return fitted if chosen == DEFAULT else fitted_afferent(Path(beside) / chosen)
 
 
 def task_population(task: DiscriminationTask, beside: Path = Path()) -> Population:

@@ -14,7 +14,6 @@ from fingerpad.core.checks import IntArray, one_of, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
-from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.data.observations import bar_firing_rates
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.fit.fit import check_enough, fit_recordings, folds_in_turn
@@ -88,7 +87,7 @@ class FitRequest:
         Processes to use; the numbers do not depend on it.
     dynamic_quantity, static_quantity : str
         What each term follows: strain energy density, "stored", as in the paper, or another quantity of
-        `SkinResponse.sample` as an extension.
+        `SkinResponse.sample` as an extension. Default: that of the tissues.
     with_posterior : bool
         Whether credible intervals are drawn as well.
     with_profiles : bool
@@ -112,8 +111,8 @@ class FitRequest:
     n_folds: int | None = None
     windows_ms: Windows = WINDOWS_MS
     jobs: int = 1
-    dynamic_quantity: str = STORED_ENERGY
-    static_quantity: str = STORED_ENERGY
+    dynamic_quantity: str | None = None
+    static_quantity: str | None = None
     with_posterior: bool = False
     with_profiles: bool = False
     with_sensitivity: bool = False
@@ -121,8 +120,8 @@ class FitRequest:
 
     def __post_init__(self) -> None:
         one_of("method", self.method, METHODS)
-        one_of("dynamic_quantity", self.dynamic_quantity, tuple(sampled_fields()))
-        one_of("static_quantity", self.static_quantity, tuple(sampled_fields()))
+        for name, quantity in zip(("dynamic_quantity", "static_quantity"), self.quantities, strict=True):
+            one_of(name, quantity, tuple(sampled_fields()))
         whole("jobs", self.jobs, at_least=1)
         for start, end in self.windows_ms:
             if not 0.0 <= start < end:
@@ -163,6 +162,12 @@ class FitRequest:
     def touches(self) -> dict[str, Touch]:
         """One touch per stimulus."""
         return stimulus_touches(self.recorded.stimuli, self.conditions)
+
+    @property
+    def quantities(self) -> tuple[str, str]:
+        """Quantities of the dynamic and of the static term."""
+        default = self.conditions.quantity
+        return self.dynamic_quantity or default, self.static_quantity or default
 
 
 def stimulus_touches(stimuli: Mapping[str, TactileStimulus], conditions: Conditions) -> dict[str, Touch]:
@@ -256,8 +261,7 @@ def run_fit(
     skins = runner.responses({"stimuli": request.touches})["stimuli"]
     offsets_mm = OFFSETS_MM if request.with_offset else (0.0,)
     sites = [[RECEPTOR_X_MM + offset, 0.0] for offset in offsets_mm]
-    quantities = (request.dynamic_quantity, request.static_quantity)
-    sampled = [skin.sed(sites, *quantities) for skin in skins.values()]
+    sampled = [skin.sed(sites, *request.quantities) for skin in skins.values()]
     beside = {
         offset: [traces.part(slice(place, place + 1)) for traces in sampled]
         for place, offset in enumerate(offsets_mm)
@@ -287,8 +291,8 @@ def run_fit(
             spikes_after_hold=recorded.spikes_after_hold,
         ),
         windows_ms=request.windows_ms,
-        dynamic_quantity=request.dynamic_quantity,
-        static_quantity=request.static_quantity,
+        dynamic_quantity=request.quantities[0],
+        static_quantity=request.quantities[1],
         manifest=runner.manifest(
             request.conditions,
             {"stimuli": next(iter(skins.values())).mesh},

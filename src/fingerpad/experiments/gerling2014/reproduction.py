@@ -10,6 +10,7 @@ from typing import Any, Literal
 from fingerpad.core.checks import whole
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
+from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.data import all_published
 from fingerpad.experiments.conditions import Conditions, Touch
 from fingerpad.experiments.gerling2014 import (
@@ -19,6 +20,7 @@ from fingerpad.experiments.gerling2014 import (
     single_unit,
     single_unit_uncertainty,
     skin_deflection,
+    skin_force,
     sphere_discrimination,
 )
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow
@@ -29,10 +31,15 @@ from fingerpad.experiments.gerling2014.response_maps import PopulationMaps
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.single_unit_uncertainty import UncertaintyResult
 from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult
+from fingerpad.experiments.gerling2014.skin_force import SkinForce
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
+from fingerpad.experiments.gerling2014.summary import Summary, summary
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
+from fingerpad.inference.fitting.methods import Method
+from fingerpad.inference.start_points import response_surface
 from fingerpad.neuron.afferent import Afferent
+from fingerpad.skin.sampling import SkinResponse
 
 STANDARD_SPHERE = (sphere_discrimination.POSITIONS_MM[0], sphere_discrimination.CURVATURES[0])
 
@@ -101,8 +108,10 @@ class ReproductionResult:
     ----------
     format, format_version : str, int
         Of the file.
-    skin_deflection : SkinDeflectionResult
-        Level 1.
+    summary : Summary
+        A few plain numbers.
+    skin_deflection, skin_force : SkinDeflectionResult, SkinForce
+        Level 1: the paper's three trials, and the tissues of the run.
     single_unit : SingleUnitResult
         Level 2.
     discrimination, population, nail : SphereDiscrimination, PopulationMaps, NailBorder
@@ -118,8 +127,10 @@ class ReproductionResult:
     """
 
     format: Literal["fingerpad reproduction"] = "fingerpad reproduction"
-    format_version: Literal[2] = 2
+    format_version: Literal[3] = 3
+    summary: Summary
     skin_deflection: SkinDeflectionResult
+    skin_force: SkinForce
     single_unit: SingleUnitResult
     discrimination: SphereDiscrimination
     population: PopulationMaps
@@ -160,6 +171,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
         # The longest indentations first: short ones fill the end, and hardly a core waits for another.
         "nail": {"nail": nail_border.nail_touch(conditions)},
         "skin deflection": skin_deflection.deflection_touches(conditions),
+        "force": skin_force.force_touches(conditions),
         "bar, 36 shifts": dict(enumerate(single_unit.bar_touches(conditions))),
         "spheres": spheres,
     }
@@ -170,16 +182,20 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
     sphere_responses, nail_response = responses["spheres"], responses["nail"]["nail"]
 
     with runner.stage("fit and discrimination", 3) as advance:
-        bar_sed = single_unit.receptor_sed(list(bar_responses.values()))
+        quantity = conditions.quantity
+        bar_sed = single_unit.receptor_sed(list(bar_responses.values()), quantity, quantity)
         problem = single_unit.rate_problem(bar_sed)
-        best, folds = single_unit.fit(problem)
+        method = _method(conditions, sphere_responses)
+        best, folds = single_unit.fit(problem, method=method)
         advance()
-        afferent = Afferent.from_parameters(best.parameters)
+        afferent = Afferent.from_parameters(
+            best.parameters, dynamic_quantity=quantity, static_quantity=quantity
+        )
         discrimination = sphere_discrimination.discriminate_spheres(
             sphere_responses, afferent, conditions.seed
         )
         advance()
-        unit = single_unit.single_unit_result(problem, best, folds)
+        unit = single_unit.single_unit_result(problem, best, folds, afferent, method.name)
         population = response_maps.population_maps(sphere_responses[STANDARD_SPHERE], afferent)
         nail = nail_border.nail_border(nail_response)
         advance()
@@ -205,15 +221,26 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
         name: deflection["trial3", name].mesh for name in skin_deflection.INDENTERS
     }
     skin = skin_deflection.deflection_result(deflection)
+    force = skin_force.skin_force(responses["force"])
+    manifest = runner.manifest(conditions, meshes, half_model=not spheres[STANDARD_SPHERE].grading.full)
     return ReproductionResult(
+        summary=summary(force, unit, afferent, discrimination, thresholds, manifest),
         skin_deflection=skin,
+        skin_force=force,
         single_unit=unit,
         discrimination=discrimination,
         population=population,
         nail=nail,
         single_unit_uncertainty=uncertainty,
         curvature_thresholds=thresholds,
-        comparison=tuple(comparison(skin, unit, discrimination, nail, thresholds)),
+        comparison=tuple(comparison(skin, force, unit, discrimination, nail, thresholds)),
         inputs=tuple(PublishedNumber(**asdict(number)) for number in all_published()),
-        manifest=runner.manifest(conditions, meshes, half_model=not spheres[STANDARD_SPHERE].grading.full),
+        manifest=manifest,
     )
+
+
+def _method(conditions: Conditions, spheres: dict[tuple[float, float], SkinResponse]) -> Method:
+    """Return the paper's method for a drive by SED; another drive is fitted to hit rates as well."""
+    if conditions.quantity == STORED_ENERGY:
+        return response_surface()
+    return sphere_discrimination.to_rates_and_hit_rates(spheres, conditions.quantity, conditions.seed)

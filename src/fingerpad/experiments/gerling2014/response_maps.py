@@ -10,7 +10,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Matrix, Number, Vector, result_class
-from fingerpad.core.signals import STORED_ENERGY, ResponseMap, SedTraces
+from fingerpad.core.signals import ResponseMap, SedTraces
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.neuron.afferent import Afferent
@@ -142,9 +142,9 @@ def resting_response(afferent: Afferent) -> RestingResponse:
     """
     end_ms = protocol.RAMP.value + protocol.HOLD.value
     nothing = np.zeros((2, 1))
-    further = None if afferent.dynamic_quantity == STORED_ENERGY else nothing
-    times_ms = np.array([0.0, end_ms])
-    sed = SedTraces(times_ms, nothing, dynamic_kpa=further, dynamic_quantity=afferent.dynamic_quantity)
+    quantities = (afferent.dynamic_quantity, afferent.static_quantity)
+    further = None if quantities[0] == quantities[1] else nothing
+    sed = SedTraces(np.array([0.0, end_ms]), nothing, np.empty(0), further, *quantities)
     dynamic_hz, static_hz = afferent.rates(sed)
     return RestingResponse(
         dynamic_rate_hz=float(dynamic_hz[0]),

@@ -19,12 +19,12 @@ from fingerpad.inference.fitting.cross_validation import (
     cross_validate,
     interleaved_folds,
 )
-from fingerpad.inference.fitting.methods import Fit
+from fingerpad.inference.fitting.methods import Fit, Method
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import response_surface, start_points
-from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
+from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS, Afferent
 from fingerpad.neuron.spikes import modulation_difference, modulation_index
 from fingerpad.skin.sampling import SkinResponse
 
@@ -48,22 +48,21 @@ def bar_touches(conditions: Conditions) -> list[Touch]:
     ]
 
 
-def receptor_sed(responses: list[SkinResponse], dynamic_quantity: str = STORED_ENERGY) -> SedTraces:
+def receptor_sed(
+    responses: list[SkinResponse],
+    dynamic_quantity: str = STORED_ENERGY,
+    static_quantity: str = STORED_ENERGY,
+) -> SedTraces:
     """Strain energy density at the one receptor, one column per shift of the bar.
 
     Parameters
     ----------
     responses : list of SkinResponse
         One per shift.
-    dynamic_quantity : str, optional
-        What the dynamic term follows; by default the same.
+    dynamic_quantity, static_quantity : str, optional
+        What the two terms follow.
     """
-    if dynamic_quantity != STORED_ENERGY:
-        return following(
-            receptor_sed(responses), receptor_traces(responses, dynamic_quantity), dynamic_quantity
-        )
-    traces = [skin.sed(RECEPTOR) for skin in responses]
-    return SedTraces(traces[0].times_ms, np.hstack([trace.sed_kpa for trace in traces]), traces[0].kinks_ms)
+    return SedTraces.joined([skin.sed(RECEPTOR, dynamic_quantity, static_quantity) for skin in responses])
 
 
 def receptor_traces(responses: list[SkinResponse], quantity: str) -> SedTraces:
@@ -107,8 +106,10 @@ def bar_recordings() -> RateRecordings:
     return RateRecordings(names, observed.dynamic_rate_hz, observed.static_rate_hz, observed.source)
 
 
-def fit(problem: RateProblem, memberships: ArrayLike | None = None) -> tuple[Fit, CrossValidation]:
-    """Best fit to all shifts from both start points, and the six folds.
+def fit(
+    problem: RateProblem, memberships: ArrayLike | None = None, method: Method | None = None
+) -> tuple[Fit, CrossValidation]:
+    """Best fit to all shifts, and the six folds.
 
     Parameters
     ----------
@@ -116,8 +117,10 @@ def fit(problem: RateProblem, memberships: ArrayLike | None = None) -> tuple[Fit
         From `rate_problem`.
     memberships : int array (n_shifts,), optional
         Fold of each shift; default: assigned in turn.
+    method : Method, optional
+        Fits the paper's six parameters; default: the paper's method from both of its start points.
     """
-    method, everything = response_surface(), np.arange(problem.n_observations)
+    method, everything = method or response_surface(), np.arange(problem.n_observations)
     folds = interleaved_folds(everything.size) if memberships is None else memberships
     return method.fit(problem, everything), cross_validate(problem, method, folds)
 
@@ -254,6 +257,10 @@ class SingleUnitResult:
         Fractional sum of squares over all shifts, weighted and by phase. [1]
     fss_out_of_sample, fss_training_mean : float
         Mean over the folds, of the testing and of the training sets. [1]
+    method : str
+        Name of the method of fitting.
+    dynamic_quantity, static_quantity : str
+        What the two terms of the current follow, see `SkinResponse.sample`.
     parameters, units : dict
         Six parameters fitted to all shifts, and their units, by name.
     shift_mm : array (n_shifts,)
@@ -275,6 +282,9 @@ class SingleUnitResult:
     fss_in_sample_static: Number
     fss_out_of_sample: Number
     fss_training_mean: Number
+    method: str
+    dynamic_quantity: str
+    static_quantity: str
     parameters: dict[str, Number]
     units: dict[str, str]
     shift_mm: Vector
@@ -287,7 +297,9 @@ class SingleUnitResult:
     modulation: RateModulation
 
 
-def single_unit_result(problem: RateProblem, best: Fit, folds: CrossValidation) -> SingleUnitResult:
+def single_unit_result(
+    problem: RateProblem, best: Fit, folds: CrossValidation, afferent: Afferent, method: str
+) -> SingleUnitResult:
     """Rates, fits and modulation.
 
     Parameters
@@ -298,6 +310,10 @@ def single_unit_result(problem: RateProblem, best: Fit, folds: CrossValidation) 
         To all shifts.
     folds : CrossValidation
         The six folds.
+    afferent : Afferent
+        That of the best fit.
+    method : str
+        Name of the method of fitting.
     """
     shift_mm, recordings = bar_firing_rates().shift_mm, problem.recordings
     observed_dynamic, observed_static = recordings.dynamic_rate_hz, recordings.static_rate_hz
@@ -311,6 +327,9 @@ def single_unit_result(problem: RateProblem, best: Fit, folds: CrossValidation) 
         fss_in_sample_static=by_phase["static"],
         fss_out_of_sample=folds.score_test,
         fss_training_mean=folds.score_train,
+        method=method,
+        dynamic_quantity=afferent.dynamic_quantity,
+        static_quantity=afferent.static_quantity,
         parameters=_named(best.parameters),
         units=dict(zip(PARAMETER_NAMES, PARAMETER_UNITS, strict=True)),
         shift_mm=shift_mm,

@@ -23,6 +23,8 @@ from fingerpad.experiments.gerling2014.goodwin import (
     fit_noise_to_goodwin,
     goodwin_hit_rates_at,
 )
+from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.rates_and_hit_rates import SphereHitRates, ToRatesAndHitRates
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import (
@@ -33,6 +35,9 @@ from fingerpad.psychophysics.encoding import (
 )
 from fingerpad.psychophysics.noise_fit import NOISE_DRAWS
 from fingerpad.skin.sampling import SkinResponse
+
+FIT_DRAWS = 1000
+"""Common random presentations behind the hit rates of a fit."""
 
 CURVATURES = psychophysics.SPHERE_CURVATURES.value
 POSITIONS_MM = protocol.SPHERE_POSITIONS.value
@@ -108,6 +113,46 @@ def discrimination_touches(conditions: Conditions) -> dict[tuple[float, float], 
         for position in POSITIONS_MM
         for curvature in CURVATURES
     }
+
+
+def to_rates_and_hit_rates(
+    responses: dict[tuple[float, float], SkinResponse], quantity: str, seed: int
+) -> ToRatesAndHitRates:
+    """Return the method that fits an afferent to its rates and to Goodwin's two points at once.
+
+    The two points are those of people at 296 and 365 /m, at both positions, by the Gradient Sum and by the
+    Euclidean Distance of static rates, with the paper's noise.
+
+    Parameters
+    ----------
+    responses : dict of SkinResponse
+        By position and curvature, from `discrimination_touches`.
+    quantity : str
+        What drives both terms of the current.
+    seed : int
+        Of the presentations behind hit rates, and of the search.
+    """
+    population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
+    n_receptors = len(population.positions_mm)
+    spheres = (CURVATURES[0], *psychophysics.GOODWIN_CURVATURES.value)
+    model = AfferentModel.of_traces(
+        [
+            responses[position, curvature].sed(population.positions_mm, quantity, quantity)
+            for position in POSITIONS_MM
+            for curvature in spheres
+        ]
+    )
+    hit_rates = SphereHitRates(
+        model,
+        n_positions=len(POSITIONS_MM),
+        n_receptors=n_receptors,
+        neighbours=neighbour_pairs(population.positions_mm, population.pitch_mm),
+        noise_sigma=psychophysics.NOISE_SIGMA.value,
+        standard_normals=normals(seed, 1, n_receptors, Purpose.RESPONSE, FIT_DRAWS)[0].T,
+    )
+    n_codes = 2
+    observed = np.tile(psychophysics.GOODWIN_HIT_RATES.value, n_codes * len(POSITIONS_MM))
+    return ToRatesAndHitRates(hit_rates, observed, seed)
 
 
 def discriminate_spheres(
