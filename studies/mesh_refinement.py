@@ -39,6 +39,7 @@ from studies.mesh_errors import (
     observed_order,
     read_stored,
 )
+from studies.study import TISSUES
 
 Sphere = tuple[float, float]
 """Position along the finger [mm] and curvature [1/m]."""
@@ -90,12 +91,12 @@ class Level:
 
     def bars(self) -> dict[int, Touch]:
         """Touches of the bar, by the number of their shift."""
-        touches = single_unit.bar_touches(Conditions(self.resolution))
+        touches = single_unit.bar_touches(Conditions(self.resolution, materials=TISSUES))
         return {shift: _at_factor(touches[shift], self.factor) for shift in self.shifts}
 
     def balls(self) -> dict[Sphere, Touch]:
         """Touches of the spheres, by position and curvature."""
-        touches = sphere_discrimination.discrimination_touches(Conditions(self.resolution))
+        touches = sphere_discrimination.discrimination_touches(Conditions(self.resolution, materials=TISSUES))
         return {sphere: _at_factor(touches[sphere], self.factor) for sphere in self.spheres}
 
 
@@ -178,7 +179,7 @@ def _at_factor(touch: Touch, factor: float) -> Touch:
 
 def single_changes() -> dict[str, dict[str, Touch]]:
     """Return bar and sphere on standard meshes that differ from the preset in one thing."""
-    presets = _examples(Conditions("standard"))
+    presets = _examples(Conditions("standard", materials=TISSUES))
     return {
         name: {
             change: replace(touch, grading=replace(touch.grading, **values))
@@ -192,7 +193,7 @@ def step_changes() -> dict[str, dict[int, Touch]]:
     """Return bar and sphere on quick meshes, by number of steps."""
     return {
         name: {count: replace(touch, settings=PressSettings(count, count)) for count in STEPS}
-        for name, touch in _examples(Conditions("quick")).items()
+        for name, touch in _examples(Conditions("quick", materials=TISSUES)).items()
     }
 
 

@@ -41,6 +41,7 @@ from studies.mesh_errors import (
     read_stored,
 )
 from studies.mesh_refinement import PEAK_SHIFT, SHIFTS_MM, Sphere
+from studies.study import TISSUES
 
 MESHES = ("quick", "standard", "paper")
 REFERENCE = "paper"
@@ -88,7 +89,7 @@ class Touches:
     @classmethod
     def of(cls, resolution: str) -> Touches:
         """Touches of a named resolution, half of the finger."""
-        conditions = Conditions(resolution)
+        conditions = Conditions(resolution, materials=TISSUES)
         bars = single_unit.bar_touches(conditions)
         spheres = sphere_discrimination.discrimination_touches(conditions)
         return cls(
@@ -328,7 +329,7 @@ def run(runner: Runner) -> PaperSize:
 
 def preset() -> Preset:
     """Count and measure the preset."""
-    conditions = Conditions(REFERENCE)
+    conditions = Conditions(REFERENCE, materials=TISSUES)
     mesh = finger_mesh(conditions.finger, resolution_grading(REFERENCE, RECEPTOR_X_MM))
     border = int((mesh.layer[: mesh.shape[2]] < LAYERS.index("dermis")).sum())
     return Preset(

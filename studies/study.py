@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from fingerpad.cli.options import Jobs, Resolution, to_whole
+from fingerpad.cli.options import Jobs, Materials, Resolution, to_whole
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.core.files import write_atomically
 from fingerpad.core.results import to_json
@@ -19,6 +19,9 @@ from fingerpad.report.parts import Page
 from studies.pages.markdown import write_markdown
 
 Seed = Annotated[int, typer.Option(parser=to_whole, metavar="INTEGER", help="Seed of all random numbers.")]
+TISSUES = "trial3"
+"""Tissues of the studies: those with which their pages were made."""
+
 Out = Annotated[Path, typer.Option(help="Folder for page, figures, numbers and stored indentations.")]
 
 
@@ -85,11 +88,12 @@ def command_of(study: Study) -> Callable[..., None]:
         out: Out = Path(study.name),
         jobs: Jobs = None,
         seed: Seed = 0,
+        materials: Materials = TISSUES,
     ) -> None:
-        execute(study, Conditions(resolution=resolution, seed=seed), out, jobs)
+        execute(study, Conditions(resolution, seed, materials), out, jobs)
 
     def without_conditions(out: Out = Path(study.name), jobs: Jobs = None) -> None:
-        execute(study, Conditions(), out, jobs)
+        execute(study, Conditions(materials=TISSUES), out, jobs)
 
     chosen = command if study.resolution else without_conditions
     chosen.__doc__ = study.help

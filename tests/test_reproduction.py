@@ -52,7 +52,7 @@ BALANCE = 0.01
 BEYOND = {"curvature_thresholds", "single_unit_uncertainty"}
 """Sections that go beyond the paper, which a run at quick resolution leaves out unless asked."""
 
-INDENTATIONS = 6 + 36 + 14 + 1
+INDENTATIONS = 6 + 4 + 36 + 14 + 1
 
 
 def run(folder, *options):
@@ -121,9 +121,11 @@ def studied(first, tmp_path_factory):
     folder = tmp_path_factory.mktemp("studies") / "out"
     shutil.copytree(first.folder / STORE_FOLDER, folder / STORE_FOLDER)
 
+    options = ("--out", str(folder), "--jobs", "2", "--materials", "human")
+
     def numbers_of(study):
         subprocess.run(
-            [sys.executable, "-W", "error", "-m", "studies", study, "--out", str(folder), "--jobs", "2"],
+            [sys.executable, "-W", "error", "-m", "studies", study, *options],
             check=True,
             cwd=Path(__file__).parents[1],
         )
@@ -172,12 +174,37 @@ def numbers(value):
 
 
 def test_results_have_every_section_and_finite_numbers_only(first):
-    studies = {"skin_deflection", "single_unit", "discrimination", "population", "nail"}
+    studies = {"summary", "skin_deflection", "skin_force", "single_unit", "discrimination"}
+    studies |= {"population", "nail"}
     files = {"format", "format_version", "comparison", "inputs", "manifest"}
     assert set(first.results) == studies | files | BEYOND
     assert {name for name, section in first.results.items() if section is None} == BEYOND
     assert not re.search(r"\b(NaN|Infinity)\b", first.text)
     assert all(math.isfinite(number) for number in numbers(first.results))
+
+
+def test_the_summary_repeats_numbers_of_the_sections(first):
+    found, unit = first.results["summary"], first.results["single_unit"]
+    assert found["fss_out_of_sample"] == unit["fss_out_of_sample"]
+    assert found["dynamic_max_hz"] == max(unit["dynamic_rate_hz"])
+    assert found["noise_sigma"] == first.results["discrimination"]["noise_sigma"]
+    assert found["force_plate_2mm_n"] == first.results["skin_force"]["plate_2mm_n"]
+    assert len(found["hit_rate_296"]) == len(found["hit_rate_365"]) == 2
+    assert found["weber_144"] is None  # not at quick resolution
+    assert found["wall_s"] == first.results["manifest"]["wall_s"]
+
+
+def test_one_set_serves_four_levels(first):
+    """Bounds of the quick resolution; docs/results.md has the numbers at standard resolution."""
+    found = first.results["summary"]
+    assert found["deflection_r2"] >= 0.97
+    assert 0.11 <= found["force_plate_1mm_n"] <= 0.23
+    assert 0.50 <= found["force_plate_2mm_n"] <= 1.04
+    assert found["fss_out_of_sample"] >= 0.90
+    assert found["resting_rate_hz"] == 0.0
+    assert 0.049 <= found["noise_sigma"] <= 0.061
+    assert found["hit_rate_296"] == pytest.approx([0.58, 0.58], abs=0.03)
+    assert found["hit_rate_365"] == pytest.approx([0.95, 0.95], abs=0.03)
 
 
 def test_skin_deflection_is_complete(first):
@@ -294,7 +321,7 @@ def test_the_manifest_holds_the_command_that_repeats_the_run(first):
     assert 100.0 < manifest["peak_memory_mb"] < 4000.0
     assert 1.0 < manifest["wall_s"] <= first.wall_s
     stages = manifest["stages"]
-    assert [stage.get("computed") for stage in stages] == [None, 1, 6, 36, 14, None]
+    assert [stage.get("computed") for stage in stages] == [None, 1, 6, 4, 36, 14, None]
     assert stages[0]["wall_s"] > 0.5 * manifest["wall_s"]
     assert sum(stage["wall_s"] for stage in stages) <= manifest["wall_s"] + 0.1
     for stage in stages[1:-1]:
@@ -399,7 +426,7 @@ def test_a_second_run_takes_everything_from_the_store(first, second, stamps):
     folder = second.folder / STORE_FOLDER
     found = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
     assert {name: found[name] for name in stamps} == stamps
-    assert [stage.get("computed") for stage in second.results["manifest"]["stages"][:5]] == [None, 0, 0, 0, 0]
+    assert [stage.get("computed") for stage in second.results["manifest"]["stages"][:6]] == [None, *[0] * 5]
 
 
 def test_a_second_run_gives_the_same_results_bit_for_bit(first, second):
@@ -411,7 +438,7 @@ def test_a_second_run_gives_the_same_results_bit_for_bit(first, second):
 
 def test_another_seed_changes_what_the_observer_draws_and_nothing_else(first, other_seed):
     ours, theirs = unmeasured(first.results), unmeasured(other_seed)
-    for section in ("skin_deflection", "single_unit", "population", "nail", "inputs"):
+    for section in ("skin_deflection", "skin_force", "single_unit", "population", "nail", "inputs"):
         assert theirs[section] == ours[section]
     assert theirs["manifest"] == ours["manifest"] | {"seed": 7}
     drawn, drawn_theirs = ours["discrimination"], theirs["discrimination"]
@@ -421,7 +448,7 @@ def test_another_seed_changes_what_the_observer_draws_and_nothing_else(first, ot
         rates, rates_theirs = drawn["gradient_sum"][measure], drawn_theirs["gradient_sum"][measure]
         assert rates_theirs["hit_rate"] != rates["hit_rate"]
         np.testing.assert_allclose(rates_theirs["hit_rate"], rates["hit_rate"], rtol=0, atol=0.1)
-    assert [stage.get("computed") for stage in other_seed["manifest"]["stages"]] == [None, 0, 0, 0, 0, None]
+    assert [stage.get("computed") for stage in other_seed["manifest"]["stages"]] == [None, *[0] * 5, None]
 
 
 # The paper's question as a question of one's own

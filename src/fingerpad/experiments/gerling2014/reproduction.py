@@ -243,4 +243,4 @@ def _method(conditions: Conditions, spheres: dict[tuple[float, float], SkinRespo
     """Return the paper's method for a drive by SED; another drive is fitted to hit rates as well."""
     if conditions.quantity == STORED_ENERGY:
         return response_surface()
-    return sphere_discrimination.to_rates_and_hit_rates(spheres, conditions.quantity, conditions.seed)
+    return sphere_discrimination.to_rates_and_hit_rates(spheres, conditions.quantity)

@@ -36,8 +36,9 @@ from fingerpad.psychophysics.encoding import (
 from fingerpad.psychophysics.noise_fit import NOISE_DRAWS
 from fingerpad.skin.sampling import SkinResponse
 
-FIT_DRAWS = 1000
-"""Common random presentations behind the hit rates of a fit."""
+FIT_SEED, FIT_DRAWS = 0, 1000
+"""Seed of a fit, and number of random presentations behind its hit rates. It is not the seed of the run:
+another seed of the observers keeps the afferent."""
 
 CURVATURES = psychophysics.SPHERE_CURVATURES.value
 POSITIONS_MM = protocol.SPHERE_POSITIONS.value
@@ -116,7 +117,7 @@ def discrimination_touches(conditions: Conditions) -> dict[tuple[float, float], 
 
 
 def to_rates_and_hit_rates(
-    responses: dict[tuple[float, float], SkinResponse], quantity: str, seed: int
+    responses: dict[tuple[float, float], SkinResponse], quantity: str
 ) -> ToRatesAndHitRates:
     """Return the method that fits an afferent to its rates and to Goodwin's two points at once.
 
@@ -129,8 +130,6 @@ def to_rates_and_hit_rates(
         By position and curvature, from `discrimination_touches`.
     quantity : str
         What drives both terms of the current.
-    seed : int
-        Of the presentations behind hit rates, and of the search.
     """
     population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
     n_receptors = len(population.positions_mm)
@@ -148,11 +147,11 @@ def to_rates_and_hit_rates(
         n_receptors=n_receptors,
         neighbours=neighbour_pairs(population.positions_mm, population.pitch_mm),
         noise_sigma=psychophysics.NOISE_SIGMA.value,
-        standard_normals=normals(seed, 1, n_receptors, Purpose.RESPONSE, FIT_DRAWS)[0].T,
+        standard_normals=normals(FIT_SEED, 1, n_receptors, Purpose.RESPONSE, FIT_DRAWS)[0].T,
     )
     n_codes = 2
     observed = np.tile(psychophysics.GOODWIN_HIT_RATES.value, n_codes * len(POSITIONS_MM))
-    return ToRatesAndHitRates(hit_rates, observed, seed)
+    return ToRatesAndHitRates(hit_rates, observed, FIT_SEED)
 
 
 def discriminate_spheres(
