@@ -15,6 +15,7 @@ from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.results import Number, Vector, from_json, read_results, result_class
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
+from fingerpad.experiments.gerling2014.summary import Summary
 from fingerpad.report.formatting import ABSENT, fixed, number
 from fingerpad.report.parts import Chapter
 from fingerpad.report.single_unit import single_unit_tables
@@ -32,6 +33,7 @@ VERDICTS = {True: "✓", False: "✗", None: "○"}
 
 README_ROWS = (
     ("skin", "Trial 3, deflection under the cylinder, R²"),
+    ("skin", "Tissues of the run, force of a flat plate 2 mm deep [N]"),
     ("skin", "Trial 1, deflection under the cylinder, against Trial 3"),
     ("afferent", "Single unit, FSS out of sample (mean of six folds)"),
     ("afferent", "Dynamic rate, largest [spikes/s]"),
@@ -133,6 +135,7 @@ class Percept:
 class Excerpt:
     """What of a run the pages show.
 
+    `summaries` holds a few plain numbers of this run and of runs with other tissues, by their names;
     `indentations` counts them by part of the run; `single_unit` is the fit to the rates, fold by fold.
     """
 
@@ -140,6 +143,7 @@ class Excerpt:
     resolution: str
     materials: str
     seed: int
+    summaries: dict[str, Summary]
     indentations: dict[str, int]
     comparison: tuple[Compared, ...]
     single_unit: SingleUnitResult
@@ -150,7 +154,11 @@ class Excerpt:
 
 
 def read_excerpt(
-    path: Path, methods: Path | None = None, drives: Path | None = None, before: Excerpt | None = None
+    path: Path,
+    methods: Path | None = None,
+    drives: Path | None = None,
+    before: Excerpt | None = None,
+    others: Sequence[Path] = (),
 ) -> Excerpt:
     """Take from the results of `fingerpad reproduce --extended` what the pages show.
 
@@ -164,6 +172,8 @@ def read_excerpt(
         The drives.json of `python -m studies drives`.
     before : Excerpt, optional
         What the pages show now; they keep those of its rows that no file replaces.
+    others : sequence of Path, optional
+        results.json of runs with other tissues, for their summaries.
 
     Raises
     ------
@@ -178,7 +188,10 @@ def read_excerpt(
         shown = replace(shown, methods=before.methods, models=before.models)
     if before is not None and driven is None:
         shown = replace(shown, drives=before.drives)
-    return shown
+    further = [read_results(other, ReproductionResult) for other in others]
+    kept = {} if before is None else before.summaries
+    named = {each.manifest.materials: each.summary for each in further}
+    return replace(shown, summaries=kept | named | shown.summaries)
 
 
 def _studied(path: Path, kind: type[Kind], study: str) -> Kind:
@@ -202,6 +215,7 @@ def excerpt(
         resolution=manifest.resolution,
         materials=manifest.materials,
         seed=manifest.seed,
+        summaries={manifest.materials: results.summary},
         indentations={stage.name: stage.indentations for stage in manifest.stages if stage.indentations},
         comparison=tuple(
             Compared(quantity=row.quantity, paper=row.paper, ours=row.ours, met=row.met, note=row.note)
@@ -268,6 +282,11 @@ def results_page(shown: Excerpt) -> str:
         f"(fingerpad {shown.version}, tissues {shown.materials}, seed {shown.seed}). "
         f"`{COMMAND}` writes the page from `results.json`; do not edit it by hand. Other pages link to it. "
         "The times are in the [benchmarks](../benchmarks/README.md).",
+        "## Summary by set of tissues",
+        "The paper's value, or that of people, beside each set with its own drive and its own fit "
+        "([which and why](decisions/paper-and-human.md)). The deflection and the force chose the moduli. The "
+        "noise and the hit rates chose the afferent of the set `human`.",
+        _summaries(shown.summaries),
         "## Indentations",
         _indentations(shown.indentations),
         "## This run and the paper",
@@ -304,6 +323,39 @@ def results_page(shown: Excerpt) -> str:
         _hit_rates(shown.percept),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+SUMMARY_ROWS = (
+    ("deflection_r2", "deflection under the cylinder, R²", "later model 0.93", 3),
+    ("force_plate_1mm_n", "force of a plate 1.0 mm deep [N]", "people 0.11-0.23", 2),
+    ("force_plate_2mm_n", "force of a plate 2.0 mm deep [N]", "people 0.50-1.04", 2),
+    ("force_disc_1mm_n", "force of a disc of 6.35 mm 1.0 mm deep [N]", ABSENT, 3),
+    ("fss_out_of_sample", "FSS out of sample", "0.81", 3),
+    ("fss_in_sample", "FSS in sample", "0.82 (fold 3)", 3),
+    ("dynamic_flat_hz", "dynamic rate under the flat face [spikes/s]", "54", 0),
+    ("dynamic_max_hz", "dynamic rate, largest [spikes/s]", "212", 0),
+    ("static_difference_hz", "static rate, difference [spikes/s]", "52", 0),
+    ("resting_rate_hz", "rate without a touch [spikes/s]", "0", 1),
+    ("noise_sigma", "noise that fits people", "0.055", 3),
+    ("euclidean_rms_same_noise", "Euclidean Distance at that noise, rms to people", "fits", 3),
+    ("hit_rate_296", "hit rate at 296 /m, at 0.0 and at 0.2 mm", "people 0.58", 3),
+    ("hit_rate_365", "hit rate at 365 /m, at 0.0 and at 0.2 mm", "people 0.95", 3),
+    ("weber_144", "Weber fraction at 144 /m", "people 0.10-0.14", 3),
+    ("weber_287", "Weber fraction at 287 /m", "people 0.10-0.14", 3),
+)
+"""Field, name, value of the paper or of people, and digits."""
+
+
+def _summaries(summaries: Mapping[str, Summary]) -> str:
+    def shown(value: object, digits: int) -> str:
+        values = value if isinstance(value, tuple) else (value,)
+        return ", ".join(fixed(each, digits) for each in values)
+
+    rows = [
+        (name, paper, *(shown(getattr(summary, field), digits) for summary in summaries.values()))
+        for field, name, paper, digits in SUMMARY_ROWS
+    ]
+    return table(("quantity", "paper or people", *(f"`{name}`" for name in summaries)), rows)
 
 
 def _linked(note: str) -> str:

@@ -44,22 +44,22 @@ _PAPER_SET = Source(
     "points, strain energy density in both terms, standard resolution",
     "assumed",
 )
-PAPER_INTERCEPT = _PAPER_SET("fitted intercept beta, set paper", 2.32e-7, "mA")
-PAPER_DYNAMIC_GAIN = _PAPER_SET("fitted dynamic gain k_d, set paper", 1.02e-4, "mA ms/kPa")
-PAPER_STATIC_GAIN = _PAPER_SET("fitted static gain k_s, set paper", 5.63e-7, "mA/kPa")
-PAPER_TIME_CONSTANT = _PAPER_SET("fitted membrane time constant tau, set paper", 71.8, "ms")
-PAPER_CAPACITANCE = _PAPER_SET("fitted membrane capacitance C, set paper", 6.03e-7, "mF")
-PAPER_THRESHOLD = _PAPER_SET("fitted threshold v, set paper", 30.2, "mV")
+PAPER_INTERCEPT = _PAPER_SET("fitted intercept beta, set paper", 4.13e-8, "mA")
+PAPER_DYNAMIC_GAIN = _PAPER_SET("fitted dynamic gain k_d, set paper", 2.435e-4, "mA ms/kPa")
+PAPER_STATIC_GAIN = _PAPER_SET("fitted static gain k_s, set paper", 2.347e-6, "mA/kPa")
+PAPER_TIME_CONSTANT = _PAPER_SET("fitted membrane time constant tau, set paper", 70.5, "ms")
+PAPER_CAPACITANCE = _PAPER_SET("fitted membrane capacitance C, set paper", 8.69e-7, "mF")
+PAPER_THRESHOLD = _PAPER_SET("fitted threshold v, set paper", 43.45, "mV")
 
 _HUMAN_SET = Source(
     "our fit of all 36 bar shifts and of two hit rates of people with the tissues human: compressive stress "
     "in both terms, standard resolution",
     "assumed",
 )
-HUMAN_INTERCEPT = _HUMAN_SET("fitted intercept beta, set human", -9.24e-7, "mA")
-HUMAN_DYNAMIC_GAIN = _HUMAN_SET("fitted dynamic gain k_d, set human", 6.89e-5, "mA ms/kPa")
-HUMAN_STATIC_GAIN = _HUMAN_SET("fitted static gain k_s, set human", 5.60e-7, "mA/kPa")
-HUMAN_TIME_CONSTANT = _HUMAN_SET("fitted membrane time constant tau, set human", 59.6, "ms")
+HUMAN_INTERCEPT = _HUMAN_SET("fitted intercept beta, set human", -8.99e-7, "mA")
+HUMAN_DYNAMIC_GAIN = _HUMAN_SET("fitted dynamic gain k_d, set human", 7.05e-5, "mA ms/kPa")
+HUMAN_STATIC_GAIN = _HUMAN_SET("fitted static gain k_s, set human", 5.705e-7, "mA/kPa")
+HUMAN_TIME_CONSTANT = _HUMAN_SET("fitted membrane time constant tau, set human", 58.86, "ms")
 REFRACTORY = Published("refractory period", 1.0, "ms", "Gerling et al. 2014, section 2.1.3", "paper")
 DIFFERENCE_STEP = Published(
     "step h of the rate of change of energy density", 0.001, "ms", "Gerling et al. 2014, Eq. 2", "paper"

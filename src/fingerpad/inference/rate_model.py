@@ -142,7 +142,7 @@ class AfferentModel:
     >>> [drive.n_sites for drive in model.drives]
     [2, 1]
     >>> model.evaluate(Afferent.for_tissues("paper").parameters)[1].round().tolist()
-    [63.0, 63.0, 63.0]
+    [106.0, 106.0, 106.0]
     """
 
     drives: tuple[Drive, ...]

@@ -30,8 +30,8 @@ from fingerpad.inference.rate_model import AfferentModel, RateModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
 
-WEIGHT = 0.5
-"""Weight of the squared differences of hit rates: 0.1 in each of eight costs as much as 0.04 of FSS."""
+WEIGHT = 2.0
+"""Weight of the squared differences of hit rates: 0.05 in each of eight costs as much as 0.04 of FSS."""
 
 FIRST_SPREAD, MOST_EVALUATIONS = 0.3, 600
 """CMA-ES: standard deviation of the first generation in units of the scales, and most evaluations."""

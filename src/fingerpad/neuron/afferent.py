@@ -69,7 +69,7 @@ class Afferent:
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
     >>> dynamic_hz, static_hz = Afferent.for_tissues("paper").rates(sed)
     >>> dynamic_hz.round().tolist(), static_hz.round().tolist()
-    ([217.0], [63.0])
+    ([258.0], [106.0])
     """
 
     intercept_ma: float = neuron.HUMAN_INTERCEPT.value
