@@ -5,7 +5,7 @@ import re
 import struct
 import subprocess
 import sys
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 
 import matplotlib
 import numpy as np
@@ -17,6 +17,7 @@ from fingerpad.experiments.gerling2014.nail_border import NailBorder
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
 from fingerpad.experiments.gerling2014.response_maps import PopulationMaps
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
+from fingerpad.experiments.gerling2014.summary import Summary
 from fingerpad.report import (
     discrimination,
     nail,
@@ -45,10 +46,15 @@ PARAMETERS = {
 }
 
 
+SUMMARY = [field.name for field in fields(Summary)]
+
+
 def synthetic_results() -> dict:
     """Results with every section, shaped like a run and plausible in size."""
     return {
+        "summary": dict.fromkeys(SUMMARY, 0.5) | {"hit_rate_296": (0.6, 0.6), "hit_rate_365": (0.9, 0.9)},
         "skin_deflection": _skin_deflection(),
+        "skin_force": dict.fromkeys(("deflection_r2", "plate_1mm_n", "plate_2mm_n", "disc_1mm_n"), 0.5),
         "single_unit": _single_unit(),
         "single_unit_uncertainty": _single_unit_uncertainty(),
         "discrimination": discrimination_section(),
@@ -154,6 +160,9 @@ def _single_unit() -> dict:
         "fss_in_sample_static": 0.92,
         "fss_out_of_sample": 0.84,
         "fss_training_mean": 0.85,
+        "method": "response surface",
+        "dynamic_quantity": "stored",
+        "static_quantity": "stored",
         "parameters": PARAMETERS,
         "units": {
             "intercept_ma": "mA",

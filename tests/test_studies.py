@@ -20,6 +20,7 @@ from fingerpad.experiments.gerling2014 import (
     skin_deflection,
     sphere_discrimination,
 )
+from fingerpad.experiments.gerling2014.skin_force import SkinForce
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
@@ -268,7 +269,7 @@ def test_the_fit_finds_what_a_known_afferent_answered(synthetic_problem, synthet
 def test_single_unit_result_names_every_number(synthetic_problem, synthetic_fit):
     problem, _ = synthetic_problem
     best, folds = synthetic_fit
-    found = single_unit.single_unit_result(problem, best, folds)
+    found = single_unit.single_unit_result(problem, best, folds, Afferent(), "response surface")
     shift_mm = bar_firing_rates().shift_mm
     dynamic, static = problem.model.evaluate(best.parameters)
     np.testing.assert_array_equal(found.dynamic_rate_hz, dynamic)
@@ -638,12 +639,16 @@ def good_results():
     rates = ("dynamic_rate_hz", "static_rate_hz", "observed_dynamic_rate_hz", "observed_static_rate_hz")
     return {
         "skin_deflection": {**trials, "observed": observed},
+        "skin_force": {"deflection_r2": 0.97, "plate_1mm_n": 0.2, "plate_2mm_n": 0.7, "disc_1mm_n": 0.1},
         "single_unit": {
             "fss_out_of_sample": 0.82,
             "fss_in_sample": 0.83,
             "fss_in_sample_dynamic": 0.7,
             "fss_in_sample_static": 0.9,
             "fss_training_mean": 0.85,
+            "method": "response surface",
+            "dynamic_quantity": "stored",
+            "static_quantity": "stored",
             "parameters": {},
             "units": {},
             "shift_mm": [],
@@ -667,6 +672,7 @@ def rows(results):
 def compared(results):
     parts = {
         "skin_deflection": skin_deflection.SkinDeflectionResult,
+        "skin_force": SkinForce,
         "single_unit": single_unit.SingleUnitResult,
         "discrimination": SphereDiscrimination,
         "nail": nail_border.NailBorder,
@@ -698,6 +704,7 @@ def worse(*path):
 
 
 R2 = "Trial 3, deflection under the cylinder, R²"
+PLATE = "Tissues of the run, force of a flat plate {} mm deep [N]"
 OUT_OF_SAMPLE = "Single unit, FSS out of sample (mean of six folds)"
 IN_SAMPLE = "Single unit, FSS in sample (all 36 shifts)"
 FOLD_3 = "Fold 3, FSS of the testing set"
@@ -722,6 +729,12 @@ STATISTICS = ("discrimination", "statistics")
     ("change", "missed"),
     [
         (worse("skin_deflection", "trial3", "cylinder", "r2", 0.9299), {R2}),
+        (
+            worse("skin_force", "deflection_r2", 0.9299),
+            {"Tissues of the run, deflection under the cylinder, R²"},
+        ),
+        (worse("skin_force", "plate_1mm_n", 0.231), {PLATE.format(1)}),
+        (worse("skin_force", "plate_2mm_n", 0.499), {PLATE.format(2)}),
         (worse("single_unit", "fss_out_of_sample", 0.8099), {OUT_OF_SAMPLE}),
         (worse("single_unit", "fss_in_sample", 0.8199), {IN_SAMPLE}),
         (worse("single_unit", "folds", 2, "fss_test", 0.8369), {FOLD_3}),

@@ -189,12 +189,12 @@ def test_an_afferent_is_ours_or_ones_own_numbers_or_of_a_file_of_results(tmp_pat
     quantities = {"dynamic_quantity": "stored", "static_quantity": "work"}
     for name, kind, results in (
         ("fit.json", FitFile, {"fit": {"parameters": six}, **quantities}),
-        ("results.json", ReproductionResult, {"single_unit": {"parameters": six}}),
+        ("results.json", ReproductionResult, {"single_unit": {"parameters": six, **quantities}}),
     ):
         named, version = file_format(kind)
         (tmp_path / name).write_text(json.dumps(results | {"format": named, "format_version": version}))
         found = task_afferent(parse_task(changed(SPHERES, afferent=name)), tmp_path)
-        assert found == (replace(expected, **quantities) if name == "fit.json" else expected)
+        assert found == replace(expected, **quantities)
 
 
 def test_the_resolution_can_be_replaced_and_nothing_else_changes(tmp_path):

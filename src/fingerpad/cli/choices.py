@@ -1,7 +1,9 @@
 """Values of options, for the help. The modules behind the commands check them."""
 
-from fingerpad.data.tissues import DEFAULT_TISSUES as DEFAULT_TISSUES
 from fingerpad.skin.fields import sampled_fields
+
+DEFAULT_TISSUES, REPRODUCED_TISSUES = "trial3", "human"
+"""Tissues of most commands, and of `reproduce` and `validate`; as in `fingerpad.data.tissues`."""
 
 RESOLUTION_CHOICES = ("quick", "standard", "paper")
 INDENTER_CHOICES = ("sphere", "cylinder", "bar", "line", "punch", "plate", "edge", "gap", "grating")

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.choices import DEFAULT_TISSUES, KIND_CHOICES, LOADING_CHOICES
+from fingerpad.cli.choices import KIND_CHOICES, LOADING_CHOICES, REPRODUCED_TISSUES
 from fingerpad.cli.options import Jobs, Materials, Resolution
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.core.errors import InputError
@@ -27,7 +27,7 @@ def validate_command(
         Path, typer.Option(help="Folder for page, figure, results and stored indentations.")
     ] = Path("validate"),
     resolution: Resolution = "standard",
-    materials: Materials = DEFAULT_TISSUES,
+    materials: Materials = REPRODUCED_TISSUES,
     afferent: Annotated[
         Path | None,
         typer.Option(

@@ -39,6 +39,19 @@ THRESHOLD = _MEMBRANE("threshold v of the membrane potential at the start", 50.0
 DRIVEN_BY = {"human": "compressive_stress"}
 """Quantity that drives both terms of the current with a set of tissues, by its name; SED with all others."""
 
+_TRIAL_3 = Source(
+    "our fit of all 36 bar shifts: response surface method from the paper's start points, strain "
+    "energy density at standard resolution with the stand-in materials of Trial 3; silent without a "
+    "touch",
+    "assumed",
+)
+TRIAL_3_INTERCEPT = _TRIAL_3("fitted intercept beta", 2.32e-7, "mA")
+TRIAL_3_DYNAMIC_GAIN = _TRIAL_3("fitted dynamic gain k_d", 1.02e-4, "mA ms/kPa")
+TRIAL_3_STATIC_GAIN = _TRIAL_3("fitted static gain k_s", 5.63e-7, "mA/kPa")
+TRIAL_3_TIME_CONSTANT = _TRIAL_3("fitted membrane time constant tau", 71.8, "ms")
+TRIAL_3_CAPACITANCE = _TRIAL_3("fitted membrane capacitance C", 6.03e-7, "mF")
+TRIAL_3_THRESHOLD = _TRIAL_3("fitted threshold v", 30.2, "mV")
+
 _PAPER_SET = Source(
     "our fit of all 36 bar shifts with the tissues paper: response surface method from the paper's start "
     "points, strain energy density in both terms, standard resolution",

@@ -141,8 +141,8 @@ class AfferentModel:
     >>> model = AfferentModel.of_traces([short, longer, short])
     >>> [drive.n_sites for drive in model.drives]
     [2, 1]
-    >>> model.evaluate(Afferent.for_tissues("paper").parameters)[1].round().tolist()
-    [106.0, 106.0, 106.0]
+    >>> model.evaluate(Afferent().parameters)[1].round().tolist()
+    [63.0, 63.0, 63.0]
     """
 
     drives: tuple[Drive, ...]

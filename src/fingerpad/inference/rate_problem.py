@@ -44,8 +44,8 @@ class RateProblem:
     >>> from fingerpad.inference.rate_model import AfferentModel
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
     >>> model = AfferentModel.of_traces(sed)
-    >>> problem = RateProblem(model, RateRecordings(("flat",), [258.0], [212.0]))
-    >>> fitted = Afferent.for_tissues("paper").parameters
+    >>> problem = RateProblem(model, RateRecordings(("flat",), [217.0], [126.0]))
+    >>> fitted = Afferent().parameters
     >>> round(problem.score(fitted, np.array([0])), 2)  # static rates half as observed
     0.81
     """

@@ -33,9 +33,9 @@ PARAMETER_UNITS = ("mA", "mA ms/kPa", "mA/kPa", "ms", "mF", "mV")
 class Afferent:
     """A slowly adapting type I (SAI) afferent.
 
-    The defaults are the fit to the recordings under the shifted bar with the tissues `human`
-    (`fingerpad.data.neuron`, names that begin with HUMAN): compressive stress drives both terms. They hold
-    for the finger and tissues with which they were fitted; `for_tissues` has those of the others.
+    The defaults are the fit to the recordings under the shifted bar with the tissues `trial3`
+    (`fingerpad.data.neuron`, names that begin with TRIAL_3). They hold for the finger and tissues with which
+    they were fitted; `for_tissues` has those of other sets.
 
     Parameters
     ----------
@@ -67,20 +67,20 @@ class Afferent:
     SED rises to 2 kPa in 50 ms and stays: the rate is high in the ramp and low in the hold.
 
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-    >>> dynamic_hz, static_hz = Afferent.for_tissues("paper").rates(sed)
+    >>> dynamic_hz, static_hz = Afferent().rates(sed)
     >>> dynamic_hz.round().tolist(), static_hz.round().tolist()
-    ([258.0], [106.0])
+    ([217.0], [63.0])
     """
 
-    intercept_ma: float = neuron.HUMAN_INTERCEPT.value
-    dynamic_gain: float = neuron.HUMAN_DYNAMIC_GAIN.value
-    static_gain: float = neuron.HUMAN_STATIC_GAIN.value
-    time_constant_ms: float = neuron.HUMAN_TIME_CONSTANT.value
-    capacitance_mf: float = neuron.CAPACITANCE.value
-    threshold_mv: float = neuron.THRESHOLD.value
+    intercept_ma: float = neuron.TRIAL_3_INTERCEPT.value
+    dynamic_gain: float = neuron.TRIAL_3_DYNAMIC_GAIN.value
+    static_gain: float = neuron.TRIAL_3_STATIC_GAIN.value
+    time_constant_ms: float = neuron.TRIAL_3_TIME_CONSTANT.value
+    capacitance_mf: float = neuron.TRIAL_3_CAPACITANCE.value
+    threshold_mv: float = neuron.TRIAL_3_THRESHOLD.value
     refractory_ms: float = neuron.REFRACTORY.value
-    dynamic_quantity: str = neuron.DRIVEN_BY["human"]
-    static_quantity: str = neuron.DRIVEN_BY["human"]
+    dynamic_quantity: str = STORED_ENERGY
+    static_quantity: str = STORED_ENERGY
 
     def __post_init__(self) -> None:
         # Both stages check their parameters when they are made.
@@ -93,7 +93,8 @@ class Afferent:
         Parameters
         ----------
         tissues : str
-            "human", or any other name: the fit with the set `paper`, driven by strain energy density (SED).
+            "human", driven by compressive stress, or "paper", driven by strain energy density (SED). Any
+            other name returns the default afferent, fitted with "trial3".
 
         Returns
         -------
@@ -101,21 +102,32 @@ class Afferent:
 
         Examples
         --------
-        >>> Afferent.for_tissues("human") == Afferent(), Afferent.for_tissues("paper").static_quantity
-        (True, 'stored')
+        >>> Afferent.for_tissues("human").static_quantity, Afferent.for_tissues("paper").static_quantity
+        ('compressive_stress', 'stored')
+        >>> Afferent.for_tissues("trial3") == Afferent()
+        True
         """
-        if tissues in neuron.DRIVEN_BY:
-            return cls()
-        return cls(
-            neuron.PAPER_INTERCEPT.value,
-            neuron.PAPER_DYNAMIC_GAIN.value,
-            neuron.PAPER_STATIC_GAIN.value,
-            neuron.PAPER_TIME_CONSTANT.value,
-            neuron.PAPER_CAPACITANCE.value,
-            neuron.PAPER_THRESHOLD.value,
-            dynamic_quantity=STORED_ENERGY,
-            static_quantity=STORED_ENERGY,
-        )
+        if tissues == "human":
+            return cls(
+                neuron.HUMAN_INTERCEPT.value,
+                neuron.HUMAN_DYNAMIC_GAIN.value,
+                neuron.HUMAN_STATIC_GAIN.value,
+                neuron.HUMAN_TIME_CONSTANT.value,
+                neuron.CAPACITANCE.value,
+                neuron.THRESHOLD.value,
+                dynamic_quantity=neuron.DRIVEN_BY["human"],
+                static_quantity=neuron.DRIVEN_BY["human"],
+            )
+        if tissues == "paper":
+            return cls(
+                neuron.PAPER_INTERCEPT.value,
+                neuron.PAPER_DYNAMIC_GAIN.value,
+                neuron.PAPER_STATIC_GAIN.value,
+                neuron.PAPER_TIME_CONSTANT.value,
+                neuron.PAPER_CAPACITANCE.value,
+                neuron.PAPER_THRESHOLD.value,
+            )
+        return cls()
 
     @classmethod
     def from_parameters(

@@ -309,8 +309,8 @@ def indent(
     stimulus : RampAndHold or ForceRampAndHold, optional
         The motion, by depth or by force; the paper's by default.
     materials : str or Tissues
-        "human" (default: one set for deflection, force, firing and percept), "paper" (closest to the paper's
-        numbers), "trial1", "trial2", "trial3" (paper, section 2.2.1), "trial2_wu", "trial3_wu",
+        "human" (one set for deflection, force, firing and percept), "paper" (closest to the paper's numbers),
+        "trial1", "trial2", "trial3" (paper, section 2.2.1), "trial2_wu", "trial3_wu",
         "trial3_stiffening", "maeno1998", "wu2007", "gerling2014_fit", or tissues of your own.
     resolution : {"quick", "standard", "paper"}
         How fine the mesh and the steps are.

@@ -62,7 +62,10 @@ def receptor_sed(
     dynamic_quantity, static_quantity : str, optional
         What the two terms follow.
     """
-    return SedTraces.joined([skin.sed(RECEPTOR, dynamic_quantity, static_quantity) for skin in responses])
+    quantities = (dynamic_quantity, static_quantity)
+    # A skin without other quantities than SED need not accept the arguments of the extension.
+    further = () if quantities == (STORED_ENERGY, STORED_ENERGY) else quantities
+    return SedTraces.joined([skin.sed(RECEPTOR, *further) for skin in responses])
 
 
 def receptor_traces(responses: list[SkinResponse], quantity: str) -> SedTraces:
