@@ -704,6 +704,7 @@ def worse(*path):
 
 
 R2 = "Trial 3, deflection under the cylinder, R²"
+OWN_R2 = "Tissues of the run, deflection under the cylinder, R²"
 PLATE = "Tissues of the run, force of a flat plate {} mm deep [N]"
 OUT_OF_SAMPLE = "Single unit, FSS out of sample (mean of six folds)"
 IN_SAMPLE = "Single unit, FSS in sample (all 36 shifts)"
