@@ -49,7 +49,11 @@ def test_there_and_back(along, share):
     place = np.array([[along, share * float(SKIN.half_girth_mm(along))]])
     point = SKIN.points(place)
     assert abs(FINGER.level(point)[0]) < 1e-12
-    assert_allclose(SKIN.places(point), place, rtol=0, atol=1e-7)
+    found = SKIN.places(point)
+    assert_allclose(SKIN.points(found), point, rtol=0, atol=1e-7)
+    if abs(share) > 0.999:  # both ends of the girth are one point, the seam on the back
+        place[0, 1] = np.copysign(place[0, 1], found[0, 1])
+    assert_allclose(found, place, rtol=0, atol=1e-7)
 
 
 def test_areas_of_the_plane_are_areas_of_the_skin():

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from fingerpad import cli
 from fingerpad.cli import choices
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.data import cylinder_deflection, protocol
+from fingerpad.data import cylinder_deflection, protocol, tissues
 from fingerpad.experiments import scores
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.skin_deflection import deflection_r2, deflection_touches
@@ -547,7 +547,8 @@ def test_options_and_their_defaults_are_those_of_the_modules():
     defaults = {option.name: option.default for option in command().params}
     assert defaults["loading"] == FingertipModel(Conditions()).loading
     assert defaults["static_window"] == protocol.STATIC_WINDOW.value
-    assert defaults["materials"] == Conditions().materials
+    assert defaults["materials"] == tissues.REPRODUCED_TISSUES == choices.REPRODUCED_TISSUES
+    assert Conditions().materials == tissues.DEFAULT_TISSUES == choices.DEFAULT_TISSUES
     assert FingertipModel(Conditions()).afferent == Afferent()
 
 

@@ -200,8 +200,11 @@ def test_the_skin_is_sampled_beside_the_receptor_and_for_the_other_quantity():
             values = np.outer([0.0, 1.0, 0.8], self.peak_kpa * (1.0 + place))
             return {"stored": 1.0, "von_mises": 10.0}[quantity] * values
 
-        def sed(self, sites):
-            return SedTraces(self.times_ms, self.sample("stored", sites), np.array(self.kinks_ms))
+        def sed(self, sites, dynamic_quantity="stored", static_quantity="stored"):
+            static, dynamic = (self.sample(name, sites) for name in (static_quantity, dynamic_quantity))
+            further = None if dynamic_quantity == static_quantity else dynamic
+            names = (dynamic_quantity, static_quantity)
+            return SedTraces(self.times_ms, static, np.array(self.kinks_ms), further, *names)
 
     skins = [Skin(1.0), Skin(2.0)]
     beside = fit_methods.traces_beside(skins)

@@ -101,14 +101,14 @@ def fit_recordings(
 
     Examples
     --------
-    Four stimuli whose energy density rises within 50 ms and stays, and an afferent that we know:
+    Six stimuli whose energy density rises within 50 ms and stays, and an afferent that we know:
 
     >>> import fingerpad as fp
-    >>> height_kpa = [0.8, 1.5, 2.2, 3.0]
+    >>> height_kpa = [0.8, 1.2, 1.6, 2.0, 2.5, 3.0]
     >>> sed = fp.SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 1.0], height_kpa), kinks_ms=[50.0])
     >>> known = fp.Afferent.from_parameters([0.0, 1.5e-4, 9e-7, 60.0, 1e-6, 50.0])
-    >>> recordings = RateRecordings(("low", "middle", "high", "highest"), *known.rates(sed))
-    >>> fit = fit_recordings(sed, recordings, memberships=[0, 1, 0, 1])
+    >>> recordings = RateRecordings(("a", "b", "c", "d", "e", "f"), *known.rates(sed))
+    >>> fit = fit_recordings(sed, recordings, memberships=[0, 1, 0, 1, 0, 1])
     >>> fit.fss_in_sample > 0.99, fit.fss_out_of_sample > 0.97
     (True, True)
     """
