@@ -2,7 +2,7 @@
 
 | command | what it studies |
 | --- | --- |
-| `materials` | sets of tissues, polynomials fitted to hyperfoams, order of the trials |
+| `tissue-search` | tissues and drives on four levels, effect of each parameter, order of the trials |
 | `drives` | quantities that drive the afferent, explanations of the dynamic rates, sampling depths |
 | `methods` | start points and units, methods of fitting, models and their limits |
 | `spike-fit` | fits to spike trains, variability of interspike intervals |

@@ -14,8 +14,8 @@ from studies import (
     paper_size,
     population_timing,
     spike_fit,
+    tissue_search,
 )
-from studies.commands.materials import materials_command
 from studies.commands.results import results_command
 from studies.pages.code_efficiency import code_efficiency_page
 from studies.pages.drive_study import drives_page
@@ -25,9 +25,16 @@ from studies.pages.mesh_refinement import MESH_REFINEMENT
 from studies.pages.paper_size import PAPER_SIZE
 from studies.pages.population_timing import population_timing_page
 from studies.pages.spike_fit import spike_fit_page
+from studies.pages.tissue_search import tissue_search_page
 from studies.study import Study, command_of
 
 STUDIES = (
+    Study(
+        "tissue-search",
+        "Compare tissues and drives on deflection, plate force, firing and percept.",
+        tissue_search.run,
+        tissue_search_page,
+    ),
     Study(
         "drives",
         "Compare what may drive the afferent: quantities, explanations of the dynamic rates, depths.",
@@ -83,7 +90,6 @@ STUDIES = (
 """Studies without options of their own."""
 
 app = typer.Typer(help="Research on the model itself.", add_completion=False, pretty_exceptions_enable=False)
-app.command("materials")(materials_command)
 app.command("results")(results_command)
 for study in STUDIES:
     app.command(study.name)(command_of(study))

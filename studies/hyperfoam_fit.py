@@ -13,6 +13,8 @@ from scipy.optimize import nnls
 
 from fingerpad.core.checks import FloatArray, float_array, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.results import Vector, result_class
+from fingerpad.data import tissues as published
 
 POINTS = 60
 """Stretches between the most compressed and the unloaded state at which the stress is fitted."""
@@ -160,3 +162,59 @@ def _stretches(stretch: ArrayLike) -> FloatArray:
     if not (length > 0.0).all():
         raise InputError(f"stretch must be above 0 everywhere: got {length.min():g}.")
     return length
+
+
+COMPRESSIONS = (0.3, 0.5)
+"""Shortenings up to which Wu's stress is fitted for the table; the second is used."""
+
+
+@result_class
+class PolynomialOfFoam:
+    """A polynomial fitted to one of Wu's hyperfoams.
+
+    Parameters
+    ----------
+    layer : str
+        Of the skin.
+    poisson, compression : float
+        Poisson ratio, and the shortening up to which the stress is fitted. [1]
+    coefficients_kpa : array (5,)
+        C10, C01, C20, C11, C02. [kPa]
+    misfit : float
+        Root mean square of the stress error over the largest stress. [1]
+    """
+
+    layer: str
+    poisson: float
+    compression: float
+    coefficients_kpa: Vector
+    misfit: float
+
+
+def polynomials() -> tuple[PolynomialOfFoam, ...]:
+    """Coefficients of the polynomials that stand for Wu's hyperfoams, and how well they do. [kPa]
+
+    Examples
+    --------
+    >>> [(found.layer, found.poisson, found.compression) for found in polynomials()][0]
+    ('dermis', 0.4, 0.3)
+    """
+    layers = {
+        "dermis": (published.WU_SKIN_HYPERFOAM_MU.value, published.WU_SKIN_HYPERFOAM_ALPHA.value),
+        "subcutis": (published.WU_SUBCUTIS_HYPERFOAM_MU.value, published.WU_SUBCUTIS_HYPERFOAM_ALPHA.value),
+    }
+    rows = []
+    for layer, (mu, alpha) in layers.items():
+        for poisson in (published.WU_HYPERFOAM_POISSON.value, published.POISSON_RATIO.value):
+            for compression in COMPRESSIONS:
+                coefficients, misfit = polynomial_of_hyperfoam(mu, alpha, poisson, compression)
+                rows.append(
+                    PolynomialOfFoam(
+                        layer=layer,
+                        poisson=poisson,
+                        compression=compression,
+                        coefficients_kpa=coefficients,
+                        misfit=misfit,
+                    )
+                )
+    return tuple(rows)

@@ -19,7 +19,7 @@ from fingerpad.geometry.indenters import Cylinder
 from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
-from studies.material_candidates import (
+from studies.tissue_candidates import (
     NU,
     SOFT_EPIDERMIS_KPA,
     STIFF_EPIDERMIS_KPA,

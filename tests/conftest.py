@@ -26,7 +26,7 @@ LONGEST = (
     "test_studies.py",
     "test_estimation_afferent_posterior.py",
     "studies/test_spike_fit.py",
-    "studies/test_material_sets.py",
+    "studies/test_tissue_search.py",
     "test_recording_extras.py",
     "test_single_unit_uncertainty.py",
     "test_validation.py",

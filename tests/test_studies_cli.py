@@ -66,9 +66,9 @@ def test_every_study_has_a_command_and_a_line_of_help(call):
         patch.setenv("COLUMNS", "200")
         _, said, _ = call("--help")
     names = [study.name for study in command.STUDIES]
-    assert len(names) == len(set(names)) == 8
-    assert all(f" {name} " in said for name in (*names, "materials", "results"))
-    assert all(f"`{name}`" in studies.__doc__ for name in (*names, "materials", "results"))
+    assert len(names) == len(set(names)) == 9
+    assert all(f" {name} " in said for name in (*names, "results"))
+    assert all(f"`{name}`" in studies.__doc__ for name in (*names, "results"))
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,6 @@ def test_every_study_has_a_command_and_a_line_of_help(call):
         (["drives", "--resolution", "fine"], "resolution must be one of quick, standard, paper", "'fine'"),
         (["paper-size", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
         (["mesh-refinement", "--resolution", "quick"], "No such option", "--resolution"),
-        (["materials", "--name", "Trial 4"], "--name must be one of Trial 1", "'Trial 4'"),
         (["results", "none.json"], "none.json cannot be read as JSON", "No such file"),
         (["meshes"], "No such command", "'meshes'"),
     ],

@@ -346,6 +346,11 @@ class Observer:
     ):
         self.rates, self.neighbours, self.noise_sigma, self.draws = rates, neighbours, noise_sigma, draws
 
+    @property
+    def farthest_per_m(self) -> float:
+        """Largest curvature between which rates are interpolated. [1/m]"""
+        return float(np.exp(self.rates.x[-1]))
+
     def responses(self, curvature_per_m: float) -> FloatArray:
         """Rates (n_receptors,) under a sphere. [spikes/s]"""
         return self.rates(np.log(curvature_per_m))
@@ -358,6 +363,38 @@ class Observer:
         """Hit rate of the comparison against the standard. [0-1]"""
         pair = [self.responses(standard_per_m), self.responses(comparison_per_m)]
         return float(expected_hit_rates(pair, self.neighbours, self.noise_sigma, self.draws)[0])
+
+
+def just_noticeable_difference(observer: Observer, standard_per_m: float) -> float:
+    """How much more curved a sphere must be to be discriminated in `PROPORTION` of trials. [1/m]
+
+    Parameters
+    ----------
+    observer : Observer
+        Model that judges.
+    standard_per_m : float
+        Curvature of the standard. [1/m]
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ConvergenceError
+        If no sphere is discriminated from the standard often enough.
+    """
+    farthest = observer.farthest_per_m
+
+    def missing(comparison_per_m: float) -> float:
+        return observer.hit_rate(standard_per_m, comparison_per_m) - PROPORTION
+
+    if missing(farthest) <= 0.0:
+        raise ConvergenceError(
+            f"No sphere up to {farthest:g} /m is discriminated from {standard_per_m:g} /m in "
+            f"{PROPORTION:.0%} of trials: use spheres of larger curvature, or lower the noise."
+        )
+    return float(brentq(missing, standard_per_m, farthest, xtol=1e-3)) - standard_per_m
 
 
 def threshold_at(observer: Observer, standard_per_m: float) -> CurvatureThreshold:
@@ -379,18 +416,7 @@ def threshold_at(observer: Observer, standard_per_m: float) -> CurvatureThreshol
     ConvergenceError
         If no sphere is discriminated from the standard often enough.
     """
-    farthest = float(np.exp(observer.rates.x[-1]))
-
-    def missing(comparison_per_m: float) -> float:
-        return observer.hit_rate(standard_per_m, comparison_per_m) - PROPORTION
-
-    if missing(farthest) <= 0.0:
-        raise ConvergenceError(
-            f"No sphere up to {farthest:g} /m is discriminated from {standard_per_m:g} /m in "
-            f"{PROPORTION:.0%} of trials: use spheres of larger curvature, or lower the noise."
-        )
-    jnd_per_m = float(brentq(missing, standard_per_m, farthest, xtol=1e-3)) - standard_per_m
-
+    jnd_per_m, farthest = just_noticeable_difference(observer, standard_per_m), observer.farthest_per_m
     steps = np.array([step for step in STEPS if standard_per_m * (1.0 + step) <= farthest])
     hit_rate = np.array([observer.hit_rate(standard_per_m, standard_per_m * (1.0 + step)) for step in steps])
     counts = np.round(JUDGEMENTS * hit_rate)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.results import Matrix, Vector, result_class
+from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014.discrepancy import (
@@ -42,6 +45,13 @@ another seed of the observers keeps the afferent."""
 
 CURVATURES = psychophysics.SPHERE_CURVATURES.value
 POSITIONS_MM = protocol.SPHERE_POSITIONS.value
+
+FITTED_SPHERES = tuple(
+    (position, curvature)
+    for position in POSITIONS_MM
+    for curvature in (CURVATURES[0], *psychophysics.GOODWIN_CURVATURES.value)
+)
+"""Position and curvature of the spheres that people discriminated, the standard first. [mm, 1/m]"""
 
 
 @result_class
@@ -131,18 +141,27 @@ def to_rates_and_hit_rates(
     quantity : str
         What drives both terms of the current.
     """
-    population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
-    n_receptors = len(population.positions_mm)
-    spheres = (CURVATURES[0], *psychophysics.GOODWIN_CURVATURES.value)
-    model = AfferentModel.of_traces(
+    sites = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0)).positions_mm
+    return fit_to_people(
         [
-            responses[position, curvature].sed(population.positions_mm, quantity, quantity)
-            for position in POSITIONS_MM
-            for curvature in spheres
+            responses[position, curvature].sed(sites, quantity, quantity)
+            for position, curvature in FITTED_SPHERES
         ]
     )
+
+
+def fit_to_people(traces: Sequence[SedTraces]) -> ToRatesAndHitRates:
+    """Return the method of `to_rates_and_hit_rates` for given drives of the afferents.
+
+    Parameters
+    ----------
+    traces : sequence of SedTraces
+        At the receptors of the population, one per sphere of `FITTED_SPHERES`.
+    """
+    population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
+    n_receptors = len(population.positions_mm)
     hit_rates = SphereHitRates(
-        model,
+        AfferentModel.of_traces(traces),
         n_positions=len(POSITIONS_MM),
         n_receptors=n_receptors,
         neighbours=neighbour_pairs(population.positions_mm, population.pitch_mm),

@@ -1,0 +1,705 @@
+"""A search for one finger on all levels: deflection, plate force, firing and percept of each candidate.
+
+Every candidate is pressed by a cylinder, a plate, a bar and spheres. One afferent is fitted to the firing
+rates under the bar and to people's hit rates at once, and is silent at rest. `evaluate` goes from a candidate
+to its levels; a search over parameters, or an emulator, calls nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import ConvergenceError
+from fingerpad.core.random_streams import Purpose, normals
+from fingerpad.core.results import Matrix, Number, Vector, result_class
+from fingerpad.core.signals import SedTraces
+from fingerpad.core.units import MN_PER_N
+from fingerpad.data import protocol, psychophysics
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.experiments.gerling2014 import single_unit
+from fingerpad.experiments.gerling2014.curvature_thresholds import (
+    Observer,
+    interpolated,
+    just_noticeable_difference,
+)
+from fingerpad.experiments.gerling2014.skin_deflection import deflection_r2
+from fingerpad.experiments.gerling2014.skin_force import PLATE_DEPTHS_MM
+from fingerpad.experiments.gerling2014.sphere_discrimination import (
+    FITTED_SPHERES,
+    POSITIONS_MM,
+    fit_to_people,
+)
+from fingerpad.experiments.manifest import Manifest
+from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.validation.observations import read_observations
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenters import Bar, Cylinder, Plate
+from fingerpad.geometry.motion import RampAndHold
+from fingerpad.inference.afferent_methods import bounds_of, by_differences, four_number_problem
+from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
+from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.rate_problem import RateProblem
+from fingerpad.inference.rates_and_hit_rates import CHANCE, ToRatesAndHitRates
+from fingerpad.neuron.afferent import PARAMETER_NAMES
+from fingerpad.neuron.population import Population
+from fingerpad.psychophysics.encoding import neighbour_pairs
+from fingerpad.psychophysics.noise_fit import (
+    NOISE_DRAWS,
+    expected_euclidean_hit_rates,
+    expected_hit_rates,
+    fit_noise_sigma,
+)
+from fingerpad.skin.sampling import SkinResponse
+from studies import trial_order
+from studies.drive_depths import borders_mm, read_in
+from studies.hyperfoam_fit import PolynomialOfFoam, polynomials
+from studies.tissue_candidates import HUMAN, LEVELS, Candidate, Reading, candidates, variations
+from studies.trial_order import TrialOrder
+
+SPHERES_PER_M = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
+
+FURTHER_SPHERES_PER_M = (144.0, 165.0, 190.0, 445.0)
+"""Spheres with which finalists are pressed besides, for the Weber fractions: about the lower standard and
+beyond the upper one. [1/m]"""
+
+SITE_MARGIN_MM = 0.3
+"""Fine zone of the one bar beyond its outermost shifted site. [mm]"""
+
+NOISE_SIGMA = psychophysics.NOISE_SIGMA.value
+PEOPLE = np.array(psychophysics.GOODWIN_HIT_RATES.value)
+STANDARDS_PER_M = (144.0, 287.0)
+"""Standards of the Weber fractions. [1/m]"""
+
+PLATE_OBSERVATIONS = Path(__file__).with_name("observations") / "plate_force.csv"
+
+Key = tuple[str, float, float]
+"""What is pressed, its size (depth, shift or curvature), and its position along the finger."""
+
+
+def touches(candidate: Candidate, conditions: Conditions) -> dict[Key, Touch]:
+    """All presses of one candidate, with its moduli before the common factor.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Its tissues, and whether it is a finalist.
+    conditions : Conditions
+        Finger and resolution; its materials are not used.
+
+    Returns
+    -------
+    dict of Touch
+        `("cylinder", diameter, 0)`, `("plate", depth, 0)`, `("bar", shift, 0)` and `("sphere", curvature,
+        position)`, in mm and 1/m; `ONE_BAR` for a bar that is read at shifted sites.
+    """
+    own, cylinder = replace(conditions, materials=candidate.tissues), Cylinder()
+    pressed: dict[Key, Touch] = {
+        ("cylinder", cylinder.diameter_mm, 0.0): own.touch(
+            cylinder, RECEPTOR_X_MM, own.deflection_grading(cylinder)
+        )
+    }
+    flat = own.touch(Plate(), RECEPTOR_X_MM, own.deflection_grading(Plate()))
+    for depth_mm in PLATE_DEPTHS_MM:
+        pressed["plate", depth_mm, 0.0] = replace(flat, stimulus=RampAndHold(depth_mm=depth_mm))
+    if candidate.finalist:
+        bars = zip(protocol.BAR_SHIFTS.value, single_unit.bar_touches(own), strict=True)
+        pressed |= {("bar", shift, 0.0): touch for shift, touch in bars}
+    else:
+        pressed[ONE_BAR] = own.touch(Bar(), RECEPTOR_X_MM, _wide_bar_grading(own), tilt_deg=own.skin_tilt_deg)
+    pressed |= {
+        ("sphere", curvature, position): own.sphere_touch(curvature, position)
+        for position in POSITIONS_MM
+        for curvature in SPHERES_PER_M
+    }
+    further = FURTHER_SPHERES_PER_M if candidate.finalist else ()
+    return pressed | {("sphere", curvature, 0.0): own.sphere_touch(curvature) for curvature in further}
+
+
+ONE_BAR: Key = ("one bar", 0.0, 0.0)
+"""The bar that is read at shifted sites."""
+
+
+def _wide_bar_grading(conditions: Conditions) -> Grading:
+    """Mesh of the single-unit study, fine over all shifted sites and not only about the receptor."""
+    farthest = max(abs(shift) for shift in protocol.BAR_SHIFTS.value)
+    return replace(conditions.bar_grading(), half_length_mm=farthest + SITE_MARGIN_MM)
+
+
+def plate_range_n() -> FloatArray:
+    """Smallest and largest observed force of the plate at each depth of `PLATE_DEPTHS_MM`, (2, 2). [N]"""
+    rows = read_observations(PLATE_OBSERVATIONS).rows
+    by_depth = [
+        [row.observed for row in rows if row.condition[1] == depth_mm] for depth_mm in PLATE_DEPTHS_MM
+    ]
+    return np.array([(min(forces), max(forces)) for forces in by_depth])
+
+
+def layer_at(skin: SkinResponse, depth_mm: float) -> int:
+    """Return the layer of elements that holds a depth below the receptor, counted from the skin, from 0."""
+    return int(np.searchsorted(borders_mm(skin.mesh), depth_mm, side="right")) - 1
+
+
+def read(skin: SkinResponse, reading: Reading, sites: FloatArray) -> SedTraces:
+    """Quantity that drives an afferent, raised to its exponent, in the place of SED.
+
+    Parameters
+    ----------
+    skin : SkinResponse
+        One press.
+    reading : Reading
+        What is read.
+    sites : array (n_sites, 2)
+        x and z of end organs. [mm]
+
+    Returns
+    -------
+    SedTraces
+        One column per site.
+    """
+    if reading.depth_mm is not None:
+        skin = read_in(skin, layer_at(skin, reading.depth_mm))
+    values = skin.sample(reading.quantity, sites) ** reading.exponent
+    return SedTraces(skin.times_ms, values, np.array(skin.kinks_ms))
+
+
+def driven(skin: SkinResponse, candidate: Candidate, sites: FloatArray) -> SedTraces:
+    """Traces that drive the afferents of a candidate at sites under one press; as of `read`."""
+    static = read(skin, candidate.reading, sites)
+    if candidate.dynamic is None:
+        return static
+    return single_unit.following(static, read(skin, candidate.dynamic, sites), candidate.dynamic.quantity)
+
+
+def bar_traces(
+    responses: Mapping[Key, SkinResponse], candidate: Candidate, conditions: Conditions
+) -> list[SedTraces]:
+    """Traces at the receptor, one column per shift of the bar.
+
+    From one bar, the sites move instead of it: a bar shifted by s towards the proximal end has the receptor
+    s distal of its axis, along the skin's tangent.
+    """
+    if ONE_BAR in responses:
+        along = float(np.cos(np.deg2rad(conditions.skin_tilt_deg)))
+        sites = [(RECEPTOR_X_MM + shift * along, 0.0) for shift in protocol.BAR_SHIFTS.value]
+        return [driven(responses[ONE_BAR], candidate, np.array(sites))]
+    receptor = np.array(single_unit.RECEPTOR)
+    return [driven(responses["bar", shift, 0.0], candidate, receptor) for shift in protocol.BAR_SHIFTS.value]
+
+
+@dataclass(frozen=True)
+class Skins:
+    """What the afferents of one candidate follow under bars and spheres.
+
+    Parameters
+    ----------
+    bars : list of SedTraces
+        At the receptor, one column per shift of the bar in all.
+    spheres : dict of SedTraces
+        At the receptors of the population, by curvature and position. [1/m, mm]
+    seed : int
+        Of the presentations behind expected hit rates.
+    """
+
+    bars: list[SedTraces]
+    spheres: Mapping[tuple[float, float], SedTraces]
+    seed: int = 0
+
+    @cached_property
+    def population(self) -> Population:
+        """Receptors about the contact point."""
+        return Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
+
+    @cached_property
+    def neighbours(self) -> np.ndarray:
+        """Pairs of the Gradient Sum."""
+        return neighbour_pairs(self.population.positions_mm, self.population.pitch_mm)
+
+    @cached_property
+    def draws(self) -> FloatArray:
+        """Presentations behind expected hit rates, (NOISE_DRAWS, n_receptors)."""
+        return normals(self.seed, 1, len(self.population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
+
+    @cached_property
+    def model(self) -> AfferentModel:
+        """The paper's model under the bar."""
+        return AfferentModel.of_traces(self.bars)
+
+    @cached_property
+    def problem(self) -> RateProblem:
+        """Rates recorded under the bar, and the model."""
+        return RateProblem(self.model, single_unit.bar_recordings())
+
+    @cached_property
+    def method(self) -> ToRatesAndHitRates:
+        """Fit to rates and hit rates; the afferent is silent at rest."""
+        return fit_to_people([self.spheres[curvature, position] for position, curvature in FITTED_SPHERES])
+
+    def static_hz(self, six: FloatArray, curvatures_per_m: Sequence[float], position_mm: float) -> FloatArray:
+        """Return static rates of the population, (n_curvatures, n_receptors). [spikes/s]"""
+        model = AfferentModel.of_traces(
+            [self.spheres[curvature, position_mm] for curvature in curvatures_per_m]
+        )
+        return model.evaluate(six)[1].reshape(len(curvatures_per_m), -1)
+
+
+@result_class
+class Deflection:
+    """Skin under cylinder and plate.
+
+    Parameters
+    ----------
+    r2 : float
+        Of the deflection under the cylinder. [1]
+    plate_force_n : array (2,)
+        Force of the plate at the depths of `PLATE_DEPTHS_MM`, at the end of the hold. [N]
+    factor_range : (float, float)
+        Common factors on all moduli with which both forces lie in people's ranges; NaN if there is none. [1]
+    """
+
+    r2: float
+    plate_force_n: Vector
+    factor_range: tuple[Number, Number]
+
+
+@result_class
+class Firing:
+    """Rates under the bar.
+
+    Parameters
+    ----------
+    fss, fss_out_of_sample : float
+        FSS over all shifts, and mean over the six folds on the shifts left out, of the afferent fitted to
+        rates and hit rates; NaN where no folds were fitted. [1]
+    fss_rates_alone : float
+        In sample, of the afferent fitted to the rates alone. [1]
+    dynamic_hz, static_hz : (float, float)
+        Smallest rate under the flat face of the bar, and largest rate. [spikes/s]
+    """
+
+    fss: float
+    fss_out_of_sample: Number
+    fss_rates_alone: float
+    dynamic_hz: tuple[float, float]
+    static_hz: tuple[float, float]
+
+
+@result_class
+class Percept:
+    """Discrimination of spheres by the population.
+
+    Parameters
+    ----------
+    noise_sigma : float
+        Noise at which the Gradient Sum meets people's two hit rates best; NaN if none does. [1]
+    hit_rates : array (n_positions, 2)
+        Of the Gradient Sum at the paper's noise. [0-1]
+    euclidean_rms : float
+        Difference of the Euclidean Distance from people, root mean square over spheres and positions, at
+        `noise_sigma`. [0-1]
+    euclidean_rms_paper : float
+        The same at the paper's noise. [0-1]
+    weber_fractions : array (2,)
+        At the standards of `STANDARDS_PER_M`, at `noise_sigma`; NaN if the standard was not pressed or no
+        pressed sphere is discriminated from it. [1]
+    """
+
+    noise_sigma: Number
+    hit_rates: Matrix
+    euclidean_rms: Number
+    euclidean_rms_paper: float
+    weber_fractions: Vector
+
+    @property
+    def shift_effect(self) -> float:
+        """Largest difference of a hit rate between the positions. [0-1]"""
+        return float(np.ptp(self.hit_rates, axis=0).max())
+
+
+@result_class
+class Levels:
+    """All levels of one candidate.
+
+    Parameters
+    ----------
+    deflection : Deflection
+        Cylinder and plate.
+    firing : Firing
+        Bar.
+    percept : Percept
+        Spheres.
+    parameters : dict of float
+        Six parameters of the afferent, by name.
+    """
+
+    deflection: Deflection
+    firing: Firing
+    percept: Percept
+    parameters: dict[str, float]
+
+
+def evaluate(
+    candidate: Candidate, responses: Mapping[Key, SkinResponse], conditions: Conditions, folds: bool = True
+) -> Levels:
+    """Compute all levels of a candidate from its presses.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        What drives the afferent, and the common factor on all moduli.
+    responses : mapping of SkinResponse
+        From `touches`.
+    conditions : Conditions
+        Finger and seed.
+    folds : bool, optional
+        Fit to the six folds, too: seven fits instead of one.
+
+    Returns
+    -------
+    Levels
+    """
+    sites = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0)).positions_mm
+    skins = Skins(
+        bar_traces(responses, candidate, conditions),
+        {
+            (curvature, position): driven(skin, candidate, sites)
+            for (body, curvature, position), skin in responses.items()
+            if body == "sphere"
+        },
+        conditions.seed,
+    )
+    firing, six = fitted(skins, folds)
+    return Levels(
+        deflection=deflection(responses, candidate.factor),
+        firing=firing,
+        percept=percept(skins, six),
+        parameters=dict(zip(PARAMETER_NAMES, six.tolist(), strict=True)),
+    )
+
+
+def deflection(responses: Mapping[Key, SkinResponse], factor: float = 1.0) -> Deflection:
+    """Return R² under the cylinder, and forces of the plate with all moduli multiplied by a common factor."""
+    force_n = (
+        np.array([responses["plate", depth, 0.0].force_mn[-1] for depth in PLATE_DEPTHS_MM])
+        * factor
+        / MN_PER_N
+    )
+    low, high = (plate_range_n() / force_n[:, None]).T
+    within = (low.max(), high.min()) if low.max() <= high.min() else (np.nan, np.nan)
+    return Deflection(
+        r2=deflection_r2(responses["cylinder", Cylinder().diameter_mm, 0.0].surface_profile()),
+        plate_force_n=force_n,
+        factor_range=within,
+    )
+
+
+def fitted(skins: Skins, folds: bool = True) -> tuple[Firing, FloatArray]:
+    """Fit one afferent to rates and hit rates, and return its rates and six parameters."""
+    problem, everything = skins.problem, np.arange(skins.problem.n_observations)
+    found = skins.method.fit(problem, everything)
+    validated = cross_validate(problem, skins.method, interleaved_folds(everything.size)) if folds else None
+    four = four_number_problem(skins.model, problem.recordings)
+    alone = by_differences(bounds_of(*skins.model.drives)).fit(four, everything)
+    dynamic, static = problem.model.evaluate(found.parameters)
+    firing = Firing(
+        fss=problem.score(found.parameters, everything),
+        fss_out_of_sample=np.nan if validated is None else validated.score_test,
+        fss_rates_alone=alone.score,
+        dynamic_hz=_flat_and_largest(dynamic),
+        static_hz=_flat_and_largest(static),
+    )
+    return firing, found.parameters
+
+
+def _flat_and_largest(rate_hz: FloatArray) -> tuple[float, float]:
+    """Smallest rate under the flat face of the bar, and largest rate. [spikes/s]"""
+    flat_mm = protocol.BAR_WIDTH.value / 2 - protocol.BAR_FILLET.value
+    return float(rate_hz[np.abs(protocol.BAR_SHIFTS.value) < flat_mm].min()), float(rate_hz.max())
+
+
+def percept(skins: Skins, six: FloatArray) -> Percept:
+    """Discriminate spheres with a population of one afferent, given by its six parameters."""
+    tables = [skins.static_hz(six, SPHERES_PER_M, position) for position in POSITIONS_MM]
+
+    def gradient(sigma: float) -> FloatArray:
+        return _hit_rates(
+            tables, lambda table: expected_hit_rates(table, skins.neighbours, sigma, skins.draws)
+        )
+
+    def euclidean_rms(sigma: float) -> float:
+        missed = _hit_rates(tables, lambda table: expected_euclidean_hit_rates(table, sigma)) - PEOPLE
+        return float(np.sqrt(np.mean(np.square(missed))))
+
+    try:
+        noise = fit_noise_sigma(lambda sigma: gradient(sigma).mean(axis=0)).noise_sigma
+    except ConvergenceError:
+        noise = np.nan
+    return Percept(
+        noise_sigma=noise,
+        hit_rates=gradient(NOISE_SIGMA),
+        euclidean_rms=euclidean_rms(noise) if np.isfinite(noise) else np.nan,
+        euclidean_rms_paper=euclidean_rms(NOISE_SIGMA),
+        weber_fractions=_weber_fractions(skins, six, noise),
+    )
+
+
+def _hit_rates(tables: Sequence[FloatArray], code: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Hit rates of a code for static rates at each position; an observer of silent receptors guesses."""
+    return np.array([code(table) if table.any() else np.full(len(table) - 1, CHANCE) for table in tables])
+
+
+def _weber_fractions(skins: Skins, six: FloatArray, noise_sigma: float) -> FloatArray:
+    fractions = np.full(len(STANDARDS_PER_M), np.nan)
+    if not np.isfinite(noise_sigma):
+        return fractions
+    curvatures = sorted(curvature for curvature, position in skins.spheres if position == POSITIONS_MM[0])
+    static = skins.static_hz(six, curvatures, POSITIONS_MM[0])
+    observer = Observer(
+        interpolated(np.array(curvatures), static), skins.neighbours, noise_sigma, skins.draws
+    )
+    for number, standard in enumerate(STANDARDS_PER_M):
+        if standard < curvatures[0]:
+            continue
+        try:
+            fractions[number] = just_noticeable_difference(observer, standard) / standard
+        except ConvergenceError:
+            continue
+    return fractions
+
+
+@result_class
+class Targets:
+    """When a level counts as met.
+
+    Parameters
+    ----------
+    r2, fss : float
+        Least R² under the cylinder, and least FSS out of sample. [1]
+    plate_force_n : array (2, 2)
+        Smallest and largest force of people at each depth of `PLATE_DEPTHS_MM`. [N]
+    noise_sigma : (float, float)
+        Range of the fitted noise. [1]
+    euclidean_rms : float
+        Largest error of the Euclidean Distance at that noise. [0-1]
+    """
+
+    r2: float
+    fss: float
+    plate_force_n: Matrix
+    noise_sigma: tuple[float, float]
+    euclidean_rms: float
+
+
+def targets() -> Targets:
+    """Return what is asked of every level; forces are those of people."""
+    return Targets(
+        r2=0.97, fss=0.90, plate_force_n=plate_range_n(), noise_sigma=(0.049, 0.061), euclidean_rms=0.05
+    )
+
+
+def met(levels: Levels, wanted: Targets) -> tuple[str, ...]:
+    """Return those of `LEVELS` that meet their targets; without folds FSS in sample decides.
+
+    Parameters
+    ----------
+    levels : Levels
+        Of one candidate.
+    wanted : Targets
+        What is asked of them.
+    """
+    found, firing, percept = levels.deflection, levels.firing, levels.percept
+    low, high = wanted.plate_force_n.T
+    fss = firing.fss_out_of_sample if np.isfinite(firing.fss_out_of_sample) else firing.fss
+    quiet, loud = wanted.noise_sigma
+    reached = (
+        found.r2 >= wanted.r2,
+        bool(((low <= found.plate_force_n) & (found.plate_force_n <= high)).all()),
+        fss >= wanted.fss,
+        quiet <= percept.noise_sigma <= loud and percept.euclidean_rms <= wanted.euclidean_rms,
+    )
+    return tuple(level for level, reaches in zip(LEVELS, reached, strict=True) if reaches)
+
+
+MOVED_R2 = 0.005
+MOVED_FORCE = 0.2
+MOVED_FSS = 0.02
+MOVED_RATE_HZ = 10.0
+MOVED_NOISE = 0.01
+MOVED_EUCLIDEAN = 0.02
+"""Changes from which a parameter counts as moving a level: R², share of a force, FSS, smallest rate under the
+flat face or largest rate [spikes/s], noise, error of the Euclidean Distance."""
+
+
+def moved(base: Levels, changed: Levels) -> tuple[str, ...]:
+    """Return those of `LEVELS` that a change of one parameter moves, by the limits above."""
+    force = changed.deflection.plate_force_n / base.deflection.plate_force_n - 1.0
+    rates = np.subtract(
+        [*changed.firing.dynamic_hz, *changed.firing.static_hz],
+        [*base.firing.dynamic_hz, *base.firing.static_hz],
+    )
+    noise = changed.percept.noise_sigma - base.percept.noise_sigma
+    euclidean = changed.percept.euclidean_rms - base.percept.euclidean_rms
+    exceeds = (
+        abs(changed.deflection.r2 - base.deflection.r2) >= MOVED_R2,
+        np.abs(force).max() >= MOVED_FORCE,
+        abs(changed.firing.fss - base.firing.fss) >= MOVED_FSS or np.abs(rates).max() >= MOVED_RATE_HZ,
+        # Without a noise that meets people, the percept is another one.
+        not (abs(noise) < MOVED_NOISE and abs(euclidean) < MOVED_EUCLIDEAN),
+    )
+    return tuple(level for level, beyond in zip(LEVELS, exceeds, strict=True) if beyond)
+
+
+@result_class
+class Row:
+    """One candidate and its levels.
+
+    Parameters
+    ----------
+    name, drive, basis : str
+        Of the candidate: tissues, what drives the afferent, and where the numbers come from.
+    shear_kpa, poisson : array (4,)
+        Initial long-term shear moduli, with the common factor, and Poisson's ratios, from the outside in.
+        [kPa]
+    long_term_share : float
+        Share of the deviatoric stress that does not relax, in the living epidermis. [1]
+    factor : float
+        Common factor on all moduli of the presses. [1]
+    chosen_by : tuple of str
+        Levels whose observations were used to choose the candidate: in sample there.
+    shifted_bars : bool
+        Whether the bar was pressed at all shifts.
+    levels : Levels or None
+        None if a press could not be solved.
+    unsolved : str
+        Why not.
+    """
+
+    name: str
+    drive: str
+    basis: str
+    shear_kpa: Vector
+    poisson: Vector
+    long_term_share: float
+    factor: float
+    chosen_by: tuple[str, ...]
+    shifted_bars: bool
+    levels: Levels | None
+    unsolved: str = ""
+
+
+@result_class
+class TissueSearch:
+    """Result of `python -m studies tissue-search`.
+
+    Parameters
+    ----------
+    rows : tuple of Row
+        One per candidate.
+    base : Row
+        `human` with one bar, which the variations are compared with.
+    variations : tuple of Row
+        Changes of one parameter of `base` each, named by it.
+    targets : Targets
+        Of the levels.
+    order : TrialOrder
+        Of the paper's three trials.
+    polynomials : tuple of PolynomialOfFoam
+        Wu's tissues.
+    manifest : Manifest
+        What ran.
+    """
+
+    rows: tuple[Row, ...]
+    base: Row
+    variations: tuple[Row, ...]
+    targets: Targets
+    order: TrialOrder
+    polynomials: tuple[PolynomialOfFoam, ...]
+    manifest: Manifest
+
+
+def search_one(candidate: Candidate, runner: Runner, conditions: Conditions, folds: bool = True) -> Row:
+    """Press what is missing of one candidate, and compute its levels.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Tissues and drive.
+    runner : Runner
+        Where indentations are stored: candidates with the same tissues share them.
+    conditions : Conditions
+        Finger, resolution and seed; its materials are not used.
+    folds : bool, optional
+        As of `evaluate`.
+
+    Returns
+    -------
+    Row
+
+    Raises
+    ------
+    StoreError
+        If a stored indentation is damaged.
+    """
+    levels, unsolved, wanted = None, "", touches(candidate, conditions)
+    try:
+        runner.solve(wanted.values(), candidate.name)
+        responses = {key: runner.store.load(touch) for key, touch in wanted.items()}
+        levels = evaluate(candidate, responses, conditions, folds)
+    except ConvergenceError as error:
+        unsolved = str(error).splitlines()[0]
+    layers = candidate.tissues.layers
+    return Row(
+        name=candidate.name,
+        drive=candidate.drive,
+        basis=candidate.basis,
+        shear_kpa=candidate.factor * np.array([layer.shear_modulus_kpa for layer in layers]),
+        poisson=np.array([layer.poisson for layer in layers]),
+        long_term_share=candidate.tissues.living_epidermis.prony.long_term_share,
+        factor=candidate.factor,
+        chosen_by=candidate.chosen_by,
+        shifted_bars=candidate.finalist,
+        levels=levels,
+        unsolved=unsolved,
+    )
+
+
+def run(runner: Runner, conditions: Conditions) -> TissueSearch:
+    """Compare all candidates, the effect of each parameter of `human`, and the trials in their order.
+
+    Parameters
+    ----------
+    runner : Runner
+        Where indentations are stored; a stopped run continues after the last one.
+    conditions : Conditions
+        Finger, resolution and seed; its materials are not used.
+
+    Returns
+    -------
+    TissueSearch
+
+    Raises
+    ------
+    ConvergenceError
+        If an indentation of the trials' order cannot be solved.
+    StoreError
+        If a stored indentation is damaged or the folder cannot be written.
+    """
+    rows = tuple(search_one(candidate, runner, conditions) for candidate in candidates())
+    base = search_one(replace(HUMAN, finalist=False), runner, conditions, folds=False)
+    varied = tuple(search_one(candidate, runner, conditions, folds=False) for candidate in variations())
+    order = runner.responses({"order of the trials": trial_order.touches(conditions)})
+    return TissueSearch(
+        rows=rows,
+        base=base,
+        variations=varied,
+        targets=targets(),
+        order=trial_order.result(order["order of the trials"]),
+        polynomials=polynomials(),
+        manifest=runner.manifest(conditions),
+    )
