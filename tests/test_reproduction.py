@@ -247,7 +247,7 @@ def test_what_goes_beyond_the_paper_comes_on_top(second):
 
 
 def test_a_stress_in_the_dynamic_term_explains_the_dynamic_rates_better(first):
-    touches = dict(enumerate(single_unit.bar_touches(Conditions("quick"))))
+    touches = dict(enumerate(single_unit.bar_touches(Conditions("quick", materials="human"))))
     bars = Runner(first.folder).responses({"bar": touches})["bar"]
     found = drive_result(
         quantity_traces(list(bars.values()), ("stored", "compressive_stress")),
