@@ -103,7 +103,7 @@ def page(first):
 @pytest.fixture(scope="session")
 def other_seed(first):
     """The same indentations met by other observers, in this process and without a report."""
-    results = reproduce(Reproduction(Conditions("quick", seed=7), first.folder))
+    results = reproduce(Reproduction(Conditions("quick", seed=7, materials="human"), first.folder))
     return json.loads(to_json(results))
 
 
@@ -261,7 +261,7 @@ def test_a_stress_in_the_dynamic_term_explains_the_dynamic_rates_better(first):
     assert best.fss_out_of_sample_dynamic > paper.fss_out_of_sample_dynamic + 0.1
 
 
-def test_the_nearest_step_is_the_skins_and_not_the_meshs(first, studied):
+def test_the_nearest_step_is_the_skins_and_not_the_meshs(studied):
     """Two more meshes of the same resolution; at quick, steps differ by 2 %."""
     found = studied("mesh-noise")["mesh_noise"]
     assert np.shape(found["static_sum"]) == (3, 2)
@@ -269,9 +269,6 @@ def test_the_nearest_step_is_the_skins_and_not_the_meshs(first, studied):
     assert min(found["step"]) > 0.0
     assert len(set(found["step"])) == 3
     assert found["largest_difference"] < found["limit"] == 0.1
-    ours, _ = found["static_sum"][0]
-    usual = first.results["discrimination"]["gradient_sums"]["static"][0][0]
-    assert ours == pytest.approx(usual, rel=1e-12)
 
 
 def test_spike_trains_are_complete(studied):
@@ -311,7 +308,7 @@ def test_population_and_nail_are_maps(first):
     assert nail["border_kpa"] > nail["far_kpa"] > 0.0
     # Figure 9: stress at the border of the nail stands out from the skin beside it in every section.
     low, high = nail["ratio_range"]
-    assert 1.3 < low <= nail["ratio"] <= high
+    assert 1.1 < low <= nail["ratio"] <= high
 
 
 def test_the_manifest_holds_the_command_that_repeats_the_run(first):
@@ -459,7 +456,7 @@ def test_another_seed_changes_what_the_observer_draws_and_nothing_else(first, ot
 
 PAPERS_QUESTION = """
 question: Which spheres can be discriminated from one of 287 /m?
-skin: {resolution: quick}
+skin: {resolution: quick, materials: human}
 common: {indenter: sphere, depth_mm: 1.0, ramp_ms: 50, hold_ms: 950}
 stimuli: {vary: curvature_per_m, values: [287, 296, 305, 316, 328, 340, 365]}
 standard: 287
