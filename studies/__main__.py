@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 from fingerpad.cli import run
+from fingerpad.cli.options import Command
 from studies import (
     code_efficiency,
     drive_study,
@@ -90,9 +91,9 @@ STUDIES = (
 """Studies without options of their own."""
 
 app = typer.Typer(help="Research on the model itself.", add_completion=False, pretty_exceptions_enable=False)
-app.command("results")(results_command)
+app.command("results", cls=Command)(results_command)
 for study in STUDIES:
-    app.command(study.name)(command_of(study))
+    app.command(study.name, cls=Command)(command_of(study))
 
 
 def main() -> None:

@@ -76,6 +76,9 @@ def test_without_a_command_the_help_is_shown(call):
         (["reproduce", "--seed", "inf"], "'--seed': must be a whole number", "'inf'"),
         (["reproduce", "--seed", ""], "'--seed': must be a whole number", "''"),
         (["reproduce", "--seed"], "--seed", "requires an argument"),
+        (["fit", "--example", "--resolution", "quick"], "'--example' requires an argument", "'--resolution'"),
+        (["validate", "--example", "--out", "here"], "'--example' requires an argument", "'--out'"),
+        (["reproduce", "--out", "--no-extended"], "'--out' requires an argument", "'--no-extended'"),
         (["export"], "Missing argument", "'folder'"),
         (["export", "out", "--indenter", "cone"], "indenter must be one of sphere, cylinder, bar", "'cone'"),
         (

@@ -94,6 +94,10 @@ class OneTrace:
         (lambda: Population.grid(density_per_cm2=-1.0), "density_per_cm2 must be greater"),
         (lambda: Population.grid(rows=0), "rows must be a whole number"),
         (lambda: Population.grid().respond(OneTrace()), "one trace per receptor: got 1 for 18"),
+        (
+            lambda: Population.grid(afferent=Afferent(static_quantity="von_mises")).respond(OneTrace()),
+            r"follows 'stored' and 'von_mises': got OneTrace\.sed\(sites\); add them, or use an afferent",
+        ),
     ],
 )
 def test_what_cannot_be_used_is_refused(wrong, message):

@@ -75,6 +75,7 @@ def test_every_study_has_a_command_and_a_line_of_help(call):
     ("arguments", "named", "came"),
     [
         (["drives", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
+        (["drives", "--out", "--jobs", "2"], "'--out' requires an argument", "'--jobs'"),
         (["drives", "--seed", "-1"], "seed must be a whole number of at least 0", "-1"),
         (["drives", "--resolution", "fine"], "resolution must be one of quick, standard, paper", "'fine'"),
         (["paper-size", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),

@@ -11,6 +11,7 @@ from fingerpad import __version__
 from fingerpad.cli.discriminate import discriminate_command
 from fingerpad.cli.export import export_command
 from fingerpad.cli.fit import fit_command
+from fingerpad.cli.options import Command
 from fingerpad.cli.reproduce import reproduce_command
 from fingerpad.cli.validate import validate_command
 from fingerpad.core.errors import FingerpadError
@@ -47,11 +48,11 @@ def _options(
 
 
 # In the order of the help.
-app.command("reproduce")(reproduce_command)
-app.command("fit")(fit_command)
-app.command("discriminate")(discriminate_command)
-app.command("validate")(validate_command)
-app.command("export")(export_command)
+app.command("reproduce", cls=Command)(reproduce_command)
+app.command("fit", cls=Command)(fit_command)
+app.command("discriminate", cls=Command)(discriminate_command)
+app.command("validate", cls=Command)(validate_command)
+app.command("export", cls=Command)(export_command)
 
 
 def main() -> None:

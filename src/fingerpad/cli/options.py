@@ -1,12 +1,28 @@
-"""Options that several commands share, and how numbers are read."""
+"""Options that several commands share, and how words of the command line are read."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Any
 
 import typer
+import typer.core
 
 from fingerpad.cli.choices import MATERIAL_CHOICES, RESOLUTION_CHOICES
+
+
+class Command(typer.core.TyperCommand):
+    """A command that does not take the name of one of its options for the value of another."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words after the name of the command."""
+        options = [each for each in self.get_params(ctx) if isinstance(each, typer.core.TyperOption)]
+        names = {name for option in options for name in (*option.opts, *option.secondary_opts)}
+        with_argument = {name for option in options if not option.is_flag for name in option.opts}
+        for word, following in pairwise(args[: args.index("--")] if "--" in args else args):
+            if word in with_argument and following in names:
+                ctx.fail(f"Option {word!r} requires an argument: got {following!r}; write its value first")
+        return super().parse_args(ctx, args)
 
 
 def to_whole(text: str) -> int:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from inspect import signature
 from typing import Protocol
 
 import numpy as np
@@ -135,6 +136,26 @@ class SedTraces:
             dynamic_kpa=np.hstack(dynamic) if dynamic else None,
         )
 
+    @classmethod
+    def at_rest(
+        cls, end_ms: float, dynamic_quantity: str = STORED_ENERGY, static_quantity: str = STORED_ENERGY
+    ) -> SedTraces:
+        """Traces of one site that is not touched: 0 from the start to `end_ms`.
+
+        Examples
+        --------
+        >>> SedTraces.at_rest(1000.0).sed_kpa.tolist()
+        [[0.0], [0.0]]
+        """
+        nothing = np.zeros((2, 1))
+        return cls(
+            np.array([0.0, end_ms]),
+            nothing,
+            dynamic_kpa=None if dynamic_quantity == static_quantity else nothing,
+            dynamic_quantity=dynamic_quantity,
+            static_quantity=static_quantity,
+        )
+
     @property
     def n_sites(self) -> int:
         """Number of receptor sites."""
@@ -160,6 +181,53 @@ class SedTraces:
             raise InputError(f"factors needs one number per site: got {each.size} for {self.n_sites}.")
         dynamic = None if self.dynamic_kpa is None else self.dynamic_kpa * each
         return replace(self, sed_kpa=self.sed_kpa * each, dynamic_kpa=dynamic)
+
+
+def traces_below(skin: Skin, sites: ArrayLike, dynamic_quantity: str, static_quantity: str) -> SedTraces:
+    """Traces of two quantities below sites of a skin.
+
+    Parameters
+    ----------
+    skin : Skin
+        A skin that has no quantity but strain energy density need not accept the arguments of `Skin.sed`
+        that name quantities.
+    sites : array_like (n_sites, 2) or (n_sites, 3)
+        As in `Skin.sed`. [mm]
+    dynamic_quantity, static_quantity : str
+        What the two terms of the current follow.
+
+    Returns
+    -------
+    SedTraces
+
+    Raises
+    ------
+    InputError
+        If another quantity than strain energy density is needed, and the skin accepts no quantity.
+
+    Examples
+    --------
+    >>> class Pressed:
+    ...     def sed(self, sites):
+    ...         return SedTraces([0.0, 50.0], [[0.0] * len(sites), [2.0] * len(sites)])
+    >>> traces_below(Pressed(), [[17.0, 0.0]], "stored", "stored").n_sites
+    1
+    >>> traces_below(Pressed(), [[17.0, 0.0]], "von_mises", "stored")
+    Traceback (most recent call last):
+    fingerpad.core.errors.InputError: skin.sed must accept dynamic_quantity and static_quantity, since ...
+    """
+    if (dynamic_quantity, static_quantity) == (STORED_ENERGY, STORED_ENERGY):
+        return skin.sed(sites)
+    try:
+        signature(skin.sed).bind(sites, dynamic_quantity, static_quantity)
+    except TypeError as error:
+        raise InputError(
+            "skin.sed must accept dynamic_quantity and static_quantity, since the afferent follows "
+            f"{dynamic_quantity!r} and {static_quantity!r}: got {type(skin).__name__}.sed"
+            f"{signature(skin.sed)}; add them, or use an afferent that follows {STORED_ENERGY!r}, such as "
+            "Afferent.for_tissues('paper')."
+        ) from error
+    return skin.sed(sites, dynamic_quantity, static_quantity)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from fingerpad.core.checks import FloatArray, finite, float_array, not_negative,
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Skin
+from fingerpad.core.signals import ResponseMap, Skin, traces_below
 from fingerpad.data import fingertip, protocol, psychophysics
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.spikes import firing_rate_hz, first_spike_latency_ms
@@ -224,12 +224,10 @@ class Population:
         Raises
         ------
         InputError
-            If the skin does not return one trace per receptor.
+            If the skin does not return one trace per receptor, or lacks what the afferent follows.
         """
         quantities = (self.afferent.dynamic_quantity, self.afferent.static_quantity)
-        # A skin without other quantities than SED need not accept the arguments of the extension.
-        further = () if quantities == (STORED_ENERGY, STORED_ENERGY) else quantities
-        sed = skin.sed(self.positions_mm, *further)
+        sed = traces_below(skin, self.positions_mm, *quantities)
         if sed.n_sites != len(self.positions_mm):
             raise InputError(
                 f"skin.sed must give one trace per receptor: got {sed.n_sites} for {len(self.positions_mm)}."

@@ -141,10 +141,7 @@ def resting_response(afferent: Afferent) -> RestingResponse:
     RestingResponse(dynamic_rate_hz=0.0, static_rate_hz=0.0, first_spike_latency_ms=nan)
     """
     end_ms = protocol.RAMP.value + protocol.HOLD.value
-    nothing = np.zeros((2, 1))
-    quantities = (afferent.dynamic_quantity, afferent.static_quantity)
-    further = None if quantities[0] == quantities[1] else nothing
-    sed = SedTraces(np.array([0.0, end_ms]), nothing, np.empty(0), further, *quantities)
+    sed = SedTraces.at_rest(end_ms, afferent.dynamic_quantity, afferent.static_quantity)
     dynamic_hz, static_hz = afferent.rates(sed)
     return RestingResponse(
         dynamic_rate_hz=float(dynamic_hz[0]),

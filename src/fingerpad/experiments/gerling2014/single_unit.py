@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Number, Vector, result_class
-from fingerpad.core.signals import STORED_ENERGY, SedTraces
+from fingerpad.core.signals import STORED_ENERGY, SedTraces, traces_below
 from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.geometry.indenters import Bar
@@ -63,9 +63,7 @@ def receptor_sed(
         What the two terms follow.
     """
     quantities = (dynamic_quantity, static_quantity)
-    # A skin without other quantities than SED need not accept the arguments of the extension.
-    further = () if quantities == (STORED_ENERGY, STORED_ENERGY) else quantities
-    return SedTraces.joined([skin.sed(RECEPTOR, *further) for skin in responses])
+    return SedTraces.joined([traces_below(skin, RECEPTOR, *quantities) for skin in responses])
 
 
 def receptor_traces(responses: list[SkinResponse], quantity: str) -> SedTraces:

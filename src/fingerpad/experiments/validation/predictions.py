@@ -10,6 +10,7 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, one_of
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.signals import SedTraces
+from fingerpad.core.units import MN_PER_N
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.indenter_text import indenter_named
@@ -23,8 +24,6 @@ from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.skin.indentation import Touch, settings_of, touch_of
 from fingerpad.skin.sampling import SkinResponse
-
-MN_PER_N = 1000.0
 
 RAMP_AND_HOLD, QUASI_STATIC = "ramp_and_hold", "quasi_static"
 LOADINGS = (RAMP_AND_HOLD, QUASI_STATIC)
@@ -272,16 +271,9 @@ def _rate(given: Mapping[str, Value], model: FingertipModel) -> Reading:
 
 def _resting_rate(model: FingertipModel) -> float:
     """Rate of the afferent without any touch. [spikes/s]"""
-    rest, afferent = np.zeros((2, 1)), model.afferent
-    dynamic, static = afferent.dynamic_quantity, afferent.static_quantity
-    traces = SedTraces(
-        np.array([0.0, RampAndHold().end_ms]),
-        rest,
-        dynamic_kpa=None if dynamic == static else rest,
-        dynamic_quantity=dynamic,
-        static_quantity=static,
-    )
-    return float(afferent.rates(traces, static_window_ms=model.static_window_ms)[1][0])
+    afferent = model.afferent
+    rest = SedTraces.at_rest(RampAndHold().end_ms, afferent.dynamic_quantity, afferent.static_quantity)
+    return float(afferent.rates(rest, static_window_ms=model.static_window_ms)[1][0])
 
 
 _READING: Mapping[str, Callable[[Mapping[str, Value], FingertipModel], Reading]] = {
