@@ -13,11 +13,15 @@ from typing import TypeVar
 
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.results import Number, Vector, from_json, read_results, result_class
+from fingerpad.experiments.gerling2014.claim_row import ClaimRow
+from fingerpad.experiments.gerling2014.discrepancy import CriterionErrorBars
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.summary import Summary
+from fingerpad.report.comparison import comparison_tables, verdict_text
+from fingerpad.report.discrimination import criterion_table
 from fingerpad.report.formatting import ABSENT, fixed, number
-from fingerpad.report.parts import Chapter
+from fingerpad.report.parts import Chapter, Paragraph
 from fingerpad.report.single_unit import single_unit_tables
 from studies.drive_quantities import DriveResult
 from studies.drive_study import DriveStudy
@@ -29,32 +33,20 @@ from studies.pages.markdown import markdown_table as table
 COMMAND = "python -m studies results"
 Kind = TypeVar("Kind")
 README_START, README_END = f"<!-- {COMMAND} writes this table -->", "<!-- end of the table -->"
-VERDICTS = {True: "✓", False: "✗", None: "○"}
 
 README_ROWS = (
     ("skin", "Trial 3, deflection under the cylinder, R²"),
     ("skin", "Tissues of the run, force of a flat plate 2 mm deep [N]"),
-    ("skin", "Trial 1, deflection under the cylinder, against Trial 3"),
+    ("skin", "Order of the three trials: deflection of Trials 1 and 2 less that of Trial 3 [mm]"),
     ("afferent", "Single unit, FSS out of sample (mean of six folds)"),
     ("afferent", "Dynamic rate, largest [spikes/s]"),
     ("afferent", "Static rate, difference [spikes/s]"),
-    ("percept", "Hit rate at 296 /m, static Gradient Sum at 0.0 mm, noise fitted"),
-    ("percept", "Hit rate at 365 /m, static Gradient Sum at 0.0 mm, noise fitted"),
+    ("percept", "Hit rate at 296 /m, static Gradient Sum at 0.0 mm and 0.2 mm, noise fitted"),
+    ("percept", "Hit rate at 365 /m, static Gradient Sum at 0.0 mm and 0.2 mm, noise fitted"),
     ("percept", "Noise sigma_1 that fits Goodwin's two points"),
     ("percept", "Static hit rates with the 0.2 mm shift, largest change"),
 )
 """Rows of the README's table: the level, and the quantity as the comparison names it."""
-
-
-@result_class
-class Compared:
-    """One quantity of the paper and of the run; `met` is None without a criterion."""
-
-    quantity: str
-    paper: str
-    ours: str
-    met: bool | None
-    note: str
 
 
 @result_class
@@ -136,7 +128,8 @@ class Excerpt:
     """What of a run the pages show.
 
     `summaries` holds a few plain numbers of this run and of runs with other tissues, by their names;
-    `indentations` counts them by part of the run; `single_unit` is the fit to the rates, fold by fold.
+    `indentations` counts them by part of the run; `single_unit` is the fit to the rates, fold by fold;
+    `criterion` has the error bars of a varied criterion.
     """
 
     version: str
@@ -145,12 +138,13 @@ class Excerpt:
     seed: int
     summaries: dict[str, Summary]
     indentations: dict[str, int]
-    comparison: tuple[Compared, ...]
+    comparison: tuple[ClaimRow, ...]
     single_unit: SingleUnitResult
     methods: tuple[Method, ...]
     models: tuple[Model, ...]
     drives: tuple[Drive, ...]
     percept: Percept
+    criterion: CriterionErrorBars
 
 
 def read_excerpt(
@@ -217,10 +211,7 @@ def excerpt(
         seed=manifest.seed,
         summaries={manifest.materials: results.summary},
         indentations={stage.name: stage.indentations for stage in manifest.stages if stage.indentations},
-        comparison=tuple(
-            Compared(quantity=row.quantity, paper=row.paper, ours=row.ours, met=row.met, note=row.note)
-            for row in results.comparison
-        ),
+        comparison=results.comparison,
         single_unit=results.single_unit,
         methods=tuple(
             Method(
@@ -269,12 +260,12 @@ def excerpt(
             people_low=found.goodwin.low,
             people_high=found.goodwin.high,
         ),
+        criterion=found.reasons.criterion,
     )
 
 
 def results_page(shown: Excerpt) -> str:
     """Return docs/results.md."""
-    judged = [row.met for row in shown.comparison if row.met is not None]
     parts = [
         "# Results of the reproduction",
         "The numbers on this page come from one run of "
@@ -289,15 +280,14 @@ def results_page(shown: Excerpt) -> str:
         _summaries(shown.summaries),
         "## Indentations",
         _indentations(shown.indentations),
-        "## This run and the paper",
-        f"{sum(judged)} of {len(judged)} criteria are met (✓), {len(judged) - sum(judged)} are missed (✗). "
-        "○: the paper gives no criterion. The report of a run also gives the status of each row.",
-        table(
-            ("quantity", "paper", "this run", "", "note"),
-            [
-                (row.quantity, row.paper, row.ours, VERDICTS[row.met], _linked(row.note))
-                for row in shown.comparison
-            ],
+        *map(
+            _linked,
+            markdown_blocks(
+                Chapter(
+                    "This run and the paper",
+                    [Paragraph(GROUPS), *comparison_tables(shown.comparison, brief=True)],
+                )
+            ),
         ),
         *markdown_blocks(
             Chapter("One afferent, fitted as in the paper", single_unit_tables(shown.single_unit))
@@ -321,10 +311,15 @@ def results_page(shown: Excerpt) -> str:
         f"The noise, {fixed(shown.percept.noise_sigma, 3)}, is fitted to the two observed hit rates "
         "with the static Gradient Sum ([decision](decisions/noise-fitted.md)); all codes use it.",
         _hit_rates(shown.percept),
+        *markdown_blocks(Chapter("Varied criterion", [criterion_table(shown.criterion)])),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
+GROUPS = (
+    "Each row belongs to one group. A number that was fitted, or by which something was chosen, is never "
+    "counted as a met prediction. The report of a run also has the differences and the status of the inputs."
+)
 SUMMARY_ROWS = (
     ("deflection_r2", "deflection under the cylinder, R²", "later model 0.93", 3),
     ("force_plate_1mm_n", "force of a plate 1.0 mm deep [N]", "people 0.11-0.23", 2),
@@ -358,9 +353,9 @@ def _summaries(summaries: Mapping[str, Summary]) -> str:
     return table(("quantity", "paper or people", *(f"`{name}`" for name in summaries)), rows)
 
 
-def _linked(note: str) -> str:
-    """Pages that a note names, as links from docs/."""
-    return re.sub(r"docs/(decisions/([\w-]+)\.md)", r"[\2](\1)", note)
+def _linked(text: str) -> str:
+    """Pages that a text names, as links from docs/."""
+    return re.sub(r"docs/(decisions/([\w-]+)\.md)", r"[\2](\1)", text)
 
 
 def _indentations(counts: Mapping[str, int]) -> str:
@@ -445,9 +440,9 @@ def readme_table(shown: Excerpt) -> str:
     if missing := [quantity for _, quantity in README_ROWS if quantity not in rows]:
         raise InputError(f"The comparison must hold the rows of README_ROWS: it lacks {', '.join(missing)}.")
     return table(
-        ("level", "quantity", "paper", "here", ""),
+        ("level", "quantity", "paper", "here", "verdict"),
         [
-            (level, quantity, rows[quantity].paper, rows[quantity].ours, VERDICTS[rows[quantity].met])
+            (level, quantity, rows[quantity].paper, rows[quantity].ours, verdict_text(rows[quantity]))
             for level, quantity in README_ROWS
         ],
     )

@@ -123,7 +123,12 @@ def discrimination_section() -> dict:
             },
         },
         "reasons": {
-            "criterion": {"criterion_sigma": [0.01, 0.02], "point": [0.05, 0.1], "fraction": [0.002, 0.004]},
+            "criterion": {
+                "criterion_sigma": [0.01, 0.02],
+                "point": [0.05, 0.1],
+                "fraction": [0.002, 0.004],
+                "likelihood": [0.003, 0.006],
+            },
             "euclidean": {"noise_sigma": 0.05, "misfit": 0.02, "hit_rate": [[0.6] * 6] * 2},
             "rise": {"static": [0.46, 0.43]},
             "rise_for_paper_noise": {"static": [0.16, None]},
@@ -142,7 +147,13 @@ def discrimination_section() -> dict:
                     "misfit": noise,
                     "own_largest_shift": noise,
                 }
-                for name, noise in (("eight neighbours (used)", 0.14), ("four neighbours", None))
+                for name, noise in (
+                    ("static, eight neighbours (used)", 0.01),
+                    ("static, four neighbours", None),
+                    ("dynamic, eight neighbours (used)", 0.06),
+                    ("latency of receptors that fire under every sphere (used)", 0.08),
+                    ("latency, waiting until the ramp ends", 0.12),
+                )
             ],
         },
         "gradient_sum": {

@@ -9,6 +9,7 @@ from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import curvature_thresholds as study
+from fingerpad.experiments.gerling2014.claim_row import Verdict, judged
 from fingerpad.experiments.gerling2014.comparison import weber_claims
 from fingerpad.experiments.gerling2014.sphere_discrimination import CURVATURES
 from fingerpad.geometry.grading import Grading
@@ -113,7 +114,7 @@ def test_a_threshold_out_of_range_is_reported_and_affects_only_its_row(found):
     assert [entry.standard_per_m for entry in reached] == [144.0, 200.0]
     assert [entry.standard_per_m for entry in missed] == [287.0, 400.0]
     rows = weber_claims(loud)
-    assert rows[0].met is False
+    assert rows[0].verdict is Verdict.MISSED
     assert "No sphere" in rows[0].note
     assert png(page.draw_thresholds, loud)[:4] == b"\x89PNG"
     assert "No sphere" in page.threshold_tables(loud)[0].note
@@ -146,7 +147,7 @@ def test_weber_rows_are_judged_in_whole_per_cent(found):
     for fractions, met in (([0.0951, 0.144], True), ([0.0949, 0.12], False), ([0.12, 0.146], False)):
         standards = tuple(replace(threshold, weber_fraction=fraction) for fraction in fractions)
         changed = replace(found, populations=(replace(population, standards=standards),))
-        assert weber_claims(changed)[0].met is met
+        assert weber_claims(changed)[0].verdict is judged(met)
 
 
 def test_page_shows_and_names_what_was_found(found):

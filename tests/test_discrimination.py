@@ -7,7 +7,9 @@ import time
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.optimize import brentq
 from scipy.special import ndtr
+from scipy.stats import norm
 
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Purpose, normals, uniforms
@@ -29,6 +31,7 @@ from fingerpad.psychophysics.noisy_responses import (
     session_trials,
     shared_noise_gradient_sums,
 )
+from fingerpad.psychophysics.signal_detection import likelihood_point
 
 GRID = Population.grid()
 PAIRS = neighbour_pairs(GRID.positions_mm, GRID.pitch_mm)
@@ -111,7 +114,7 @@ def test_gradient_sum_follows_the_printed_steps(session):
     assert_allclose(rates.hit_rate_sd, [sd for _, sd in expected], rtol=1e-9)
 
 
-@pytest.mark.parametrize("moves", ["point", "fraction"])
+@pytest.mark.parametrize("moves", ["point", "fraction", "likelihood"])
 def test_the_varied_criterion_follows_the_printed_steps(moves):
     values, sigma, seed = bumps([287.0, 310.0, 340.0]), 0.05, 6
     plan = Experiment(presentations_varied=9, hit_rates=7, criterion_sigma=0.02, criterion_moves=moves)
@@ -119,15 +122,24 @@ def test_the_varied_criterion_follows_the_printed_steps(moves):
         [float(gradient_sum(one, PAIRS)) for one in one_by_one(values[sphere], sigma, seed, sphere, 9)]
         for sphere in range(3)
     ]
-    (standard_mean, _), *others = [mean_and_sd(of_sphere) for of_sphere in sums]
+    (standard_mean, standard_sd), *others = [mean_and_sd(of_sphere) for of_sphere in sums]
     hits = [[], []]
     for comparison, (mean, sd) in enumerate(others):
         for number in normals(seed, [comparison], [0], Purpose.CRITERION, plan.hit_rates)[0, 0]:
             shift = 1.0 + 0.02 * number
             if moves == "point":
                 point = 0.5 * (standard_mean + mean) * shift
-            else:
+            elif moves == "fraction":
                 point = standard_mean + 0.5 * shift * (mean - standard_mean)
+            else:
+                common = math.sqrt(0.5 * (standard_sd**2 + sd**2))
+
+                def excess(x, mean=mean, common=common, shift=shift):
+                    return (
+                        norm.logpdf(x, mean, common) - norm.logpdf(x, standard_mean, common) - math.log(shift)
+                    )
+
+                point = brentq(excess, standard_mean - 9.0 * common, mean + 9.0 * common, xtol=1e-12)
             hits[comparison].append(normal_beyond(point, mean, sd, math.copysign(1.0, mean - standard_mean)))
     rates = discriminate_gradient_sum(values, PAIRS, sigma, seed, plan)
     assert_allclose(rates.hit_rate, [mean_and_sd(rate)[0] for rate in hits], rtol=1e-11)
@@ -267,6 +279,15 @@ def test_the_criterion_moves_the_decision_point(criterion):
     plan = Experiment(presentations=1000, criterion=criterion)
     sampled = discriminate_gradient_sum(values, TWO, sigma, 2, plan)
     assert_allclose(sampled.hit_rate, ndtr(margin), atol=0.01)
+
+
+def test_a_likelihood_ratio_of_one_halves_the_distance_and_equal_means_have_no_other_point():
+    ratio = np.array([1.0, 2.0, 0.0])
+    found = likelihood_point(10.0, 14.0, 4.0, ratio)
+    assert found[:2].tolist() == [12.0, 12.0 + math.log(2.0)]
+    assert found[2] < -600.0
+    assert likelihood_point(14.0, 10.0, 4.0, ratio)[1] == 12.0 - math.log(2.0)
+    assert likelihood_point(10.0, 10.0, 4.0, ratio).tolist() == [10.0] * 3
 
 
 def test_equal_spheres_are_discriminated_by_chance_only():
@@ -416,7 +437,10 @@ def test_city_block_and_euclidean_distance_lead_to_different_hit_rates():
         (lambda: Experiment(hit_rates=2.5), "hit_rates must be a whole number"),
         (lambda: Experiment(criterion=math.nan), "criterion must be a finite number"),
         (lambda: Experiment(criterion_sigma=-0.1), "criterion_sigma must not be negative"),
-        (lambda: Experiment(criterion_moves="beta"), "criterion_moves must be one of point, fraction"),
+        (
+            lambda: Experiment(criterion_moves="beta"),
+            "criterion_moves must be one of point, fraction, likelihood",
+        ),
         (lambda: discriminate_gradient_sum(0.0 * bumps(), PAIRS, 0.1, 0), "population stays silent"),
         (
             lambda: discriminate_euclidean(bumps() * np.nan, 0.1, 0, silent_value=1.0),

@@ -13,6 +13,7 @@ import pytest
 
 from fingerpad.core.results import schema_of, to_json
 from fingerpad.data import all_published
+from fingerpad.experiments.gerling2014.claim_row import Group, Verdict
 from fingerpad.experiments.gerling2014.nail_border import NailBorder
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
 from fingerpad.experiments.gerling2014.response_maps import PopulationMaps
@@ -28,6 +29,7 @@ from fingerpad.report import (
 )
 from fingerpad.report import formatting as words
 from fingerpad.report import page as page_module
+from fingerpad.report.comparison import KINDS, MEANINGS, SIGNS, TITLES, comparison_tables
 from fingerpad.report.page import write_html
 from fingerpad.report.parts import Chapter, Drawing, Page, Paragraph, Row, Table
 from fingerpad.report.reproduction import reproduction_page, reproduction_summary, write_report
@@ -62,9 +64,14 @@ def synthetic_results() -> dict:
         "population": _population(),
         "nail": nail_section(),
         "comparison": [
-            _compared("FSS out of sample", "0.81", "0.84", "+0.03", True),
-            _compared("hit rate at 296 /m", "0.58", "0.71", "+0.13", False),
-            _compared("force under the cylinder", "–", "210 mN", "–", None),
+            _compared("statement", "FSS out of sample", "0.81", "0.84", "+0.03", "met"),
+            _compared("statement", "rises", "rises", "does not", "", "missed"),
+            _compared("statement", "order of trials", "over", "less", "", "met", reading="as drawn"),
+            _compared("statement", "fold 3", "0.837", "0.8", "", "not judged"),
+            _compared("statement", "latency", "diverge", "0.0", "", "not decidable"),
+            _compared("fitted", "hit rate at 296 /m", "0.58", "0.71", "+0.13", "missed", fitted_to="noise"),
+            _compared("fitted", "hit rate at 365 /m", "0.95", "0.95", "0.00", "met", fitted_to="noise"),
+            _compared("addition", "force under the cylinder", "–", "210 mN", "–", "not judged"),
         ],
         "inputs": [
             {"name": "depth", "value": 1.0, "unit": "mm", "source": "section 2.2", "status": "paper"},
@@ -104,15 +111,19 @@ def synthetic_results() -> dict:
     }
 
 
-def _compared(quantity: str, paper: str, ours: str, difference: str, met: bool | None) -> dict:
+def _compared(
+    group: str, quantity: str, paper: str, ours: str, difference: str, verdict: str, **more: str
+) -> dict:
     return {
+        "group": group,
         "quantity": quantity,
         "paper": paper,
         "ours": ours,
         "difference": difference,
         "status": "paper / assumed materials",
-        "met": met,
+        "verdict": verdict,
         "note": "mean of six folds",
+        **more,
     }
 
 
@@ -449,15 +460,17 @@ def test_one_page_is_written_as_html_and_as_markdown(tmp_path):
 HOSTILE = "<script>alert('x')</script>&\""
 
 
+CHOICES = ("paper", "read", "recalled", "assumed", *Group, *Verdict, "")
+"""Texts that are chosen from a few, and absent ones."""
+
+
 def poisoned(value):
     """The same results with hostile texts and hostile names wherever a name is free."""
     if isinstance(value, dict):
         return {key: poisoned(item) for key, item in value.items()}
     if isinstance(value, list):
         return [poisoned(item) for item in value]
-    return (
-        HOSTILE if isinstance(value, str) and value not in ("paper", "read", "recalled", "assumed") else value
-    )
+    return HOSTILE if isinstance(value, str) and value not in CHOICES else value
 
 
 def test_texts_are_escaped_wherever_they_stand(tmp_path, monkeypatch):
@@ -534,12 +547,41 @@ def test_parts_beyond_the_paper_are_left_out_where_they_were_not_run():
 
 def test_a_miss_is_marked_in_words_and_by_its_row(report):
     text = report.read_text(encoding="utf-8")
-    rows = re.findall(r'<tr class="(met|missed|open)"><th scope="row">([^<]+)</th>.*?([✓✗○][^<]+)</td>', text)
+    rows = re.findall(
+        r'<tr class="(met|missed|open)"><th scope="row">([^<]+)</th>.*?<td>([✓✗○?] [^<]+)</td>', text
+    )
     assert rows == [
         ("met", "FSS out of sample", "✓ met"),
-        ("missed", "hit rate at 296 /m", "✗ missed"),
+        ("missed", "rises", "✗ missed"),
+        ("met", "order of trials", "✓ met as drawn"),
+        ("open", "fold 3", "○ not judged"),
+        ("open", "latency", "? not decidable"),
+        ("missed", "hit rate at 296 /m", "✗ missed (fitted)"),
+        ("met", "hit rate at 365 /m", "✓ met (fitted)"),
         ("open", "force under the cylinder", "○ not judged"),
     ]
+
+
+def test_each_group_has_its_table_and_a_fitted_number_is_not_counted_as_a_prediction():
+    rows = typed(ReproductionResult, synthetic_results()).comparison
+    counts, *tables = comparison_tables(rows)
+    assert [row.cells for row in counts.rows] == [
+        ("Statements of the paper that can fail", "2", "1", "1", "1"),
+        ("Numbers that were fitted or chosen in sample", "1", "1", "0", "0"),
+        ("Consequences of definitions", "0", "0", "0", "0"),
+        ("Our own additions", "0", "0", "1", "0"),
+    ]
+    assert [table.title for table in tables] == [counts.rows[group].cells[0] for group in (0, 1, 3)]
+    assert [len(table.rows) for table in tables] == [5, 2, 1]
+    assert ["what was fitted" in table.columns for table in tables] == [False, True, False]
+    brief = comparison_tables(rows, brief=True)[2]
+    assert brief.columns == ("quantity", "paper", "this run", "verdict", "what was fitted", "note")
+
+
+def test_signs_of_the_verdicts_differ_without_colour():
+    assert set(SIGNS) == set(KINDS) == set(Verdict)
+    assert len(set(SIGNS.values())) == len(Verdict)
+    assert set(TITLES) == set(MEANINGS) == set(Group)
 
 
 def test_the_summary_counts_and_names_what_was_missed():
@@ -548,18 +590,22 @@ def test_the_summary_counts_and_names_what_was_missed():
     assert "0.84" in found
     assert "296 1/m in 63 % of trials (observed: 58 %)" in found
     assert verdicts == (
-        "Of 2 judged comparisons with the paper, 1 is met and 1 is missed. "
-        "Missed: hit rate at 296 /m (0.71, the paper 0.58). 1 more is shown without a verdict."
+        "Of the statements of the paper that can fail, 2 met, 1 missed, 1 not judged and 1 not decidable. "
+        "Missed: rises (does not, the paper rises). Of the numbers that were fitted or chosen in sample, "
+        "1 met and 1 missed; these are no predictions."
     )
 
 
 def test_the_summary_follows_the_numbers():
     results = synthetic_results()
     results["skin_deflection"]["trial1"]["cylinder"]["r2"] = 0.99
-    results["comparison"] = [{**row, "met": True} for row in results["comparison"]]
+    results["comparison"] = [{**row, "verdict": "met"} for row in results["comparison"]]
     found, verdicts = reproduction_summary(typed(ReproductionResult, results))
     assert "Trial 1 is closest" in found
-    assert verdicts == "Of 3 judged comparisons with the paper, 3 are met and 0 are missed."
+    assert verdicts == (
+        "Of the statements of the paper that can fail, 5 met and 0 missed. Of the numbers that were fitted "
+        "or chosen in sample, 2 met and 0 missed; these are no predictions."
+    )
 
 
 def test_inputs_are_listed_exactly_and_the_assumed_ones_are_marked():
@@ -742,9 +788,18 @@ def test_figure_15_draws_every_code_that_answers_and_both_positions_of_the_sweep
 
 def test_interpretations_stand_in_their_table_and_what_was_used_is_marked():
     table = discrimination.discrimination_tables(typed(SphereDiscrimination, discrimination_section()))[1]
-    assert [row.kind for row in table.rows] == ["final", ""]
-    assert table.rows[0].cells[:3] == ("eight neighbours (used)", "18 / 17", "0.460 / 0.430")
+    assert [row.kind for row in table.rows] == ["final", "", "final", "final", ""]
+    assert table.rows[0].cells[:3] == ("static, eight neighbours (used)", "18 / 17", "0.460 / 0.430")
     assert table.rows[1].cells[4] == table.rows[1].cells[6]
+
+
+def test_each_reading_of_the_criterion_has_its_error_bars():
+    table = discrimination.discrimination_tables(typed(SphereDiscrimination, discrimination_section()))[2]
+    assert [row.cells[1:] for row in table.rows] == [
+        ("0.0500", "0.1000"),
+        ("0.0020", "0.0040"),
+        ("0.0030", "0.0060"),
+    ]
 
 
 def test_figure_7_shows_rates_far_below_chance():

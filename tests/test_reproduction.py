@@ -25,6 +25,7 @@ from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.discrimination.task_files import read_task
 from fingerpad.experiments.discrimination.task_stimuli import task_touches
 from fingerpad.experiments.gerling2014 import single_unit
+from fingerpad.experiments.gerling2014.claim_row import Group, Verdict
 from fingerpad.experiments.gerling2014.reproduction import Reproduction, ReproductionResult, reproduce
 from fingerpad.experiments.runner import STORE_FOLDER, Runner
 from fingerpad.report.reproduction import reproduction_page
@@ -152,7 +153,7 @@ def test_a_run_ends_with_status_0_and_names_results_and_missed_criteria(first):
     report, results, missed = first.said.splitlines()
     assert report == f"Report: {first.folder / 'report.html'}"
     assert results == f"Results: {first.folder / 'results.json'}"
-    names = [row["quantity"] for row in first.results["comparison"] if row["met"] is False]
+    names = [row["quantity"] for row in first.results["comparison"] if row["verdict"] == "missed"]
     assert missed == "Missed: " + ("; ".join(names) if names else "nothing")
 
 
@@ -355,9 +356,27 @@ def test_the_comparison_marks_what_it_misses(first):
     rows = first.results["comparison"]
     assert len(rows) >= 20
     for row in rows:
-        assert set(row) == {"quantity", "paper", "ours", "difference", "status", "met", "note"}
-        assert row["met"] in (True, False, None)
-    assert any(row["met"] is True for row in rows)
+        assert row["verdict"] in list(Verdict)
+        assert (row["group"] == Group.FITTED) == bool(row["fitted_to"])
+    assert {row["group"] for row in rows} == set(Group)
+    assert any(row["verdict"] == "met" for row in rows if row["group"] == "statement")
+
+
+def test_a_fitted_number_is_told_apart_from_a_prediction(first):
+    """The set human is fitted to hit rates of people, and its moduli to deflection and force."""
+    group = {row["quantity"]: row["group"] for row in first.results["comparison"]}
+    chosen = (
+        "Tissues of the run",
+        "Hit rate at",
+        "Dynamic rate",
+        "Static rate,",
+        "Euclidean",
+        "Noise sigma_1",
+    )
+    for quantity, found in group.items():
+        if quantity.startswith(chosen):
+            assert found == "fitted", quantity
+    assert group["Single unit, FSS out of sample (mean of six folds)"] == "statement"
 
 
 # The page

@@ -38,6 +38,7 @@ def reproduce_command(
 
     from fingerpad.experiments.conditions import Conditions
     from fingerpad.experiments.gerling2014 import Reproduction, reproduce
+    from fingerpad.experiments.gerling2014.claim_row import Verdict
     from fingerpad.experiments.schemas import write
     from fingerpad.report.reproduction import write_report
 
@@ -55,7 +56,7 @@ def reproduce_command(
         results = reproduce(run, Bars(console))
         write(out / "results.json", results)
         report = write_report(results, out)
-    missed = [row.quantity for row in results.comparison if row.met is False]
+    missed = [row.quantity for row in results.comparison if row.verdict is Verdict.MISSED]
     typer.echo(f"Report: {report}")
     typer.echo(f"Results: {out / 'results.json'}")
     typer.echo(f"Missed: {'; '.join(missed) if missed else 'nothing'}")

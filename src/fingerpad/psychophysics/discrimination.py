@@ -27,13 +27,20 @@ from fingerpad.core.signals import HitRates
 from fingerpad.data import protocol, psychophysics
 from fingerpad.psychophysics.encoding import NORMS, check_neighbours, distance
 from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, noisy_responses, session_trials
-from fingerpad.psychophysics.signal_detection import decision_point, hit_probability, moments, side
+from fingerpad.psychophysics.signal_detection import (
+    decision_point,
+    hit_probability,
+    likelihood_point,
+    moments,
+    side,
+)
 
 END_OF_STIMULUS_MS = protocol.RAMP.value + protocol.HOLD.value
 """A usual value for the latency of a silent receptor. [ms]"""
 
-CRITERION_MOVES = ("point", "fraction")
-"""Quantity multiplied by a varied criterion: the decision point, or the fraction beta."""
+CRITERION_MOVES = ("point", "fraction", "likelihood")
+"""Quantity multiplied by a varied criterion: the decision point, the fraction beta, or a likelihood ratio of
+1 between comparison and standard, which then is the criterion in the place of the fraction."""
 
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
 _REPETITIONS_VARIED = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
@@ -62,8 +69,9 @@ class Experiment:
         sphere, from `presentations_varied` sums; steps (f) and (g) are omitted.
     presentations_varied : int
         Presentations of each sphere when the criterion varies.
-    criterion_moves : {"point", "fraction"}
-        Quantity multiplied by the varied criterion: the decision point itself, or beta.
+    criterion_moves : {"point", "fraction", "likelihood"}
+        Quantity multiplied by the varied criterion: the decision point itself, beta, or a likelihood ratio of
+        1 that replaces beta.
 
     Raises
     ------
@@ -334,8 +342,11 @@ def _varied_criterion(
     standard, comparison = means[0, 0], means[0, 1:]
     if plan.criterion_moves == "point":
         point = decision_point(standard, comparison, plan.criterion) * factors
-    else:
+    elif plan.criterion_moves == "fraction":
         point = decision_point(standard, comparison, plan.criterion * factors)
+    else:
+        variance = 0.5 * (np.square(spreads[0, 0]) + np.square(spreads[0, 1:]))
+        point = likelihood_point(standard, comparison, variance, factors)
     return hit_probability(point, comparison, spreads[0, 1:], side(means[:1]))
 
 

@@ -49,6 +49,36 @@ def decision_point(standard: FloatArray, comparison: FloatArray, criterion: floa
     return np.asarray(standard + criterion * (comparison - standard))
 
 
+def likelihood_point(
+    standard: FloatArray, comparison: FloatArray, variance: FloatArray, ratio: FloatArray
+) -> FloatArray:
+    """Return the point at which the comparison is `ratio` times as likely as the standard.
+
+    For two normal distributions of one variance s^2 the logarithm of the likelihood ratio is linear:
+
+        point = (mu_standard + mu_comparison)/2 + s^2 ln(ratio) / (mu_comparison - mu_standard)
+
+    Parameters
+    ----------
+    standard, comparison, variance, ratio : arrays that broadcast
+        Both means, the variance of both, and the likelihood ratio.
+
+    Returns
+    -------
+    array
+        The midpoint where the means are equal.
+
+    Examples
+    --------
+    >>> float(likelihood_point(10.0, 14.0, 4.0, 1.0)), float(likelihood_point(10.0, 14.0, 4.0, np.e))
+    (12.0, 13.0)
+    """
+    shift = np.asarray(variance * np.log(np.maximum(ratio, np.finfo(float).tiny)))
+    distance = np.broadcast_to(comparison - standard, shift.shape)
+    away = np.divide(shift, distance, out=np.zeros_like(shift), where=distance != 0.0)
+    return decision_point(standard, comparison, 0.5) + away
+
+
 def side(means: FloatArray) -> FloatArray:
     """Return the side of the standard on which each comparison lies.
 

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.data import psychophysics
+from fingerpad.experiments.gerling2014.discrepancy import CriterionErrorBars
 from fingerpad.experiments.gerling2014.goodwin import GoodwinHitRates
 from fingerpad.experiments.gerling2014.sphere_discrimination import ObserverHitRates, SphereDiscrimination
 from fingerpad.report.formatting import fixed, number, whole_percent, with_error
@@ -238,7 +239,7 @@ def caption_criterion(section: SphereDiscrimination) -> str:
 
 def discrimination_tables(section: SphereDiscrimination) -> list[Table]:
     """Return the hit rates of Figures 7 and 8, and the alternative interpretations of the paper's steps."""
-    return [_hit_rates(section), _interpretations(section)]
+    return [_hit_rates(section), _interpretations(section), criterion_table(section.reasons.criterion)]
 
 
 def _hit_rates(section: SphereDiscrimination) -> Table:
@@ -253,6 +254,24 @@ def _hit_rates(section: SphereDiscrimination) -> Table:
     ]
     spheres = (f"{number(curvature)} 1/m" for curvature in section.curvature_per_m[1:])
     return Table("Hit rates, mean ± standard deviation", ("observer", "sphere at [mm]", *spheres), rows)
+
+
+def criterion_table(bars: CriterionErrorBars) -> Table:
+    """Return the mean error bar for each interpretation of what a varied criterion multiplies."""
+    rows = {
+        "the decision point (used)": bars.point,
+        "the fraction beta of the distance between the means": bars.fraction,
+        "a likelihood ratio of mean 1 between comparison and standard": bars.likelihood,
+    }
+    return Table(
+        "Error bars by what the varied criterion multiplies",
+        ("Normal(1, σ) multiplies", *(f"σ = {number(sigma)}" for sigma in bars.criterion_sigma)),
+        [
+            Row((name, *(fixed(bar, 4) for bar in found)), "final" if "(used)" in name else "")
+            for name, found in rows.items()
+        ],
+        "Mean standard deviation of a hit rate over the six spheres at 0.0 mm, static Gradient Sum.",
+    )
 
 
 def _interpretations(section: SphereDiscrimination) -> Table:

@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from fingerpad.data import STATUSES, paper
-from fingerpad.experiments.gerling2014.claim_row import ClaimRow
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
+from fingerpad.report.comparison import comparison_tables, verdict_sentence
 from fingerpad.report.curvature_thresholds import caption_thresholds, draw_thresholds, threshold_tables
 from fingerpad.report.discrimination import (
     caption_criterion,
@@ -26,7 +26,7 @@ from fingerpad.report.formatting import fixed, joined, number, plain, whole_perc
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.nail import caption_nail, draw_nail
 from fingerpad.report.page import write_html
-from fingerpad.report.parts import Chapter, Drawing, Kind, Page, Part, Row, Table, illustrated
+from fingerpad.report.parts import Chapter, Drawing, Page, Part, Row, Table, illustrated
 from fingerpad.report.population import caption_population, draw_population
 from fingerpad.report.single_unit import caption_single_unit, draw_single_unit, single_unit_tables
 from fingerpad.report.single_unit_uncertainty import (
@@ -40,11 +40,6 @@ from fingerpad.report.skin_deflection import (
     skin_deflection_tables,
 )
 
-VERDICTS: dict[bool | None, tuple[Kind, str]] = {
-    True: ("met", "✓ met"),
-    False: ("missed", "✗ missed"),
-    None: ("open", "○ not judged"),
-}
 # Inputs are the record of what was used: nothing of them is rounded or left out.
 ALL_DIGITS, ALL_VALUES = 12, 1000
 
@@ -80,7 +75,7 @@ def reproduction_page(result: ReproductionResult) -> Page:
         f"{edition(result.manifest)}",
         reproduction_summary(result),
         [
-            Chapter("Comparison with the paper", [comparison_table(result.comparison)]),
+            Chapter("Comparison with the paper", comparison_tables(result.comparison)),
             *_levels(result),
             Chapter("Published numbers used", input_tables(result.inputs)),
             manifest_chapter(result.manifest),
@@ -142,7 +137,7 @@ def reproduction_summary(result: ReproductionResult) -> list[str]:
     found = " ".join(
         [_skin(result.skin_deflection), _afferent(result.single_unit), _percept(result.discrimination)]
     )
-    paragraphs = [found, _verdicts(result.comparison)]
+    paragraphs = [found, verdict_sentence(result.comparison)]
     if result.single_unit_uncertainty is None:
         paragraphs.append(
             "Parts beyond the paper were not run: uncertainty of the fit and curvature thresholds "
@@ -183,51 +178,6 @@ def _percept(section: SphereDiscrimination) -> str:
         f"Percept: with noise of {number(section.noise_sigma)}, the static Gradient Sum discriminates "
         f"spheres of {joined(discriminated)} from the standard; the paper's noise is "
         f"{number(section.noise_sigma_paper)}."
-    )
-
-
-def _verdicts(comparison: Sequence[ClaimRow]) -> str:
-    met = [row for row in comparison if row.met is True]
-    missed = [row for row in comparison if row.met is False]
-    open_rows = len(comparison) - len(met) - len(missed)
-    judged = len(met) + len(missed)
-    text = (
-        f"Of {judged} judged comparison{'s' * (judged != 1)} with the paper, {len(met)} {_are(len(met))} met "
-        f"and {len(missed)} {_are(len(missed))} missed."
-    )
-    if missed:
-        text += (
-            f" Missed: {'; '.join(f'{row.quantity} ({row.ours}, the paper {row.paper})' for row in missed)}."
-        )
-    if open_rows:
-        text += f" {open_rows} more {_are(open_rows)} shown without a verdict."
-    return text
-
-
-def _are(count: int) -> str:
-    return "is" if count == 1 else "are"
-
-
-def comparison_table(rows: Sequence[ClaimRow]) -> Table:
-    """Return this run beside the paper; a miss is marked in words as well as in colour."""
-    return Table(
-        "",
-        ("quantity", "paper", "this run", "difference", "verdict", "status of the inputs", "note"),
-        [
-            Row(
-                (
-                    row.quantity,
-                    row.paper,
-                    row.ours,
-                    row.difference,
-                    VERDICTS[row.met][1],
-                    row.status,
-                    row.note,
-                ),
-                VERDICTS[row.met][0],
-            )
-            for row in rows
-        ],
     )
 
 

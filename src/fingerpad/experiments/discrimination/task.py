@@ -257,7 +257,7 @@ class ExperimentSettings(TaskPart):
         Decision point, as a fraction of the way from the standard to the comparison.
     criterion_sigma : float
         Spread of the criterion from one hit rate to the next.
-    criterion_moves : {"point", "fraction"}
+    criterion_moves : {"point", "fraction", "likelihood"}
         What that spread multiplies: the decision point itself, or the fraction.
     presentations, distributions, pairs, hit_rates : int
         As of `fingerpad.psychophysics.discrimination.Experiment`.

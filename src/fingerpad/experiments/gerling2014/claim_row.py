@@ -1,6 +1,9 @@
-"""One row of the table that holds our numbers beside the paper's."""
+"""One row of the table that holds our numbers beside the paper's: its group and its verdict."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import StrEnum
 
 from fingerpad.core.results import result_class
 from fingerpad.data.published import Published
@@ -11,56 +14,129 @@ CLOSE = 0.2
 MATERIALS = "materials assumed (Tables 1 and 2 are lost), geometry read"
 
 
+class Group(StrEnum):
+    """What a row can show."""
+
+    STATEMENT = "statement"
+    """A statement of the paper that can fail; nothing was fitted to it."""
+    FITTED = "fitted"
+    """A number that was fitted, or by which something was chosen in sample."""
+    DEFINITION = "definition"
+    """A consequence of definitions: it holds for nearly any model."""
+    ADDITION = "addition"
+    """Our own addition, of which the paper says nothing that could be judged."""
+
+
+class Verdict(StrEnum):
+    """Whether a claim is met."""
+
+    MET = "met"
+    MISSED = "missed"
+    NOT_JUDGED = "not judged"
+    """It cannot be compared: the paper gives no number, or not the inputs behind its number."""
+    NOT_DECIDABLE = "not decidable"
+    """The outcome depends on a reading that the paper leaves open."""
+
+
 @result_class
 class ClaimRow:
     """A claim of the paper beside this run.
 
     Parameters
     ----------
+    group : Group
+        What the row can show.
     quantity : str
         What is compared.
     paper, ours, difference : str
         As they are printed.
     status : str
         How far the inputs can be trusted.
-    met : bool or None
-        Whether the claim is met; None where the paper gives no criterion.
+    verdict : Verdict
+        Whether the claim is met.
+    reading : str
+        Under which reading of the paper the verdict holds; empty where there is one reading.
+    fitted_to : str
+        What was fitted to the observed number, or chosen by it. Rows of the group `FITTED` have it, and no
+        others.
     note : str
         How it was judged.
 
+    Raises
+    ------
+    ValueError
+        If a row of the group `FITTED` lacks `fitted_to`, or another row has it.
+
     Examples
     --------
-    >>> ClaimRow(quantity="hit rate", paper="0.58", ours="0.60", met=True).met
-    True
+    >>> row = ClaimRow(
+    ...     group=Group.STATEMENT, quantity="hit rate", paper="0.58", ours="0.60", verdict=Verdict.MET
+    ... )
+    >>> row.verdict.value
+    'met'
     """
 
+    group: Group
     quantity: str
     paper: str
     ours: str
     difference: str = ""
     status: str = ""
-    met: bool | None = None
+    verdict: Verdict
+    reading: str = ""
+    fitted_to: str = ""
     note: str = ""
+
+    def __post_init__(self) -> None:
+        if (self.group is Group.FITTED) != bool(self.fitted_to):
+            raise ValueError(
+                "fitted_to must say what was fitted in rows of the group fitted, and in no others: "
+                f"got {self.fitted_to!r} in the group {self.group}."
+            )
+
+
+def judged(met: bool) -> Verdict:
+    """Return the verdict of a criterion that holds or does not."""
+    return Verdict.MET if met else Verdict.MISSED
+
+
+def count_by_verdict(rows: Sequence[ClaimRow], group: Group) -> dict[Verdict, int]:
+    """Count the rows of one group by their verdict; all verdicts are counted.
+
+    Examples
+    --------
+    >>> row = ClaimRow(
+    ...     group=Group.ADDITION, quantity="force", paper="", ours="0.2", verdict=Verdict.NOT_JUDGED
+    ... )
+    >>> count_by_verdict([row], Group.ADDITION)[Verdict.NOT_JUDGED]
+    1
+    """
+    found = [row.verdict for row in rows if row.group is group]
+    return {verdict: found.count(verdict) for verdict in Verdict}
 
 
 def measured_row(
+    group: Group,
     quantity: str,
     published: Published[float],
     ours: float,
     status: str,
     digits: int = 3,
     at_least: bool = False,
+    fitted_to: str = "",
     note: str = "",
 ) -> ClaimRow:
     """Return the row of a number that the paper prints: met from it on, or close to it."""
     difference = ours - published.value
-    judged = "" if at_least else f"judged: within {CLOSE:.0%}"
+    criterion = "judged: at least the paper's" if at_least else f"judged: within {CLOSE:.0%}"
     return ClaimRow(
+        group=group,
         quantity=quantity,
         paper=f"{published.value:g}",
         ours=f"{ours:.{digits}f}",
         difference=f"{difference:+.{digits}f}",
         status=status,
-        met=bool(difference >= 0.0 if at_least else abs(difference) <= CLOSE * published.value),
-        note="; ".join(text for text in (judged, note) if text),
+        verdict=judged(bool(difference >= 0.0 if at_least else abs(difference) <= CLOSE * published.value)),
+        fitted_to=fitted_to,
+        note="; ".join(text for text in (criterion, note) if text),
     )

@@ -19,7 +19,12 @@ from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_c
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.gerling2014 import goodwin
 from fingerpad.experiments.gerling2014.discrimination_sessions import CRITERION_SIGMAS, Measured
-from fingerpad.psychophysics.discrimination import END_OF_STIMULUS_MS, Experiment, discriminate_gradient_sum
+from fingerpad.psychophysics.discrimination import (
+    CRITERION_MOVES,
+    END_OF_STIMULUS_MS,
+    Experiment,
+    discriminate_gradient_sum,
+)
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
 
@@ -31,6 +36,13 @@ DRAWS = 1000
 
 CURVE_NOISE = tuple(round(0.01 * step, 2) for step in range(1, 31))
 """Noise at which the misfit of every code is computed."""
+
+USED = {
+    "static": "static, eight neighbours (used)",
+    "dynamic": "dynamic, eight neighbours (used)",
+    "latency": "latency of receptors that fire under every sphere (used)",
+}
+"""The interpretation by which the study decodes each measure."""
 
 STEEPEST = 20.0
 """Largest multiple of the model's rise that is tried."""
@@ -69,19 +81,21 @@ class Interpretation:
 
 @result_class
 class CriterionErrorBars:
-    """Mean error bar by the spread of the criterion, for two interpretations of what varies.
+    """Mean error bar by the spread of the criterion, for three interpretations of what varies.
 
     Parameters
     ----------
     criterion_sigma : array (n_spreads,)
         Standard deviation of the criterion.
-    point, fraction : array (n_spreads,)
-        Error bar if the decision point varies, or the fraction beta that places it. [0-1]
+    point, fraction, likelihood : array (n_spreads,)
+        Error bar if the decision point varies, the fraction beta that places it, or a likelihood ratio of
+        mean 1 between comparison and standard. [0-1]
     """
 
     criterion_sigma: Vector
     point: Vector
     fraction: Vector
+    likelihood: Vector
 
 
 @result_class
@@ -298,10 +312,10 @@ def _interpretations(
     eight, four = (neighbour_pairs(positions_mm, pitch_mm, count) for count in (8, 4))
     early = [np.where(latency <= PATIENCE_MS, latency, np.nan) for latency in latency_ms]
     found = {
-        "static, eight neighbours (used)": list(measures["static"]),
+        USED["static"]: list(measures["static"]),
         "static, four neighbours": [replace(one, neighbours=four) for one in measures["static"]],
-        "dynamic, eight neighbours (used)": list(measures.get("dynamic", [])),
-        "latency of receptors that fire under every sphere (used)": list(measures.get("latency", [])),
+        USED["dynamic"]: list(measures.get("dynamic", [])),
+        USED["latency"]: list(measures.get("latency", [])),
         "latency of receptors that fire within the ramp under every sphere": [
             Measured(*taking_part(latency, eight)) for latency in early if np.isfinite(latency).any()
         ],
@@ -351,15 +365,15 @@ def _judged(
 
 
 def _criterion(static: Measured, noise_sigma: float, seed: int) -> CriterionErrorBars:
-    """Mean error bar when the decision point varies, and when the fraction that places it does."""
+    """Mean error bar for each quantity that the criterion may multiply."""
 
     def mean_error_bar(sigma: float, moves: str) -> float:
         plan = Experiment(criterion_sigma=sigma, criterion_moves=moves)
         rates = discriminate_gradient_sum(static.responses, static.neighbours, noise_sigma, seed, plan)
         return float(rates.hit_rate_sd.mean())
 
-    point, fraction = (
-        np.array([mean_error_bar(sigma, moves) for sigma in CRITERION_SIGMAS])
-        for moves in ("point", "fraction")
-    )
-    return CriterionErrorBars(criterion_sigma=np.array(CRITERION_SIGMAS), point=point, fraction=fraction)
+    bars = {
+        moves: np.array([mean_error_bar(sigma, moves) for sigma in CRITERION_SIGMAS])
+        for moves in CRITERION_MOVES
+    }
+    return CriterionErrorBars(criterion_sigma=np.array(CRITERION_SIGMAS), **bars)

@@ -6,9 +6,18 @@ a difference counts if it exceeds two Monte-Carlo errors.
 
 from __future__ import annotations
 
+import math
+
 from fingerpad.data import psychophysics
-from fingerpad.experiments.gerling2014.claim_row import MATERIALS, ClaimRow, measured_row
-from fingerpad.experiments.gerling2014.discrepancy import EuclideanFit
+from fingerpad.experiments.gerling2014.claim_row import (
+    MATERIALS,
+    ClaimRow,
+    Group,
+    Verdict,
+    judged,
+    measured_row,
+)
+from fingerpad.experiments.gerling2014.discrepancy import USED, DiscrepancyAnalysis, Interpretation
 from fingerpad.experiments.gerling2014.discrimination_statistics import DiscriminationStatistics, Estimate
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 
@@ -22,182 +31,271 @@ CLOSE_POINTS = 0.03
 FROM_LINE = 0.05
 """Within this of the line in z, hit rates between the two points count as on it."""
 
+SAME = 1e-9
+"""Changes of hit rates that differ by less are those of one reading."""
+
 PLACES = ("0.0 mm", "0.2 mm")
 MEASURES = ("static", "dynamic", "latency")
+JUDGED_RISE = "judged against two Monte-Carlo errors, at both positions"
+NOISE_FITTED = "the noise was fitted to people's two hit rates"
+AFFERENT_FITTED = "the afferent to them at the paper's noise"
 
 
-def discrimination_claims(found: SphereDiscrimination) -> list[ClaimRow]:
+def discrimination_claims(found: SphereDiscrimination, fitted_to_people: bool) -> list[ClaimRow]:
     """Judge the paper's statements about discrimination.
 
     Parameters
     ----------
     found : SphereDiscrimination
         From `discriminate_spheres`.
+    fitted_to_people : bool
+        Whether the afferent was fitted to the hit rates of people as well, by both codes.
 
     Returns
     -------
     list of ClaimRow
     """
     statistics = found.statistics
+    fitted_to = f"{NOISE_FITTED}, {AFFERENT_FITTED}" if fitted_to_people else NOISE_FITTED
+    fitted = "noise and afferent" if fitted_to_people else "the noise"
+    before = f"static hit rates at 296 and 365 /m fitted {fitted}"
     return [
-        _noise(found),
-        *_targets(found),
-        _fits_best(statistics),
-        *_shift(statistics),
-        *_rises(found),
+        _noise(found, fitted_to),
+        *_targets(found, fitted_to),
+        _fits_best(found, before),
+        *_shift(statistics, before),
+        *_latency_shift(found),
+        *_rises(found, before),
+        _euclidean(statistics, found.reasons, fitted_to_people),
         *_variants(statistics),
-        _euclidean(statistics, found.reasons.euclidean),
     ]
 
 
-def _row(quantity: str, paper: str, ours: str, met: bool, note: str, difference: str = "") -> ClaimRow:
+def _row(
+    quantity: str,
+    paper: str,
+    ours: str,
+    verdict: Verdict,
+    note: str,
+    difference: str = "",
+    group: Group = Group.STATEMENT,
+    fitted_to: str = "",
+) -> ClaimRow:
     """Return the row of a statement about discrimination; all rest on the same inputs."""
     return ClaimRow(
-        quantity=quantity, paper=paper, ours=ours, difference=difference, status=STATUS, met=met, note=note
+        group=group,
+        quantity=quantity,
+        paper=paper,
+        ours=ours,
+        difference=difference,
+        status=STATUS,
+        verdict=verdict,
+        fitted_to=fitted_to,
+        note=note,
     )
 
 
-def _noise(found: SphereDiscrimination) -> ClaimRow:
+def _noise(found: SphereDiscrimination, fitted_to: str) -> ClaimRow:
     rises, needed = (rise["static"] for rise in (found.reasons.rise, found.reasons.rise_for_paper_noise))
     expected = " and ".join(f"{rise:.0%}" if rise == rise else "none" for rise in needed)
     return measured_row(
+        Group.FITTED,
         "Noise sigma_1 that fits Goodwin's two points",
         psychophysics.NOISE_SIGMA,
         found.noise_sigma,
         STATUS,
+        fitted_to=fitted_to,
         note=f"our static sum increases by {' and '.join(f'{rise:.0%}' for rise in rises)} from 287 to "
         f"365 /m at the two positions; the paper's noise would need {expected}",
     )
 
 
-def _targets(found: SphereDiscrimination) -> list[ClaimRow]:
-    people, targets = found.goodwin, dict(zip(PLACES, found.statistics.targets, strict=True))
-    at_points = [
-        _at_point(place, curvature, observed, target.at_goodwin[index])
-        for index, (curvature, observed) in enumerate(
-            zip(people.curvature_per_m, people.hit_rate, strict=True)
-        )
-        for place, target in targets.items()
-    ]
-    between = [
+def _targets(found: SphereDiscrimination, fitted_to: str) -> list[ClaimRow]:
+    people, places = found.goodwin, found.statistics.targets
+    farthest = max((place.largest_from_line for place in places), key=lambda distance: distance.value)
+    return [
+        *(
+            _at_point(curvature, observed, [place.at_goodwin[index] for place in places], fitted_to)
+            for index, (curvature, observed) in enumerate(
+                zip(people.curvature_per_m, people.hit_rate, strict=True)
+            )
+        ),
         _row(
-            f"Static hit rates between Goodwin's points, largest distance from their line in z, at {place}",
+            "Static hit rates between Goodwin's points, largest distance from their line in z",
             "on the line (two points)",
-            _text(target.largest_from_line),
-            target.largest_from_line.value <= FROM_LINE,
-            f"judged: within {FROM_LINE:g}; only 296 and 365 /m were observed, the line is interpolated",
-        )
-        for place, target in targets.items()
+            _text(farthest),
+            judged(farthest.value <= FROM_LINE),
+            f"judged: within {FROM_LINE:g} at both positions; only 296 and 365 /m were observed, the line "
+            "is our interpolation",
+            group=Group.ADDITION,
+        ),
     ]
-    return at_points + between
 
 
-def _at_point(place: str, curvature_per_m: float, observed: float, ours: Estimate) -> ClaimRow:
+def _at_point(curvature_per_m: float, observed: float, ours: list[Estimate], fitted_to: str) -> ClaimRow:
+    away = [rate.value - observed for rate in ours]
     return _row(
-        f"Hit rate at {curvature_per_m:g} /m, static Gradient Sum at {place}, noise fitted",
+        f"Hit rate at {curvature_per_m:g} /m, static Gradient Sum at {' and '.join(PLACES)}, noise fitted",
         f"{observed:g} (Goodwin)",
-        _text(ours),
-        bool(abs(ours.value - observed) <= CLOSE_POINTS),
-        f"judged: within {CLOSE_POINTS:g}; one noise for both positions",
-        f"{ours.value - observed:+.3f}",
+        ", ".join(map(_text, ours)),
+        judged(max(map(abs, away)) <= CLOSE_POINTS),
+        f"judged: within {CLOSE_POINTS:g} at both positions, for which there is one noise",
+        ", ".join(f"{each:+.3f}" for each in away),
+        Group.FITTED,
+        fitted_to,
     )
 
 
-def _fits_best(statistics: DiscriminationStatistics) -> ClaimRow:
-    misfit, above = statistics.misfit, statistics.misfit_above_static
+def _fits_best(found: SphereDiscrimination, before: str) -> ClaimRow:
+    """Judge the three measures at one noise, and each at the noise that fits it best."""
+    misfit, above = found.statistics.misfit, found.statistics.misfit_above_static
+    at_own = {name: reading for name in MEASURES if (reading := _used(found.reasons, name))}
+    at_one_noise = all(_more(above[name]) for name in MEASURES[1:] if name in above)
+    # A measure that no noise fits has no misfit of its own, and fits worse than any other.
+    own = {name: _or_infinite(reading.misfit) for name, reading in at_own.items()}
+    at_own_noise = all(own["static"] < own[name] for name in MEASURES[1:] if name in own)
     return _row(
         "Static rates fit best, by root mean square distance to Goodwin's points",
         "static best of three",
-        ", ".join(f"{name} {_text(misfit[name])}" for name in MEASURES if name in misfit),
-        all(_more(above[name]) for name in MEASURES[1:] if name in above),
-        "judged: the others at least two Monte-Carlo errors farther; noise fitted to static rates",
+        "at one noise "
+        + ", ".join(f"{name} {_text(misfit[name])}" for name in MEASURES if name in misfit)
+        + "; each at its own best noise "
+        + ", ".join(f"{name} {_or_none(reading.misfit)}" for name, reading in at_own.items()),
+        judged(at_one_noise and at_own_noise),
+        f"at one noise, that of static rates: {judged(at_one_noise)} (the others at least two Monte-Carlo "
+        f"errors farther); each at its own: {judged(at_own_noise)}, noise "
+        + ", ".join(f"{name} {_or_none(reading.noise_sigma)}" for name, reading in at_own.items())
+        + f"; judged: both; {before}",
     )
 
 
-def _shift(statistics: DiscriminationStatistics) -> list[ClaimRow]:
+def _shift(statistics: DiscriminationStatistics, before: str) -> list[ClaimRow]:
     shift, above = statistics.shift, statistics.shift_above_static
-    reasons = {
-        "dynamic": "",
-        "latency": "; the sum consists of differences between early receptors and late ones far from the "
-        "sphere, and a shift along the finger changes both in the same way",
-    }
-    return [
+    rows = [
         _row(
             "Static hit rates with the 0.2 mm shift, largest change",
             "robust",
             _text(shift["static"]),
-            shift["static"].value <= CLOSE_POINTS,
-            f"judged: at most {CLOSE_POINTS:g}",
-        ),
-        *(
-            _row(
-                f"Hit rates diverge with the 0.2 mm shift, {name}, largest change",
-                "diverge",
-                _text(shift[name]),
-                _more(above[name]) and shift[name].value > CLOSE_POINTS,
-                f"judged: more than {CLOSE_POINTS:g}, and than static by two Monte-Carlo errors{reason}",
-                f"{above[name].value:+.3f} against static",
-            )
-            for name, reason in reasons.items()
-            if name in shift
-        ),
+            judged(shift["static"].value <= CLOSE_POINTS),
+            f"judged: at most {CLOSE_POINTS:g}; {before}",
+        )
     ]
+    if "dynamic" in shift:
+        rows.append(
+            _row(
+                "Hit rates diverge with the 0.2 mm shift, dynamic, largest change",
+                "diverge",
+                _text(shift["dynamic"]),
+                judged(_more(above["dynamic"]) and shift["dynamic"].value > CLOSE_POINTS),
+                f"judged: more than {CLOSE_POINTS:g}, and than static by two Monte-Carlo errors",
+                f"{above['dynamic'].value:+.3f} against static",
+            )
+        )
+    return rows
 
 
-def _rises(found: SphereDiscrimination) -> list[ClaimRow]:
+def _latency_shift(found: SphereDiscrimination) -> list[ClaimRow]:
+    """Judge the divergence of latencies by every reading of silent receptors, each at its own best noise.
+
+    The paper does not say what a silent receptor counts as. The verdict holds if the readings can be told
+    apart and agree (docs/decisions/silent-receptors.md).
+    """
+    readings = [reading for reading in found.reasons.readings if reading.reading.startswith("latency")]
+    if not readings:
+        return []
+    shifts = [reading.own_largest_shift for reading in readings]
+    # A reading that no noise fits has no shift.
+    known = [shift for shift in shifts if not math.isnan(shift)] or [0.0]
+    outcomes = {shift > CLOSE_POINTS for shift in known}
+    told_apart = max(known) - min(known) > SAME
+    if told_apart and len(outcomes) == 1:
+        verdict, why = judged(outcomes == {True}), "all readings agree"
+    elif told_apart:
+        verdict, why = Verdict.NOT_DECIDABLE, "the reading of silent receptors decides"
+    else:
+        verdict, why = (
+            Verdict.NOT_DECIDABLE,
+            "the reading of silent receptors could decide, but the readings cannot be told apart here",
+        )
+    listed = "; ".join(
+        f"{reading.reading.removeprefix('latency').strip(' ,')} {_or_none(shift)}"
+        for reading, shift in zip(readings, shifts, strict=True)
+    )
     return [
         _row(
-            f"Hit rate rises with curvature, {measure} Gradient Sum at {place}",
-            "rises",
-            "rises" if _more(step) else "does not",
-            _more(step),
-            f"{', '.join(f'{rate:.2f}' for rate in rates)}; smallest step {_text(step)}, judged against two "
-            "Monte-Carlo errors",
-        )
-        for measure in MEASURES
-        if (drawn := found.gradient_sum.get(measure))
-        for place, rates, step in zip(
-            PLACES,
-            (drawn.hit_rate, drawn.hit_rate_shifted),
-            found.statistics.smallest_rise[measure],
-            strict=True,
+            "Hit rates diverge with the 0.2 mm shift, latency, largest change by reading",
+            "diverge",
+            listed,
+            verdict,
+            f"{why} (docs/decisions/silent-receptors.md); each reading at the noise that fits people best, "
+            f"diverging: more than {CLOSE_POINTS:g}",
         )
     ]
+
+
+def _rises(found: SphereDiscrimination, before: str) -> list[ClaimRow]:
+    rows = []
+    for measure in MEASURES:
+        if drawn := found.gradient_sum.get(measure):
+            steps = found.statistics.smallest_rise[measure]
+            rises = [_more(step) for step in steps]
+            curves = [
+                f"at {place} {', '.join(f'{rate:.2f}' for rate in rates)} (smallest step {_text(step)})"
+                for place, rates, step in zip(
+                    PLACES, (drawn.hit_rate, drawn.hit_rate_shifted), steps, strict=True
+                )
+            ]
+            at = [place for place, each in zip(PLACES, rises, strict=True) if each]
+            rows.append(
+                _row(
+                    f"Hit rate rises with curvature, {measure} Gradient Sum",
+                    "rises",
+                    "rises" if all(rises) else f"rises at {at[0]} only" if at else "does not",
+                    judged(all(rises)),
+                    "; ".join([*curves, JUDGED_RISE, *([before] if measure == "static" else [])]),
+                )
+            )
+    return rows
 
 
 def _variants(statistics: DiscriminationStatistics) -> list[ClaimRow]:
+    """Return the rows of what follows from how hit rates are defined, in nearly any model."""
     fall, unsteady = statistics.noise_lowers, statistics.unsteadiness
     few, wide = statistics.ten_matrices, statistics.criterion
-    return [
-        _row(
+    rows = (
+        (
             "More noise lowers the curve, smallest fall of the mean hit rate from one noise to the next",
             "lowers",
             _text(fall.smallest_fall),
             _more(fall.smallest_fall),
             f"sigma_1 of {fall.noise_sigma[0]:g} to {fall.noise_sigma[-1]:g} in steps of 0.01",
+            "",
         ),
-        _row(
+        (
             "10 noise matrices instead of 100 widen the error bars",
             "wider",
             f"{_text(few.ratio, 2)} times",
             _more(few.ratio, 1.0),
             f"largest change of a mean {_text(few.change)}",
+            "",
         ),
-        _row(
+        (
             "A criterion that varies by 0.02 instead of 0.01 widens the error bars",
             "wider",
             f"{_text(wide.ratio, 2)} times",
             _more(wide.ratio, 1.0),
-            "the decision point varies; if beta varied, the bars would be below a tenth of these (reasons)",
+            "the decision point varies; other readings: docs/decisions/decision-criterion.md",
+            "",
         ),
-        _row(
+        (
             "A criterion that varies by 0.02 instead of 0.01 does not change the means, largest change",
             "unchanged",
             _text(wide.change),
             wide.change.value <= CLOSE_POINTS,
             f"judged: at most {CLOSE_POINTS:g}",
+            "",
         ),
-        _row(
+        (
             "The mean of 10 hit rates is not stable, that of 100 is: standard deviation of the means",
             "10 unstable",
             f"{_text(unsteady.few, 4)} against {_text(unsteady.many, 4)}",
@@ -205,11 +303,17 @@ def _variants(statistics: DiscriminationStatistics) -> list[ClaimRow]:
             "repeated judgements of the same sums",
             f"{unsteady.ratio.value:.2f} times",
         ),
+    )
+    return [
+        _row(quantity, paper, ours, judged(met), note, difference, Group.DEFINITION)
+        for quantity, paper, ours, met, note, difference in rows
     ]
 
 
-def _euclidean(statistics: DiscriminationStatistics, own: EuclideanFit) -> ClaimRow:
-    misfit, above = statistics.misfit, statistics.misfit_above_static
+def _euclidean(
+    statistics: DiscriminationStatistics, reasons: DiscrepancyAnalysis, fitted_to_people: bool
+) -> ClaimRow:
+    misfit, above, own = statistics.misfit, statistics.misfit_above_static, reasons.euclidean
     others = [misfit[name].value for name in MEASURES[1:] if name in misfit]
     ours = misfit["euclidean"].value
     alone = (
@@ -221,10 +325,25 @@ def _euclidean(statistics: DiscriminationStatistics, own: EuclideanFit) -> Claim
         "Euclidean Distance of static rates fits too, by root mean square distance to Goodwin's points",
         "fits",
         _text(misfit["euclidean"]),
-        ours <= FROM_LINE and all(ours < other for other in others),
+        judged(ours <= FROM_LINE and all(ours < other for other in others)),
         f"judged: at most {FROM_LINE:g} and closer than dynamic rates and latencies; {alone}",
         f"{above['euclidean'].value:+.3f} against the static Gradient Sum",
+        Group.FITTED if fitted_to_people else Group.STATEMENT,
+        "the afferent was fitted to people's hit rates by this code, too" if fitted_to_people else "",
     )
+
+
+def _used(reasons: DiscrepancyAnalysis, measure: str) -> Interpretation | None:
+    """Return the reading by which the study decodes a measure, None if the measure is silent."""
+    return next((reading for reading in reasons.readings if reading.reading == USED[measure]), None)
+
+
+def _or_infinite(misfit: float) -> float:
+    return math.inf if math.isnan(misfit) else misfit
+
+
+def _or_none(value: float) -> str:
+    return "none" if math.isnan(value) else f"{value:.3f}"
 
 
 def _text(estimate: Estimate, digits: int = 3) -> str:

@@ -127,7 +127,7 @@ class ReproductionResult:
     """
 
     format: Literal["fingerpad reproduction"] = "fingerpad reproduction"
-    format_version: Literal[3] = 3
+    format_version: Literal[4] = 4
     summary: Summary
     skin_deflection: SkinDeflectionResult
     skin_force: SkinForce
@@ -233,7 +233,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
         nail=nail,
         single_unit_uncertainty=uncertainty,
         curvature_thresholds=thresholds,
-        comparison=tuple(comparison(skin, force, unit, discrimination, nail, thresholds)),
+        comparison=tuple(comparison(manifest.materials, skin, force, unit, discrimination, nail, thresholds)),
         inputs=tuple(PublishedNumber(**asdict(number)) for number in all_published()),
         manifest=manifest,
     )

@@ -1,0 +1,112 @@
+"""The paper beside a run: one table of counts, and one table of rows per group."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Verdict, count_by_verdict
+from fingerpad.report.formatting import joined, plain
+from fingerpad.report.parts import Kind, Row, Table
+
+SIGNS = {
+    Verdict.MET: "✓",
+    Verdict.MISSED: "✗",
+    Verdict.NOT_JUDGED: "○",
+    Verdict.NOT_DECIDABLE: "?",
+}
+"""Sign of each verdict; they differ without colour."""
+
+KINDS: dict[Verdict, Kind] = {
+    Verdict.MET: "met",
+    Verdict.MISSED: "missed",
+    Verdict.NOT_JUDGED: "open",
+    Verdict.NOT_DECIDABLE: "open",
+}
+"""How a row is marked by its verdict."""
+
+TITLES = {
+    Group.STATEMENT: "Statements of the paper that can fail",
+    Group.FITTED: "Numbers that were fitted or chosen in sample",
+    Group.DEFINITION: "Consequences of definitions",
+    Group.ADDITION: "Our own additions",
+}
+MEANINGS = {
+    Group.STATEMENT: "Nothing was fitted to these statements themselves; the notes say what was fitted "
+    "before.",
+    Group.FITTED: "Something was fitted to these numbers or chosen by them: a number that is met shows that "
+    "the model can have it, and is no prediction.",
+    Group.DEFINITION: "They follow from how hit rates and error bars are defined, and hold for nearly any "
+    "model.",
+    Group.ADDITION: "The paper says nothing about these that could be judged. The bounds are ours or those "
+    "of other publications.",
+}
+
+
+def verdict_text(row: ClaimRow) -> str:
+    """Return sign and verdict of a row, under which reading, and whether the number was fitted."""
+    fitted = "(fitted)" if row.group is Group.FITTED else ""
+    return " ".join(text for text in (SIGNS[row.verdict], row.verdict.value, row.reading, fitted) if text)
+
+
+def comparison_tables(rows: Sequence[ClaimRow], brief: bool = False) -> list[Table]:
+    """Return the counts by group and verdict, then the rows of each group.
+
+    Parameters
+    ----------
+    rows : sequence of ClaimRow
+        The comparison.
+    brief : bool, optional
+        Whether to leave out the differences and the status of the inputs.
+    """
+    by_group = {group: [row for row in rows if row.group is group] for group in Group}
+    return [_counts(rows), *(_of_group(group, found, brief) for group, found in by_group.items() if found)]
+
+
+def verdict_sentence(rows: Sequence[ClaimRow]) -> str:
+    """Return the counts of statements that can fail, with what was missed, and those of fitted numbers."""
+    missed = [
+        f"{row.quantity} ({row.ours}, the paper {row.paper})"
+        for row in rows
+        if row.group is Group.STATEMENT and row.verdict is Verdict.MISSED
+    ]
+    text = f"Of the statements of the paper that can fail, {_counted(rows, Group.STATEMENT)}."
+    if missed:
+        text += f" Missed: {'; '.join(missed)}."
+    return text + (
+        f" Of the numbers that were fitted or chosen in sample, {_counted(rows, Group.FITTED)}; these are no "
+        "predictions."
+    )
+
+
+def _counted(rows: Sequence[ClaimRow], group: Group) -> str:
+    counts = count_by_verdict(rows, group)
+    always = (Verdict.MET, Verdict.MISSED)
+    return joined(
+        [f"{count} {verdict.value}" for verdict, count in counts.items() if count or verdict in always]
+    )
+
+
+def _counts(rows: Sequence[ClaimRow]) -> Table:
+    return Table(
+        "Rows by group and verdict",
+        ("group", *(f"{SIGNS[verdict]} {verdict.value}" for verdict in Verdict)),
+        [
+            Row((TITLES[group], *(plain(count) for count in count_by_verdict(rows, group).values())))
+            for group in Group
+        ],
+    )
+
+
+def _of_group(group: Group, rows: Sequence[ClaimRow], brief: bool) -> Table:
+    """Return the rows of one group; what was fitted has a column where something was."""
+
+    def cells(row: ClaimRow) -> dict[str, str]:
+        found = {"quantity": row.quantity, "paper": row.paper, "this run": row.ours}
+        found |= {} if brief else {"difference": row.difference}
+        found["verdict"] = verdict_text(row)
+        found |= {"what was fitted": row.fitted_to} if group is Group.FITTED else {}
+        found |= {} if brief else {"status of the inputs": row.status}
+        return found | {"note": row.note}
+
+    listed = [Row(tuple(cells(row).values()), KINDS[row.verdict]) for row in rows]
+    return Table(TITLES[group], tuple(cells(rows[0])), listed, MEANINGS[group])
