@@ -229,6 +229,14 @@ def test_hit_rates_of_distances_of_many_receptors_agree_with_the_closed_form():
     assert 0.6 < sampled.hit_rate[0] < sampled.hit_rate[1] < 0.999
 
 
+@pytest.mark.parametrize("sigma", [0.03, 0.058, 0.12])
+def test_few_receptors_give_a_skewed_distance_that_the_closed_form_knows(sigma):
+    """Twelve receptors, as respond to a sphere: without the skewness rates near chance are 0.02 too high."""
+    values = np.linspace(10.0, 55.0, 12) * np.array([[1.0], [1.03], [1.06], [1.2]])
+    sampled = discriminate_euclidean(values, sigma, 3, Experiment(hit_rates=4000)).hit_rate
+    assert_allclose(sampled, expected_euclidean_hit_rates(values, sigma), atol=0.005)
+
+
 def test_a_receptor_silent_under_both_spheres_changes_no_distance():
     values = bumps()
     silent = np.column_stack([values, np.zeros(7)])
