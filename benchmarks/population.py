@@ -53,7 +53,7 @@ def fire(receptors: int) -> dict[str, Any]:
     dict
         Seconds from traces to spikes, and of the membrane alone per afferent; number of spikes.
     """
-    afferent, sed = Afferent(), traces(receptors)
+    afferent, sed = Afferent.for_tissues("trial3"), traces(receptors)  # it follows SED
     afferent.spikes(sed.part(slice(0, 2)))  # loads compiled kernels
     started = perf_counter()
     spikes = afferent.spikes(sed)

@@ -47,7 +47,11 @@ class FittedBars:
     @property
     def afferent(self) -> Afferent:
         """The afferent of the best fit."""
-        return Afferent.from_parameters(self.best.parameters)
+        return Afferent.from_parameters(
+            self.best.parameters,
+            dynamic_quantity=self.sed.dynamic_quantity,
+            static_quantity=self.sed.static_quantity,
+        )
 
 
 def fit_bars(

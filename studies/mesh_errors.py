@@ -21,6 +21,7 @@ from fingerpad.neuron.spikes import firing_rate_hz, first_spike_latency_ms
 from fingerpad.psychophysics.noise_fit import expected_hit_rates
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
+from studies.study import TISSUES
 
 DRAWS = 5000
 """Common random presentations behind the hit rates."""
@@ -238,7 +239,7 @@ def read(responses: Mapping[Any, SkinResponse], receptors_mm: FloatArray, sheets
     """
     traces = [over_thickness(skin, sheets).sed(receptors_mm) for skin in responses.values()]
     ramp_ends = [int(np.argmin(np.abs(trace.times_ms - trace.kinks_ms[0]))) for trace in traces]
-    trains = [Afferent().spikes(trace) for trace in traces]
+    trains = [Afferent.for_tissues(TISSUES).spikes(trace) for trace in traces]
     windows = {"dynamic": protocol.DYNAMIC_WINDOW.value, "static": protocol.STATIC_WINDOW.value}
     return Reading(
         touches=tuple(responses),

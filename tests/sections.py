@@ -1,12 +1,13 @@
 """Inputs of several test files: sections of results as JSON holds them, and skins given by a formula."""
 
 import json
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
 from fingerpad.core.results import from_json
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import STORED_ENERGY, SedTraces
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.neuron.afferent import Afferent
 
@@ -51,8 +52,17 @@ SKINS = {
     for position in (0.0, 0.2)
     for curvature in CURVATURE_PER_M
 }
-SENSITIVE = Afferent(static_gain=1.2e-6)
-RESTLESS = Afferent(static_gain=1.2e-6, intercept_ma=8e-7)
+SED_DRIVEN = Afferent.for_tissues("trial3")
+"""It follows SED in both terms, the only quantity of the skins given by a formula."""
+
+
+def sed_driven(parameters, refractory_ms=1.0):
+    """An afferent of six numbers that follows SED in both terms."""
+    return Afferent.from_parameters(parameters, refractory_ms, STORED_ENERGY, STORED_ENERGY)
+
+
+SENSITIVE = replace(SED_DRIVEN, static_gain=1.2e-6)
+RESTLESS = replace(SENSITIVE, intercept_ma=8e-7)
 """It fires without a touch: beta tau / C is above the threshold."""
 
 

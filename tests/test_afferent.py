@@ -1,17 +1,21 @@
 import time
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import STORED_ENERGY, SedTraces
 from fingerpad.core.threads import BLOCK
 from fingerpad.data import neuron
+from fingerpad.data.tissues import DEFAULT_TISSUES
+from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.spikes import firing_rate_hz
 from fingerpad.neuron.transduction import drive
+from sections import SED_DRIVEN, sed_driven
 
 
 def ramp_and_hold(*peaks_kpa):
@@ -19,7 +23,7 @@ def ramp_and_hold(*peaks_kpa):
 
 
 def test_the_stages_are_chained():
-    afferent, sed = Afferent(static_gain=1.5e-6), ramp_and_hold(1.0, 2.0)
+    afferent, sed = replace(SED_DRIVEN, static_gain=1.5e-6), ramp_and_hold(1.0, 2.0)
     by_hand = afferent.membrane.spikes(afferent.transduction.current(sed))
     assert by_hand.times_ms.size > 20
     assert_array_equal(afferent.spikes(sed).times_ms, by_hand.times_ms)
@@ -29,7 +33,7 @@ def test_the_stages_are_chained():
 
 
 def test_static_rate_is_the_closed_form_of_a_steady_current():
-    afferent = Afferent(intercept_ma=0.0, static_gain=1.4e-6)
+    afferent = replace(SED_DRIVEN, intercept_ma=0.0, static_gain=1.4e-6)
     _, static_hz = afferent.rates(ramp_and_hold(2.0))
     drive_mv = 1.4e-6 * 2.0 * afferent.time_constant_ms / afferent.capacitance_mf
     interval_ms = afferent.refractory_ms - afferent.time_constant_ms * np.log1p(
@@ -38,9 +42,36 @@ def test_static_rate_is_the_closed_form_of_a_steady_current():
     assert_allclose(static_hz, 1000.0 / interval_ms, rtol=1e-10)
 
 
-def test_the_default_afferent_answers_like_an_sai():
+def test_the_default_afferent_is_that_of_the_default_tissues():
+    """It follows compressive stress: no spike below the rheobase in the hold, more for more above it."""
+    afferent = Afferent()
+    assert afferent == Afferent.for_tissues(DEFAULT_TISSUES)
+    assert afferent.dynamic_quantity == afferent.static_quantity == "compressive_stress"
+    rheobase_ma = afferent.capacitance_mf * afferent.threshold_mv / afferent.time_constant_ms
+    least_kpa = (rheobase_ma - afferent.intercept_ma) / afferent.static_gain
+    energy = ramp_and_hold(*(least_kpa * np.array([0.0, 0.95, 1.05, 1.5, 2.0])))
+    stress = replace(energy, dynamic_quantity="compressive_stress", static_quantity="compressive_stress")
+    dynamic_hz, static_hz = afferent.rates(stress)
+    assert dynamic_hz[0] == static_hz[0] == static_hz[1] == 0.0
+    assert (np.diff(dynamic_hz[2:]) > 0).all()
+    assert (np.diff(static_hz[1:]) > 0).all()
+    assert (dynamic_hz[2:] > static_hz[2:]).all()
+    with pytest.raises(
+        InputError, match=r"got traces of 'stored'; .* such as Afferent.for_tissues\('paper'\)"
+    ):
+        afferent.spikes(energy)
+
+
+def test_only_the_sets_with_an_afferent_of_their_own_differ_from_trial_3():
+    assert Afferent.for_tissues("paper").dynamic_quantity == SED_DRIVEN.dynamic_quantity == STORED_ENERGY
+    assert len({Afferent.for_tissues(name) for name in ("human", "paper", "trial3")}) == 3
+    for other in ("trial1", "wu2007", named_tissues("human")):
+        assert Afferent.for_tissues(other) == SED_DRIVEN
+
+
+def test_the_afferent_of_trial_3_answers_like_an_sai():
     """Fast in the ramp, slow in the hold, more for more: SED of a 1 mm touch is 1 to 2 kPa."""
-    dynamic_hz, static_hz = Afferent().rates(ramp_and_hold(0.0, 1.0, 1.5, 2.0))
+    dynamic_hz, static_hz = SED_DRIVEN.rates(ramp_and_hold(0.0, 1.0, 1.5, 2.0))
     assert dynamic_hz[0] == static_hz[0] == 0.0
     assert (np.diff(dynamic_hz) > 0).all()
     assert (np.diff(static_hz) > 0).all()
@@ -60,9 +91,9 @@ def test_the_printed_dynamic_gain_is_silent_in_the_ramp():
     }
     gain = neuron.DYNAMIC_GAIN_START_1.value
     sed = ramp_and_hold(1.0, 2.0, 3.0)
-    without = Afferent(dynamic_gain=0.0, **start).rates(sed)[0]
-    assert_array_equal(Afferent(dynamic_gain=gain, **start).rates(sed)[0], without)
-    rescaled = Afferent(dynamic_gain=gain * neuron.DYNAMIC_GAIN_SCALE.value, **start)
+    without = replace(SED_DRIVEN, dynamic_gain=0.0, **start).rates(sed)[0]
+    assert_array_equal(replace(SED_DRIVEN, dynamic_gain=gain, **start).rates(sed)[0], without)
+    rescaled = replace(SED_DRIVEN, dynamic_gain=gain * neuron.DYNAMIC_GAIN_SCALE.value, **start)
     assert (rescaled.rates(sed)[0] > 50.0).all()
 
 
@@ -84,10 +115,10 @@ def test_parameters_go_round():
 
 
 def test_capacitance_and_threshold_only_scale_the_gains():
-    values = Afferent().parameters
-    scaled = Afferent.from_parameters(values * [6.0, 6.0, 6.0, 1.0, 2.0, 3.0])
+    values = SED_DRIVEN.parameters
+    scaled = sed_driven(values * [6.0, 6.0, 6.0, 1.0, 2.0, 3.0])
     sed = ramp_and_hold(2.0, 3.0)
-    assert_allclose(scaled.spikes(sed).times_ms, Afferent().spikes(sed).times_ms, rtol=1e-11)
+    assert_allclose(scaled.spikes(sed).times_ms, SED_DRIVEN.spikes(sed).times_ms, rtol=1e-11)
 
 
 def test_a_drive_gives_what_its_traces_give_and_a_fit_can_afford_it():
@@ -96,7 +127,7 @@ def test_a_drive_gives_what_its_traces_give_and_a_fit_can_afford_it():
         np.outer(np.append(np.linspace(0.0, 1.0, 9), np.linspace(0.99, 0.85, 12)), np.linspace(0.3, 3.0, 36)),
         kinks_ms=[50.0],
     )
-    prepared, afferent = drive(sed), Afferent()
+    prepared, afferent = drive(sed), SED_DRIVEN
     assert_array_equal(afferent.rates(prepared), afferent.rates(sed))
     durations = []
     for _ in range(20):
@@ -109,15 +140,15 @@ def test_a_drive_gives_what_its_traces_give_and_a_fit_can_afford_it():
 def test_many_receptors_never_stand_on_all_knots_at_once():
     times = np.append(np.linspace(0.0, 50.0, 9), 50.0 + np.geomspace(2.0, 950.0, 12))
     sed = SedTraces(times, np.outer(np.minimum(times, 50.0), np.linspace(0.0, 0.02, 24 * BLOCK)), [50.0])
-    Afferent().spikes(sed.part(slice(0, 2)))  # compile
+    SED_DRIVEN.spikes(sed.part(slice(0, 2)))  # compile
     tracemalloc.start()
-    spikes = Afferent().spikes(sed)
+    spikes = SED_DRIVEN.spikes(sed)
     peak_bytes = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     knots = drive(sed.part(slice(0, 1))).times_ms.size
     assert len(spikes[24 * BLOCK - 1]) > 10
     assert peak_bytes < 0.8 * knots * sed.n_sites * np.dtype(float).itemsize
-    alone = Afferent().spikes(sed.part(slice(23 * BLOCK, 23 * BLOCK + 1)))[0]
+    alone = SED_DRIVEN.spikes(sed.part(slice(23 * BLOCK, 23 * BLOCK + 1)))[0]
     assert alone.size > 10
     assert_array_equal(spikes[23 * BLOCK], alone)
 
@@ -145,17 +176,18 @@ def test_a_single_wrong_field_is_named():
 def test_an_afferent_refuses_traces_of_another_static_quantity():
     energy = ramp_and_hold(1.0, 2.0)
     with pytest.raises(InputError, match="static term of this afferent needs 'work': got traces of 'stored'"):
-        Afferent(static_quantity="work").spikes(energy)
+        replace(SED_DRIVEN, static_quantity="work").spikes(energy)
 
 
 def test_an_afferent_and_its_traces_agree_on_what_the_dynamic_term_follows():
     energy = ramp_and_hold(1.0, 2.0)
     both = SedTraces(energy.times_ms, energy.sed_kpa, energy.kinks_ms, 10.0 * energy.sed_kpa, "von_mises")
-    extended = Afferent(dynamic_gain=Afferent().dynamic_gain / 10.0, dynamic_quantity="von_mises")
+    gain = SED_DRIVEN.dynamic_gain / 10.0
+    extended = replace(SED_DRIVEN, dynamic_gain=gain, dynamic_quantity="von_mises")
     # Ten times the quantity and a tenth of its gain are the paper's afferent.
-    assert_allclose(extended.spikes(both).times_ms, Afferent().spikes(energy).times_ms, rtol=1e-12)
+    assert_allclose(extended.spikes(both).times_ms, SED_DRIVEN.spikes(energy).times_ms, rtol=1e-12)
     assert_array_equal(extended.spikes(drive(both)).times_ms, extended.spikes(both).times_ms)
-    for afferent, traces in ((Afferent(), both), (extended, energy), (extended, drive(energy))):
+    for afferent, traces in ((SED_DRIVEN, both), (extended, energy), (extended, drive(energy))):
         with pytest.raises(
             InputError, match=r"dynamic term of this afferent needs '\w+': got traces of '\w+'"
         ):

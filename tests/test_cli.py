@@ -1,5 +1,6 @@
 """The command line: output, errors and exit status."""
 
+import inspect
 import re
 import signal
 import subprocess
@@ -7,12 +8,16 @@ import sys
 from functools import partial
 
 import pytest
+import typer
 
 import fingerpad as fp
 from fingerpad import __version__, cli
 from fingerpad.cli import choices
 from fingerpad.core.errors import ConvergenceError, FingerpadError, StoreError
+from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments import gerling2014
+from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.discrimination.task import SkinSettings
 from fingerpad.export import formats
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS
@@ -51,6 +56,19 @@ def test_the_help_names_what_the_modules_know():
     assert tuple(formats.FORMATS) == choices.FORMAT_CHOICES
     assert tuple(INDENTERS) == choices.INDENTER_CHOICES
     assert all(getattr(fp, body.__name__) is body for body in INDENTERS.values())
+
+
+def test_one_set_of_tissues_is_the_default_everywhere():
+    commands = typer.main.get_command(cli.app).commands
+    options = {
+        name: {each.name: each.default for each in command.params} for name, command in commands.items()
+    }
+    pressed = {name: each["materials"] for name, each in options.items() if "materials" in each}
+    assert set(pressed) == {"reproduce", "fit", "validate", "export"}
+    functions = [inspect.signature(function).parameters["materials"] for function in (fp.indent, touch_of)]
+    found = {*pressed.values(), *(each.default for each in functions), Conditions().materials}
+    assert found | {SkinSettings().materials, choices.DEFAULT_TISSUES} == {DEFAULT_TISSUES}
+    assert Conditions().afferent == fp.Afferent() == fp.Population.grid().afferent
 
 
 def test_without_a_command_the_help_is_shown(call):
@@ -181,7 +199,7 @@ def test_options_reach_the_export(call, monkeypatch, tmp_path):
     assert (relaxing, elastic) == (None, "long_term")
     assert touch == touch_of(Fingertip(), Sphere(340), RampAndHold(depth_mm=0.5), "trial1", "standard")
     assert (folder.resolve(), format_name) == (tmp_path / "a" / "b", "vtu")
-    assert default == touch_of(Fingertip(), Plate(), RampAndHold(depth_mm=1.0), "trial3", "quick")
+    assert default == touch_of(Fingertip(), Plate(), RampAndHold(depth_mm=1.0), "human", "quick")
 
 
 def test_a_subprocess_has_the_same_output_and_no_warning(tmp_path):

@@ -13,7 +13,6 @@ from fingerpad.experiments.gerling2014.claim_row import Verdict, judged
 from fingerpad.experiments.gerling2014.comparison import weber_claims
 from fingerpad.experiments.gerling2014.sphere_discrimination import CURVATURES
 from fingerpad.geometry.grading import Grading
-from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics import yes_no
 from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD
@@ -21,10 +20,9 @@ from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.noise_fit import expected_hit_rates
 from fingerpad.report import curvature_thresholds as page
 from fingerpad.report.style import png
-from sections import SphereSkin
+from sections import SENSITIVE, SphereSkin
 
-AFFERENT = Afferent(static_gain=1.2e-6)
-POPULATION = Population.grid(rows=3, columns=4, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
+POPULATION = Population.grid(rows=3, columns=4, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=SENSITIVE)
 PAIRS = neighbour_pairs(POPULATION.positions_mm, POPULATION.pitch_mm)
 DRAWS = normals(0, 1, 12, Purpose.RESPONSE, 2000)[0].T
 
@@ -34,7 +32,7 @@ SKINS = {curvature: SphereSkin.wide(curvature) for curvature in (*CURVATURES, *s
 
 @pytest.fixture(scope="module")
 def found():
-    return study.curvature_thresholds(SKINS, AFFERENT, 0.06, seed=0)
+    return study.curvature_thresholds(SKINS, SENSITIVE, 0.06, seed=0)
 
 
 def proportional(power):
@@ -55,7 +53,7 @@ def test_rates_that_scale_with_curvature_obey_webers_law():
 def test_threshold_is_at_a_hit_rate_of_three_quarters(found):
     entry = found.populations[1].standards[2]
     assert entry.standard_per_m == 287.0
-    population = Population.grid(rows=6, columns=6, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
+    population = Population.grid(rows=6, columns=6, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=SENSITIVE)
     pairs = neighbour_pairs(population.positions_mm, population.pitch_mm)
     table = [
         population.respond(SphereSkin.wide(curvature)).static_rate_hz
@@ -72,7 +70,7 @@ def test_threshold_is_at_a_hit_rate_of_three_quarters(found):
 def test_second_population_has_the_noise_that_fits_people(found):
     population = found.populations[1]
     at = found.pressed_per_m
-    layout = Population.grid(rows=6, columns=6, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
+    layout = Population.grid(rows=6, columns=6, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=SENSITIVE)
     table = [layout.respond(SphereSkin.wide(curvature)).static_rate_hz for curvature in (287.0, 296.0, 365.0)]
     pairs = neighbour_pairs(layout.positions_mm, layout.pitch_mm)
     draws = normals(0, 1, 36, Purpose.RESPONSE, 4000)[0].T
@@ -109,7 +107,7 @@ def test_a_threshold_out_of_range_is_reported_and_affects_only_its_row(found):
     noisy = study.Observer(proportional(0.1).rates, PAIRS, 0.5, DRAWS)
     with pytest.raises(ConvergenceError, match="No sphere up to 700 /m is discriminated from 287 /m in 75%"):
         study.threshold_at(noisy, 287.0)
-    loud = study.curvature_thresholds(SKINS, AFFERENT, 3.0, seed=0)
+    loud = study.curvature_thresholds(SKINS, SENSITIVE, 3.0, seed=0)
     reached, missed = (getattr(loud.populations[0], name) for name in ("standards", "without_threshold"))
     assert [entry.standard_per_m for entry in reached] == [144.0, 200.0]
     assert [entry.standard_per_m for entry in missed] == [287.0, 400.0]
@@ -132,7 +130,7 @@ def test_receptors_that_are_silent_under_a_standard_do_not_change_its_threshold(
 
 
 def test_noise_that_cannot_be_fitted_is_reported_in_place_of_thresholds():
-    same = study.curvature_thresholds(dict.fromkeys(SKINS, SphereSkin.wide(287.0)), AFFERENT, 0.06, seed=0)
+    same = study.curvature_thresholds(dict.fromkeys(SKINS, SphereSkin.wide(287.0)), SENSITIVE, 0.06, seed=0)
     paper, square = same.populations
     assert len(paper.without_threshold) == 4
     assert np.isnan(square.noise_sigma)

@@ -39,6 +39,7 @@ from fingerpad.report import discrimination_task_figures as figures
 ROOT = Path(__file__).parents[1]
 QUESTION = {
     "question": "Which bumps?",
+    "skin": {"materials": "trial3"},  # whose afferent follows energy density
     "common": {"indenter": "sphere"},
     "stimuli": {"vary": "curvature_per_m", "values": [200, 220, 240, 280, 320]},
     "standard": 200,
@@ -377,7 +378,8 @@ def written(folder):
 
 
 # JSON is YAML.
-MINE = json.dumps(QUESTION | {"skin": {"resolution": "quick"}, "code": "gradient_sum", "measure": "static"})
+QUICK = {"skin": QUESTION["skin"] | {"resolution": "quick"}}
+MINE = json.dumps(QUESTION | QUICK | {"code": "gradient_sum", "measure": "static"})
 
 
 def test_an_answer_is_a_page_figures_and_numbers_with_their_origin(call, tmp_path):

@@ -13,7 +13,7 @@ from fingerpad.inference.identifiable import (
     silent_at_rest,
     six_parameters,
 )
-from fingerpad.neuron.afferent import Afferent
+from sections import sed_driven
 
 SIX = np.array([2.3e-7, 1.0e-4, 5.6e-7, 72.0, 6.0e-7, 30.0])
 SED = SedTraces([0.0, 25.0, 50.0, 1000.0], [[0.0, 0.0], [0.4, 0.9], [1.0, 2.0], [0.8, 1.7]], [50.0])
@@ -32,14 +32,14 @@ def test_spikes_depend_on_the_four_numbers_alone(capacitance: float, threshold: 
     others = six_parameters(identifiable(SIX), capacitance, threshold)
     assert others[4:].tolist() == [capacitance, threshold]
     np.testing.assert_allclose(identifiable(others), identifiable(SIX), rtol=1e-14)
-    expected, found = (Afferent.from_parameters(six).spikes(SED) for six in (SIX, others))
+    expected, found = (sed_driven(six).spikes(SED) for six in (SIX, others))
     np.testing.assert_array_equal(found.offsets, expected.offsets)
     np.testing.assert_allclose(found.times_ms, expected.times_ms, rtol=1e-11)
     # Each of the four does move spikes.
     for index in range(4):
         moved = identifiable(SIX)
         moved[index] *= 1.05
-        other = Afferent.from_parameters(six_parameters(moved)).spikes(SED)
+        other = sed_driven(six_parameters(moved)).spikes(SED)
         assert abs(other[1][3] - expected[1][3]) > 0.005
 
 
@@ -73,5 +73,5 @@ def test_an_afferent_at_rest_is_lowered_to_the_bound_and_another_one_is_kept():
     np.testing.assert_array_equal(lowered[0, 1:], firing[1:])
     assert identifiable(lowered[0])[0] * 50.0 == pytest.approx(LARGEST_RESTING_SHARE)
     untouched = SedTraces([0.0, 2000.0], [[0.0], [0.0]])
-    assert Afferent.from_parameters(lowered[0]).spikes(untouched).times_ms.size == 0
-    assert Afferent.from_parameters(firing).spikes(untouched).times_ms.size > 0
+    assert sed_driven(lowered[0]).spikes(untouched).times_ms.size == 0
+    assert sed_driven(firing).spikes(untouched).times_ms.size > 0

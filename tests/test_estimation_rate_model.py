@@ -9,7 +9,7 @@ from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.identifiable import identifiable
 from fingerpad.inference.rate_model import AfferentModel, evaluate_rows, four_number_model
 from fingerpad.inference.receptor_offset import ReceptorOffset
-from fingerpad.neuron.afferent import Afferent
+from sections import SED_DRIVEN, sed_driven
 
 PEAKS = np.array([0.0, 0.3, 0.8, 1.4, 1.9, 2.5])
 TIMES = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 100.0, 200.0, 500.0, 1000.0])
@@ -17,7 +17,7 @@ COURSE = np.where(TIMES <= 50.0, (TIMES / 50.0) ** 2, 0.75 + 0.25 * np.exp(-(TIM
 SED = SedTraces(TIMES, COURSE[:, None] * PEAKS, [50.0])
 LONGER = SedTraces(np.append(TIMES, 1500.0), np.append(COURSE, COURSE[-1])[:, None] * PEAKS[2:4], [50.0])
 MODEL = AfferentModel.of_traces(SED)
-SIX = Afferent().parameters
+SIX = SED_DRIVEN.parameters
 
 
 def scattered(parameters: np.ndarray, n_points: int = 37) -> np.ndarray:
@@ -58,8 +58,8 @@ def test_single_runs_equal_the_afferent_to_the_bit() -> None:
     (driven,) = MODEL.drives
     chosen = AfferentModel.of_drive(driven, windows, 2.0)
     for point in scattered(SIX, 9):
-        np.testing.assert_array_equal(MODEL.evaluate(point), Afferent.from_parameters(point).rates(driven))
-        rested = Afferent.from_parameters(point, 2.0).rates(driven, *windows)
+        np.testing.assert_array_equal(MODEL.evaluate(point), sed_driven(point).rates(driven))
+        rested = sed_driven(point, 2.0).rates(driven, *windows)
         np.testing.assert_array_equal(chosen.evaluate(point), rested)
 
 

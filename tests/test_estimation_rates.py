@@ -24,10 +24,10 @@ from fingerpad.inference.rate_model import AfferentModel, Reparametrised, four_n
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import RateRecordings
-from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.spikes import firing_rate_hz
 from fingerpad.neuron.transduction import drive
+from sections import SED_DRIVEN, sed_driven
 
 SHIFT_MM = np.linspace(-2.0, 2.0, 21)
 FOUR = np.array([0.012, 3.2, 0.03, 45.0])
@@ -211,7 +211,7 @@ def offset_model() -> ReceptorOffset:
 
 def test_at_a_sampled_position_the_drive_is_the_sampled_one():
     model = offset_model()
-    six = Afferent().parameters
+    six = SED_DRIVEN.parameters
     for offset in OFFSETS_MM:
         rates = model.evaluate(np.append(six, offset))
         np.testing.assert_array_equal(rates, AfferentModel.of_traces(traces(offset)).evaluate(six))
@@ -285,4 +285,4 @@ def test_no_fit_within_the_bounds_fires_at_rest(four_numbers):
     bounds = bounds_of(*AfferentModel.of_traces(traces()).drives)
     highest = np.array([bounds.high[0], 0.0, 0.0, 40.0])
     untouched = SedTraces([0.0, 3000.0], [[0.0], [0.0]])
-    assert Afferent.from_parameters(fitted_six(highest)).spikes(untouched).times_ms.size == 0
+    assert sed_driven(fitted_six(highest)).spikes(untouched).times_ms.size == 0

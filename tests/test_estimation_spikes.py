@@ -27,9 +27,9 @@ from fingerpad.inference.spike_parameters import (
     canonical_jacobian,
     from_canonical,
 )
-from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.escape_rate import EscapeRate
 from fingerpad.neuron.transduction import Drive, drive
+from sections import SED_DRIVEN, sed_driven
 from studies.spike_fit import interval
 
 TRUTH = np.array([0.0127, 5.6, 0.031, 40.0, 0.25])
@@ -51,7 +51,7 @@ def touched():
 
 def simulated(seed, n_repeats=12, parameters=TRUTH):
     """Spikes of an afferent with these parameters under all six touches."""
-    afferent = Afferent.from_parameters(six_parameters(parameters[:4]), REFRACTORY)
+    afferent = sed_driven(six_parameters(parameters[:4]), REFRACTORY)
     presentations = Presentations.of_one_afferent(6, n_repeats)
     current = afferent.transduction.current(touched())
     spikes = EscapeRate(afferent.membrane, parameters[4]).spikes(current, seed, presentations)
@@ -267,7 +267,7 @@ def test_intervals_of_positive_numbers_stay_positive():
 
 
 def test_a_clock_has_no_width():
-    afferent = Afferent.from_parameters(six_parameters(TRUTH[:4]), REFRACTORY)
+    afferent = sed_driven(six_parameters(TRUTH[:4]), REFRACTORY)
     exact = SpikeLikelihood(touched(), afferent.spikes(touched()))
     with pytest.raises(ConvergenceError, match="too regular"):
         fit_spikes(exact, START)
@@ -275,7 +275,7 @@ def test_a_clock_has_no_width():
 
 def test_one_strength_without_a_ramp_does_not_determine_both_gains():
     held = Drive([0.0, 1e4], [[1.0], [1.0]], [[0.0], [0.0]])
-    spikes = EscapeRate(Afferent().membrane, 0.2).spikes(Afferent().transduction.current(held), 1)
+    spikes = EscapeRate(SED_DRIVEN.membrane, 0.2).spikes(SED_DRIVEN.transduction.current(held), 1)
     with pytest.raises(ConvergenceError, match="determine all parameters: these do not"):
         fit_spikes(SpikeLikelihood(held, spikes), START)
 

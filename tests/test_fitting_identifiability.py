@@ -8,7 +8,8 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.inference.fitting.identifiability import identifiability, jacobian
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel
-from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.neuron.afferent import PARAMETER_NAMES
+from sections import SED_DRIVEN
 
 PEAKS = np.array([0.3, 0.8, 1.4, 1.9, 2.5])
 TIMES = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 100.0, 200.0, 500.0, 1000.0])
@@ -21,7 +22,7 @@ def rates(six: np.ndarray) -> np.ndarray:
 
 
 def test_rates_determine_four_of_six_parameters_and_not_two_scalings() -> None:
-    found = identifiability(rates, Afferent().parameters, PARAMETER_NAMES)
+    found = identifiability(rates, SED_DRIVEN.parameters, PARAMETER_NAMES)
     assert found.rank == 4
     assert found.singular_values[4] < 1e-6 * found.singular_values[0]
     assert found.singular_values[3] > 1e-4 * found.singular_values[0]
@@ -34,7 +35,7 @@ def test_rates_determine_four_of_six_parameters_and_not_two_scalings() -> None:
 
 
 def test_rates_determine_all_four_parameters() -> None:
-    four = identifiable(Afferent().parameters)
+    four = identifiable(SED_DRIVEN.parameters)
     found = identifiability(lambda numbers: rates(six_parameters(numbers)), four, IDENTIFIABLE_NAMES)
     assert found.rank == 4
     assert found.silent_directions.shape == (0, 4)

@@ -18,7 +18,7 @@ from fingerpad.data import (
     tissues,
 )
 
-NAMES = {"SPHERES", "DRIVEN_BY", "DEFAULT_TISSUES", "REPRODUCED_TISSUES"}
+NAMES = {"SPHERES", "HUMAN_QUANTITY", "DEFAULT_TISSUES"}
 """Constants that are no published numbers."""
 
 

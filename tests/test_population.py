@@ -11,6 +11,7 @@ from fingerpad.core.regions import Ellipse
 from fingerpad.core.signals import SedTraces
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population, sensitivities
+from sections import SED_DRIVEN, SENSITIVE
 
 
 class Bump:
@@ -47,7 +48,7 @@ def test_a_lattice_is_symmetric_about_its_centre():
 
 
 def test_each_receptor_answers_what_a_lone_afferent_would_answer_there():
-    population, skin = Population.grid(afferent=Afferent(static_gain=1.2e-6)), Bump(17.0, 0.3)
+    population, skin = Population.grid(afferent=SENSITIVE), Bump(17.0, 0.3)
     response = population.respond(skin)
     assert len(response.spikes) == 18
     for receptor, position in enumerate(population.positions_mm):
@@ -59,7 +60,7 @@ def test_each_receptor_answers_what_a_lone_afferent_would_answer_there():
 
 
 def test_the_map_peaks_under_the_touch_and_latency_is_shortest_there():
-    population = Population.grid()
+    population = Population.grid(afferent=SED_DRIVEN)
     response = population.respond(Bump(17.37, 0.5))
     under = int(np.argmin(np.square(population.positions_mm - [17.37, 0.5]).sum(axis=1)))
     assert np.argmax(response.static_rate_hz) == under
@@ -68,7 +69,7 @@ def test_the_map_peaks_under_the_touch_and_latency_is_shortest_there():
 
 
 def test_a_mirrored_touch_gives_a_mirrored_map():
-    population = Population.grid()
+    population = Population.grid(afferent=SED_DRIVEN)
     left, right = population.respond(Bump(17.0, -0.8)), population.respond(Bump(17.0, 0.8))
     mirrored = left.dynamic_rate_hz.reshape(3, 6)[:, ::-1].ravel()
     assert (right.dynamic_rate_hz > 0).any()
@@ -76,7 +77,7 @@ def test_a_mirrored_touch_gives_a_mirrored_map():
 
 
 def test_an_untouched_skin_is_silent():
-    response = Population.grid().respond(Bump(17.0, 0.0, peak_kpa=0.0))
+    response = Population.grid(afferent=SED_DRIVEN).respond(Bump(17.0, 0.0, peak_kpa=0.0))
     assert_array_equal(response.static_rate_hz, np.zeros(18))
     assert np.isnan(response.first_spike_latency_ms).all()
 
@@ -93,10 +94,13 @@ class OneTrace:
         (lambda: Population([[1.0, 2.0]], 0.0), "pitch_mm must be greater"),
         (lambda: Population.grid(density_per_cm2=-1.0), "density_per_cm2 must be greater"),
         (lambda: Population.grid(rows=0), "rows must be a whole number"),
-        (lambda: Population.grid().respond(OneTrace()), "one trace per receptor: got 1 for 18"),
+        (
+            lambda: Population.grid(afferent=SED_DRIVEN).respond(OneTrace()),
+            "one trace per receptor: got 1 for",
+        ),
         (
             lambda: Population.grid(afferent=Afferent(static_quantity="von_mises")).respond(OneTrace()),
-            r"follows 'stored' and 'von_mises': got OneTrace\.sed\(sites\); add them, or use an afferent",
+            r"'compressive_stress' and 'von_mises': got OneTrace\.sed\(sites\); add them, or use an afferent",
         ),
     ],
 )
@@ -124,12 +128,10 @@ class BumpWithStress(Bump):
 
 def test_a_population_samples_what_the_dynamic_term_of_its_afferent_follows():
     skin = BumpWithStress(17.0, 0.3)
-    usual, extended = (
-        Population.grid(afferent=afferent).respond(skin)
-        for afferent in (Afferent(), Afferent(dynamic_quantity="compressive_stress"))
-    )
-    assert_array_equal(usual.spikes.times_ms, Population.grid().respond(Bump(17.0, 0.3)).spikes.times_ms)
-    lone = Afferent(dynamic_quantity="compressive_stress")
+    lone = replace(SED_DRIVEN, dynamic_quantity="compressive_stress")
+    of_energy, of_stress = (Population.grid(afferent=afferent) for afferent in (SED_DRIVEN, lone))
+    usual, extended = of_energy.respond(skin), of_stress.respond(skin)
+    assert_array_equal(usual.spikes.times_ms, of_energy.respond(Bump(17.0, 0.3)).spikes.times_ms)
     dynamic_hz, _ = lone.rates(skin.sed(Population.grid().positions_mm, "compressive_stress"))
     assert_array_equal(extended.dynamic_rate_hz, dynamic_hz)
     assert (extended.dynamic_rate_hz != usual.dynamic_rate_hz).any()
@@ -138,7 +140,7 @@ def test_a_population_samples_what_the_dynamic_term_of_its_afferent_follows():
 
 
 def test_sensitivity_multiplies_both_gains_and_not_the_intercept():
-    resting = Afferent(intercept_ma=4e-7, dynamic_gain=3e-4, static_gain=1e-6)
+    resting = replace(SED_DRIVEN, intercept_ma=4e-7, dynamic_gain=3e-4, static_gain=1e-6)
     positions, skin = Population.grid().positions_mm, BumpWithStress(17.0, 0.3)
     factors = np.linspace(0.4, 1.8, 18)
     for quantity in ("stored", "compressive_stress"):

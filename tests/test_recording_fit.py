@@ -48,10 +48,11 @@ from fingerpad.inference.start_points import start_points
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.transduction import drive
 from fingerpad.report import recording_fit as report
+from sections import sed_driven
 
 ROOT = Path(__file__).parents[1]
 KNOWN = [2e-7, 1.2e-4, 9e-7, 60.0, 1e-6, 50.0]
-AFFERENT = Afferent.from_parameters(KNOWN)
+AFFERENT = sed_driven(KNOWN)
 TIMES_MS = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 80.0, 120.0, 200.0, 400.0, 700.0, 1000.0])
 
 
@@ -208,7 +209,7 @@ def test_every_stimulus_is_predicted_without_its_fold(recovered):
     assert recovered.fold.tolist() == [1, 2] * 4
     assert [fold.stimuli for fold in recovered.folds] == [NAMES[::2], NAMES[1::2]]
     for fold in recovered.folds:
-        dynamic, static = Afferent.from_parameters(list(fold.parameters.values())).rates(SED)
+        dynamic, static = sed_driven(list(fold.parameters.values())).rates(SED)
         rows = np.flatnonzero(np.array(recovered.fold) == fold.fold)
         np.testing.assert_array_equal(
             np.array(recovered.phases["static"].out_of_sample_hz)[rows], static[rows]
@@ -375,12 +376,13 @@ class Pressed:
         return 3.0 * np.exp(-((np.abs(self.shift_mm - offset_mm) - 1.5) ** 2)) * self.depth_mm
 
     def sed(self, sites, dynamic_quantity, static_quantity):
-        assert (dynamic_quantity, static_quantity) == ("stored", "stored")
         offsets = np.array(sites)[:, 0] - RECEPTOR_X_MM
         assert [offset for offset, (_, across) in zip(offsets, sites, strict=True) if across == 0.0].count(
             0.0
         )
-        return traces(self.height(offsets))
+        return replace(
+            traces(self.height(offsets)), dynamic_quantity=dynamic_quantity, static_quantity=static_quantity
+        )
 
 
 @pytest.fixture
@@ -414,10 +416,12 @@ def test_a_fit_writes_page_figures_numbers_and_their_origin(call, tmp_path):
     assert fit["presentations"] == [1] * 6
     assert manifest["command"] == shlex.join(["fingerpad", "fit", *arguments])
     assert manifest["inputs"] == {"mine.csv": sha256(tmp_path / "mine.csv")}
-    assert (manifest["seed"], manifest["resolution"], manifest["materials"]) == (3, "quick", "trial3")
+    assert (manifest["seed"], manifest["resolution"], manifest["materials"]) == (3, "quick", "human")
+    assert results["dynamic_quantity"] == results["static_quantity"] == "compressive_stress"
     assert results["windows_ms"] == [[30.0, 50.0], [600.0, 950.0]]
     page = (tmp_path / "fit" / "fit.html").read_text()
     assert "<h1>An afferent fitted to recordings</h1>" in page
+    assert "its dynamic term follows compressive stress, its static term compressive stress" in page
     assert page.count("data:image/png;base64,") == 2
     assert f"<td>{fit['fss_out_of_sample']:.3f}</td>" in page.replace("−", "-")
 
@@ -646,7 +650,7 @@ def test_undetermined_parameters_are_reported(recovered):
 
 def test_a_fit_from_nothing_recovers_a_known_afferent(call, monkeypatch, tmp_path):
     """Presses included, in a process whose warnings are errors; then the same stimuli with other rates."""
-    listed, strong = ["-1.5", "1.3", "1.5"], np.array([2e-7, 1.2e-4, 2e-6, 60.0, 1e-6, 50.0])
+    listed, known = ["-1.5", "1.3", "1.5"], Afferent()
     (tmp_path / "mine.csv").write_text(ROWS.splitlines()[0] + "".join(f"\n{name},100,30" for name in listed))
     options = ("mine.csv", "--stimulus", "bar", "--resolution", "quick", "--jobs", "1")
     shell = subprocess.run(
@@ -666,8 +670,9 @@ def test_a_fit_from_nothing_recovers_a_known_afferent(call, monkeypatch, tmp_pat
         runner.Store(folder / runner.STORE_FOLDER),
         session.stimulus_touches(stimuli, Conditions("quick")),
     )
-    sed = [store.load(touch).sed([[RECEPTOR_X_MM, 0.0]]) for touch in pressed.values()]
-    rates = zip(listed, *AfferentModel.of_traces(sed).evaluate(strong), strict=True)
+    followed = (known.dynamic_quantity, known.static_quantity)
+    stress = [store.load(touch).sed([[RECEPTOR_X_MM, 0.0]], *followed) for touch in pressed.values()]
+    rates = zip(listed, *AfferentModel.of_traces(stress).evaluate(known.parameters), strict=True)
     (tmp_path / "mine.csv").write_text(
         ROWS.splitlines()[0] + "".join(f"\n{name},{dynamic},{static}" for name, dynamic, static in rates)
     )

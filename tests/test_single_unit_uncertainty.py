@@ -13,16 +13,16 @@ from fingerpad.experiments.gerling2014.single_unit_uncertainty import Uncertaint
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
-from fingerpad.neuron.afferent import Afferent
 from fingerpad.report import single_unit_uncertainty as report
 from fingerpad.report.style import png
+from sections import SED_DRIVEN
 
 SHIFTS = bar_firing_rates().shift_mm
 TIMES = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 100.0, 200.0, 500.0, 1000.0])
 COURSE = np.where(TIMES <= 50.0, (TIMES / 50.0) ** 2, 0.75 + 0.25 * np.exp(-(TIMES - 50.0) / 150.0))
 PEAKS = 0.05 + 1.5 * np.exp(-(((np.abs(SHIFTS) - 1.6) / 0.5) ** 2)) + 0.4 * (np.abs(SHIFTS) < 1.5)
 SED = SedTraces(TIMES, COURSE[:, None] * PEAKS, [50.0])
-TRUTH = Afferent().parameters
+TRUTH = SED_DRIVEN.parameters
 
 
 @pytest.fixture(scope="module")

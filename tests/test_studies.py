@@ -31,10 +31,18 @@ from fingerpad.geometry.motion import RampAndHold
 from fingerpad.inference.start_points import increments, printed_starts, start_points
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SurfaceProfile
-from sections import RESTLESS, SENSITIVE, SKINS, SphereSkin, discrimination_section, nail_section, typed
+from sections import (
+    RESTLESS,
+    SED_DRIVEN,
+    SENSITIVE,
+    SKINS,
+    SphereSkin,
+    discrimination_section,
+    nail_section,
+    typed,
+)
 
 RESOLUTIONS = ["quick", "standard", "paper"]
 CURVATURES = [287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0]
@@ -76,7 +84,7 @@ def test_the_bar_is_shifted_36_times_along_the_skin_over_one_mesh(conditions):
     np.testing.assert_allclose(along_skin, bar_firing_rates().shift_mm, rtol=0, atol=1e-12)
     assert all(follows_the_protocol(touch) for touch in touches)
     assert {touch.indenter for touch in touches} == {Bar(3.0, 0.3)}
-    assert {touch.tissues for touch in touches} == {named_tissues("trial3")}
+    assert {touch.tissues for touch in touches} == {named_tissues(conditions.materials)}
     assert len({(touch.grading, touch.tilt_deg, touch.settings) for touch in touches}) == 1
     assert len(set(touches)) == 36
 
@@ -270,7 +278,7 @@ def test_the_fit_finds_what_a_known_afferent_answered(synthetic_problem, synthet
 def test_single_unit_result_names_every_number(synthetic_problem, synthetic_fit):
     problem, _ = synthetic_problem
     best, folds = synthetic_fit
-    found = single_unit.single_unit_result(problem, best, folds, Afferent(), "response surface")
+    found = single_unit.single_unit_result(problem, best, folds, SED_DRIVEN, "response surface")
     shift_mm = bar_firing_rates().shift_mm
     dynamic, static = problem.model.evaluate(best.parameters)
     np.testing.assert_array_equal(found.dynamic_rate_hz, dynamic)
@@ -397,7 +405,7 @@ def test_one_noise_serves_both_positions_and_lies_between_those_of_each_alone(di
 
 def test_a_measure_that_stays_silent_is_left_out_and_named():
     """An afferent without a dynamic gain, so slow that it fires no second spike within the ramp."""
-    slow = Afferent(dynamic_gain=0.0, static_gain=3.5e-7)
+    slow = replace(SED_DRIVEN, dynamic_gain=0.0, static_gain=3.5e-7)
     found = sphere_discrimination.discriminate_spheres(SKINS, slow, seed=0, sessions=2)
     assert found.silent == ("dynamic",)
     assert set(found.gradient_sum) == {"static", "latency"} == set(found.statistics.shift) - {"euclidean"}

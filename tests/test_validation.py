@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from fingerpad import cli
 from fingerpad.cli import choices
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.data import cylinder_deflection, protocol, tissues
+from fingerpad.data import cylinder_deflection, protocol
 from fingerpad.experiments import scores
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.skin_deflection import deflection_r2, deflection_touches
@@ -433,8 +433,9 @@ def test_the_published_deflection_scores_as_in_the_reproduction(folder):
     found, table = read_observations(path), cylinder_deflection()
     assert found.observed.tolist() == table.deflection_mm[~table.is_artefact].tolist()
     assert [row.condition[2] for row in found.rows] == table.distance_mm[~table.is_artefact].tolist()
-    scored = validate(ValidationRequest(found, QUICK, folder))
-    touch = deflection_touches(QUICK.conditions)["trial3", "cylinder"]
+    third = Conditions(resolution="quick", materials="trial3")
+    scored = validate(ValidationRequest(found, FingertipModel(third), folder))
+    touch = deflection_touches(third)["trial3", "cylinder"]
     profile = Store(folder / STORE_FOLDER).load(touch).surface_profile()
     assert scored.r2 == pytest.approx(deflection_r2(profile), abs=1e-12)
     assert scored.r2_mirrored == pytest.approx(deflection_r2(profile, proximal_positive=False), abs=1e-12)
@@ -485,7 +486,7 @@ def test_an_interrupted_run_keeps_what_is_finished_and_goes_on(call, folder, tmp
     is_resumed = False
     monkeypatch.setattr(Touch, "solve", press_until_stopped)
     written(tmp_path, FORCE + rows)
-    options = ("mine.csv", "--resolution", "quick", "--jobs", "1", "--materials", "trial3")
+    options = ("mine.csv", "--resolution", "quick", "--jobs", "1")
     status, said, errors = call(*options)
     assert (status, said) == (130, "")
     assert "The same command continues after the last finished indentation" in errors
@@ -548,9 +549,15 @@ def test_options_and_their_defaults_are_those_of_the_modules():
     defaults = {option.name: option.default for option in command().params}
     assert defaults["loading"] == FingertipModel(Conditions()).loading
     assert defaults["static_window"] == protocol.STATIC_WINDOW.value
-    assert defaults["materials"] == tissues.REPRODUCED_TISSUES == choices.REPRODUCED_TISSUES
-    assert Conditions().materials == tissues.DEFAULT_TISSUES == choices.DEFAULT_TISSUES
-    assert FingertipModel(Conditions()).afferent == Afferent()
+
+
+@pytest.mark.parametrize(
+    "tissues", ["human", "paper", "trial3", "wu2007", named_tissues("human")], ids=lambda each: str(each)[:6]
+)
+def test_the_afferent_is_that_of_the_tissues_unless_one_is_given(tissues):
+    conditions, own = Conditions(materials=tissues), Afferent(static_gain=1e-6)
+    assert FingertipModel(conditions).responding == Afferent.for_tissues(tissues)
+    assert FingertipModel(conditions, own).responding == own
 
 
 def test_the_page_of_the_format_names_every_option_and_kind_and_shows_commands_that_parse():

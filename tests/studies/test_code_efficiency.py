@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
-from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, neighbour_pairs
-from sections import SphereSkin
+from sections import SENSITIVE, SphereSkin
 from studies import code_efficiency
 from studies.pages import code_efficiency as page
 
 CURVATURES = (287.0, 316.0)
-AFFERENT = Afferent(static_gain=1.2e-6)
-POPULATION = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0), afferent=AFFERENT)
+POPULATION = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0), afferent=SENSITIVE)
 PAIRS = neighbour_pairs(POPULATION.positions_mm, POPULATION.pitch_mm)
 
 

@@ -21,9 +21,9 @@ from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import start_points
-from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.report.style import png
+from sections import SED_DRIVEN, sed_driven
 from studies import drive_depths, drive_fits, drive_quantities, drive_study, dynamic_response
 from studies.drive_fits import BestOf, information, thorough_method
 from studies.drive_quantities import ALONE, APART, CANDIDATES, EXTENDED, PAPER, Drivers
@@ -105,8 +105,8 @@ def test_the_paper_comes_first_and_every_quantity_once():
 
 def test_a_fitted_model_follows_what_its_drive_follows():
     traces = SedTraces(TIMES_MS, TRACES["stored"].sed_kpa, [50.0], TRACES["von_mises"].sed_kpa, "von_mises")
-    rates = AfferentModel.of_traces(traces).evaluate(Afferent().parameters)
-    assert_array_equal(rates, Afferent(dynamic_quantity="von_mises").rates(traces))
+    rates = AfferentModel.of_traces(traces).evaluate(SED_DRIVEN.parameters)
+    assert_array_equal(rates, replace(SED_DRIVEN, dynamic_quantity="von_mises").rates(traces))
 
 
 def test_drives_put_each_quantity_where_its_term_looks():
@@ -448,7 +448,7 @@ def test_an_explained_model_begins_at_the_scaled_start():
     assert model.names[4:] == ("offset_mm",)
     assert model.n_stimuli == 24
     assert_array_equal(model.numbers(np.array([0.0, 0.0, 0.0, 0.0, 0.25])), [0.25])
-    at_start = Afferent.from_parameters(drive_fits.six_of_relative(np.zeros(4), start_points()[0]))
+    at_start = sed_driven(drive_fits.six_of_relative(np.zeros(4), start_points()[0]))
     assert_array_equal(model.evaluate(np.zeros(5)), at_start.rates(PATCH.drive(PATCH.at("stored"))))
 
 

@@ -12,10 +12,11 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.geometry.grading import lines_along
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
+from sections import SED_DRIVEN
 from studies import mesh_noise
 from studies.pages import mesh_noise as page
 
-GRID = Population.grid()
+GRID = Population.grid(afferent=SED_DRIVEN)
 PAIRS = neighbour_pairs(GRID.positions_mm, 1.0)
 
 

@@ -21,6 +21,7 @@ from studies.mesh_refinement import PEAK_SHIFT
 from studies.pages.markdown import markdown
 from studies.pages.paper_size import PAPER_SIZE, draw, summary
 from studies.paper_size import PaperSize
+from studies.study import TISSUES
 
 COARSE = Grading(RECEPTOR_X_MM, 1.0, 1.0, 1.0, 1.0, stratum_corneum=1, dermis=1, subcutis=1)
 ERRORS = {"quick": 0.2, "standard": 0.05, "paper": 0.0, "deeper": -0.1}
@@ -34,7 +35,7 @@ def touches():
 
 @pytest.mark.parametrize("name", paper_size.MESHES)
 def test_touches_are_those_of_the_studies_on_half_of_the_finger(touches, name):
-    conditions, mine = Conditions(name), touches[name]
+    conditions, mine = Conditions(name, materials=TISSUES), touches[name]
     bars = single_unit.bar_touches(conditions)
     asked = [
         *(bars[shift] for shift in paper_size.CHOSEN_SHIFTS),

@@ -13,16 +13,15 @@ from fingerpad.inference.soft_afferent import soft_spikes
 from fingerpad.inference.spike_parameters import (
     SPIKE_PARAMETER_NAMES,
 )
-from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.transduction import drive
 from fingerpad.report.style import png
+from sections import SED_DRIVEN as AFFERENT
 from studies import isi_variability, spike_fit
 from studies.interval_statistics import interval_statistics
 from studies.isi_variability import SETTLED_MS, SOURCES, held_at_its_rate
 from studies.pages import spike_fit as report
 
 SHIFT_MM = np.linspace(-3.5, 3.5, 8)
-AFFERENT = Afferent()
 SEED = 4
 
 
@@ -138,7 +137,7 @@ def test_the_same_seed_gives_the_same_numbers(found):
 
 
 def test_a_silent_afferent_makes_an_empty_section_that_can_be_drawn():
-    silent = Afferent(intercept_ma=-1e-3)
+    silent = replace(AFFERENT, intercept_ma=-1e-3)
     section = spike_fit.result(bar(), silent, SHIFT_MM, SEED)
     assert (section.recovery, section.raster, section.other_noise) == (None, None, ())
     assert section.variability.sources == ()

@@ -2,8 +2,8 @@
 
 from fingerpad.skin.fields import sampled_fields
 
-DEFAULT_TISSUES, REPRODUCED_TISSUES = "trial3", "human"
-"""Tissues of most commands, and of `reproduce` and `validate`; as in `fingerpad.data.tissues`."""
+DEFAULT_TISSUES = "human"
+"""Tissues of every command; as in `fingerpad.data.tissues`."""
 
 RESOLUTION_CHOICES = ("quick", "standard", "paper")
 INDENTER_CHOICES = ("sphere", "cylinder", "bar", "line", "punch", "plate", "edge", "gap", "grating")

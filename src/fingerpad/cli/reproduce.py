@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.choices import REPRODUCED_TISSUES
+from fingerpad.cli.choices import DEFAULT_TISSUES
 from fingerpad.cli.options import Jobs, Materials, Resolution, Seed
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 
@@ -23,7 +23,7 @@ def reproduce_command(
     ] = Path("reproduction"),
     jobs: Jobs = None,
     seed: Seed = 0,
-    materials: Materials = REPRODUCED_TISSUES,
+    materials: Materials = DEFAULT_TISSUES,
     extended: Annotated[
         bool | None,
         typer.Option(

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.choices import KIND_CHOICES, LOADING_CHOICES, REPRODUCED_TISSUES
+from fingerpad.cli.choices import DEFAULT_TISSUES, KIND_CHOICES, LOADING_CHOICES
 from fingerpad.cli.options import Jobs, Materials, Resolution
 from fingerpad.cli.running import Bars, interruptible, make_writable, processes
 from fingerpad.core.errors import InputError
@@ -27,12 +27,12 @@ def validate_command(
         Path, typer.Option(help="Folder for page, figure, results and stored indentations.")
     ] = Path("validate"),
     resolution: Resolution = "standard",
-    materials: Materials = REPRODUCED_TISSUES,
+    materials: Materials = DEFAULT_TISSUES,
     afferent: Annotated[
         Path | None,
         typer.Option(
             help="fit.json of a fit, or results.json of a reproduction: the afferent whose rates are "
-            "predicted. Default: that of the package."
+            "predicted. Default: that of the tissues."
         ),
     ] = None,
     loading: Annotated[
@@ -61,7 +61,6 @@ def validate_command(
     from fingerpad.experiments.validation.observations import example_file, read_observations
     from fingerpad.experiments.validation.predictions import FingertipModel
     from fingerpad.experiments.validation.validation import ValidationRequest, validate
-    from fingerpad.neuron.afferent import Afferent
     from fingerpad.report.validation import validation_summary, write_validation_page
 
     if example is not None:
@@ -74,7 +73,7 @@ def validate_command(
         raise InputError("validate needs a file of observations, or --example KIND: see --help.")
     model = FingertipModel(
         Conditions(resolution=resolution, materials=materials),
-        Afferent.for_tissues(materials) if afferent is None else fitted_afferent(afferent),
+        None if afferent is None else fitted_afferent(afferent),
         loading,
         static_window,
     )

@@ -36,8 +36,8 @@ STATIC_GAIN_SCALE = Published(
 TIME_CONSTANT = _MEMBRANE("membrane time constant tau at the start", 68.0, "ms")
 CAPACITANCE = _MEMBRANE("membrane capacitance C at the start", 1.0e-6, "mF")
 THRESHOLD = _MEMBRANE("threshold v of the membrane potential at the start", 50.0, "mV")
-DRIVEN_BY = {"human": "compressive_stress"}
-"""Quantity that drives both terms of the current with a set of tissues, by its name; SED with all others."""
+HUMAN_QUANTITY = "compressive_stress"
+"""Quantity that drives both terms of the current with the tissues human; SED with all others."""
 
 _TRIAL_3 = Source(
     "our fit of all 36 bar shifts: response surface method from the paper's start points, strain "

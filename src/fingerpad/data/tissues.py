@@ -103,11 +103,9 @@ PLATE_FORCE_2MM = _DANDEKAR(
     "force of a flat plate 2.0 mm deep, lowest and highest of four subjects", (0.50, 1.04), "N"
 )
 
-DEFAULT_TISSUES = "trial3"
-"""Name of the set of tissues that is pressed unless another one is asked for."""
-
-REPRODUCED_TISSUES = "human"
-"""Name of the set of tissues of `reproduce` and `validate` unless another one is asked for."""
+DEFAULT_TISSUES = "human"
+"""Name of the set of tissues that is pressed, and with which `Afferent()` was fitted, unless another one is
+asked for."""
 
 STIFFENING_RATIO = Published(
     "C20 over C10 of dermis and subcutis in the stiffening Trial 3",

@@ -7,14 +7,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fingerpad.core.checks import one_of, whole
-from fingerpad.core.signals import STORED_ENERGY
-from fingerpad.data import neuron
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Indenter, Sphere
 from fingerpad.mechanics.materials import Tissues
+from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.indentation import CONTACT_POINT_MM, touch_of
 from fingerpad.skin.indentation import Touch as Touch
 
@@ -58,13 +57,14 @@ class Conditions:
         whole("seed", self.seed, at_least=0)
 
     @property
+    def afferent(self) -> Afferent:
+        """Afferent that was fitted with the tissues, see `Afferent.for_tissues`."""
+        return Afferent.for_tissues(self.materials)
+
+    @property
     def quantity(self) -> str:
-        """Quantity that drives both terms of the current: SED, unless another one belongs to the tissues."""
-        return (
-            neuron.DRIVEN_BY.get(self.materials, STORED_ENERGY)
-            if isinstance(self.materials, str)
-            else STORED_ENERGY
-        )
+        """Quantity that drives both terms of the current of that afferent."""
+        return self.afferent.static_quantity
 
     @property
     def skin_tilt_deg(self) -> float:

@@ -70,7 +70,7 @@ class RateLikelihood:
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0, 0.0], [1.0, 2.0], [1.0, 2.0]], kinks_ms=[50.0])
     >>> observed = RateRecordings(("flat", "edge"), [120.0, 210.0], [35.0, 60.0])
     >>> likelihood = RateLikelihood(AfferentModel.of_traces(sed), observed)
-    >>> fitted = Afferent().parameters
+    >>> fitted = Afferent.for_tissues("trial3").parameters
     >>> good, poor = likelihood.log_likelihood(fitted * np.array([[1.0], [2.0]]))
     >>> bool(good > poor)
     True

@@ -141,7 +141,7 @@ class AfferentModel:
     >>> model = AfferentModel.of_traces([short, longer, short])
     >>> [drive.n_sites for drive in model.drives]
     [2, 1]
-    >>> model.evaluate(Afferent().parameters)[1].round().tolist()
+    >>> model.evaluate(Afferent.for_tissues("trial3").parameters)[1].round().tolist()
     [63.0, 63.0, 63.0]
     """
 

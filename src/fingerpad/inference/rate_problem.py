@@ -45,7 +45,7 @@ class RateProblem:
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
     >>> model = AfferentModel.of_traces(sed)
     >>> problem = RateProblem(model, RateRecordings(("flat",), [217.0], [126.0]))
-    >>> fitted = Afferent().parameters
+    >>> fitted = Afferent.for_tissues("trial3").parameters
     >>> round(problem.score(fitted, np.array([0])), 2)  # static rates half as observed
     0.81
     """

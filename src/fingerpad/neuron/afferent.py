@@ -33,18 +33,18 @@ PARAMETER_UNITS = ("mA", "mA ms/kPa", "mA/kPa", "ms", "mF", "mV")
 class Afferent:
     """A slowly adapting type I (SAI) afferent.
 
-    The defaults are the fit to the recordings under the shifted bar with the tissues `trial3`
-    (`fingerpad.data.neuron`, names that begin with TRIAL_3). They hold for the finger and tissues with which
-    they were fitted; `for_tissues` has those of other sets.
+    The defaults are the fit with the default tissues, `human`, to the recordings under the shifted bar and to
+    two hit rates of people (`fingerpad.data.neuron`, names that begin with HUMAN). They hold for the finger
+    and the tissues with which they were fitted; `for_tissues` has those of other sets.
 
     Parameters
     ----------
     intercept_ma : float
         Current without any load, beta. [mA]
     dynamic_gain : float
-        Gain on the rate of change of strain energy density (SED), k_d. [mA ms/kPa]
+        Gain on the rate of change of what the dynamic term follows, k_d. [mA ms/kPa]
     static_gain : float
-        Gain on SED itself, k_s. [mA/kPa]
+        Gain on what the static term follows, k_s. [mA/kPa]
     time_constant_ms : float
         Time constant of the membrane, tau. [ms]
     capacitance_mf : float
@@ -54,8 +54,9 @@ class Afferent:
     refractory_ms : float
         Refractory period after each spike. [ms]
     dynamic_quantity, static_quantity : str
-        What the two terms follow, by the names of `SkinResponse.sample`. Any but SED, "stored", is an
-        extension of the paper's model. The units of k_d and k_s depend on them.
+        What the two terms follow, by the names of `SkinResponse.sample`: compressive stress, unless another
+        one is given. The paper's is strain energy density (SED), "stored"; any other is an extension of its
+        model. The units of k_d and k_s depend on them.
 
     Raises
     ------
@@ -67,34 +68,35 @@ class Afferent:
     SED rises to 2 kPa in 50 ms and stays: the rate is high in the ramp and low in the hold.
 
     >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-    >>> dynamic_hz, static_hz = Afferent().rates(sed)
+    >>> dynamic_hz, static_hz = Afferent.for_tissues("trial3").rates(sed)
     >>> dynamic_hz.round().tolist(), static_hz.round().tolist()
     ([217.0], [63.0])
     """
 
-    intercept_ma: float = neuron.TRIAL_3_INTERCEPT.value
-    dynamic_gain: float = neuron.TRIAL_3_DYNAMIC_GAIN.value
-    static_gain: float = neuron.TRIAL_3_STATIC_GAIN.value
-    time_constant_ms: float = neuron.TRIAL_3_TIME_CONSTANT.value
-    capacitance_mf: float = neuron.TRIAL_3_CAPACITANCE.value
-    threshold_mv: float = neuron.TRIAL_3_THRESHOLD.value
+    intercept_ma: float = neuron.HUMAN_INTERCEPT.value
+    dynamic_gain: float = neuron.HUMAN_DYNAMIC_GAIN.value
+    static_gain: float = neuron.HUMAN_STATIC_GAIN.value
+    time_constant_ms: float = neuron.HUMAN_TIME_CONSTANT.value
+    capacitance_mf: float = neuron.CAPACITANCE.value
+    threshold_mv: float = neuron.THRESHOLD.value
     refractory_ms: float = neuron.REFRACTORY.value
-    dynamic_quantity: str = STORED_ENERGY
-    static_quantity: str = STORED_ENERGY
+    dynamic_quantity: str = neuron.HUMAN_QUANTITY
+    static_quantity: str = neuron.HUMAN_QUANTITY
 
     def __post_init__(self) -> None:
         # Both stages check their parameters when they are made.
         self.transduction, self.membrane  # noqa: B018
 
     @classmethod
-    def for_tissues(cls, tissues: str) -> Afferent:
-        """Afferent that was fitted with a named set of tissues.
+    def for_tissues(cls, tissues: object) -> Afferent:
+        """Afferent that was fitted with a set of tissues.
 
         Parameters
         ----------
-        tissues : str
-            "human", driven by compressive stress, or "paper", driven by strain energy density (SED). Any
-            other name returns the default afferent, fitted with "trial3".
+        tissues : str or Tissues
+            "human", the default afferent, driven by compressive stress; "paper" or "trial3", driven by strain
+            energy density (SED). For any other name and for tissues of your own, no afferent was fitted; the
+            one of "trial3" is returned.
 
         Returns
         -------
@@ -104,38 +106,41 @@ class Afferent:
         --------
         >>> Afferent.for_tissues("human").static_quantity, Afferent.for_tissues("paper").static_quantity
         ('compressive_stress', 'stored')
-        >>> Afferent.for_tissues("trial3") == Afferent()
+        >>> Afferent.for_tissues("human") == Afferent()
         True
         """
         if tissues == "human":
-            return cls(
-                neuron.HUMAN_INTERCEPT.value,
-                neuron.HUMAN_DYNAMIC_GAIN.value,
-                neuron.HUMAN_STATIC_GAIN.value,
-                neuron.HUMAN_TIME_CONSTANT.value,
-                neuron.CAPACITANCE.value,
-                neuron.THRESHOLD.value,
-                dynamic_quantity=neuron.DRIVEN_BY["human"],
-                static_quantity=neuron.DRIVEN_BY["human"],
+            return cls()
+        fitted = (
+            (
+                neuron.PAPER_INTERCEPT,
+                neuron.PAPER_DYNAMIC_GAIN,
+                neuron.PAPER_STATIC_GAIN,
+                neuron.PAPER_TIME_CONSTANT,
+                neuron.PAPER_CAPACITANCE,
+                neuron.PAPER_THRESHOLD,
             )
-        if tissues == "paper":
-            return cls(
-                neuron.PAPER_INTERCEPT.value,
-                neuron.PAPER_DYNAMIC_GAIN.value,
-                neuron.PAPER_STATIC_GAIN.value,
-                neuron.PAPER_TIME_CONSTANT.value,
-                neuron.PAPER_CAPACITANCE.value,
-                neuron.PAPER_THRESHOLD.value,
+            if tissues == "paper"
+            else (
+                neuron.TRIAL_3_INTERCEPT,
+                neuron.TRIAL_3_DYNAMIC_GAIN,
+                neuron.TRIAL_3_STATIC_GAIN,
+                neuron.TRIAL_3_TIME_CONSTANT,
+                neuron.TRIAL_3_CAPACITANCE,
+                neuron.TRIAL_3_THRESHOLD,
             )
-        return cls()
+        )
+        return cls.from_parameters(
+            [each.value for each in fitted], dynamic_quantity=STORED_ENERGY, static_quantity=STORED_ENERGY
+        )
 
     @classmethod
     def from_parameters(
         cls,
         parameters: ArrayLike,
         refractory_ms: float = neuron.REFRACTORY.value,
-        dynamic_quantity: str = STORED_ENERGY,
-        static_quantity: str = STORED_ENERGY,
+        dynamic_quantity: str = neuron.HUMAN_QUANTITY,
+        static_quantity: str = neuron.HUMAN_QUANTITY,
     ) -> Afferent:
         """Make an afferent from the six fitted numbers.
 
@@ -147,7 +152,7 @@ class Afferent:
         refractory_ms : float, optional
             Refractory period after each spike, which is not fitted. [ms]
         dynamic_quantity, static_quantity : str, optional
-            What the two terms follow.
+            What the two terms follow; default: as of `Afferent()`.
 
         Returns
         -------
@@ -197,7 +202,7 @@ class Afferent:
         Parameters
         ----------
         sed : SedTraces or Drive
-            Strain energy density. Pass `fingerpad.neuron.transduction.drive` of it if many afferents are
+            What the two terms follow. Pass `fingerpad.neuron.transduction.drive` of it if many afferents are
             simulated under the same traces, as in a fit.
 
         Returns
@@ -215,7 +220,8 @@ class Afferent:
             if needed != got:
                 raise InputError(
                     f"The {name.partition('_')[0]} term of this afferent needs {needed!r}: got traces of "
-                    f"{got!r}; sample the skin with {name}={needed!r}."
+                    f"{got!r}; sample the skin with {name}={needed!r}, or use an afferent that follows "
+                    f"{got!r}, such as Afferent.for_tissues('paper') for {STORED_ENERGY!r}."
                 )
 
         def trains(sites: slice) -> SpikeTrains:

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.experiments.fit.results import FitResult, PhaseRates, SpikeFitSummary
 from fingerpad.experiments.fit.session import FitFile
 from fingerpad.report.formatting import (
@@ -194,12 +195,17 @@ def write_fit_page(results: FitFile, folder: Path) -> Path:
     """
     page = Page(
         "An afferent fitted to recordings",
-        "Strain energy density in a finite-element fingertip drives a leaky integrate-and-fire "
-        f"afferent, after Gerling et al. 2014. {edition(results.manifest)}",
+        "A finite-element fingertip drives a leaky integrate-and-fire afferent, after Gerling et al. 2014: "
+        f"its dynamic term follows {_in_words(results.dynamic_quantity)}, its static term "
+        f"{_in_words(results.static_quantity)}. {edition(results.manifest)}",
         fit_summary(results.fit),
         [*_chapters(results.fit), manifest_chapter(results.manifest)],
     )
     return write_html(page, Path(folder) / _PAGE)
+
+
+def _in_words(quantity: str) -> str:
+    return "strain energy density" if quantity == STORED_ENERGY else quantity.replace("_", " ")
 
 
 def fit_summary(found: FitResult) -> list[str]:

@@ -311,7 +311,8 @@ def indent(
     materials : str or Tissues
         "human" (one set for deflection, force, firing and percept), "paper" (closest to the paper's numbers),
         "trial1", "trial2", "trial3" (paper, section 2.2.1), "trial2_wu", "trial3_wu",
-        "trial3_stiffening", "maeno1998", "wu2007", "gerling2014_fit", or tissues of your own.
+        "trial3_stiffening", "maeno1998", "wu2007", "gerling2014_fit", or tissues of your own. The default
+        afferent was fitted with the default tissues; `Afferent.for_tissues` has the one for others.
     resolution : {"quick", "standard", "paper"}
         How fine the mesh and the steps are.
     at_mm : (float, float)
@@ -336,8 +337,8 @@ def indent(
     --------
     >>> import fingerpad as fp
     >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287), fp.RampAndHold(depth_mm=0.3))
-    >>> print(f"{skin.surface_profile().deflection_mm.max():.1f} mm deep, {skin.force_mn[-1]:.0f} mN")
-    0.3 mm deep, 32 mN
+    >>> print(f"{skin.surface_profile().deflection_mm.max():.1f} mm deep")
+    0.3 mm deep
     """
     return touch_of(finger, indenter, stimulus, materials, resolution, at_mm, settings=settings).solve()
 

@@ -41,7 +41,7 @@ CODES = ("gradient_sum", "euclidean", IDEAL)
 MEASURES = ("static", "dynamic", "latency")
 FREE = "free"
 DEFAULT = "default"
-"""Value of `afferent` for the fit to the recordings under the shifted bar."""
+"""Value of `afferent` for the one that was fitted with the tissues."""
 
 FITTED = "fitted"
 """Value of `noise` where it is fitted to observed hit rates."""
@@ -206,7 +206,7 @@ class PopulationSettings(TaskPart):
 
 
 class AfferentSettings(TaskPart):
-    """The afferent by its numbers; what is absent is as in `fingerpad.Afferent`.
+    """The afferent by its numbers; what is absent is as in the afferent of the tissues.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ class AfferentSettings(TaskPart):
     refractory_ms : float
         Rest after each spike. [ms]
     dynamic_quantity, static_quantity : str
-        What the two terms follow; default: as the afferent of the tissues.
+        What the two terms follow.
     """
 
     intercept_ma: FiniteNumber | None = None

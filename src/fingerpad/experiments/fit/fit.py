@@ -106,7 +106,8 @@ def fit_recordings(
     >>> import fingerpad as fp
     >>> height_kpa = [0.8, 1.2, 1.6, 2.0, 2.5, 3.0]
     >>> sed = fp.SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 1.0], height_kpa), kinks_ms=[50.0])
-    >>> known = fp.Afferent.from_parameters([0.0, 1.5e-4, 9e-7, 60.0, 1e-6, 50.0])
+    >>> six, energy = [0.0, 1.5e-4, 9e-7, 60.0, 1e-6, 50.0], "stored"
+    >>> known = fp.Afferent.from_parameters(six, dynamic_quantity=energy, static_quantity=energy)
     >>> recordings = RateRecordings(("a", "b", "c", "d", "e", "f"), *known.rates(sed))
     >>> fit = fit_recordings(sed, recordings, memberships=[0, 1, 0, 1, 0, 1])
     >>> fit.fss_in_sample > 0.99, fit.fss_out_of_sample > 0.97

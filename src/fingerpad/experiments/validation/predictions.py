@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,8 +41,8 @@ class FingertipModel:
     ----------
     conditions : Conditions
         Finger, tissues and accuracy.
-    afferent : Afferent
-        Responds to the touches of rates.
+    afferent : Afferent, optional
+        Responds to the touches of rates; default: the one that was fitted with the tissues.
     loading : {"ramp_and_hold", "quasi_static"}
         How depths of force and deflection are reached.
     static_window_ms : (float, float)
@@ -50,7 +50,7 @@ class FingertipModel:
     """
 
     conditions: Conditions
-    afferent: Afferent = field(default_factory=Afferent)
+    afferent: Afferent | None = None
     loading: str = RAMP_AND_HOLD
     static_window_ms: tuple[float, ...] = protocol.STATIC_WINDOW.value
 
@@ -63,6 +63,11 @@ class FingertipModel:
                 f"static_window must be a start from 0 on and a later end, at most {end_ms:g} ms, where the "
                 f"hold ends: got {start:g}, {end:g}."
             )
+
+    @property
+    def responding(self) -> Afferent:
+        """The afferent that responds: the given one, or that of the tissues."""
+        return self.afferent or self.conditions.afferent
 
 
 @dataclass(frozen=True)
@@ -260,7 +265,7 @@ def _rate(given: Mapping[str, Value], model: FingertipModel) -> Reading:
         grading=grading,
         tilt_deg=conditions.skin_tilt_deg,
     )
-    receptor = Population(np.array([site]), 1.0, model.afferent)
+    receptor = Population(np.array([site]), 1.0, model.responding)
 
     def read(skin: SkinResponse | None) -> float:
         assert skin is not None
@@ -271,7 +276,7 @@ def _rate(given: Mapping[str, Value], model: FingertipModel) -> Reading:
 
 def _resting_rate(model: FingertipModel) -> float:
     """Rate of the afferent without any touch. [spikes/s]"""
-    afferent = model.afferent
+    afferent = model.responding
     rest = SedTraces.at_rest(RampAndHold().end_ms, afferent.dynamic_quantity, afferent.static_quantity)
     return float(afferent.rates(rest, static_window_ms=model.static_window_ms)[1][0])
 

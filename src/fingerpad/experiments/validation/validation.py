@@ -225,7 +225,7 @@ def validate(
     )
     motion = RampAndHold()
     of_rates = {
-        "afferent": asdict(model.afferent),
+        "afferent": asdict(model.responding),
         "ramp_ms": motion.ramp_ms,
         "hold_ms": motion.hold_ms,
         "static_window_ms": model.static_window_ms,
