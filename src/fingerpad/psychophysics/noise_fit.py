@@ -148,7 +148,7 @@ def expected_euclidean_hit_rates(
     point = decision_point(means[0], means[1:], finite("criterion", criterion))
     normal = hit_probability(point, means[1:], spreads[1:], larger)
     z = (means[1:] - point) / np.maximum(spreads[1:], np.finfo(float).tiny)
-    skewness = third.sum(axis=1)[1:] / np.maximum(spreads[1:], np.finfo(float).tiny) ** 3
+    skewness = third.sum(axis=1)[1:] / np.maximum(spreads[1:] ** 3, np.finfo(float).tiny)
     edgeworth = skewness / 6.0 * (np.square(z) - 1.0) * np.exp(-0.5 * np.square(z)) / np.sqrt(2.0 * np.pi)
     return np.clip(normal + larger * edgeworth, 0.0, 1.0)
 
