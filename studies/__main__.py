@@ -7,6 +7,7 @@ import typer
 from fingerpad.cli import run
 from fingerpad.cli.options import Command
 from studies import (
+    bar_readings,
     code_efficiency,
     drive_study,
     fit_methods,
@@ -18,6 +19,7 @@ from studies import (
     tissue_search,
 )
 from studies.commands.results import results_command
+from studies.pages.bar_readings import bar_readings_page
 from studies.pages.code_efficiency import code_efficiency_page
 from studies.pages.drive_study import drives_page
 from studies.pages.fit_methods import methods_page
@@ -35,6 +37,12 @@ STUDIES = (
         "Compare tissues and drives on deflection, plate force, firing and percept.",
         tissue_search.run,
         tissue_search_page,
+    ),
+    Study(
+        "bar-readings",
+        "Compare readings of the rates under the bar: intervals in windows, and bar or grating.",
+        bar_readings.run,
+        bar_readings_page,
     ),
     Study(
         "drives",

@@ -49,11 +49,19 @@ def caption_single_unit(section: SingleUnitResult) -> str:
         f"Firing rate of one SAI afferent under a bar {protocol.BAR_WIDTH.value} mm wide, pressed in by "
         f"{protocol.DEPTH.value} mm at {section.shift_mm.size} positions relative to the centre of its "
         "receptive field; shaded: positions at which the bar covers the centre. Observed: Phillips & "
-        "Johnson 1981. The line is predicted with the parameters below. Fractional sum of squares (FSS, 1 "
+        "Johnson 1981, an afferent of a monkey; the finger of the model is human. The line is predicted with "
+        "the parameters below. Fractional sum of squares (FSS, 1 "
         f"is perfect) out of sample: {fixed(section.fss_out_of_sample, 2)} here, "
         f"{fixed(paper.FSS_OUT_OF_SAMPLE.value, 2)} in the paper. The paper's dynamic rates range from "
         f"{number(paper.DYNAMIC_RATE_MINIMUM.value)} to {number(paper.DYNAMIC_RATE_MAXIMUM.value)} spikes/s."
     )
+
+
+SPECIES = (
+    "The recordings are from afferents of monkeys (the paper, section 2.2.2: primate), the finger is human "
+    "(section 2.1.1). The fit of the afferent takes up what differs between the two, which is not known."
+)
+"""What the paper combines; see docs/single-unit.md."""
 
 
 def single_unit_tables(section: SingleUnitResult) -> list[Table]:
@@ -80,6 +88,7 @@ def _scores(section: SingleUnitResult) -> Table:
         "Fractional sum of squares (FSS)",
         ("over", "paper", "this run"),
         [Row((name, fixed(printed, 2), fixed(ours, 3))) for name, printed, ours in rows],
+        SPECIES,
     )
 
 

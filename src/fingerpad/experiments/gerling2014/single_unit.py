@@ -342,10 +342,10 @@ def single_unit_result(
         folds=tuple(_fold(problem, fold, shift_mm) for fold in folds.folds),
         modulation=RateModulation(
             dynamic=PhaseModulation(
-                observed=_modulation(shift_mm, observed_dynamic), ours=_modulation(shift_mm, dynamic)
+                observed=edge_modulation(shift_mm, observed_dynamic), ours=edge_modulation(shift_mm, dynamic)
             ),
             static=PhaseModulation(
-                observed=_modulation(shift_mm, observed_static), ours=_modulation(shift_mm, static)
+                observed=edge_modulation(shift_mm, observed_static), ours=edge_modulation(shift_mm, static)
             ),
         ),
     )
@@ -382,7 +382,14 @@ def _named(parameters: FloatArray) -> dict[str, float]:
     return dict(zip(PARAMETER_NAMES, parameters.tolist(), strict=True))
 
 
-def _modulation(shift_mm: FloatArray, rate_hz: FloatArray) -> Modulation:
+def edge_modulation(shift_mm: FloatArray, rate_hz: FloatArray) -> Modulation:
+    """Return the largest rate, the smallest under the flat face of the bar, and their modulation.
+
+    Parameters
+    ----------
+    shift_mm, rate_hz : array (n_shifts,)
+        Shifts of the bar, and rates. [mm, spikes/s]
+    """
     under_flat = np.abs(shift_mm) < protocol.BAR_WIDTH.value / 2 - protocol.BAR_FILLET.value
     largest, smallest = float(rate_hz.max()), float(rate_hz[under_flat].min())
     return Modulation(
