@@ -11,6 +11,7 @@ from studies import (
     code_efficiency,
     drive_study,
     fit_methods,
+    held_out,
     mesh_noise,
     mesh_refinement,
     paper_size,
@@ -23,6 +24,7 @@ from studies.pages.bar_readings import bar_readings_page
 from studies.pages.code_efficiency import code_efficiency_page
 from studies.pages.drive_study import drives_page
 from studies.pages.fit_methods import methods_page
+from studies.pages.held_out import held_out_page
 from studies.pages.mesh_noise import mesh_noise_page
 from studies.pages.mesh_refinement import MESH_REFINEMENT
 from studies.pages.paper_size import PAPER_SIZE
@@ -43,6 +45,13 @@ STUDIES = (
         "Compare readings of the rates under the bar: intervals in windows, and bar or grating.",
         bar_readings.run,
         bar_readings_page,
+    ),
+    Study(
+        "held-out",
+        "Predict what no search has used: force, spheres by force, gratings, adaptation, volume, thresholds.",
+        held_out.run,
+        held_out_page,
+        materials="human",
     ),
     Study(
         "drives",

@@ -41,6 +41,8 @@ class Study:
         From that result to its page.
     resolution : str or None, optional
         Resolution by default; None for a study that has resolutions and random numbers of its own.
+    materials : str, optional
+        Tissues by default.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Study:
     run: Callable[[Runner, Conditions], Any]
     page: Callable[[Any], Page]
     resolution: str | None = "quick"
+    materials: str = TISSUES
 
 
 def run_study(study: Study, runner: Runner, conditions: Conditions) -> tuple[Path, Path]:
@@ -88,12 +91,12 @@ def command_of(study: Study) -> Callable[..., None]:
         out: Out = Path(study.name),
         jobs: Jobs = None,
         seed: Seed = 0,
-        materials: Materials = TISSUES,
+        materials: Materials = study.materials,
     ) -> None:
         execute(study, Conditions(resolution, seed, materials), out, jobs)
 
     def without_conditions(out: Out = Path(study.name), jobs: Jobs = None) -> None:
-        execute(study, Conditions(materials=TISSUES), out, jobs)
+        execute(study, Conditions(materials=study.materials), out, jobs)
 
     chosen = command if study.resolution else without_conditions
     chosen.__doc__ = study.help
