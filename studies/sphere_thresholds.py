@@ -40,8 +40,8 @@ from fingerpad.skin.sampling import SkinResponse
 
 STANDARDS_PER_M = (144.0, 200.0, 287.0)
 STANDARD_PER_M = psychophysics.SPHERE_287.value
-PRESSED_PER_M = (144.0, 155.0, 170.0, 200.0, 235.0, STANDARD_PER_M, 296.0, 325.0, 365.0)
-"""Spheres of every row: close together above each standard, and people's two comparisons. [1/m]"""
+PRESSED_PER_M = (144.0, 165.0, 190.0, 218.0, 250.0, STANDARD_PER_M, 296.0, 328.0, 365.0)
+"""Spheres of every row, of those that `fingerpad reproduce --extended` presses. [1/m]"""
 
 DEEPER_MM = 2.3
 FORCES_N = (0.1, 0.2)
