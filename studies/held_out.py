@@ -59,18 +59,22 @@ FORCE_INDENTERS = ("plate", "punch:6.35", "cylinder:3.17", "sphere:287")
 DEFLECTED = (("cylinder:3.17", 0.5), ("cylinder:3.17", 1.0), ("cylinder:3.17", 2.0), ("line", 1.0))
 DISTANCES_MM = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0)
 
-SPHERE_FORCES_N = (0.2, *facts.SPHERE_FORCES.value)
+SPHERE_FORCES_N = (0.2, facts.SPHERE_FORCES.value[0], facts.SPHERE_FORCES.value[-1])
 PROFILE_FORCE_N = 0.2
 PROFILES_PER_M = (172.0, 340.0, 694.0)
 POSITIONS_MM = tuple(np.arange(0.0, 5.01, 0.5).tolist())
 """Places of the receptor from the middle of the sphere, towards the proximal end. [mm]"""
 
-RIDGES_MM = (0.5, 1.0, 1.5, 3.0, 5.0)
+RIDGES_MM = (0.5, 1.0, 1.5, 2.5, 3.0, 5.0)
 """Width of the ridges of a grating, and of its grooves. [mm]"""
 
 TURNED_MM = (1.0, 3.0)
-"""Gratings that are also pressed with their ridges along the finger, and by two forces. [mm]"""
+"""Gratings that are also pressed with their ridges along the finger. [mm]"""
 
+IN_VIVO_MM = (3.0, 5.0)
+"""Gratings whose modulation index in vivo was published. [mm]"""
+
+FORCED_MM = (3.0,)
 GRATING_FORCES_N = (0.1, 0.2)
 PLACES_PER_PERIOD = 24
 
@@ -484,7 +488,7 @@ def force_checks(forces: Forces) -> Iterable[Check]:
                 statement=f"plate at {depth:g} mm, {loading.replace('_', ' ')}: {how}",
                 source=source,
                 status="read",
-                role=CHOSEN if ranged and loading == RAMP_AND_HOLD else PREDICTED,
+                role=CHOSEN if ranged else PREDICTED,
                 predicted=force,
                 unit="N",
                 low=low if ranged else PLATE_SHARES[0] * mean,
@@ -560,6 +564,19 @@ def _smallest_step(values: FloatArray, axis: int) -> float:
 def sphere_checks(spheres: SphereRates) -> Iterable[Check]:
     """Compare with what was stated of human afferents under spheres."""
     fact, force = facts.SPHERE_CURVATURES, facts.SPHERE_FORCES
+    applied = spheres.rate_hz[np.isin(spheres.force_n, force.value)]
+    yield Check(
+        subject="spheres",
+        statement="share of the spheres applied to people that stay away from the bone, "
+        + " and ".join(f"{newton:g} N" for newton in SPHERE_FORCES_N if newton in force.value),
+        source=force.source,
+        status=force.status,
+        role=PREDICTED,
+        predicted=float(np.isfinite(applied).mean()),
+        unit="1",
+        low=1.0,
+        high=np.nan,
+    )
     yield _direction(
         "spheres",
         "rate increases with curvature, smallest step at all forces",
@@ -626,11 +643,11 @@ def grating_rates(model: FingertipModel, runner: Runner) -> GratingRates:
     forced = [
         (force, ridge, ridge, place)
         for force in GRATING_FORCES_N
-        for ridge in TURNED_MM
+        for ridge in FORCED_MM
         for place in _places_mm(ridge).tolist()
     ]
     by_force = predicted("grating", forced, model, runner)
-    by_force = by_force.reshape(len(GRATING_FORCES_N), len(TURNED_MM), PLACES_PER_PERIOD)
+    by_force = by_force.reshape(len(GRATING_FORCES_N), len(FORCED_MM), PLACES_PER_PERIOD)
     return GratingRates(
         ridge_mm=np.array([ridge for ridge, _ in gratings]),
         spin_deg=np.array([spin for _, spin in gratings]),
@@ -638,7 +655,7 @@ def grating_rates(model: FingertipModel, runner: Runner) -> GratingRates:
         static_index=_index(static),
         dynamic_index=_index(dynamic),
         force_n=np.array(GRATING_FORCES_N),
-        forced_ridge_mm=np.array(TURNED_MM),
+        forced_ridge_mm=np.array(FORCED_MM),
         forced_index=_index(by_force),
     )
 
@@ -680,18 +697,32 @@ def period_rates_hz(
 def grating_checks(gratings: GratingRates) -> Iterable[Check]:
     """Compare with modulation in vivo, and with what was stated of gratings."""
     across = gratings.spin_deg == 0.0
-    for size, observed in zip((3.0, 5.0), paper.GRATING_MODULATION_IN_VIVO.value, strict=True):
+    readings = [
+        (size, observed, read_as, ridge)
+        for size, observed in zip(IN_VIVO_MM, paper.GRATING_MODULATION_IN_VIVO.value, strict=True)
+        for read_as, ridge in (("width of a ridge", size), ("period", size / 2.0))
+    ]
+    for size, observed, read_as, ridge in readings:
         yield Check(
             subject="gratings",
-            statement=f"static modulation index, ridges of {size:g} mm, within 10 % of that in vivo",
+            statement=f"static modulation index, {size:g} mm read as the {read_as}, within 10 % of in vivo",
             source=paper.GRATING_MODULATION_IN_VIVO.source,
             status=paper.GRATING_MODULATION_IN_VIVO.status,
             role=PREDICTED,
-            predicted=gratings.index_of(size),
+            predicted=gratings.index_of(ridge),
             unit="1",
             low=0.9 * observed,
             high=1.1 * observed,
         )
+    fine = facts.FINEST_GRATING
+    finest = gratings.static_hz[across & (gratings.ridge_mm == fine.value)]
+    yield _direction(
+        "gratings",
+        f"rate changes over a grating with grooves of {fine.value:g} mm, static difference",
+        fine,
+        float(np.ptp(finest)),
+        "spikes/s",
+    )
     fact = facts.GRATINGS
     yield _direction(
         "gratings",

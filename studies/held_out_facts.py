@@ -34,6 +34,13 @@ VOLUME_CHANGE = Published(
 _GRATINGS = Source("Bensmaia, Craig, Yoshioka & Johnson 2006, abstract; monkey SA1 afferents", "read")
 GRATINGS = _GRATINGS("orientations of the gratings: across and along the finger", (0.0, 90.0), "degrees")
 
+FINEST_GRATING = Published(
+    "width of the finest grooves that SAI afferents resolve, about",
+    0.5,
+    "mm",
+    "Phillips & Johnson 1981 II and later reviews; monkey SAI afferents",
+    "recalled",
+)
 GAP_THRESHOLD = Published(
     "gap that people detect in 75 % of trials",
     0.87,

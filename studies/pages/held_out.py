@@ -10,12 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.data import paper
 from fingerpad.report.formatting import ABSENT, fixed, number
 from fingerpad.report.manifest import edition
 from fingerpad.report.parts import Chapter, Drawing, Page, Part
 from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, LineStyle, new_figure
 from studies import held_out_facts as facts
-from studies.held_out import PREDICTED, Check, HeldOut, Score
+from studies.held_out import IN_VIVO_MM, PREDICTED, Check, HeldOut, Score
 from studies.pages.markdown import parts_of, share, table
 from studies.sphere_thresholds import STANDARDS_PER_M, SphereThresholds, ThresholdRow
 
@@ -36,9 +37,9 @@ def held_out_page(results: HeldOut) -> Page:
         partial(draw, results),
         "(a) Force of indenters; bars: range of four subjects under the plate, crosses: their mean. "
         "(b) Static rate under spheres pressed by force. (c) Static rate beside the middle of spheres. "
-        "(d) Modulation index of gratings with grooves as wide as ridges; crosses: in vivo. (e) Rates in "
-        "successive windows over that in the first; crosses: after 12 s in vivo. (f) Weber fractions at 144 "
-        "/m by force, for noise that is proportional to the rate or independent of it; shaded: people.",
+        "(d) Modulation index of gratings with grooves as wide as ridges; crosses: in vivo, in two readings. (e) "
+        "Rates in successive windows over that in the first; crosses: after 12 s in vivo. (f) Weber fractions "
+        "at 144 /m by force, for noise that is proportional to the rate or independent of it; shaded: people.",
     )
     return Page(
         "Predictions that no search has used",
@@ -206,8 +207,8 @@ def _gratings(results: HeldOut) -> list[Part]:
         for force, row in zip(found.force_n, found.forced_index, strict=True)
     ]
     return parts_of(
-        "Gratings 1.0 mm deep; grooves are as wide as ridges. Which width the 3 and 5 mm in vivo are, of a "
-        "ridge or of a period, is not told in the source; they are read as ridges.",
+        "Gratings 1.0 mm deep; grooves are as wide as ridges. Our source does not say whether the 3 and 5 mm "
+        "in vivo are the width of a ridge or a period, nor which phase they belong to.",
         table(("ridge", "ridges", "static [spikes/s]", "static index", "dynamic index"), rows),
         "Static index by force, from the rates of kind `grating` (header "
         "`force_n,ridge_mm,groove_mm,position_mm,rate_hz`):",
@@ -232,8 +233,8 @@ def _adaptation(results: HeldOut) -> list[Part]:
         "Rate below the middle of the contact in successive windows:",
         table(("touch", "windows [s]", "rate [spikes/s]", "decline"), rows),
         "All decline of the model is relaxation of the tissues (time constants of 2 and 9 s) and of the "
-        "membrane. It has no current that inactivates and no adaptation of the spike generator. In the "
-        "recordings of SAI afferents most of the decline lies in the first second.",
+        "membrane. It has no current that inactivates and no adaptation of the spike generator, which would "
+        "add a fast decline. For the first second no number that can be cited was at hand.",
     )
 
 
@@ -354,9 +355,9 @@ def _draw_gratings(axes: Axes, results: HeldOut) -> None:
     for line, spin, label in zip(LINES, (0.0, 90.0), ("across the finger", "along it"), strict=False):
         chosen = found.spin_deg == spin
         axes.plot(found.ridge_mm[chosen], found.static_index[chosen], **line, label=label, markersize=4.0)
-    in_vivo = [check for check in results.checks if "modulation index, ridges" in check.statement]
-    middles = [(check.low + check.high) / 2.0 for check in in_vivo]
-    axes.plot((3.0, 5.0)[: len(middles)], middles, "x", color=GREY, label="in vivo")
+    in_vivo = paper.GRATING_MODULATION_IN_VIVO.value
+    axes.plot(IN_VIVO_MM, in_vivo, "x", color=GREY, label="in vivo, ridge")
+    axes.plot(np.divide(IN_VIVO_MM, 2.0), in_vivo, "+", color=GREY, label="in vivo, period")
     axes.set(
         title="(d) gratings",
         xlabel="width of ridges and grooves [mm]",
@@ -402,5 +403,5 @@ def _draw_thresholds(axes: Axes, found: SphereThresholds) -> None:
         xlabel="force of the spheres [N]",
         ylabel="threshold over standard",
     )
-    axes.set_ylim(bottom=0.0)
-    axes.legend(title="noise, receptors", fontsize=8.0)
+    axes.set_ylim(0.0, 0.4)
+    axes.legend(title="noise, receptors", fontsize=8.0, loc="upper left")

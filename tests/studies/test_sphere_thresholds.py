@@ -1,6 +1,7 @@
 """Curvature thresholds under other noise, places and forces: closed forms of rates that are powers."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -83,6 +84,12 @@ def test_one_factor_for_all_gives_the_threshold_in_closed_form():
     mean = 1.0 + SIGMA * DRAWS[:, 0].mean()
     expected = (1.0 - 2.0 * ndtri(0.75) * spread / mean) ** (-1.0 / POWER) - 1.0
     assert weber(judge, 144.0) == pytest.approx(expected, rel=1e-3)
+
+
+def test_elasticity_of_a_power_is_its_exponent():
+    skins = {curvature: SimpleNamespace(depth_mm=[1.0], force_mn=[50.0]) for curvature in PRESSED_PER_M}
+    found = study._threshold(observer(proportional), 200.0, skins)
+    assert found.elasticity == pytest.approx(POWER, rel=1e-3)
 
 
 def test_a_row_has_the_noise_that_fits_people_and_says_what_it_depends_on():
