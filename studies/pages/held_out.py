@@ -37,9 +37,10 @@ def held_out_page(results: HeldOut) -> Page:
         partial(draw, results),
         "(a) Force of indenters; bars: range of four subjects under the plate, crosses: their mean. "
         "(b) Static rate under spheres pressed by force. (c) Static rate beside the middle of spheres. "
-        "(d) Modulation index of gratings with grooves as wide as ridges; crosses: in vivo, in two readings. (e) "
-        "Rates in successive windows over that in the first; crosses: after 12 s in vivo. (f) Weber fractions "
-        "at 144 /m by force, for noise that is proportional to the rate or independent of it; shaded: people.",
+        "(d) Modulation index of gratings with grooves as wide as ridges; crosses: in vivo, in two readings. "
+        "(e) Rates in successive windows over that in the first; crosses: after 12 s in vivo. (f) Weber "
+        "fractions at 144 /m by force, for noise that is proportional to the rate or independent of it; "
+        "shaded: people.",
     )
     return Page(
         "Predictions that no search has used",
