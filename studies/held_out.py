@@ -361,8 +361,7 @@ def run(runner: Runner, conditions: Conditions) -> HeldOut:
     runner : Runner
         Stores the presses; a stopped run continues after the last one.
     conditions : Conditions
-        Finger, named tissues, resolution and seed. Tissues without an afferent of their own respond with
-        that of `trial3`.
+        Finger, tissues, resolution and seed; the afferent is the one that belongs to the tissues.
 
     Returns
     -------
@@ -375,13 +374,13 @@ def run(runner: Runner, conditions: Conditions) -> HeldOut:
     StoreError
         If a stored press is damaged or the folder cannot be written.
     """
-    model = FingertipModel(conditions, Afferent.for_tissues(str(conditions.materials)))
+    model = FingertipModel(conditions)
     forces = indenter_forces(model, runner)
     spheres = sphere_rates(model, runner)
     gratings = grating_rates(model, runner)
     adaptation = adaptations(model, runner)
     volumes = volume_changes(conditions, runner)
-    thresholds = sphere_thresholds.run(runner, conditions, model.afferent)
+    thresholds = sphere_thresholds.run(runner, conditions, model.responding)
     checks = (
         *force_checks(forces),
         *sphere_checks(spheres),
@@ -636,7 +635,7 @@ def grating_rates(model: FingertipModel, runner: Runner) -> GratingRates:
     touches = {grating: grating_touch(conditions, *grating) for grating in gratings}
     skins = runner.responses({"gratings": touches})["gratings"]
     rates = [
-        period_rates_hz(skins[grating], model.afferent, *grating, conditions.skin_tilt_deg)
+        period_rates_hz(skins[grating], model.responding, *grating, conditions.skin_tilt_deg)
         for grating in gratings
     ]
     static, dynamic = np.array([rate[1] for rate in rates]), np.array([rate[0] for rate in rates])
@@ -775,7 +774,7 @@ def adaptations(model: FingertipModel, runner: Runner) -> tuple[Adaptation, ...]
     skins = runner.responses({"adaptation": {name: touch for name, (touch, _) in named.items()}})[
         "adaptation"
     ]
-    middle = Population(np.array([(RECEPTOR_X_MM, 0.0)]), 1.0, model.afferent)
+    middle = Population(np.array([(RECEPTOR_X_MM, 0.0)]), 1.0, model.responding)
     return tuple(
         Adaptation(
             name=name,
