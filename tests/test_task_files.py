@@ -15,7 +15,7 @@ from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.discrimination.analysis import PreparedTask
 from fingerpad.experiments.discrimination.task import DiscriminationTask, StimulusSettings
-from fingerpad.experiments.discrimination.task_files import example_tasks, parse_task, read_task
+from fingerpad.experiments.discrimination.task_files import example_tasks, input_hashes, parse_task, read_task
 from fingerpad.experiments.discrimination.task_population import task_afferent, task_population
 from fingerpad.experiments.discrimination.task_stimuli import task_stimuli, task_touches
 from fingerpad.experiments.fit.session import FitFile
@@ -214,6 +214,13 @@ def test_ready_made_questions_can_be_asked(name):
         touch.grading == task_touches(question)[found.stimuli[0].name].grading
         for touch in task_touches(question).values()
     )
+
+
+def test_a_folder_named_like_an_example_task_is_not_taken_for_a_file(tmp_path, monkeypatch):
+    (tmp_path / "sphere_curvature").mkdir()
+    before = input_hashes("sphere_curvature", read_task("sphere_curvature"))
+    monkeypatch.chdir(tmp_path)
+    assert input_hashes("sphere_curvature", read_task("sphere_curvature")) == before
 
 
 # YAML as people mean it

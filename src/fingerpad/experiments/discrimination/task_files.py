@@ -77,7 +77,7 @@ def input_hashes(source: str | Path, task: DiscriminationTask) -> dict[str, str]
         By name of the file.
     """
     path = Path(source)
-    content = path.read_bytes() if path.exists() else example_tasks()[str(source)].encode()
+    content = path.read_bytes() if path.is_file() else example_tasks()[str(source)].encode()
     hashes = {str(source): hashlib.sha256(content).hexdigest()}
     if isinstance(task.afferent, str) and task.afferent != DEFAULT:
         named = path.parent / task.afferent
@@ -112,7 +112,7 @@ def read_task(source: str | Path, **skin: Any) -> DiscriminationTask:
     """
     name, path = str(source), Path(source)
     known = example_tasks()
-    if name in known and not path.exists():
+    if name in known and not path.is_file():
         text = known[name]
     elif path.suffix or path.exists():
         text = read_text(path)
