@@ -57,7 +57,7 @@ class FittedBars:
 def fit_bars(
     runner: Runner, conditions: Conditions, others: Mapping[str, Mapping[Any, Touch]] | None = None
 ) -> FittedBars:
-    """Press the bar at all shifts, and fit the afferent as the reproduction does.
+    """Press the bar at all shifts, and fit the afferent by the paper's method, SED in both terms.
 
     Parameters
     ----------
