@@ -321,24 +321,42 @@ GROUPS = (
     "counted as a met prediction. The report of a run also has the differences and the status of the inputs."
 )
 SUMMARY_ROWS = (
-    ("deflection_r2", "deflection under the cylinder, R²", "later model 0.93", 3),
-    ("force_plate_1mm_n", "force of a plate 1.0 mm deep [N]", "people 0.11-0.23", 2),
-    ("force_plate_2mm_n", "force of a plate 2.0 mm deep [N]", "people 0.50-1.04", 2),
-    ("force_disc_1mm_n", "force of a disc of 6.35 mm 1.0 mm deep [N]", ABSENT, 3),
-    ("fss_out_of_sample", "FSS out of sample", "0.81", 3),
-    ("fss_in_sample", "FSS in sample", "0.82 (fold 3)", 3),
-    ("dynamic_flat_hz", "dynamic rate under the flat face [spikes/s]", "54", 0),
-    ("dynamic_max_hz", "dynamic rate, largest [spikes/s]", "212", 0),
-    ("static_difference_hz", "static rate, difference [spikes/s]", "52", 0),
-    ("resting_rate_hz", "rate without a touch [spikes/s]", "0", 1),
-    ("noise_sigma", "noise that fits people", "0.055", 3),
-    ("euclidean_rms_same_noise", "Euclidean Distance at that noise, rms to people", "fits", 3),
-    ("hit_rate_296", "hit rate at 296 /m, at 0.0 and at 0.2 mm", "people 0.58", 3),
-    ("hit_rate_365", "hit rate at 365 /m, at 0.0 and at 0.2 mm", "people 0.95", 3),
-    ("weber_144", "Weber fraction at 144 /m", "people 0.10-0.14", 3),
-    ("weber_287", "Weber fraction at 287 /m", "people 0.10-0.14", 3),
+    ("deflection_r2", "deflection under the cylinder, R²", "later model 0.93", "chose the moduli", 3),
+    (
+        "force_plate_1mm_n",
+        "force of a plate 1.0 mm deep [N]",
+        "people 0.11-0.23",
+        "chose the factor of `human`",
+        2,
+    ),
+    (
+        "force_plate_2mm_n",
+        "force of a plate 2.0 mm deep [N]",
+        "people 0.50-1.04",
+        "chose the factor of `human`",
+        2,
+    ),
+    ("force_disc_1mm_n", "force of a disc of 6.35 mm 1.0 mm deep [N]", ABSENT, "predicted", 3),
+    ("fss_out_of_sample", "FSS out of sample", "0.81", "predicted by folds", 3),
+    ("fss_in_sample", "FSS in sample", "0.82 (fold 3)", "fitted", 3),
+    ("dynamic_flat_hz", "dynamic rate under the flat face [spikes/s]", "54", "fitted", 0),
+    ("dynamic_max_hz", "dynamic rate, largest [spikes/s]", "212", "fitted", 0),
+    ("static_difference_hz", "static rate, difference [spikes/s]", "52", "fitted", 0),
+    ("resting_rate_hz", "rate without a touch [spikes/s]", "0", "bound of the fit", 1),
+    ("noise_sigma", "noise that fits people", "0.055", "fitted", 3),
+    (
+        "euclidean_rms_same_noise",
+        "Euclidean Distance at that noise, rms to people",
+        "fits",
+        "fitted with `human`",
+        3,
+    ),
+    ("hit_rate_296", "hit rate at 296 /m, at 0.0 and at 0.2 mm", "people 0.58", "fitted", 3),
+    ("hit_rate_365", "hit rate at 365 /m, at 0.0 and at 0.2 mm", "people 0.95", "fitted", 3),
+    ("weber_144", "Weber fraction at 144 /m", "people 0.10-0.14", "predicted", 3),
+    ("weber_287", "Weber fraction at 287 /m", "people 0.10-0.14", "predicted", 3),
 )
-"""Field, name, value of the paper or of people, and digits."""
+"""Field, name, value of the paper or of people, whether it was fitted or chosen in sample, and digits."""
 
 
 def _summaries(summaries: Mapping[str, Summary]) -> str:
@@ -347,10 +365,11 @@ def _summaries(summaries: Mapping[str, Summary]) -> str:
         return ", ".join(fixed(each, digits) for each in values)
 
     rows = [
-        (name, paper, *(shown(getattr(summary, field), digits) for summary in summaries.values()))
-        for field, name, paper, digits in SUMMARY_ROWS
+        (name, paper, *(shown(getattr(summary, field), digits) for summary in summaries.values()), basis)
+        for field, name, paper, basis, digits in SUMMARY_ROWS
     ]
-    return table(("quantity", "paper or people", *(f"`{name}`" for name in summaries)), rows)
+    columns = ("quantity", "paper or people", *(f"`{name}`" for name in summaries), "fitted or predicted")
+    return table(columns, rows)
 
 
 def _linked(text: str) -> str:
