@@ -872,6 +872,8 @@ def test_what_was_fitted_depends_on_the_tissues_and_on_the_fit():
     assert rows(results)[EUCLIDEAN].group is Group.FITTED
     assert "a search in its training set" in rows(results)[OUT_OF_SAMPLE].note
     assert "the afferent" in rows(results)[HIT_RATE.format(296)].fitted_to
+    for name, chosen in (("human", True), ("paper", True), ("trial1", False)):
+        assert ("Poisson's ratio" in rows(results, name)[OUT_OF_SAMPLE].note) is chosen
 
 
 def test_rows_say_what_was_fitted_if_and_only_if_something_was():

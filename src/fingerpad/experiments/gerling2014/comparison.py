@@ -29,6 +29,9 @@ CHOSEN_BY_DEFLECTION = ("trial2", "trial3", "trial3_stiffening", "paper", "human
 """Sets of tissues whose moduli were identified from the deflection under the cylinder
 (docs/decisions/lost-hyperelastic-coefficients.md, docs/decisions/paper-and-human.md)."""
 
+CHOSEN_BY_RATES = ("paper", "human")
+"""Sets whose moduli, Poisson's ratio and drive were chosen by the rates under the bar, among others."""
+
 CHOSEN_BY_FORCE = ("human",)
 """Sets of tissues with a common factor on the moduli that was chosen by the force of a flat plate."""
 
@@ -60,7 +63,7 @@ def comparison(
     return [
         *_deflection(skin),
         *_force(materials, force),
-        *_single_unit(unit),
+        *_single_unit(materials, unit),
         *discrimination_claims(discrimination, unit.method == ToRatesAndHitRates.name),
         *(weber_claims(curvature_thresholds) if curvature_thresholds else ()),
         _nail(nail),
@@ -157,17 +160,20 @@ SESSION_START = 2
 """Start point of the session of fold 3 that the paper tells of, counted from 1."""
 
 FITTED_TO_RATES = "the afferent was fitted to the rates at all 36 shifts"
-CHOSEN_IN_SAMPLE = (
-    "a fold leaves out rates only; the drive, the moduli and Poisson's ratio were chosen with all 36 shifts"
-)
-STARTS = {
-    True: "; a fit starts from a search in its training set; the hit rates of people enter each fold",
-    False: "; the start gains were chosen on all 36 shifts",
-}
-"""Where a fit starts, by whether it is to hit rates of people as well."""
 
 
-def _single_unit(found: SingleUnitResult) -> list[ClaimRow]:
+def _before_folds(materials: str, fitted_to_people: bool) -> str:
+    """Say what had been chosen on all 36 shifts before a fold left any out."""
+    if fitted_to_people:
+        starts = "each fit starts from a search in its training set; the hit rates of people enter each fold"
+    else:
+        starts = "the start gains were chosen on all 36 shifts (docs/decisions/dynamic-gain-rescaled.md)"
+    if materials not in CHOSEN_BY_RATES:
+        return starts
+    return f"{starts}; drive, moduli and Poisson's ratio of {materials} were chosen with all 36 shifts"
+
+
+def _single_unit(materials: str, found: SingleUnitResult) -> list[ClaimRow]:
     status = MATERIALS + "; recordings read, from monkeys"
     dynamic, static = found.modulation.dynamic.ours, found.modulation.static.ours
     rates = (
@@ -184,7 +190,7 @@ def _single_unit(found: SingleUnitResult) -> list[ClaimRow]:
             found.fss_out_of_sample,
             status,
             at_least=True,
-            note=CHOSEN_IN_SAMPLE + STARTS[found.method == ToRatesAndHitRates.name],
+            note=_before_folds(materials, found.method == ToRatesAndHitRates.name),
         ),
         measured_row(
             Group.FITTED,
