@@ -289,9 +289,7 @@ def results_page(shown: Excerpt) -> str:
                 )
             ),
         ),
-        *markdown_blocks(
-            Chapter("One afferent, fitted as in the paper", single_unit_tables(shown.single_unit))
-        ),
+        *markdown_blocks(Chapter("One afferent under the bar", single_unit_tables(shown.single_unit))),
         "## FSS by method of fitting",
         "Fractional sum of squares (FSS, Eqs. 12-14) of one afferent under the bar. "
         "Out of sample: mean of six folds. From `python -m studies methods`, on the same recordings. "

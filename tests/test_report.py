@@ -17,6 +17,7 @@ from fingerpad.experiments.gerling2014.claim_row import Group, Verdict
 from fingerpad.experiments.gerling2014.nail_border import NailBorder
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
 from fingerpad.experiments.gerling2014.response_maps import PopulationMaps
+from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 from fingerpad.experiments.gerling2014.summary import Summary
 from fingerpad.report import (
@@ -631,6 +632,16 @@ def test_the_last_step_of_the_papers_fold_is_marked_and_others_are_not():
     assert "fold 3, start 2" in table.title
     assert [row.kind for row in table.rows] == ["", "", "", "", "final"]
     assert table.rows[-1].cells[:2] == ("4", "0.820")
+
+
+def test_a_fit_without_the_papers_start_points_is_not_shown_beside_them():
+    section = _single_unit()
+    for fold in section["folds"]:
+        fold |= {"start": 1, "fss_start": [0.9], "climbs": fold["climbs"][:1]}
+    _, parameters, _, _, steps, _ = single_unit.single_unit_tables(typed(SingleUnitResult, section))
+    assert parameters.columns == ("parameter", "fitted", "unit")
+    assert steps.title == "Steps of the fit: fold 3, start 1"
+    assert "In the paper" not in steps.note
 
 
 def test_every_fold_and_start_has_its_climb_and_the_better_ones_are_marked():

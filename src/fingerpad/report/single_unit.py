@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
 
@@ -66,13 +66,14 @@ SPECIES = (
 
 def single_unit_tables(section: SingleUnitResult) -> list[Table]:
     """Return scores, parameters, folds, the steps of one search, and modulation."""
-    paper_search = section.folds[PAPER_FOLD - 1].climbs[-1]
+    search = section.folds[PAPER_FOLD - 1].climbs[-1]
+    as_printed = search.start == len(section.start_points)
     return [
         _scores(section),
-        _parameters(section),
+        _parameters(section, section.start_points if as_printed else ()),
         _folds(section.folds),
         _searches(section.folds),
-        _steps(paper_search, section),
+        _steps(search, section, as_printed),
         _modulation(section.modulation),
     ]
 
@@ -92,19 +93,20 @@ def _scores(section: SingleUnitResult) -> Table:
     )
 
 
-def _parameters(section: SingleUnitResult) -> Table:
+def _parameters(section: SingleUnitResult, start_points: Sequence[Mapping[str, float]]) -> Table:
+    """Return the fitted parameters beside the paper's start points, where the fit begins with these."""
     rows = [
         Row(
             (
                 PARAMETER_SYMBOLS.get(name, spelled(name)),
-                *(number(start.get(name)) for start in section.start_points),
+                *(number(start.get(name)) for start in start_points),
                 number(value),
                 section.units.get(name, ""),
             )
         )
         for name, value in section.parameters.items()
     ]
-    starts = (f"start {index}" for index in range(1, len(section.start_points) + 1))
+    starts = (f"start {index}" for index in range(1, len(start_points) + 1))
     return Table("Parameters of the afferent", ("parameter", *starts, "fitted", "unit"), rows)
 
 
@@ -150,10 +152,11 @@ def _searches(folds: Sequence[FoldResult]) -> Table:
         "evaluations",
     )
     note = "In bold: the better start on the training positions, which is the result of the fold."
-    return Table("Searches from both start points", columns, rows, note)
+    return Table("Searches of every fold", columns, rows, note)
 
 
-def _steps(search: Search, section: SingleUnitResult) -> Table:
+def _steps(search: Search, section: SingleUnitResult, as_printed: bool) -> Table:
+    """Return the steps of one search, beside the paper's session if it has the same start point."""
     names = list(search.history[0].parameters)
     rows = [
         Row(
@@ -164,13 +167,16 @@ def _steps(search: Search, section: SingleUnitResult) -> Table:
     ]
     note = (
         "The last row, in bold, is final; its FSS on the testing positions is "
-        f"{fixed(search.fss_test, 3)}. In the paper FSS rose from "
-        f"{number(paper.FOLD_3_FSS_START.value)} to {number(paper.FOLD_3_FSS_FITTED.value)} in "
-        f"{number(paper.FOLD_3_ITERATIONS.value)} iterations, and was "
-        f"{number(paper.FOLD_3_FSS_TEST.value)} on its testing positions. results.json holds these steps for "
-        "each fold and start."
+        f"{fixed(search.fss_test, 3)}. results.json holds these steps for each fold and start."
     )
-    title = f"Steps of the fit: fold {PAPER_FOLD}, start {search.start} (the paper's Table 4)"
+    title = f"Steps of the fit: fold {PAPER_FOLD}, start {search.start}"
+    if as_printed:
+        title += " (the paper's Table 4)"
+        note += (
+            f" In the paper FSS rose from {number(paper.FOLD_3_FSS_START.value)} to "
+            f"{number(paper.FOLD_3_FSS_FITTED.value)} in {number(paper.FOLD_3_ITERATIONS.value)} iterations, "
+            f"and was {number(paper.FOLD_3_FSS_TEST.value)} on its testing positions, which are unknown."
+        )
     headings = [
         PARAMETER_SYMBOLS.get(name, spelled(name))
         + (f" [{section.units[name]}]" if name in section.units else "")
