@@ -1,6 +1,7 @@
 """The report draws finished numbers: all of them, escaped, in files that are whole or absent."""
 
 import base64
+import json
 import re
 import struct
 import subprocess
@@ -10,16 +11,22 @@ from dataclasses import asdict, fields, replace
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.collections import PolyCollection
+from matplotlib.patches import Circle
 
 from fingerpad.core.results import schema_of, to_json
 from fingerpad.data import all_published
 from fingerpad.experiments.gerling2014.claim_row import Group, Verdict
+from fingerpad.experiments.gerling2014.mesh_picture import mesh_picture
 from fingerpad.experiments.gerling2014.nail_border import NailBorder
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
 from fingerpad.experiments.gerling2014.response_maps import PopulationMaps
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 from fingerpad.experiments.gerling2014.summary import Summary
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import resolution_grading
+from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.report import (
     discrimination,
     nail,
@@ -27,8 +34,10 @@ from fingerpad.report import (
     reproduction,
     single_unit,
     skin_deflection,
+    three_levels,
 )
 from fingerpad.report import formatting as words
+from fingerpad.report import mesh_picture as mesh_picture_figure
 from fingerpad.report import page as page_module
 from fingerpad.report.comparison import KINDS, MEANINGS, SIGNS, TITLES, comparison_tables
 from fingerpad.report.page import write_html
@@ -49,6 +58,8 @@ PARAMETERS = {
 }
 
 
+QUICK = finger_mesh(Fingertip(), resolution_grading("quick", 17.37))
+
 SUMMARY = [field.name for field in fields(Summary)]
 
 
@@ -56,6 +67,8 @@ def synthetic_results() -> dict:
     """Results with every section, shaped like a run and plausible in size."""
     return {
         "summary": dict.fromkeys(SUMMARY, 0.5) | {"hit_rate_296": (0.6, 0.6), "hit_rate_365": (0.9, 0.9)},
+        "mesh": json.loads(to_json(mesh_picture(QUICK, 17.37))),
+        "levels": _levels(),
         "skin_deflection": _skin_deflection(),
         "skin_force": dict.fromkeys(("deflection_r2", "plate_1mm_n", "plate_2mm_n", "disc_1mm_n"), 0.5),
         "single_unit": _single_unit(),
@@ -125,6 +138,35 @@ def _compared(
         "verdict": verdict,
         "note": "mean of six folds",
         **more,
+    }
+
+
+def _levels() -> dict:
+    """Skin, spikes and rates of a receptor under a sphere, all of them made up."""
+    along, down = np.meshgrid(np.linspace(10.0, 25.0, 31), np.linspace(-9.0, -5.0, 9), indexing="ij")
+    distance, times = np.linspace(-5.0, 5.0, 21), np.linspace(0.0, 200.0, 41)
+    return {
+        "curvature_per_m": 287.0,
+        "centre_mm": [17.4, -12.4],
+        "ramp_ms": 50.0,
+        "x_mm": along.tolist(),
+        "y_mm": down.tolist(),
+        "sed_kpa": np.exp(-np.abs(along[:-1, :-1] - 17.4)).tolist(),
+        "end_ms": 1000.0,
+        "quantity": "compressive_stress",
+        "distance_mm": distance.tolist(),
+        "drive_at_ramp_end": (9.0 * np.exp(-(distance**2))).tolist(),
+        "drive_at_hold_end": (8.0 * np.exp(-(distance**2))).tolist(),
+        "offset_mm": [0.0, 1.0, 2.0],
+        "spikes_ms": [[5.0, 30.0, 70.0], [8.0, 60.0], []],
+        "dynamic_rate_hz": [140.0, 200.0, 0.0],
+        "static_rate_hz": [66.0, 58.0, 0.0],
+        "times_ms": times.tolist(),
+        "until_ms": 200.0,
+        "current_ma": (1e-6 * np.exp(-times / 50.0)).tolist(),
+        "potential_mv": (times % 50.0).tolist(),
+        "rheobase_ma": 7e-7,
+        "threshold_mv": 50.0,
     }
 
 
@@ -374,9 +416,9 @@ def pixels_per_metre(png: bytes) -> int:
 
 def test_one_picture_per_figure_of_the_paper_at_its_resolution(report):
     pictures = sorted((report.parent / "figures").iterdir())
-    numbers = sorted(drawing.number for drawing in DRAWINGS)
+    numbers = [drawing.number for drawing in DRAWINGS]
     assert sorted(int(picture.name.split("_")[1]) for picture in pictures) == numbers
-    assert numbers[:6] == [4, 5, 6, 7, 8, 9]
+    assert numbers == [1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12]
     for picture in pictures:
         assert pixels_per_metre(picture.read_bytes()) == round(RESOLUTION_DPI / 0.0254)
 
@@ -702,6 +744,71 @@ def test_figure_5_draws_predicted_lines_over_observed_points():
         assert drawn["predicted"].get_marker() in ("None", "")
 
 
+def test_figure_1_draws_every_element_of_the_planes_by_its_layer():
+    section = typed(ReproductionResult, synthetic_results()).mesh
+    along, across, near = mesh_picture_figure.draw_mesh(section).axes
+    n_through = section.layer.size
+    for axes, plane, halves in (
+        (along, section.along, 1),
+        (across, section.across, 2),
+        (near, section.along, 1),
+    ):
+        faces = [part for part in axes.collections if isinstance(part, PolyCollection)]
+        assert len(faces) == halves
+        for part in faces:
+            assert len(part.get_paths()) == (plane.right_mm.shape[0] - 1) * n_through
+            drawn = [matplotlib.colors.to_hex(colour) for colour in part.get_facecolor()[:n_through]]
+            assert drawn == [mesh_picture_figure.LAYER_COLOURS[layer] for layer in section.layer]
+    (receptor,) = near.get_lines()
+    assert np.hypot(*(receptor.get_xydata()[0] - section.contact_mm)) == pytest.approx(0.471, abs=0.002)
+    assert f"{len(QUICK.nodes_mm)} nodes and" in mesh_picture_figure.caption_mesh(section)
+    assert "stratum corneum 0.371 mm, living epidermis 0.1 mm" in mesh_picture_figure.caption_mesh(section)
+
+
+def test_figure_2_draws_skin_current_potential_and_the_spikes_of_three_afferents():
+    section = typed(ReproductionResult, synthetic_results()).levels
+    skin, drive, _, current, potential, train, spikes, rates = three_levels.draw_levels(section).axes
+    np.testing.assert_array_equal(skin.collections[0].get_array(), section.sed_kpa.ravel())
+    sphere = next(patch for patch in skin.patches if isinstance(patch, Circle))
+    assert sphere.radius == pytest.approx(1000.0 / 287.0)
+    np.testing.assert_array_equal(lines(drive)["end of the hold"].get_ydata(), section.drive_at_hold_end)
+    assert "compressive stress" in drive.get_ylabel()
+    np.testing.assert_array_equal(current.get_lines()[0].get_ydata(), 1e6 * section.current_ma)
+    np.testing.assert_array_equal(potential.get_lines()[0].get_ydata(), section.potential_mv)
+    assert lines(potential)["threshold"].get_ydata()[0] == 50.0
+    assert train.collections[0].get_positions() == [5.0, 30.0, 70.0]
+    assert [len(row.get_positions()) for row in spikes.collections] == [3, 2, 0]
+    assert [bar.get_height() for bar in rates.patches] == [140.0, 200.0, 0.0, 66.0, 58.0, 0.0]
+
+
+def test_figure_5_marks_what_the_paper_predicts_and_what_was_observed():
+    section = typed(ReproductionResult, synthetic_results()).single_unit
+    dynamic, static = single_unit.draw_single_unit(section).axes
+    levels = {
+        label: [line.get_ydata()[0] for line in dynamic.get_lines() if line.get_label() == label]
+        for label in ("predicted by the paper, lowest and highest", "observed, lowest and highest")
+    }
+    assert list(levels.values()) == [[54.0, 212.0], [70.0, 210.0]]
+    assert dynamic.get_ylim()[1] > 212.0
+    (difference,) = static.containers
+    (low, high) = difference.lines[2][0].get_segments()[0][:, 1]
+    assert (low, high - low) == (section.modulation.static.ours.minimum_hz, pytest.approx(52.0))
+    assert "54 and 212 spikes/s" in single_unit.caption_single_unit(section)
+    assert "70 and 210 spikes/s as observed" in single_unit.caption_single_unit(section)
+
+
+def test_every_caption_names_the_run():
+    assert all(d.caption.endswith("Run: standard resolution, tissues trial3.") for d in DRAWINGS)
+
+
+def test_colours_of_layers_become_lighter_inwards():
+    greys = [
+        np.dot(matplotlib.colors.to_rgb(colour), (0.2126, 0.7152, 0.0722))
+        for colour in mesh_picture_figure.LAYER_COLOURS
+    ]
+    assert (np.diff(greys) > 0.15).all()
+
+
 def test_figure_6_leaves_silent_places_open():
     section = typed(PopulationMaps, _population())
     maps = [
@@ -752,8 +859,8 @@ def test_figure_7_keeps_the_papers_letters_and_shows_people_in_every_panel():
     assert titles[0] == "(a) Gradient Sum, static σ₁ = 0.12"
     assert titles[3] == "(d) Euclidean, static σ₁ = 0.12"
     assert titles[4:7] == [
-        "(e) Gradient Sum, static σ₁ = 0.025",
-        "(f) Gradient Sum, static σ₁ = 0.085",
+        "(e) Gradient Sum, static σ₁ = 0.055",
+        "(f) Gradient Sum, static σ₁ = 0.19",
         "(g) Gradient Sum, static σ₁ = 0.12, 10 matrices",
     ]
     for axes in panels:

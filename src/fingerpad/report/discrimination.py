@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.data import psychophysics
 from fingerpad.experiments.gerling2014.discrepancy import CriterionErrorBars
+from fingerpad.experiments.gerling2014.discrimination_sessions import BESIDE
 from fingerpad.experiments.gerling2014.goodwin import GoodwinHitRates
 from fingerpad.experiments.gerling2014.sphere_discrimination import ObserverHitRates, SphereDiscrimination
 from fingerpad.report.formatting import fixed, number, whole_percent, with_error
@@ -57,7 +57,7 @@ def draw_criterion(section: SphereDiscrimination) -> Figure:
 
 def draw_noise(section: SphereDiscrimination) -> Figure:
     """Draw the distance of each code from people over the noise, and the sweep of the paper's range."""
-    figure = new_figure(11.0, 4.4)
+    figure = new_figure(11.0, 5.0)
     codes, sweep = figure.subplots(1, 2, sharey=True)
     curve = section.reasons.misfit_curve
     for (name, label), style in zip(CODES.items(), CODE_STYLES, strict=True):
@@ -84,8 +84,7 @@ def draw_noise(section: SphereDiscrimination) -> Figure:
         axes.set_ylim(bottom=0.0)
     codes.set_ylabel("distance to observed hit rates, rms [fraction]")
     sweep.set_xlim(left=0.0)
-    codes.legend(loc="upper right")
-    sweep.legend()
+    shared_legend(figure, (codes, sweep), columns=4)
     return figure
 
 
@@ -99,10 +98,10 @@ def caption_noise(section: SphereDiscrimination) -> str:
         else ""
     )
     return (
-        "Root mean square distance of predicted from observed hit rates at 296 and 365 1/m, against the "
-        "noise. (a) Each code has its own best noise. (b) The range of the paper, in "
-        f"{number(section.sessions)} sessions of the whole protocol; bars are Monte-Carlo errors. The best "
-        "noise compensates for the slope of a code: our static Gradient Sum increases by "
+        "Root mean square distance of predicted hit rates from those of people (Goodwin et al. 1991) at 296 "
+        "and 365 1/m, against the noise. (a) Each code has its own best noise. (b) The range of the paper, "
+        f"in {number(section.sessions)} sessions of the whole protocol; bars are Monte-Carlo errors. The "
+        "best noise compensates for the slope of a code: our static Gradient Sum increases by "
         f"{whole_percent(rise)} from 287 to 365 1/m{people}."
     )
 
@@ -118,18 +117,17 @@ def observer_panels(section: SphereDiscrimination) -> list[Panel]:
     Returns
     -------
     list of (str, ObserverHitRates or None)
-        The codes (None for a measure without responses), levels of noise, 10 noise matrices, and last the
-        paper's noise, which has no panel in the paper.
+        The codes (None for a measure without responses), noise on either side of the fitted
+        one, 10 noise matrices, and last the paper's noise, which has no panel in the paper.
     """
     sums, variants, static = section.gradient_sum, section.variants, CODES["static"]
     best = f"σ₁ = {number(section.noise_sigma)}"
     printed = f"sigma_{section.noise_sigma_paper:g}"
-    shown = [f"sigma_{sigma:g}" for sigma in psychophysics.NOISE_SIGMA_SHOWN.value]
-    levels = [name for name in shown if name in variants and name != printed]
+    levels = zip(section.noise_sigma_beside, BESIDE, strict=True)
     rates = {**sums, "euclidean": section.euclidean["static"]}
     return [
         *((f"{label}\n{best}", rates.get(name)) for name, label in CODES.items()),
-        *((f"{static}\nσ₁ = {name.removeprefix('sigma_')}", variants[name]) for name in levels),
+        *((f"{static}\nσ₁ = {number(sigma)}", variants[name]) for sigma, name in levels),
         (f"{static}\n{best}, 10 matrices", variants["ten_matrices"]),
         (f"{static}\nσ₁ = {printed.removeprefix('sigma_')}", variants[printed]),
     ]
@@ -215,15 +213,16 @@ def caption_observers(section: SphereDiscrimination) -> str:
     """Caption of Figure 7."""
     return (
         "Fraction of trials in which a sphere is discriminated from the standard of "
-        f"{number(section.curvature_per_m[0])} 1/m; bars are one standard deviation. Solid: sphere over "
-        "the middle of the receptors; dotted: 0.2 mm away. Diamonds: observed, with "
-        f"{_interval(section.goodwin)}. (a-c) Gradient Sum of static "
-        "rates, dynamic rates and first-spike latencies, (d) Euclidean Distance of static rates, all with "
-        f"noise σ₁ = {number(section.noise_sigma)}; the paper's best noise is "
-        f"{number(section.noise_sigma_paper)}. The following panels vary "
-        "the noise or the number of noise matrices, as their titles say. In the paper the static "
-        "Gradient Sum fits best and hardly depends on the shift, dynamic rates and latencies depend on it, "
-        "more noise lowers the curve, and fewer matrices widen the bars."
+        f"{number(section.curvature_per_m[0])} 1/m; bars are one standard deviation over hit rates. Blue, "
+        "solid: predicted for a sphere over the middle of the receptors; orange, dotted: for one 0.2 mm "
+        f"away. Diamonds: observed in people (Goodwin et al. 1991), with {_interval(section.goodwin)}. (a-c) "
+        "Gradient Sum of static rates, dynamic rates and first-spike latencies, (d) Euclidean Distance of "
+        f"static rates, all with noise σ₁ = {number(section.noise_sigma)}, which was fitted to the diamonds "
+        f"with the code of (a); the paper's best noise is {number(section.noise_sigma_paper)}. (e, f) Noise "
+        "on either side of the fitted one, by the ratios of the paper's 0.025 and 0.085 to its 0.055; (g) "
+        "10 noise matrices in place of 100; (h) the paper's noise. In the paper the static Gradient Sum "
+        "fits best and hardly depends on the shift, dynamic rates and latencies depend on it, more noise "
+        "lowers the curve, and fewer matrices widen the bars."
     )
 
 
@@ -233,7 +232,9 @@ def caption_criterion(section: SphereDiscrimination) -> str:
         "Gradient Sum of static rates with a varied criterion: for each hit rate the decision point is "
         "multiplied by a new normal variable with mean 1 and the standard deviation in the title. In the "
         "paper the wider distribution increases the error bars and does not change the means. Noise σ₁ = "
-        f"{number(section.noise_sigma)}. Diamonds: observed, with {_interval(section.goodwin)}."
+        f"{number(section.noise_sigma)}, fitted without a varied criterion. Blue, solid: sphere over the "
+        "middle of the receptors; orange, dotted: 0.2 mm away; bars are one standard deviation. Diamonds: "
+        f"observed in people (Goodwin et al. 1991), with {_interval(section.goodwin)}."
     )
 
 

@@ -132,7 +132,8 @@ def caption_nail(section: NailBorder) -> str:
     """Caption of Figure 9."""
     low, high = section.ratio_range
     return (
-        "Von Mises stress under the standard sphere at the end of the hold, on the deformed finger: (a, b) "
+        "Predicted von Mises stress at the end of the hold, on the finger that the standard sphere deforms; "
+        "nothing here was observed: (a, b) "
         "in the outermost elements of the skin and (c) in the middle section, on a logarithmic scale of "
         f"{number(DECADES)} decades; (d) the back of the finger and (e) the section with the highest ratio, "
         "on a linear scale up to the highest stress at the border of the nail (its outline in white); (f) "

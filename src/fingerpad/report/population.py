@@ -191,12 +191,12 @@ def _map(
 def caption_population(section: PopulationMaps) -> str:
     """Caption of Figure 6."""
     return (
-        f"Response of afferents all over the pad to a sphere of {number(section.curvature_per_m)} 1/m, "
-        f"at a depth of {protocol.DEPTH.value} mm. Left: the quantity as a height, as in the paper, but "
+        f"Predicted response of afferents all over the pad to a sphere of {number(section.curvature_per_m)} "
+        f"1/m, at a depth of {protocol.DEPTH.value} mm. Left: the quantity as a height, as in the paper, but "
         "latencies on a logarithmic scale. Middle: the same on the deformed skin at the end of the hold, "
         "seen from below, the tip to the right; afferents in grey skin do not respond. Right: seen from "
-        "above; circles are the receptors of Figures 7 and 8, hatched skin is silent."
-        f"{_resting(section.at_rest)}"
+        "above; circles are the receptors of Figures 7 and 8, hatched skin is silent. All afferents have "
+        f"the parameters fitted under the bar; nothing here was observed.{_resting(section.at_rest)}"
     )
 
 

@@ -11,6 +11,7 @@ from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, Repr
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
+from fingerpad.experiments.manifest import Manifest
 from fingerpad.report.comparison import comparison_tables, verdict_sentence
 from fingerpad.report.curvature_thresholds import caption_thresholds, draw_thresholds, threshold_tables
 from fingerpad.report.discrimination import (
@@ -24,6 +25,7 @@ from fingerpad.report.discrimination import (
 )
 from fingerpad.report.formatting import fixed, joined, number, plain, whole_percent
 from fingerpad.report.manifest import edition, manifest_chapter
+from fingerpad.report.mesh_picture import caption_mesh, draw_mesh
 from fingerpad.report.nail import caption_nail, draw_nail
 from fingerpad.report.page import write_html
 from fingerpad.report.parts import Chapter, Drawing, Page, Part, Row, Table, illustrated
@@ -39,6 +41,7 @@ from fingerpad.report.skin_deflection import (
     draw_skin_deflection,
     skin_deflection_tables,
 )
+from fingerpad.report.three_levels import caption_levels, draw_levels
 
 # Inputs are the record of what was used: nothing of them is rounded or left out.
 ALL_DIGITS, ALL_VALUES = 12, 1000
@@ -84,8 +87,18 @@ def reproduction_page(result: ReproductionResult) -> Page:
 
 
 def _levels(result: ReproductionResult) -> list[Chapter]:
-    """Return the chapters of the three levels; numbers of figures up to 9 are the paper's."""
+    """Return the chapters in the paper's order of figures, 1 to 9, then what goes beyond the paper."""
     chapters = {
+        "The finger": illustrated(
+            result.mesh,
+            None,
+            (1, "mesh", "Mesh of the finger and its four layers", draw_mesh, caption_mesh),
+        ),
+        "Three levels": illustrated(
+            result.levels,
+            None,
+            (2, "three_levels", "One sphere on three levels", draw_levels, caption_levels),
+        ),
         "Level 1: skin": illustrated(
             result.skin_deflection,
             skin_deflection_tables,
@@ -95,11 +108,6 @@ def _levels(result: ReproductionResult) -> list[Chapter]:
             result.single_unit,
             single_unit_tables,
             (5, "single_unit", "Rates under a bar", draw_single_unit, caption_single_unit),
-        ),
-        "Level 2: uncertainty of the fit": illustrated(
-            result.single_unit_uncertainty,
-            uncertainty_tables,
-            (10, "uncertainty", "Uncertainty of the fit", draw_uncertainty, caption_uncertainty),
         ),
         "Level 3: population": illustrated(
             result.population,
@@ -111,25 +119,39 @@ def _levels(result: ReproductionResult) -> list[Chapter]:
             discrimination_tables,
             (7, "discrimination", "Discrimination of spheres", draw_observers, caption_observers),
             (8, "varied_criterion", "The same with a varied criterion", draw_criterion, caption_criterion),
-            (11, "noise", "Amount of noise", draw_noise, caption_noise),
-        ),
-        "Level 3: curvature thresholds": illustrated(
-            result.curvature_thresholds,
-            threshold_tables,
-            (12, "curvature_thresholds", "Thresholds of curvature", draw_thresholds, caption_thresholds),
         ),
         "The border of the nail": illustrated(
             result.nail,
             None,
             (9, "nail", "Stress at the border of the nail", draw_nail, caption_nail),
         ),
+        "Beyond the paper: uncertainty of the fit": illustrated(
+            result.single_unit_uncertainty,
+            uncertainty_tables,
+            (10, "uncertainty", "Uncertainty of the fit", draw_uncertainty, caption_uncertainty),
+        ),
+        "Beyond the paper: noise": illustrated(
+            result.discrimination, None, (11, "noise", "Amount of noise", draw_noise, caption_noise)
+        ),
+        "Beyond the paper: curvature thresholds": illustrated(
+            result.curvature_thresholds,
+            threshold_tables,
+            (12, "curvature_thresholds", "Thresholds of curvature", draw_thresholds, caption_thresholds),
+        ),
     }
-    return [Chapter(title, [_numbered(part) for part in parts]) for title, parts in chapters.items() if parts]
+    return [
+        Chapter(title, [_of_run(part, result.manifest) for part in parts])
+        for title, parts in chapters.items()
+        if parts
+    ]
 
 
-def _numbered(part: Part) -> Part:
-    """Put the number of a figure before the name of its file."""
-    return replace(part, name=f"figure_{part.number}_{part.name}") if isinstance(part, Drawing) else part
+def _of_run(part: Part, manifest: Manifest) -> Part:
+    """Put the number of a figure before the name of its file, and the run behind its caption."""
+    if not isinstance(part, Drawing):
+        return part
+    caption = f"{part.caption} Run: {manifest.resolution} resolution, tissues {manifest.materials}."
+    return replace(part, name=f"figure_{part.number}_{part.name}", caption=caption)
 
 
 def reproduction_summary(result: ReproductionResult) -> list[str]:

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.data import paper, protocol
-from fingerpad.experiments.gerling2014.single_unit import FoldResult, RateModulation, Search, SingleUnitResult
+from fingerpad.experiments.gerling2014.single_unit import (
+    FoldResult,
+    Modulation,
+    RateModulation,
+    Search,
+    SingleUnitResult,
+)
 from fingerpad.report.formatting import PARAMETER_SYMBOLS, fixed, number, spelled
 from fingerpad.report.parts import Row, Table
-from fingerpad.report.style import draw_rates, new_figure
+from fingerpad.report.style import BLACK, ORANGE, draw_rates, new_figure, shared_legend
 
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
+STATIC_MARK_MM = 2.9
+"""Position at which the paper's static difference is drawn, where no rates are. [mm]"""
+
 PAPER_FOLD, PAPER_START = 3, 2
 """Fold and start point whose steps the paper's Table 4 lists."""
 
@@ -39,21 +50,64 @@ def draw_single_unit(section: SingleUnitResult) -> Figure:
         draw_rates(axes, section.shift_mm, predicted_hz, observed_hz)
         axes.set_title(f"{title}, FSS = {fixed(fss, 2)}")
         axes.set_xlabel("position of the bar, proximal positive [mm]")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    dynamic, static = figure.axes
+    _mark_dynamic_rates(dynamic, section.modulation.dynamic.observed)
+    _mark_static_difference(static, section.modulation.static.ours.minimum_hz)
+    shared_legend(figure, figure.axes, columns=3)
     return figure
+
+
+def _mark_dynamic_rates(axes: Axes, observed: Modulation) -> None:
+    """Draw the rates under the flat face and at the edge that the paper predicts, and the observed ones."""
+    printed = (paper.DYNAMIC_RATE_MINIMUM.value, paper.DYNAMIC_RATE_MAXIMUM.value)
+    marks = (
+        (printed, ORANGE, (0, (6, 3)), "predicted by the paper, lowest and highest"),
+        ((observed.minimum_hz, observed.maximum_hz), BLACK, (0, (1, 2)), "observed, lowest and highest"),
+    )
+    low, high = axes.get_xlim()
+    sides = ((low, "left", "bottom"), (high, "right", "top"))
+    for (place, side, edge), (levels, colour, dashes, label) in zip(sides, marks, strict=True):
+        for level in levels:
+            axes.axhline(level, color=colour, linestyle=dashes, linewidth=1.2, label=label, zorder=1)
+            text: Any = {"ha": side, "va": edge, "color": colour, "fontsize": 9.0}
+            axes.text(place, level, f" {number(level)} ", **text)
+    axes.set_xlim(low, high)
+    axes.set_ylim(top=1.1 * max(*printed, axes.get_ylim()[1] / 1.05))
+
+
+def _mark_static_difference(axes: Axes, lowest_hz: float) -> None:
+    """Draw the difference that the paper predicts, from our lowest rate: it prints no static rates."""
+    difference = paper.STATIC_RATE_DIFFERENCE.value
+    axes.errorbar(
+        STATIC_MARK_MM,
+        lowest_hz + 0.5 * difference,
+        yerr=0.5 * difference,
+        color=ORANGE,
+        capsize=5.0,
+        elinewidth=1.8,
+        label="difference predicted by the paper",
+    )
+    text: Any = {"ha": "left", "va": "center", "color": ORANGE, "fontsize": 9.0}
+    axes.text(STATIC_MARK_MM, lowest_hz + 0.5 * difference, f" {number(difference)}", **text)
 
 
 def caption_single_unit(section: SingleUnitResult) -> str:
     """Describe Figure 5 and what the paper found."""
+    observed = section.modulation.dynamic.observed
     return (
         f"Firing rate of one SAI afferent under a bar {protocol.BAR_WIDTH.value} mm wide, pressed in by "
         f"{protocol.DEPTH.value} mm at {section.shift_mm.size} positions relative to the centre of its "
-        "receptive field; shaded: positions at which the bar covers the centre. Observed: Phillips & "
-        "Johnson 1981, an afferent of a monkey; the finger of the model is human. The line is predicted with "
-        "the parameters below. Fractional sum of squares (FSS, 1 "
-        f"is perfect) out of sample: {fixed(section.fss_out_of_sample, 2)} here, "
-        f"{fixed(paper.FSS_OUT_OF_SAMPLE.value, 2)} in the paper. The paper's dynamic rates range from "
-        f"{number(paper.DYNAMIC_RATE_MINIMUM.value)} to {number(paper.DYNAMIC_RATE_MAXIMUM.value)} spikes/s."
+        "receptive field; shaded: positions at which the bar covers the centre. Circles: observed in one "
+        "afferent of a monkey (Phillips & Johnson 1981); the finger of the model is human. Blue line: rates "
+        "of the model, whose afferent was fitted to all of these circles. Fractional sum of squares (FSS, 1 "
+        "is perfect): that of the line is in the titles; out of sample it is "
+        f"{fixed(section.fss_out_of_sample, 2)}, in the paper {fixed(paper.FSS_OUT_OF_SAMPLE.value, 2)}. (a) "
+        "Horizontal lines: lowest rate under the flat face and highest rate, "
+        f"{number(paper.DYNAMIC_RATE_MINIMUM.value)} and {number(paper.DYNAMIC_RATE_MAXIMUM.value)} spikes/s "
+        f"as the paper's model predicts them (dashed), and {number(observed.minimum_hz)} and "
+        f"{number(observed.maximum_hz)} spikes/s as observed (dotted). (b) Bar: the difference of "
+        f"{number(paper.STATIC_RATE_DIFFERENCE.value)} spikes/s between them that the paper's model "
+        "predicts, drawn from the lowest rate of the line; it prints no static rates."
     )
 
 

@@ -66,7 +66,8 @@ def caption_uncertainty(section: UncertaintyResult) -> str:
     )
     return (
         f"Uncertainty of one afferent given its rates under a bar {protocol.BAR_WIDTH.value} mm wide at "
-        f"{section.shift_mm.size} positions. (a, b) {level} bands: blue, of the rates that the posterior "
+        f"{section.shift_mm.size} positions, observed in one afferent of a monkey (Phillips & Johnson 1981; "
+        f"circles). (a, b) {level} bands: blue, of the rates that the posterior "
         "predicts; pale, of a new recording with residuals like those observed. Of the observed "
         f"rates {within} lie within. (c-f) Loss of log likelihood with one parameter held and the others "
         f"fitted again; points below the dashed line are within the {level} interval, the bar below is that "

@@ -92,10 +92,12 @@ def caption_skin_deflection(_: SkinDeflectionResult) -> str:
     """Describe Figure 4 and what the paper found."""
     return (
         "Deflection of the skin along the midline of the fingertip at the end of the indentation, drawn "
-        "downwards. Points: a living human fingertip under the cylinder; the cross is an artefact of "
-        "digitising at the end of the curve and is left out of R². No observations under the line are "
-        "available. In the paper Trial 1 overshoots, Trial 2 undershoots and Trial 3, which combines the "
-        "two, matches."
+        "downwards, under (a) a line load and (b) a cylinder. Lines: the model with the paper's three "
+        "trials, which are the sets of tissues trial1, trial2 and trial3 whatever the tissues of the run "
+        "are. Circles: observed under the cylinder on a living human fingertip (Dandekar 1995); the cross "
+        "is an artefact of digitising at the end of the curve and is left out of R². No observations under "
+        "the line are available. The inner moduli of Trials 2 and 3 were identified from these circles. In "
+        "the paper Trial 1 overshoots, Trial 2 undershoots and Trial 3, which combines the two, matches."
     )
 
 

@@ -12,9 +12,10 @@ from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.data import all_published
-from fingerpad.experiments.conditions import Conditions, Touch
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014 import (
     curvature_thresholds,
+    mesh_picture,
     nail_border,
     response_maps,
     single_unit,
@@ -22,10 +23,12 @@ from fingerpad.experiments.gerling2014 import (
     skin_deflection,
     skin_force,
     sphere_discrimination,
+    three_levels,
 )
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow
 from fingerpad.experiments.gerling2014.comparison import comparison
 from fingerpad.experiments.gerling2014.curvature_thresholds import CurvatureThresholds
+from fingerpad.experiments.gerling2014.mesh_picture import MeshPicture
 from fingerpad.experiments.gerling2014.nail_border import NailBorder
 from fingerpad.experiments.gerling2014.response_maps import PopulationMaps
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
@@ -34,6 +37,7 @@ from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResu
 from fingerpad.experiments.gerling2014.skin_force import SkinForce
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 from fingerpad.experiments.gerling2014.summary import Summary, summary
+from fingerpad.experiments.gerling2014.three_levels import ThreeLevels
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.inference.fitting.methods import Method
@@ -110,6 +114,8 @@ class ReproductionResult:
         Of the file.
     summary : Summary
         A few plain numbers.
+    mesh, levels : MeshPicture, ThreeLevels
+        The mesh under the standard sphere, and that indentation on all levels.
     skin_deflection, skin_force : SkinDeflectionResult, SkinForce
         Level 1: the paper's three trials, and the tissues of the run.
     single_unit : SingleUnitResult
@@ -129,6 +135,8 @@ class ReproductionResult:
     format: Literal["fingerpad reproduction"] = "fingerpad reproduction"
     format_version: Literal[4] = 4
     summary: Summary
+    mesh: MeshPicture
+    levels: ThreeLevels
     skin_deflection: SkinDeflectionResult
     skin_force: SkinForce
     single_unit: SingleUnitResult
@@ -196,7 +204,9 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
         )
         advance()
         unit = single_unit.single_unit_result(problem, best, folds, afferent, method.name)
-        population = response_maps.population_maps(sphere_responses[STANDARD_SPHERE], afferent)
+        standard = sphere_responses[STANDARD_SPHERE]
+        population = response_maps.population_maps(standard, afferent)
+        levels = three_levels.three_levels(standard, afferent)
         nail = nail_border.nail_border(nail_response)
         advance()
     uncertainty: UncertaintyResult | None = None
@@ -225,6 +235,8 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
     manifest = runner.manifest(conditions, meshes, half_model=not spheres[STANDARD_SPHERE].grading.full)
     return ReproductionResult(
         summary=summary(force, unit, afferent, discrimination, thresholds, manifest),
+        mesh=mesh_picture.mesh_picture(standard.mesh, RECEPTOR_X_MM),
+        levels=levels,
         skin_deflection=skin,
         skin_force=force,
         single_unit=unit,

@@ -16,7 +16,13 @@ from fingerpad.experiments.gerling2014.discrepancy import (
     discrepancy_analysis,
     expected_of_measure,
 )
-from fingerpad.experiments.gerling2014.discrimination_sessions import SESSIONS, Measured, Observers, observe
+from fingerpad.experiments.gerling2014.discrimination_sessions import (
+    SESSIONS,
+    Measured,
+    Observers,
+    noise_beside,
+    observe,
+)
 from fingerpad.experiments.gerling2014.discrimination_statistics import (
     DiscriminationStatistics,
     discrimination_statistics,
@@ -84,6 +90,8 @@ class SphereDiscrimination:
         The spheres, the standard first. [1/m]
     noise_sigma, noise_fit_error, noise_sigma_paper : float
         Fitted noise, root mean square error of the fit [0-1], and the paper's noise.
+    noise_sigma_beside : (float, float)
+        Noise of the variants "noise_below" and "noise_above", on either side of the fitted one.
     goodwin : GoodwinHitRates
         Of people.
     gradient_sums : dict of array (n_positions, 7)
@@ -104,6 +112,7 @@ class SphereDiscrimination:
     noise_sigma: float
     noise_fit_error: float
     noise_sigma_paper: float
+    noise_sigma_beside: tuple[float, float]
     goodwin: GoodwinHitRates
     gradient_sums: dict[str, Matrix]
     gradient_sum: dict[str, ObserverHitRates]
@@ -228,6 +237,7 @@ def discriminate_spheres(
         noise_sigma=noise.noise_sigma,
         noise_fit_error=noise.root_mean_square_error,
         noise_sigma_paper=psychophysics.NOISE_SIGMA.value,
+        noise_sigma_beside=noise_beside(noise.noise_sigma),
         goodwin=goodwin_hit_rates_at(CURVATURES[1:]),
         gradient_sums={
             name: np.array([gradient_sum(one.responses, one.neighbours) for one in both])
