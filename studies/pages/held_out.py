@@ -141,8 +141,10 @@ def _forces(results: HeldOut) -> list[Part]:
     rows.append(("plate, quasi-static", *(fixed(force, 3) for force in found.slow_plate_n)))
     rows.append(("people under a plate, mean", *(fixed(force, 2) for force in found.people_n)))
     return parts_of(
-        "Force at the end of the hold [N]. Except for the plate no numbers that can be cited were at hand; "
-        "`fingerpad validate` scores a file with the header `indenter,depth_mm,force_n`.",
+        "Force at the end of the hold [N]. People were pressed slowly, so that their force lies between the "
+        "two rows of the plate. With both, the ratio of the force to people's falls with the depth: the "
+        "tissues stiffen less than fingers do. Except for the plate no numbers that can be cited were at "
+        "hand; `fingerpad validate` scores a file with the header `indenter,depth_mm,force_n`.",
         table(("indenter", *depths), rows),
     )
 
@@ -176,7 +178,9 @@ def _spheres(results: HeldOut) -> list[Part]:
     return parts_of(
         "Static rate [spikes/s] in the middle of spheres, with the forces and curvatures of Goodwin, "
         "Macefield & Bisley 1997 and a smaller force. Their abstract states directions, no rates; a file "
-        "with the header `force_n,curvature_per_m,rate_hz` can be scored.",
+        "with the header `force_n,curvature_per_m,rate_hz` can be scored. A dash: the sphere would come "
+        "nearer to the bone than a fifth of the way, which the model refuses. Fingers bear these spheres: "
+        "the same lack of stiffening.",
         table(("force", *(f"{curvature:g} /m" for curvature in found.curvature_per_m)), middle),
         f"Static rate [spikes/s] beside the middle, {found.profile_force_n:g} N, by the position of the "
         "receptor towards the proximal end (header `force_n,curvature_per_m,position_mm,rate_hz`):",
@@ -209,7 +213,9 @@ def _gratings(results: HeldOut) -> list[Part]:
     ]
     return parts_of(
         "Gratings 1.0 mm deep; grooves are as wide as ridges. Our source does not say whether the 3 and 5 mm "
-        "in vivo are the width of a ridge or a period, nor which phase they belong to.",
+        "in vivo are the width of a ridge or a period, nor which phase they belong to. An index of 1 means "
+        "that the receptor is silent over a groove; it cannot increase with the period or the amplitude. "
+        "Recorded afferents keep firing there, so that the model is too selective for edges in the hold.",
         table(("ridge", "ridges", "static [spikes/s]", "static index", "dynamic index"), rows),
         "Static index by force, from the rates of kind `grating` (header "
         "`force_n,ridge_mm,groove_mm,position_mm,rate_hz`):",
@@ -272,7 +278,8 @@ def _thresholds(found: SphereThresholds) -> list[Part]:
         "same in all rows, and that at 144 /m differs. The first row is the paper's experiment; `changed` is "
         "the number of causes that differ from it. Elasticity: relative change of the sum over that of the "
         "curvature. Spread: standard deviation of the noisy sum over its mean. The fraction is about 1.35 "
-        "times spread over elasticity. Noise independent of the rate is in units of 100 spikes/s.",
+        "times spread over elasticity. Noise independent of the rate is in units of 100 spikes/s. Between "
+        "pressed spheres rates are interpolated; another choice of spheres moves a fraction by up to 0.02.",
         table(columns, [_threshold_row(found, row) for row in found.rows]),
         "[Curvature thresholds](decisions/curvature-thresholds.md) has the conclusion.",
     )
