@@ -24,6 +24,7 @@ from fingerpad.experiments.gerling2014.response_maps import PopulationMaps
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 from fingerpad.experiments.gerling2014.summary import Summary
+from fingerpad.experiments.tissue_sets import tissue_layers
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
@@ -87,6 +88,7 @@ def synthetic_results() -> dict:
             _compared("fitted", "hit rate at 365 /m", "0.95", "0.95", "0.00", "met", fitted_to="noise"),
             _compared("addition", "force under the cylinder", "–", "210 mN", "–", "not judged"),
         ],
+        "tissues": [json.loads(to_json(layer)) for layer in tissue_layers()],
         "inputs": [
             {"name": "depth", "value": 1.0, "unit": "mm", "source": "section 2.2", "status": "paper"},
             {"name": "fillet", "value": 0.3, "unit": "mm", "source": "later model", "status": "read"},

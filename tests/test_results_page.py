@@ -21,6 +21,7 @@ from studies.results_page import (
     results_page,
     with_table,
 )
+from studies.tissue_page import tissue_page
 
 ROOT = Path(__file__).parents[1]
 
@@ -44,6 +45,10 @@ def test_the_table_of_the_readme_is_written_from_the_same_numbers(shown):
 
 def test_the_page_of_the_command_line_is_written_from_the_commands():
     assert page("docs/command-line.md") == command_line_page()
+
+
+def test_the_page_of_tissues_is_written_from_their_numbers():
+    assert page("docs/tissues.md") == tissue_page()
 
 
 def test_a_changed_number_changes_the_table_and_nothing_else_of_the_readme(shown):

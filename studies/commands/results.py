@@ -13,7 +13,7 @@ from fingerpad.core.results import from_json, to_json
 ROOT = Path(__file__).parents[2]
 README, DOCS = ROOT / "README.md", ROOT / "docs"
 PAGE, NUMBERS, PICTURE = DOCS / "results.md", DOCS / "results.json", DOCS / "images" / "chain.png"
-COMMANDS = DOCS / "command-line.md"
+COMMANDS, TISSUES = DOCS / "command-line.md", DOCS / "tissues.md"
 
 
 def results_command(
@@ -37,9 +37,9 @@ def results_command(
         bool, typer.Option(help="Also press the standard sphere and draw the README's picture.")
     ] = True,
 ) -> None:
-    """Write docs/results.md, docs/command-line.md, and the table and the picture of the README."""
+    """Write docs/results.md, docs/command-line.md, docs/tissues.md, and table and picture of the README."""
     from fingerpad.report.style import write_png
-    from studies import chain_picture, command_line_page, results_page
+    from studies import chain_picture, command_line_page, results_page, tissue_page
 
     shown = from_json(results_page.Excerpt, NUMBERS.read_bytes())
     if results is not None:
@@ -49,7 +49,8 @@ def results_command(
     write_atomically(PAGE, results_page.results_page(shown).encode())
     write_atomically(README, readme.encode())
     write_atomically(COMMANDS, command_line_page.command_line_page().encode())
-    written = [NUMBERS, PAGE, README, COMMANDS]
+    write_atomically(TISSUES, tissue_page.tissue_page().encode())
+    written = [NUMBERS, PAGE, README, COMMANDS, TISSUES]
     if picture:
         skin, response = chain_picture.touched(shown.percept.standard_per_m, shown.resolution)
         write_png(lambda parts: chain_picture.draw(*parts), (skin, response, shown.percept), PICTURE)

@@ -42,6 +42,7 @@ from fingerpad.report.skin_deflection import (
     skin_deflection_tables,
 )
 from fingerpad.report.three_levels import caption_levels, draw_levels
+from fingerpad.report.tissues import tissue_table
 
 # Inputs are the record of what was used: nothing of them is rounded or left out.
 ALL_DIGITS, ALL_VALUES = 12, 1000
@@ -80,6 +81,7 @@ def reproduction_page(result: ReproductionResult) -> Page:
         [
             Chapter("Comparison with the paper", comparison_tables(result.comparison)),
             *_levels(result),
+            Chapter("Tissues", [tissue_table(result.tissues)]),
             Chapter("Published numbers used", input_tables(result.inputs)),
             manifest_chapter(result.manifest),
         ],

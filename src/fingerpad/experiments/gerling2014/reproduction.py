@@ -40,6 +40,7 @@ from fingerpad.experiments.gerling2014.summary import Summary, summary
 from fingerpad.experiments.gerling2014.three_levels import ThreeLevels
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.tissue_sets import TissueLayer, tissue_layers
 from fingerpad.inference.fitting.methods import Method
 from fingerpad.inference.start_points import response_surface
 from fingerpad.neuron.afferent import Afferent
@@ -126,6 +127,8 @@ class ReproductionResult:
         What goes beyond the paper, None where it was not asked for.
     comparison : tuple of ClaimRow
         The paper's numbers beside ours.
+    tissues : tuple of TissueLayer
+        Every named set of tissues, those of the run and of the trials among them.
     inputs : tuple of PublishedNumber
         Published numbers on which all of it rests.
     manifest : Manifest
@@ -146,6 +149,7 @@ class ReproductionResult:
     single_unit_uncertainty: UncertaintyResult | None = None
     curvature_thresholds: CurvatureThresholds | None = None
     comparison: tuple[ClaimRow, ...]
+    tissues: tuple[TissueLayer, ...]
     inputs: tuple[PublishedNumber, ...]
     manifest: Manifest
 
@@ -246,6 +250,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
         single_unit_uncertainty=uncertainty,
         curvature_thresholds=thresholds,
         comparison=tuple(comparison(manifest.materials, skin, force, unit, discrimination, nail, thresholds)),
+        tissues=tissue_layers(),
         inputs=tuple(PublishedNumber(**asdict(number)) for number in all_published()),
         manifest=manifest,
     )
