@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import isfinite
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import FixedLocator, NullLocator
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.data import paper, psychophysics
 from fingerpad.report.formatting import fixed, joined
 from fingerpad.report.manifest import edition
 from fingerpad.report.parts import Chapter, Drawing, Page, Part
-from fingerpad.report.style import BLACK, BLUE, GREEN, ORANGE, PALE, new_figure
+from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, new_figure
 from studies.pages.markdown import parts_of, table
 from studies.tissue_candidates import CHANGE, LEVELS, SED, STRESS
 from studies.tissue_search import (
@@ -47,6 +49,18 @@ ONE_BAR = (
 FEW = 4
 """Numbers of a shared label from which on only the first and the last are written."""
 
+MARKS = {str(SED): (BLUE, "o"), str(STRESS): (ORANGE, "s")}
+"""Colour and marker by the drive; others are green triangles."""
+
+FORCES_N = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
+SCORES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.93, 0.95, 0.96, 0.97, 0.98, 0.99)
+BEST_SCORE = 1.005
+"""Score at which the scale of the scores would end."""
+
+LABEL_PT, MARK_PT, POINTS_PER_INCH = 7.0, 2.5, 72.0
+RADII_PT = (4.0, 8.0, 13.0, 20.0, 29.0, 40.0, 54.0, 70.0)
+"""Distances of a label from its point that are tried. [1/72 inch]"""
+
 _REGIONS = ("within 0.5 mm", "0.5 to 5 mm")
 
 
@@ -57,8 +71,10 @@ def tissue_search_page(results: TissueSearch) -> Page:
         "tissue_search",
         "Levels of every candidate",
         partial(draw, results),
-        "Each point is a candidate, labelled by its number. Blue: driven by strain energy density (SED); "
-        "orange: by compressive stress; green: by another quantity. Shaded: targets. Cross in (c): the "
+        "Each point is a candidate of the table below, labelled by its number. Blue circles: driven by "
+        "strain energy density (SED); orange squares: by compressive stress; green triangles: by another "
+        "quantity. Shaded: targets. The scales of R² and FSS are logarithmic in their distance from 1. "
+        "Cross in (c): the "
         f"paper's {PAPER_DYNAMIC_HZ[0]:g} and {PAPER_DYNAMIC_HZ[1]:g} spikes/s.",
     )
     return Page(
@@ -92,46 +108,108 @@ def draw(results: TissueSearch) -> Figure:
     -------
     Figure
     """
-    figure = new_figure(10.0, 8.0)
+    figure = new_figure(12.0, 9.0)
     (force, firing), (rates, codes) = figure.subplots(2, 2)
     wanted = results.targets
     (_, _), (low, high) = wanted.plate_force_n
+    clouds = (
+        (force, lambda found: (found.deflection.plate_force_n[1], found.deflection.r2)),
+        (firing, lambda found: (found.percept.noise_sigma, found.firing.fss_out_of_sample)),
+        (rates, lambda found: found.firing.dynamic_hz),
+        (codes, lambda found: (found.percept.noise_sigma, found.percept.euclidean_rms)),
+    )
     force.set_xscale("log")
-    _cloud(force, results, lambda found: (found.deflection.plate_force_n[1], found.deflection.r2))
+    force.xaxis.set_major_locator(FixedLocator(FORCES_N))
+    force.xaxis.set_major_formatter("{x:g}")
+    force.xaxis.set_minor_locator(NullLocator())
+    for axes in (force, firing):
+        # Scores lie close together near 1: the scale is logarithmic in what they miss.
+        axes.set_yscale("function", functions=(_from_score, _to_score))
+        axes.yaxis.set_major_locator(FixedLocator(SCORES))
+    labels = [_cloud(axes, results, point) for axes, point in clouds]
     _shade(force, (low, high), (wanted.r2, 1.0))
     force.set(
         title="(a) deflection, force",
         xlabel="force of the plate at 2 mm [N]",
         ylabel="$R^2$ under the cylinder",
     )
-    _cloud(firing, results, lambda found: (found.percept.noise_sigma, found.firing.fss_out_of_sample))
     _shade(firing, wanted.noise_sigma, (wanted.fss, 1.0))
     firing.set(title="(b) percept, firing", xlabel=r"fitted noise $\sigma_1$", ylabel="FSS out of sample")
-    _cloud(rates, results, lambda found: found.firing.dynamic_hz)
     rates.plot(*PAPER_DYNAMIC_HZ, "+", color=BLACK, markersize=12.0)
     rates.set(title="(c) dynamic rates", xlabel="under the flat face [spikes/s]", ylabel="largest [spikes/s]")
-    _cloud(codes, results, lambda found: (found.percept.noise_sigma, found.percept.euclidean_rms))
     _shade(codes, wanted.noise_sigma, (0.0, wanted.euclidean_rms))
     codes.set(
         title="(d) both codes at one noise",
         xlabel=r"noise $\sigma_1$ fitted to the Gradient Sum",
         ylabel="rms error of the Euclidean Distance",
     )
+    figure.draw_without_rendering()  # which gives the panels their final sizes
+    for (axes, _), named in zip(clouds, labels, strict=True):
+        _write_labels(axes, named)
     return figure
 
 
-def _cloud(axes: Axes, results: TissueSearch, point: Callable[[Levels], Sequence[float]]) -> None:
-    """Draw one point per candidate that has both numbers; candidates at one point share a label."""
-    colours, labels = {str(SED): BLUE, str(STRESS): ORANGE}, dict[tuple[float, float], list[str]]()
+def _from_score(score: FloatArray) -> FloatArray:
+    return -np.log(np.maximum(BEST_SCORE - np.asarray(score), 1.0 - BEST_SCORE))
+
+
+def _to_score(place: FloatArray) -> FloatArray:
+    return BEST_SCORE - np.exp(-np.asarray(place))
+
+
+def _cloud(
+    axes: Axes, results: TissueSearch, point: Callable[[Levels], Sequence[float]]
+) -> dict[tuple[float, float], str]:
+    """Draw one point per candidate that has both numbers, and return labels; one point has one label."""
+    numbers: dict[tuple[float, float], list[str]] = {}
     for number, row in enumerate(results.rows, start=1):
         if row.levels is None or not all(isfinite(value) for value in point(row.levels)):
             continue
         x, y = point(row.levels)
-        axes.plot(x, y, "o", markersize=5.0, color=colours.get(row.drive, GREEN))
-        labels.setdefault((x, y), []).append(str(number))
-    for place, numbers in labels.items():
-        label = ", ".join(numbers) if len(numbers) < FEW else f"{numbers[0]} ... {numbers[-1]}"
-        axes.annotate(label, place, xytext=(4, 3), textcoords="offset points", fontsize=7.0, color=BLACK)
+        colour, marker = MARKS.get(row.drive, (GREEN, "^"))
+        axes.plot(x, y, marker, markersize=5.0, color=colour)
+        numbers.setdefault((x, y), []).append(str(number))
+    return {
+        place: ", ".join(group) if len(group) < FEW else f"{group[0]} ... {group[-1]}"
+        for place, group in numbers.items()
+    }
+
+
+def _write_labels(axes: Axes, labels: Mapping[tuple[float, float], str]) -> None:
+    """Write each label where it covers no label and no point; a line leads to a point that is far."""
+    if not labels:
+        return
+    points = axes.transData.transform(list(labels)) * POINTS_PER_INCH / axes.figure.dpi
+    frame = axes.bbox.get_points() * POINTS_PER_INCH / axes.figure.dpi
+    boxes = [(point - MARK_PT, point + MARK_PT) for point in points]
+    angles = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False) + 0.5
+    for (place, text), point in zip(labels.items(), points, strict=True):
+        half = 0.5 * np.array([0.62 * LABEL_PT * len(text), 1.05 * LABEL_PT])
+        offsets = [
+            (half + radius) * (np.cos(angle), np.sin(angle)) for radius in RADII_PT for angle in angles
+        ]
+
+        def covered(offset: FloatArray, half: FloatArray = half, point: FloatArray = point) -> float:
+            low, high = point + offset - half, point + offset + half
+            outside = float(np.maximum(frame[0] - low, high - frame[1]).clip(0.0).sum())
+            shared = (np.minimum(high, other[1]) - np.maximum(low, other[0]) for other in boxes)
+            return outside + sum(float(side.prod()) for side in shared if (side > 0.0).all())
+
+        # The nearest of the places that cover least.
+        offset = min(offsets, key=covered)
+        boxes.append((point + offset - half, point + offset + half))
+        far = np.abs(offset).max() > half.max() + 2.0 * RADII_PT[0]
+        axes.annotate(
+            text,
+            place,
+            xytext=tuple(offset),
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            fontsize=LABEL_PT,
+            color=BLACK,
+            arrowprops={"arrowstyle": "-", "linewidth": 0.4, "color": GREY, "shrinkB": 2.0} if far else None,
+        ).set_in_layout(False)
 
 
 def _shade(axes: Axes, across: Sequence[float], up: Sequence[float]) -> None:

@@ -1,11 +1,13 @@
 """Search for tissues: closed forms, a fit that recovers the truth, and one tiny run."""
 
+import itertools
 import re
 from dataclasses import asdict, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.results import from_json, to_json
@@ -27,7 +29,7 @@ from studies.hyperfoam_fit import (
     polynomials,
 )
 from studies.pages.markdown import markdown, write_markdown
-from studies.pages.tissue_search import tissue_search_page
+from studies.pages.tissue_search import draw, tissue_search_page
 from studies.tissue_candidates import (
     HUMAN,
     HUMAN_KPA,
@@ -578,6 +580,48 @@ def test_the_page_names_unsolved_candidates_and_those_that_meet_all_levels(tiny)
     assert "No candidate meets all targets" in markdown(
         tissue_search_page(replace(tiny.results, rows=(unsolved,)))
     )
+
+
+def test_labels_of_crowded_candidates_do_not_overlap():
+    random = np.random.default_rng(3)
+    found = levels()
+
+    def crowded(number):
+        far = 0.05 * (number == 0)
+        r2, fss, noise, error = random.normal((0.974, 0.92, 0.057, 0.04), (0.003, 0.01, 0.002, 0.004))
+        r2, fss, noise, error = r2 - 4.0 * far, fss - 4.0 * far, noise + far, error + far
+        return SimpleNamespace(
+            drive=(tissue_candidates.SED, tissue_candidates.STRESS, "other")[number % 3],
+            levels=replace(
+                found,
+                deflection=replace(
+                    found.deflection,
+                    r2=r2,
+                    plate_force_n=np.array([0.2, random.normal(0.7, 0.05) + 40.0 * far]),
+                ),
+                firing=replace(
+                    found.firing,
+                    fss_out_of_sample=fss,
+                    dynamic_hz=tuple(random.normal((50.0, 180.0), 5.0) + 1000.0 * far),
+                ),
+                percept=replace(found.percept, noise_sigma=noise, euclidean_rms=error),
+            ),
+        )
+
+    rows = [crowded(number) for number in range(16)]
+    figure = draw(SimpleNamespace(rows=rows, targets=targets()))
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        boxes = [text.get_tightbbox() for text in axes.texts]
+        assert len(boxes) == len(rows)
+        frame = axes.get_window_extent().padded(2.0)
+        assert all(frame.contains(*corner) for box in boxes for corner in (box.min, box.max))
+    ticks = [text.get_text() for text in figure.axes[0].get_xticklabels()]
+    assert not any("10^" in text for text in ticks)
+    for axes in figure.axes:
+        boxes = [Text.get_window_extent(text) for text in axes.texts]
+        pairs = itertools.combinations(boxes, 2)
+        assert not any(one.shrunk(0.8, 0.8).overlaps(other.shrunk(0.8, 0.8)) for one, other in pairs)
 
 
 def test_a_candidate_that_cannot_be_solved_is_named(tmp_path, monkeypatch):
