@@ -41,6 +41,89 @@ PRIOR_OBSERVATIONS = 1.0
 
 
 @dataclass(frozen=True)
+class CorrelatedResiduals:
+    """Distribution of residuals along a line, whose deviation and correlation length are integrated out.
+
+    Parameters
+    ----------
+    n_residuals : int
+        How many.
+    positions_mm : array (n_residuals,), optional
+        Their places along a line; default: independent residuals. [mm]
+    lengths_mm : tuple of float, optional
+        Grid of correlation lengths; 0 for independence. [mm]
+    deviation : float, optional
+        Scale s of the prior of sigma. [unit of the residuals]
+
+    Raises
+    ------
+    InputError
+        If a length is negative, the deviation is not positive, or two residuals have the same position.
+
+    Examples
+    --------
+    >>> residuals = CorrelatedResiduals(3, np.array([0.0, 1.0, 2.0]), deviation=0.1)
+    >>> small, large = residuals.log_likelihood(np.array([[0.1, 0.1, 0.1], [0.4, 0.4, 0.4]]))
+    >>> bool(small > large)
+    True
+    """
+
+    n_residuals: int
+    positions_mm: FloatArray | None = None
+    lengths_mm: tuple[float, ...] = LENGTHS_MM
+    deviation: float = DEVIATION_HZ
+    _whitening: FloatArray = field(init=False, repr=False, compare=False)
+    _log_weights: FloatArray = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        n = self.n_residuals
+        positive("deviation", self.deviation)
+        lengths = float_array("lengths_mm", self.lengths_mm, 1)
+        if not lengths.size or (lengths < 0.0).any():
+            raise InputError(f"lengths_mm must hold lengths of at least 0: got {self.lengths_mm}.")
+        if self.positions_mm is None:
+            lengths, distances = np.zeros(1), np.zeros((n, n))
+        else:
+            places = float_array("positions_mm", self.positions_mm, 1)
+            if places.size != n or np.unique(places).size != n:
+                raise InputError(
+                    f"positions_mm needs a different position for each of {n} stimuli: "
+                    f"got {places.size} values, {np.unique(places).size} of them different."
+                )
+            distances = np.abs(places[:, None] - places)
+        whitening = np.array([_whitening(distances, length) for length in lengths])
+        # log |R|^(-1/2), and equal prior probabilities.
+        log_weights = np.log(np.diagonal(whitening, axis1=1, axis2=2)).sum(axis=1) - np.log(lengths.size)
+        object.__setattr__(self, "lengths_mm", tuple(lengths.tolist()))
+        object.__setattr__(self, "_whitening", whitening)
+        object.__setattr__(self, "_log_weights", log_weights)
+
+    def log_likelihood(self, residuals: FloatArray) -> FloatArray:
+        """Log likelihood (n_points,) of rows of residuals (n_points, n_residuals), up to a constant."""
+        return np.asarray(logsumexp(self._log_shares(self._squares(residuals)), axis=1))
+
+    def draw(self, residuals: FloatArray, random: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+        """Draw sigma and length (n_points,) given rows of residuals (n_points, n_residuals)."""
+        squares = self._squares(residuals)
+        n_points = len(squares)
+        shares = np.cumsum(np.exp(_normalised(self._log_shares(squares))), axis=1)
+        which = (random.uniform(size=(n_points, 1)) > shares[:, :-1]).sum(axis=1)
+        total = PRIOR_OBSERVATIONS * self.deviation**2 + squares[np.arange(n_points), which]
+        deviation = np.sqrt(total / random.chisquare(PRIOR_OBSERVATIONS + self.n_residuals, size=n_points))
+        return deviation, np.array(self.lengths_mm)[which]
+
+    def _squares(self, residuals: FloatArray) -> FloatArray:
+        """Return q (n_points, n_lengths)."""
+        white = residuals @ np.swapaxes(self._whitening, 1, 2)  # (n_lengths, n_points, n_residuals)
+        return (white**2).sum(axis=2).T
+
+    def _log_shares(self, squares: FloatArray) -> FloatArray:
+        """Logarithm of the likelihood for each length, (n_points, n_lengths)."""
+        exponent = 0.5 * (PRIOR_OBSERVATIONS + self.n_residuals)
+        return self._log_weights - exponent * np.log(PRIOR_OBSERVATIONS * self.deviation**2 + squares)
+
+
+@dataclass(frozen=True)
 class RateLikelihood:
     """Likelihood of the parameters of a rate model, given the observed rates of one afferent.
 
@@ -81,8 +164,7 @@ class RateLikelihood:
     positions_mm: FloatArray | None = None
     lengths_mm: tuple[float, ...] = LENGTHS_MM
     deviation_hz: float = DEVIATION_HZ
-    _whitening: FloatArray = field(init=False, repr=False, compare=False)
-    _log_weights: FloatArray = field(init=False, repr=False, compare=False)
+    _residuals: CorrelatedResiduals = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         n = self.model.n_stimuli
@@ -92,25 +174,9 @@ class RateLikelihood:
                 f"got {len(self.recordings.stimuli)} for {n}."
             )
         positive("deviation_hz", self.deviation_hz, "spikes/s")
-        lengths = float_array("lengths_mm", self.lengths_mm, 1)
-        if not lengths.size or (lengths < 0.0).any():
-            raise InputError(f"lengths_mm must hold lengths of at least 0: got {self.lengths_mm}.")
-        if self.positions_mm is None:
-            lengths, distances = np.zeros(1), np.zeros((n, n))
-        else:
-            places = float_array("positions_mm", self.positions_mm, 1)
-            if places.size != n or np.unique(places).size != n:
-                raise InputError(
-                    f"positions_mm needs a different position for each of {n} stimuli: "
-                    f"got {places.size} values, {np.unique(places).size} of them different."
-                )
-            distances = np.abs(places[:, None] - places)
-        whitening = np.array([_whitening(distances, length) for length in lengths])
-        # log |R|^(-1/2), and equal prior probabilities.
-        log_weights = np.log(np.diagonal(whitening, axis1=1, axis2=2)).sum(axis=1) - np.log(lengths.size)
-        object.__setattr__(self, "lengths_mm", tuple(lengths.tolist()))
-        object.__setattr__(self, "_whitening", whitening)
-        object.__setattr__(self, "_log_weights", log_weights)
+        residuals = CorrelatedResiduals(n, self.positions_mm, self.lengths_mm, self.deviation_hz)
+        object.__setattr__(self, "_residuals", residuals)
+        object.__setattr__(self, "lengths_mm", residuals.lengths_mm)
 
     @property
     def phases(self) -> tuple[str, ...]:
@@ -132,7 +198,7 @@ class RateLikelihood:
         array (n_points,)
         """
         return sum(
-            (logsumexp(self._log_shares(squares), axis=1) for _, _, squares in self._phases(points)),
+            (self._residuals.log_likelihood(residuals) for _, _, residuals in self._phases(points)),
             start=np.zeros(len(points)),
         )
 
@@ -151,35 +217,19 @@ class RateLikelihood:
         dict of str to ResidualDraws
             By phase.
         """
-        return {
-            phase: self._residuals_of(predicted, squares, random)
-            for phase, predicted, squares in self._phases(points)
-        }
-
-    def _residuals_of(
-        self, predicted: FloatArray, squares: FloatArray, random: np.random.Generator
-    ) -> ResidualDraws:
-        n_points, n = predicted.shape
-        shares = np.cumsum(np.exp(_normalised(self._log_shares(squares))), axis=1)
-        which = (random.uniform(size=(n_points, 1)) > shares[:, :-1]).sum(axis=1)
-        total = PRIOR_OBSERVATIONS * self.deviation_hz**2 + squares[np.arange(n_points), which]
-        deviation = np.sqrt(total / random.chisquare(PRIOR_OBSERVATIONS + n, size=n_points))
-        # A new recording has residuals of the same size, independent of those observed.
-        new = np.maximum(predicted + deviation[:, None] * random.normal(size=predicted.shape), 0.0)
-        return ResidualDraws(predicted, new, deviation, np.array(self.lengths_mm)[which])
+        drawn = {}
+        for phase, predicted, residuals in self._phases(points):
+            deviation, length = self._residuals.draw(residuals, random)
+            # A new recording has residuals of the same size, independent of those observed.
+            new = np.maximum(predicted + deviation[:, None] * random.normal(size=predicted.shape), 0.0)
+            drawn[phase] = ResidualDraws(predicted, new, deviation, length)
+        return drawn
 
     def _phases(self, points: FloatArray) -> Iterator[tuple[str, FloatArray, FloatArray]]:
-        """Name, predicted rates (n_points, n_stimuli) and q (n_points, n_lengths) of each recorded phase."""
+        """Name, predicted rates and residuals (n_points, n_stimuli) of each recorded phase."""
         predicted = dict(zip(PHASES, self.model.evaluate_batch(points), strict=True))
         for phase in self.phases:
-            residuals = getattr(self.recordings, f"{phase}_rate_hz") - predicted[phase]
-            white = residuals @ np.swapaxes(self._whitening, 1, 2)  # (n_lengths, n_points, n_stimuli)
-            yield phase, predicted[phase], (white**2).sum(axis=2).T
-
-    def _log_shares(self, squares: FloatArray) -> FloatArray:
-        """Logarithm of the likelihood for each length, (n_points, n_lengths)."""
-        exponent = 0.5 * (PRIOR_OBSERVATIONS + self.model.n_stimuli)
-        return self._log_weights - exponent * np.log(PRIOR_OBSERVATIONS * self.deviation_hz**2 + squares)
+            yield phase, predicted[phase], getattr(self.recordings, f"{phase}_rate_hz") - predicted[phase]
 
 
 @dataclass(frozen=True)
