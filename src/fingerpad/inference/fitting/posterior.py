@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import emcee
 import numpy as np
@@ -137,6 +138,7 @@ def sample(
     most_steps: int = 1280,
     largest_r_hat: float = 1.01,
     smallest_effective_size: float = 400.0,
+    moves: Sequence[tuple[Any, float]] | None = None,
 ) -> Chains:
     """Sample a density until the ensembles agree and the effective sample sizes suffice.
 
@@ -161,6 +163,8 @@ def sample(
     largest_r_hat, smallest_effective_size : float, optional
         Limits of convergence: R-hat at most the first, effective sample sizes at least the second, for the
         middle and the tails of all parameters.
+    moves : sequence of (emcee.moves.Move, float), optional
+        Proposals and how often each is made. Default: both of this module, equally often.
 
     Returns
     -------
@@ -195,7 +199,8 @@ def sample(
     positive("smallest_effective_size", smallest_effective_size)
     density = _Checked(log_density)
     seeds = np.random.SeedSequence(whole("seed", seed, at_least=0)).spawn(n_ensembles)
-    ensembles = [_ensemble(density, middle, scale, n_walkers, one) for one in seeds]
+    proposals = list(moves) if moves is not None else _moves()
+    ensembles = [_ensemble(density, middle, scale, n_walkers, one, proposals) for one in seeds]
     history: list[str] = []
     done, wanted = 0, n_steps
     while True:
@@ -242,6 +247,10 @@ def sample(
         wanted = min(2 * done, most_steps)
 
 
+def _moves() -> list[tuple[Any, float]]:
+    return [(emcee.moves.StretchMove(), 0.5), (emcee.moves.KDEMove(bw_method=BANDWIDTH), 0.5)]
+
+
 @dataclass
 class _Ensemble:
     """A sampler and its present state."""
@@ -259,6 +268,7 @@ def _ensemble(
     spread: FloatArray,
     n_walkers: int,
     seed: np.random.SeedSequence,
+    proposals: list[tuple[Any, float]],
 ) -> _Ensemble:
     """Start an ensemble at scattered points, with random numbers of its own."""
     start, moves = seed.spawn(2)
@@ -269,7 +279,7 @@ def _ensemble(
         n_walkers,
         centre.size,
         density,
-        moves=[(emcee.moves.StretchMove(), 0.5), (emcee.moves.KDEMove(bw_method=BANDWIDTH), 0.5)],
+        moves=proposals,
         vectorize=True,
     )
     sampler.random_state = np.random.RandomState(np.random.MT19937(moves)).get_state()
