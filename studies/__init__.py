@@ -5,6 +5,7 @@
 | `tissue-search` | tissues and drives on four levels, effect of each parameter, order of the trials |
 | `bar-readings` | readings of Eqs. 7-8, and bar or ridge of a grating, on the rates under the bar |
 | `held-out` | predictions of `human` that no search has used, inside or outside of what was published |
+| `tissue-posterior` | one posterior of tissues, afferent and noise, with bands on all figures |
 | `drives` | quantities that drive the afferent, explanations of the dynamic rates, sampling depths |
 | `methods` | start points and units, methods of fitting, models and their limits |
 | `spike-fit` | fits to spike trains, variability of interspike intervals |

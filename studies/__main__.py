@@ -17,6 +17,7 @@ from studies import (
     paper_size,
     population_timing,
     spike_fit,
+    tissue_posterior,
     tissue_search,
 )
 from studies.commands.results import results_command
@@ -30,6 +31,7 @@ from studies.pages.mesh_refinement import MESH_REFINEMENT
 from studies.pages.paper_size import PAPER_SIZE
 from studies.pages.population_timing import population_timing_page
 from studies.pages.spike_fit import spike_fit_page
+from studies.pages.tissue_posterior import tissue_posterior_page
 from studies.pages.tissue_search import tissue_search_page
 from studies.study import Study, command_of
 
@@ -51,6 +53,13 @@ STUDIES = (
         "Predict what no search has used: force, spheres by force, gratings, adaptation, volume, thresholds.",
         held_out.run,
         held_out_page,
+        materials="human",
+    ),
+    Study(
+        "tissue-posterior",
+        "Draw tissues, afferent and noise from one posterior, with bands on all figures.",
+        tissue_posterior.run,
+        tissue_posterior_page,
         materials="human",
     ),
     Study(

@@ -410,14 +410,14 @@ def fitted(skins: Skins, folds: bool = True) -> tuple[Firing, FloatArray]:
         fss=problem.score(found.parameters, everything),
         fss_out_of_sample=np.nan if validated is None else validated.score_test,
         fss_rates_alone=alone.score,
-        dynamic_hz=_flat_and_largest(dynamic),
-        static_hz=_flat_and_largest(static),
+        dynamic_hz=flat_and_largest(dynamic),
+        static_hz=flat_and_largest(static),
     )
     return firing, found.parameters
 
 
-def _flat_and_largest(rate_hz: FloatArray) -> tuple[float, float]:
-    """Smallest rate under the flat face of the bar, and largest rate. [spikes/s]"""
+def flat_and_largest(rate_hz: FloatArray) -> tuple[float, float]:
+    """Return the smallest rate under the flat face of the bar, and the largest rate. [spikes/s]"""
     flat_mm = protocol.BAR_WIDTH.value / 2 - protocol.BAR_FILLET.value
     return float(rate_hz[np.abs(protocol.BAR_SHIFTS.value) < flat_mm].min()), float(rate_hz.max())
 
