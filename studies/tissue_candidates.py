@@ -28,8 +28,8 @@ HUMAN_KPA = (
 )
 """Long-term shear moduli of the set `human`, from the outside in. [kPa]"""
 
-SECOND_KPA = (32.0, 8.0, 8.0, 1.9)
-"""Another set of the same kind, with a softer outer layer over equal living epidermis and dermis. [kPa]"""
+STIFFER_KPA, SOFTER_KPA = (54.0, 12.4, 6.9, 1.9), (32.0, 8.0, 8.0, 1.9)
+"""Sets of the same kind with stiffer and with softer outer layers; `human` lies between them. [kPa]"""
 
 LAYER_NAMES = ("stratum corneum", "living epidermis", "dermis", "subcutis")
 
@@ -187,7 +187,7 @@ def neo_hookean(
 
     Examples
     --------
-    >>> round(neo_hookean((54.0, 12.4, 6.9, 1.9), (0.4, 0.4, 0.4, 0.48)).subcutis.poisson, 2)
+    >>> round(neo_hookean(HUMAN_KPA, (0.4, 0.4, 0.4, 0.48)).subcutis.poisson, 2)
     0.48
     """
     ratios = [poisson] * len(LAYER_NAMES) if isinstance(poisson, int | float) else poisson
@@ -307,7 +307,7 @@ HUMAN = Candidate(
 )
 
 OUTER_RATIOS = (1.0, 2.0, 8.0)
-"""Stiffness of the stratum corneum over that of the living epidermis; it is 4.4 in `human`."""
+"""Stiffness of the stratum corneum over that of the living epidermis; it is 4.1 in `human`."""
 
 
 def candidates() -> tuple[Candidate, ...]:
@@ -330,12 +330,9 @@ def candidates() -> tuple[Candidate, ...]:
         *(replace(HUMAN, name=f"human, {drive}", reading=drive, finalist=False) for drive in drives),
         replace(HUMAN, name="human, SED and stress", reading=SED, dynamic=STRESS, finalist=False),
     )
-    second = Candidate(
-        "32/8/8/1.9",
-        neo_hookean(SECOND_KPA),
-        STRESS,
-        "assumed, chosen by a scan of moduli",
-        LEVELS,
+    stiffer, softer = (
+        Candidate(name, neo_hookean(moduli), STRESS, "assumed, chosen by a scan of moduli", LEVELS)
+        for name, moduli in (("54/12.4/6.9/1.9", STIFFER_KPA), ("32/8/8/1.9", SOFTER_KPA))
     )
     paper = Candidate(
         "paper",
@@ -357,8 +354,9 @@ def candidates() -> tuple[Candidate, ...]:
     return (
         HUMAN,
         *tissues_of_human,
-        second,
-        replace(second, name="32/8/8/1.9, SED^0.5", reading=Reading(exponent=0.5)),
+        stiffer,
+        softer,
+        replace(softer, name="32/8/8/1.9, SED^0.5", reading=Reading(exponent=0.5)),
         *stratum_corneum,
         Candidate(
             "stiff living epidermis",

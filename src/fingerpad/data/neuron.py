@@ -69,10 +69,10 @@ _HUMAN_SET = Source(
     "in both terms, standard resolution",
     "assumed",
 )
-HUMAN_INTERCEPT = _HUMAN_SET("fitted intercept beta, set human", -8.99e-7, "mA")
-HUMAN_DYNAMIC_GAIN = _HUMAN_SET("fitted dynamic gain k_d, set human", 7.05e-5, "mA ms/kPa")
-HUMAN_STATIC_GAIN = _HUMAN_SET("fitted static gain k_s, set human", 5.705e-7, "mA/kPa")
-HUMAN_TIME_CONSTANT = _HUMAN_SET("fitted membrane time constant tau, set human", 58.86, "ms")
+HUMAN_INTERCEPT = _HUMAN_SET("fitted intercept beta, set human", -9.067e-7, "mA")
+HUMAN_DYNAMIC_GAIN = _HUMAN_SET("fitted dynamic gain k_d, set human", 6.552e-5, "mA ms/kPa")
+HUMAN_STATIC_GAIN = _HUMAN_SET("fitted static gain k_s, set human", 5.201e-7, "mA/kPa")
+HUMAN_TIME_CONSTANT = _HUMAN_SET("fitted membrane time constant tau, set human", 82.54, "ms")
 REFRACTORY = Published("refractory period", 1.0, "ms", "Gerling et al. 2014, section 2.1.3", "paper")
 DIFFERENCE_STEP = Published(
     "step h of the rate of change of energy density", 0.001, "ms", "Gerling et al. 2014, Eq. 2", "paper"

@@ -86,11 +86,11 @@ _HUMAN = Source(
     "discrimination of spheres at once (docs/decisions/paper-and-human.md)",
     "assumed",
 )
-HUMAN_STRATUM_CORNEUM_SHEAR = _HUMAN("long-term shear modulus of the stratum corneum, set human", 54.0, "kPa")
+HUMAN_STRATUM_CORNEUM_SHEAR = _HUMAN("long-term shear modulus of the stratum corneum, set human", 37.0, "kPa")
 HUMAN_LIVING_EPIDERMIS_SHEAR = _HUMAN(
-    "long-term shear modulus of the living epidermis, set human", 12.4, "kPa"
+    "long-term shear modulus of the living epidermis, set human", 9.0, "kPa"
 )
-HUMAN_DERMIS_SHEAR = _HUMAN("long-term shear modulus of the dermis, set human", 6.9, "kPa")
+HUMAN_DERMIS_SHEAR = _HUMAN("long-term shear modulus of the dermis, set human", 7.7, "kPa")
 HUMAN_SUBCUTIS_SHEAR = _HUMAN("long-term shear modulus of the subcutis, set human", 1.9, "kPa")
 
 _DANDEKAR = Source(
