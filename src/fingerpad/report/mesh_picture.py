@@ -42,6 +42,8 @@ def draw_mesh(section: MeshPicture) -> Figure:
     if section.half:
         _draw_plane(across, section.across, section, lines=0.15, sign=-1.0)
     _draw_plane(near, section.along, section, lines=0.4)
+    _name_fixed_parts(along, section.along, mirrored=False)
+    _name_fixed_parts(across, section.across, mirrored=section.half)
     width, height = ENLARGED_MM
     corner = (x - width, y - 0.15)
     along.add_patch(
@@ -72,8 +74,7 @@ def draw_mesh(section: MeshPicture) -> Figure:
         Patch(facecolor=colour, edgecolor=BLACK, linewidth=0.5, label=name)
         for name, colour in zip(section.layers, LAYER_COLOURS, strict=True)
     ]
-    fixed_parts = [Patch(facecolor=BONE, label="bone"), Patch(facecolor=NAIL, label="nail")]
-    figure.legend(handles=[*patches, *fixed_parts], loc="outside lower center", ncols=6)
+    figure.legend(handles=patches, loc="outside lower center", ncols=len(patches))
     return figure
 
 
@@ -92,6 +93,24 @@ def _draw_plane(axes: Axes, plane: MeshPlane, section: MeshPicture, lines: float
     edges = np.stack([skin[:-1], skin[1:]], axis=1)[covered]
     axes.add_collection(LineCollection(list(edges), colors=NAIL, linewidths=NAIL_WIDTH, capstyle="round"))
     axes.autoscale_view()
+
+
+def _name_fixed_parts(axes: Axes, plane: MeshPlane, mirrored: bool) -> None:
+    """Write bone and nail beside them: in grey they resemble the layers."""
+    bone = plane.right_mm[:, -1], plane.up_mm[:, -1]
+    right, up = (0.5 * float(values.min() + values.max()) for values in bone)
+    axes.text(0.0 if mirrored else right, up, "bone", ha="center", va="center")
+    nail = plane.right_mm[plane.under_nail, 0], plane.up_mm[plane.under_nail, 0]
+    if nail[0].size:
+        axes.annotate(
+            "nail",
+            (0.0 if mirrored else float(nail[0].mean()), float(nail[1].max())),
+            xytext=(0.0, 6.0),
+            textcoords="offset points",
+            ha="center",
+            color=NAIL,
+        )
+        axes.set_ylim(top=axes.get_ylim()[1] + 1.5)
 
 
 def caption_mesh(section: MeshPicture) -> str:

@@ -123,7 +123,14 @@ def _profiles(axes: Axes, profile: StressProfile) -> None:
     axes.axvline(0.0, color=BLACK, linewidth=0.8)
     axes.set_ylim(bottom=0.0)
     axes.text(
-        -0.1, 0.02, "under the nail", transform=axes.get_xaxis_transform(), color=GREY, ha="right", size=8
+        -0.1,
+        0.95,
+        "under\nthe nail",
+        transform=axes.get_xaxis_transform(),
+        color=BLACK,
+        ha="right",
+        va="top",
+        size=9,
     )
     axes.legend(loc="upper right")
 
