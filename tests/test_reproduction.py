@@ -176,8 +176,8 @@ def numbers(value):
 
 def test_results_have_every_section_and_finite_numbers_only(first):
     studies = {"summary", "skin_deflection", "skin_force", "single_unit", "discrimination"}
-    studies |= {"population", "nail"}
-    files = {"format", "format_version", "comparison", "inputs", "manifest"}
+    studies |= {"mesh", "levels", "population", "nail"}
+    files = {"format", "format_version", "comparison", "tissues", "inputs", "manifest"}
     assert set(first.results) == studies | files | BEYOND
     assert {name for name, section in first.results.items() if section is None} == BEYOND
     assert not re.search(r"\b(NaN|Infinity)\b", first.text)
@@ -419,7 +419,7 @@ def test_figures_are_images_of_a_readable_size(first):
     figures = sorted((first.folder / "figures").iterdir())
     named = sorted(int(re.match(r"figure_(\d+)_\w+\.png$", path.name)[1]) for path in figures)
     assert named == sorted(drawing.number for drawing in drawings(first))
-    assert named[:6] == [4, 5, 6, 7, 8, 9]
+    assert named[:8] == [1, 2, 4, 5, 6, 7, 8, 9]
     for path in figures:
         content = path.read_bytes()
         assert content.startswith(b"\x89PNG\r\n\x1a\n")

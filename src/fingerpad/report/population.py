@@ -196,7 +196,7 @@ def caption_population(section: PopulationMaps) -> str:
         "latencies on a logarithmic scale. Middle: the same on the deformed skin at the end of the hold, "
         "seen from below, the tip to the right; afferents in grey skin do not respond. Right: seen from "
         "above; circles are the receptors of Figures 7 and 8, hatched skin is silent. All afferents have "
-        f"the parameters fitted under the bar; nothing here was observed.{_resting(section.at_rest)}"
+        f"the parameters of the fitted afferent; nothing here was observed.{_resting(section.at_rest)}"
     )
 
 
