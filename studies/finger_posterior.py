@@ -497,8 +497,8 @@ class Sampling:
     n_walkers: int = 60
     n_steps: int = 100
     most_steps: int = 1600
-    largest_r_hat: float = 1.01
-    smallest_effective_size: float = 400.0
+    largest_r_hat: float = 1.03
+    smallest_effective_size: float = 150.0
     n_ensembles: int = 4
 
 

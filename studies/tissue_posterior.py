@@ -84,7 +84,14 @@ N_REPLICATES = 20
 """Synthetic experiments of the calibration."""
 
 SAMPLING = Sampling()
-REPEATED = Sampling(n_walkers=50, n_steps=80, n_ensembles=2, largest_r_hat=1.05, smallest_effective_size=60.0)
+REPEATED = Sampling(
+    n_walkers=50,
+    n_steps=80,
+    most_steps=640,
+    n_ensembles=2,
+    largest_r_hat=1.1,
+    smallest_effective_size=30.0,
+)
 """Of the posterior, and of those that leave out a level or belong to a synthetic experiment."""
 
 LEVEL, INNER_LEVEL = 0.95, 0.5

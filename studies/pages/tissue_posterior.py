@@ -80,8 +80,20 @@ def _in_short(results: TissuePosterior) -> str:
     )
     return (
         f"**All {len(results.targets)} targets of the set `human` hold at once with probability "
-        f"{fixed(results.all_targets, 2)}.** {verdict}"
+        f"{fixed(results.all_targets, 2)}.** {verdict} {_beside(results)}"
     )
+
+
+def _beside(results: TissuePosterior) -> str:
+    """Say which numbers of `human` lie outside of their intervals."""
+    names = [
+        _short(one.name)
+        for one in results.marginals
+        if not one.posterior.low <= one.human <= one.posterior.high
+    ]
+    if not names:
+        return "All numbers of `human` lie within their 95 % intervals."
+    return f"Of the numbers of `human` these lie outside of their 95 % intervals: {joined(names)}."
 
 
 def draw(results: TissuePosterior) -> Figure:
@@ -175,16 +187,20 @@ def _draw_widths(axes: Axes, results: TissuePosterior) -> None:
     """Draw the width of every marginal relative to its prior."""
     place = np.arange(len(results.marginals))[::-1]
     axes.barh(place, [one.width for one in results.marginals], color=GREY, height=0.7)
-    axes.set_yticks(place, [_short(one.name) for one in results.marginals])
+    axes.set_yticks(place, [_short(one.name) for one in results.marginals], fontsize=7.0)
     axes.set(title="(i) posterior / prior", xlabel="width of the 95 % interval", xlim=(0.0, 1.1))
 
 
 def _short(name: str) -> str:
-    return (
-        name.split(" [")[0]
-        .replace("stratum corneum", "s. corneum")
-        .replace("living epidermis", "l. epidermis")
-    )
+    """Return a name without its unit, long words abbreviated.
+
+    Examples
+    --------
+    >>> _short("dynamic gain k_d/(C v) [1/kPa]"), _short("stratum corneum / living epidermis")
+    ('dynamic gain', 'corneum / epidermis')
+    """
+    text = name.split(" [")[0].replace("stratum corneum", "corneum").replace("living epidermis", "epidermis")
+    return text.split(" k_")[0].replace("modulus of the subcutis", "subcutis modulus")
 
 
 def _interval(found: CredibleInterval, digits: int = DIGITS) -> tuple[str, str]:
