@@ -84,6 +84,7 @@ def test_without_a_command_the_help_is_shown(call):
         (["reproduce", "--resolution", "qick"], "resolution must be one of quick, standard, paper", "'qick'"),
         (["reproduce", "--resolution", "nan"], "resolution must be one of quick, standard, paper", "'nan'"),
         (["reproduce", "--resolution", ""], "resolution must be one of quick, standard, paper", "''"),
+        (["reproduce", "--materials", "humann"], "materials must be one of human, paper", "'humann'"),
         (["reproduce", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
         (["reproduce", "--jobs", "-2"], "jobs must be a whole number of at least 1", "-2"),
         (["reproduce", "--jobs", "nan"], "'--jobs': must be a whole number", "'nan'"),

@@ -13,6 +13,7 @@ from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Indenter, Sphere
 from fingerpad.mechanics.materials import Tissues
+from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.indentation import CONTACT_POINT_MM, touch_of
 from fingerpad.skin.indentation import Touch as Touch
@@ -55,6 +56,8 @@ class Conditions:
     def __post_init__(self) -> None:
         one_of("resolution", self.resolution, RESOLUTIONS)
         whole("seed", self.seed, at_least=0)
+        if isinstance(self.materials, str):
+            one_of("materials", self.materials, tuple(TISSUES))
 
     @property
     def afferent(self) -> Afferent:
