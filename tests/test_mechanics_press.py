@@ -59,7 +59,7 @@ def test_skin_under_a_wire_goes_down_with_it_and_does_not_slide():
     under = mesh.skin_nodes[mesh.nodes_mm[mesh.skin_nodes, 0] == 0.0]
     assert not done.displacement_mm[:, under, 0].any()
     deepest = done.displacement_mm[:, under, 1].max(axis=1)
-    np.testing.assert_allclose(deepest, motion.depth_at(done.times_ms), rtol=0, atol=0.005 * 0.2)
+    np.testing.assert_allclose(deepest, motion.prescribed_at(done.times_ms), rtol=0, atol=0.005 * 0.2)
     beside = mesh.skin_nodes[np.abs(mesh.nodes_mm[mesh.skin_nodes, 0] - 0.4) < 1e-9]
     assert done.displacement_mm[-1, beside, 0].any()
 
@@ -71,7 +71,7 @@ def test_penetration_is_within_its_tolerance_and_the_tip_lies_at_its_depth():
         done = pressed(mesh, settings=settings)
         assert done.penetration_mm <= tolerance * MOTION.depth_mm
         under_tip = mesh.skin_nodes[np.linalg.norm(mesh.nodes_mm[mesh.skin_nodes], axis=1).argmin()]
-        depths = MOTION.depth_at(done.times_ms)
+        depths = MOTION.prescribed_at(done.times_ms)
         np.testing.assert_allclose(
             done.displacement_mm[:, under_tip, 1], depths, rtol=0, atol=tolerance * MOTION.depth_mm
         )
@@ -184,7 +184,7 @@ def test_moment_is_the_same_to_the_last_bit_after_a_step_from_it_failed(monkeypa
     def arrays(moment):
         found, history = moment.found, moment.history
         return (
-            found.displacement_mm, found.multipliers_mn, found.contact.force_mn, moment.velocity_mm_per_ms,
+            found.displacement_mm, found.multipliers_mn, found.contact.force_mn, moment.step_mm,
             history.instantaneous, history.relaxed, moment.sed_kpa,
         )  # fmt: skip
 

@@ -12,16 +12,16 @@ from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 def test_depth_rises_linearly_then_stays():
     motion = RampAndHold(depth_mm=2.0, ramp_ms=40.0, hold_ms=100.0)
     np.testing.assert_allclose(
-        motion.depth_at([-5.0, 0.0, 10.0, 40.0, 41.0, 140.0]), [0, 0, 0.5, 2, 2, 2], rtol=1e-15
+        motion.prescribed_at([-5.0, 0.0, 10.0, 40.0, 41.0, 140.0]), [0, 0, 0.5, 2, 2, 2], rtol=1e-15
     )
     assert motion.end_ms == 140.0
-    assert motion.depth_at(np.zeros((2, 3))).shape == (2, 3)
+    assert motion.prescribed_at(np.zeros((2, 3))).shape == (2, 3)
 
 
 def test_force_rises_linearly_then_stays_and_is_solved_at_the_same_times_as_a_depth():
     motion = ForceRampAndHold(force_mn=80.0, ramp_ms=40.0, hold_ms=100.0)
     np.testing.assert_allclose(
-        motion.force_at([-5.0, 0.0, 10.0, 40.0, 140.0]), [0, 0, 20, 80, 80], rtol=1e-15
+        motion.prescribed_at([-5.0, 0.0, 10.0, 40.0, 140.0]), [0, 0, 20, 80, 80], rtol=1e-15
     )
     assert motion.end_ms == 140.0
     depth = RampAndHold(depth_mm=1.0, ramp_ms=40.0, hold_ms=100.0)

@@ -89,6 +89,7 @@ __all__ = [
     "SurfaceProfile",
     "Tissues",
     "Touch",
+    "Trajectory",
     "indent",
     "named_tissues",
     "save_figure",
@@ -119,7 +120,7 @@ _HOMES = {
     "report.touch": ("save_figure",),
     "skin.sampling": ("SkinResponse", "SurfaceProfile"),
     "core.signals": ("CurrentTraces", "HitRates", "ResponseMap", "SedTraces", "SpikeTrains"),
-    "geometry.motion": ("ForceRampAndHold", "RampAndHold"),
+    "geometry.motion": ("ForceRampAndHold", "RampAndHold", "Trajectory"),
 }
 """Public names by the module that defines them."""
 

@@ -39,7 +39,7 @@ def job() -> Job:
     materials = tuple(Material.linear_elastic(young, POISSON) for young in YOUNG_KPA)
     placement = place(BALL, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
     times = np.linspace(0.0, MOTION.ramp_ms, STEPS + 1)
-    return Job(mesh, materials, BALL, placement, times, MOTION.depth_at(times))
+    return Job(mesh, materials, BALL, placement, times, MOTION.prescribed_at(times))
 
 
 @lru_cache(maxsize=1)

@@ -132,7 +132,7 @@ def calculix_indenters() -> list[Row]:
         placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), axes)
         settings = PressSettings(ramp_steps=2, hold_steps=1)
         got = press(mesh, materials, indenter, placement, motion, settings, friction=friction).force_mn[2]
-        pressed = Job(mesh, materials, indenter, placement, times, motion.depth_at(times), friction)
+        pressed = Job(mesh, materials, indenter, placement, times, motion.prescribed_at(times), friction)
         with tempfile.TemporaryDirectory() as folder:
             found = calculix.run(calculix_deck(pressed), Path(folder), len(mesh.elements), ())
         rows.append(near(name, 2.0 * found.force_mn[-1] @ placement.axis, got, COARSE_MESH, "mN"))
@@ -155,7 +155,7 @@ def calculix_gap() -> list[Row]:
     settings = PressSettings(ramp_steps=2, hold_steps=1)
     got = press(mesh, materials, indenter, placement, motion, settings).force_mn[2]
     times = np.array([0.0, 5.0, 10.0])
-    pressed = Job(mesh, materials, indenter, placement, times, motion.depth_at(times))
+    pressed = Job(mesh, materials, indenter, placement, times, motion.prescribed_at(times))
     with tempfile.TemporaryDirectory() as folder:
         found = calculix.run(calculix_deck(pressed), Path(folder), len(mesh.elements), ())
     return [near("bar with a gap", 2.0 * found.force_mn[-1] @ placement.axis, got, OTHER_ELEMENT[0], "mN")]

@@ -15,7 +15,6 @@ from fingerpad.core.errors import InputError
 from fingerpad.export.outline import Outline, RigidMesh, outline_of, rigid_mesh
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import LAYERS, Mesh
-from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import Placement, check_friction
 from fingerpad.mechanics.materials import Material
 from fingerpad.skin.behaviour import code_hash
@@ -326,12 +325,12 @@ def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike
             )
         times_ms = stimulus.times_ms(settings.ramp_steps, settings.hold_steps)
     if depths_mm is None:
-        if not isinstance(stimulus, RampAndHold):
+        if stimulus.by_force:
             raise InputError(
                 f"{type(stimulus).__name__} sets forces, and a deck moves its indenter: give times_ms "
                 "and depths_mm, those of its response."
             )
-        depths_mm = stimulus.depth_at(times_ms)
+        depths_mm = stimulus.prescribed_at(times_ms)
     return Job(
         touch.mesh,
         touch.tissues.layers,

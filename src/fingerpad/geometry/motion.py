@@ -1,4 +1,4 @@
-"""Motion of the indenter: ramp and hold of its depth or of its force."""
+"""Motion of the indenter: ramp and hold of its depth or force, or any trajectory of either."""
 
 from __future__ import annotations
 
@@ -7,15 +7,68 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, positive
+from fingerpad.core.checks import FloatArray, float_array, increasing, not_negative, positive, whole
+from fingerpad.core.errors import InputError
+from fingerpad.core.units import MS_PER_S
 from fingerpad.data import protocol
 
 MOTION_UNITS = {"depth_mm": "mm", "force_mn": "mN", "ramp_ms": "ms", "hold_ms": "ms"}
 """Units of the parameters of motions."""
 
+SAME_SPEED = 1e-6
+"""Change of speed, over the largest speed of a trajectory, below which it goes on at the same speed."""
+
+CORNER_SHARE, CORNER_OVER_NEIGHBOURS = 0.5, 3.0
+"""A sample is a corner if the speed changes there by more than this share of the largest speed, or by more
+than this many times its change at the samples beside it, as it does not along a smooth curve."""
+
+SAMPLES_PER_CYCLE = 20
+"""Samples of a sine per cycle; a line between two of them misses it by up to 1.2 % of the amplitude."""
+
 
 class Motion:
-    """A ramp at a constant rate from 0, then a hold: common part of all motions of the indenter."""
+    """What an indenter does over time: common part of all motions.
+
+    A motion prescribes the depth of the indenter, or its force. It is linear in time between some times.
+    """
+
+    by_force: bool = False
+    """Whether the force is prescribed instead of the depth."""
+
+    @property
+    def corners_ms(self) -> tuple[float, ...]:
+        """Times after the start at which the speed jumps, without the end. [ms]"""
+        raise NotImplementedError
+
+    @property
+    def end_ms(self) -> float:
+        """End of the motion. [ms]"""
+        raise NotImplementedError
+
+    @property
+    def largest(self) -> float:
+        """Largest depth [mm] or force [mN]."""
+        raise NotImplementedError
+
+    def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
+        """Depth [mm] or force [mN] at `times_ms`, any shape."""
+        raise NotImplementedError
+
+    def times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
+        """List the times to solve at, from 0. [ms]
+
+        Parameters
+        ----------
+        ramp_steps : int
+            Equal steps from nothing to the largest depth or force.
+        hold_steps : int
+            Steps of a hold.
+        """
+        raise NotImplementedError
+
+
+class _OneRamp(Motion):
+    """A ramp at a constant rate from 0, then a hold."""
 
     ramp_ms: float
     hold_ms: float
@@ -30,9 +83,14 @@ class Motion:
         """End of the hold. [ms]"""
         return self.ramp_ms + self.hold_ms
 
-    def share_at(self, times_ms: ArrayLike) -> FloatArray:
-        """Completed share of the ramp at `times_ms`, any shape: 0 at the start, 1 in the hold."""
-        return np.clip(np.asarray(times_ms, dtype=float) / self.ramp_ms, 0.0, 1.0)
+    @property
+    def corners_ms(self) -> tuple[float, ...]:
+        """End of the ramp. [ms]"""
+        return (self.ramp_ms,)
+
+    def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
+        """Depth [mm] or force [mN] at `times_ms`, any shape: 0 at the start, the largest in the hold."""
+        return self.largest * np.clip(np.asarray(times_ms, dtype=float) / self.ramp_ms, 0.0, 1.0)
 
     def times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
         """List the times to solve at: 0, equal ramp steps, hold steps that grow geometrically. [ms]
@@ -46,14 +104,13 @@ class Motion:
         [0.0, 25.0, 50.0, 75.0, 204.1, 1000.0]
         """
         ramp = np.linspace(0.0, self.ramp_ms, ramp_steps + 1)
-        first = min(self.ramp_ms / ramp_steps, self.hold_ms / hold_steps)
-        since_ramp = np.geomspace(first, self.hold_ms, hold_steps)
-        since_ramp[-1] = self.hold_ms
-        return np.concatenate([ramp, self.ramp_ms + since_ramp])
+        return np.concatenate(
+            [ramp, self.ramp_ms + _hold(self.hold_ms, self.ramp_ms / ramp_steps, hold_steps)]
+        )
 
 
 @dataclass(frozen=True)
-class RampAndHold(Motion):
+class RampAndHold(_OneRamp):
     """Indent at constant speed to a depth, then hold it.
 
     Parameters
@@ -72,7 +129,8 @@ class RampAndHold(Motion):
 
     Examples
     --------
-    >>> RampAndHold(depth_mm=1.0, ramp_ms=50.0, hold_ms=950.0).depth_at([0.0, 25.0, 50.0, 400.0]).tolist()
+    >>> motion = RampAndHold(depth_mm=1.0, ramp_ms=50.0, hold_ms=950.0)
+    >>> motion.prescribed_at([0.0, 25.0, 50.0, 400.0]).tolist()
     [0.0, 0.5, 1.0, 1.0]
     """
 
@@ -80,13 +138,14 @@ class RampAndHold(Motion):
     ramp_ms: float = protocol.RAMP.value
     hold_ms: float = protocol.HOLD.value
 
-    def depth_at(self, times_ms: ArrayLike) -> FloatArray:
-        """Depth at `times_ms`, any shape. [mm]"""
-        return self.depth_mm * self.share_at(times_ms)
+    @property
+    def largest(self) -> float:
+        """Depth of the hold. [mm]"""
+        return self.depth_mm
 
 
 @dataclass(frozen=True)
-class ForceRampAndHold(Motion):
+class ForceRampAndHold(_OneRamp):
     """Press with a force that grows at a constant rate, then hold it: the skin creeps.
 
     Parameters
@@ -105,7 +164,8 @@ class ForceRampAndHold(Motion):
 
     Examples
     --------
-    >>> ForceRampAndHold(force_mn=100.0, ramp_ms=50.0, hold_ms=950.0).force_at([0.0, 25.0, 400.0]).tolist()
+    >>> motion = ForceRampAndHold(force_mn=100.0, ramp_ms=50.0, hold_ms=950.0)
+    >>> motion.prescribed_at([0.0, 25.0, 400.0]).tolist()
     [0.0, 50.0, 100.0]
     """
 
@@ -113,10 +173,222 @@ class ForceRampAndHold(Motion):
     ramp_ms: float = protocol.RAMP.value
     hold_ms: float = protocol.HOLD.value
 
-    def force_at(self, times_ms: ArrayLike) -> FloatArray:
-        """Force at `times_ms`, any shape. [mN]"""
-        return self.force_mn * self.share_at(times_ms)
+    by_force = True
+
+    @property
+    def largest(self) -> float:
+        """Force of the hold. [mN]"""
+        return self.force_mn
 
 
-Stimulus = RampAndHold | ForceRampAndHold
+@dataclass(frozen=True)
+class Trajectory(Motion):
+    """Move the indenter along any course of depth or of force, back as well as forth.
+
+    Depth or force is linear between the samples. Contact may be lost and made again: a depth below 0 lifts
+    the indenter off the undeformed skin, and skin that still recovers follows it or stays behind.
+
+    Parameters
+    ----------
+    samples_ms : sequence of float
+        Increasing times from 0. [ms]
+    depth_mm : sequence of float, optional
+        Depth at these times, 0 at first touch of the undeformed skin, from 0 or less. [mm]
+    force_mn : sequence of float, optional
+        Instead of a depth, force along the direction of pressing on the whole finger, from 0. [mN]
+
+    Raises
+    ------
+    InputError
+        If not exactly one of depth and force is given, lengths differ, times do not increase from 0, a value
+        is not finite, a force is negative, or the indenter never presses.
+
+    Examples
+    --------
+    Press for half a second, release within 50 ms, and let the skin recover:
+
+    >>> release = Trajectory([0.0, 50.0, 500.0, 550.0, 1000.0], depth_mm=[0.0, 1.0, 1.0, 0.0, 0.0])
+    >>> release.prescribed_at([25.0, 525.0]).tolist()
+    [0.5, 0.5]
+    >>> release.corners_ms
+    (50.0, 500.0, 550.0)
+    """
+
+    samples_ms: tuple[float, ...]
+    depth_mm: tuple[float, ...] | None = None
+    force_mn: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        times = increasing("samples_ms", float_array("samples_ms", self.samples_ms, 1))
+        if times.size < 2 or times[0] != 0.0:
+            raise InputError(f"samples_ms must hold at least two times, the first of them 0: got {times}.")
+        if (self.depth_mm is None) == (self.force_mn is None):
+            raise InputError("A trajectory needs either depth_mm or force_mn: give one of them.")
+        name = "force_mn" if self.depth_mm is None else "depth_mm"
+        values = float_array(name, getattr(self, name), 1)
+        if values.size != times.size:
+            raise InputError(f"{name} must have one value per time, {times.size}: got {values.size}.")
+        if values[0] > 0.0 or (name == "force_mn" and values.min() < 0.0):
+            allowed = "0, and never be negative" if name == "force_mn" else "0 or less, without contact"
+            raise InputError(f"{name} must begin with {allowed}: it begins with {values[0]:g}.")
+        if values.max() <= 0.0:
+            raise InputError(f"{name} must be above 0 at some time: the indenter would never press.")
+        object.__setattr__(self, "samples_ms", tuple(times.tolist()))
+        object.__setattr__(self, name, tuple(values.tolist()))
+
+    @property
+    def by_force(self) -> bool:  # type: ignore[override]
+        """Whether the force is prescribed instead of the depth."""
+        return self.force_mn is not None
+
+    @property
+    def prescribed(self) -> tuple[float, ...]:
+        """Depth [mm] or force [mN] at the samples."""
+        values = self.force_mn if self.depth_mm is None else self.depth_mm
+        assert values is not None
+        return values
+
+    @property
+    def largest(self) -> float:
+        """Largest depth [mm] or force [mN]."""
+        return max(self.prescribed)
+
+    @property
+    def end_ms(self) -> float:
+        """Last sample. [ms]"""
+        return self.samples_ms[-1]
+
+    @property
+    def corners_ms(self) -> tuple[float, ...]:
+        """Samples at which the speed jumps, other than along a smooth curve; without start and end. [ms]"""
+        speed = np.diff(self.prescribed) / np.diff(self.samples_ms)
+        change = np.abs(np.diff(speed, prepend=speed[0], append=speed[-1])) / np.abs(speed).max()
+        beside = np.maximum(np.roll(change, 1), np.roll(change, -1))
+        stands_out = change > CORNER_OVER_NEIGHBOURS * beside + SAME_SPEED
+        corners = stands_out | (change > CORNER_SHARE)
+        return tuple(np.array(self.samples_ms)[corners].tolist())
+
+    def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
+        """Depth [mm] or force [mN] at `times_ms`, any shape."""
+        return np.interp(np.asarray(times_ms, dtype=float), self.samples_ms, self.prescribed)
+
+    def times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
+        """List the times to solve at: all samples, and times between them where they are far apart. [ms]
+
+        A part of the way takes its share of `ramp_steps`. A hold longer than the step before it takes
+        `hold_steps`, which grow geometrically, because relaxation is fastest at its beginning.
+
+        Examples
+        --------
+        >>> Trajectory([0.0, 50.0, 1000.0], depth_mm=[0.0, 1.0, 1.0]).times_ms(2, 3).round(1).tolist()
+        [0.0, 25.0, 50.0, 75.0, 204.1, 1000.0]
+        """
+        times, last_ms = [0.0], np.inf
+        for start, end, moved in zip(
+            self.samples_ms, self.samples_ms[1:], np.abs(np.diff(self.prescribed)), strict=False
+        ):
+            length_ms = end - start
+            if moved > SAME_SPEED * self.largest:
+                steps = int(np.ceil(ramp_steps * moved / self.largest - SAME_SPEED))
+                since = np.linspace(0.0, length_ms, steps + 1)[1:]
+            elif length_ms > last_ms * (1.0 + SAME_SPEED):
+                since = _hold(length_ms, last_ms, hold_steps)
+            else:
+                since = np.array([length_ms])
+            last_ms = since[-1] - (since[-2] if since.size > 1 else 0.0)
+            times += (start + since[:-1]).tolist()
+            times.append(end)
+        return np.array(times)
+
+
+def sine(
+    depth_mm: float,
+    amplitude_mm: float,
+    frequency_hz: float,
+    cycles: int,
+    ramp_ms: float = protocol.RAMP.value,
+    hold_ms: float = protocol.HOLD.value,
+) -> Trajectory:
+    """Indent to a depth, hold it, then vibrate about it.
+
+    Parameters
+    ----------
+    depth_mm : float
+        Depth of the hold. [mm]
+    amplitude_mm : float
+        Half of the way from peak to peak. [mm]
+    frequency_hz : float
+        Frequency. [Hz]
+    cycles : int
+        Number of whole cycles.
+    ramp_ms, hold_ms : float, optional
+        Durations of the ramp and of the hold before the vibration. [ms]
+
+    Returns
+    -------
+    Trajectory
+        With 20 samples per cycle.
+
+    Examples
+    --------
+    >>> motion = sine(0.8, 0.1, 20.0, cycles=2, hold_ms=100.0)
+    >>> round(motion.largest, 6), motion.end_ms
+    (0.9, 250.0)
+    """
+    positive("depth_mm", depth_mm, "mm")
+    positive("amplitude_mm", amplitude_mm, "mm")
+    positive("ramp_ms", ramp_ms, "ms")
+    not_negative("hold_ms", hold_ms, "ms")
+    period_ms = MS_PER_S / positive("frequency_hz", frequency_hz, "Hz")
+    phase = np.arange(1, SAMPLES_PER_CYCLE * whole("cycles", cycles, at_least=1) + 1) / SAMPLES_PER_CYCLE
+    before_ms = [0.0, ramp_ms, ramp_ms + hold_ms][: 3 if hold_ms > 0.0 else 2]
+    return Trajectory(
+        (*before_ms, *(before_ms[-1] + period_ms * phase)),
+        (0.0, *[depth_mm] * (len(before_ms) - 1), *(depth_mm + amplitude_mm * np.sin(2.0 * np.pi * phase))),
+    )
+
+
+def repeated(depth_mm: float, touches: int, ramp_ms: float, hold_ms: float, pause_ms: float) -> Trajectory:
+    """Press several times to the same depth, with pauses at first touch of the undeformed skin.
+
+    Parameters
+    ----------
+    depth_mm : float
+        Depth of each hold. [mm]
+    touches : int
+        How often.
+    ramp_ms, hold_ms, pause_ms : float
+        Durations of a ramp (in and out), of a hold and of a pause. [ms]
+
+    Returns
+    -------
+    Trajectory
+
+    Examples
+    --------
+    >>> repeated(1.0, 2, ramp_ms=50.0, hold_ms=200.0, pause_ms=300.0).end_ms
+    1200.0
+    """
+    positive("depth_mm", depth_mm, "mm")
+    lengths_ms = [
+        positive(name, value, "ms")
+        for name, value in (
+            ("ramp_ms", ramp_ms),
+            ("hold_ms", hold_ms),
+            ("ramp_ms", ramp_ms),
+            ("pause_ms", pause_ms),
+        )
+    ]
+    n = whole("touches", touches, at_least=1)
+    return Trajectory((0.0, *np.cumsum(n * lengths_ms)), (0.0, *n * (depth_mm, depth_mm, 0.0, 0.0)))
+
+
+def _hold(length_ms: float, first_ms: float, steps: int) -> FloatArray:
+    """Return ends of the steps of a hold since its start, growing from `first_ms` or less. [ms]"""
+    ends = np.geomspace(min(first_ms, length_ms / steps), length_ms, steps)
+    ends[-1] = length_ms
+    return ends
+
+
+Stimulus = RampAndHold | ForceRampAndHold | Trajectory
 """A motion by depth or by force."""

@@ -22,6 +22,9 @@ from fingerpad.mechanics.viscoelastic import StepCoefficients
 SMALLEST_FORCE_MN = 1e-6
 """Below it residuals are no longer taken relative to the force of contact. [mN]"""
 
+LEAST_SHARE_OF_FORCE = 1e-3
+"""Least force that residuals are compared to, over the largest force of the press so far."""
+
 CURVATURE_BELOW_RESIDUAL = 0.1
 """Residual over contact force below which the indenter's curvature is part of the tangent."""
 
@@ -52,6 +55,34 @@ class Body:
 
 
 @dataclass(frozen=True)
+class Reached:
+    """Largest force and depth of a press so far.
+
+    Force and depth fall to 0 when the indenter is withdrawn. Tolerances relative to them would then ask for
+    more than round-off allows, so these are the least that a tolerance refers to.
+
+    Parameters
+    ----------
+    force_mn : float
+        Largest contact force on the body as it is meshed. [mN]
+    depth_mm : float
+        Largest depth. [mm]
+    """
+
+    force_mn: float = 0.0
+    depth_mm: float = 0.0
+
+    @property
+    def least_force_mn(self) -> float:
+        """Smallest force that residuals are compared to. [mN]"""
+        return LEAST_SHARE_OF_FORCE * self.force_mn
+
+    def after(self, force_mn: float, depth_mm: float) -> Reached:
+        """Return the largest of both after one more step."""
+        return Reached(max(self.force_mn, force_mn), max(self.depth_mm, depth_mm))
+
+
+@dataclass(frozen=True)
 class Load:
     """What acts on the body in one time step.
 
@@ -72,6 +103,8 @@ class Load:
         Where the skin holds on to the indenter at the start of the step; without friction nothing.
     pressure_kpa : array (n_elements,), optional
         Pressures at the start of the step, for a mixed method. [kPa]
+    reached : Reached, optional
+        Largest force and depth before the step.
     """
 
     contact: Contact
@@ -81,6 +114,11 @@ class Load:
     force_mn: float | None = None
     anchors: Anchors | None = None
     pressure_kpa: FloatArray | None = None
+    reached: Reached = Reached()
+
+    def force_scale_mn(self, force_mn: float) -> float:
+        """Force to which a force that is out of balance is compared. [mN]"""
+        return max(force_mn, self.reached.least_force_mn, SMALLEST_FORCE_MN)
 
 
 @dataclass(frozen=True)
@@ -143,8 +181,10 @@ class Configuration:
         Contact forces minus internal forces; on nodes that are held, what their supports take. [mN]
     residual_mn : array (n_free,)
         The same of the free degrees of freedom. [mN]
+    residual_norm_mn : float
+        Norm of the residual, infinite if an element is turned inside out. [mN]
     relative_residual : float
-        Norm of the residual over the contact force.
+        This norm over the contact force.
     has_tangent : bool
         Whether the tangent was assembled.
     is_curved : bool
@@ -161,6 +201,7 @@ class Configuration:
     potential_uj: float
     out_of_balance_mn: FloatArray
     residual_mn: FloatArray
+    residual_norm_mn: float
     relative_residual: float
     has_tangent: bool
     is_curved: bool
@@ -177,7 +218,7 @@ class Configuration:
         taken.ravel()[body.free] = 0.0
         given = self.contact.force_mn.sum(axis=0)
         missing = float(np.linalg.norm(given - taken.sum(axis=0)))
-        scale = max(float(given @ load.contact.placement.axis), SMALLEST_FORCE_MN)
+        scale = load.force_scale_mn(float(given @ load.contact.placement.axis))
         reaction, nail = (
             self.out_of_balance_mn[nodes].sum(axis=0)
             for nodes in (body.mesh.fixed_nodes, body.mesh.nail_nodes)
@@ -245,10 +286,9 @@ def evaluate(
     force[contact.nodes] += touch.force_mn
     residual = force.ravel()[body.free]
     pressed = float(np.linalg.norm(touch.force_mn.sum(axis=0)))
-    relative_residual = float(np.linalg.norm(residual)) / max(pressed, SMALLEST_FORCE_MN)
-    if np.isnan(internal):
-        # Forces were left half summed, and could look balanced.
-        relative_residual = np.inf
+    # Of a folded element forces were left half summed, and could look balanced.
+    residual_norm_mn = np.inf if np.isnan(internal) else float(np.linalg.norm(residual))
+    relative_residual = residual_norm_mn / load.force_scale_mn(pressed)
     stiffness = touch.stiffness
     is_curved = curved and relative_residual < CURVATURE_BELOW_RESIDUAL
     if is_curved:
@@ -264,6 +304,7 @@ def evaluate(
         potential_uj=internal + touch.potential,
         out_of_balance_mn=force,
         residual_mn=residual,
+        residual_norm_mn=residual_norm_mn,
         relative_residual=relative_residual,
         has_tangent=has_tangent,
         is_curved=is_curved,

@@ -185,14 +185,15 @@ class _Search:
                 f"iteration {iteration}: residual {now.relative_residual:.2e}, "
                 f"imbalance {balance.imbalance:.2e}, misfit {1e3 * now.contact.misfit_mm:.3f} µm"
             )
-            accepted_mn = settings.residual_tolerance * (load.force_mn or 0.0)
+            accepted_mn = settings.residual_tolerance * load.force_scale_mn(load.force_mn or 0.0)
             if abs(now.missing_force_mn(load)) > accepted_mn and now.relative_residual <= AT_REST:
                 now = self.advance_indenter(self.with_tangent(now))
                 potentials, settled = [now.potential_uj], not rubs
                 continue
             balanced = balance.imbalance <= settings.balance_tolerance
             if now.relative_residual <= settings.residual_tolerance and balanced:
-                close = now.contact.misfit_mm <= settings.penetration_tolerance * now.depth_mm
+                deepest_mm = max(now.depth_mm, load.reached.depth_mm)
+                close = now.contact.misfit_mm <= settings.penetration_tolerance * deepest_mm
                 if close and settled:
                     return self.found(now, iteration, balance)
                 self.lagging = self.renewed(now, augmented=not close)
@@ -280,8 +281,10 @@ class _Search:
         while length >= SHORTEST_STEP:
             trial = self.moved(start, length * direction)
             falls = trial.potential_uj <= highest_uj + SUFFICIENT_DECREASE * length * slope
-            # Near the solution the decrease of the potential is below round-off: compare residuals.
-            if falls or trial.relative_residual < 0.9 * start.relative_residual:
+            # Near the solution the decrease of the potential is below round-off: compare residuals. They are
+            # not compared relative to the contact force of each: a retreat sets all nodes free at first, and
+            # any step that drives skin into the indenter would then count as better.
+            if falls or trial.residual_norm_mn < 0.9 * start.residual_norm_mn:
                 return trial
             length /= 2
         folds = "" if trial.whole else f": it turns {self.folded(trial.displacement_mm)} inside out"

@@ -14,7 +14,7 @@ from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.mesh_checks import check_mesh
 from fingerpad.geometry.mesh_quality import element_place, squeezed_most
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Stimulus
+from fingerpad.geometry.motion import Stimulus
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.balance import (
     EnergyBalance,
@@ -23,7 +23,7 @@ from fingerpad.mechanics.balance import (
     dissipated_energy,
     energy_balance,
 )
-from fingerpad.mechanics.configuration import Balance, Body, Load
+from fingerpad.mechanics.configuration import Balance, Body, Load, Reached
 from fingerpad.mechanics.contact import Contact, Placement, check_friction
 from fingerpad.mechanics.fields import (
     ElementFields,
@@ -54,6 +54,14 @@ from fingerpad.mechanics.viscoelastic import (
 PENETRATION_SHARE = 0.1
 """Largest penetration over depth, as a share of the tolerance of SED: SED grows as the square of depth or
 faster, and what augmentation leaves open differs from step to step."""
+
+
+MOST_CONTINUED = 4.0
+"""Largest factor by which the last step of the skin is extended for the next guess."""
+
+
+LIFT_MM = 100.0
+"""How far an indenter without force is lifted while the skin below it is solved. [mm]"""
 
 
 @dataclass(frozen=True)
@@ -143,12 +151,18 @@ class Deformation:
 
 @dataclass(frozen=True)
 class _Moment:
-    """The press at one time: what the next step starts from."""
+    """The press at one time: what the next step starts from.
+
+    `step_mm`, `step_depth_mm` and `advance` are the changes of displacements, depth and prescribed depth or
+    force in the step that ends here.
+    """
 
     time_ms: float
     found: Equilibrium
-    velocity_mm_per_ms: FloatArray
-    depth_rate: float
+    step_mm: FloatArray
+    step_depth_mm: float
+    advance: float
+    reached: Reached
     history: StressHistory
     sed_kpa: FloatArray
     fields: FieldState
@@ -178,7 +192,8 @@ class _Press:
         history = StressHistory.unloaded(len(mesh.elements), table.shares.shape[1])
         unstrained = FieldState.unloaded(len(mesh.nodes_mm), len(self.watched.elements))
         return _Moment(
-            0.0, rest, nowhere, 0.0, history, np.zeros(len(mesh.elements)), unstrained, (Entry(),)
+            0.0, rest, nowhere, 0.0, 0.0, Reached(), history, np.zeros(len(mesh.elements)), unstrained,
+            (Entry(),),
         )  # fmt: skip
 
     def free_skin(self) -> Anchors | None:
@@ -193,22 +208,46 @@ class _Press:
         mesh, table = self.body.mesh, self.body.table
         step_ms = target_ms - start.time_ms
         load = self.load(start, target_ms)
-        # Motion goes on as before inside a phase; at the end of the ramp it stops, and so does the guess.
-        ramps = target_ms <= self.stimulus.ramp_ms
-        guess = start.found.displacement_mm + (step_ms * start.velocity_mm_per_ms if ramps else 0.0)
+        guess = start.found.displacement_mm + self.continued(start, target_ms) * start.step_mm
         found = find_equilibrium(self.body, load, self.solver, guess, start.found.multipliers_mn, self.newton)
+        if self.stimulus.by_force and load.force_mn is None:
+            found = replace(found, depth_mm=self.touching_mm(found.displacement_mm))
         self.newton_steps += found.iterations
         where = mesh, found.displacement_mm, table
         now = instantaneous_state(*where)
         spent = dissipated_energy(*where, step_ms, start.history, now)
         history = start.history.advanced(load.step, mesh.layer, now.stress_kpa)
         sed_kpa = stored_energy_density(*where, history, now)
-        velocity = (found.displacement_mm - start.found.displacement_mm) / step_ms
-        depth_rate = (found.depth_mm - start.found.depth_mm) / step_ms
+        moved_mm = found.displacement_mm - start.found.displacement_mm
+        depth_mm = found.depth_mm - start.found.depth_mm
         fields = self.watched.after(start.fields, found.displacement_mm, history, now, sed_kpa)
         stored = float(now.energies[:, :, 0].sum(axis=1) @ sed_kpa)
         ledger = (*start.ledger, self.entry(start, target_ms, found, stored, spent))
-        return _Moment(target_ms, found, velocity, depth_rate, history, sed_kpa, fields, ledger)
+        force_mn = float(np.linalg.norm(found.contact.force_mn.sum(axis=0)))
+        return _Moment(
+            target_ms, found, moved_mm, depth_mm, self.advance(start, target_ms),
+            start.reached.after(force_mn, found.depth_mm), history, sed_kpa, fields, ledger,
+        )  # fmt: skip
+
+    def touching_mm(self, displacement_mm: FloatArray) -> float:
+        """Depth at which the indenter just touches the deformed skin. [mm]"""
+        skin_mm = (self.body.mesh.nodes_mm + displacement_mm)[self.contact.nodes]
+        local_mm = self.contact.placement.to_local(skin_mm, depth_mm=0.0)
+        return float((local_mm[:, 1] - self.contact.indenter.front(local_mm)).min())
+
+    def advance(self, start: _Moment, target_ms: float) -> float:
+        """Change of the prescribed depth [mm] or force [mN] in a step."""
+        before, after = self.stimulus.prescribed_at([start.time_ms, target_ms])
+        return float(after - before)
+
+    def continued(self, start: _Moment, target_ms: float) -> float:
+        """Advance of the indenter in a step over that in the step before: how far the skin is expected to go.
+
+        It is 0 in a hold and negative after a reversal.
+        """
+        if start.advance == 0.0:
+            return 0.0
+        return float(np.clip(self.advance(start, target_ms) / start.advance, -MOST_CONTINUED, MOST_CONTINUED))
 
     def entry(
         self, start: _Moment, target_ms: float, found: Equilibrium, stored_uj: float, spent_uj: float
@@ -231,23 +270,22 @@ class _Press:
         step_ms = target_ms - start.time_ms
         step = StepCoefficients.of(self.body.table, step_ms)
         carried = start.history.carried(step, self.body.mesh.layer)
-        if isinstance(self.stimulus, ForceRampAndHold):
-            parts = 2.0 if self.body.mesh.symmetry_nodes.size else 1.0
-            force_mn = float(self.stimulus.force_at(target_ms)) / parts
-            ramps = target_ms <= self.stimulus.ramp_ms
-            depth_mm = start.found.depth_mm + (step_ms * start.depth_rate if ramps else 0.0)
-            return Load(
-                self.contact, depth_mm or FIRST_DEPTH_MM, step, carried, force_mn,
-                start.found.anchors, start.found.pressure_kpa,
-            )  # fmt: skip
+        force_mn, depth_mm = None, float(self.stimulus.prescribed_at(target_ms))
+        if self.stimulus.by_force and depth_mm == 0.0:
+            depth_mm = start.found.depth_mm - LIFT_MM
+        elif self.stimulus.by_force:
+            force_mn = depth_mm / (2.0 if self.body.mesh.symmetry_nodes.size else 1.0)
+            touches = start.found.contact.pressed_mn.any()
+            further_mm = self.continued(start, target_ms) * start.step_depth_mm
+            depth_mm = start.found.depth_mm + (further_mm if touches else FIRST_DEPTH_MM)
         return Load(
-            self.contact, float(self.stimulus.depth_at(target_ms)), step, carried,
-            anchors=start.found.anchors, pressure_kpa=start.found.pressure_kpa,
+            self.contact, depth_mm, step, carried, force_mn, start.found.anchors, start.found.pressure_kpa,
+            start.reached,
         )  # fmt: skip
 
     def stopped(self, last: _Moment, attempts: tuple[str, ...]) -> ConvergenceError:
         """Error for a press that gets no further than `last`."""
-        less = "force" if isinstance(self.stimulus, ForceRampAndHold) else "depth"
+        less = "force" if self.stimulus.by_force else "depth"
         element, ratio = squeezed_most(self.body.mesh, last.found.displacement_mm)
         squeezed = (
             f", where {element_place(self.body.mesh, element)} has {ratio:.0%} of its volume at a point"
@@ -283,7 +321,7 @@ def press(
         The rigid body.
     placement : Placement
         Where it stands at first touch.
-    stimulus : RampAndHold or ForceRampAndHold
+    stimulus : RampAndHold, ForceRampAndHold or Trajectory
         Its motion.
     settings : PressSettings, optional
         Steps and tolerances.
@@ -310,8 +348,8 @@ def press(
     """
     settings = settings or PressSettings()
     check_mesh(mesh, len(materials))
-    if isinstance(stimulus, RampAndHold):
-        _check_depth(mesh, indenter, placement, stimulus.depth_mm)
+    if not stimulus.by_force:
+        _check_depth(mesh, indenter, placement, stimulus.largest)
     table = MaterialTable.of(materials)
     undeformed = placement.to_local(mesh.nodes_mm[mesh.skin_nodes], depth_mm=0.0)
     candidates = indenter.may_touch(undeformed) & ~np.isin(mesh.skin_nodes, mesh.fixed_nodes)
@@ -331,11 +369,11 @@ def press(
     moment = job.unloaded()
     reached, values = [], [moment.fields.values]
     for moment in _moments(job, settings):
-        if moment.found.depth_mm > deepest_mm and isinstance(stimulus, ForceRampAndHold):
+        if moment.found.depth_mm > deepest_mm and stimulus.by_force:
             raise InputError(
                 f"force_mn must not push the indenter deeper than {deepest_mm:.2f} mm: it is there after "
-                f"{moment.time_ms:.4g} ms, at {stimulus.force_at(moment.time_ms):.4g} of "
-                f"{stimulus.force_mn:g} mN."
+                f"{moment.time_ms:.4g} ms, at {stimulus.prescribed_at(moment.time_ms):.4g} of "
+                f"{stimulus.largest:g} mN."
             )
         # Without its history, which is as large as all else together.
         reached.append((moment.time_ms, moment.found, moment.sed_kpa))
@@ -362,7 +400,7 @@ def press(
         stress_kpa=cauchy_stress(mesh, displacement[-1], table, moment.history),
         fields=fields_over_time(chosen, values),
         contact=skin_contact(mesh, displacement, pressed),
-        energy=energy_balance(moment.ledger, kinks_ms=(stimulus.ramp_ms,)).at(times),
+        energy=energy_balance(moment.ledger, kinks_ms=stimulus.corners_ms).at(times),
         penetration_mm=max(each.contact.penetration_mm for each in found),
         newton_steps=job.newton_steps,
         factorisations=solver.renewals,
@@ -407,13 +445,16 @@ def _moments(job: _Press, settings: PressSettings) -> Iterator[_Moment]:
     times = stimulus.times_ms(settings.ramp_steps, settings.hold_steps)[1:]
     if settings.sed_tolerance is None:
         return steps_at(start, times, job.step, job.stopped)
-    first_hold_ms = times[settings.ramp_steps] - stimulus.ramp_ms
-    # A first step much longer than a relaxation would not see that the relaxation is curved.
     relaxing = job.body.table.times_ms[job.body.table.shares > 0.0]
-    phases = (
-        Phase(stimulus.ramp_ms, first_ms=times[0], loading=True),
-        Phase(stimulus.end_ms, first_ms=relaxing.min(initial=first_hold_ms), loading=False),
-    )
+    phases, begin_ms = [], 0.0
+    for end_ms in (*stimulus.corners_ms, stimulus.end_ms):
+        before, after = stimulus.prescribed_at([begin_ms, end_ms])
+        first_ms = times[np.searchsorted(times, begin_ms, side="right")] - begin_ms
+        if before == after:
+            # A first step much longer than a relaxation would not see that the relaxation is curved.
+            first_ms = relaxing.min(initial=first_ms)
+        phases.append(Phase(end_ms, first_ms=first_ms, loading=after > before))
+        begin_ms = end_ms
     receptors = mesh.living_epidermis.ravel()
     where = receptors if receptors.size else np.arange(len(mesh.elements))
     return adaptive_steps(start, phases, settings.sed_tolerance, where, job.step, job.stopped)

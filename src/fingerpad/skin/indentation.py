@@ -49,7 +49,7 @@ class Touch:
         The finger.
     indenter : Indenter
         The rigid body.
-    stimulus : RampAndHold or ForceRampAndHold
+    stimulus : RampAndHold, ForceRampAndHold or Trajectory
         Its motion, by depth or by force.
     tissues : Tissues
         Laws of the four layers.
@@ -115,10 +115,10 @@ class Touch:
             )
         self._check_grooves()
         check_friction(self.friction, self.indenter)
-        if isinstance(self.stimulus, RampAndHold) and self.stimulus.depth_mm > self.deepest_mm:
+        if not self.stimulus.by_force and self.stimulus.largest > self.deepest_mm:
             raise InputError(
                 f"depth_mm must stay below {self.deepest_mm:.2f} mm at x = {x:g}, z = {z:g} mm, "
-                f"because of the bone: got {self.stimulus.depth_mm:g} mm."
+                f"because of the bone: got {self.stimulus.largest:g} mm."
             )
 
     def _check_grooves(self) -> None:
@@ -170,7 +170,7 @@ class Touch:
         """
         return SkinResponse(
             mesh=self.mesh,
-            kinks_ms=(self.stimulus.ramp_ms,),
+            kinks_ms=self.stimulus.corners_ms,
             axis_x_mm=self.at_mm[0],
             direction=_rotation(self.tilt_deg, self.spin_deg)[:, 1].copy(),
             fields=fields,
@@ -306,7 +306,7 @@ def indent(
         The finger.
     indenter : Indenter
         `Line`, `Cylinder`, `Bar`, `Sphere`, `FlatPunch`, `Plate`, `Edge`, `Gap` or `Grating`.
-    stimulus : RampAndHold or ForceRampAndHold, optional
+    stimulus : RampAndHold, ForceRampAndHold or Trajectory, optional
         The motion, by depth or by force; the paper's by default.
     materials : str or Tissues
         "human" (one set for deflection, force, firing and percept), "paper" (closest to the paper's numbers),

@@ -1,0 +1,181 @@
+"""Motions back and forth: their samples and corners, release, second touch, vibration, force to 0."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.indenters import Bar, Sphere
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Trajectory, repeated, sine
+from fingerpad.mechanics import newton
+from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.materials import Material, Prony
+from fingerpad.mechanics.newton import NewtonSettings
+from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.skin.indentation import touch_of
+
+PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))
+ELASTIC = tuple(Material.neo_hooke(shear, 0.45) for shear in (40.0, 40.0, 20.0, 8.0))
+RELAXING = tuple(layer.with_prony(PRONY) for layer in ELASTIC)
+BALL = Sphere(curvature_per_m=500.0)
+STEPS = PressSettings(ramp_steps=4, hold_steps=3)
+TIGHT = replace(STEPS, newton=NewtonSettings(residual_tolerance=1e-7, penetration_tolerance=1e-4))
+RELEASE = Trajectory((0.0, 50.0, 500.0, 550.0, 1500.0), (0.0, 0.4, 0.4, 0.0, 0.0))
+
+
+def pressed(motion, materials=RELAXING, indenter=BALL, settings=STEPS, friction=0.0):
+    lines = np.array([0.0, 0.4, 0.8, 1.3, 2.0, 3.0])
+    both, depth = np.concatenate([-lines[:0:-1], lines]), np.array([0.0, 0.3, 0.6, 1.2, 2.0, 3.0])
+    mesh = block_mesh(both, depth, lines, layers=[0, 1, 2, 3, 3], symmetric=True)
+    placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
+    return press(mesh, materials, indenter, placement, motion, settings, friction=friction)
+
+
+def test_ramp_and_hold_as_a_trajectory_is_solved_at_the_same_times_and_gives_the_same_force():
+    for ready, other in (
+        (RampAndHold(0.4, 50.0, 500.0), Trajectory((0.0, 50.0, 550.0), (0.0, 0.4, 0.4))),
+        (ForceRampAndHold(20.0, 50.0, 500.0), Trajectory((0.0, 50.0, 550.0), force_mn=(0.0, 20.0, 20.0))),
+    ):
+        np.testing.assert_allclose(other.times_ms(5, 7), ready.times_ms(5, 7), rtol=1e-14)
+        assert other.corners_ms == ready.corners_ms
+        one, two = pressed(ready), pressed(other)
+        np.testing.assert_allclose(two.force_mn, one.force_mn, rtol=1e-6)
+        np.testing.assert_allclose(two.depth_mm, one.depth_mm, rtol=1e-6)
+
+
+def test_corners_are_kept_and_a_smooth_curve_has_none_but_at_its_ends():
+    assert RELEASE.corners_ms == (50.0, 500.0, 550.0)
+    # The vibration begins at full speed after a hold: a corner. Its extremes are smooth.
+    assert sine(0.8, 0.1, 20.0, cycles=2).corners_ms == (50.0, 1000.0)
+    triangle = Trajectory((0.0, 10.0, 20.0, 30.0), (0.0, 1.0, 0.0, 1.0))
+    assert triangle.corners_ms == (10.0, 20.0)
+    straight = Trajectory((0.0, 10.0, 30.0, 40.0), (0.0, 0.1, 0.3, 0.4))
+    assert straight.corners_ms == ()
+
+
+@given(
+    steps=st.lists(st.tuples(st.floats(0.1, 500.0), st.floats(-0.5, 2.0)), min_size=1, max_size=8),
+    ramp_steps=st.integers(1, 9),
+    hold_steps=st.integers(1, 9),
+)
+def test_solved_times_increase_and_hold_all_samples(steps, ramp_steps, hold_steps):
+    lengths, depths = zip(*steps, strict=True)
+    samples = (0.0, *np.cumsum(lengths))
+    motion = Trajectory(samples, (0.0, *depths[:-1], 1.0))
+    times = motion.times_ms(ramp_steps, hold_steps)
+    assert (np.diff(times) > 0.0).all()
+    assert np.isin(samples, times).all()
+    way = np.abs(np.diff(motion.prescribed_at(times)))
+    assert way.max() <= motion.largest / ramp_steps * (1 + 1e-5)
+
+
+@pytest.mark.parametrize(
+    ("given_values", "said"),
+    [
+        (((0.0,), (0.0,)), "at least two times"),
+        (((1.0, 2.0), (0.0, 1.0)), "the first of them 0"),
+        (((0.0, 2.0, 2.0), (0.0, 1.0, 1.0)), "samples_ms must increase"),
+        (((0.0, np.nan), (0.0, 1.0)), "samples_ms"),
+        (((0.0, 1.0), (0.0, np.inf)), "depth_mm"),
+        (((0.0, 1.0), (0.0, 1.0, 2.0)), "one value per time, 2: got 3"),
+        (((0.0, 1.0), (0.5, 1.0)), "depth_mm must begin with 0 or less"),
+        (((0.0, 1.0), (0.0, -1.0)), "would never press"),
+        (((0.0, 1.0), (0.0, 1.0), (0.0, 1.0)), "either depth_mm or force_mn"),
+        (((0.0, 1.0),), "either depth_mm or force_mn"),
+        (((0.0, 1.0, 2.0), None, (0.0, -1.0, 1.0)), "force_mn must begin with 0, and never be negative"),
+    ],
+)
+def test_impossible_trajectories_are_refused_in_one_sentence(given_values, said):
+    with pytest.raises(InputError, match=said) as refusal:
+        Trajectory(*given_values)
+    assert str(refusal.value).endswith(".")
+
+
+def test_elastic_skin_takes_the_same_path_back():
+    """Without relaxation and friction the force depends on the depth only, and all work is returned."""
+    motion = Trajectory((0.0, 50.0, 100.0), (0.0, 0.4, 0.0))
+    done = pressed(motion, ELASTIC, settings=TIGHT)
+    middle = np.flatnonzero(done.times_ms == 50.0)[0]
+    down, up = done.force_mn[: middle + 1], done.force_mn[middle:][::-1]
+    np.testing.assert_allclose(up, down, rtol=0, atol=1e-4 * down.max())
+    # At depth 0 the skin lies on the indenter within the tolerance of the residual.
+    assert done.force_mn[-1] <= 1e-5 * down.max()
+    np.testing.assert_allclose(done.displacement_mm[-1], 0.0, atol=1e-5)
+    assert done.sed_kpa[-1].max() <= 1e-6 * done.sed_kpa.max()
+
+
+@pytest.mark.parametrize("indenter", [BALL, Bar(1.7, 0.3)], ids=lambda body: type(body).__name__)
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_release_ends_without_force_and_with_energy_in_balance(indenter, friction):
+    done = pressed(RELEASE, indenter=indenter, friction=friction)
+    assert done.force_mn[-1] == 0.0
+    assert (done.force_mn >= 0.0).all()
+    assert done.energy.relative_imbalance <= 0.02
+    assert not done.contact.area_mm2[-1]
+
+
+def test_released_skin_recovers_by_its_relaxation():
+    """Unloaded skin creeps back: what remains of the dent decays, and is gone after many relaxation times."""
+    samples, depths = RELEASE.samples_ms, RELEASE.depth_mm
+    lifted = Trajectory((*samples[:3], 550.0, 600.0, 1000.0, 20_000.0), (*depths[:3], -0.1, -0.1, -0.1, -0.1))
+    done = pressed(lifted)
+    dent = done.displacement_mm[:, :, 1].max(axis=1)
+    after = dent[np.isin(done.times_ms, (550.0, 600.0, 1000.0, 20_000.0))]
+    assert 0.0 < after[0] < 0.4
+    assert (np.diff(after) < 0.0).all()
+    assert after[-1] < 1e-3 * after[0]
+
+
+def test_second_touch_is_that_of_one_history():
+    """After a long pause the second touch equals the first; after a short one it is weaker."""
+    long, short = (repeated(0.4, 2, 50.0, 200.0, pause_ms) for pause_ms in (20_000.0, 20.0))
+    for motion, equal in ((long, True), (short, False)):
+        done = pressed(motion, settings=replace(TIGHT, ramp_steps=4))
+        first, second = (done.force_mn[done.times_ms == corner][0] for corner in (50.0, motion.samples_ms[5]))
+        assert second == pytest.approx(first, rel=1e-3) if equal else second < 0.99 * first
+
+
+def test_force_back_to_zero_lets_the_skin_go_and_takes_it_up_again():
+    motion = Trajectory((0.0, 50.0, 250.0, 300.0, 400.0, 450.0), force_mn=(0.0, 20.0, 20.0, 0.0, 0.0, 20.0))
+    done = pressed(motion)
+    np.testing.assert_allclose(done.force_mn, motion.prescribed_at(done.times_ms), rtol=0, atol=1e-3)
+    released = np.flatnonzero((done.times_ms >= 300.0) & (done.times_ms <= 400.0))
+    assert not done.force_mn[released].any()
+    # The indenter follows the skin that recovers, up to its surface.
+    assert (np.diff(done.depth_mm[released]) < 0.0).all()
+    assert (done.depth_mm[released] > 0.0).all()
+    assert done.depth_mm[-1] > done.depth_mm[done.times_ms == 50.0][0]
+
+
+def test_sine_on_a_hold_repeats_itself_in_an_elastic_body():
+    done = pressed(sine(0.3, 0.05, 20.0, cycles=2, hold_ms=100.0), ELASTIC, settings=TIGHT)
+    cycles = done.force_mn[done.times_ms > 150.0 + 1e-9].reshape(2, -1)
+    np.testing.assert_allclose(cycles[1], cycles[0], rtol=1e-4)
+    assert cycles.argmax(axis=1).tolist() == [4, 4]  # a quarter of 20 samples
+
+
+def test_line_search_refuses_a_step_that_drives_the_skin_into_the_indenter(monkeypatch):
+    """Contact is lost at the start of a step back: relative to its own force any contact is better."""
+    free = SimpleNamespace(residual_mn=np.array([20.0]), residual_norm_mn=20.0, relative_residual=2e7)
+    deep = SimpleNamespace(potential_uj=15_566.0, residual_norm_mn=9290.0, relative_residual=0.9, whole=True)
+    monkeypatch.setattr(newton._Search, "moved", lambda search, start, step: deep)
+    with pytest.raises(ConvergenceError, match="found no better configuration"):
+        newton._Search.line_search(object.__new__(newton._Search), free, np.array([-1.0]), highest_uj=37.0)
+
+
+def test_finger_is_released_from_a_millimetre():
+    motion = Trajectory((0.0, 50.0, 100.0, 150.0), (0.0, 1.0, 0.0, 0.0))
+    skin = touch_of(Fingertip(), Sphere(), motion).solve()
+    assert skin.kinks_ms == (50.0, 100.0)
+    assert skin.force_mn[-1] == 0.0
+    assert (np.diff(skin.force_mn[skin.times_ms >= 50.0]) <= 0.0).all()
+    assert skin.energy_imbalance <= 0.01
+    # Released skin that still recovers holds some stress, but less and less.
+    sed = skin.sed_kpa[:, skin.mesh.living_epidermis.ravel()].max(axis=1)
+    assert 0.0 < sed[-1] < 0.1 * sed.max()
