@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.indenters import Bar, Sphere
+from fingerpad.geometry.indenters import Bar, FlatPunch, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Trajectory, repeated, sine
 from fingerpad.mechanics import newton
@@ -179,3 +179,9 @@ def test_finger_is_released_from_a_millimetre():
     # Released skin that still recovers holds some stress, but less and less.
     sed = skin.sed_kpa[:, skin.mesh.living_epidermis.ravel()].max(axis=1)
     assert 0.0 < sed[-1] < 0.1 * sed.max()
+
+
+def test_punch_that_goes_between_two_nodes_is_refused_instead_of_pressing_with_no_force():
+    tiny = FlatPunch(diameter_mm=0.1, fillet_mm=0.02)
+    with pytest.raises(InputError, match="FlatPunch goes between the nodes of the skin"):
+        touch_of(Fingertip(), tiny, RampAndHold(depth_mm=0.3)).solve()

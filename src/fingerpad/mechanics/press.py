@@ -23,7 +23,7 @@ from fingerpad.mechanics.balance import (
     dissipated_energy,
     energy_balance,
 )
-from fingerpad.mechanics.configuration import Balance, Body, Load, Reached
+from fingerpad.mechanics.configuration import SMALLEST_FORCE_MN, Balance, Body, Load, Reached
 from fingerpad.mechanics.contact import Contact, Placement, check_friction
 from fingerpad.mechanics.fields import (
     ElementFields,
@@ -341,8 +341,8 @@ def press(
     ------
     InputError
         If the mesh fails `check_mesh`, a material is less compressible than a solver of this machine can
-        take, a depth drives the indenter into the bone, or a force pushes it deeper
-        than `deepest_mm`.
+        take, a depth drives the indenter into the bone, a force pushes it deeper than `deepest_mm`, or the
+        indenter is so small that it goes between the nodes of the skin.
     ConvergenceError
         If a step fails even when it is cut; the history lists each attempt.
     """
@@ -380,6 +380,12 @@ def press(
         values.append(moment.fields.values)
     times = _from_rest(time_ms for time_ms, _, _ in reached)
     found = [equilibrium for _, equilibrium, _ in reached]
+    along_axis_mn = [float(each.contact.force_mn.sum(axis=0) @ placement.axis) for each in found]
+    if max(along_axis_mn) <= SMALLEST_FORCE_MN:
+        raise InputError(
+            f"{type(indenter).__name__} goes between the nodes of the skin and meets no resistance: take a "
+            "grading with elements smaller than it."
+        )
     whole_body = 2.0 if mesh.symmetry_nodes.size else 1.0
     # Across the plane of symmetry the reactions of the two halves cancel.
     both_halves = np.array([2.0, 2.0, 0.0]) if mesh.symmetry_nodes.size else np.ones(3)
@@ -388,9 +394,7 @@ def press(
     pressed[1:, np.searchsorted(mesh.skin_nodes, contact.nodes)] = [each.contact.pressed_mn for each in found]
     return Deformation(
         times_ms=times,
-        force_mn=_from_rest(
-            whole_body * each.contact.force_mn.sum(axis=0) @ placement.axis for each in found
-        ),
+        force_mn=whole_body * _from_rest(along_axis_mn),
         displacement_mm=displacement,
         sed_kpa=_from_rest(sed_kpa for _, _, sed_kpa in reached),
         depth_mm=_from_rest(each.depth_mm for each in found),
