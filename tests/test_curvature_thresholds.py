@@ -167,10 +167,10 @@ def test_page_shows_and_names_what_was_found(found):
 
 
 class Coarse(Conditions):
-    """A mesh of a few hundred elements."""
+    """A mesh of few elements; on coarser ones the spheres' contact grows from node to node."""
 
     def sphere_grading(self):
-        return Grading(RECEPTOR_X_MM, 4.0, 1.5, 1.0, 0.75, stratum_corneum=1, dermis=1, subcutis=2)
+        return Grading(RECEPTOR_X_MM, 4.0, 1.5, 0.7, 0.5, stratum_corneum=1, dermis=1, subcutis=2)
 
 
 def test_spheres_are_pressed_like_the_papers():

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from fingerpad.geometry.fingertip import Fingertip
     from fingerpad.geometry.grading import Grading
     from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
-    from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+    from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Trajectory
     from fingerpad.mechanics.materials import (
         Energy,
         Hencky,

@@ -150,7 +150,7 @@ def draw(results: TissueSearch) -> Figure:
 
 
 def _from_score(score: FloatArray) -> FloatArray:
-    return -np.log(np.maximum(BEST_SCORE - np.asarray(score), 1.0 - BEST_SCORE))
+    return -np.log(np.maximum(BEST_SCORE - np.asarray(score), BEST_SCORE - 1.0))
 
 
 def _to_score(place: FloatArray) -> FloatArray:
