@@ -311,7 +311,7 @@ def draw(results: HeldOut) -> Figure:
     -------
     Figure
     """
-    figure = new_figure(11.0, 7.0)
+    figure = new_figure(12.0, 7.5)
     panels = figure.subplots(2, 3)
     _draw_forces(panels[0, 0], results)
     spheres = results.spheres

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
+
+from PIL import Image
 
 from fingerpad.report.formatting import fixed
 from fingerpad.report.page import images_of, write_beside
@@ -32,7 +35,16 @@ def write_markdown(page: Page, path: Path) -> Path:
     StoreError
         If the folder cannot be written.
     """
-    return write_beside(path, markdown(page), images_of(page), "images")
+    images = {name: with_palette(image) for name, image in images_of(page).items()}
+    return write_beside(path, markdown(page), images, "images")
+
+
+def with_palette(image: bytes) -> bytes:
+    """Return a PNG with at most 256 colours, a third as large: pages of the repository must stay light."""
+    buffer = io.BytesIO()
+    colours = Image.open(io.BytesIO(image)).convert("RGB")
+    colours.quantize(dither=Image.Dither.NONE).save(buffer, format="png", optimize=True)
+    return buffer.getvalue()
 
 
 def markdown(page: Page) -> str:

@@ -108,7 +108,7 @@ def draw(results: TissuePosterior) -> Figure:
     -------
     Figure
     """
-    figure = new_figure(10.5, 8.75)
+    figure = new_figure(12.0, 10.0)
     first, second, third = figure.subplots(3, 3)
     bands, observed, rates = results.bands, Observations.published(), bar_firing_rates()
     deflection, force, dynamic = first

@@ -30,7 +30,7 @@ from studies.drive_quantities import ALONE, APART, CANDIDATES, EXTENDED, PAPER, 
 from studies.dynamic_response import EXPLANATIONS, ExplainedModel, Patch, low_passed
 from studies.pages import drive_quantities as report
 from studies.pages import drive_study as drives_report
-from studies.pages.markdown import write_markdown
+from studies.pages.markdown import with_palette, write_markdown
 
 TIMES_MS = np.concatenate([np.linspace(0.0, 50.0, 5), [60.0, 100.0, 300.0, 1000.0]])
 SHIFT_MM = np.round(np.linspace(-3.45, 3.45, 24), 2)
@@ -572,7 +572,7 @@ def test_the_page_shows_every_explanation_and_both_methods(section, tmp_path):
     assert len(page.drawings) == 3
     for drawing in page.drawings:
         assert f"](images/{drawing.name}.png)" in text
-        assert (tmp_path / "images" / f"{drawing.name}.png").read_bytes() == png(drawing.draw)
+        assert (tmp_path / "images" / f"{drawing.name}.png").read_bytes() == with_palette(png(drawing.draw))
 
 
 def test_explanations_are_drawn_by_what_they_predict_and_gain(section, tmp_path):
