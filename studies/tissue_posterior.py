@@ -80,7 +80,7 @@ N_FOLDS = 7
 N_DRAWN = 300
 """Draws behind bands and probabilities."""
 
-N_REPLICATES = 6
+N_REPLICATES = 20
 """Synthetic experiments of the calibration."""
 
 SAMPLING = Sampling()
