@@ -789,7 +789,7 @@ def test_a_touch_becomes_a_job_and_decks():
         tilt_deg=10.0,
     )
     job = job_of(touch)
-    np.testing.assert_allclose(job.times_ms, touch.stimulus.times_ms(5, 5))
+    np.testing.assert_allclose(job.times_ms, touch.stimulus.step_times_ms(5, 5))
     np.testing.assert_allclose(job.depths_mm, touch.stimulus.prescribed_at(job.times_ms))
     np.testing.assert_allclose(job.placement.origin_mm, touch.placement.origin_mm)
     assert job.materials == touch.tissues.layers

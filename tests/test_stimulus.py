@@ -25,7 +25,7 @@ def test_force_rises_linearly_then_stays_and_is_solved_at_the_same_times_as_a_de
     )
     assert motion.end_ms == 140.0
     depth = RampAndHold(depth_mm=1.0, ramp_ms=40.0, hold_ms=100.0)
-    np.testing.assert_array_equal(motion.times_ms(4, 5), depth.times_ms(4, 5))
+    np.testing.assert_array_equal(motion.step_times_ms(4, 5), depth.step_times_ms(4, 5))
 
 
 @given(
@@ -36,7 +36,7 @@ def test_force_rises_linearly_then_stays_and_is_solved_at_the_same_times_as_a_de
 )
 def test_times_cover_both_phases_and_increase(ramp_ms, hold_ms, ramp_steps, hold_steps):
     motion = RampAndHold(depth_mm=1.0, ramp_ms=ramp_ms, hold_ms=hold_ms)
-    times = motion.times_ms(ramp_steps, hold_steps)
+    times = motion.step_times_ms(ramp_steps, hold_steps)
     assert times.size == 1 + ramp_steps + hold_steps
     assert times[0] == 0.0
     assert times[ramp_steps] == ramp_ms
@@ -47,7 +47,7 @@ def test_times_cover_both_phases_and_increase(ramp_ms, hold_ms, ramp_steps, hold
 
 
 def test_hold_times_grow_geometrically_from_the_ramp_step():
-    since_ramp = RampAndHold(depth_mm=1.0, ramp_ms=50.0, hold_ms=950.0).times_ms(5, 6)[6:] - 50.0
+    since_ramp = RampAndHold(depth_mm=1.0, ramp_ms=50.0, hold_ms=950.0).step_times_ms(5, 6)[6:] - 50.0
     np.testing.assert_allclose(since_ramp[0], 10.0, rtol=1e-13)
     np.testing.assert_allclose(since_ramp[1:] / since_ramp[:-1], 95.0 ** (1 / 5), rtol=1e-12)
 

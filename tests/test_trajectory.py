@@ -42,7 +42,7 @@ def test_ramp_and_hold_as_a_trajectory_is_solved_at_the_same_times_and_gives_the
         (RampAndHold(0.4, 50.0, 500.0), Trajectory((0.0, 50.0, 550.0), (0.0, 0.4, 0.4))),
         (ForceRampAndHold(20.0, 50.0, 500.0), Trajectory((0.0, 50.0, 550.0), force_mn=(0.0, 20.0, 20.0))),
     ):
-        np.testing.assert_allclose(other.times_ms(5, 7), ready.times_ms(5, 7), rtol=1e-14)
+        np.testing.assert_allclose(other.step_times_ms(5, 7), ready.step_times_ms(5, 7), rtol=1e-14)
         assert other.corners_ms == ready.corners_ms
         one, two = pressed(ready), pressed(other)
         np.testing.assert_allclose(two.force_mn, one.force_mn, rtol=1e-6)
@@ -68,7 +68,7 @@ def test_solved_times_increase_and_hold_all_samples(steps, ramp_steps, hold_step
     lengths, depths = zip(*steps, strict=True)
     samples = (0.0, *np.cumsum(lengths))
     motion = Trajectory(samples, (0.0, *depths[:-1], 1.0))
-    times = motion.times_ms(ramp_steps, hold_steps)
+    times = motion.step_times_ms(ramp_steps, hold_steps)
     assert (np.diff(times) > 0.0).all()
     assert np.isin(samples, times).all()
     way = np.abs(np.diff(motion.prescribed_at(times)))
@@ -80,8 +80,8 @@ def test_solved_times_increase_and_hold_all_samples(steps, ramp_steps, hold_step
     [
         (((0.0,), (0.0,)), "at least two times"),
         (((1.0, 2.0), (0.0, 1.0)), "the first of them 0"),
-        (((0.0, 2.0, 2.0), (0.0, 1.0, 1.0)), "samples_ms must increase"),
-        (((0.0, np.nan), (0.0, 1.0)), "samples_ms"),
+        (((0.0, 2.0, 2.0), (0.0, 1.0, 1.0)), "times_ms must increase"),
+        (((0.0, np.nan), (0.0, 1.0)), "times_ms"),
         (((0.0, 1.0), (0.0, np.inf)), "depth_mm"),
         (((0.0, 1.0), (0.0, 1.0, 2.0)), "one value per time, 2: got 3"),
         (((0.0, 1.0), (0.5, 1.0)), "depth_mm must begin with 0 or less"),
@@ -122,7 +122,7 @@ def test_release_ends_without_force_and_with_energy_in_balance(indenter, frictio
 
 def test_released_skin_recovers_by_its_relaxation():
     """Unloaded skin creeps back: what remains of the dent decays, and is gone after many relaxation times."""
-    samples, depths = RELEASE.samples_ms, RELEASE.depth_mm
+    samples, depths = RELEASE.times_ms, RELEASE.depth_mm
     lifted = Trajectory((*samples[:3], 550.0, 600.0, 1000.0, 20_000.0), (*depths[:3], -0.1, -0.1, -0.1, -0.1))
     done = pressed(lifted)
     dent = done.displacement_mm[:, :, 1].max(axis=1)
@@ -137,7 +137,7 @@ def test_second_touch_is_that_of_one_history():
     long, short = (repeated(0.4, 2, 50.0, 200.0, pause_ms) for pause_ms in (20_000.0, 20.0))
     for motion, equal in ((long, True), (short, False)):
         done = pressed(motion, settings=replace(TIGHT, ramp_steps=4))
-        first, second = (done.force_mn[done.times_ms == corner][0] for corner in (50.0, motion.samples_ms[5]))
+        first, second = (done.force_mn[done.times_ms == corner][0] for corner in (50.0, motion.times_ms[5]))
         assert second == pytest.approx(first, rel=1e-3) if equal else second < 0.99 * first
 
 

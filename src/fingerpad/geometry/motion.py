@@ -15,6 +15,9 @@ from fingerpad.data import protocol
 MOTION_UNITS = {"depth_mm": "mm", "force_mn": "mN", "ramp_ms": "ms", "hold_ms": "ms"}
 """Units of the parameters of motions."""
 
+POSE_COLUMNS = ("x_mm", "z_mm", "tilt_deg", "spin_deg")
+"""Columns of a trajectory that say where the indenter stands, beside its depth or force."""
+
 SAME_SPEED = 1e-6
 """Change of speed, over the largest speed of a trajectory, below which it goes on at the same speed."""
 
@@ -26,6 +29,36 @@ SAMPLES_PER_CYCLE = 20
 """Samples of a sine per cycle; a line between two of them misses it by up to 1.2 % of the amplitude."""
 
 
+@dataclass(frozen=True)
+class Pose:
+    """How far an indenter has moved and turned since first touch, beside its advance.
+
+    Parameters
+    ----------
+    x_mm, z_mm : float
+        Way of its tip along the finger, distal positive, and across it. [mm]
+    tilt_deg, spin_deg : float
+        Rotations about its tip, added to those of the `Touch`. [degrees]
+    """
+
+    x_mm: float = 0.0
+    z_mm: float = 0.0
+    tilt_deg: float = 0.0
+    spin_deg: float = 0.0
+
+    @property
+    def way(self) -> FloatArray:
+        """Way [mm] and rotations [degrees], (4,)."""
+        return np.array([self.x_mm, self.z_mm, self.tilt_deg, self.spin_deg])
+
+
+STILL = Pose()
+"""The pose at first touch."""
+
+TURN_LIKE_MM = 20.0
+"""Rotation that takes as many steps as a way of 1 mm. [degrees]"""
+
+
 class Motion:
     """What an indenter does over time: common part of all motions.
 
@@ -34,6 +67,24 @@ class Motion:
 
     by_force: bool = False
     """Whether the force is prescribed instead of the depth."""
+
+    @property
+    def poses(self) -> tuple[Pose, ...]:
+        """Poses between which the indenter moves, in order; one if it only goes up and down."""
+        return (STILL,)
+
+    def pose_at(self, time_ms: float) -> Pose:
+        """Pose of the indenter at a time [ms]."""
+        return STILL
+
+    @property
+    def stays(self) -> bool:
+        """Whether the indenter only goes up and down."""
+        return self.poses == (STILL,)
+
+    def keeps_symmetry(self) -> bool:
+        """Whether an indenter on the midline stays its own mirror image across z = 0, unless it spins."""
+        return all(pose.z_mm == 0.0 for pose in self.poses)
 
     @property
     def corners_ms(self) -> tuple[float, ...]:
@@ -54,7 +105,7 @@ class Motion:
         """Depth [mm] or force [mN] at `times_ms`, any shape."""
         raise NotImplementedError
 
-    def times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
+    def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
         """List the times to solve at, from 0. [ms]
 
         Parameters
@@ -92,7 +143,7 @@ class _OneRamp(Motion):
         """Depth [mm] or force [mN] at `times_ms`, any shape: 0 at the start, the largest in the hold."""
         return self.largest * np.clip(np.asarray(times_ms, dtype=float) / self.ramp_ms, 0.0, 1.0)
 
-    def times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
+    def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
         """List the times to solve at: 0, equal ramp steps, hold steps that grow geometrically. [ms]
 
         The first hold step is as long as a ramp step, or shorter for a short hold, because relaxation is
@@ -100,7 +151,7 @@ class _OneRamp(Motion):
 
         Examples
         --------
-        >>> RampAndHold().times_ms(2, 3).round(1).tolist()
+        >>> RampAndHold().step_times_ms(2, 3).round(1).tolist()
         [0.0, 25.0, 50.0, 75.0, 204.1, 1000.0]
         """
         ramp = np.linspace(0.0, self.ramp_ms, ramp_steps + 1)
@@ -183,25 +234,34 @@ class ForceRampAndHold(_OneRamp):
 
 @dataclass(frozen=True)
 class Trajectory(Motion):
-    """Move the indenter along any course of depth or of force, back as well as forth.
+    """Move the indenter along any course of depth or of force, back as well as forth, aside and turning.
 
-    Depth or force is linear between the samples. Contact may be lost and made again: a depth below 0 lifts
-    the indenter off the undeformed skin, and skin that still recovers follows it or stays behind.
+    All is linear between the samples. Contact may be lost and made again: a depth below 0 lifts the indenter
+    off the undeformed skin, and skin that still recovers follows it or stays behind. Depth and force are
+    along the direction of pressing at first touch, however the indenter moves and turns later
+    (docs/decisions/pose-over-time.md).
 
     Parameters
     ----------
-    samples_ms : sequence of float
+    times_ms : sequence of float
         Increasing times from 0. [ms]
     depth_mm : sequence of float, optional
         Depth at these times, 0 at first touch of the undeformed skin, from 0 or less. [mm]
     force_mn : sequence of float, optional
         Instead of a depth, force along the direction of pressing on the whole finger, from 0. [mN]
+    x_mm, z_mm : sequence of float, optional
+        How far the indenter has moved along the finger, distal positive, and across it since first touch,
+        from 0; it stays in its place by default. [mm]
+    tilt_deg, spin_deg : sequence of float, optional
+        How far it has turned about its tip since first touch, from 0, as `tilt_deg` and `spin_deg` of a
+        `Touch`, to which they are added; it does not turn by default. [degrees]
 
     Raises
     ------
     InputError
         If not exactly one of depth and force is given, lengths differ, times do not increase from 0, a value
-        is not finite, a force is negative, or the indenter never presses.
+        is not finite, a force is negative, a way or rotation does not start at 0, or the indenter never
+        presses.
 
     Examples
     --------
@@ -214,27 +274,39 @@ class Trajectory(Motion):
     (50.0, 500.0, 550.0)
     """
 
-    samples_ms: tuple[float, ...]
+    times_ms: tuple[float, ...]
     depth_mm: tuple[float, ...] | None = None
     force_mn: tuple[float, ...] | None = None
+    x_mm: tuple[float, ...] | None = None
+    z_mm: tuple[float, ...] | None = None
+    tilt_deg: tuple[float, ...] | None = None
+    spin_deg: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        times = increasing("samples_ms", float_array("samples_ms", self.samples_ms, 1))
+        times = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
         if times.size < 2 or times[0] != 0.0:
-            raise InputError(f"samples_ms must hold at least two times, the first of them 0: got {times}.")
+            raise InputError(f"times_ms must hold at least two times, the first of them 0: got {times}.")
         if (self.depth_mm is None) == (self.force_mn is None):
             raise InputError("A trajectory needs either depth_mm or force_mn: give one of them.")
         name = "force_mn" if self.depth_mm is None else "depth_mm"
-        values = float_array(name, getattr(self, name), 1)
-        if values.size != times.size:
-            raise InputError(f"{name} must have one value per time, {times.size}: got {values.size}.")
+        for column in (name, *POSE_COLUMNS):
+            if getattr(self, column) is None:
+                continue
+            values = float_array(column, getattr(self, column), 1)
+            if values.size != times.size:
+                raise InputError(f"{column} must have one value per time, {times.size}: got {values.size}.")
+            if column in POSE_COLUMNS and values[0] != 0.0:
+                raise InputError(
+                    f"{column} must begin with 0, since it is counted from first touch: got {values[0]:g}."
+                )
+            object.__setattr__(self, column, tuple(values.tolist()))
+        values = np.array(getattr(self, name))
         if values[0] > 0.0 or (name == "force_mn" and values.min() < 0.0):
             allowed = "0, and never be negative" if name == "force_mn" else "0 or less, without contact"
             raise InputError(f"{name} must begin with {allowed}: it begins with {values[0]:g}.")
         if values.max() <= 0.0:
             raise InputError(f"{name} must be above 0 at some time: the indenter would never press.")
-        object.__setattr__(self, "samples_ms", tuple(times.tolist()))
-        object.__setattr__(self, name, tuple(values.tolist()))
+        object.__setattr__(self, "times_ms", tuple(times.tolist()))
 
     @property
     def by_force(self) -> bool:  # type: ignore[override]
@@ -256,40 +328,64 @@ class Trajectory(Motion):
     @property
     def end_ms(self) -> float:
         """Last sample. [ms]"""
-        return self.samples_ms[-1]
+        return self.times_ms[-1]
+
+    @property
+    def poses(self) -> tuple[Pose, ...]:
+        """Pose of the indenter at the samples; one if it only goes up and down."""
+        columns = [getattr(self, name) for name in POSE_COLUMNS]
+        if not any(column is not None and any(column) for column in columns):
+            return (STILL,)
+        still = (0.0,) * len(self.times_ms)
+        return tuple(Pose(*row) for row in zip(*(column or still for column in columns), strict=True))
+
+    def pose_at(self, time_ms: float) -> Pose:
+        """Pose of the indenter at a time [ms]."""
+        columns = (getattr(self, name) for name in POSE_COLUMNS)
+        return Pose(
+            *(0.0 if each is None else float(np.interp(time_ms, self.times_ms, each)) for each in columns)
+        )
+
+    @property
+    def _course(self) -> FloatArray:
+        """Depth or force over the largest, way in mm and rotations over `TURN_LIKE_MM`: (n_samples, 5)."""
+        ways = np.array([pose.way for pose in self.poses]) / [1.0, 1.0, TURN_LIKE_MM, TURN_LIKE_MM]
+        prescribed = np.array(self.prescribed) / self.largest
+        return np.column_stack([prescribed, np.broadcast_to(ways, (prescribed.size, 4))])
 
     @property
     def corners_ms(self) -> tuple[float, ...]:
         """Samples at which the speed jumps, other than along a smooth curve; without start and end. [ms]"""
-        speed = np.diff(self.prescribed) / np.diff(self.samples_ms)
-        change = np.abs(np.diff(speed, prepend=speed[0], append=speed[-1])) / np.abs(speed).max()
+        speed = np.diff(self._course, axis=0) / np.diff(self.times_ms)[:, None]
+        change = np.linalg.norm(np.diff(speed, axis=0, prepend=speed[:1], append=speed[-1:]), axis=1)
+        change /= np.linalg.norm(speed, axis=1).max()
         beside = np.maximum(np.roll(change, 1), np.roll(change, -1))
         stands_out = change > CORNER_OVER_NEIGHBOURS * beside + SAME_SPEED
         corners = stands_out | (change > CORNER_SHARE)
-        return tuple(np.array(self.samples_ms)[corners].tolist())
+        return tuple(np.array(self.times_ms)[corners].tolist())
 
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
         """Depth [mm] or force [mN] at `times_ms`, any shape."""
-        return np.interp(np.asarray(times_ms, dtype=float), self.samples_ms, self.prescribed)
+        return np.interp(np.asarray(times_ms, dtype=float), self.times_ms, self.prescribed)
 
-    def times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
+    def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
         """List the times to solve at: all samples, and times between them where they are far apart. [ms]
 
-        A part of the way takes its share of `ramp_steps`. A hold longer than the step before it takes
-        `hold_steps`, which grow geometrically, because relaxation is fastest at its beginning.
+        A part of the way takes its share of `ramp_steps`, which is also the number of steps per mm aside. A
+        hold longer than the step before it takes `hold_steps`, which grow geometrically, because relaxation
+        is fastest at its beginning.
 
         Examples
         --------
-        >>> Trajectory([0.0, 50.0, 1000.0], depth_mm=[0.0, 1.0, 1.0]).times_ms(2, 3).round(1).tolist()
+        >>> Trajectory([0.0, 50.0, 1000.0], depth_mm=[0.0, 1.0, 1.0]).step_times_ms(2, 3).round(1).tolist()
         [0.0, 25.0, 50.0, 75.0, 204.1, 1000.0]
         """
         times, last_ms = [0.0], np.inf
-        for start, end, moved in zip(
-            self.samples_ms, self.samples_ms[1:], np.abs(np.diff(self.prescribed)), strict=False
-        ):
+        moved_by = np.linalg.norm(np.diff(self._course, axis=0), axis=1)
+        for start, end, moved in zip(self.times_ms, self.times_ms[1:], moved_by, strict=False):
             length_ms = end - start
-            if moved > SAME_SPEED * self.largest:
-                steps = int(np.ceil(ramp_steps * moved / self.largest - SAME_SPEED))
+            if moved > SAME_SPEED:
+                steps = int(np.ceil(ramp_steps * moved - SAME_SPEED))
                 since = np.linspace(0.0, length_ms, steps + 1)[1:]
             elif length_ms > last_ms * (1.0 + SAME_SPEED):
                 since = _hold(length_ms, last_ms, hold_steps)

@@ -446,7 +446,7 @@ def _newton_settings(settings: PressSettings) -> NewtonSettings:
 def _moments(job: _Press, settings: PressSettings) -> Iterator[_Moment]:
     """Solved times after the unloaded one."""
     stimulus, mesh, start = job.stimulus, job.body.mesh, job.unloaded()
-    times = stimulus.times_ms(settings.ramp_steps, settings.hold_steps)[1:]
+    times = stimulus.step_times_ms(settings.ramp_steps, settings.hold_steps)[1:]
     if settings.sed_tolerance is None:
         return steps_at(start, times, job.step, job.stopped)
     relaxing = job.body.table.times_ms[job.body.table.shares > 0.0]
