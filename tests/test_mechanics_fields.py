@@ -16,7 +16,6 @@ from fingerpad.mechanics.fields import (
     fields_over_time,
 )
 from fingerpad.mechanics.materials import Hencky, Hyperfoam, Material, MaterialTable, Prony
-from fingerpad.mechanics.skin_contact import skin_contact
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
     StressHistory,
@@ -208,18 +207,3 @@ def test_invariants_of_a_known_stress():
     np.testing.assert_allclose(fields.compressive_stress_kpa, [[8.0, 2.0]])
     np.testing.assert_allclose(fields.pressure_kpa, [[2.0, 0.0]], atol=1e-15)
     assert not fields.compressive_strain.any()
-
-
-def test_pressure_and_area_of_a_stretched_skin():
-    """Skin stretched by 1.5 along x: present areas are 1.5 times as large, and pressure as much smaller."""
-    mesh = block_mesh([0.0, 1.0, 2.0], [0.0, 1.0], [0.0, 1.0, 2.0], layers=[2], symmetric=True)
-    stretched = np.zeros((2, *mesh.nodes_mm.shape))
-    stretched[1, :, 0] = 0.5 * mesh.nodes_mm[:, 0]
-    forces = np.zeros((2, mesh.skin_nodes.size))
-    middle = np.flatnonzero((mesh.nodes_mm[mesh.skin_nodes] == [1.0, 0.0, 1.0]).all(axis=1))[0]
-    forces[1, middle] = 6.0
-    found = skin_contact(mesh, stretched, forces)
-    assert not found.pressure_kpa[0].any()
-    np.testing.assert_allclose(found.pressure_kpa[1].sum(), 6.0 / 1.5, rtol=1e-12)  # 1 mm² belongs to it
-    np.testing.assert_allclose(found.area_mm2, [0.0, 2.0], rtol=1e-12)  # both halves
-    np.testing.assert_allclose(found.present_area_mm2, [0.0, 3.0], rtol=1e-12)

@@ -23,7 +23,7 @@ from fingerpad.mechanics.linear import LinearSolver, choose_preconditioner, free
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.newton import NewtonSettings, find_equilibrium
 from fingerpad.mechanics.press import PressSettings, press
-from fingerpad.mechanics.skin_contact import skin_contact
+from fingerpad.mechanics.skin_contact import SkinContact, skin_contact
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
     StressHistory,
@@ -90,7 +90,17 @@ class Pressed:
     force_mn: float
     sed_kpa: np.ndarray
     stress_kpa: np.ndarray
-    pressure_kpa: np.ndarray
+    contact: SkinContact
+
+    @property
+    def pressure_kpa(self):
+        """Pressure on skin nodes."""
+        return self.contact.pressure_kpa[-1]
+
+    @property
+    def area_mm2(self):
+        """Area of contact, of the whole body where half of it is solved."""
+        return self.contact.area_mm2[-1]
 
     @property
     def nodal_force_mn(self):
@@ -135,7 +145,7 @@ def pressed(mesh, indenter, depth_mm, poisson, force_mn=None) -> Pressed:
         force_mn=done.force_mn[-1] / 2,
         sed_kpa=done.sed_kpa[-1],
         stress_kpa=done.stress_kpa,
-        pressure_kpa=done.contact.pressure_kpa[-1],
+        contact=done.contact,
     )
 
 
@@ -165,8 +175,8 @@ def pressed_slice(mesh, indenter, depth_mm, poisson) -> Pressed:
     where = mesh, found.displacement_mm, solid.table
     now = instantaneous_state(*where)
     history = replace(history, instantaneous=now.stress_kpa)
-    on_skin = np.zeros((1, len(skin)))
-    on_skin[0, chosen] = found.contact.pressed_mn
+    on_skin, gap = np.zeros((1, len(skin))), np.full((1, len(skin)), np.inf)
+    on_skin[0, chosen], gap[0, chosen] = found.contact.pressed_mn, found.contact.gap_mm
     return Pressed(
         solid=solid,
         displacement_mm=found.displacement_mm,
@@ -174,7 +184,7 @@ def pressed_slice(mesh, indenter, depth_mm, poisson) -> Pressed:
         force_mn=found.contact.pressed_mn.sum(),
         sed_kpa=stored_energy_density(*where, history, now),
         stress_kpa=cauchy_stress(mesh, found.displacement_mm, solid.table, history),
-        pressure_kpa=skin_contact(mesh, found.displacement_mm[None], on_skin).pressure_kpa[0],
+        contact=skin_contact(mesh, found.displacement_mm[None], on_skin, gap, material.contact_modulus_kpa),
     )
 
 
@@ -224,6 +234,7 @@ def sphere_rows(poisson):
     rows = [
         near(f"nu = {poisson}: force of half the sphere", force, done.force_mn, 0.03, "mN"),
         near(f"nu = {poisson}: contact radius, from the second moment", CONTACT_MM, radius, 0.03, "mm"),
+        near(f"nu = {poisson}: contact area, pi R d", np.pi * CONTACT_MM**2, done.area_mm2, 0.05, "mm²"),
         near(
             f"nu = {poisson}: pressure at the centre",
             peak, done.pressure_kpa[centre], 0.05, "kPa",
@@ -273,6 +284,7 @@ def cylinder_rows(poisson):
     pressure = done.pressure_kpa[centre].mean()
     rows = [
         near(f"nu = {poisson}: half-width, from the second moment", half_width, found, 0.02, "mm"),
+        near(f"nu = {poisson}: half-width, from the area", half_width, done.area_mm2 / 2, 0.05, "mm"),
         near(f"nu = {poisson}: pressure at the centre", peak, pressure, 0.03, "kPa"),
     ]
     for share in (0.5, 1.0, 2.0):
@@ -433,9 +445,12 @@ def rounded_punch_force(fillet, depth_mm):
 @case(THEME, "Flat punch with a rounded rim", "Sneddon 1965, by quadrature")
 def rounded_punch() -> list[Row]:
     """A fillet of 0.1 mm, depth 2 µm: contact ends on the fillet. Elements of 0.02 mm there."""
-    force, _ = rounded_punch_force(0.1, 0.002)
+    force, radius = rounded_punch_force(0.1, 0.002)
     done = punch(fillet=0.1, even=0.12)
-    return [near("force of half the punch", force, done.force_mn, 0.02, "mN")]
+    return [
+        near("force of half the punch", force, done.force_mn, 0.02, "mN"),
+        near("contact area", np.pi * radius**2, done.area_mm2, 0.02, "mm²"),
+    ]
 
 
 @case(THEME, "Line load", "Flamant 1892; Johnson 1985, ch. 2")

@@ -218,6 +218,11 @@ class Material:
         return (3 * bulk - 2 * shear) / (2 * (3 * bulk + shear))
 
     @property
+    def contact_modulus_kpa(self) -> float:
+        """Instantaneous E* = E / (1 - nu²) at small strain, that of a half-space under a rigid body. [kPa]"""
+        return 2.0 * self.instantaneous_factor * self.shear_modulus_kpa / (1.0 - self.poisson)
+
+    @property
     def instantaneous_factor(self) -> float:
         """Factor from the given coefficients to the instantaneous ones."""
         return 1.0 / self.prony.long_term_share if self.moduli == "long_term" else 1.0

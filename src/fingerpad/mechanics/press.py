@@ -391,7 +391,10 @@ def press(
     both_halves = np.array([2.0, 2.0, 0.0]) if mesh.symmetry_nodes.size else np.ones(3)
     displacement = _from_rest(each.displacement_mm for each in found)
     pressed = np.zeros((times.size, mesh.skin_nodes.size))
-    pressed[1:, np.searchsorted(mesh.skin_nodes, contact.nodes)] = [each.contact.pressed_mn for each in found]
+    gap = np.full_like(pressed, np.inf)
+    pressed[1:, candidates] = [each.contact.pressed_mn for each in found]
+    gap[1:, candidates] = [each.contact.gap_mm for each in found]
+    e_star_kpa = materials[mesh.layer[0]].contact_modulus_kpa
     return Deformation(
         times_ms=times,
         force_mn=whole_body * _from_rest(along_axis_mn),
@@ -403,7 +406,7 @@ def press(
         force_imbalance=max(each.balance.imbalance for each in found),
         stress_kpa=cauchy_stress(mesh, displacement[-1], table, moment.history),
         fields=fields_over_time(chosen, values),
-        contact=skin_contact(mesh, displacement, pressed),
+        contact=skin_contact(mesh, displacement, pressed, gap, e_star_kpa),
         energy=energy_balance(moment.ledger, kinks_ms=stimulus.corners_ms).at(times),
         penetration_mm=max(each.contact.penetration_mm for each in found),
         newton_steps=job.newton_steps,
