@@ -1,7 +1,10 @@
-"""Files for ParaView, read back by VTK's own reader."""
+"""Files for ParaView, read back by VTK's own reader; tables of a touch, read back as well."""
 
+import csv
+import json
 import sys
 import xml.etree.ElementTree as xml
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -35,13 +38,18 @@ WARPED = 16  # vtkCellValidator's flag for faces that are not quite plane
 
 
 @pytest.fixture(scope="module")
-def done():
-    return TOUCH.deform()
+def skin():
+    return TOUCH.solve(whole=True)
 
 
 @pytest.fixture(scope="module")
-def files(done, tmp_path_factory):
-    return write_vtu_series(tmp_path_factory.mktemp("series") / "a & b.pvd", done, TOUCH.mesh)
+def done(skin):
+    return skin.deformation
+
+
+@pytest.fixture(scope="module")
+def files(skin, tmp_path_factory):
+    return write_vtu_series(tmp_path_factory.mktemp("series") / "a & b.pvd", skin)
 
 
 def read(path):
@@ -121,14 +129,16 @@ def test_fields_come_back_at_every_time(done, files):
         overall = arrays(grid.GetFieldData())
         assert overall["TimeValue"].tolist() == [done.times_ms[number]]
         assert overall["force_mn"] == done.force_mn[number].astype("f4")
+        assert overall["contact_area_mm2"] == done.contact.area_mm2[number].astype("f4")
+        np.testing.assert_array_equal(overall["reaction_mn"], done.reaction_mn[[number]].astype("f4"))
+        assert overall["dissipated_uj"] == done.energy.dissipated_uj[number].astype("f4")
         names = [grid.GetCellData().GetArray("stress_kpa").GetComponentName(k) for k in range(6)]
         assert names == ["XX", "YY", "ZZ", "XY", "YZ", "XZ"]
 
 
-def test_only_a_deformation_of_all_elements_is_written(done, tmp_path):
-    block = block_mesh([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], layers=[0])
-    with pytest.raises(InputError, match=r"all 1 elements of the mesh: it holds those of .* Touch.deform"):
-        write_vtu_series(tmp_path / "other.pvd", done, block)
+def test_response_without_its_deformation_is_refused(skin, tmp_path):
+    with pytest.raises(InputError, match=r"does not hold: solve the touch with whole=True\."):
+        write_vtu_series(tmp_path / "other.pvd", replace(skin, deformation=None))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -141,24 +151,24 @@ def test_element_that_is_neither_brick_nor_wedge_is_named():
         cells_of(Mesh(**(parts | {"elements": elements})))
 
 
-def test_without_vtk_the_error_names_the_extra(done, tmp_path, monkeypatch):
+def test_without_vtk_the_error_names_the_extra(skin, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "vtkmodules.vtkIOXML", None)
     with pytest.raises(InputError, match=r"pip install 'fingerpad\[vtk\]'"):
-        write_vtu_series(tmp_path / "a.pvd", done, TOUCH.mesh)
+        write_vtu_series(tmp_path / "a.pvd", skin)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_without_vtk_nothing_is_pressed(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "vtkmodules.vtkIOXML", None)
-    monkeypatch.setattr(Touch, "deform", lambda touch: pytest.fail("the touch was solved for nothing"))
+    monkeypatch.setattr(Touch, "solve", lambda touch, **_: pytest.fail("the touch was solved for nothing"))
     with pytest.raises(InputError, match="need the package vtk"):
         export_touch(TOUCH, tmp_path, "vtu")
 
 
-def test_a_folder_that_cannot_be_made_is_named(done, tmp_path):
+def test_a_folder_that_cannot_be_made_is_named(skin, tmp_path):
     (tmp_path / "note").write_text("mine")
     with pytest.raises(StoreError, match="note"):
-        write_vtu_series(tmp_path / "note" / "a.pvd", done, TOUCH.mesh)
+        write_vtu_series(tmp_path / "note" / "a.pvd", skin)
 
 
 def test_a_touch_is_exported_by_the_name_of_a_format(files, tmp_path):
@@ -171,8 +181,33 @@ def test_a_touch_is_exported_by_the_name_of_a_format(files, tmp_path):
 
 @pytest.mark.parametrize(("format_name", "file_name"), [("abaqus", "touch.inp"), ("febio", "touch.feb")])
 def test_decks_are_exported_without_a_press(monkeypatch, tmp_path, format_name, file_name):
-    monkeypatch.setattr(Touch, "deform", pytest.fail)
+    monkeypatch.setattr(Touch, "solve", pytest.fail)
     (written,) = export_touch(TOUCH, tmp_path, format_name)
     assert written == tmp_path / file_name
     assert written.stat().st_size > 10_000
     assert format_name in FORMATS
+
+
+def test_table_of_a_touch_has_one_row_per_time_and_loses_no_digit(skin, tmp_path):
+    (written,) = export_touch(TOUCH, tmp_path, "csv")
+    with written.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    for name in ("times_ms", "force_mn", "depth_mm", "contact_area_mm2", "external_uj", "dissipated_uj"):
+        assert [float(row[name]) for row in rows] == skin.fields[name].tolist()
+    for axis, name in enumerate("xyz"):
+        assert [float(row[f"reaction_mn_{name}"]) for row in rows] == skin.reaction_mn[:, axis].tolist()
+
+
+def test_one_file_holds_force_depth_contact_surface_and_energy_density_with_their_mesh(skin, tmp_path):
+    (written,) = export_touch(TOUCH, tmp_path, "npz")
+    with np.load(written) as file:
+        units = json.loads(str(file["units"]))
+        assert set(units) == set(skin.fields)
+        assert (units["contact_pressure_kpa"], units["skin_displacement_mm"]) == ("kPa", "mm")
+        for name, values in skin.fields.items():
+            np.testing.assert_array_equal(file[name], values)
+        # Pressure over the skin as it is then adds up to the force, all of it below the ball.
+        placed = file["nodes_mm"][file["skin_nodes"]] + file["skin_displacement_mm"][-1]
+        touched = file["contact_pressure_kpa"][-1] > 0.0
+        assert np.hypot(placed[touched, 0] - 17.37, placed[touched, 2]).max() < 2.5
+        np.testing.assert_array_equal(file["elements"], TOUCH.mesh.elements)

@@ -45,9 +45,14 @@ SIX = [
     replace(TINY, settings=PressSettings(3, 3), stimulus=RampAndHold(depth_mm=depth))
     for depth in (0.10, 0.12, 0.14, 0.16, 0.18, 0.20)
 ]
-DOUBLE = {"times_ms": "t", "force_mn": "t", "depth_mm": "t"}
+DOUBLE = {
+    **dict.fromkeys(("times_ms", "force_mn", "depth_mm", "contact_area_mm2"), "t"),
+    "reaction_mn": "t3",
+    **dict.fromkeys(("external_uj", "stored_uj", "dissipated_uj", "contact_uj"), "t"),
+}
 SINGLE = {
     "skin_displacement_mm": "ts3",
+    "contact_pressure_kpa": "ts",
     "displacement_mm": "n3",
     "sed_kpa": "te",
     "von_mises_kpa": "e",
@@ -208,8 +213,8 @@ def test_what_comes_back_is_what_went_in_rounded_to_single_precision(stored, ski
     assert (skin.sed_kpa != back.sed_kpa).any()  # or rounding would not have been tested
 
 
-def test_files_of_the_first_layout_are_read(tmp_path):
-    """The layout before fields were declared, which held the direction of pressing as well."""
+def test_arrays_that_are_not_known_are_left_aside_and_a_missing_one_is_named(tmp_path):
+    """The direction of pressing stood in files once; the area of contact did not."""
     store, mesh, rng = Store(tmp_path), TINY.mesh, np.random.default_rng(3)
     sizes = {
         "t": 4,
@@ -241,6 +246,10 @@ def test_files_of_the_first_layout_are_read(tmp_path):
             name: values.dtype for name, values in content.items()
         }
         np.testing.assert_array_equal(file["solution"], solution)
+    del content["contact_area_mm2"]
+    np.savez(store.path(TINY), **content, solution=solution, linear_solver=np.array("multigrid"))
+    with pytest.raises(StoreError, match=r"contact_area_mm2 .*: delete it and run again\."):
+        store.load(TINY)
 
 
 def test_one_declaration_is_stored_loaded_sampled_and_exported(tmp_path, monkeypatch):
@@ -254,11 +263,11 @@ def test_one_declaration_is_stored_loaded_sampled_and_exported(tmp_path, monkeyp
         exported="pore_pressure_kpa",
     )
     monkeypatch.setitem(FIELDS, declared.name, declared)
-    store, done = Store(tmp_path), TINY.deform()
+    store, skin = Store(tmp_path), TINY.solve(whole=True)
     solve_missing(store.missing([TINY]), jobs=1)
     back = store.load(TINY)
     elements = TINY.mesh.living_epidermis.ravel()
-    pressure = done.fields.pressure_kpa[:, elements].astype(np.float32)
+    pressure = skin.deformation.fields.pressure_kpa[:, elements].astype(np.float32)
     np.testing.assert_array_equal(back.fields["pore_pressure"], pressure)
     middle = TINY.mesh.nodes_mm[TINY.mesh.elements[elements]].mean(axis=1)
     under = middle[np.hypot(middle[:, 0] - 17.37, middle[:, 2]) < 3.0][:, [0, 2]]
@@ -267,10 +276,10 @@ def test_one_declaration_is_stored_loaded_sampled_and_exported(tmp_path, monkeyp
     assert sampled[-1].max() > 0.5 * pressure[-1].max() > 0.0
     assert back.sed(under, dynamic_quantity="pore_pressure").dynamic_quantity == "pore_pressure"
     reader = vtkXMLUnstructuredGridReader()
-    reader.SetFileName(str(write_vtu_series(tmp_path / "press.pvd", done, TINY.mesh)[-1]))
+    reader.SetFileName(str(write_vtu_series(tmp_path / "press.pvd", skin)[-1]))
     reader.Update()
     written = vtk_to_numpy(reader.GetOutput().GetCellData().GetArray("pore_pressure_kpa"))
-    np.testing.assert_array_equal(written, done.fields.pressure_kpa[-1].astype(np.float32))
+    np.testing.assert_array_equal(written, skin.deformation.fields.pressure_kpa[-1].astype(np.float32))
 
 
 def test_fields_that_are_not_declared_or_have_another_shape_are_refused(skin):

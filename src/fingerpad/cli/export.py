@@ -33,7 +33,7 @@ def export_command(
         typer.Option(help="For calculix, whose materials do not relax: long_term or instantaneous."),
     ] = None,
 ) -> None:
-    """Press an indenter into the finger and write the touch for ParaView or another solver."""
+    """Press an indenter into the finger and write the touch as a table, for ParaView or another solver."""
     from fingerpad.core.checks import one_of
     from fingerpad.experiments.indenter_text import indenter_named
     from fingerpad.export.formats import export_touch

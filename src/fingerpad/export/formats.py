@@ -12,6 +12,7 @@ from fingerpad.export.abaqus import abaqus_deck
 from fingerpad.export.calculix import calculix_deck
 from fingerpad.export.febio import febio_deck
 from fingerpad.export.job import Job, job_of
+from fingerpad.export.tables import write_touch_csv, write_touch_npz
 from fingerpad.export.vtu import require_vtk, write_vtu_series
 from fingerpad.skin.indentation import Touch
 
@@ -22,7 +23,10 @@ DECKS: dict[str, tuple[str, Callable[[Job], str]]] = {
 }
 """Name of the input file of each solver, and the function that returns its text."""
 
-FORMATS = ("vtu", *DECKS)
+TABLES = {"csv": write_touch_csv, "npz": write_touch_npz}
+"""Functions that write the result of a touch as one file."""
+
+FORMATS = ("vtu", *TABLES, *DECKS)
 
 
 def export_touch(
@@ -33,7 +37,7 @@ def export_touch(
     Parameters
     ----------
     touch : Touch
-        The indentation to export; "vtu" also solves it.
+        The indentation to export; "vtu", "csv" and "npz" also solve it.
     folder : Path
         Folder for the files; it is created if needed.
     format_name : str
@@ -58,7 +62,9 @@ def export_touch(
         )
     if format_name == "vtu":
         require_vtk()  # first, since solving takes its time
-        return write_vtu_series(Path(folder) / "touch.pvd", touch.deform(), touch.mesh)
+        return write_vtu_series(Path(folder) / "touch.pvd", touch.solve(whole=True))
+    if format_name in TABLES:
+        return TABLES[format_name](Path(folder) / f"touch.{format_name}", touch.solve())
     name, deck = DECKS[format_name]
     job, path = job_of(touch), Path(folder) / name
     text = deck(job) if elastic_moduli is None else calculix_deck(job, elastic_moduli)

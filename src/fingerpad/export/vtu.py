@@ -19,6 +19,7 @@ from fingerpad.export.job import wedge_nodes
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.press import Deformation
 from fingerpad.skin.fields import FIELDS, Place
+from fingerpad.skin.sampling import SkinResponse
 
 HEXAHEDRON, WEDGE = 12, 13
 """VTK's numbers of the two cells."""
@@ -27,23 +28,21 @@ AXES = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 """Components of a tensor, in the order of ours and of ParaView's symmetric tensors."""
 
 
-def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[Path, ...]:
+def write_vtu_series(path: Path, skin: SkinResponse) -> tuple[Path, ...]:
     """Write an indentation for ParaView.
 
     The exported fields are those of `skin.fields.FIELDS`. Cell data: layer; energy densities stored,
     instantaneous and work; Cauchy stress, logarithmic and Green-Lagrange strain; their principal values; von
     Mises stress, pressure, largest compressive strain and stress. Point data: displacement, contact pressure,
     and the sets skin, bone, nail, symmetry and midline as masks. Field data: time, depth and force of the
-    indenter.
+    indenter, area of contact, reaction of bone and nail, and energies.
 
     Parameters
     ----------
     path : Path
         The PVD file; the VTU files are in the same folder, with its name and a number.
-    deformation : Deformation
-        A deformation with the fields of all elements, as `Touch.deform` returns it.
-    mesh : Mesh
-        The undeformed body that was pressed.
+    skin : SkinResponse
+        With its deformation, as `Touch.solve(whole=True)` returns it.
 
     Returns
     -------
@@ -53,7 +52,7 @@ def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[
     Raises
     ------
     InputError
-        If VTK is not installed, or the deformation is not that of all elements of this mesh.
+        If VTK is not installed, or the response is without its deformation.
     StoreError
         If a file cannot be written. Each file is written as a whole, the PVD as the last one.
 
@@ -66,28 +65,29 @@ def write_vtu_series(path: Path, deformation: Deformation, mesh: Mesh) -> tuple[
     >>> motion, steps = RampAndHold(depth_mm=0.2), PressSettings(ramp_steps=1, hold_steps=1)
     >>> touch = Touch(Fingertip(), Sphere(287), motion, named_tissues("trial3"), coarse, steps)
     >>> with TemporaryDirectory() as folder:
-    ...     written = write_vtu_series(Path(folder) / "touch.pvd", touch.deform(), touch.mesh)
+    ...     written = write_vtu_series(Path(folder) / "touch.pvd", touch.solve(whole=True))
     ...     [file.name for file in written]
     ['touch.pvd', 'touch_0000.vtu', 'touch_0001.vtu', 'touch_0002.vtu']
     """
     require_vtk()
     path = Path(path)
-    if len(deformation.fields.elements) != len(mesh.elements):
+    if skin.deformation is None:
         raise InputError(
-            f"deformation must hold the fields of all {len(mesh.elements)} elements of the mesh: it holds "
-            f"those of {len(deformation.fields.elements)}; use Touch.deform()."
+            "VTU files show all nodes and elements over time, which this response does not hold: solve the "
+            "touch with whole=True."
         )
-    names = [f"{path.stem}_{number:04d}.vtu" for number in range(deformation.times_ms.size)]
+    mesh = skin.mesh
+    names = [f"{path.stem}_{number:04d}.vtu" for number in range(skin.times_ms.size)]
     grid = _grid(mesh)
     _add(grid.GetCellData(), {"layer": mesh.layer.astype(np.int32)})
     _add(grid.GetPointData(), _node_sets(mesh))
-    overall, points, cells = _exported(deformation, mesh)
+    overall, points, cells = _exported(skin.deformation, mesh)
     for number, name in enumerate(names):  # an array replaces the one of its name
         _add(grid.GetCellData(), {key: values[number] for key, values in cells.items()})
         _add(grid.GetPointData(), {key: values[number] for key, values in points.items()})
         _add(grid.GetFieldData(), {key: values[[number]] for key, values in overall.items()})
         write_atomically(path.with_name(name), _xml(grid))
-    write_atomically(path, _index(names, deformation))
+    write_atomically(path, _index(names, skin.times_ms))
     return path, *(path.with_name(name) for name in names)
 
 
@@ -106,7 +106,6 @@ def _exported(deformation: Deformation, mesh: Mesh) -> tuple[dict[str, np.ndarra
     overall: dict[str, np.ndarray] = {}
     points: dict[str, np.ndarray] = {}
     cells: dict[str, np.ndarray] = {}
-    order = np.argsort(deformation.fields.elements)
     for field in (field for field in FIELDS.values() if field.exported):
         values = field.of(deformation, mesh)
         match field.place:
@@ -118,10 +117,8 @@ def _exported(deformation: Deformation, mesh: Mesh) -> tuple[dict[str, np.ndarra
                 padded = np.zeros((len(values), len(mesh.nodes_mm), *values.shape[2:]))
                 padded[:, mesh.skin_nodes] = values
                 points[field.exported] = padded
-            case Place.ELEMENT:
+            case Place.ELEMENT | Place.WATCHED:
                 cells[field.exported] = values
-            case Place.WATCHED:
-                cells[field.exported] = values[:, order]
     return overall, points, cells
 
 
@@ -213,11 +210,11 @@ def _xml(grid: Any) -> bytes:
     return writer.GetOutputString().encode("ascii")
 
 
-def _index(names: list[str], deformation: Deformation) -> bytes:
+def _index(names: list[str], times_ms: np.ndarray) -> bytes:
     """Content of a PVD file."""
     lines = [
         f'    <DataSet timestep="{time_ms:.17g}" part="0" file={quoteattr(name)}/>'
-        for time_ms, name in zip(deformation.times_ms, names, strict=True)
+        for time_ms, name in zip(times_ms, names, strict=True)
     ]
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <!-- times in ms -->\n'
     return "\n".join([f"{head}  <Collection>", *lines, "  </Collection>\n</VTKFile>\n"]).encode()

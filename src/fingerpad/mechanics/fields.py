@@ -67,6 +67,15 @@ class ElementFields:
     instantaneous_kpa: FloatArray
     work_kpa: FloatArray
 
+    def of(self, elements: np.ndarray) -> ElementFields:
+        """Return the fields of some of the elements, by their numbers in the mesh."""
+        order = np.argsort(self.elements)
+        rows = order[np.searchsorted(self.elements, elements, sorter=order)]
+        return ElementFields(
+            self.elements[rows], self.gradient[:, rows], self.stress_kpa[:, rows], self.stored_kpa[:, rows],
+            self.instantaneous_kpa[:, rows], self.work_kpa[:, rows],
+        )  # fmt: skip
+
     @property
     def strain(self) -> FloatArray:
         """Logarithmic (Hencky) strain 1/2 ln(F F') in the present frame, (n_times, n_elements, 6)."""

@@ -1,7 +1,8 @@
 """Fields of an indentation, each declared once: name, unit, place, how it is stored, sampled and exported.
 
-`Touch.solve` computes, `Store` writes and reads, `SkinResponse.sample` interpolates and `write_vtu_series`
-exports the entries of `FIELDS`. To add a field, add one entry.
+`Touch.solve` computes, `Store` writes and reads, `SkinResponse.sample` interpolates and `export_touch` writes
+the entries of `FIELDS`. To add a field, add one entry. Files stored before are not found any more, because
+the key of a touch depends on this file.
 """
 
 from __future__ import annotations
@@ -100,6 +101,19 @@ def _von_mises_at_last_time(deformation: Deformation, _: Mesh) -> FloatArray:
     return von_mises(deformation.stress_kpa)[None]
 
 
+def _of_press(
+    name: str,
+    unit: str,
+    of: Callable[[Deformation], FloatArray],
+    components: int = 1,
+    exported: str = "",
+) -> Field:
+    """Field of the whole press over time, stored and exported."""
+    return Field(
+        name, unit, Place.PRESS, lambda d, _: of(d), components, stored=Times.ALL, exported=exported or name
+    )
+
+
 def _watched(
     name: str, unit: str, attribute: str, *, components: int = 1, sampled: bool = False, exported: str = ""
 ) -> Field:
@@ -119,9 +133,15 @@ def _watched(
 FIELDS: dict[str, Field] = {
     field.name: field
     for field in (
-        Field("times_ms", "ms", Place.PRESS, lambda d, _: d.times_ms, stored=Times.ALL, exported="TimeValue"),
-        Field("force_mn", "mN", Place.PRESS, lambda d, _: d.force_mn, stored=Times.ALL, exported="force_mn"),
-        Field("depth_mm", "mm", Place.PRESS, lambda d, _: d.depth_mm, stored=Times.ALL, exported="depth_mm"),
+        _of_press("times_ms", "ms", lambda d: d.times_ms, exported="TimeValue"),
+        _of_press("force_mn", "mN", lambda d: d.force_mn),
+        _of_press("depth_mm", "mm", lambda d: d.depth_mm),
+        _of_press("contact_area_mm2", "mm²", lambda d: d.contact.area_mm2),
+        _of_press("reaction_mn", "mN", lambda d: d.reaction_mn, components=3),
+        _of_press("external_uj", "µJ", lambda d: d.energy.external_uj),
+        _of_press("stored_uj", "µJ", lambda d: d.energy.stored_uj),
+        _of_press("dissipated_uj", "µJ", lambda d: d.energy.dissipated_uj),
+        _of_press("contact_uj", "µJ", lambda d: d.energy.contact_uj),
         Field(
             "skin_displacement_mm",
             "mm",
@@ -144,6 +164,7 @@ FIELDS: dict[str, Field] = {
             "kPa",
             Place.SKIN_NODE,
             lambda d, _: d.contact.pressure_kpa,
+            stored=Times.ALL,
             exported="contact_pressure_kpa",
         ),
         Field(

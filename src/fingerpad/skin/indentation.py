@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -131,13 +131,16 @@ class Touch:
                 "grading_about(...)."
             )
 
-    def solve(self, threads: int | None = None) -> SkinResponse:
+    def solve(self, threads: int | None = None, whole: bool = False) -> SkinResponse:
         """Solve the indentation and return the response of the skin.
 
         Parameters
         ----------
         threads : int, optional
             Number of threads, all by default; the result has the same bits on any number of threads.
+        whole : bool
+            Whether to keep `SkinResponse.deformation` as well: displacement of all nodes, stress, strain and
+            energies of all elements over time. It takes about 200 bytes per element and time.
 
         Raises
         ------
@@ -147,15 +150,18 @@ class Touch:
             If a step cannot be solved.
         """
         mesh = self.mesh
-        done = self._press(mesh.living_epidermis.ravel(), threads)
+        sheet = mesh.living_epidermis.ravel()
+        done = self._press(np.arange(len(mesh.elements)) if whole else sheet, threads)
+        kept = replace(done, fields=done.fields.of(sheet)) if whole else done
         return self.response(
-            {field.name: field.stored_values(done, mesh) for field in stored_fields()},
+            {field.name: field.stored_values(kept, mesh) for field in stored_fields()},
             force_imbalance=done.force_imbalance,
             energy_imbalance=done.energy.relative_imbalance,
             penetration_mm=done.penetration_mm,
             newton_steps=done.newton_steps,
             factorisations=done.factorisations,
             linear_solver=done.linear_solver,
+            deformation=done if whole else None,
         )
 
     def response(self, fields: Mapping[str, FloatArray], **solution: Any) -> SkinResponse:
@@ -176,28 +182,6 @@ class Touch:
             fields=fields,
             **solution,
         )
-
-    def deform(self, threads: int | None = None) -> Deformation:
-        """Solve the indentation and return all fields of all elements and nodes over time.
-
-        For the study of one indentation (`fingerpad.export`); `solve` keeps what the later stages need.
-
-        Parameters
-        ----------
-        threads : int, optional
-            As in `solve`.
-
-        Returns
-        -------
-        Deformation
-            Of the nodes and elements of `mesh`.
-
-        Raises
-        ------
-        ConvergenceError
-            If a step cannot be solved.
-        """
-        return self._press(np.arange(len(self.mesh.elements)), threads)
 
     def _press(self, watched: np.ndarray, threads: int | None) -> Deformation:
         # Libraries get one thread, since their sums depend on the number of threads; our loops' do not.
@@ -297,6 +281,7 @@ def indent(
     resolution: str = "quick",
     at_mm: Sequence[float] = CONTACT_POINT_MM,
     settings: PressSettings | None = None,
+    whole: bool = False,
 ) -> SkinResponse:
     """Press an indenter into a finger and return the response of the skin.
 
@@ -320,11 +305,13 @@ def indent(
     settings : PressSettings, optional
         Steps and tolerances instead of those of `resolution`; `PressSettings(sed_tolerance=0.01)` chooses
         steps that keep the error of SED in time below 1 % of its largest value.
+    whole : bool
+        Whether to keep all nodes and elements over time as well, see `Touch.solve`.
 
     Returns
     -------
     SkinResponse
-        Force, depth, surface profile and strain energy density over time.
+        Force, depth, contact, surface, energies and strain energy density over time.
 
     Raises
     ------
@@ -340,7 +327,8 @@ def indent(
     >>> print(f"{skin.surface_profile().deflection_mm.max():.1f} mm deep")
     0.3 mm deep
     """
-    return touch_of(finger, indenter, stimulus, materials, resolution, at_mm, settings=settings).solve()
+    touch = touch_of(finger, indenter, stimulus, materials, resolution, at_mm, settings=settings)
+    return touch.solve(whole=whole)
 
 
 def settings_of(resolution: str) -> PressSettings:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,9 @@ from fingerpad.geometry.mesh import Mesh
 from fingerpad.skin.fields import Place, sampled_fields, stored_fields
 from fingerpad.skin.receptor_sheet import ReceptorSheet
 from fingerpad.skin.section import Section, middle_section
+
+if TYPE_CHECKING:
+    from fingerpad.mechanics.press import Deformation
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,8 @@ class SkinResponse:
         Numbers of Newton steps and of factorisations.
     linear_solver : str
         The linear solver, and why it was chosen.
+    deformation : Deformation, optional
+        All nodes and elements over time, of `Touch.solve(whole=True)`; stored files do not hold it.
 
     Raises
     ------
@@ -84,6 +90,7 @@ class SkinResponse:
     newton_steps: int
     factorisations: int
     linear_solver: str
+    deformation: Deformation | None = None
 
     def __post_init__(self) -> None:
         declared = {field.name: field for field in stored_fields()}
@@ -112,6 +119,21 @@ class SkinResponse:
     def depth_mm(self) -> FloatArray:
         """Advance of the indenter since first touch, (n_times,). [mm]"""
         return self.fields["depth_mm"]
+
+    @property
+    def contact_area_mm2(self) -> FloatArray:
+        """Undeformed skin that the indenter touches, on the whole finger, (n_times,). [mm²]"""
+        return self.fields["contact_area_mm2"]
+
+    @property
+    def contact_pressure_kpa(self) -> FloatArray:
+        """Pressure of the indenter on `mesh.skin_nodes`, (n_times, n_skin_nodes). [kPa]"""
+        return self.fields["contact_pressure_kpa"]
+
+    @property
+    def reaction_mn(self) -> FloatArray:
+        """Force of the tissue on bone and nail, of the whole finger, (n_times, 3). [mN]"""
+        return self.fields["reaction_mn"]
 
     @property
     def skin_displacement_mm(self) -> FloatArray:

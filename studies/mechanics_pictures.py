@@ -1,0 +1,107 @@
+"""Pictures of docs/mechanics.md: one press with all that it returns, and an afferent that falls silent.
+
+`python -m studies.mechanics_pictures` draws them again.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fingerpad.core.signals import SpikeTrains
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.indenters import Sphere
+from fingerpad.geometry.motion import Trajectory, repeated
+from fingerpad.mechanics.press import PressSettings
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, write_png
+from fingerpad.skin.indentation import CONTACT_POINT_MM, indent
+from fingerpad.skin.sampling import SkinResponse
+
+IMAGES = Path(__file__).parents[1] / "docs" / "images"
+BALL = Sphere(curvature_per_m=287.0)
+PRESSED = Trajectory((0.0, 40.0, 300.0, 340.0, 500.0), (0.0, 1.0, 1.0, 0.0, 0.0))
+FINE = PressSettings(ramp_steps=20, hold_steps=6)
+TOUCHES = repeated(0.8, touches=2, ramp_ms=50.0, hold_ms=400.0, pause_ms=200.0)
+SITES_MM = [(CONTACT_POINT_MM[0] + along_mm, 0.0) for along_mm in (0.0, 1.0, 2.0)]
+
+
+def pressed() -> SkinResponse:
+    """Press a sphere and release it."""
+    return indent(Fingertip(), BALL, PRESSED, settings=FINE)
+
+
+def touched_twice() -> tuple[SkinResponse, SpikeTrains]:
+    """Touch twice with a pause, and let three afferents respond."""
+    skin, afferent = indent(Fingertip(), BALL, TOUCHES), Afferent()
+    return skin, afferent.spikes(skin.sed(SITES_MM, afferent.dynamic_quantity, afferent.static_quantity))
+
+
+def draw_one_result(skin: SkinResponse) -> Figure:
+    """Draw depth, force, area of contact and energies over time."""
+    figure = new_figure(8.0, 4.6)
+    (depth, force), (area, energy) = figure.subplots(2, 2, sharex=True)
+    for axes, values, label in (
+        (depth, skin.depth_mm, "depth [mm]"),
+        (force, skin.force_mn, "force [mN]"),
+        (area, skin.contact_area_mm2, "area of contact [mm²]"),
+    ):
+        axes.plot(skin.times_ms, values, color=BLUE, marker=".", markersize=4.0)
+        axes.set_ylabel(label)
+    for name, label, colour, line in (
+        ("external_uj", "work of the indenter", BLACK, "-"),
+        ("stored_uj", "stored", BLUE, "--"),
+        ("dissipated_uj", "dissipated", ORANGE, ":"),
+    ):
+        energy.plot(skin.times_ms, skin.fields[name], color=colour, linestyle=line, label=label)
+    energy.set_ylabel("energy [µJ]")
+    energy.legend(loc="center left", bbox_to_anchor=(0.1, 0.45))
+    for axes in (area, energy):
+        axes.set_xlabel("time [ms]")
+    return figure
+
+
+def draw_released(touched: tuple[SkinResponse, SpikeTrains]) -> Figure:
+    """Draw depth and force, energy density at the afferents, and their spikes."""
+    skin, trains = touched
+    figure = new_figure(7.0, 5.2)
+    motion, density, spikes = figure.subplots(3, 1, sharex=True, height_ratios=(1.0, 1.2, 1.0))
+    motion.plot(skin.times_ms, skin.depth_mm, color=BLUE)
+    motion.set_ylabel("depth [mm]", color=BLUE)
+    force: Axes = motion.twinx()
+    force.plot(skin.times_ms, skin.force_mn, color=ORANGE, linestyle="--")
+    force.set_ylabel("force [mN]", color=ORANGE)
+    force.grid(visible=False)
+    names = ["below the sphere", "1 mm distal", "2 mm distal"]
+    sed = skin.sed(SITES_MM).sed_kpa
+    for column, name, colour, line in zip(sed.T, names, (BLACK, GREEN, GREY), ("-", "--", ":"), strict=True):
+        density.plot(skin.times_ms, column, color=colour, linestyle=line, label=name)
+    density.set_ylabel("stored energy\ndensity [kPa]")
+    density.set_ylim(top=1.05)
+    density.legend(loc="upper center", ncols=3)
+    spikes.eventplot(
+        [trains[n] for n in (2, 1, 0)], lineoffsets=[1, 2, 3], linelengths=0.7, linewidths=1.0, colors=BLACK
+    )
+    spikes.set(xlabel="time [ms]", yticks=[1, 2, 3], yticklabels=names[::-1], ylim=(0.4, 3.6))
+    for axes in (motion, density, spikes):
+        for start, end in _phases():
+            axes.axvspan(start, end, color="#f1f1ee", zorder=0)
+    return figure
+
+
+def _phases() -> list[tuple[float, float]]:
+    """List the times without indentation. [ms]"""
+    times, depth = np.array(TOUCHES.times_ms), np.array(TOUCHES.prescribed)
+    return [
+        (start, end)
+        for start, end, first, last in zip(times, times[1:], depth, depth[1:], strict=False)
+        if first == last == 0.0
+    ]
+
+
+if __name__ == "__main__":
+    write_png(draw_one_result, pressed(), IMAGES / "one-result.png")
+    write_png(draw_released, touched_twice(), IMAGES / "released-afferent.png")
