@@ -32,13 +32,13 @@ from fingerpad.inference.afferent_methods import (
 )
 from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
 from fingerpad.inference.rate_model import (
-    WINDOWS_MS,
     AfferentModel,
     RateModel,
     Rates,
     evaluate_rows,
 )
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
 from fingerpad.neuron.transduction import Drive, drive
 
 USED = "all intervals that close in the window over their number (used)"
@@ -127,7 +127,7 @@ class CountedModel:
         """Rates (n_stimuli,) for six parameters. [spikes/s]"""
         follows = {name: getattr(self.driven, name) for name in ("dynamic_quantity", "static_quantity")}
         spikes = Afferent.from_parameters(parameters, **follows).spikes(self.driven)
-        dynamic, static = (counted_rates_hz(spikes, window, self.reading) for window in WINDOWS_MS)
+        dynamic, static = (counted_rates_hz(spikes, window, self.reading) for window in PAPER_WINDOWS_MS)
         return dynamic, static
 
     def evaluate_batch(self, points: FloatArray) -> Rates:

@@ -22,10 +22,10 @@ from fingerpad.experiments.gerling2014.single_unit_uncertainty import PIECES
 from fingerpad.experiments.gerling2014.skin_force import PLATE_DEPTHS_MM
 from fingerpad.experiments.gerling2014.sphere_discrimination import POSITIONS_MM
 from fingerpad.geometry.indenters import Cylinder
-from fingerpad.inference.rate_model import WINDOWS_MS
 from fingerpad.inference.rates_and_hit_rates import CHANCE
 from fingerpad.neuron.exact_spikes import exact_trains
 from fingerpad.neuron.population import Population
+from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
 from fingerpad.neuron.spikes import window_rates_hz
 from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.psychophysics.encoding import neighbour_pairs
@@ -179,7 +179,7 @@ class Afferents:
             + self.dynamic_gain[number] / RAMP_MS * relative[1]
         )
         trains = exact_trains(times_ms, current, tau, 1.0, 1.0, neuron.REFRACTORY.value)
-        dynamic, static = (window_rates_hz(*trains, *window) for window in WINDOWS_MS)
+        dynamic, static = (window_rates_hz(*trains, *window) for window in PAPER_WINDOWS_MS)
         return dynamic, static
 
 

@@ -25,6 +25,7 @@ from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
+from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
 from fingerpad.neuron.spikes import firing_rate_hz
 from fingerpad.neuron.transduction import drive
 from sections import SED_DRIVEN, sed_driven
@@ -250,7 +251,7 @@ def test_places_that_were_not_sampled_are_refused():
     with pytest.raises(InputError, match="got 1 offsets and 1 models"):
         ReceptorOffset.of_traces({0.0: traces()})
     with pytest.raises(InputError, match="got 2 offsets and 2 models of 2 kinds"):
-        ReceptorOffset.of_traces({0.0: traces(), 0.1: SedTraces([0.0, 1000.0], [[0.0], [1.0]])})
+        ReceptorOffset.of_traces({0.0: traces(), 0.1: SedTraces([0, 1000], [[0], [1]])}, PAPER_WINDOWS_MS)
     with pytest.raises(InputError, match="offsets_mm must increase strictly"):
         ReceptorOffset.of_traces({0.1: traces(), 0.0: traces()})
 

@@ -6,6 +6,7 @@ import pytest
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
+from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
 
 
 def test_chosen_rows_keep_names_rates_and_a_phase_that_was_not_recorded():
@@ -35,7 +36,7 @@ def test_rates_that_cannot_be_are_refused(arguments, said):
 def test_rates_of_spikes_are_means_over_presentations_in_the_order_of_their_first():
     # Intervals that close in (30, 50]: 10 ms, then 20 ms, then none; in (600, 950]: 50 ms in the last alone.
     trains = SpikeTrains.from_lists([[25.0, 35.0], [700.0, 750.0], [15.0, 35.0]])
-    rates = SpikeRecordings(("b", "a", "b"), trains, [1000.0, 1200.0, 1000.0]).rates()
+    rates = SpikeRecordings(("b", "a", "b"), trains, [1000.0, 1200.0, 1000.0]).rates(PAPER_WINDOWS_MS)
     assert rates.stimuli == ("b", "a")
     assert rates.dynamic_rate_hz.tolist() == [(100.0 + 50.0) / 2, 0.0]
     assert rates.static_rate_hz.tolist() == [0.0, 20.0]
@@ -60,5 +61,5 @@ def test_spikes_that_cannot_be_are_refused(trains, duration_ms, said):
 def test_a_window_beyond_the_recording_has_no_rate():
     recordings = SpikeRecordings(("a",), SpikeTrains.from_lists([[1.0]]), 900.0)
     with pytest.raises(InputError, match="one ends at 950 ms"):
-        recordings.rates()
+        recordings.rates(PAPER_WINDOWS_MS)
     assert recordings.rates(((30.0, 50.0), (600.0, 900.0))).static_rate_hz.tolist() == [0.0]

@@ -21,7 +21,7 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Presentations
 from fingerpad.core.results import to_json
 from fingerpad.core.signals import SedTraces, SpikeTrains
-from fingerpad.data import bar_firing_rates, protocol
+from fingerpad.data import bar_firing_rates
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.fit import fit as study
@@ -46,6 +46,7 @@ from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 from fingerpad.inference.soft_afferent import soft_spikes
 from fingerpad.inference.start_points import start_points
 from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
 from fingerpad.neuron.transduction import drive
 from fingerpad.report import recording_fit as report
 from sections import sed_driven
@@ -301,7 +302,7 @@ def test_spikes_that_have_no_likelihood_are_refused(recordings, n_motions, said)
 
 def test_a_stimulus_that_ends_before_a_window_is_refused():
     with pytest.raises(InputError, match="one ends at 950 ms, stimulus 9 at 700 ms"):
-        AfferentModel.of_traces([SED, traces([1.0], TIMES_MS[:-1])])
+        AfferentModel.of_traces([SED, traces([1.0], TIMES_MS[:-1])], PAPER_WINDOWS_MS)
 
 
 # What is pressed
@@ -599,8 +600,8 @@ def test_options_and_their_defaults_are_those_of_the_modules():
     assert METHODS == choices.METHOD_CHOICES
     assert set(INDENTERS) == set(choices.INDENTER_CHOICES)
     defaults = {option.name: option.default for option in command().params}
-    assert defaults["dynamic_window"] == protocol.DYNAMIC_WINDOW.value
-    assert defaults["static_window"] == protocol.STATIC_WINDOW.value
+    assert defaults["dynamic_window"] is None
+    assert defaults["static_window"] is None
 
 
 def command():

@@ -12,7 +12,8 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Bar, FlatPunch, Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Trajectory, repeated, sine
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Trajectory
+from fingerpad.geometry.motions import repeated, sine
 from fingerpad.mechanics import newton
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony

@@ -40,11 +40,19 @@ def fit_command(
     ] = None,
     depth: Annotated[float | None, number_option("Depth of the hold. Default: 1. [mm]")] = None,
     dynamic_window: Annotated[
-        tuple[float, float], typer.Option(help="Window of the dynamic rate: start and end. [ms]")
-    ] = (30.0, 50.0),
+        tuple[float, float] | None,
+        typer.Option(
+            help="Window of the dynamic rate: start and end. Default: the last 40 % of the ramp (30 50 in "
+            "the paper). [ms]"
+        ),
+    ] = None,
     static_window: Annotated[
-        tuple[float, float], typer.Option(help="Window of the static rate: start and end. [ms]")
-    ] = (600.0, 950.0),
+        tuple[float, float] | None,
+        typer.Option(
+            help="Window of the static rate: start and end. Default: 550 to 900 ms from the start of the "
+            "hold, or 58 to 95 % of a shorter one (600 950 in the paper). [ms]"
+        ),
+    ] = None,
     dynamic_quantity: Annotated[
         str | None,
         typer.Option(

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array, increasing, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.phases import Phase, ramp_and_hold
 
 STORED_ENERGY = "stored"
 """Name of the quantity that drives both terms of the current in the paper: strain energy density."""
@@ -75,6 +76,9 @@ class SedTraces:
     dynamic_quantity, static_quantity : str, optional
         What each term follows, by the names of `SkinResponse.sample`: "stored" is SED, as in the paper; any
         other is an extension of its model.
+    phases : tuple of Phase, optional
+        Named parts of the touch; by default one kink separates "ramp" and "hold", and there are none where
+        there is not one kink.
 
     Raises
     ------
@@ -94,6 +98,7 @@ class SedTraces:
     dynamic_kpa: FloatArray | None = None
     dynamic_quantity: str = STORED_ENERGY
     static_quantity: str = STORED_ENERGY
+    phases: tuple[Phase, ...] = ()
 
     def __post_init__(self) -> None:
         times, sed = _traces("SedTraces", "sed_kpa", self.times_ms, self.sed_kpa)
@@ -104,6 +109,8 @@ class SedTraces:
         if not np.isin(kinks, times).all():
             raise InputError(f"kinks_ms must be among times_ms: got {kinks[~np.isin(kinks, times)]}.")
         _freeze(self, times_ms=times, sed_kpa=sed, kinks_ms=kinks)
+        if not self.phases and kinks.size == 1 and 0.0 < kinks[0] < times[-1]:
+            object.__setattr__(self, "phases", ramp_and_hold(float(kinks[0]), float(times[-1])))
         if (self.dynamic_kpa is None) != (self.dynamic_quantity == self.static_quantity):
             raise InputError(
                 "dynamic_kpa is needed if dynamic_quantity is not static_quantity, and only then: got "

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import groupby, pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, increasing, not_negative, positive, whole
+from fingerpad.core.checks import FloatArray, float_array, increasing, positive
 from fingerpad.core.errors import InputError
-from fingerpad.core.units import MS_PER_S
+from fingerpad.core.phases import HOLD, RAMP, Phase, ramp_and_hold
 from fingerpad.data import protocol
 
 MOTION_UNITS = {"depth_mm": "mm", "force_mn": "mN", "ramp_ms": "ms", "hold_ms": "ms"}
@@ -25,8 +26,8 @@ CORNER_SHARE, CORNER_OVER_NEIGHBOURS = 0.5, 3.0
 """A sample is a corner if the speed changes there by more than this share of the largest speed, or by more
 than this many times its change at the samples beside it, as it does not along a smooth curve."""
 
-SAMPLES_PER_CYCLE = 20
-"""Samples of a sine per cycle; a line between two of them misses it by up to 1.2 % of the amplitude."""
+SAME_VALUE = 0.02
+"""Change over the largest depth, force or way of a trajectory below which it holds; recordings have noise."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +93,11 @@ class Motion:
         raise NotImplementedError
 
     @property
+    def phases(self) -> tuple[Phase, ...]:
+        """Named phases, in order; rates are counted in "ramp" and "hold"."""
+        raise NotImplementedError
+
+    @property
     def end_ms(self) -> float:
         """End of the motion. [ms]"""
         raise NotImplementedError
@@ -138,6 +144,11 @@ class _OneRamp(Motion):
     def corners_ms(self) -> tuple[float, ...]:
         """End of the ramp. [ms]"""
         return (self.ramp_ms,)
+
+    @property
+    def phases(self) -> tuple[Phase, ...]:
+        """Ramp and hold."""
+        return ramp_and_hold(self.ramp_ms, self.end_ms)
 
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
         """Depth [mm] or force [mN] at `times_ms`, any shape: 0 at the start, the largest in the hold."""
@@ -255,13 +266,17 @@ class Trajectory(Motion):
     tilt_deg, spin_deg : sequence of float, optional
         How far it has turned about its tip since first touch, from 0, as `tilt_deg` and `spin_deg` of a
         `Touch`, to which they are added; it does not turn by default. [degrees]
+    phases : sequence of Phase, optional
+        Names of its parts. By default it is divided where it changes its course: "ramp" goes deeper, "hold"
+        stays, "move" goes aside or turns, "release" comes back, "pause" stays out of contact and "course" is
+        any other part; from the second on they are numbered, as "ramp 2".
 
     Raises
     ------
     InputError
         If not exactly one of depth and force is given, lengths differ, times do not increase from 0, a value
-        is not finite, a force is negative, a way or rotation does not start at 0, or the indenter never
-        presses.
+        is not finite, a force is negative, a way or rotation does not start at 0, the indenter never presses,
+        or a phase goes beyond the last time.
 
     Examples
     --------
@@ -272,6 +287,8 @@ class Trajectory(Motion):
     [0.5, 0.5]
     >>> release.corners_ms
     (50.0, 500.0, 550.0)
+    >>> [phase.name for phase in release.phases]
+    ['ramp', 'hold', 'release', 'pause']
     """
 
     times_ms: tuple[float, ...]
@@ -281,6 +298,8 @@ class Trajectory(Motion):
     z_mm: tuple[float, ...] | None = None
     tilt_deg: tuple[float, ...] | None = None
     spin_deg: tuple[float, ...] | None = None
+    # Names do not change what is pressed, and a stored press is found by what is compared.
+    phases: tuple[Phase, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         times = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
@@ -307,6 +326,13 @@ class Trajectory(Motion):
         if values.max() <= 0.0:
             raise InputError(f"{name} must be above 0 at some time: the indenter would never press.")
         object.__setattr__(self, "times_ms", tuple(times.tolist()))
+        object.__setattr__(self, "phases", tuple(self.phases) or self._phases_of_course())
+        for phase in self.phases:
+            if phase.end_ms > self.end_ms:
+                raise InputError(
+                    f"phases must end with the trajectory, at {self.end_ms:g} ms: {phase.name!r} ends at "
+                    f"{phase.end_ms:g} ms."
+                )
 
     @property
     def by_force(self) -> bool:  # type: ignore[override]
@@ -359,10 +385,40 @@ class Trajectory(Motion):
         speed = np.diff(self._course, axis=0) / np.diff(self.times_ms)[:, None]
         change = np.linalg.norm(np.diff(speed, axis=0, prepend=speed[:1], append=speed[-1:]), axis=1)
         change /= np.linalg.norm(speed, axis=1).max()
-        beside = np.maximum(np.roll(change, 1), np.roll(change, -1))
-        stands_out = change > CORNER_OVER_NEIGHBOURS * beside + SAME_SPEED
-        corners = stands_out | (change > CORNER_SHARE)
-        return tuple(np.array(self.times_ms)[corners].tolist())
+        corners = change > CORNER_SHARE
+        while True:
+            # A corner says nothing about the curve beside it, on which there may be another one.
+            smooth = np.where(corners, 0.0, change)
+            beside = np.maximum(np.roll(smooth, 1), np.roll(smooth, -1))
+            found = smooth > CORNER_OVER_NEIGHBOURS * beside + SAME_SPEED
+            if not found.any():
+                return tuple(np.array(self.times_ms)[corners].tolist())
+            corners |= found
+
+    def _phases_of_course(self) -> tuple[Phase, ...]:
+        """Phases named by what the indenter does between corners, adjacent equal ones as one."""
+        course, corners = self._course, np.searchsorted(self.times_ms, self.corners_ms).tolist()
+        parts = list(pairwise([0, *corners, len(self.times_ms) - 1]))
+        phases: list[Phase] = []
+        for kind, group in groupby(parts, lambda part: self._kind(course[part[0] : part[1] + 1])):
+            same = list(group)
+            count = 1 + sum(phase.name.split()[0] == kind for phase in phases)
+            name = kind if count == 1 else f"{kind} {count}"
+            phases.append(Phase(name, self.times_ms[same[0][0]], self.times_ms[same[-1][1]]))
+        return tuple(phases)
+
+    @staticmethod
+    def _kind(course: FloatArray) -> str:
+        """Say what the indenter does in a part of its `_course`."""
+        prescribed, ways = course[:, 0], course[:, 1:]
+        if np.ptp(prescribed) <= SAME_VALUE:
+            if np.ptp(ways, axis=0).max() > SAME_VALUE:
+                return "move"
+            return HOLD if prescribed.max() > SAME_VALUE else "pause"
+        if (np.maximum.accumulate(prescribed) - prescribed).max() <= SAME_VALUE:
+            return RAMP
+        released = (prescribed - np.minimum.accumulate(prescribed)).max() <= SAME_VALUE
+        return "release" if released else "course"
 
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
         """Depth [mm] or force [mN] at `times_ms`, any shape."""
@@ -395,88 +451,6 @@ class Trajectory(Motion):
             times += (start + since[:-1]).tolist()
             times.append(end)
         return np.array(times)
-
-
-def sine(
-    depth_mm: float,
-    amplitude_mm: float,
-    frequency_hz: float,
-    cycles: int,
-    ramp_ms: float = protocol.RAMP.value,
-    hold_ms: float = protocol.HOLD.value,
-) -> Trajectory:
-    """Indent to a depth, hold it, then vibrate about it.
-
-    Parameters
-    ----------
-    depth_mm : float
-        Depth of the hold. [mm]
-    amplitude_mm : float
-        Half of the way from peak to peak. [mm]
-    frequency_hz : float
-        Frequency. [Hz]
-    cycles : int
-        Number of whole cycles.
-    ramp_ms, hold_ms : float, optional
-        Durations of the ramp and of the hold before the vibration. [ms]
-
-    Returns
-    -------
-    Trajectory
-        With 20 samples per cycle.
-
-    Examples
-    --------
-    >>> motion = sine(0.8, 0.1, 20.0, cycles=2, hold_ms=100.0)
-    >>> round(motion.largest, 6), motion.end_ms
-    (0.9, 250.0)
-    """
-    positive("depth_mm", depth_mm, "mm")
-    positive("amplitude_mm", amplitude_mm, "mm")
-    positive("ramp_ms", ramp_ms, "ms")
-    not_negative("hold_ms", hold_ms, "ms")
-    period_ms = MS_PER_S / positive("frequency_hz", frequency_hz, "Hz")
-    phase = np.arange(1, SAMPLES_PER_CYCLE * whole("cycles", cycles, at_least=1) + 1) / SAMPLES_PER_CYCLE
-    before_ms = [0.0, ramp_ms, ramp_ms + hold_ms][: 3 if hold_ms > 0.0 else 2]
-    return Trajectory(
-        (*before_ms, *(before_ms[-1] + period_ms * phase)),
-        (0.0, *[depth_mm] * (len(before_ms) - 1), *(depth_mm + amplitude_mm * np.sin(2.0 * np.pi * phase))),
-    )
-
-
-def repeated(depth_mm: float, touches: int, ramp_ms: float, hold_ms: float, pause_ms: float) -> Trajectory:
-    """Press several times to the same depth, with pauses at first touch of the undeformed skin.
-
-    Parameters
-    ----------
-    depth_mm : float
-        Depth of each hold. [mm]
-    touches : int
-        How often.
-    ramp_ms, hold_ms, pause_ms : float
-        Durations of a ramp (in and out), of a hold and of a pause. [ms]
-
-    Returns
-    -------
-    Trajectory
-
-    Examples
-    --------
-    >>> repeated(1.0, 2, ramp_ms=50.0, hold_ms=200.0, pause_ms=300.0).end_ms
-    1200.0
-    """
-    positive("depth_mm", depth_mm, "mm")
-    lengths_ms = [
-        positive(name, value, "ms")
-        for name, value in (
-            ("ramp_ms", ramp_ms),
-            ("hold_ms", hold_ms),
-            ("ramp_ms", ramp_ms),
-            ("pause_ms", pause_ms),
-        )
-    ]
-    n = whole("touches", touches, at_least=1)
-    return Trajectory((0.0, *np.cumsum(n * lengths_ms)), (0.0, *n * (depth_mm, depth_mm, 0.0, 0.0)))
 
 
 def _hold(length_ms: float, first_ms: float, steps: int) -> FloatArray:

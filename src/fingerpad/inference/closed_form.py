@@ -135,7 +135,7 @@ class ClosedFormModel:
 
     def evaluate(self, parameters: FloatArray) -> Rates:
         """Rates (n_stimuli,) for the four parameters. [spikes/s]"""
-        dynamic, static = (self._window(parameters, window)[0] for window in self.stimuli.windows_ms)
+        dynamic, static = (self._window(parameters, window)[0] for window in self.stimuli.used_windows_ms)
         return dynamic, static
 
     def evaluate_batch(self, points: FloatArray) -> Rates:
@@ -144,7 +144,7 @@ class ClosedFormModel:
 
     def slopes(self, parameters: FloatArray) -> Rates:
         """Return the derivatives of both rates along the four parameters, (n_stimuli, 4) each."""
-        dynamic, static = (self._window(parameters, window)[1] for window in self.stimuli.windows_ms)
+        dynamic, static = (self._window(parameters, window)[1] for window in self.stimuli.used_windows_ms)
         return dynamic, static
 
     def _window(self, parameters: FloatArray, window_ms: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:

@@ -9,18 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray, not_negative
 from fingerpad.core.errors import InputError
+from fingerpad.core.phases import Phase
 from fingerpad.core.signals import SedTraces
 from fingerpad.core.threads import in_blocks
-from fingerpad.data import neuron, protocol
+from fingerpad.data import neuron
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.exact_spikes import exact_trains
+from fingerpad.neuron.rate_windows import Windows, common_rate_windows_ms
 from fingerpad.neuron.spikes import window_rates_hz
 from fingerpad.neuron.transduction import Drive, drive
 
@@ -29,11 +32,6 @@ Rates = tuple[FloatArray, FloatArray]
 
 Evaluate = Callable[[FloatArray], Rates]
 """From one set of parameters (n_parameters,) to rates (n_stimuli,)."""
-
-Windows = tuple[tuple[float, ...], tuple[float, ...]]
-
-WINDOWS_MS: Windows = (protocol.DYNAMIC_WINDOW.value, protocol.STATIC_WINDOW.value)
-"""The paper's windows of the dynamic and of the static rate. [ms]"""
 
 ROWS_PER_BLOCK = 4
 """Rows of parameters that a thread evaluates at a time."""
@@ -124,15 +122,17 @@ class AfferentModel:
         One per group of stimuli with the same times, so that a group is simulated at once.
     stimuli : tuple of int array
         Stimulus number of each column of each drive; every stimulus once.
-    windows_ms : ((float, float), (float, float))
-        Windows of the dynamic and of the static rate. [ms]
+    windows_ms : ((float, float), (float, float)), optional
+        Windows of the dynamic and of the static rate; by default those that follow the phases of the stimuli.
+        [ms]
     refractory_ms : float
         Refractory period, which is not fitted. [ms]
 
     Raises
     ------
     InputError
-        If a stimulus ends before a window does, or the refractory period is negative.
+        If a stimulus ends before a window does, windows are not given where the phases of the stimuli differ,
+        or the refractory period is negative.
 
     Examples
     --------
@@ -147,12 +147,12 @@ class AfferentModel:
 
     drives: tuple[Drive, ...]
     stimuli: tuple[IntArray, ...]
-    windows_ms: Windows = WINDOWS_MS
+    windows_ms: Windows | None = None
     refractory_ms: float = neuron.REFRACTORY.value
 
     def __post_init__(self) -> None:
         not_negative("refractory_ms", self.refractory_ms, "ms")
-        end = max(bound for window in self.windows_ms for bound in window)
+        end = max(bound for window in self.used_windows_ms for bound in window)
         for group, columns in zip(self.drives, self.stimuli, strict=True):
             if group.times_ms[-1] < end:
                 raise InputError(
@@ -162,7 +162,10 @@ class AfferentModel:
 
     @classmethod
     def of_drive(
-        cls, driven: Drive, windows_ms: Windows = WINDOWS_MS, refractory_ms: float = neuron.REFRACTORY.value
+        cls,
+        driven: Drive,
+        windows_ms: Windows | None = None,
+        refractory_ms: float = neuron.REFRACTORY.value,
     ) -> AfferentModel:
         """Make the model for stimuli that share their times.
 
@@ -179,7 +182,7 @@ class AfferentModel:
     def of_traces(
         cls,
         sed: SedTraces | Sequence[SedTraces],
-        windows_ms: Windows = WINDOWS_MS,
+        windows_ms: Windows | None = None,
         refractory_ms: float = neuron.REFRACTORY.value,
     ) -> AfferentModel:
         """Make the model for strain energy density, stimuli grouped by their times.
@@ -195,8 +198,7 @@ class AfferentModel:
         Raises
         ------
         InputError
-            If a stimulus ends before a window does, or the traces differ in the quantity of the dynamic
-            term.
+            As the class, or if the traces differ in the quantity of the dynamic term.
         """
         traces = [sed] if isinstance(sed, SedTraces) else list(sed)
         quantities = sorted({f"{trace.dynamic_quantity} and {trace.static_quantity}" for trace in traces})
@@ -205,10 +207,11 @@ class AfferentModel:
                 "sed must bring one dynamic_quantity and one static_quantity: got "
                 f"{', '.join(quantities) or 'no traces'}."
             )
-        groups: dict[tuple[bytes, bytes], list[tuple[int, SedTraces]]] = {}
+        groups: dict[tuple[bytes, bytes, tuple[Phase, ...]], list[tuple[int, SedTraces]]] = {}
         first = 0
         for trace in traces:
-            groups.setdefault((trace.times_ms.tobytes(), trace.kinks_ms.tobytes()), []).append((first, trace))
+            key = trace.times_ms.tobytes(), trace.kinks_ms.tobytes(), trace.phases
+            groups.setdefault(key, []).append((first, trace))
             first += trace.n_sites
         return cls(
             tuple(drive(SedTraces.joined([trace for _, trace in group])) for group in groups.values()),
@@ -219,6 +222,11 @@ class AfferentModel:
             windows_ms,
             refractory_ms,
         )
+
+    @cached_property
+    def used_windows_ms(self) -> Windows:
+        """Windows of the two rates: the given ones, or those of the phases. [ms]"""
+        return self.windows_ms or common_rate_windows_ms([group.phases for group in self.drives])
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -240,7 +248,7 @@ class AfferentModel:
 
     def _evaluator(self) -> Evaluate:
         """Return a function like `evaluate` that reuses its arrays: only one thread may call it."""
-        groups = [_evaluator_of(group, self.refractory_ms, self.windows_ms) for group in self.drives]
+        groups = [_evaluator_of(group, self.refractory_ms, self.used_windows_ms) for group in self.drives]
 
         def evaluate(parameters: FloatArray) -> Rates:
             dynamic, static = np.empty((2, self.n_stimuli))

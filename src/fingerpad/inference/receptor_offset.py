@@ -14,8 +14,9 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, finite, float_array, increasing
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
-from fingerpad.inference.rate_model import WINDOWS_MS, AfferentModel, Rates, Windows, evaluate_rows
+from fingerpad.inference.rate_model import AfferentModel, Rates, evaluate_rows
 from fingerpad.neuron.afferent import PARAMETER_NAMES
+from fingerpad.neuron.rate_windows import Windows
 from fingerpad.neuron.transduction import Drive
 
 OFFSET_NAME = "offset_mm"
@@ -42,7 +43,7 @@ class ReceptorOffset:
 
     Examples
     --------
-    >>> near, far = (SedTraces([0.0, 50.0, 1000.0], [[0.0], [peak], [peak]]) for peak in (2.0, 1.0))
+    >>> near, far = (SedTraces([0, 50, 1000], [[0], [peak], [peak]], [50]) for peak in (2.0, 1.0))
     >>> model = ReceptorOffset.of_traces({-0.1: near, 0.1: far})
     >>> model.at(0.0).drives[0].sed_kpa[-1].tolist()
     [1.5]
@@ -71,7 +72,7 @@ class ReceptorOffset:
 
     @classmethod
     def of_traces(
-        cls, traces: Mapping[float, SedTraces | Sequence[SedTraces]], windows_ms: Windows = WINDOWS_MS
+        cls, traces: Mapping[float, SedTraces | Sequence[SedTraces]], windows_ms: Windows | None = None
     ) -> ReceptorOffset:
         """Make the model from strain energy density at each offset.
 
@@ -80,7 +81,7 @@ class ReceptorOffset:
         traces : mapping of float to SedTraces or to a sequence of SedTraces
             By offset along the finger, distal positive [mm]; one column per stimulus.
         windows_ms : ((float, float), (float, float)), optional
-            Windows of the dynamic and of the static rate. [ms]
+            As of `AfferentModel`. [ms]
         """
         return cls(
             np.array(list(traces), dtype=np.float64),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, float_array, instance
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SpikeTrains
-from fingerpad.data import protocol
+from fingerpad.neuron.rate_windows import Windows
 from fingerpad.neuron.spikes import firing_rate_hz
 
 PHASES = ("dynamic", "static")
@@ -111,7 +110,7 @@ class SpikeRecordings:
     --------
     >>> trains = SpikeTrains.from_lists([[10.0, 40.0, 45.0], [12.0, 38.0, 42.0], [100.0]])
     >>> recordings = SpikeRecordings(("edge", "edge", "flat"), trains, 1000.0)
-    >>> rates = recordings.rates()
+    >>> rates = recordings.rates(((30.0, 50.0), (600.0, 950.0)))
     >>> rates.stimuli, rates.dynamic_rate_hz.round(1).tolist()
     (('edge', 'flat'), [61.9, 0.0])
     """
@@ -145,19 +144,14 @@ class SpikeRecordings:
                     f"{outside:g} ms."
                 )
 
-    def rates(
-        self,
-        windows_ms: tuple[Sequence[float], Sequence[float]] = (
-            protocol.DYNAMIC_WINDOW.value,
-            protocol.STATIC_WINDOW.value,
-        ),
-    ) -> RateRecordings:
+    def rates(self, windows_ms: Windows) -> RateRecordings:
         """Compute the rates of each stimulus in the ramp and in the hold, Eqs. 6-10, mean over presentations.
 
         Parameters
         ----------
-        windows_ms : ((float, float), (float, float)), optional
-            Start and end of the dynamic and of the static window. [ms]
+        windows_ms : ((float, float), (float, float))
+            Start and end of the dynamic and of the static window, such as `rate_windows_ms` of the phases of
+            the motion. [ms]
 
         Returns
         -------
@@ -179,7 +173,7 @@ class SpikeRecordings:
         owner = np.array([names.index(name) for name in self.stimuli], dtype=np.int64)
         n_presentations = np.bincount(owner, minlength=len(names))
         dynamic, static = (
-            np.bincount(owner, firing_rate_hz(self.trains, tuple(window)), len(names)) / n_presentations
+            np.bincount(owner, firing_rate_hz(self.trains, window), len(names)) / n_presentations
             for window in windows_ms
         )
         return RateRecordings(names, dynamic, static, self.source)

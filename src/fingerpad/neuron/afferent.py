@@ -10,8 +10,9 @@ from fingerpad.core.checks import FloatArray, float_array
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import STORED_ENERGY, SedTraces, SpikeTrains
 from fingerpad.core.threads import in_blocks
-from fingerpad.data import neuron, protocol
+from fingerpad.data import neuron
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
+from fingerpad.neuron.rate_windows import Window, rate_windows_ms
 from fingerpad.neuron.spikes import firing_rate_hz
 from fingerpad.neuron.transduction import Drive, Transduction
 
@@ -232,8 +233,8 @@ class Afferent:
     def rates(
         self,
         sed: SedTraces | Drive,
-        dynamic_window_ms: tuple[float, ...] = protocol.DYNAMIC_WINDOW.value,
-        static_window_ms: tuple[float, ...] = protocol.STATIC_WINDOW.value,
+        dynamic_window_ms: Window | None = None,
+        static_window_ms: Window | None = None,
     ) -> tuple[FloatArray, FloatArray]:
         """Compute the firing rates at every site in the ramp and in the hold, Eqs. 6-10.
 
@@ -242,12 +243,19 @@ class Afferent:
         sed : SedTraces or Drive
             As in `spikes`.
         dynamic_window_ms, static_window_ms : (float, float), optional
-            Start and end of the two windows. [ms]
+            Start and end of the two windows; by default those of `rate_windows_ms`, which follow the phases
+            of `sed`: the paper's for the paper's motion. [ms]
 
         Returns
         -------
         dynamic_hz, static_hz : array (n_sites,)
             Rates; 0 where no interval closes in the window. [spikes/s]
+
+        Raises
+        ------
+        InputError
+            As `spikes`, or if a window is not given and `sed` has no ramp or no hold.
         """
+        dynamic, static = rate_windows_ms(sed.phases, dynamic_window_ms, static_window_ms)
         spikes = self.spikes(sed)
-        return firing_rate_hz(spikes, dynamic_window_ms), firing_rate_hz(spikes, static_window_ms)
+        return firing_rate_hz(spikes, dynamic), firing_rate_hz(spikes, static)

@@ -13,8 +13,9 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import ResponseMap, Skin, traces_below
-from fingerpad.data import fingertip, protocol, psychophysics
+from fingerpad.data import fingertip, psychophysics
 from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.rate_windows import Window, rate_windows_ms
 from fingerpad.neuron.spikes import firing_rate_hz, first_spike_latency_ms
 
 MM_PER_CM = 10.0
@@ -204,8 +205,8 @@ class Population:
     def respond(
         self,
         skin: Skin,
-        dynamic_window_ms: tuple[float, ...] = protocol.DYNAMIC_WINDOW.value,
-        static_window_ms: tuple[float, ...] = protocol.STATIC_WINDOW.value,
+        dynamic_window_ms: Window | None = None,
+        static_window_ms: Window | None = None,
     ) -> ResponseMap:
         """Sample the skin at every receptor and simulate each afferent.
 
@@ -214,7 +215,7 @@ class Population:
         skin : Skin
             Any object with `sed(sites)`, such as a solved indentation.
         dynamic_window_ms, static_window_ms : (float, float), optional
-            Windows of the two firing rates. [ms]
+            Windows of the two firing rates, by default as of `Afferent.rates`. [ms]
 
         Returns
         -------
@@ -224,7 +225,8 @@ class Population:
         Raises
         ------
         InputError
-            If the skin does not return one trace per receptor, or lacks what the afferent follows.
+            If the skin does not return one trace per receptor, or lacks what the afferent follows, or a
+            window is not given and the touch has no ramp or no hold.
         """
         quantities = (self.afferent.dynamic_quantity, self.afferent.static_quantity)
         sed = traces_below(skin, self.positions_mm, *quantities)
@@ -232,13 +234,14 @@ class Population:
             raise InputError(
                 f"skin.sed must give one trace per receptor: got {sed.n_sites} for {len(self.positions_mm)}."
             )
+        dynamic, static = rate_windows_ms(sed.phases, dynamic_window_ms, static_window_ms)
         # Both terms of the current are proportional to what they follow: scaling it scales both gains.
         spikes = self.afferent.spikes(sed if self.sensitivity is None else sed.scaled(self.sensitivity))
         return ResponseMap(
             positions_mm=self.positions_mm,
             pitch_mm=self.pitch_mm,
             spikes=spikes,
-            dynamic_rate_hz=firing_rate_hz(spikes, dynamic_window_ms),
-            static_rate_hz=firing_rate_hz(spikes, static_window_ms),
+            dynamic_rate_hz=firing_rate_hz(spikes, dynamic),
+            static_rate_hz=firing_rate_hz(spikes, static),
             first_spike_latency_ms=first_spike_latency_ms(spikes),
         )

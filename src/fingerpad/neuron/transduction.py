@@ -23,6 +23,7 @@ from scipy.interpolate import PchipInterpolator, PPoly
 
 from fingerpad.core.checks import FloatArray, finite, float_array, positive, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.phases import Phase
 from fingerpad.core.signals import STORED_ENERGY, CurrentTraces, SedTraces
 
 PIECES_PER_INTERVAL = 32
@@ -47,6 +48,8 @@ class Drive:
         onset. [kPa/ms, for a strain 1/ms]
     dynamic_quantity, static_quantity : str, optional
         What the two terms follow, by the names of `SkinResponse.sample`; "stored" is SED.
+    phases : tuple of Phase, optional
+        As of `SedTraces`.
     """
 
     times_ms: FloatArray
@@ -54,6 +57,7 @@ class Drive:
     rate_kpa_per_ms: FloatArray
     dynamic_quantity: str = STORED_ENERGY
     static_quantity: str = STORED_ENERGY
+    phases: tuple[Phase, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "times_ms", float_array("times_ms", self.times_ms, 1))
@@ -195,21 +199,27 @@ def drive(
             rate_kpa_per_ms=followed.rate_kpa_per_ms,
             dynamic_quantity=sed.dynamic_quantity,
             static_quantity=sed.static_quantity,
+            phases=sed.phases,
         )
-    phases = _phases(sed)
-    knots = [_knots(phase.x, pieces, shortest_piece_ms) for phase in phases]
+    parts = _between_kinks(sed)
+    knots = [_knots(part.x, pieces, shortest_piece_ms) for part in parts]
     if difference_step_ms is not None:
-        driven = _difference(phases, knots, positive("difference_step_ms", difference_step_ms, "ms"))
-        return replace(driven, dynamic_quantity=sed.dynamic_quantity, static_quantity=sed.static_quantity)
+        driven = _difference(parts, knots, positive("difference_step_ms", difference_step_ms, "ms"))
+        return replace(
+            driven,
+            dynamic_quantity=sed.dynamic_quantity,
+            static_quantity=sed.static_quantity,
+            phases=sed.phases,
+        )
     times = np.concatenate([sed.times_ms[:1], *knots])
     values, rates = np.empty((2, times.size, sed.n_sites))
     values[0], rates[0] = sed.sed_kpa[0], 0.0
     first = 1
-    for phase, phase_knots in zip(phases, knots, strict=True):
-        rows = slice(first, first + phase_knots.size)
-        _evaluate(phase.c, phase.x, phase_knots, values[rows], rates[rows])
+    for part, part_knots in zip(parts, knots, strict=True):
+        rows = slice(first, first + part_knots.size)
+        _evaluate(part.c, part.x, part_knots, values[rows], rates[rows])
         first = rows.stop
-    return Drive(times, values, rates, sed.dynamic_quantity, sed.static_quantity)
+    return Drive(times, values, rates, sed.dynamic_quantity, sed.static_quantity, sed.phases)
 
 
 @njit(cache=True, nogil=True)
@@ -239,10 +249,10 @@ def _evaluate(coefficients, breaks, times, values, rates):  # type: ignore[no-un
             rates[row, site] = abs(c1 + c2 * s * 2.0 + c3 * (s * s) * 3.0)
 
 
-def _phases(sed: SedTraces) -> list[PPoly]:
-    """Return one monotone interpolant of SED for each phase between kinks."""
-    parts = np.searchsorted(sed.times_ms, sed.kinks_ms)
-    inner = parts[(parts > 0) & (parts < sed.times_ms.size - 1)]
+def _between_kinks(sed: SedTraces) -> list[PPoly]:
+    """Return one monotone interpolant of SED for each part between kinks."""
+    borders = np.searchsorted(sed.times_ms, sed.kinks_ms)
+    inner = borders[(borders > 0) & (borders < sed.times_ms.size - 1)]
     ends = [0, *inner.tolist(), sed.times_ms.size - 1]
     return [
         PchipInterpolator(sed.times_ms[first : last + 1], sed.sed_kpa[first : last + 1], axis=0)
@@ -259,13 +269,13 @@ def _knots(times_ms: FloatArray, pieces: int, shortest_piece_ms: float) -> Float
     return np.append(knots, times_ms[-1])
 
 
-def _difference(phases: list[PPoly], knots: list[FloatArray], step_ms: float) -> Drive:
+def _difference(parts: list[PPoly], knots: list[FloatArray], step_ms: float) -> Drive:
     """Compute the backward difference of Eq. 2 as printed: U' = |U(t) - U(t - h)| / h."""
-    given = np.concatenate([phases[0].x[:1], *(phase.x[1:] for phase in phases)])
-    sed = PPoly(np.concatenate([phase.c for phase in phases], axis=1), given)
+    given = np.concatenate([parts[0].x[:1], *(part.x[1:] for part in parts)])
+    sed = PPoly(np.concatenate([part.c for part in parts], axis=1), given)
     onset, end = given[0], given[-1]
-    # From one step after a kink on, the difference lies within one phase: a knot there limits the jump.
-    settled = np.array([phase.x[0] + step_ms for phase in phases])
+    # From one step after a kink on, the difference lies within one part: a knot there limits the jump.
+    settled = np.array([part.x[0] + step_ms for part in parts])
     times = np.unique(np.concatenate([*knots, settled[settled < end]]))
     before = np.maximum(times - step_ms, onset)
     return Drive(times, sed(times), np.abs(sed(times) - sed(before)) / step_ms)

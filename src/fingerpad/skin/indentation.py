@@ -177,6 +177,7 @@ class Touch:
         return SkinResponse(
             mesh=self.mesh,
             kinks_ms=self.stimulus.corners_ms,
+            phases=self.stimulus.phases,
             axis_x_mm=self.at_mm[0],
             direction=_rotation(self.tilt_deg, self.spin_deg)[:, 1].copy(),
             fields=fields,

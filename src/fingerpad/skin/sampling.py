@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array, one_of
 from fingerpad.core.errors import InputError
+from fingerpad.core.phases import Phase
 from fingerpad.core.signals import STORED_ENERGY, SedTraces
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.skin.fields import Place, sampled_fields, stored_fields
@@ -72,6 +73,8 @@ class SkinResponse:
         The linear solver, and why it was chosen.
     deformation : Deformation, optional
         All nodes and elements over time, of `Touch.solve(whole=True)`; stored files do not hold it.
+    phases : tuple of Phase
+        Named phases of the motion.
 
     Raises
     ------
@@ -91,6 +94,7 @@ class SkinResponse:
     factorisations: int
     linear_solver: str
     deformation: Deformation | None = None
+    phases: tuple[Phase, ...] = ()
 
     def __post_init__(self) -> None:
         declared = {field.name: field for field in stored_fields()}
@@ -216,6 +220,7 @@ class SkinResponse:
             dynamic[0] if dynamic else None,
             dynamic_quantity,
             static_quantity,
+            self.phases,
         )
 
     def sample(self, quantity: str, sites: ArrayLike) -> FloatArray:

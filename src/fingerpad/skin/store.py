@@ -73,7 +73,11 @@ def _plain(value: Any, is_float: bool = False) -> Any:
     if is_dataclass(value):
         return [
             class_tag(type(value)),
-            {field.name: _plain(getattr(value, field.name), _holds_floats(field)) for field in fields(value)},
+            {
+                field.name: _plain(getattr(value, field.name), _holds_floats(field))
+                for field in fields(value)
+                if field.compare
+            },
         ]
     if isinstance(value, tuple | list):
         return [_plain(item, is_float) for item in value]

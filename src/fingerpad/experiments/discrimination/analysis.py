@@ -34,6 +34,7 @@ from fingerpad.experiments.discrimination.task import (
 )
 from fingerpad.experiments.discrimination.task_stimuli import TaskStimulus, stimulus_index
 from fingerpad.neuron.population import Population
+from fingerpad.neuron.rate_windows import Windows, rate_windows_ms
 from fingerpad.psychophysics.code_efficiency import (
     EFFICIENCY_TRIALS,
     SMALLEST_SPREAD,
@@ -252,8 +253,7 @@ class PreparedTask:
 
     def __post_init__(self) -> None:
         task = self.task
-        for key in ("dynamic", "static"):
-            self._check_window(key, *getattr(task.windows_ms, key))
+        self._check_windows()
         for number, point in enumerate(task.observed.points if task.observed else (), start=1):
             if isinstance(point.at, str) or self.stimuli[0].level is None:
                 stimulus_index(self.stimuli, point.at, f"observed.points[{number}].at")
@@ -272,17 +272,22 @@ class PreparedTask:
                 f"does not vary: got {task.experiment.criterion_sigma:g}."
             )
 
-    def _check_window(self, key: str, start: float, end: float) -> None:
-        if not 0.0 <= start < end:
-            raise InputError(
-                f"windows_ms.{key} must be a start from 0 on and a later end: got {start:g}, {end:g}."
-            )
+    def _check_windows(self) -> None:
         for stimulus in self.stimuli:
-            if stimulus.motion.end_ms < end:
-                raise InputError(
-                    f"windows_ms.{key} must end with the stimuli, not at {end:g} ms: {stimulus.name!r} ends "
-                    f"at {stimulus.motion.end_ms:g} ms."
-                )
+            for key, (start, end) in zip(("dynamic", "static"), self._windows_ms(stimulus), strict=True):
+                if not 0.0 <= start < end:
+                    raise InputError(
+                        f"windows_ms.{key} must be a start from 0 on and a later end: got {start:g}, {end:g}."
+                    )
+                if stimulus.motion.end_ms < end:
+                    raise InputError(
+                        f"windows_ms.{key} must end with the stimuli, not at {end:g} ms: {stimulus.name!r} "
+                        f"ends at {stimulus.motion.end_ms:g} ms."
+                    )
+
+    def _windows_ms(self, stimulus: TaskStimulus) -> Windows:
+        asked = self.task.windows_ms
+        return rate_windows_ms(stimulus.motion.phases, asked.dynamic, asked.static)
 
     @cached_property
     def observed_comparisons(self) -> dict[int, float]:
@@ -319,9 +324,8 @@ class PreparedTask:
 
     def responses(self, skins: Mapping[str, Skin]) -> list[ResponseMap]:
         """Responses of the population to every stimulus."""
-        windows = self.task.windows_ms
         return [
-            self.population.respond(skins[stimulus.name], windows.dynamic, windows.static)
+            self.population.respond(skins[stimulus.name], *self._windows_ms(stimulus))
             for stimulus in self.stimuli
         ]
 

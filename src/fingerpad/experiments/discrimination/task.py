@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 
 from fingerpad.core.layouts import PATTERNS
-from fingerpad.data import protocol, psychophysics
+from fingerpad.data import psychophysics
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments.discrimination.task_types import (
     Count,
@@ -235,14 +235,15 @@ class WindowSettings(TaskPart):
     Parameters
     ----------
     dynamic, static : (float, float)
-        Start and end of the windows of the two rates. [ms]
+        Start and end of the windows of the two rates; without them they follow the phases of each stimulus,
+        as in `fingerpad.neuron.rate_windows`. [ms]
     latency : float
         Latest first spike that counts; a later one, or none, counts as this time. Without it, receptors that
         are silent under one stimulus are left out. [ms]
     """
 
-    dynamic: Pair = protocol.DYNAMIC_WINDOW.value
-    static: Pair = protocol.STATIC_WINDOW.value
+    dynamic: Pair | None = None
+    static: Pair | None = None
     latency: Positive | None = None
 
 

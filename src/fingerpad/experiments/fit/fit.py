@@ -23,10 +23,11 @@ from fingerpad.inference.identifiable import (
     IDENTIFIABLE_UNITS,
     identifiable,
 )
-from fingerpad.inference.rate_model import WINDOWS_MS, AfferentModel, Windows, four_number_model
+from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
+from fingerpad.neuron.rate_windows import Windows
 
 _PARTS = {
     "posterior": "fingerpad.experiments.fit.posterior:rate_posterior",
@@ -48,7 +49,7 @@ def fit_recordings(
     memberships: ArrayLike | None = None,
     *,
     method: str = "least_squares",
-    windows_ms: Windows = WINDOWS_MS,
+    windows_ms: Windows | None = None,
     seed: int = 0,
     with_posterior: bool = False,
     with_profiles: bool = False,
@@ -71,7 +72,8 @@ def fit_recordings(
     method : str, optional
         One of `fingerpad.experiments.fit.methods.METHODS`.
     windows_ms : ((float, float), (float, float)), optional
-        Windows of the dynamic and of the static rate; the paper's by default. [ms]
+        Windows of the dynamic and of the static rate; by default those that follow the phases of `sed`, the
+        paper's for the paper's motion. [ms]
     seed : int, optional
         Of methods that draw.
     with_posterior : bool, optional
@@ -95,7 +97,8 @@ def fit_recordings(
     ------
     InputError
         If there are fewer rates than free parameters in a training set, a fold has rates of 0 only, sizes
-        disagree, a stimulus ends before a window, or a likelihood is asked of rates.
+        disagree, windows are not given where phases differ, a stimulus ends before a window, or a likelihood
+        is asked of rates.
     ConvergenceError
         If a fit does not end.
 
@@ -113,12 +116,13 @@ def fit_recordings(
     >>> fit.fss_in_sample > 0.99, fit.fss_out_of_sample > 0.97
     (True, True)
     """
-    rates = recordings if isinstance(recordings, RateRecordings) else recordings.rates(windows_ms)
+    model = AfferentModel.of_traces(sed, windows_ms)
+    counted = model.used_windows_ms
+    rates = recordings if isinstance(recordings, RateRecordings) else recordings.rates(counted)
     if beside is not None:
         check_beside(beside)
     folds = folds_in_turn(len(rates.stimuli)) if memberships is None else np.asarray(memberships)
     check_enough(rates, folds, len(IDENTIFIABLE_NAMES) + (beside is not None))
-    model = AfferentModel.of_traces(sed, windows_ms)
     prepared = prepare(method, model, recordings, rates, seed)
     best = prepared.method.fit(prepared.problem, np.arange(len(rates.stimuli)))
     validation = cross_validate(prepared.problem, prepared.method, folds)

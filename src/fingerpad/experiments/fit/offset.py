@@ -28,9 +28,9 @@ from fingerpad.inference.fitting.cross_validation import cross_validate
 from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.fitting.methods import Continued, Method
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
-from fingerpad.inference.rate_model import Windows
 from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import RateRecordings
+from fingerpad.neuron.rate_windows import Windows
 
 Beside = Mapping[float, SedTraces | Sequence[SedTraces]]
 """Strain energy density by offset from the believed place, distal positive [mm], one column per stimulus."""
@@ -71,7 +71,7 @@ def fit_offset(
     rates: RateRecordings,
     memberships: IntArray,
     method: str,
-    windows_ms: Windows,
+    windows_ms: Windows | None,
     seed: int = 0,
 ) -> OffsetFit:
     """Fit the four numbers and the receptor's offset together, on the same folds.
@@ -86,8 +86,8 @@ def fit_offset(
         Fold of each stimulus.
     method : str
         One of `OFFSET_METHODS`.
-    windows_ms : ((float, float), (float, float))
-        Windows of the dynamic and of the static rate. [ms]
+    windows_ms : ((float, float), (float, float)) or None
+        As of `AfferentModel`. [ms]
     seed : int, optional
         Of methods that draw.
 

@@ -29,8 +29,8 @@ from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Bar, FlatPunch, Line, Sphere
 from fingerpad.inference.afferent_methods import OFFSETS_MM
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
-from fingerpad.inference.rate_model import WINDOWS_MS, Windows
 from fingerpad.inference.recordings import RateRecordings
+from fingerpad.neuron.rate_windows import Window, Windows, common_rate_windows_ms
 from fingerpad.skin.fields import sampled_fields
 from fingerpad.skin.indentation import Touch, touch_of
 
@@ -81,8 +81,9 @@ class FitRequest:
         One of `METHODS`.
     n_folds : int, optional
         Number of folds; not together with folds that the recordings give.
-    windows_ms : ((float, float), (float, float))
-        Windows of the dynamic and of the static rate. [ms]
+    windows_ms : ((float, float) or None, (float, float) or None)
+        Windows of the dynamic and of the static rate; one that is None follows the phases of the stimuli, and
+        is the paper's for the paper's motion. [ms]
     jobs : int
         Processes to use; the numbers do not depend on it.
     dynamic_quantity, static_quantity : str
@@ -109,7 +110,7 @@ class FitRequest:
     folder: Path
     method: str = "least_squares"
     n_folds: int | None = None
-    windows_ms: Windows = WINDOWS_MS
+    windows_ms: tuple[Window | None, Window | None] = (None, None)
     jobs: int = 1
     dynamic_quantity: str | None = None
     static_quantity: str | None = None
@@ -123,12 +124,12 @@ class FitRequest:
         for name, quantity in zip(("dynamic_quantity", "static_quantity"), self.quantities, strict=True):
             one_of(name, quantity, tuple(sampled_fields()))
         whole("jobs", self.jobs, at_least=1)
-        for start, end in self.windows_ms:
+        for start, end in self.used_windows_ms:
             if not 0.0 <= start < end:
                 raise InputError(
                     f"windows must be a start from 0 on and a later end: got {start:g}, {end:g}."
                 )
-        end = max(end for _, end in self.windows_ms)
+        end = max(end for _, end in self.used_windows_ms)
         for name, stimulus in self.recorded.stimuli.items():
             if stimulus.motion.end_ms < end:
                 raise InputError(
@@ -145,10 +146,16 @@ class FitRequest:
         self.touches  # noqa: B018
 
     @cached_property
+    def used_windows_ms(self) -> Windows:
+        """Windows of the two rates, the same for all stimuli. [ms]"""
+        touches = [stimulus.motion.phases for stimulus in self.recorded.stimuli.values()]
+        return common_rate_windows_ms(touches, *self.windows_ms)
+
+    @cached_property
     def rates(self) -> RateRecordings:
         """What is fitted."""
-        recordings = self.recorded.recordings
-        return recordings if isinstance(recordings, RateRecordings) else recordings.rates(self.windows_ms)
+        given = self.recorded.recordings
+        return given if isinstance(given, RateRecordings) else given.rates(self.used_windows_ms)
 
     @cached_property
     def memberships(self) -> IntArray:
@@ -273,7 +280,7 @@ def run_fit(
             recorded.recordings,
             request.memberships,
             method=request.method,
-            windows_ms=request.windows_ms,
+            windows_ms=request.used_windows_ms,
             seed=request.conditions.seed,
             with_posterior=request.with_posterior,
             with_profiles=request.with_profiles,
@@ -290,7 +297,7 @@ def run_fit(
             presentations=tuple(recorded.presentations.values()),
             spikes_after_hold=recorded.spikes_after_hold,
         ),
-        windows_ms=request.windows_ms,
+        windows_ms=request.used_windows_ms,
         dynamic_quantity=request.quantities[0],
         static_quantity=request.quantities[1],
         manifest=runner.manifest(

@@ -125,7 +125,7 @@ def prepare_spikes(
     sites = np.array([rates.stimuli.index(name) for name in trains.stimuli], dtype=np.int64)
     method = MaximumLikelihood(drive, trains, sites)
     return PreparedSpikes(
-        RateProblem(SoftAfferent(drive, model.windows_ms, seed), rates),
+        RateProblem(SoftAfferent(drive, model.used_windows_ms, seed), rates),
         method,
         lambda five: six_parameters(five[:4]),
         method.of(np.arange(drive.n_sites)),

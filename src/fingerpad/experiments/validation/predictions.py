@@ -22,6 +22,7 @@ from fingerpad.geometry.indenters import Indenter, Plate, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
+from fingerpad.neuron.spikes import firing_rate_hz
 from fingerpad.skin.indentation import Touch, settings_of, touch_of
 from fingerpad.skin.sampling import SkinResponse
 
@@ -278,7 +279,7 @@ def _resting_rate(model: FingertipModel) -> float:
     """Rate of the afferent without any touch. [spikes/s]"""
     afferent = model.responding
     rest = SedTraces.at_rest(RampAndHold().end_ms, afferent.dynamic_quantity, afferent.static_quantity)
-    return float(afferent.rates(rest, static_window_ms=model.static_window_ms)[1][0])
+    return float(firing_rate_hz(afferent.spikes(rest), model.static_window_ms)[0])
 
 
 _READING: Mapping[str, Callable[[Mapping[str, Value], FingertipModel], Reading]] = {

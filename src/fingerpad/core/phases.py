@@ -1,0 +1,68 @@
+"""Named phases of a touch, such as ramp and hold, in which responses are read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fingerpad.core.checks import finite
+from fingerpad.core.errors import InputError
+
+RAMP, HOLD = "ramp", "hold"
+"""Names of the phases in which the two rates of the paper are counted."""
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A named part of a touch.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    start_ms, end_ms : float
+        From when until when, since the start of the touch. [ms]
+
+    Raises
+    ------
+    InputError
+        If it has no name, or does not end after its start.
+    """
+
+    name: str
+    start_ms: float
+    end_ms: float
+
+    def __post_init__(self) -> None:
+        start, end = (finite(f"{at} of phase {self.name!r}", getattr(self, at), "ms")
+                      for at in ("start_ms", "end_ms"))  # fmt: skip
+        if not self.name or not 0.0 <= start < end:
+            raise InputError(
+                f"A phase needs a name, a start from 0 on and a later end: got {self.name!r}, {start:g} and "
+                f"{end:g} ms."
+            )
+
+    @property
+    def window_ms(self) -> tuple[float, float]:
+        """Start and end. [ms]"""
+        return self.start_ms, self.end_ms
+
+
+def ramp_and_hold(ramp_end_ms: float, hold_end_ms: float) -> tuple[Phase, Phase]:
+    """Phases of a ramp from 0 and of the hold after it. [ms]"""
+    return Phase(RAMP, 0.0, ramp_end_ms), Phase(HOLD, ramp_end_ms, hold_end_ms)
+
+
+def phase_named(phases: Sequence[Phase], name: str, asks: str = "phase") -> Phase:
+    """Return the first phase with a name, or raise `InputError` that says who asks.
+
+    Examples
+    --------
+    >>> phase_named(ramp_and_hold(50.0, 1000.0), "hold").window_ms
+    (50.0, 1000.0)
+    """
+    for phase in phases:
+        if phase.name == name:
+            return phase
+    names = ", ".join(phase.name for phase in phases) or "none"
+    raise InputError(f"{asks} must be given where no phase is called {name!r}: the phases are {names}.")
