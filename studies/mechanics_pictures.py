@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Sphere
-from fingerpad.geometry.motion import Trajectory, repeated
+from fingerpad.geometry.motions import repeated
+from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.press import PressSettings
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, write_png

@@ -30,7 +30,7 @@ from fingerpad.experiments.gerling2014.curvature_thresholds import (
     just_noticeable_difference,
 )
 from fingerpad.experiments.runner import Runner
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Stimulus
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
@@ -234,7 +234,7 @@ class Variant:
         Standard deviation of the place of the sphere from trial to trial, along and across. [mm]
     """
 
-    stimulus: Stimulus = field(default_factory=RampAndHold)
+    stimulus: RampAndHold | ForceRampAndHold = field(default_factory=RampAndHold)
     noise: str = "proportional to the rate"
     layout: tuple[int, int] = PAPER
     density_per_cm2: float = psychophysics.RECEPTOR_DENSITY.value

@@ -13,8 +13,9 @@ from fingerpad.experiments.discrimination.analysis import PreparedTask
 from fingerpad.experiments.discrimination.task_files import parse_task
 from fingerpad.experiments.discrimination.task_population import task_population
 from fingerpad.experiments.discrimination.task_stimuli import task_stimuli
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Trajectory
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.geometry.motions import repeated, sine
+from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.neuron.afferent import Afferent

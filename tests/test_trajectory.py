@@ -12,8 +12,9 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Bar, FlatPunch, Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Trajectory
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.geometry.motions import repeated, sine
+from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics import newton
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony

@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from fingerpad.geometry.fingertip import Fingertip
     from fingerpad.geometry.grading import Grading
     from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
-    from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Trajectory
+    from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+    from fingerpad.geometry.trajectory import Trajectory
     from fingerpad.mechanics.materials import (
         Energy,
         Hencky,
@@ -120,7 +121,8 @@ _HOMES = {
     "report.touch": ("save_figure",),
     "skin.sampling": ("SkinResponse", "SurfaceProfile"),
     "core.signals": ("CurrentTraces", "HitRates", "ResponseMap", "SedTraces", "SpikeTrains"),
-    "geometry.motion": ("ForceRampAndHold", "RampAndHold", "Trajectory"),
+    "geometry.motion": ("ForceRampAndHold", "RampAndHold"),
+    "geometry.trajectory": ("Trajectory",),
 }
 """Public names by the module that defines them."""
 

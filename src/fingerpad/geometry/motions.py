@@ -11,7 +11,7 @@ from fingerpad.core.checks import not_negative, positive, whole
 from fingerpad.core.phases import Phase
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data import protocol
-from fingerpad.geometry.motion import Trajectory
+from fingerpad.geometry.trajectory import Trajectory
 
 SAMPLES_PER_CYCLE = 20
 """Samples of a sine per cycle; a line between two of them misses it by up to 1.2 % of the amplitude."""

@@ -1,0 +1,237 @@
+"""Any course of the depth or the force of an indenter, of its place and of its rotation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import groupby, pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import FloatArray, float_array, increasing
+from fingerpad.core.errors import InputError
+from fingerpad.core.phases import HOLD, RAMP, Phase
+from fingerpad.geometry.motion import STILL, TURN_LIKE_MM, Motion, Pose, hold_ends_ms
+
+POSE_COLUMNS = ("x_mm", "z_mm", "tilt_deg", "spin_deg")
+"""Columns of a trajectory that say where the indenter stands, beside its depth or force."""
+
+SAME_SPEED = 1e-6
+"""Change of speed, over the largest speed of a trajectory, below which it goes on at the same speed."""
+
+CORNER_SHARE, CORNER_OVER_NEIGHBOURS = 0.5, 3.0
+"""A sample is a corner if the speed changes there by more than this share of the largest speed, or by more
+than this many times its change at the samples beside it, as it does not along a smooth curve."""
+
+SAME_VALUE = 0.02
+"""Change over the largest depth, force or way of a trajectory below which it holds; recordings have noise."""
+
+
+@dataclass(frozen=True)
+class Trajectory(Motion):
+    """Move the indenter along any course of depth or of force, back as well as forth, aside and turning.
+
+    All is linear between the samples. Contact may be lost and made again: a depth below 0 lifts the indenter
+    off the undeformed skin, and skin that still recovers follows it or stays behind. Depth and force are
+    along the direction of pressing at first touch, however the indenter moves and turns later
+    (docs/decisions/pose-over-time.md).
+
+    Parameters
+    ----------
+    times_ms : sequence of float
+        Increasing times from 0. [ms]
+    depth_mm : sequence of float, optional
+        Depth at these times, 0 at first touch of the undeformed skin, from 0 or less. [mm]
+    force_mn : sequence of float, optional
+        Instead of a depth, force along the direction of pressing on the whole finger, from 0. [mN]
+    x_mm, z_mm : sequence of float, optional
+        How far the indenter has moved along the finger, distal positive, and across it since first touch,
+        from 0; it stays in its place by default. [mm]
+    tilt_deg, spin_deg : sequence of float, optional
+        How far it has turned about its tip since first touch, from 0, as `tilt_deg` and `spin_deg` of a
+        `Touch`, to which they are added; it does not turn by default. [degrees]
+    phases : sequence of Phase, optional
+        Names of its parts. By default it is divided where it changes its course: "ramp" goes deeper, "hold"
+        stays, "move" goes aside or turns, "release" comes back, "pause" stays out of contact and "course" is
+        any other part; from the second on they are numbered, as "ramp 2".
+
+    Raises
+    ------
+    InputError
+        If not exactly one of depth and force is given, lengths differ, times do not increase from 0, a value
+        is not finite, a force is negative, a way or rotation does not start at 0, the indenter never presses,
+        or a phase goes beyond the last time.
+
+    Examples
+    --------
+    Press for half a second, release within 50 ms, and let the skin recover:
+
+    >>> release = Trajectory([0.0, 50.0, 500.0, 550.0, 1000.0], depth_mm=[0.0, 1.0, 1.0, 0.0, 0.0])
+    >>> release.prescribed_at([25.0, 525.0]).tolist()
+    [0.5, 0.5]
+    >>> release.corners_ms
+    (50.0, 500.0, 550.0)
+    >>> [phase.name for phase in release.phases]
+    ['ramp', 'hold', 'release', 'pause']
+    """
+
+    times_ms: tuple[float, ...]
+    depth_mm: tuple[float, ...] | None = None
+    force_mn: tuple[float, ...] | None = None
+    x_mm: tuple[float, ...] | None = None
+    z_mm: tuple[float, ...] | None = None
+    tilt_deg: tuple[float, ...] | None = None
+    spin_deg: tuple[float, ...] | None = None
+    # Names do not change what is pressed, and a stored press is found by what is compared.
+    phases: tuple[Phase, ...] = field(default=(), compare=False)
+
+    def __post_init__(self) -> None:
+        times = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
+        if times.size < 2 or times[0] != 0.0:
+            raise InputError(f"times_ms must hold at least two times, the first of them 0: got {times}.")
+        if (self.depth_mm is None) == (self.force_mn is None):
+            raise InputError("A trajectory needs either depth_mm or force_mn: give one of them.")
+        name = "force_mn" if self.depth_mm is None else "depth_mm"
+        for column in (name, *POSE_COLUMNS):
+            if getattr(self, column) is None:
+                continue
+            values = float_array(column, getattr(self, column), 1)
+            if values.size != times.size:
+                raise InputError(f"{column} must have one value per time, {times.size}: got {values.size}.")
+            if column in POSE_COLUMNS and values[0] != 0.0:
+                raise InputError(
+                    f"{column} must begin with 0, since it is counted from first touch: got {values[0]:g}."
+                )
+            object.__setattr__(self, column, tuple(values.tolist()))
+        values = np.array(getattr(self, name))
+        if values[0] > 0.0 or (name == "force_mn" and values.min() < 0.0):
+            allowed = "0, and never be negative" if name == "force_mn" else "0 or less, without contact"
+            raise InputError(f"{name} must begin with {allowed}: it begins with {values[0]:g}.")
+        if values.max() <= 0.0:
+            raise InputError(f"{name} must be above 0 at some time: the indenter would never press.")
+        object.__setattr__(self, "times_ms", tuple(times.tolist()))
+        object.__setattr__(self, "phases", tuple(self.phases) or self._phases_of_course())
+        for phase in self.phases:
+            if phase.end_ms > self.end_ms:
+                raise InputError(
+                    f"phases must end with the trajectory, at {self.end_ms:g} ms: {phase.name!r} ends at "
+                    f"{phase.end_ms:g} ms."
+                )
+
+    @property
+    def by_force(self) -> bool:  # type: ignore[override]
+        """Whether the force is prescribed instead of the depth."""
+        return self.force_mn is not None
+
+    @property
+    def prescribed(self) -> tuple[float, ...]:
+        """Depth [mm] or force [mN] at the samples."""
+        values = self.force_mn if self.depth_mm is None else self.depth_mm
+        assert values is not None
+        return values
+
+    @property
+    def largest(self) -> float:
+        """Largest depth [mm] or force [mN]."""
+        return max(self.prescribed)
+
+    @property
+    def end_ms(self) -> float:
+        """Last sample. [ms]"""
+        return self.times_ms[-1]
+
+    @property
+    def poses(self) -> tuple[Pose, ...]:
+        """Pose of the indenter at the samples; one if it only goes up and down."""
+        columns = [getattr(self, name) for name in POSE_COLUMNS]
+        if not any(column is not None and any(column) for column in columns):
+            return (STILL,)
+        still = (0.0,) * len(self.times_ms)
+        return tuple(Pose(*row) for row in zip(*(column or still for column in columns), strict=True))
+
+    def pose_at(self, time_ms: float) -> Pose:
+        """Pose of the indenter at a time [ms]."""
+        columns = (getattr(self, name) for name in POSE_COLUMNS)
+        return Pose(
+            *(0.0 if each is None else float(np.interp(time_ms, self.times_ms, each)) for each in columns)
+        )
+
+    @property
+    def _course(self) -> FloatArray:
+        """Depth or force over the largest, way in mm and rotations over `TURN_LIKE_MM`: (n_samples, 5)."""
+        ways = np.array([pose.way for pose in self.poses]) / [1.0, 1.0, TURN_LIKE_MM, TURN_LIKE_MM]
+        prescribed = np.array(self.prescribed) / self.largest
+        return np.column_stack([prescribed, np.broadcast_to(ways, (prescribed.size, 4))])
+
+    @property
+    def corners_ms(self) -> tuple[float, ...]:
+        """Samples at which the speed jumps, other than along a smooth curve; without start and end. [ms]"""
+        speed = np.diff(self._course, axis=0) / np.diff(self.times_ms)[:, None]
+        change = np.linalg.norm(np.diff(speed, axis=0, prepend=speed[:1], append=speed[-1:]), axis=1)
+        change /= np.linalg.norm(speed, axis=1).max()
+        corners = change > CORNER_SHARE
+        while True:
+            # A corner says nothing about the curve beside it, on which there may be another one.
+            smooth = np.where(corners, 0.0, change)
+            beside = np.maximum(np.roll(smooth, 1), np.roll(smooth, -1))
+            found = smooth > CORNER_OVER_NEIGHBOURS * beside + SAME_SPEED
+            if not found.any():
+                return tuple(np.array(self.times_ms)[corners].tolist())
+            corners |= found
+
+    def _phases_of_course(self) -> tuple[Phase, ...]:
+        """Phases named by what the indenter does between corners, adjacent equal ones as one."""
+        course, corners = self._course, np.searchsorted(self.times_ms, self.corners_ms).tolist()
+        parts = list(pairwise([0, *corners, len(self.times_ms) - 1]))
+        phases: list[Phase] = []
+        for kind, group in groupby(parts, lambda part: self._kind(course[part[0] : part[1] + 1])):
+            same = list(group)
+            count = 1 + sum(phase.name.split()[0] == kind for phase in phases)
+            name = kind if count == 1 else f"{kind} {count}"
+            phases.append(Phase(name, self.times_ms[same[0][0]], self.times_ms[same[-1][1]]))
+        return tuple(phases)
+
+    @staticmethod
+    def _kind(course: FloatArray) -> str:
+        """Say what the indenter does in a part of its `_course`."""
+        prescribed, ways = course[:, 0], course[:, 1:]
+        if np.ptp(prescribed) <= SAME_VALUE:
+            if np.ptp(ways, axis=0).max() > SAME_VALUE:
+                return "move"
+            return HOLD if prescribed.max() > SAME_VALUE else "pause"
+        if (np.maximum.accumulate(prescribed) - prescribed).max() <= SAME_VALUE:
+            return RAMP
+        released = (prescribed - np.minimum.accumulate(prescribed)).max() <= SAME_VALUE
+        return "release" if released else "course"
+
+    def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
+        """Depth [mm] or force [mN] at `times_ms`, any shape."""
+        return np.interp(np.asarray(times_ms, dtype=float), self.times_ms, self.prescribed)
+
+    def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
+        """List the times to solve at: all samples, and times between them where they are far apart. [ms]
+
+        A part of the way takes its share of `ramp_steps`, which is also the number of steps per mm aside. A
+        hold longer than the step before it takes `hold_steps`, which grow geometrically, because relaxation
+        is fastest at its beginning.
+
+        Examples
+        --------
+        >>> Trajectory([0.0, 50.0, 1000.0], depth_mm=[0.0, 1.0, 1.0]).step_times_ms(2, 3).round(1).tolist()
+        [0.0, 25.0, 50.0, 75.0, 204.1, 1000.0]
+        """
+        times, last_ms = [0.0], np.inf
+        moved_by = np.linalg.norm(np.diff(self._course, axis=0), axis=1)
+        for start, end, moved in zip(self.times_ms, self.times_ms[1:], moved_by, strict=False):
+            length_ms = end - start
+            if moved > SAME_SPEED:
+                steps = int(np.ceil(ramp_steps * moved - SAME_SPEED))
+                since = np.linspace(0.0, length_ms, steps + 1)[1:]
+            elif length_ms > last_ms * (1.0 + SAME_SPEED):
+                since = hold_ends_ms(length_ms, last_ms, hold_steps)
+            else:
+                since = np.array([length_ms])
+            last_ms = since[-1] - (since[-2] if since.size > 1 else 0.0)
+            times += (start + since[:-1]).tolist()
+            times.append(end)
+        return np.array(times)
