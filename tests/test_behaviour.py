@@ -159,7 +159,7 @@ def test_every_class_has_a_tag_of_its_own():
 
 
 def test_every_source_that_mechanics_imports_counts():
-    """Apart from what cannot alter a solved number: checks, errors, names of phases, a notice, results, inputs.
+    """Apart from what cannot alter a number: checks, errors, names of phases, a notice, results, inputs.
 
     Published values reach an indentation as its own fields, which are in the key already.
     """
