@@ -12,7 +12,7 @@ from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics import press as press_module
 from fingerpad.mechanics.contact import Contact, Placement, place
-from fingerpad.mechanics.friction import Anchors, dragged, friction, rubbing_heat
+from fingerpad.mechanics.friction import Anchors, Approach, dragged, friction, slid_mm
 from fingerpad.mechanics.linear import free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings
@@ -35,6 +35,11 @@ def names(body):
 # One node
 
 
+def at_rest(nodes):
+    """No contact yet with nodes at their places in the frame of an indenter at the origin."""
+    return Anchors.none_held(Approach.at_rest(nodes, nodes, tip_mm=np.zeros(3)))
+
+
 def some_anchors(n=30, seed=0):
     """Nodes around their anchors: some stick, some slip, one has no limit."""
     generator = np.random.default_rng(seed)
@@ -42,7 +47,7 @@ def some_anchors(n=30, seed=0):
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     anchor = generator.normal(size=(n, 3))
     limit = np.append(generator.uniform(0.5, 2.0, n - 1), 0.0)
-    anchors = replace(Anchors.none_held(anchor), normal=normal, limit_mn=limit)
+    anchors = replace(at_rest(anchor), normal=normal, limit_mn=limit)
     return anchors, anchor + generator.uniform(-0.01, 0.01, (n, 3)), generator.uniform(100.0, 300.0, n)
 
 
@@ -95,20 +100,20 @@ def test_tangent_of_any_pull_is_symmetric_and_never_indefinite():
 def test_node_dragged_to_and_fro_follows_the_loop_of_stick_and_slip():
     """Spring k = 100 mN/mm with a slider at L = 1 mN, in series, driven along x: the closed loop by hand."""
     up, zero = np.array([[0.0, 1.0, 0.0]]), np.zeros((1, 3))
-    anchors = replace(Anchors.none_held(zero), normal=up, limit_mn=np.array([1.0]))
+    anchors = replace(at_rest(zero), normal=up, limit_mn=np.array([1.0]))
     stiffness, touching = np.array([100.0]), np.array([True])
     forces, heat_uj = [], 0.0
     for x in (0.005, 0.01, 0.05, 0.045, 0.03, 0.025, -0.2, -0.19, -0.17):
         local = np.array([[x, 0.0, 0.0]])
         forces.append(friction(anchors, local, stiffness).force_mn[0, 0])
-        after = dragged(anchors, local, stiffness, touching, depth_mm=0.1)
-        heat_uj += rubbing_heat(anchors, anchors, after)
+        after = dragged(anchors, local, stiffness, touching)
+        heat_uj += float(anchors.limit_mn @ slid_mm(anchors, after))
         anchors = after
     np.testing.assert_allclose(forces, [-0.5, -1, -1, -0.5, 1, 1, 1, 0, -1], atol=1e-12)
     # Heat is the limit times the way of the slider: from 0 to 0.04, to -0.19 and to -0.18 mm.
     np.testing.assert_allclose(heat_uj, 0.04 + 0.23 + 0.01, rtol=1e-9)
     assert anchors.held.all()
-    free = dragged(anchors, local, stiffness, ~touching, depth_mm=0.1)
+    free = dragged(anchors, local, stiffness, ~touching)
     assert not friction(free, local + 0.1, stiffness).force_mn.any()
 
 
@@ -123,7 +128,7 @@ def test_node_is_anchored_where_it_met_the_indenter():
     assert rise[1] < depth < rise[2]
     moved = nodes + np.array([0.0, 0.02, 0.0])
     state = contact.state(moved, depth, np.zeros(3))
-    anchors = contact.renewed(Anchors.none_held(nodes), state, moved, depth)
+    anchors = contact.renewed(contact.free_anchors(nodes), state, moved, depth)
     np.testing.assert_allclose(anchors.anchor_mm[0], nodes[0], atol=1e-15)
     # The gap is not linear in depth, hence 1 % of the way.
     np.testing.assert_allclose(anchors.anchor_mm[1], [0.4, -rise[1], 0.0], atol=0.01 * depth)

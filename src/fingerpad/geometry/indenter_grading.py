@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import cosine_and_sine
-from fingerpad.geometry.grading import Grading, resolution_grading
+from fingerpad.geometry.grading import Grading, covering, resolution_grading
 from fingerpad.geometry.indenters import Indenter
+from fingerpad.geometry.motion import Pose
 
 THIN_SIZE_MM = 0.025
 """Size along the finger of elements below a wire: two across the strip in contact. [mm]"""
@@ -76,6 +78,38 @@ def grading_about(
     largest = EDGE_SIZE_MM if spin_deg % 90.0 == 0.0 else OBLIQUE_SIZE_MM
     size = min(largest[resolution], indenter.narrowest_mm / ACROSS_GROOVE)
     return _finer_across_edges(grading, size, indenter.edge_reach_mm, spin_deg)
+
+
+def grading_along(
+    indenter: Indenter, resolution: str, x_mm: float, z_mm: float, spin_deg: float, poses: Sequence[Pose]
+) -> Grading:
+    """Grading that is fine under an indenter wherever it goes.
+
+    Parameters
+    ----------
+    indenter, resolution, x_mm, z_mm, spin_deg
+        As for `grading_about`, at first touch.
+    poses : sequence of Pose
+        Poses between which it moves along straight lines.
+
+    Returns
+    -------
+    Grading
+        It covers the gradings about all poses.
+
+    Examples
+    --------
+    >>> from fingerpad.geometry.indenters import Sphere
+    >>> slides = grading_along(Sphere(), "quick", 17.0, 0.0, 0.0, [Pose(), Pose(x_mm=4.0)])
+    >>> slides.centre_mm, round(slides.half_length_mm, 2)
+    (19.0, 6.48)
+    """
+    places = {(pose.x_mm, pose.z_mm, pose.spin_deg) for pose in poses}
+    outermost = sorted(places, key=lambda place: (place[2], place[0], place[1]))
+    gradings = [
+        grading_about(indenter, resolution, x_mm + x, z_mm + z, spin_deg + spin) for x, z, spin in outermost
+    ]
+    return covering(gradings)
 
 
 def _finer_across_edges(grading: Grading, size_mm: float, reach_mm: float, spin_deg: float) -> Grading:

@@ -63,6 +63,15 @@ class Motion:
         """Pose of the indenter at a time [ms]."""
         return STILL
 
+    def course_at(self, time_ms: float) -> FloatArray:
+        """Where the motion is at a time [ms], in numbers of one order, (5,).
+
+        Depth or force over the largest, ways in mm and rotations over `TURN_LIKE_MM`.
+        """
+        pose = self.pose_at(time_ms)
+        prescribed = float(self.prescribed_at(time_ms)) / self.largest
+        return np.array([prescribed, *(pose.way / [1.0, 1.0, TURN_LIKE_MM, TURN_LIKE_MM])])
+
     @property
     def stays(self) -> bool:
         """Whether the indenter only goes up and down."""
@@ -91,6 +100,11 @@ class Motion:
     def largest(self) -> float:
         """Largest depth [mm] or force [mN]."""
         raise NotImplementedError
+
+    @property
+    def depths_mm(self) -> tuple[float, ...]:
+        """Prescribed depth in each of `poses`, the largest if there is only one. [mm]"""
+        return (self.largest,)
 
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
         """Depth [mm] or force [mN] at `times_ms`, any shape."""

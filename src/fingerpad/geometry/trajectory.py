@@ -136,6 +136,11 @@ class Trajectory(Motion):
         return max(self.prescribed)
 
     @property
+    def depths_mm(self) -> tuple[float, ...]:
+        """Prescribed depth in each of `poses`, the largest if there is only one. [mm]"""
+        return (self.largest,) if self.stays else self.prescribed
+
+    @property
     def end_ms(self) -> float:
         """Last sample. [ms]"""
         return self.times_ms[-1]

@@ -4,7 +4,8 @@
 
 Each term is computed independently, so their balance is a check of the indentation:
 
-- external: the force of the indenter over its path, integral of F dd;
+- external: the force of the indenter over its path, integral of F dd, also aside, and its torque over its
+  rotations;
 - stored: the energy that springs hold now, summed over the elements (`viscoelastic.stored_energy_density`);
 - dissipated: what flows in the dampers of the Prony series, at 2 e_i / tau_i for a branch that holds e_i, and
   what friction turns into heat;
@@ -95,15 +96,16 @@ class Entry(NamedTuple):
     ----------
     time_ms : float
         End of the step. [ms]
-    depth_mm, force_mn : float
-        The indenter's advance and its force along it. [mm, mN]
+    way, force : tuple of 5 floats
+        The indenter's advance, ways along x and z [mm] and rotations [radians], and the forces [mN] and
+        torques [mN mm] that do work on them.
     stored_uj, dissipated_uj, contact_uj : float
         As in `EnergyBalance`; dissipated and contact are sums over all steps up to here. [µJ]
     """
 
     time_ms: float = 0.0
-    depth_mm: float = 0.0
-    force_mn: float = 0.0
+    way: tuple[float, ...] = (0.0,) * 5
+    force: tuple[float, ...] = (0.0,) * 5
     stored_uj: float = 0.0
     dissipated_uj: float = 0.0
     contact_uj: float = 0.0
@@ -124,8 +126,14 @@ def energy_balance(entries: Sequence[Entry], kinks_ms: Sequence[float]) -> Energ
     EnergyBalance
         One row per entry.
     """
-    times, depth, force, stored, dissipated, contact = np.array(entries).T
-    return EnergyBalance(times, indenter_work(times, depth, force, kinks_ms), stored, dissipated, contact)
+    times, ways, forces, stored, dissipated, contact = (
+        np.array(column).T for column in zip(*entries, strict=True)
+    )
+    external = np.zeros(times.size)
+    for way, force in zip(ways, forces, strict=True):
+        if way.any():
+            external += indenter_work(times, way, force, kinks_ms)
+    return EnergyBalance(times, external, stored, dissipated, contact)
 
 
 def indenter_work(

@@ -19,8 +19,10 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, not_negative
 from fingerpad.core.errors import InputError
+from fingerpad.core.units import cosine_and_sine
 from fingerpad.geometry.indenters import Indenter
-from fingerpad.mechanics.friction import Anchors, Friction, dragged, friction
+from fingerpad.geometry.motion import STILL, Pose
+from fingerpad.mechanics.friction import Anchors, Approach, Friction, dragged, friction
 
 PENALTY_KPA_PER_MM = 15_000.0
 """Contact stiffness per area; skin pressures of 10-100 kPa then penetrate by a few microns. [kPa/mm]"""
@@ -38,20 +40,65 @@ class Placement:
     origin_mm : array (3,)
         Position of the indenter's tip at first touch. [mm]
     rotation : array (3, 3)
-        Columns are the indenter's x, y (direction of pressing) and z axes in the finger's frame.
+        Columns are the indenter's x, y and z axes in the finger's frame.
+    pressing : array (3,), optional
+        Unit direction of pressing; the indenter's y axis by default, as it is until the indenter tilts.
     """
 
     origin_mm: FloatArray
     rotation: FloatArray
+    pressing: FloatArray | None = None
 
     @property
     def axis(self) -> FloatArray:
         """Unit direction of pressing, (3,)."""
-        return self.rotation[:, 1]
+        return self.rotation[:, 1] if self.pressing is None else self.pressing
+
+    def tip_mm(self, depth_mm: float) -> FloatArray:
+        """Position of the tip of the indenter that has advanced by `depth_mm`, (3,). [mm]"""
+        return self.origin_mm + depth_mm * self.axis
 
     def to_local(self, points_mm: FloatArray, depth_mm: float) -> FloatArray:
         """Points (n, 3) in the frame of the indenter that has advanced by `depth_mm`. [mm]"""
         return (points_mm - self.origin_mm - depth_mm * self.axis) @ self.rotation
+
+    def moved(self, pose: Pose) -> Placement:
+        """Where the indenter of this first touch stands in a later pose."""
+        if pose == STILL:
+            return self
+        tilt, spin = rotation_of(pose.tilt_deg, 0.0), rotation_of(0.0, pose.spin_deg)
+        origin_mm = self.origin_mm + np.array([pose.x_mm, 0.0, pose.z_mm])
+        return Placement(origin_mm, tilt @ self.rotation @ spin, self.axis)
+
+    def generalised_force(self, force_mn: FloatArray, points_mm: FloatArray, depth_mm: float) -> FloatArray:
+        """Return the forces that do work on the advance, the ways along x and z, the tilt and the spin.
+
+        Parameters
+        ----------
+        force_mn : array (n, 3)
+            Forces of the indenter on points of the skin. [mN]
+        points_mm : array (n, 3)
+            These points. [mm]
+        depth_mm : float
+            How far the indenter has advanced. [mm]
+
+        Returns
+        -------
+        array (5,)
+            Three forces [mN], two torques about the tip [mN mm per radian].
+        """
+        force = force_mn.sum(axis=0)
+        torque = np.cross(points_mm - self.tip_mm(depth_mm), force_mn).sum(axis=0)
+        # A positive tilt turns about the finger's z axis, a positive spin about the indenter's -y axis.
+        return np.array([force @ self.axis, force[0], force[2], torque[2], -(torque @ self.rotation[:, 1])])
+
+
+def rotation_of(tilt_deg: float, spin_deg: float) -> FloatArray:
+    """Axes of an indenter tilted about z and then turned about its own y, as columns."""
+    cosine, sine = np.cos(np.deg2rad(tilt_deg)), np.sin(np.deg2rad(tilt_deg))
+    tilt = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    along, towards = cosine_and_sine(spin_deg)
+    return tilt @ np.array([[along, 0.0, -towards], [0.0, 1.0, 0.0], [towards, 0.0, along]])
 
 
 def place(indenter: Indenter, skin_mm: FloatArray, at_mm: FloatArray, rotation: FloatArray) -> Placement:
@@ -217,6 +264,11 @@ class Contact:
             friction=rubbed,
         )
 
+    def free_anchors(self, skin_mm: FloatArray) -> Anchors:
+        """Anchors of the candidate nodes at rest, `skin_mm` (n, 3), before anything touches them."""
+        local_mm = self.placement.to_local(skin_mm, depth_mm=0.0)
+        return Anchors.none_held(Approach.at_rest(local_mm, skin_mm, self.placement.tip_mm(0.0)))
+
     def renewed(
         self, start: Anchors, state: ContactState, positions_mm: FloatArray, depth_mm: float
     ) -> Anchors:
@@ -226,12 +278,14 @@ class Contact:
         gone on as in the step before; if it would not have met it, where it is.
         """
         local = self.placement.to_local(positions_mm, depth_mm)
-        approach = (depth_mm - start.depth_before_mm) * start.approach
-        gap_before = np.maximum(self.indenter.gap(start.before_mm)[0], 0.0)
-        gap_after = self.indenter.gap(start.before_mm + approach)[0]
+        expected_mm = start.approach.expected_mm(self.placement.tip_mm(depth_mm))
+        before = start.approach.local_mm
+        way = self.placement.to_local(expected_mm, depth_mm) - before
+        gap_before = np.maximum(self.indenter.gap(before)[0], 0.0)
+        gap_after = self.indenter.gap(before + way)[0]
         met = gap_after < 0.0
         share = np.where(met, gap_before / np.where(met, gap_before - gap_after, 1.0), 1.0)
-        first_touch = np.where(met[:, None], start.before_mm + share[:, None] * approach, local)
+        first_touch = np.where(met[:, None], before + share[:, None] * way, local)
         return replace(
             start,
             anchor_mm=np.where(start.held[:, None], start.anchor_mm, first_touch),
@@ -245,7 +299,9 @@ class Contact:
     ) -> Anchors:
         """Anchors with which the next step starts."""
         local = self.placement.to_local(positions_mm, depth_mm)
-        return dragged(anchors, local, self.stiffness, state.pressed_mn > 0.0, depth_mm)
+        after = dragged(anchors, local, self.stiffness, state.pressed_mn > 0.0)
+        approach = anchors.approach.after(local, positions_mm, self.placement.tip_mm(depth_mm))
+        return replace(after, approach=approach)
 
     def curvature_stiffness(
         self, state: ContactState, positions_mm: FloatArray, depth_mm: float

@@ -19,11 +19,55 @@ not indefinite; they are renewed between its runs until the equilibrium no longe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
+
+MOST_EXPECTED = 4.0
+"""Largest factor by which the last step of free skin is extended to where it is expected next."""
+
+
+@dataclass(frozen=True)
+class Approach:
+    """Skin and indenter at the end of the step before, and how they moved in it.
+
+    Parameters
+    ----------
+    local_mm : array (n, 3)
+        Nodes in the indenter's frame of then. [mm]
+    skin_mm, skin_step_mm : array (n, 3)
+        Nodes in the finger's frame, and their motion in that step. [mm]
+    tip_mm, tip_step_mm : array (3,)
+        The indenter's tip, and its motion. [mm]
+    """
+
+    local_mm: FloatArray
+    skin_mm: FloatArray
+    skin_step_mm: FloatArray
+    tip_mm: FloatArray
+    tip_step_mm: FloatArray
+
+    @classmethod
+    def at_rest(cls, local_mm: FloatArray, skin_mm: FloatArray, tip_mm: FloatArray) -> Approach:
+        """Nothing has moved yet."""
+        return cls(local_mm, skin_mm, np.zeros_like(skin_mm), tip_mm, np.zeros(3))
+
+    def after(self, local_mm: FloatArray, skin_mm: FloatArray, tip_mm: FloatArray) -> Approach:
+        """Return the approach after one more step."""
+        return Approach(local_mm, skin_mm, skin_mm - self.skin_mm, tip_mm, tip_mm - self.tip_mm)
+
+    def expected_mm(self, tip_mm: FloatArray) -> FloatArray:
+        """Nodes in the finger's frame, had they gone on with the tip as in the step before. [mm]
+
+        Only as far as the tip goes on in the same direction: after a change of direction free skin is
+        expected to stay.
+        """
+        before = float(self.tip_step_mm @ self.tip_step_mm)
+        further = float((tip_mm - self.tip_mm) @ self.tip_step_mm)
+        ratio = float(np.clip(further / before, 0.0, MOST_EXPECTED)) if before > 0.0 else 0.0
+        return self.skin_mm + ratio * self.skin_step_mm
 
 
 @dataclass(frozen=True)
@@ -42,12 +86,8 @@ class Anchors:
         t, where the search for the pull begins, see `friction`. [mN]
     held : bool array (n,)
         Nodes that were in contact at the end of the step before.
-    before_mm : array (n, 3)
-        Nodes at the end of the step before, in the indenter's frame of then. [mm]
-    depth_before_mm : float
-        Depth of the indenter then. [mm]
-    approach : array (n, 3)
-        Motion of the nodes in the indenter's frame in the step before, per depth gained.
+    approach : Approach
+        Motion of skin and indenter in the step before.
     """
 
     anchor_mm: FloatArray
@@ -55,16 +95,13 @@ class Anchors:
     limit_mn: FloatArray
     pull_mn: FloatArray
     held: np.ndarray
-    before_mm: FloatArray
-    depth_before_mm: float
-    approach: FloatArray
+    approach: Approach
 
     @classmethod
-    def none_held(cls, local_mm: FloatArray) -> Anchors:
-        """No contact yet: nodes `local_mm` (n, 3) in the frame of the indenter at first touch."""
-        n = len(local_mm)
-        zero, still = np.zeros((n, 3)), np.tile([0.0, -1.0, 0.0], (n, 1))
-        return cls(local_mm, zero, np.zeros(n), zero, np.zeros(n, dtype=bool), local_mm, 0.0, still)
+    def none_held(cls, approach: Approach) -> Anchors:
+        """No contact yet."""
+        n, zero = len(approach.local_mm), np.zeros_like(approach.local_mm)
+        return cls(approach.local_mm, zero, np.zeros(n), zero, np.zeros(n, dtype=bool), approach)
 
 
 @dataclass(frozen=True)
@@ -130,7 +167,8 @@ def friction(
 
     >>> from dataclasses import replace
     >>> up, zero = np.array([[0.0, 1.0, 0.0]]), np.zeros((1, 3))
-    >>> anchors = replace(Anchors.none_held(zero), normal=up, limit_mn=np.array([0.5 * 2.0]))
+    >>> free = Anchors.none_held(Approach.at_rest(zero, zero, tip_mm=np.zeros(3)))
+    >>> anchors = replace(free, normal=up, limit_mn=np.array([0.5 * 2.0]))
     >>> for slip_mm in (0.001, 0.1):
     ...     there = np.array([[slip_mm, 0.0, 0.0]])
     ...     print(friction(anchors, there, np.array([100.0])).force_mn[0, 0].round(6))
@@ -169,9 +207,7 @@ def _slip(
     return g, s, m, np.where(slips[:, None], g / np.where(s > 0.0, s, 1.0)[:, None], 0.0)
 
 
-def dragged(
-    anchors: Anchors, local_mm: FloatArray, stiffness: FloatArray, touching: np.ndarray, depth_mm: float
-) -> Anchors:
+def dragged(anchors: Anchors, local_mm: FloatArray, stiffness: FloatArray, touching: np.ndarray) -> Anchors:
     """Anchors with which the next step starts: of nodes that slip they follow, of nodes set free they go.
 
     Parameters
@@ -184,41 +220,29 @@ def dragged(
         k. [mN/mm]
     touching : bool array (n,)
         Nodes in contact there.
-    depth_mm : float
-        Depth of the indenter there. [mm]
 
     Returns
     -------
     Anchors
     """
     pull = np.where(touching[:, None], -friction(anchors, local_mm, stiffness).force_mn, 0.0)
-    gained = depth_mm - anchors.depth_before_mm
-    return Anchors(
+    return replace(
+        anchors,
         anchor_mm=local_mm - pull / stiffness[:, None],
-        normal=anchors.normal,
         limit_mn=np.where(touching, anchors.limit_mn, 0.0),
         pull_mn=pull,
         held=touching,
-        before_mm=local_mm,
-        depth_before_mm=depth_mm,
-        approach=(local_mm - anchors.before_mm) / gained if gained > 0.0 else anchors.approach,
     )
 
 
-def rubbing_heat(start: Anchors, found: Anchors, after: Anchors) -> float:
-    """Energy that friction turns into heat in a step: the mean limit over the way that anchors were dragged.
+def slid_mm(found: Anchors, after: Anchors) -> FloatArray:
+    """How far each node slid over the indenter in a step: the way that its anchor was dragged, (n,). [mm]
 
     Parameters
     ----------
-    start, found, after : Anchors
-        At the start of the step, of the equilibrium found, and dragged along for the next step.
-
-    Returns
-    -------
-    float
-        [µJ]
+    found, after : Anchors
+        Of the equilibrium found, and dragged along for the next step.
     """
     n = found.normal
     way = after.anchor_mm - found.anchor_mm
-    way = np.linalg.norm(way - n * (n * way).sum(axis=1)[:, None], axis=1)
-    return float(0.5 * (start.limit_mn + found.limit_mn) @ way)
+    return np.linalg.norm(way - n * (n * way).sum(axis=1)[:, None], axis=1)

@@ -25,7 +25,7 @@ from fingerpad.geometry.mesh_quality import element_place, squeezed_most
 from fingerpad.mechanics.configuration import Balance, Body, Configuration, Lagging, Load, evaluate
 from fingerpad.mechanics.contact import ContactState
 from fingerpad.mechanics.factors import NotPositiveDefiniteError
-from fingerpad.mechanics.friction import Anchors, rubbing_heat
+from fingerpad.mechanics.friction import Anchors, slid_mm
 from fingerpad.mechanics.linear import LinearSolver
 
 SUFFICIENT_DECREASE = 1e-4
@@ -101,6 +101,8 @@ class Equilibrium:
         Reaction of the supports.
     anchors : Anchors, optional
         Where the skin holds on to the indenter when the next step starts.
+    slid_mm : array (n_candidates,), optional
+        How far each node slid over the indenter in this step, with friction. [mm]
     rubbed_uj : float
         Energy that friction has turned into heat in this step. [µJ]
     pressure_kpa : array (n_elements,), optional
@@ -114,6 +116,7 @@ class Equilibrium:
     iterations: int
     balance: Balance
     anchors: Anchors | None = None
+    slid_mm: FloatArray | None = None
     rubbed_uj: float = 0.0
     pressure_kpa: FloatArray | None = None
 
@@ -241,11 +244,12 @@ class _Search:
 
     def found(self, now: Configuration, iterations: int, balance: Balance) -> Equilibrium:
         """Gather the equilibrium, its anchors ready for the next step."""
-        carried, heat_uj = None, 0.0
+        carried, slid, heat_uj = None, None, 0.0
         if self.load.anchors is not None and self.lagging.anchors is not None:
             anchors = self.lagging.anchors
             carried = self.load.contact.carried(anchors, now.contact, now.positions_mm, now.depth_mm)
-            heat_uj = rubbing_heat(self.load.anchors, anchors, carried)
+            slid = slid_mm(anchors, carried)
+            heat_uj = float(0.5 * (self.load.anchors.limit_mn + anchors.limit_mn) @ slid)
         return Equilibrium(
             displacement_mm=now.displacement_mm,
             depth_mm=now.depth_mm,
@@ -254,6 +258,7 @@ class _Search:
             iterations=iterations,
             balance=balance,
             anchors=carried,
+            slid_mm=slid,
             rubbed_uj=heat_uj,
             pressure_kpa=None if now.pressures is None else now.pressures.pressure_kpa,
         )

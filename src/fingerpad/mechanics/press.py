@@ -153,15 +153,15 @@ class Deformation:
 class _Moment:
     """The press at one time: what the next step starts from.
 
-    `step_mm`, `step_depth_mm` and `advance` are the changes of displacements, depth and prescribed depth or
-    force in the step that ends here.
+    `step_mm`, `step_depth_mm` and `advance` are the changes of displacements, of depth and of the prescribed
+    course in the step that ends here.
     """
 
     time_ms: float
     found: Equilibrium
     step_mm: FloatArray
     step_depth_mm: float
-    advance: float
+    advance: FloatArray
     reached: Reached
     history: StressHistory
     sed_kpa: FloatArray
@@ -181,6 +181,12 @@ class _Press:
     watched: Watched
     newton_steps: int = 0
 
+    def contact_at(self, time_ms: float) -> Contact:
+        """Contact with the indenter where it stands at a time."""
+        if self.stimulus.stays:
+            return self.contact
+        return replace(self.contact, placement=self.contact.placement.moved(self.stimulus.pose_at(time_ms)))
+
     def unloaded(self) -> _Moment:
         """Return the moment before the first step."""
         mesh, table = self.body.mesh, self.body.table
@@ -192,16 +198,15 @@ class _Press:
         history = StressHistory.unloaded(len(mesh.elements), table.shares.shape[1])
         unstrained = FieldState.unloaded(len(mesh.nodes_mm), len(self.watched.elements))
         return _Moment(
-            0.0, rest, nowhere, 0.0, 0.0, Reached(), history, np.zeros(len(mesh.elements)), unstrained,
-            (Entry(),),
+            0.0, rest, nowhere, 0.0, np.zeros(5), Reached(), history, np.zeros(len(mesh.elements)),
+            unstrained, (Entry(),),
         )  # fmt: skip
 
     def free_skin(self) -> Anchors | None:
         """Skin that does not yet hold on to the indenter, if there is friction."""
         if self.contact.friction == 0.0:
             return None
-        undeformed = self.body.mesh.nodes_mm[self.contact.nodes]
-        return Anchors.none_held(self.contact.placement.to_local(undeformed, depth_mm=0.0))
+        return self.contact.free_anchors(self.body.mesh.nodes_mm[self.contact.nodes])
 
     def step(self, start: _Moment, target_ms: float) -> _Moment:
         """Solve one step; `start` stays as it is, so a step that fails or is too long can be repeated."""
@@ -211,7 +216,7 @@ class _Press:
         guess = start.found.displacement_mm + self.continued(start, target_ms) * start.step_mm
         found = find_equilibrium(self.body, load, self.solver, guess, start.found.multipliers_mn, self.newton)
         if self.stimulus.by_force and load.force_mn is None:
-            found = replace(found, depth_mm=self.touching_mm(found.displacement_mm))
+            found = replace(found, depth_mm=self.touching_mm(load.contact, found.displacement_mm))
         self.newton_steps += found.iterations
         where = mesh, found.displacement_mm, table
         now = instantaneous_state(*where)
@@ -222,44 +227,55 @@ class _Press:
         depth_mm = found.depth_mm - start.found.depth_mm
         fields = self.watched.after(start.fields, found.displacement_mm, history, now, sed_kpa)
         stored = float(now.energies[:, :, 0].sum(axis=1) @ sed_kpa)
-        ledger = (*start.ledger, self.entry(start, target_ms, found, stored, spent))
+        ledger = (*start.ledger, self.entry(start, target_ms, load.contact, found, stored, spent))
         force_mn = float(np.linalg.norm(found.contact.force_mn.sum(axis=0)))
         return _Moment(
             target_ms, found, moved_mm, depth_mm, self.advance(start, target_ms),
             start.reached.after(force_mn, found.depth_mm), history, sed_kpa, fields, ledger,
         )  # fmt: skip
 
-    def touching_mm(self, displacement_mm: FloatArray) -> float:
+    def touching_mm(self, contact: Contact, displacement_mm: FloatArray) -> float:
         """Depth at which the indenter just touches the deformed skin. [mm]"""
-        skin_mm = (self.body.mesh.nodes_mm + displacement_mm)[self.contact.nodes]
-        local_mm = self.contact.placement.to_local(skin_mm, depth_mm=0.0)
-        return float((local_mm[:, 1] - self.contact.indenter.front(local_mm)).min())
+        skin_mm = (self.body.mesh.nodes_mm + displacement_mm)[contact.nodes]
+        local_mm = contact.placement.to_local(skin_mm, depth_mm=0.0)
+        return float((local_mm[:, 1] - contact.indenter.front(local_mm)).min())
 
-    def advance(self, start: _Moment, target_ms: float) -> float:
-        """Change of the prescribed depth [mm] or force [mN] in a step."""
-        before, after = self.stimulus.prescribed_at([start.time_ms, target_ms])
-        return float(after - before)
+    def advance(self, start: _Moment, target_ms: float) -> FloatArray:
+        """Change of the prescribed course in a step, as in `Motion.course_at`."""
+        return self.stimulus.course_at(target_ms) - self.stimulus.course_at(start.time_ms)
 
     def continued(self, start: _Moment, target_ms: float) -> float:
         """Advance of the indenter in a step over that in the step before: how far the skin is expected to go.
 
-        It is 0 in a hold and negative after a reversal.
+        It is 0 in a hold and negative after a reversal; of another direction only the part along the old one
+        counts.
         """
-        if start.advance == 0.0:
+        before = float(start.advance @ start.advance)
+        if before == 0.0:
             return 0.0
-        return float(np.clip(self.advance(start, target_ms) / start.advance, -MOST_CONTINUED, MOST_CONTINUED))
+        further = float(self.advance(start, target_ms) @ start.advance)
+        return float(np.clip(further / before, -MOST_CONTINUED, MOST_CONTINUED))
 
     def entry(
-        self, start: _Moment, target_ms: float, found: Equilibrium, stored_uj: float, spent_uj: float
+        self,
+        start: _Moment,
+        target_ms: float,
+        contact: Contact,
+        found: Equilibrium,
+        stored_uj: float,
+        spent_uj: float,
     ) -> Entry:
         """Energies of the whole body at the end of a step, from those of the body as it is meshed."""
         parts = 2.0 if self.body.mesh.symmetry_nodes.size else 1.0
         last, before, now = start.ledger[-1], start.found.contact, found.contact
         squeezed = contact_energy(before.gap_mm, before.pressed_mn, now.gap_mm, now.pressed_mn)
+        pose = self.stimulus.pose_at(target_ms)
+        skin_mm = (self.body.mesh.nodes_mm + found.displacement_mm)[contact.nodes]
+        force = contact.placement.generalised_force(now.force_mn, skin_mm, found.depth_mm)
         return Entry(
             time_ms=target_ms,
-            depth_mm=found.depth_mm,
-            force_mn=parts * float(now.force_mn.sum(axis=0) @ self.contact.placement.axis),
+            way=(found.depth_mm, pose.x_mm, pose.z_mm, *np.deg2rad([pose.tilt_deg, pose.spin_deg])),
+            force=tuple(parts * force),
             stored_uj=parts * stored_uj,
             dissipated_uj=last.dissipated_uj + parts * (spent_uj + found.rubbed_uj),
             contact_uj=last.contact_uj + parts * squeezed,
@@ -279,8 +295,8 @@ class _Press:
             further_mm = self.continued(start, target_ms) * start.step_depth_mm
             depth_mm = start.found.depth_mm + (further_mm if touches else FIRST_DEPTH_MM)
         return Load(
-            self.contact, depth_mm, step, carried, force_mn, start.found.anchors, start.found.pressure_kpa,
-            start.reached,
+            self.contact_at(target_ms), depth_mm, step, carried, force_mn, start.found.anchors,
+            start.found.pressure_kpa, start.reached,
         )  # fmt: skip
 
     def stopped(self, last: _Moment, attempts: tuple[str, ...]) -> ConvergenceError:
@@ -348,8 +364,7 @@ def press(
     """
     settings = settings or PressSettings()
     check_mesh(mesh, len(materials))
-    if not stimulus.by_force:
-        _check_depth(mesh, indenter, placement, stimulus.largest)
+    _check_bone(mesh, indenter, placement, stimulus)
     table = MaterialTable.of(materials)
     undeformed = placement.to_local(mesh.nodes_mm[mesh.skin_nodes], depth_mm=0.0)
     candidates = indenter.may_touch(undeformed) & ~np.isin(mesh.skin_nodes, mesh.fixed_nodes)
@@ -369,7 +384,7 @@ def press(
     moment = job.unloaded()
     reached, values = [], [moment.fields.values]
     for moment in _moments(job, settings):
-        if moment.found.depth_mm > deepest_mm and stimulus.by_force:
+        if moment.found.depth_mm > deepest_mm and stimulus.by_force and stimulus.stays:
             raise InputError(
                 f"force_mn must not push the indenter deeper than {deepest_mm:.2f} mm: it is there after "
                 f"{moment.time_ms:.4g} ms, at {stimulus.prescribed_at(moment.time_ms):.4g} of "
@@ -421,21 +436,25 @@ def _from_rest(values: Iterable[FloatArray | float]) -> FloatArray:
     return np.stack([np.zeros_like(later[0]), *later])
 
 
-def _check_depth(mesh: Mesh, indenter: Indenter, placement: Placement, depth_mm: float) -> None:
-    """Bone does not move, so no mesh survives an indenter that reaches it."""
+def _check_bone(mesh: Mesh, indenter: Indenter, placement: Placement, stimulus: Stimulus) -> None:
+    """Bone does not move, so no mesh survives an indenter that reaches it or, under a force, starts in it."""
     bone_mm = mesh.nodes_mm[mesh.bone_nodes]
+    depths = np.zeros(len(stimulus.poses)) if stimulus.by_force else stimulus.depths_mm
+    for number, (pose, depth_mm) in enumerate(zip(stimulus.poses, depths, strict=True), 1):
+        there = placement.moved(pose)
 
-    def clearance_mm(depth_mm: float) -> float:
-        return float(indenter.gap(placement.to_local(bone_mm, depth_mm))[0].min(initial=np.inf))
+        def clearance_mm(depth_mm: float, there: Placement = there) -> float:
+            return float(indenter.gap(there.to_local(bone_mm, depth_mm))[0].min(initial=np.inf))
 
-    if clearance_mm(depth_mm) > 0.0:
-        return
-    reaches = clearance_mm(0.0) > 0.0
-    deepest_mm = brentq(clearance_mm, 0.0, depth_mm, xtol=1e-6) if reaches else 0.0
-    raise InputError(
-        f"depth_mm must stay below {deepest_mm:.4g} mm, where the {type(indenter).__name__} meets the bone: "
-        f"got {depth_mm:g} mm."
-    )
+        if clearance_mm(depth_mm) > 0.0:
+            continue
+        reaches = clearance_mm(0.0) > 0.0
+        deepest_mm = brentq(clearance_mm, 0.0, depth_mm, xtol=1e-6) if reaches else 0.0
+        at = "" if stimulus.stays else f" at sample {number}"
+        raise InputError(
+            f"depth_mm must stay below {deepest_mm:.4g} mm{at}, where the {type(indenter).__name__} meets "
+            f"the bone: got {depth_mm:g} mm."
+        )
 
 
 def _newton_settings(settings: PressSettings) -> NewtonSettings:
@@ -455,12 +474,12 @@ def _moments(job: _Press, settings: PressSettings) -> Iterator[_Moment]:
     relaxing = job.body.table.times_ms[job.body.table.shares > 0.0]
     phases, begin_ms = [], 0.0
     for end_ms in (*stimulus.corners_ms, stimulus.end_ms):
-        before, after = stimulus.prescribed_at([begin_ms, end_ms])
+        before, after = stimulus.course_at(begin_ms), stimulus.course_at(end_ms)
         first_ms = times[np.searchsorted(times, begin_ms, side="right")] - begin_ms
-        if before == after:
+        if (before == after).all():
             # A first step much longer than a relaxation would not see that the relaxation is curved.
             first_ms = relaxing.min(initial=first_ms)
-        phases.append(Phase(end_ms, first_ms=first_ms, loading=after > before))
+        phases.append(Phase(end_ms, first_ms=first_ms, loading=bool(after[0] > before[0])))
         begin_ms = end_ms
     receptors = mesh.living_epidermis.ravel()
     where = receptors if receptors.size else np.arange(len(mesh.elements))

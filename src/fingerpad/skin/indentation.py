@@ -14,16 +14,15 @@ from fingerpad.core.checks import FloatArray, finite, instance, one_of
 from fingerpad.core.compilation import announce_compilation
 from fingerpad.core.errors import InputError
 from fingerpad.core.threads import compiled_threads
-from fingerpad.core.units import cosine_and_sine
 from fingerpad.data import fingertip as published
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
-from fingerpad.geometry.indenter_grading import FEWEST_ACROSS_GROOVE, grading_about, sizes_across
+from fingerpad.geometry.indenter_grading import FEWEST_ACROSS_GROOVE, grading_along, sizes_across
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh, finger_mesh
 from fingerpad.geometry.motion import Motion, RampAndHold, Stimulus
-from fingerpad.mechanics.contact import Placement, check_friction, place
+from fingerpad.mechanics.contact import Placement, check_friction, place, rotation_of
 from fingerpad.mechanics.kernels import KERNELS
 from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.press import Deformation, PressSettings, press
@@ -108,11 +107,19 @@ class Touch:
         for name, angle in (("tilt_deg", self.tilt_deg), ("spin_deg", spin)):
             if self.indenter.grips and angle != 0.0:
                 raise InputError(f"{name} must be 0 for {body}: got {angle:g} degrees.")
-        if not self.grading.full and not self.indenter.mirrors(spin):
-            raise InputError(
-                f"spin_deg = {spin:g} degrees leaves {body} without symmetry across the midline, so half a "
-                "finger is not enough: give a grading with full=True."
-            )
+        if self.indenter.grips and not self.stimulus.stays:
+            raise InputError(f"{body} may only be moved up and down: got a motion that moves or turns it.")
+        for pose in self.stimulus.poses:
+            if self.grading.full:
+                break
+            if pose.z_mm != 0.0:
+                raise InputError(f"z_mm = {pose.z_mm:g} mm of the motion needs a grading with full=True.")
+            turned = spin + pose.spin_deg
+            if not self.indenter.mirrors(turned):
+                raise InputError(
+                    f"spin_deg = {turned:g} degrees leaves {body} without symmetry across the midline, so "
+                    "half a finger is not enough: give a grading with full=True."
+                )
         self._check_grooves()
         check_friction(self.friction, self.indenter)
         if not self.stimulus.by_force and self.stimulus.largest > self.deepest_mm:
@@ -179,7 +186,7 @@ class Touch:
             kinks_ms=self.stimulus.corners_ms,
             phases=self.stimulus.phases,
             axis_x_mm=self.at_mm[0],
-            direction=_rotation(self.tilt_deg, self.spin_deg)[:, 1].copy(),
+            direction=rotation_of(self.tilt_deg, self.spin_deg)[:, 1].copy(),
             fields=fields,
             **solution,
         )
@@ -197,7 +204,7 @@ class Touch:
         """Position and rotation of the indenter at first touch."""
         skin = self.mesh.nodes_mm[self.mesh.skin_nodes]
         at = self.finger.skin_point(*self.at_mm)
-        return place(self.indenter, skin, at, _rotation(self.tilt_deg, self.spin_deg))
+        return place(self.indenter, skin, at, rotation_of(self.tilt_deg, self.spin_deg))
 
     @property
     def deepest_mm(self) -> float:
@@ -208,14 +215,6 @@ class Touch:
     def mesh(self) -> Mesh:
         """Mesh of the undeformed finger."""
         return _mesh(self.finger, self.grading)
-
-
-def _rotation(tilt_deg: float, spin_deg: float) -> FloatArray:
-    """Axes of an indenter tilted about z and then turned about its own y, as columns."""
-    cosine, sine = np.cos(np.deg2rad(tilt_deg)), np.sin(np.deg2rad(tilt_deg))
-    tilt = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    along, towards = cosine_and_sine(spin_deg)
-    return tilt @ np.array([[along, 0.0, -towards], [0.0, 1.0, 0.0], [towards, 0.0, along]])
 
 
 @lru_cache(maxsize=4)
@@ -257,15 +256,17 @@ def touch_of(
     """
     one_of("resolution", resolution, RESOLUTIONS)
     x, z = _check_position(at_mm)
+    stimulus = instance("stimulus", stimulus or RampAndHold(), Motion)
     # The grading depends on this point, so finger, indenter and point are checked first.
     instance("finger", finger, Fingertip).skin_point(x, z)
     instance("indenter", indenter, Indenter)
+    finite("spin_deg", spin_deg, "degrees")
     return Touch(
         finger=finger,
         indenter=indenter,
-        stimulus=stimulus or RampAndHold(),
+        stimulus=stimulus,
         tissues=materials if isinstance(materials, Tissues) else named_tissues(materials),
-        grading=grading or grading_about(indenter, resolution, x, z, finite("spin_deg", spin_deg, "degrees")),
+        grading=grading or grading_along(indenter, resolution, x, z, spin_deg, stimulus.poses),
         settings=settings or settings_of(resolution),
         at_mm=(x, z),
         tilt_deg=tilt_deg,
