@@ -128,11 +128,11 @@ def test_node_is_anchored_where_it_met_the_indenter():
     assert rise[1] < depth < rise[2]
     moved = nodes + np.array([0.0, 0.02, 0.0])
     state = contact.state(moved, depth, np.zeros(3))
-    anchors = contact.renewed(contact.free_anchors(nodes), state, moved, depth)
+    anchors = contact.renewed(contact.free_anchors(nodes), state, depth)
     np.testing.assert_allclose(anchors.anchor_mm[0], nodes[0], atol=1e-15)
     # The gap is not linear in depth, hence 1 % of the way.
     np.testing.assert_allclose(anchors.anchor_mm[1], [0.4, -rise[1], 0.0], atol=0.01 * depth)
-    np.testing.assert_allclose(anchors.anchor_mm[2], moved[2] - [0.0, depth, 0.0], atol=1e-15)
+    np.testing.assert_allclose(anchors.anchor_mm[2], nodes[2] - [0.0, depth, 0.0], atol=1e-15)
     np.testing.assert_allclose(anchors.limit_mn, 0.5 * state.pressed_mn, rtol=1e-14)
 
 

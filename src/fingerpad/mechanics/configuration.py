@@ -105,6 +105,8 @@ class Load:
         Pressures at the start of the step, for a mixed method. [kPa]
     reached : Reached, optional
         Largest force and depth before the step.
+    pressed_before : bool array (n_candidates,), optional
+        Nodes that were pressed before the step.
     """
 
     contact: Contact
@@ -115,6 +117,7 @@ class Load:
     anchors: Anchors | None = None
     pressure_kpa: FloatArray | None = None
     reached: Reached = Reached()
+    pressed_before: np.ndarray | None = None
 
     def force_scale_mn(self, force_mn: float) -> float:
         """Force to which a force that is out of balance is compared. [mN]"""
@@ -242,6 +245,7 @@ def evaluate(
     before: Friction | None = None,
     pressure_kpa: FloatArray | None = None,
     curved: bool = True,
+    closed: bool = False,
 ) -> Configuration:
     """Potential, out-of-balance forces and tangent of one configuration.
 
@@ -263,6 +267,8 @@ def evaluate(
         Pressures in the tangent of a mixed method; those that belong to the displacements by default. [kPa]
     curved : bool
         Whether the tangent may have the indenter's curvature, near the solution.
+    closed : bool
+        Whether nodes that were pressed before the step resist in the tangent even where the contact is open now.
 
     Returns
     -------
@@ -293,6 +299,8 @@ def evaluate(
     is_curved = curved and relative_residual < CURVATURE_BELOW_RESIDUAL
     if is_curved:
         stiffness = stiffness + contact.curvature_stiffness(touch, positions, depth_mm)
+    if closed and load.pressed_before is not None:
+        stiffness = stiffness + contact.closed_stiffness(touch, load.pressed_before)
     if has_tangent:
         blocks[body.sparsity.diagonal[contact.nodes]] += stiffness
     return Configuration(

@@ -269,15 +269,13 @@ class Contact:
         local_mm = self.placement.to_local(skin_mm, depth_mm=0.0)
         return Anchors.none_held(Approach.at_rest(local_mm, skin_mm, self.placement.tip_mm(0.0)))
 
-    def renewed(
-        self, start: Anchors, state: ContactState, positions_mm: FloatArray, depth_mm: float
-    ) -> Anchors:
+    def renewed(self, start: Anchors, state: ContactState, depth_mm: float) -> Anchors:
         """Anchors with the normals and limits of the contact found.
 
         A node that was free at the start of the step is anchored where it would have met the indenter, had it
-        gone on as in the step before; if it would not have met it, where it is.
+        gone on as in the step before; if it would not have met it, where it would be at the end of the step.
+        Both do not depend on the search: an anchor that followed its node would let it creep at each renewal.
         """
-        local = self.placement.to_local(positions_mm, depth_mm)
         expected_mm = start.approach.expected_mm(self.placement.tip_mm(depth_mm))
         before = start.approach.local_mm
         way = self.placement.to_local(expected_mm, depth_mm) - before
@@ -285,7 +283,7 @@ class Contact:
         gap_after = self.indenter.gap(before + way)[0]
         met = gap_after < 0.0
         share = np.where(met, gap_before / np.where(met, gap_before - gap_after, 1.0), 1.0)
-        first_touch = np.where(met[:, None], before + share[:, None] * way, local)
+        first_touch = before + share[:, None] * way
         return replace(
             start,
             anchor_mm=np.where(start.held[:, None], start.anchor_mm, first_touch),
@@ -319,6 +317,11 @@ class Contact:
         stiffness = np.zeros((len(pressed), 3, 3))
         stiffness[touching] = -pressed[touching, None, None] * (rotation @ slope @ rotation.T)
         return stiffness
+
+    def closed_stiffness(self, state: ContactState, closed: np.ndarray) -> FloatArray:
+        """Penalty of the `closed` nodes that carry no force, as if they were pressed, (n, 3, 3). [mN/mm]"""
+        apart = np.where(closed & (state.pressed_mn == 0.0), self.stiffness, 0.0)
+        return apart[:, None, None] * state.normal[:, :, None] * state.normal[:, None, :]
 
     def augmented(self, state: ContactState) -> FloatArray:
         """Multipliers after an augmentation: the pressures found. [mN]"""

@@ -207,8 +207,13 @@ class _Search:
                     continue  # only friction was renewed: the body may still be at rest
             enough = ENOUGH * settings.residual_tolerance / now.relative_residual
             forcing = float(np.clip(max(FORCING * now.relative_residual, enough), *FORCING_RANGE))
-            now, direction = self.newton_direction(self.with_tangent(now), forcing)
-            now = self.line_search(now, direction, max(potentials[-REMEMBERED_POTENTIALS:]))
+            highest_uj = max(potentials[-REMEMBERED_POTENTIALS:])
+            try:
+                now = self.line_search(*self.newton_direction(self.with_tangent(now), forcing), highest_uj)
+            except ConvergenceError:
+                if not self.is_set_free(now):
+                    raise
+                now = self.line_search(*self.closed_direction(now, forcing), highest_uj)
             potentials.append(now.potential_uj)
             settled = not rubs
         raise ConvergenceError(f"No equilibrium after {settings.most_iterations} Newton steps.")
@@ -234,12 +239,27 @@ class _Search:
         straight = evaluate(self.body, self.load, *where, self.lagging, self.blocks, curved=False)
         return straight, self.solver.solve(self.blocks, straight.residual_mn, forcing)
 
+    def is_set_free(self, now: Configuration) -> bool:
+        """Whether a node that was pressed before the step carries no force now."""
+        before = self.load.pressed_before
+        return before is not None and bool((before & (now.contact.pressed_mn == 0.0)).any())
+
+    def closed_direction(self, now: Configuration, forcing: float) -> tuple[Configuration, FloatArray]:
+        """Solve for a Newton step in which the skin does not fly into an indenter that moves aside.
+
+        An indenter that slides by more than the penetration sets most nodes free for one iteration. Without
+        their stiffness a Newton step drives the skin deep into the indenter.
+        """
+        where = now.displacement_mm, now.depth_mm
+        closed = evaluate(self.body, self.load, *where, self.lagging, self.blocks, curved=False, closed=True)
+        return closed, self.solver.solve(self.blocks, closed.residual_mn, forcing)
+
     def renewed(self, now: Configuration, augmented: bool) -> Lagging:
         """Multipliers and anchors of the contact found."""
         contact, anchors = self.load.contact, self.load.anchors
         multipliers = contact.augmented(now.contact) if augmented else self.lagging.multipliers_mn
         if anchors is not None:
-            anchors = contact.renewed(anchors, now.contact, now.positions_mm, now.depth_mm)
+            anchors = contact.renewed(anchors, now.contact, now.depth_mm)
         return Lagging(multipliers, anchors)
 
     def found(self, now: Configuration, iterations: int, balance: Balance) -> Equilibrium:

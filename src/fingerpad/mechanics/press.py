@@ -296,7 +296,7 @@ class _Press:
             depth_mm = start.found.depth_mm + (further_mm if touches else FIRST_DEPTH_MM)
         return Load(
             self.contact_at(target_ms), depth_mm, step, carried, force_mn, start.found.anchors,
-            start.found.pressure_kpa, start.reached,
+            start.found.pressure_kpa, start.reached, start.found.contact.pressed_mn > 0.0,
         )  # fmt: skip
 
     def stopped(self, last: _Moment, attempts: tuple[str, ...]) -> ConvergenceError:
