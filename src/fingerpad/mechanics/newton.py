@@ -43,6 +43,10 @@ LAST_STEP = 5e-3
 """Residual over contact force from which one Newton step mostly ends the search. The tangent after it is
 assembled only if it is needed after all."""
 
+RENEW_AT = 0.2
+"""Residual, over that right after the last renewal, at which the limits of friction are renewed. Each renewal
+changes the equilibrium by about a fifth of what the last one did, so more accuracy between them is wasted."""
+
 AT_REST = 1e-2
 """Residual over contact force below which the depth is moved towards the given force."""
 DEPTH_FORCING = 1e-3
@@ -181,7 +185,7 @@ class _Search:
             raise ConvergenceError(f"The starting guess turns {self.folded(guess_mm)} inside out.")
         potentials = [now.potential_uj]
         # Whether the limits of friction are those of the contact found.
-        settled = not rubs
+        settled, renewed_at = not rubs, now.relative_residual
         for iteration in range(settings.most_iterations):
             balance = now.balance(self.body, load)
             self.history.append(
@@ -202,9 +206,14 @@ class _Search:
                 self.lagging = self.renewed(now, augmented=not close)
                 displacement, depth_mm = now.displacement_mm, now.depth_mm
                 now = evaluate(self.body, load, displacement, depth_mm, self.lagging, self.blocks)
-                potentials, settled = [now.potential_uj], True
+                potentials, settled, renewed_at = [now.potential_uj], True, now.relative_residual
                 if close:
                     continue  # only friction was renewed: the body may still be at rest
+            elif rubs and not settled and now.relative_residual < RENEW_AT * renewed_at:
+                self.lagging = self.renewed(now, augmented=False)
+                displacement, depth_mm = now.displacement_mm, now.depth_mm
+                now = evaluate(self.body, load, displacement, depth_mm, self.lagging, self.blocks)
+                potentials, renewed_at = [now.potential_uj], now.relative_residual
             enough = ENOUGH * settings.residual_tolerance / now.relative_residual
             forcing = float(np.clip(max(FORCING * now.relative_residual, enough), *FORCING_RANGE))
             highest_uj = max(potentials[-REMEMBERED_POTENTIALS:])
