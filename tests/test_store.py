@@ -47,12 +47,13 @@ SIX = [
 ]
 DOUBLE = {
     **dict.fromkeys(("times_ms", "force_mn", "depth_mm", "contact_area_mm2"), "t"),
-    "reaction_mn": "t3",
+    **dict.fromkeys(("contact_force_mn", "reaction_mn"), "t3"),
     **dict.fromkeys(("external_uj", "stored_uj", "dissipated_uj", "contact_uj"), "t"),
 }
 SINGLE = {
     "skin_displacement_mm": "ts3",
-    "contact_pressure_kpa": "ts",
+    **dict.fromkeys(("contact_pressure_kpa", "slip_mm"), "ts"),
+    "shear_kpa": "ts3",
     "displacement_mm": "n3",
     "sed_kpa": "te",
     "von_mises_kpa": "e",

@@ -25,6 +25,9 @@ SMALLEST_FORCE_MN = 1e-6
 LEAST_SHARE_OF_FORCE = 1e-3
 """Least force that residuals are compared to, over the largest force of the press so far."""
 
+LEAST_DEPTH_MM = 0.02
+"""Least depth that a penetration is compared to: one that tilts may press at a depth below 0. [mm]"""
+
 CURVATURE_BELOW_RESIDUAL = 0.1
 """Residual over contact force below which the indenter's curvature is part of the tangent."""
 
@@ -66,11 +69,11 @@ class Reached:
     force_mn : float
         Largest contact force on the body as it is meshed. [mN]
     depth_mm : float
-        Largest depth. [mm]
+        Largest depth, at least `LEAST_DEPTH_MM`. [mm]
     """
 
     force_mn: float = 0.0
-    depth_mm: float = 0.0
+    depth_mm: float = LEAST_DEPTH_MM
 
     @property
     def least_force_mn(self) -> float:
@@ -268,7 +271,7 @@ def evaluate(
     curved : bool
         Whether the tangent may have the indenter's curvature, near the solution.
     closed : bool
-        Whether nodes that were pressed before the step resist in the tangent even where the contact is open now.
+        Whether nodes that were pressed before the step resist in the tangent even where they are free now.
 
     Returns
     -------

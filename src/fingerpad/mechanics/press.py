@@ -108,6 +108,9 @@ class Deformation:
         Stored strain energy density, element mean. [kPa]
     depth_mm : array (n_times,)
         How far the indenter has advanced since first touch. [mm]
+    contact_force_mn : array (n_times, 3)
+        Whole force of the indenter on the skin, with friction, of the whole body also when half of it is
+        solved. [mN]
     reaction_mn : array (n_times, 3)
         Force of the body on bone and nail, of the whole body also when half of it is solved. [mN]
     nail_reaction_mn : array (n_times, 3)
@@ -136,6 +139,7 @@ class Deformation:
     displacement_mm: FloatArray
     sed_kpa: FloatArray
     depth_mm: FloatArray
+    contact_force_mn: FloatArray
     reaction_mn: FloatArray
     nail_reaction_mn: FloatArray
     force_imbalance: float
@@ -154,7 +158,7 @@ class _Moment:
     """The press at one time: what the next step starts from.
 
     `step_mm`, `step_depth_mm` and `advance` are the changes of displacements, of depth and of the prescribed
-    course in the step that ends here.
+    course in the step that ends here. `slip_mm` is how far each candidate node has slid since it touched.
     """
 
     time_ms: float
@@ -167,6 +171,7 @@ class _Moment:
     sed_kpa: FloatArray
     fields: FieldState
     ledger: tuple[Entry, ...]
+    slip_mm: FloatArray
 
 
 @dataclass
@@ -199,7 +204,7 @@ class _Press:
         unstrained = FieldState.unloaded(len(mesh.nodes_mm), len(self.watched.elements))
         return _Moment(
             0.0, rest, nowhere, 0.0, np.zeros(5), Reached(), history, np.zeros(len(mesh.elements)),
-            unstrained, (Entry(),),
+            unstrained, (Entry(),), no_force,
         )  # fmt: skip
 
     def free_skin(self) -> Anchors | None:
@@ -227,11 +232,14 @@ class _Press:
         depth_mm = found.depth_mm - start.found.depth_mm
         fields = self.watched.after(start.fields, found.displacement_mm, history, now, sed_kpa)
         stored = float(now.energies[:, :, 0].sum(axis=1) @ sed_kpa)
+        slip = np.zeros_like(start.slip_mm)
+        if found.slid_mm is not None:
+            slip = np.where(found.contact.pressed_mn > 0.0, start.slip_mm + found.slid_mm, 0.0)
         ledger = (*start.ledger, self.entry(start, target_ms, load.contact, found, stored, spent))
         force_mn = float(np.linalg.norm(found.contact.force_mn.sum(axis=0)))
         return _Moment(
             target_ms, found, moved_mm, depth_mm, self.advance(start, target_ms),
-            start.reached.after(force_mn, found.depth_mm), history, sed_kpa, fields, ledger,
+            start.reached.after(force_mn, found.depth_mm), history, sed_kpa, fields, ledger, slip,
         )  # fmt: skip
 
     def touching_mm(self, contact: Contact, displacement_mm: FloatArray) -> float:
@@ -382,7 +390,7 @@ def press(
     follow = Watched(chosen, mesh.nodes_mm, mesh.elements[chosen], mesh.layer[chosen], table)
     job = _Press(body, contact, stimulus, solver, _newton_settings(settings), follow)
     moment = job.unloaded()
-    reached, values = [], [moment.fields.values]
+    reached, slips, values = [], [], [moment.fields.values]
     for moment in _moments(job, settings):
         if moment.found.depth_mm > deepest_mm and stimulus.by_force and stimulus.stays:
             raise InputError(
@@ -392,6 +400,7 @@ def press(
             )
         # Without its history, which is as large as all else together.
         reached.append((moment.time_ms, moment.found, moment.sed_kpa))
+        slips.append(moment.slip_mm)
         values.append(moment.fields.values)
     times = _from_rest(time_ms for time_ms, _, _ in reached)
     found = [equilibrium for _, equilibrium, _ in reached]
@@ -405,9 +414,12 @@ def press(
     # Across the plane of symmetry the reactions of the two halves cancel.
     both_halves = np.array([2.0, 2.0, 0.0]) if mesh.symmetry_nodes.size else np.ones(3)
     displacement = _from_rest(each.displacement_mm for each in found)
-    pressed = np.zeros((times.size, mesh.skin_nodes.size))
-    gap = np.full_like(pressed, np.inf)
+    pressed, slip = np.zeros((2, times.size, mesh.skin_nodes.size))
+    rubbed, gap = np.zeros((*pressed.shape, 3)), np.full_like(pressed, np.inf)
     pressed[1:, candidates] = [each.contact.pressed_mn for each in found]
+    slip[1:, candidates] = slips
+    if friction > 0.0:
+        rubbed[1:, candidates] = [each.contact.friction_mn for each in found]
     gap[1:, candidates] = [each.contact.gap_mm for each in found]
     e_star_kpa = materials[mesh.layer[0]].contact_modulus_kpa
     return Deformation(
@@ -416,12 +428,13 @@ def press(
         displacement_mm=displacement,
         sed_kpa=_from_rest(sed_kpa for _, _, sed_kpa in reached),
         depth_mm=_from_rest(each.depth_mm for each in found),
+        contact_force_mn=_from_rest(both_halves * each.contact.force_mn.sum(axis=0) for each in found),
         reaction_mn=_from_rest(both_halves * each.balance.reaction_mn for each in found),
         nail_reaction_mn=_from_rest(both_halves * each.balance.nail_mn for each in found),
         force_imbalance=max(each.balance.imbalance for each in found),
         stress_kpa=cauchy_stress(mesh, displacement[-1], table, moment.history),
         fields=fields_over_time(chosen, values),
-        contact=skin_contact(mesh, displacement, pressed, gap, e_star_kpa),
+        contact=skin_contact(mesh, displacement, pressed, rubbed, slip, gap, e_star_kpa),
         energy=energy_balance(moment.ledger, kinks_ms=stimulus.corners_ms).at(times),
         penetration_mm=max(each.contact.penetration_mm for each in found),
         newton_steps=job.newton_steps,

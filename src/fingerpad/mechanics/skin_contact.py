@@ -35,19 +35,31 @@ class SkinContact:
     ----------
     pressure_kpa : array (n_times, n_skin_nodes)
         Normal force on each node of `mesh.skin_nodes` over the present area that belongs to it. [kPa]
+    shear_kpa : array (n_times, n_skin_nodes, 3)
+        Friction on each node over that area. [kPa]
+    slip_mm : array (n_times, n_skin_nodes)
+        How far each node in contact has slid over the indenter since it came to touch, with friction. [mm]
     area_mm2, present_area_mm2 : array (n_times,)
         Skin in contact, undeformed and as it is then; of the whole body also when half of it is solved. [mm²]
     """
 
     pressure_kpa: FloatArray
+    shear_kpa: FloatArray
+    slip_mm: FloatArray
     area_mm2: FloatArray
     present_area_mm2: FloatArray
 
 
 def skin_contact(
-    mesh: Mesh, displacement_mm: FloatArray, pressed_mn: FloatArray, gap_mm: FloatArray, modulus_kpa: float
+    mesh: Mesh,
+    displacement_mm: FloatArray,
+    pressed_mn: FloatArray,
+    friction_mn: FloatArray,
+    slip_mm: FloatArray,
+    gap_mm: FloatArray,
+    modulus_kpa: float,
 ) -> SkinContact:
-    """Pressure and area from the force on each node of the skin and its gap.
+    """Pressure, shear, slip and area from the forces on each node of the skin and its gap.
 
     Parameters
     ----------
@@ -57,6 +69,10 @@ def skin_contact(
         Displacements. [mm]
     pressed_mn : array (n_times, n_skin_nodes)
         Normal forces on `mesh.skin_nodes`. [mN]
+    friction_mn : array (n_times, n_skin_nodes, 3)
+        Friction on them. [mN]
+    slip_mm : array (n_times, n_skin_nodes)
+        How far each has slid over the indenter since it came to touch. [mm]
     gap_mm : array (n_times, n_skin_nodes)
         Distances of these nodes from the indenter, infinite for nodes that it cannot touch; those of pressed
         nodes do not matter. [mm]
@@ -71,13 +87,15 @@ def skin_contact(
     triangles = _triangles(mesh)
     undeformed_mm2 = _areas(mesh.nodes_mm[mesh.skin_nodes], triangles)
     pressure, areas = np.empty_like(pressed_mn), np.empty((2, len(pressed_mn)))
+    shear = np.empty_like(friction_mn)
     for n, moved in enumerate(displacement_mm):
         present = mesh.nodes_mm + moved
-        pressure[n] = pressed_mn[n] / mesh.skin_area_of(present)
+        node_mm2 = mesh.skin_area_of(present)
+        pressure[n], shear[n] = pressed_mn[n] / node_mm2, friction_mn[n] / node_mm2[:, None]
         skin = present[mesh.skin_nodes]
         touching = covered(skin, triangles, pressure[n], gap_mm[n], modulus_kpa)
         areas[:, n] = undeformed_mm2 @ touching, _areas(skin, triangles) @ touching
-    return SkinContact(pressure, *(whole_body * areas))
+    return SkinContact(pressure, shear, slip_mm, *(whole_body * areas))
 
 
 def covered(

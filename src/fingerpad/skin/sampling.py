@@ -135,6 +135,21 @@ class SkinResponse:
         return self.fields["contact_pressure_kpa"]
 
     @property
+    def contact_force_mn(self) -> FloatArray:
+        """Whole force of the indenter on the skin, with friction, (n_times, 3). [mN]"""
+        return self.fields["contact_force_mn"]
+
+    @property
+    def shear_kpa(self) -> FloatArray:
+        """Friction over the area of each of `mesh.skin_nodes`, (n_times, n_skin_nodes, 3). [kPa]"""
+        return self.fields["shear_kpa"]
+
+    @property
+    def slip_mm(self) -> FloatArray:
+        """How far skin in contact has slid since it came to touch, (n_times, n_skin_nodes). [mm]"""
+        return self.fields["slip_mm"]
+
+    @property
     def reaction_mn(self) -> FloatArray:
         """Force of the tissue on bone and nail, of the whole finger, (n_times, 3). [mN]"""
         return self.fields["reaction_mn"]

@@ -1,0 +1,141 @@
+"""An indenter that moves aside and turns while it presses: same place, same answer; mirror images; work."""
+
+import numpy as np
+import pytest
+
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.indenters import Bar, Cylinder, Line, Sphere
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.motion import Pose, Trajectory
+from fingerpad.mechanics.contact import Placement, place, rotation_of
+from fingerpad.mechanics.materials import Material, Prony
+from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.skin.indentation import touch_of
+
+PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))
+RELAXING = tuple(Material.neo_hooke(shear, 0.45, PRONY) for shear in (40.0, 40.0, 20.0, 8.0))
+ELASTIC = tuple(material.with_prony(Prony()) for material in RELAXING)
+STEPS = PressSettings(4, 2)
+PITCH_MM = 0.4
+
+
+def block(half_length=2.4):
+    """Both halves, with even lines along x and z within 2.4 mm."""
+    along = np.arange(-half_length, half_length + 0.01, PITCH_MM)
+    across = np.arange(-2.0, 2.01, PITCH_MM)
+    return block_mesh(along, [0.0, 0.3, 0.6, 1.2, 2.0], across, layers=[0, 1, 2, 3])
+
+
+def touching(indenter, mesh):
+    return place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("indenter", "pose"),
+    [
+        (Sphere(500.0), Pose(x_mm=0.4, z_mm=-0.8)),
+        (Cylinder(2.0), Pose(tilt_deg=20.0)),
+        (Bar(1.6, 0.4), Pose(x_mm=0.4, tilt_deg=-10.0, spin_deg=30.0)),
+    ],
+    ids=["moved", "tilted", "all"],
+)
+def test_indenter_that_moves_and_turns_before_it_touches_presses_as_if_placed_there(indenter, pose):
+    mesh = block()
+    first = touching(indenter, mesh)
+    way = {name: (0.0, getattr(pose, name), getattr(pose, name)) for name in vars(pose)}
+    motion = Trajectory((0.0, 50.0, 100.0), depth_mm=(-0.6, -0.6, 0.3), **way)
+    moved = press(mesh, ELASTIC, indenter, first, motion, STEPS, friction=0.3)
+    rotation = rotation_of(pose.tilt_deg, pose.spin_deg)
+    there = Placement(
+        first.origin_mm + np.array([pose.x_mm, 0.0, pose.z_mm]), rotation, np.array([0.0, 1.0, 0.0])
+    )
+    down = Trajectory((0.0, 50.0, 100.0), depth_mm=(-0.6, -0.6, 0.3))
+    placed = press(mesh, ELASTIC, indenter, there, down, STEPS, friction=0.3)
+    assert placed.force_mn[-1] > 1.0
+    np.testing.assert_allclose(moved.force_mn[-4:], placed.force_mn[-4:], rtol=1e-6)
+    np.testing.assert_allclose(moved.sed_kpa[-1], placed.sed_kpa[-1], atol=1e-5 * placed.sed_kpa.max())
+
+
+def sliding(way_mm, mu, depth_mm=0.3, materials=RELAXING, **aside):
+    """Press, then slide the sphere along x at constant depth."""
+    mesh = block()
+    indenter = Sphere(500.0)
+    motion = Trajectory(
+        (0.0, 50.0, 100.0, 300.0), (0.0, depth_mm, depth_mm, depth_mm), x_mm=(0.0, 0.0, 0.0, way_mm), **aside
+    )
+    return press(
+        mesh, materials, indenter, touching(indenter, mesh), motion, PressSettings(16, 2), friction=mu
+    )
+
+
+def test_sliding_to_either_side_is_a_mirror_image():
+    there, back = sliding(0.5, 0.3), sliding(-0.5, 0.3)
+    np.testing.assert_allclose(back.force_mn, there.force_mn, rtol=1e-5)
+    np.testing.assert_allclose(
+        back.contact_force_mn * [-1.0, 1.0, 1.0], there.contact_force_mn, atol=1e-4 * there.force_mn.max()
+    )
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3, 0.8])
+def test_sliding_is_resisted_by_friction_times_force_and_balances_its_energy(mu):
+    done = sliding(1.2, mu, materials=ELASTIC)
+    normal, aside = done.contact_force_mn[-1, 1], done.contact_force_mn[-1, 0]
+    # The pressure of a sphere that slides is not symmetric, which adds to the force along x.
+    assert aside == pytest.approx(mu * normal, abs=0.05 * normal)
+    assert done.energy.relative_imbalance < 2e-3
+    np.testing.assert_allclose(done.contact_force_mn, done.reaction_mn, atol=1e-4 * done.force_mn.max())
+    slip = done.contact.slip_mm[-1]
+    assert (slip.max() > 0.2) if mu else not slip.any()
+    limit = mu * done.contact.pressure_kpa
+    shear = np.linalg.norm(done.contact.shear_kpa, axis=2)
+    assert (shear <= limit * (1.0 + 1e-3) + 1e-9).all()
+
+
+def test_skin_sticks_until_the_force_aside_reaches_the_limit():
+    done = sliding(0.4, 2.0, materials=ELASTIC)
+    assert np.median(done.contact.slip_mm[-1][done.contact.pressure_kpa[-1] > 0.0]) < 0.01
+    aside = done.contact_force_mn[:, 0]
+    assert (np.diff(aside[done.times_ms >= 100.0]) > 0.0).all()
+
+
+def test_sphere_that_slides_by_one_element_without_friction_presses_as_before():
+    mesh = block(half_length=4.8)
+    indenter = Sphere(500.0)
+    motion = Trajectory((0.0, 50.0, 100.0), (0.0, 0.3, 0.3), x_mm=(0.0, 0.0, 2 * PITCH_MM))
+    done = press(mesh, ELASTIC, indenter, touching(indenter, mesh), motion, PressSettings(6, 2))
+    before, after = done.force_mn[done.times_ms == 50.0][0], done.force_mn[-1]
+    assert after == pytest.approx(before, rel=5e-3)
+
+
+def test_spin_of_a_sphere_meets_a_torque_within_its_limit():
+    done = sliding(0.0, 0.3, spin_deg=(0.0, 0.0, 0.0, 40.0))
+    work = done.energy.external_uj
+    during = done.times_ms >= 100.0
+    assert work[during][-1] > work[during][0]
+    # The torque of pressure p within radius a is at most mu times the integral of p r, below mu F a.
+    radius_mm = np.sqrt(done.contact.area_mm2[-1] / np.pi)
+    assert work[during][-1] - work[during][0] < 0.3 * done.force_mn.max() * radius_mm * np.deg2rad(40.0)
+    assert done.energy.relative_imbalance < 5e-3
+
+
+def test_half_a_finger_and_a_wire_are_refused_what_they_cannot_do():
+    aside = Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 0.5), z_mm=(0.0, 0.0, 1.0))
+    assert touch_of(Fingertip(), Sphere(), aside).grading.full
+    half = touch_of(Fingertip(), Sphere()).grading
+    with pytest.raises(InputError, match="z_mm = 1 mm of the motion needs a grading with full=True"):
+        touch_of(Fingertip(), Sphere(), aside, grading=half)
+    along = Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 0.5), x_mm=(0.0, 0.0, 1.0))
+    with pytest.raises(InputError, match="Line may only be moved up and down"):
+        touch_of(Fingertip(), Line(), along)
+    covered = touch_of(Fingertip(), Sphere(), along).grading
+    assert covered.centre_mm == half.centre_mm + 0.5
+    assert covered.half_length_mm == pytest.approx(half.half_length_mm + 0.5)
+
+
+def test_bone_on_the_way_is_named_before_anything_is_pressed():
+    mesh = block()
+    indenter = Bar(1.6, 0.4)
+    deep = Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 1.9), tilt_deg=(0.0, 0.0, 30.0))
+    with pytest.raises(InputError, match=r"depth_mm must stay below .* mm at sample 3"):
+        press(mesh, ELASTIC, indenter, touching(indenter, mesh), deep, STEPS)
