@@ -7,7 +7,8 @@ from fingerpad.core.errors import InputError
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Bar, Cylinder, Line, Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.motion import Pose, Trajectory
+from fingerpad.geometry.motion import Pose
+from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.contact import Placement, place, rotation_of
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.press import PressSettings, press
