@@ -118,7 +118,7 @@ def test_release_ends_without_force_and_with_energy_in_balance(indenter, frictio
     done = pressed(RELEASE, indenter=indenter, friction=friction)
     assert done.force_mn[-1] == 0.0
     assert (done.force_mn >= 0.0).all()
-    assert done.energy.relative_imbalance <= 0.02
+    assert done.energy.relative_imbalance <= 0.015
     assert not done.contact.area_mm2[-1]
 
 
@@ -177,7 +177,7 @@ def test_finger_is_released_from_a_millimetre():
     assert skin.kinks_ms == (50.0, 100.0)
     assert skin.force_mn[-1] == 0.0
     assert (np.diff(skin.force_mn[skin.times_ms >= 50.0]) <= 0.0).all()
-    assert skin.energy_imbalance <= 0.01
+    assert skin.energy_imbalance <= 0.005
     # Released skin that still recovers holds some stress, but less and less.
     sed = skin.sed_kpa[:, skin.mesh.living_epidermis.ravel()].max(axis=1)
     assert 0.0 < sed[-1] < 0.1 * sed.max()

@@ -7,8 +7,9 @@ Each term is computed independently, so their balance is a check of the indentat
 - external: the force of the indenter over its path, integral of F dd, also aside, and its torque over its
   rotations;
 - stored: the energy that springs hold now, summed over the elements (`viscoelastic.stored_energy_density`);
-- dissipated: what flows in the dampers of the Prony series, at 2 e_i / tau_i for a branch that holds e_i, and
-  what friction turns into heat;
+- dissipated: the work of the stress on the tissue less the change of what is stored, and what friction turns
+  into heat. With S = S0 - sum S_i the stress does the work dW0 + dU - sum S_i : dE, so that relaxation turns
+  d(W0 + U - stored) - sum S_i : dE into heat;
 - contact: what closed the springs of the penalty, -integral of lambda dg over pressed nodes.
 """
 
@@ -28,8 +29,8 @@ from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import run_kernel
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.element import N_NODES, N_POINTS, frame_scale, gradients_at_points, take_nodes
-from fingerpad.mechanics.materials import COUPLED, MaterialTable
-from fingerpad.mechanics.tensors import invert, push_forward
+from fingerpad.mechanics.materials import MaterialTable
+from fingerpad.mechanics.tensors import COLUMN, ROW, invert
 from fingerpad.mechanics.viscoelastic import InstantaneousState, StressHistory
 
 FEW_STEPS = 3
@@ -101,6 +102,8 @@ class Entry(NamedTuple):
         torques [mN mm] that do work on them.
     stored_uj, dissipated_uj, contact_uj : float
         As in `EnergyBalance`; dissipated and contact are sums over all steps up to here. [µJ]
+    lost_uj : float
+        What would be stored if nothing had relaxed, less what is. [µJ]
     """
 
     time_ms: float = 0.0
@@ -109,6 +112,25 @@ class Entry(NamedTuple):
     stored_uj: float = 0.0
     dissipated_uj: float = 0.0
     contact_uj: float = 0.0
+    lost_uj: float = 0.0
+
+
+class TissueEnergies(NamedTuple):
+    """Energies of the body as it is meshed at the end of a step.
+
+    Parameters
+    ----------
+    stored_uj : float
+        Held by its springs. [µJ]
+    instantaneous_uj : float
+        What they would hold if nothing had relaxed, see `instantaneous_energy`. [µJ]
+    relaxed_work_uj : float
+        See `relaxed_work`; of this step. [µJ]
+    """
+
+    stored_uj: float
+    instantaneous_uj: float
+    relaxed_work_uj: float
 
 
 def energy_balance(entries: Sequence[Entry], kinks_ms: Sequence[float]) -> EnergyBalance:
@@ -126,7 +148,7 @@ def energy_balance(entries: Sequence[Entry], kinks_ms: Sequence[float]) -> Energ
     EnergyBalance
         One row per entry.
     """
-    times, ways, forces, stored, dissipated, contact = (
+    times, ways, forces, stored, dissipated, contact, _ = (
         np.array(column).T for column in zip(*entries, strict=True)
     )
     external = np.zeros(times.size)
@@ -213,109 +235,97 @@ def contact_energy(
 
 
 @dataclass(frozen=True)
-class DissipationCoefficients:
-    """How the energy spent in a step depends on the branch's stress before and its increment.
+class MeanRelaxed:
+    """Mean of the stress that a branch has relaxed away over a step, by its values at both ends.
 
-    A branch starts with the stress q and the instantaneous stress grows evenly by d = g (S0 - S0_n); then
-    q(t) = q exp(-t/tau) + d tau/dt (1 - exp(-t/tau)), and with c |q|² its energy, 2 c/tau times the integral
-    of |q(t)|² over the step is
+    With S0 linear in the step, S_i' = (g_i S0 - S_i) / tau_i gives g_i (new S0 + old S0_n) + kept S_i,n,
 
-        c (A |q|² + B q.d + C |d|²),    x = dt/tau,   gamma = exp(-x),
-        A = 1 - gamma²,   B = 2 (1 - gamma)²/x,   C = (2 x - 4 (1 - gamma) + 1 - gamma²)/x².
+        kept = (1 - exp(-x)) / x,   new = 1/2 - (1 - kept) / x,   old = 1 - kept - new,   x = dt / tau_i.
 
     Parameters
     ----------
-    before, mixed, increment : array (n_layers, n_terms)
-        A, B and C.
+    new, old, kept : array (n_layers, n_terms)
+        Shares g_i times `new` and `old`, and `kept`.
     """
 
-    before: FloatArray
-    mixed: FloatArray
-    increment: FloatArray
+    new: FloatArray
+    old: FloatArray
+    kept: FloatArray
 
     @classmethod
-    def of(cls, table: MaterialTable, step_ms: float) -> DissipationCoefficients:
-        """Coefficients of a step of `step_ms`. [ms]"""
+    def of(cls, table: MaterialTable, step_ms: float) -> MeanRelaxed:
+        """Factors of a step of `step_ms`. [ms]"""
         x = step_ms / table.times_ms
-        lost, lost_twice = -np.expm1(-x), -np.expm1(-2.0 * x)
-        # In short steps the terms of C cancel down to 2 x/3; its series is then good to 12 digits.
-        series = x * (2.0 / 3.0 + x * (-0.5 + x * (7.0 / 30.0 + x * (-1.0 / 12.0 + x * 31.0 / 1260.0))))
-        exact = (2.0 * x - 4.0 * lost + lost_twice) / x**2
-        return cls(lost_twice, 2.0 * lost**2 / x, np.where(x < _SERIES_BELOW, series, exact))
+        kept = -np.expm1(-x) / x
+        # In short steps the terms of `new` cancel down to x/6; its series is then good to 12 digits.
+        series = x / 6.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * (1.0 - x / 6.0 * (1.0 - x / 7.0))))
+        new = np.where(x < _SERIES_BELOW, series, 0.5 - (1.0 - kept) / x)
+        return cls(table.shares * new, table.shares * (1.0 - kept - new), kept)
 
 
 @njit(cache=True, nogil=True)
-def _dissipated(  # type: ignore[no-untyped-def]
-    nodes, elements, displacement, layer, law, shares, before, mixed, increment, old, relaxed, new, energies,
-    first, last,
+def _relaxed_work(  # type: ignore[no-untyped-def]
+    nodes, elements, before, now, layer, law, shares, new, old, kept, stress_before, relaxed_before,
+    stress_now, first, last,
 ):  # fmt: skip
-    n_terms = relaxed.shape[0]
+    """Return the sum over elements of w_q S : 1/2 (C_n+1 - C_n), S being the mean relaxed stress."""
     weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
-    gradients, inverse = small_array((N_POINTS, 3, 3)), small_array((3, 3))
-    jacobians, spatial = small_array((N_POINTS,)), np.empty((n_terms + 2, 6))
-    reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3))
+    start, end, inverse = small_array((N_POINTS, 3, 3)), small_array((N_POINTS, 3, 3)), small_array((3, 3))
+    reference, moved, jacobians = (
+        small_array((N_NODES, 3)),
+        small_array((N_NODES, 3)),
+        small_array((2, N_POINTS)),
+    )
     total = 0.0
     for e in range(first, last):
         material = layer[e]
         take_nodes(nodes, elements[e], reference)
-        take_nodes(displacement, elements[e], moved)
-        volume = gradients_at_points(reference, moved, weights, slopes, gradients)
-        present_volume = 0.0
+        take_nodes(before, elements[e], moved)
+        volume = gradients_at_points(reference, moved, weights, slopes, start)
+        take_nodes(now, elements[e], moved)
+        gradients_at_points(reference, moved, weights, slopes, end)
+        volume_before, volume_now = 0.0, 0.0
         for q in range(N_POINTS):
-            jacobians[q] = invert(gradients[q], inverse)
-            present_volume += weights[q] * jacobians[q]
+            jacobians[0, q], jacobians[1, q] = invert(start[q], inverse), invert(end[q], inverse)
+            volume_before += weights[q] * jacobians[0, q]
+            volume_now += weights[q] * jacobians[1, q]
         for q in range(N_POINTS):
-            scale = frame_scale(law[material], jacobians[q], present_volume / volume)
-            push_forward(gradients[q], scale, new[e, q], spatial[0])
-            push_forward(gradients[q], scale, old[e, q], spatial[1])
-            for term in range(n_terms):
-                push_forward(gradients[q], scale, relaxed[term, e, q], spatial[term + 2])
-            for n in range(n_terms + 2):
-                if law[material, 8] != COUPLED:  # only the deviator relaxes then
-                    mean = (spatial[n, 0] + spatial[n, 1] + spatial[n, 2]) / 3.0
-                    for k in range(3):
-                        spatial[n, k] -= mean
-            norm = 0.0
+            scale_before = frame_scale(law[material], jacobians[0, q], volume_before / volume)
+            scale_now = frame_scale(law[material], jacobians[1, q], volume_now / volume)
             for k in range(6):
-                norm += (1.0 if k < 3 else 2.0) * spatial[0, k] * spatial[0, k]
-            if not norm > 0.0:
-                continue
-            for term in range(n_terms):
-                share = shares[material, term]
-                if share > 0.0:
-                    spent = 0.0
-                    for k in range(6):
-                        start = share * spatial[1, k] - spatial[term + 2, k]
-                        grown = share * (spatial[0, k] - spatial[1, k])
-                        rate = before[material, term] * start * start
-                        rate += mixed[material, term] * start * grown
-                        rate += increment[material, term] * grown * grown
-                        spent += (1.0 if k < 3 else 2.0) * rate
-                    total += weights[q] * energies[e, q, 1] / (share * norm) * spent
+                mean = 0.0
+                for term in range(relaxed_before.shape[0]):
+                    if shares[material, term] > 0.0:
+                        mean += new[material, term] * stress_now[e, q, k]
+                        mean += old[material, term] * stress_before[e, q, k]
+                        mean += kept[material, term] * relaxed_before[term, e, q, k]
+                i, j, change = ROW[k], COLUMN[k], 0.0
+                for m in range(3):
+                    change += scale_now * end[q, m, i] * end[q, m, j]
+                    change -= scale_before * start[q, m, i] * start[q, m, j]
+                total += (0.5 if k < 3 else 1.0) * weights[q] * mean * change
     return total
 
 
-def dissipated_energy(
+def relaxed_work(
     mesh: Mesh,
-    displacement: FloatArray,
+    before_mm: FloatArray,
+    now_mm: FloatArray,
     table: MaterialTable,
     step_ms: float,
     before: StressHistory,
     now: InstantaneousState,
 ) -> float:
-    """Energy that relaxation turns into heat in one step, all elements together.
+    """Work that the relaxed stress would have done in one step: the integral of sum_i S_i : dE.
 
-    Branch i holds e_i = c |tau_i|² with c = W0 / (g_i |tau0|²), as in `stored_energy_density`, and loses
-    2 e_i / tau_i per time. Within the step its stress follows the exponentials that the stress update uses.
-    This is exact for a linear law. For others c and the frame of the stresses are those of the step's end,
-    and the loss rate is itself that of a linear law: docs/decisions/energy-balance.md says what that costs.
+    The mean of S_i is exact if S0 is linear in the step, as the stress update takes it.
 
     Parameters
     ----------
     mesh : Mesh
         The undeformed body.
-    displacement : array (n_nodes, 3)
-        Displacements at the end of the step. [mm]
+    before_mm, now_mm : array (n_nodes, 3)
+        Displacements at the start and at the end of the step. [mm]
     table : MaterialTable
         Laws.
     step_ms : float
@@ -328,11 +338,17 @@ def dissipated_energy(
     Returns
     -------
     float
-        [µJ]
+        Of all elements together. [µJ]
     """
-    c = DissipationCoefficients.of(table, step_ms)
+    mean = MeanRelaxed.of(table, step_ms)
     return sum(run_kernel(
-        _dissipated, len(mesh.elements), mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table.law,
-        table.shares, c.before, c.mixed, c.increment, before.instantaneous, before.relaxed, now.stress_kpa,
-        now.energies,
+        _relaxed_work, len(mesh.elements), mesh.nodes_mm, mesh.elements, before_mm, now_mm, mesh.layer,
+        table.law, table.shares, mean.new, mean.old, mean.kept, before.instantaneous, before.relaxed,
+        now.stress_kpa,
     ))  # fmt: skip
+
+
+def instantaneous_energy(now: InstantaneousState) -> float:
+    """Energy that the tissue would hold if nothing had relaxed, sum of W0 + U over the elements. [µJ]"""
+    weights, isochoric = now.energies[:, :, 0], now.energies[:, :, 1]
+    return float((weights * isochoric).sum() + weights.sum(axis=1) @ now.volumetric_kpa)

@@ -19,9 +19,11 @@ from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.balance import (
     EnergyBalance,
     Entry,
+    TissueEnergies,
     contact_energy,
-    dissipated_energy,
     energy_balance,
+    instantaneous_energy,
+    relaxed_work,
 )
 from fingerpad.mechanics.configuration import SMALLEST_FORCE_MN, Balance, Body, Load, Reached
 from fingerpad.mechanics.contact import Contact, Placement, check_friction
@@ -225,17 +227,21 @@ class _Press:
         self.newton_steps += found.iterations
         where = mesh, found.displacement_mm, table
         now = instantaneous_state(*where)
-        spent = dissipated_energy(*where, step_ms, start.history, now)
+        unspent = relaxed_work(
+            mesh, start.found.displacement_mm, found.displacement_mm, table, step_ms, start.history, now
+        )
         history = start.history.advanced(load.step, mesh.layer, now.stress_kpa)
         sed_kpa = stored_energy_density(*where, history, now)
         moved_mm = found.displacement_mm - start.found.displacement_mm
         depth_mm = found.depth_mm - start.found.depth_mm
         fields = self.watched.after(start.fields, found.displacement_mm, history, now, sed_kpa)
-        stored = float(now.energies[:, :, 0].sum(axis=1) @ sed_kpa)
+        energies = TissueEnergies(
+            float(now.energies[:, :, 0].sum(axis=1) @ sed_kpa), instantaneous_energy(now), unspent
+        )
         slip = np.zeros_like(start.slip_mm)
         if found.slid_mm is not None:
             slip = np.where(found.contact.pressed_mn > 0.0, start.slip_mm + found.slid_mm, 0.0)
-        ledger = (*start.ledger, self.entry(start, target_ms, load.contact, found, stored, spent))
+        ledger = (*start.ledger, self.entry(start, target_ms, load.contact, found, energies))
         force_mn = float(np.linalg.norm(found.contact.force_mn.sum(axis=0)))
         return _Moment(
             target_ms, found, moved_mm, depth_mm, self.advance(start, target_ms),
@@ -270,12 +276,14 @@ class _Press:
         target_ms: float,
         contact: Contact,
         found: Equilibrium,
-        stored_uj: float,
-        spent_uj: float,
+        tissue: TissueEnergies,
     ) -> Entry:
         """Energies of the whole body at the end of a step, from those of the body as it is meshed."""
         parts = 2.0 if self.body.mesh.symmetry_nodes.size else 1.0
         last, before, now = start.ledger[-1], start.found.contact, found.contact
+        relaxes = self.body.table.shares.any()
+        lost_uj = parts * (tissue.instantaneous_uj - tissue.stored_uj) if relaxes else 0.0
+        spent_uj = lost_uj - last.lost_uj + parts * (found.rubbed_uj - tissue.relaxed_work_uj)
         squeezed = contact_energy(before.gap_mm, before.pressed_mn, now.gap_mm, now.pressed_mn)
         pose = self.stimulus.pose_at(target_ms)
         skin_mm = (self.body.mesh.nodes_mm + found.displacement_mm)[contact.nodes]
@@ -284,9 +292,10 @@ class _Press:
             time_ms=target_ms,
             way=(found.depth_mm, pose.x_mm, pose.z_mm, *np.deg2rad([pose.tilt_deg, pose.spin_deg])),
             force=tuple(parts * force),
-            stored_uj=parts * stored_uj,
-            dissipated_uj=last.dissipated_uj + parts * (spent_uj + found.rubbed_uj),
+            stored_uj=parts * tissue.stored_uj,
+            dissipated_uj=last.dissipated_uj + spent_uj,
             contact_uj=last.contact_uj + parts * squeezed,
+            lost_uj=lost_uj,
         )
 
     def load(self, start: _Moment, target_ms: float) -> Load:
