@@ -79,7 +79,12 @@ def float_array(name: str, values: ArrayLike, ndim: int) -> FloatArray:
     if array.ndim != ndim:
         raise InputError(f"{name} must have {ndim} dimension(s): got shape {array.shape}.")
     if not np.isfinite(array).all():
-        raise InputError(f"{name} must hold finite numbers only: {(~np.isfinite(array)).sum()} are not.")
+        bad = np.argwhere(~np.isfinite(array)) + 1
+        first = " in row and column " if ndim == 2 else " number "
+        raise InputError(
+            f"{name} must hold finite numbers only: {len(bad)} are not, first"
+            f"{first if ndim else ''}{', '.join(map(str, bad[0]))}."
+        )
     array.setflags(write=False)
     return array
 
@@ -87,7 +92,9 @@ def float_array(name: str, values: ArrayLike, ndim: int) -> FloatArray:
 def increasing(name: str, values: FloatArray) -> FloatArray:
     """Return `values` if each is above the one before, else raise `InputError`."""
     if values.size and not (np.diff(values) > 0).all():
-        raise InputError(f"{name} must increase strictly: got {values[:4]} ...")
+        last = int(np.argmin(np.diff(values) > 0)) + 1
+        pair = f"{values[last]:g} after {values[last - 1]:g}"
+        raise InputError(f"{name} must increase strictly: got {pair}, number {last + 1}.")
     return values
 
 

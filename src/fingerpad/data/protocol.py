@@ -11,6 +11,13 @@ HOLD = Published("duration of the hold", 950.0, "ms", _PROTOCOL, "paper")
 DEPTH = Published("depth of indentation", 1.0, "mm", _PROTOCOL, "paper")
 DYNAMIC_WINDOW = Published("window of the dynamic firing rate", (30.0, 50.0), "ms", _PROTOCOL, "paper")
 STATIC_WINDOW = Published("window of the static firing rate", (600.0, 950.0), "ms", _PROTOCOL, "paper")
+FASTEST = Published(
+    "speed that no indenter exceeds",
+    10.0,
+    "m/s",
+    "a hand in a blow, and about as fast as shear waves in soft tissue; beyond it a unit is wrong",
+    "assumed",
+)
 
 BAR_WIDTH = Published("width of the bar", 3.0, "mm", _PROTOCOL, "paper")
 BAR_FILLET = Published(

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from fingerpad.core.checks import FloatArray, not_negative, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SpikeTrains
+from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.core.units import MS_PER_S
 from fingerpad.experiments.stimuli import Stimuli, TactileStimulus
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
-from fingerpad.inference.tables import TableRow, read_csv
 
 RATES = tuple(f"{phase}_rate_hz" for phase in PHASES)
 SPIKES = "spike_times_ms"

@@ -11,11 +11,11 @@ from fingerpad.core.checks import finite
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
 from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.geometry.indenters import Bar, Indenter
 from fingerpad.geometry.motion import MOTION_UNITS, ForceRampAndHold, RampAndHold, Stimulus
 from fingerpad.geometry.names import SIZE_UNITS
-from fingerpad.inference.tables import TableRow, read_csv
 
 PLACE = {"x_mm": "mm", "z_mm": "mm", "tilt_deg": "degrees", "spin_deg": "degrees"}
 COLUMNS = ("stimulus", "indenter", *SIZE_UNITS, *MOTION_UNITS, *PLACE)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, positive
+from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase, ramp_and_hold
 from fingerpad.data import protocol
 
@@ -53,6 +55,14 @@ class Motion:
 
     by_force: bool = False
     """Whether the force is prescribed instead of the depth."""
+
+    given_samples: bool = False
+    """Whether a user gave the samples, so that errors name them."""
+
+    @property
+    def samples_ms(self) -> tuple[float, ...]:
+        """Times between which the motion is linear in time, from 0 to its end. [ms]"""
+        return 0.0, *self.corners_ms, self.end_ms
 
     @property
     def poses(self) -> tuple[Pose, ...]:
@@ -133,6 +143,8 @@ class _OneRamp(Motion):
         for name, unit in MOTION_UNITS.items():
             if hasattr(self, name):
                 positive(name, getattr(self, name), unit)
+        if not self.by_force:
+            check_speed("depth_mm", self.samples_ms, (0.0, self.largest, self.largest))
 
     @property
     def end_ms(self) -> float:
@@ -240,6 +252,22 @@ class ForceRampAndHold(_OneRamp):
     def largest(self) -> float:
         """Force of the hold. [mN]"""
         return self.force_mn
+
+
+def check_speed(
+    name: str, times_ms: ArrayLike, values_mm: ArrayLike, place: Callable[[int], str] = lambda _: ""
+) -> None:
+    """Raise `InputError` if values [mm] change between two times [ms] as fast as no indenter moves.
+
+    `place` says where the later of the two stands, from its number, and begins the message.
+    """
+    speed = np.abs(np.diff(values_mm)) / np.diff(times_ms)
+    fastest = int(speed.argmax())
+    if speed[fastest] > protocol.FASTEST.value:  # 1 mm/ms is 1 m/s
+        raise InputError(
+            f"{place(fastest + 1)}{name} must not change faster than {protocol.FASTEST.value:g} m/s: got "
+            f"{speed[fastest]:.4g} m/s until {np.asarray(times_ms)[fastest + 1]:g} ms; check the units."
+        )
 
 
 def hold_ends_ms(length_ms: float, first_ms: float, steps: int) -> FloatArray:

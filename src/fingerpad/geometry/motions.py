@@ -1,4 +1,4 @@
-"""Ready-made motions: repeated touches and vibration on a hold."""
+"""Ready-made motions: repeated touches, staircase, stroke along the skin, vibration and sweep on a hold."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from fingerpad.core.checks import not_negative, positive, whole
-from fingerpad.core.phases import Phase
+from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, positive, whole
+from fingerpad.core.errors import InputError
+from fingerpad.core.phases import HOLD, RAMP, Phase
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data import protocol
 from fingerpad.geometry.trajectory import Trajectory
@@ -43,7 +44,7 @@ def sine(
     Returns
     -------
     Trajectory
-        With 20 samples per cycle.
+        With 20 samples per cycle and the phases "ramp", "hold" and "vibration".
 
     Examples
     --------
@@ -51,19 +52,58 @@ def sine(
     >>> round(motion.largest, 6), motion.end_ms
     (0.9, 250.0)
     """
-    positive("depth_mm", depth_mm, "mm")
-    positive("amplitude_mm", amplitude_mm, "mm")
-    positive("ramp_ms", ramp_ms, "ms")
-    not_negative("hold_ms", hold_ms, "ms")
     period_ms = MS_PER_S / positive("frequency_hz", frequency_hz, "Hz")
-    phase = np.arange(1, SAMPLES_PER_CYCLE * whole("cycles", cycles, at_least=1) + 1) / SAMPLES_PER_CYCLE
-    before_ms = [0.0, ramp_ms, ramp_ms + hold_ms][: 3 if hold_ms > 0.0 else 2]
-    times_ms = (*before_ms, *(before_ms[-1] + period_ms * phase))
-    return Trajectory(
-        times_ms,
-        (0.0, *[depth_mm] * (len(before_ms) - 1), *(depth_mm + amplitude_mm * np.sin(2.0 * np.pi * phase))),
-        phases=_named(("ramp", "hold", "vibration"), (0.0, ramp_ms, before_ms[-1], times_ms[-1])),
-    )
+    turns = np.arange(1, SAMPLES_PER_CYCLE * whole("cycles", cycles, at_least=1) + 1) / SAMPLES_PER_CYCLE
+    return _on_a_hold(depth_mm, amplitude_mm, period_ms * turns, turns, ramp_ms, hold_ms, "vibration")
+
+
+def chirp(
+    depth_mm: float,
+    amplitude_mm: float,
+    frequencies_hz: Sequence[float],
+    sweep_ms: float,
+    ramp_ms: float = protocol.RAMP.value,
+    hold_ms: float = protocol.HOLD.value,
+) -> Trajectory:
+    """Indent to a depth, hold it, then vibrate about it with a frequency that changes at a constant rate.
+
+    Parameters
+    ----------
+    depth_mm, amplitude_mm, ramp_ms, hold_ms : float
+        As of `sine`. [mm], [ms]
+    frequencies_hz : (float, float)
+        First and last frequency, upwards or downwards. [Hz]
+    sweep_ms : float
+        Duration of the sweep; it ends at the last whole cycle. [ms]
+
+    Returns
+    -------
+    Trajectory
+        With 20 samples per cycle and the phases "ramp", "hold" and "sweep".
+
+    Raises
+    ------
+    InputError
+        If a value is not above 0, or the sweep is shorter than one cycle.
+
+    Examples
+    --------
+    >>> motion = chirp(0.8, 0.05, (5.0, 50.0), sweep_ms=1000.0, ramp_ms=50.0, hold_ms=450.0)
+    >>> len(motion.times_ms), round(motion.end_ms, 1)
+    (543, 1490.0)
+    """
+    first, last = (positive("frequencies_hz", each, "Hz") for each in frequencies_hz)
+    seconds = positive("sweep_ms", sweep_ms, "ms") / MS_PER_S
+    cycles = int((first + last) / 2.0 * seconds)
+    if cycles < 1:
+        raise InputError(
+            f"sweep_ms must leave time for a cycle of {first:g} to {last:g} Hz: got {sweep_ms:g} ms."
+        )
+    turns = np.arange(1, SAMPLES_PER_CYCLE * cycles + 1) / SAMPLES_PER_CYCLE
+    # turns = first t + rate t^2 / 2, solved for t in the form that also holds for a rate of 0.
+    rate = (last - first) / seconds
+    times_ms = MS_PER_S * 2.0 * turns / (first + np.sqrt(first**2 + 2.0 * rate * turns))
+    return _on_a_hold(depth_mm, amplitude_mm, times_ms, turns, ramp_ms, hold_ms, "sweep")
 
 
 def repeated(depth_mm: float, touches: int, ramp_ms: float, hold_ms: float, pause_ms: float) -> Trajectory:
@@ -81,6 +121,7 @@ def repeated(depth_mm: float, touches: int, ramp_ms: float, hold_ms: float, paus
     Returns
     -------
     Trajectory
+        With the phases "ramp", "hold", "release", "pause", "ramp 2" and so on.
 
     Examples
     --------
@@ -101,10 +142,147 @@ def repeated(depth_mm: float, touches: int, ramp_ms: float, hold_ms: float, paus
     return Trajectory((0.0, *np.cumsum(n * lengths_ms)), (0.0, *n * (depth_mm, depth_mm, 0.0, 0.0)))
 
 
-def _named(names: Sequence[str], ends_ms: Sequence[float]) -> tuple[Phase, ...]:
-    """Return phases that follow each other, without those of no length; (n + 1,) ends for n names."""
-    return tuple(
-        Phase(name, start, end)
-        for name, (start, end) in zip(names, pairwise(ends_ms), strict=True)
-        if end > start
+def staircase(
+    depths_mm: Sequence[float] | None = None,
+    forces_mn: Sequence[float] | None = None,
+    *,
+    ramp_ms: float = protocol.RAMP.value,
+    hold_ms: float = protocol.HOLD.value,
+) -> Trajectory:
+    """Press to several depths or forces, one after the other, and hold each.
+
+    Parameters
+    ----------
+    depths_mm : sequence of float, optional
+        Depths of the steps, upwards or downwards; 0 is first touch. [mm]
+    forces_mn : sequence of float, optional
+        Instead of depths, forces on the whole finger. [mN]
+    ramp_ms, hold_ms : float, optional
+        Durations of each ramp and of each hold. [ms]
+
+    Returns
+    -------
+    Trajectory
+        With the phases "ramp", "hold", "ramp 2", "hold 2" and so on, or "release" for a step down.
+
+    Raises
+    ------
+    InputError
+        If not exactly one of the two is given, or the trajectory cannot be.
+
+    Examples
+    --------
+    >>> steps = staircase(depths_mm=[0.5, 1.0, 0.2], ramp_ms=50.0, hold_ms=300.0)
+    >>> [phase.name for phase in steps.phases]
+    ['ramp', 'hold', 'ramp 2', 'hold 2', 'release', 'hold 3']
+    """
+
+    def doubled(name: str, values: Sequence[float] | None) -> tuple[float, ...] | None:
+        """Each level at the end of its ramp and of its hold, after 0."""
+        return None if values is None else (0.0, *np.repeat(float_array(name, values, 1), 2).tolist())
+
+    depths, forces = doubled("depths_mm", depths_mm), doubled("forces_mn", forces_mn)
+    count = len(depths or forces or ()) // 2
+    lengths_ms = count * [positive("ramp_ms", ramp_ms, "ms"), positive("hold_ms", hold_ms, "ms")]
+    return Trajectory((0.0, *np.cumsum(lengths_ms).tolist()), depths, forces)
+
+
+def stroke(
+    depth_mm: float | None = None,
+    force_mn: float | None = None,
+    *,
+    speed_mm_per_s: float,
+    x_mm: float = 0.0,
+    z_mm: float = 0.0,
+    strokes: int = 1,
+    ramp_ms: float = protocol.RAMP.value,
+    hold_ms: float = protocol.HOLD.value,
+) -> Trajectory:
+    """Press, hold, then slide along the skin at a constant speed, once or to and fro.
+
+    Parameters
+    ----------
+    depth_mm : float, optional
+        Depth of the hold and of the strokes. [mm]
+    force_mn : float, optional
+        Instead of a depth, force on the whole finger. [mN]
+    speed_mm_per_s : float
+        Speed along the skin. [mm/s]
+    x_mm, z_mm : float, optional
+        Way of a stroke along the finger, distal positive, and across it; one of them at least. [mm]
+    strokes : int, optional
+        How often it goes there or back.
+    ramp_ms, hold_ms : float, optional
+        Durations of the ramp and of the hold before the first stroke; the hold may be 0. [ms]
+
+    Returns
+    -------
+    Trajectory
+        With the phases "ramp", "hold", "stroke", "stroke 2" and so on.
+
+    Raises
+    ------
+    InputError
+        If not exactly one of depth and force is given, or there is no way.
+
+    Examples
+    --------
+    >>> there_and_back = stroke(0.5, speed_mm_per_s=20.0, x_mm=5.0, strokes=2, hold_ms=200.0)
+    >>> there_and_back.times_ms, there_and_back.x_mm
+    ((0.0, 50.0, 250.0, 500.0, 750.0), (0.0, 0.0, 0.0, 5.0, 0.0))
+    """
+    way_mm = float(np.hypot(finite("x_mm", x_mm, "mm"), finite("z_mm", z_mm, "mm")))
+    if way_mm == 0.0:
+        raise InputError("x_mm or z_mm must not be 0: a stroke needs a way.")
+    one_ms = MS_PER_S * way_mm / positive("speed_mm_per_s", speed_mm_per_s, "mm/s")
+    before_ms = _before(ramp_ms, hold_ms)
+    n = whole("strokes", strokes, at_least=1)
+    times_ms = (*before_ms, *(before_ms[-1] + one_ms * np.arange(1, n + 1)).tolist())
+    there = np.array([0.0] * len(before_ms) + [float(number % 2) for number in range(1, n + 1)])
+
+    def pressed(level: float | None) -> tuple[float, ...] | None:
+        return None if level is None else (0.0, *[level] * (len(times_ms) - 1))
+
+    return Trajectory(
+        times_ms,
+        pressed(depth_mm),
+        pressed(force_mn),
+        x_mm=tuple((x_mm * there).tolist()),
+        z_mm=tuple((z_mm * there).tolist()),
+        phases=_named(("stroke", *(f"stroke {number}" for number in range(2, n + 1))), before_ms, times_ms),
     )
+
+
+def _on_a_hold(
+    depth_mm: float,
+    amplitude_mm: float,
+    since_ms: FloatArray,
+    turns: FloatArray,
+    ramp_ms: float,
+    hold_ms: float,
+    name: str,
+) -> Trajectory:
+    """Make a ramp and hold, then a vibration that has made `turns` at times `since_ms` after the hold."""
+    positive("depth_mm", depth_mm, "mm")
+    positive("amplitude_mm", amplitude_mm, "mm")
+    before_ms = _before(ramp_ms, hold_ms)
+    times_ms = (*before_ms, *(before_ms[-1] + since_ms))
+    return Trajectory(
+        times_ms,
+        (0.0, *[depth_mm] * (len(before_ms) - 1), *(depth_mm + amplitude_mm * np.sin(2.0 * np.pi * turns))),
+        phases=_named((name,), before_ms, (before_ms[-1], times_ms[-1])),
+    )
+
+
+def _before(ramp_ms: float, hold_ms: float) -> tuple[float, ...]:
+    """Return the samples of a ramp, and of a hold unless it takes no time. [ms]"""
+    positive("ramp_ms", ramp_ms, "ms")
+    held = (ramp_ms + hold_ms,) if not_negative("hold_ms", hold_ms, "ms") > 0.0 else ()
+    return 0.0, ramp_ms, *held
+
+
+def _named(names: Sequence[str], before_ms: Sequence[float], times_ms: Sequence[float]) -> tuple[Phase, ...]:
+    """Return the phases of `_before`, then named ones that end at the last times."""
+    ends_ms = (*before_ms, *times_ms[-len(names) :])
+    all_names = (*(RAMP, HOLD)[: len(before_ms) - 1], *names)
+    return tuple(Phase(name, *ends) for name, ends in zip(all_names, pairwise(ends_ms), strict=True))

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, float_array, increasing
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import HOLD, RAMP, Phase
-from fingerpad.geometry.motion import STILL, TURN_LIKE_MM, Motion, Pose, hold_ends_ms
+from fingerpad.geometry.motion import STILL, TURN_LIKE_MM, Motion, Pose, check_speed, hold_ends_ms
 
 POSE_COLUMNS = ("x_mm", "z_mm", "tilt_deg", "spin_deg")
 """Columns of a trajectory that say where the indenter stands, beside its depth or force."""
@@ -59,8 +59,8 @@ class Trajectory(Motion):
     ------
     InputError
         If not exactly one of depth and force is given, lengths differ, times do not increase from 0, a value
-        is not finite, a force is negative, a way or rotation does not start at 0, the indenter never presses,
-        or a phase goes beyond the last time.
+        is not finite, a force is negative, a way or rotation does not start at 0, the indenter never presses
+        or is faster than 10 m/s, or a phase goes beyond the last time.
 
     Examples
     --------
@@ -85,6 +85,8 @@ class Trajectory(Motion):
     # Names do not change what is pressed, and a stored press is found by what is compared.
     phases: tuple[Phase, ...] = field(default=(), compare=False)
 
+    given_samples = True
+
     def __post_init__(self) -> None:
         times = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
         if times.size < 2 or times[0] != 0.0:
@@ -102,11 +104,20 @@ class Trajectory(Motion):
                 raise InputError(
                     f"{column} must begin with 0, since it is counted from first touch: got {values[0]:g}."
                 )
+            if column.endswith("_mm"):
+                check_speed(column, times, values)
             object.__setattr__(self, column, tuple(values.tolist()))
         values = np.array(getattr(self, name))
-        if values[0] > 0.0 or (name == "force_mn" and values.min() < 0.0):
-            allowed = "0, and never be negative" if name == "force_mn" else "0 or less, without contact"
-            raise InputError(f"{name} must begin with {allowed}: it begins with {values[0]:g}.")
+        if values[0] > 0.0:
+            raise InputError(
+                f"{name} must begin with 0 or less, without contact: it begins with {values[0]:g}."
+            )
+        if name == "force_mn" and values.min() < 0.0:
+            first = int(np.argmax(values < 0.0))
+            raise InputError(
+                f"force_mn must not be negative: got {values[first]:g} mN at {times[first]:g} ms, sample "
+                f"{first + 1}."
+            )
         if values.max() <= 0.0:
             raise InputError(f"{name} must be above 0 at some time: the indenter would never press.")
         object.__setattr__(self, "times_ms", tuple(times.tolist()))
@@ -122,6 +133,11 @@ class Trajectory(Motion):
     def by_force(self) -> bool:  # type: ignore[override]
         """Whether the force is prescribed instead of the depth."""
         return self.force_mn is not None
+
+    @property
+    def samples_ms(self) -> tuple[float, ...]:
+        """The samples, `times_ms`. [ms]"""
+        return self.times_ms
 
     @property
     def prescribed(self) -> tuple[float, ...]:
@@ -184,6 +200,11 @@ class Trajectory(Motion):
                 return tuple(np.array(self.times_ms)[corners].tolist())
             corners |= found
 
+    @property
+    def named_phases(self) -> bool:
+        """Whether its phases were given, and not named by its course."""
+        return self.phases != self._phases_of_course()
+
     def _phases_of_course(self) -> tuple[Phase, ...]:
         """Phases named by what the indenter does between corners, adjacent equal ones as one."""
         course, corners = self._course, np.searchsorted(self.times_ms, self.corners_ms).tolist()
@@ -218,7 +239,7 @@ class Trajectory(Motion):
 
         A part of the way takes its share of `ramp_steps`, which is also the number of steps per mm aside. A
         hold longer than the step before it takes `hold_steps`, which grow geometrically, because relaxation
-        is fastest at its beginning.
+        is fastest at its beginning; a long part in which a recording drifts is a hold.
 
         Examples
         --------
@@ -229,7 +250,8 @@ class Trajectory(Motion):
         moved_by = np.linalg.norm(np.diff(self._course, axis=0), axis=1)
         for start, end, moved in zip(self.times_ms, self.times_ms[1:], moved_by, strict=False):
             length_ms = end - start
-            if moved > SAME_SPEED:
+            drifts = moved <= SAME_VALUE and length_ms > hold_steps * last_ms
+            if moved > SAME_SPEED and not drifts:
                 steps = int(np.ceil(ramp_steps * moved - SAME_SPEED))
                 since = np.linspace(0.0, length_ms, steps + 1)[1:]
             elif length_ms > last_ms * (1.0 + SAME_SPEED):

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, one_of, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.experiments.indenter_text import indenter_named
-from fingerpad.inference.tables import TableRow, read_csv
 
 LARGEST_FILE_MB = 1.0
 """Larger files are refused: they hold no published table but, for example, a recording over time. [MB]"""

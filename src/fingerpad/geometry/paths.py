@@ -1,0 +1,93 @@
+"""Whether an indenter stays on the finger and out of its bone, wherever its motion takes it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.motion import Motion
+
+CLEARANCE_TO_BONE = 0.8
+"""Share of the way to the bone that an indenter may go."""
+
+STEP_MM = 0.25
+"""Distance between places at which a way along the skin is looked at. [mm]"""
+
+
+def check_path(finger: Fingertip, motion: Motion, at_mm: tuple[float, float]) -> None:
+    """Check every place of a motion before anything is pressed.
+
+    Parameters
+    ----------
+    finger : Fingertip
+        The finger.
+    motion : Motion
+        Depths are checked if it prescribes them.
+    at_mm : (float, float)
+        x and z of the skin point at first touch. [mm]
+
+    Raises
+    ------
+    InputError
+        If a sample stands beside the finger, or the depth exceeds 80 % of the way to the bone at a sample or
+        between two of them.
+
+    Examples
+    --------
+    >>> from fingerpad.geometry.motion import RampAndHold
+    >>> check_path(Fingertip(), RampAndHold(depth_mm=9.0), (17.37, 0.0))
+    Traceback (most recent call last):
+    fingerpad.core.errors.InputError: depth_mm must stay below 4.44 mm at x = 17.37, z = 0 mm, ...
+    """
+    samples_ms = np.array(motion.samples_ms)
+    if motion.stays:
+        # Depths between samples lie between theirs.
+        times, places = samples_ms, np.broadcast_to(at_mm, (samples_ms.size, 2))
+    else:
+        ways = np.array([[pose.x_mm, pose.z_mm] for pose in motion.poses])
+        parts = np.maximum(np.ceil(np.linalg.norm(np.diff(ways, axis=0), axis=1) / STEP_MM), 1).astype(int)
+        numbers = np.repeat(np.arange(parts.size), parts)
+        share = (np.arange(numbers.size) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[numbers]
+        positions = np.append(numbers + share, parts.size)
+        times = np.interp(positions, np.arange(samples_ms.size), samples_ms)
+        places = at_mm + np.column_stack([np.interp(times, samples_ms, way) for way in ways.T])
+    x, z = places.T
+    skin_y_mm = _skin_y_mm(finger, motion, times, x, z)
+    if motion.by_force:
+        return
+    # Depth is counted from the skin at first touch, and skin elsewhere lies higher or lower.
+    lies_mm = skin_y_mm - skin_y_mm[0]
+    deepest_mm = lies_mm + CLEARANCE_TO_BONE * finger.depth_available_mm(x, z)
+    depths_mm = motion.prescribed_at(times)
+    worst = int((depths_mm - deepest_mm).argmax())
+    if depths_mm[worst] > deepest_mm[worst]:
+        raise InputError(
+            f"depth_mm must stay below {deepest_mm[worst]:.2f} mm at x = {x[worst]:g}, z = {z[worst]:g} mm, "
+            f"because of the bone: got {depths_mm[worst]:g} mm{_sample(motion, times[worst])}."
+        )
+
+
+def _skin_y_mm(
+    finger: Fingertip, motion: Motion, times_ms: FloatArray, x_mm: FloatArray, z_mm: FloatArray
+) -> FloatArray:
+    """Return y of the skin at every place, or raise `InputError` that names the first beside the finger. [mm]"""
+    try:
+        return finger.skin_point(x_mm, z_mm)[..., 1]
+    except InputError:
+        for time, x, z in zip(times_ms, x_mm, z_mm, strict=True):
+            try:
+                finger.skin_point(x, z)
+            except InputError as error:
+                if motion.stays:
+                    raise
+                where = _sample(motion, float(time))
+                raise InputError(f"The indenter must not leave the finger{where}: {error}") from error
+        raise
+
+
+def _sample(motion: Motion, time_ms: float) -> str:
+    """Name the sample at a time, or the next one; nothing if no samples were given."""
+    number = int(np.searchsorted(motion.samples_ms, time_ms * (1.0 - 1e-12))) + 1
+    return f" at {time_ms:.6g} ms, sample {number}" if motion.given_samples else ""
