@@ -154,7 +154,7 @@ def test_phases_of_a_trajectory_are_named_by_its_course():
     assert names(around) == ["ramp", "release", "ramp 2"]
 
 
-@given(st.lists(st.tuples(st.floats(0.1, 500.0), st.floats(-0.5, 2.0)), min_size=1, max_size=8))
+@given(st.lists(st.tuples(st.floats(0.5, 500.0), st.floats(-0.5, 2.0)), min_size=1, max_size=8))
 def test_phases_of_any_trajectory_follow_each_other_from_start_to_end(steps):
     lengths, depths = zip(*steps, strict=True)
     motion = Trajectory((0.0, *np.cumsum(lengths)), (0.0, *depths[:-1], 1.0))

@@ -27,13 +27,17 @@ if TYPE_CHECKING:
         MaterialWarning,
         StoreError,
     )
+    from fingerpad.core.phases import Phase
     from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
     from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
     from fingerpad.geometry.fingertip import Fingertip
     from fingerpad.geometry.grading import Grading
     from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
     from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+    from fingerpad.geometry.motions import chirp, repeated, sine, staircase, stroke
+    from fingerpad.geometry.sampled_motions import reduced, sampled
     from fingerpad.geometry.trajectory import Trajectory
+    from fingerpad.geometry.trajectory_files import read_trajectory
     from fingerpad.mechanics.materials import (
         Energy,
         Hencky,
@@ -75,6 +79,7 @@ __all__ = [
     "Material",
     "MaterialWarning",
     "Ogden",
+    "Phase",
     "Plate",
     "Polynomial",
     "Population",
@@ -91,9 +96,17 @@ __all__ = [
     "Tissues",
     "Touch",
     "Trajectory",
+    "chirp",
     "indent",
     "named_tissues",
+    "read_trajectory",
+    "reduced",
+    "repeated",
+    "sampled",
     "save_figure",
+    "sine",
+    "staircase",
+    "stroke",
     "touch_of",
 ]
 
@@ -122,7 +135,11 @@ _HOMES = {
     "skin.sampling": ("SkinResponse", "SurfaceProfile"),
     "core.signals": ("CurrentTraces", "HitRates", "ResponseMap", "SedTraces", "SpikeTrains"),
     "geometry.motion": ("ForceRampAndHold", "RampAndHold"),
+    "geometry.motions": ("chirp", "repeated", "sine", "staircase", "stroke"),
+    "core.phases": ("Phase",),
+    "geometry.sampled_motions": ("reduced", "sampled"),
     "geometry.trajectory": ("Trajectory",),
+    "geometry.trajectory_files": ("read_trajectory",),
 }
 """Public names by the module that defines them."""
 

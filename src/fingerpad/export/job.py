@@ -323,7 +323,7 @@ def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike
                 "A tolerance chooses the steps of this touch while it is solved: give times_ms, for example "
                 "those of its response."
             )
-        times_ms = stimulus.step_times_ms(settings.ramp_steps, settings.hold_steps)
+        times_ms = settings.steps_ms(stimulus)
     if depths_mm is None:
         if stimulus.by_force:
             raise InputError(

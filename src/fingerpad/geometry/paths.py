@@ -72,7 +72,7 @@ def check_path(finger: Fingertip, motion: Motion, at_mm: tuple[float, float]) ->
 def _skin_y_mm(
     finger: Fingertip, motion: Motion, times_ms: FloatArray, x_mm: FloatArray, z_mm: FloatArray
 ) -> FloatArray:
-    """Return y of the skin at every place, or raise `InputError` that names the first beside the finger. [mm]"""
+    """Return y of the skin at every place, or raise `InputError` that names the first outside. [mm]"""
     try:
         return finger.skin_point(x_mm, z_mm)[..., 1]
     except InputError:

@@ -114,6 +114,8 @@ def _columns(rows: Sequence[TableRow], path: str) -> dict[str, FloatArray]:
 
 def _check_times(times_ms: FloatArray, rows: Sequence[TableRow]) -> None:
     """Check that times increase, and that a recording at a fixed rate has no gap."""
+    if len(rows) < 2:
+        raise InputError(f"{rows[0].place}: a motion must have at least two rows: got one.")
     steps = np.diff(times_ms)
     if not (steps > 0.0).all():
         last = int((steps <= 0.0).argmax())
@@ -121,8 +123,8 @@ def _check_times(times_ms: FloatArray, rows: Sequence[TableRow]) -> None:
             f"{rows[last + 1].place}: the time must increase: got {times_ms[last + 1]:.10g} ms after "
             f"{times_ms[last]:.10g} ms."
         )
-    usual = float(np.median(steps)) if steps.size else 0.0
-    regular = steps.size and np.mean(np.abs(steps - usual) <= SAME_STEP * usual) >= REGULAR_SHARE
+    usual = float(np.median(steps))
+    regular = np.mean(np.abs(steps - usual) <= SAME_STEP * usual) >= REGULAR_SHARE
     if regular and steps.max() > GAP * usual:
         last = int(steps.argmax())
         raise InputError(

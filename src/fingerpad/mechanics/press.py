@@ -8,13 +8,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from fingerpad.core.checks import FloatArray, positive, whole
+from fingerpad.core.checks import FloatArray, float_array, increasing, positive, whole
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.mesh_checks import check_mesh
 from fingerpad.geometry.mesh_quality import element_place, squeezed_most
-from fingerpad.geometry.motion import Stimulus
+from fingerpad.geometry.motion import Motion, Stimulus
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.balance import (
     EnergyBalance,
@@ -62,6 +62,10 @@ MOST_CONTINUED = 4.0
 """Largest factor by which the last step of the skin is extended for the next guess."""
 
 
+SAME_TIME = 1e-9
+"""Times closer than this, over the end of the motion, are one."""
+
+
 LIFT_MM = 100.0
 """How far an indenter without force is lifted while the skin below it is solved. [mm]"""
 
@@ -80,18 +84,55 @@ class PressSettings:
         If given, steps are as long as this bound on the error of SED in time allows, between the steps too
         when SED is taken as linear there. It is relative to the largest SED and holds in the living
         epidermis, or everywhere in a mesh without one.
+    times_ms : tuple of float
+        Times at which the result is wanted, beside those of the steps; each is solved at exactly. [ms]
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range, or the times do not increase from above 0.
     """
 
     ramp_steps: int = 8
     hold_steps: int = 8
     newton: NewtonSettings = field(default_factory=NewtonSettings)
     sed_tolerance: float | None = None
+    times_ms: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
+        wanted = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
+        if wanted.size and wanted[0] <= 0.0:
+            raise InputError(f"times_ms must lie above 0, which is solved anyway: got {wanted[0]:g}.")
+        object.__setattr__(self, "times_ms", tuple(wanted.tolist()))
         whole("ramp_steps", self.ramp_steps, at_least=1)
         whole("hold_steps", self.hold_steps, at_least=1)
         if self.sed_tolerance is not None and positive("sed_tolerance", self.sed_tolerance) >= 1.0:
             raise InputError(f"sed_tolerance must be below 1: got {self.sed_tolerance!r}.")
+
+    def steps_ms(self, motion: Motion) -> FloatArray:
+        """List the times to solve a motion at, from 0, without a tolerance of SED. [ms]
+
+        Raises
+        ------
+        InputError
+            If a wanted time lies beyond the end of the motion.
+        """
+        return self._with_wanted(motion, motion.step_times_ms(self.ramp_steps, self.hold_steps))
+
+    def smooth_ends_ms(self, motion: Motion) -> FloatArray:
+        """List the ends of the parts of a motion within which a tolerance of SED chooses the steps. [ms]"""
+        return self._with_wanted(motion, np.array([*motion.corners_ms, motion.end_ms]))
+
+    def _with_wanted(self, motion: Motion, times_ms: FloatArray) -> FloatArray:
+        wanted = np.array(self.times_ms)
+        if wanted.size and wanted[-1] > motion.end_ms:
+            raise InputError(
+                f"times_ms must lie within the motion, which ends at {motion.end_ms:g} ms: got "
+                f"{wanted[-1]:g} ms."
+            )
+        # A step of no length cannot be solved, so that a time which is there but for rounding stays as it is.
+        apart = np.abs(wanted[:, None] - times_ms).min(axis=1) > SAME_TIME * motion.end_ms
+        return np.union1d(times_ms, wanted[apart])
 
 
 @dataclass(frozen=True)
@@ -490,12 +531,12 @@ def _newton_settings(settings: PressSettings) -> NewtonSettings:
 def _moments(job: _Press, settings: PressSettings) -> Iterator[_Moment]:
     """Solved times after the unloaded one."""
     stimulus, mesh, start = job.stimulus, job.body.mesh, job.unloaded()
-    times = stimulus.step_times_ms(settings.ramp_steps, settings.hold_steps)[1:]
+    times = settings.steps_ms(stimulus)[1:]
     if settings.sed_tolerance is None:
         return steps_at(start, times, job.step, job.stopped)
     relaxing = job.body.table.times_ms[job.body.table.shares > 0.0]
     phases, begin_ms = [], 0.0
-    for end_ms in (*stimulus.corners_ms, stimulus.end_ms):
+    for end_ms in settings.smooth_ends_ms(stimulus).tolist():
         before, after = stimulus.course_at(begin_ms), stimulus.course_at(end_ms)
         first_ms = times[np.searchsorted(times, begin_ms, side="right")] - begin_ms
         if (before == after).all():

@@ -22,6 +22,7 @@ from fingerpad.geometry.indenter_grading import FEWEST_ACROSS_GROOVE, grading_al
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh, finger_mesh
 from fingerpad.geometry.motion import Motion, RampAndHold, Stimulus
+from fingerpad.geometry.paths import CLEARANCE_TO_BONE, check_path
 from fingerpad.mechanics.contact import Placement, check_friction, place, rotation_of
 from fingerpad.mechanics.kernels import KERNELS
 from fingerpad.mechanics.materials import Tissues
@@ -35,7 +36,6 @@ STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
 """Steps in ramp and hold of each resolution."""
 
 LARGEST_TILT_DEG = 45.0
-_CLEARANCE_TO_BONE = 0.8
 
 
 @dataclass(frozen=True)
@@ -122,11 +122,8 @@ class Touch:
                 )
         self._check_grooves()
         check_friction(self.friction, self.indenter)
-        if not self.stimulus.by_force and self.stimulus.largest > self.deepest_mm:
-            raise InputError(
-                f"depth_mm must stay below {self.deepest_mm:.2f} mm at x = {x:g}, z = {z:g} mm, "
-                f"because of the bone: got {self.stimulus.largest:g} mm."
-            )
+        check_path(self.finger, self.stimulus, self.at_mm)
+        self.settings.steps_ms(self.stimulus)
 
     def _check_grooves(self) -> None:
         """Check that elements are small enough: a ridge or groove between two nodes would have no effect."""
@@ -209,7 +206,7 @@ class Touch:
     @property
     def deepest_mm(self) -> float:
         """Largest allowed depth, 80 % of the distance to the bone. [mm]"""
-        return _CLEARANCE_TO_BONE * float(self.finger.depth_available_mm(*self.at_mm))
+        return CLEARANCE_TO_BONE * float(self.finger.depth_available_mm(*self.at_mm))
 
     @property
     def mesh(self) -> Mesh:
@@ -234,6 +231,7 @@ def touch_of(
     settings: PressSettings | None = None,
     friction: float = 0.0,
     spin_deg: float = 0.0,
+    times_ms: Sequence[float] = (),
 ) -> Touch:
     """Describe a touch without solving it; arguments as in `indent`.
 
@@ -258,16 +256,17 @@ def touch_of(
     x, z = _check_position(at_mm)
     stimulus = instance("stimulus", stimulus or RampAndHold(), Motion)
     # The grading depends on this point, so finger, indenter and point are checked first.
-    instance("finger", finger, Fingertip).skin_point(x, z)
+    check_path(instance("finger", finger, Fingertip), stimulus, (x, z))
     instance("indenter", indenter, Indenter)
     finite("spin_deg", spin_deg, "degrees")
+    settings = settings or settings_of(resolution)
     return Touch(
         finger=finger,
         indenter=indenter,
         stimulus=stimulus,
         tissues=materials if isinstance(materials, Tissues) else named_tissues(materials),
         grading=grading or grading_along(indenter, resolution, x, z, spin_deg, stimulus.poses),
-        settings=settings or settings_of(resolution),
+        settings=replace(settings, times_ms=tuple(times_ms)) if len(times_ms) else settings,
         at_mm=(x, z),
         tilt_deg=tilt_deg,
         friction=friction,
@@ -284,6 +283,7 @@ def indent(
     at_mm: Sequence[float] = CONTACT_POINT_MM,
     settings: PressSettings | None = None,
     whole: bool = False,
+    times_ms: Sequence[float] = (),
 ) -> SkinResponse:
     """Press an indenter into a finger and return the response of the skin.
 
@@ -309,6 +309,9 @@ def indent(
         steps that keep the error of SED in time below 1 % of its largest value.
     whole : bool
         Whether to keep all nodes and elements over time as well, see `Touch.solve`.
+    times_ms : sequence of float
+        Times at which the response is wanted: it has them among its times, which the motion and the settings
+        choose. [ms]
 
     Returns
     -------
@@ -329,7 +332,9 @@ def indent(
     >>> print(f"{skin.surface_profile().deflection_mm.max():.1f} mm deep")
     0.3 mm deep
     """
-    touch = touch_of(finger, indenter, stimulus, materials, resolution, at_mm, settings=settings)
+    touch = touch_of(
+        finger, indenter, stimulus, materials, resolution, at_mm, settings=settings, times_ms=times_ms
+    )
     return touch.solve(whole=whole)
 
 
