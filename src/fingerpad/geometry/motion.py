@@ -43,7 +43,7 @@ class Pose:
 STILL = Pose()
 """The pose at first touch."""
 
-TURN_LIKE_MM = 20.0
+TURN_LIKE_MM = 10.0
 """Rotation that takes as many steps as a way of 1 mm. [degrees]"""
 
 
