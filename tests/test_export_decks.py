@@ -499,12 +499,14 @@ def test_skin_rubs_where_it_shall():
         calculix = of(read_cards(calculix_deck(job)), "FRICTION")
         assert [numbers(data)[0] for _, data in calculix] == ([friction] if friction else [])
         febio = read_febio(job)
-        assert float(febio.find("Contact/contact/fric_coeff").text) == friction
-        symmetric = (
-            febio.find("Contact/contact/symmetric_stiffness").text,
-            febio.find("Control/solver")[0].text,
-        )
-        assert symmetric == (("0", "non-symmetric") if friction else ("1", "symmetric"))
+        assert febio.find("Control/solver")[0].text == ("non-symmetric" if friction else "symmetric")
+        contact = febio.find("Contact/contact")
+        if friction:
+            assert contact.get("type") == "sliding-elastic"
+            assert float(contact.find("fric_coeff").text) == friction
+            assert contact.find("symmetric_stiffness").text == "0"
+        else:
+            assert contact.get("type") == "sliding-node-on-facet"
     with pytest.raises(InputError, match="friction must"):
         replace(job, friction=-0.1)
 
@@ -558,6 +560,8 @@ FEBIO = {  # ADD_PARAMETER and ADD_PROPERTY of each class in the sources of FEBi
     "rigid_displacement": {"rb", "dof", "value", "relative"},
     "sliding-elastic": {"laugon", "tolerance", "gaptol", "penalty", "auto_penalty", "two_pass",
                         "search_radius", "symmetric_stiffness", "tension", "fric_coeff"},
+    "sliding-node-on-facet": {"laugon", "tolerance", "gaptol", "penalty", "auto_penalty", "two_pass",
+                              "search_tol", "maxaug", "fric_coeff"},
     "loadcurve": {"interpolate", "extend", "points"},
 }  # fmt: skip
 SECTIONS = ["Module", "Control", "Globals", "Material", "Mesh", "MeshDomains", "Boundary", "Rigid", "Contact",
@@ -658,6 +662,26 @@ def test_febio_moves_as_we_do():
         np.testing.assert_allclose(
             curve(root, item.find("value").get("lc")), np.column_stack([TIMES, DEPTHS])
         )
+
+
+def test_febio_is_asked_for_energies_only_where_nothing_relaxes():
+    """A relaxing uncoupled material throws when `sed` or `strain energy density` is asked for."""
+    relaxing, elastic = (
+        read_febio(block_job(material=NEO_HOOKE.with_prony(each))) for each in (PRONY, Prony())
+    )
+    for root in (relaxing, elastic):
+        assert not [item for item in root.iter("var") if "energy" in item.get("type")]
+        asked = {name for item in root.find("Output/logfile") for name in item.get("data").split(";")}
+        assert {"ux", "uy", "uz", "J", "sx", "x", "Fz"} <= asked
+        assert "sed" not in asked
+    for root, prony in ((relaxing, PRONY), (elastic, Prony())):
+        job = block_job(material=NEO_HOOKE.with_prony(prony))
+        unrelaxed = [layer for layer in job.layer_names if not job.materials[layer].prony.shares]
+        expected = np.flatnonzero(np.isin(job.mesh.layer, unrelaxed)) + 1
+        asked = [item for item in root.iter("element_data") if item.get("data") == "devsed"]
+        listed = [int(number) for item in asked for number in item.text.split(",")]
+        assert listed == expected.tolist()
+    assert len(listed) > 0
 
 
 def febio_energy(material, stretches):
