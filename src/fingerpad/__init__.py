@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from fingerpad.core.errors import (
         ConvergenceError,
         FingerpadError,
+        InertiaWarning,
         InputError,
         MaterialWarning,
         StoreError,
@@ -74,6 +75,7 @@ __all__ = [
     "Hencky",
     "HitRates",
     "Hyperfoam",
+    "InertiaWarning",
     "InputError",
     "Line",
     "Material",
@@ -113,7 +115,14 @@ __all__ = [
 _HOMES = {
     "neuron.afferent": ("Afferent",),
     "geometry.edged_indenters": ("Edge", "Gap", "Grating"),
-    "core.errors": ("ConvergenceError", "FingerpadError", "InputError", "MaterialWarning", "StoreError"),
+    "core.errors": (
+        "ConvergenceError",
+        "FingerpadError",
+        "InertiaWarning",
+        "InputError",
+        "MaterialWarning",
+        "StoreError",
+    ),
     "geometry.fingertip": ("Fingertip",),
     "geometry.grading": ("Grading",),
     "skin.indentation": ("Touch", "indent", "touch_of"),

@@ -34,3 +34,7 @@ class ConvergenceError(FingerpadError, RuntimeError):
 
 class MaterialWarning(UserWarning):
     """A material that becomes unstable within the range of stretches of a touch."""
+
+
+class InertiaWarning(UserWarning):
+    """A motion so fast that the inertia of the tissue, which is neglected, matters."""

@@ -18,6 +18,14 @@ _IDENTIFIED = Source(
 
 POISSON_RATIO = _MAENO("Poisson's ratio of every skin layer", 0.48, "1")
 
+DENSITY = Published(
+    "density of soft tissue",
+    1100.0,
+    "kg/m3",
+    "skin, as in tables of tissue properties (Duck 1990); subcutaneous fat is a sixth lighter",
+    "recalled",
+)
+
 MAENO_EPIDERMIS_YOUNG = _MAENO("Young's modulus of the epidermis, Maeno", 136.0, "kPa")
 MAENO_DERMIS_YOUNG = _MAENO("Young's modulus of the dermis, Maeno", 80.0, "kPa")
 MAENO_SUBCUTIS_YOUNG = _MAENO("Young's modulus of the subcutis, Maeno", 34.0, "kPa")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, positive
+from fingerpad.core.checks import FloatArray, not_negative, positive, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase, ramp_and_hold
 from fingerpad.data import protocol
@@ -40,6 +40,38 @@ class Pose:
         return np.array([self.x_mm, self.z_mm, self.tilt_deg, self.spin_deg])
 
 
+@dataclass(frozen=True)
+class Cycles:
+    """A part of a motion that repeats itself.
+
+    Parameters
+    ----------
+    start_ms, period_ms : float
+        Its start and the length of a cycle. [ms]
+    count : int
+        Number of cycles.
+
+    Examples
+    --------
+    >>> Cycles(start_ms=100.0, period_ms=10.0, count=50).end_ms
+    600.0
+    """
+
+    start_ms: float
+    period_ms: float
+    count: int
+
+    def __post_init__(self) -> None:
+        not_negative("start_ms", self.start_ms, "ms")
+        positive("period_ms", self.period_ms, "ms")
+        whole("count", self.count, at_least=1)
+
+    @property
+    def end_ms(self) -> float:
+        """End of the last cycle. [ms]"""
+        return self.start_ms + self.count * self.period_ms
+
+
 STILL = Pose()
 """The pose at first touch."""
 
@@ -55,6 +87,9 @@ class Motion:
 
     by_force: bool = False
     """Whether the force is prescribed instead of the depth."""
+
+    cycles: Cycles | None = None
+    """The part that repeats itself, if there is one: not all of its cycles need be solved."""
 
     given_samples: bool = False
     """Whether a user gave the samples, so that errors name them."""

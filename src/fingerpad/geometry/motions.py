@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +13,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.phases import HOLD, RAMP, Phase
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data import protocol
+from fingerpad.geometry.motion import Cycles
 from fingerpad.geometry.trajectory import Trajectory
 
 SAMPLES_PER_CYCLE = 20
@@ -44,7 +46,8 @@ def sine(
     Returns
     -------
     Trajectory
-        With 20 samples per cycle and the phases "ramp", "hold" and "vibration".
+        With 20 samples per cycle and the phases "ramp", "hold" and "vibration". A press solves some of more
+        than 10 cycles and interpolates the others within a tolerance (`PressSettings.cycle_tolerance`).
 
     Examples
     --------
@@ -54,7 +57,8 @@ def sine(
     """
     period_ms = MS_PER_S / positive("frequency_hz", frequency_hz, "Hz")
     turns = np.arange(1, SAMPLES_PER_CYCLE * whole("cycles", cycles, at_least=1) + 1) / SAMPLES_PER_CYCLE
-    return _on_a_hold(depth_mm, amplitude_mm, period_ms * turns, turns, ramp_ms, hold_ms, "vibration")
+    motion = _on_a_hold(depth_mm, amplitude_mm, period_ms * turns, turns, ramp_ms, hold_ms, "vibration")
+    return replace(motion, cycles=Cycles(ramp_ms + hold_ms, period_ms, cycles))
 
 
 def chirp(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -169,9 +170,9 @@ def reduced(motion: Trajectory, tolerance: float = TOLERANCE) -> Trajectory:
         if found[worst] > tolerance:
             keep[first + worst] = True
             waiting += [(first, first + worst), (first + worst, last)]
-    columns = {name: tuple(np.array(getattr(motion, name))[keep]) for name in names}
+    columns: dict[str, Any] = {name: tuple(np.array(getattr(motion, name))[keep]) for name in names}
     phases = motion.phases if motion.named_phases else ()
-    return replace(motion, times_ms=tuple(times[keep]), **columns, phases=phases)
+    return replace(motion, times_ms=tuple(times[keep]), **columns, phases=phases, cycles=None)
 
 
 def _extent(table: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, float_array, increasing
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import HOLD, RAMP, Phase
-from fingerpad.geometry.motion import STILL, TURN_LIKE_MM, Motion, Pose, check_speed, hold_ends_ms
+from fingerpad.geometry.motion import STILL, TURN_LIKE_MM, Cycles, Motion, Pose, check_speed, hold_ends_ms
 
 POSE_COLUMNS = ("x_mm", "z_mm", "tilt_deg", "spin_deg")
 """Columns of a trajectory that say where the indenter stands, beside its depth or force."""
@@ -54,13 +54,16 @@ class Trajectory(Motion):
         Names of its parts. By default it is divided where it changes its course: "ramp" goes deeper, "hold"
         stays, "move" goes aside or turns, "release" comes back, "pause" stays out of contact and "course" is
         any other part; from the second on they are numbered, as "ramp 2".
+    cycles : Cycles, optional
+        The part that repeats itself. If it has many cycles, a press solves some of them and interpolates
+        the others (`PressSettings.cycle_tolerance`).
 
     Raises
     ------
     InputError
         If not exactly one of depth and force is given, lengths differ, times do not increase from 0, a value
         is not finite, a force is negative, a way or rotation does not start at 0, the indenter never presses
-        or is faster than 10 m/s, or a phase goes beyond the last time.
+        or is faster than 10 m/s, a phase goes beyond the last time, or the cycles do not repeat.
 
     Examples
     --------
@@ -84,6 +87,7 @@ class Trajectory(Motion):
     spin_deg: tuple[float, ...] | None = None
     # Names do not change what is pressed, and a stored press is found by what is compared.
     phases: tuple[Phase, ...] = field(default=(), compare=False)
+    cycles: Cycles | None = None
 
     given_samples = True
 
@@ -128,6 +132,23 @@ class Trajectory(Motion):
                     f"phases must end with the trajectory, at {self.end_ms:g} ms: {phase.name!r} ends at "
                     f"{phase.end_ms:g} ms."
                 )
+        if self.cycles is not None:
+            self._check_cycles(self.cycles)
+
+    def _check_cycles(self, cycles: Cycles) -> None:
+        """Check that every cycle has the same samples."""
+        times, near = np.array(self.times_ms), SAME_SPEED * cycles.period_ms
+        inside = (times > cycles.start_ms + near) & (times < cycles.end_ms + near)
+        if inside.any() and inside.sum() % cycles.count == 0 and np.isclose(times, cycles.start_ms).any():
+            since = times[inside].reshape(cycles.count, -1)
+            since = since - cycles.start_ms - cycles.period_ms * np.arange(cycles.count)[:, None]
+            course = self._course[inside].reshape(*since.shape, -1)
+            if np.ptp(since, axis=0).max() < near and np.ptp(course, axis=0).max() < SAME_SPEED:
+                return
+        raise InputError(
+            f"cycles must repeat the samples of the first of them {cycles.count} times, every "
+            f"{cycles.period_ms:g} ms from a sample at {cycles.start_ms:g} ms: they do not."
+        )
 
     @property
     def by_force(self) -> bool:  # type: ignore[override]

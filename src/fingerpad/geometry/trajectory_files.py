@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -85,9 +86,10 @@ def read_trajectory(
             columns[name] = _without_noise(values - finite("first_touch_mm", first_touch_mm, "mm"), False)
         else:
             columns[name] = _without_noise(values, True) if name == "force_mn" else values - values[0]
+    samples: dict[str, Any] = {name: tuple(values.tolist()) for name, values in columns.items()}
     try:
         return Trajectory(
-            **{name: tuple(values.tolist()) for name, values in columns.items()},
+            **samples,
             times_ms=tuple((times_ms - times_ms[0]).tolist()),
             phases=tuple(phases),
         )

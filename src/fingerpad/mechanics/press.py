@@ -27,6 +27,7 @@ from fingerpad.mechanics.balance import (
 )
 from fingerpad.mechanics.configuration import SMALLEST_FORCE_MN, Balance, Body, Load, Reached
 from fingerpad.mechanics.contact import Contact, Placement, check_friction
+from fingerpad.mechanics.cycles import CycleJumps
 from fingerpad.mechanics.fields import (
     ElementFields,
     FieldState,
@@ -52,6 +53,10 @@ from fingerpad.mechanics.viscoelastic import (
     instantaneous_state,
     stored_energy_density,
 )
+
+MOST_SOLVED = 10
+"""Equal cycles up to which all are solved."""
+
 
 PENETRATION_SHARE = 0.1
 """Largest penetration over depth, as a share of the tolerance of SED: SED grows as the square of depth or
@@ -86,6 +91,10 @@ class PressSettings:
         epidermis, or everywhere in a mesh without one.
     times_ms : tuple of float
         Times at which the result is wanted, beside those of the steps; each is solved at exactly. [ms]
+    cycle_tolerance : float, optional
+        Of a motion with more than `MOST_SOLVED` equal cycles, only so many are solved as this bound on the
+        error of SED asks for, and the others are interpolated (see `cycles`). It is relative to the largest
+        SED, at the same places. None solves all of them, as do friction and `sed_tolerance`.
 
     Raises
     ------
@@ -98,6 +107,7 @@ class PressSettings:
     newton: NewtonSettings = field(default_factory=NewtonSettings)
     sed_tolerance: float | None = None
     times_ms: tuple[float, ...] = ()
+    cycle_tolerance: float | None = 0.01
 
     def __post_init__(self) -> None:
         wanted = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
@@ -106,8 +116,10 @@ class PressSettings:
         object.__setattr__(self, "times_ms", tuple(wanted.tolist()))
         whole("ramp_steps", self.ramp_steps, at_least=1)
         whole("hold_steps", self.hold_steps, at_least=1)
-        if self.sed_tolerance is not None and positive("sed_tolerance", self.sed_tolerance) >= 1.0:
-            raise InputError(f"sed_tolerance must be below 1: got {self.sed_tolerance!r}.")
+        for name in ("sed_tolerance", "cycle_tolerance"):
+            tolerance = getattr(self, name)
+            if tolerance is not None and positive(name, tolerance) >= 1.0:
+                raise InputError(f"{name} must be below 1: got {tolerance!r}.")
 
     def steps_ms(self, motion: Motion) -> FloatArray:
         """List the times to solve a motion at, from 0, without a tolerance of SED. [ms]
@@ -532,7 +544,12 @@ def _moments(job: _Press, settings: PressSettings) -> Iterator[_Moment]:
     """Solved times after the unloaded one."""
     stimulus, mesh, start = job.stimulus, job.body.mesh, job.unloaded()
     times = settings.steps_ms(stimulus)[1:]
+    receptors = mesh.living_epidermis.ravel()
+    where = receptors if receptors.size else np.arange(len(mesh.elements))
     if settings.sed_tolerance is None:
+        cycle_times = _cycle_times(job, settings, times)
+        if settings.cycle_tolerance is not None and cycle_times.size:
+            return _with_jumps(job, times, cycle_times, settings.cycle_tolerance, where)
         return steps_at(start, times, job.step, job.stopped)
     relaxing = job.body.table.times_ms[job.body.table.shares > 0.0]
     phases, begin_ms = [], 0.0
@@ -544,6 +561,36 @@ def _moments(job: _Press, settings: PressSettings) -> Iterator[_Moment]:
             first_ms = relaxing.min(initial=first_ms)
         phases.append(Phase(end_ms, first_ms=first_ms, loading=bool(after[0] > before[0])))
         begin_ms = end_ms
-    receptors = mesh.living_epidermis.ravel()
-    where = receptors if receptors.size else np.arange(len(mesh.elements))
     return adaptive_steps(start, phases, settings.sed_tolerance, where, job.step, job.stopped)
+
+
+def _cycle_times(job: _Press, settings: PressSettings, times: FloatArray) -> FloatArray:
+    """List the times of many equal cycles of which not all are solved, (n_cycles, n_steps); else (0, 0).
+
+    Skin that slides may creep from cycle to cycle, so that with friction all are solved.
+    """
+    cycles = job.stimulus.cycles
+    if cycles is None or settings.cycle_tolerance is None or job.contact.friction > 0.0:
+        return np.empty((0, 0))
+    near_ms = SAME_TIME * job.stimulus.end_ms
+    inside = times[(times > cycles.start_ms + near_ms) & (times < cycles.end_ms + near_ms)]
+    if cycles.count <= MOST_SOLVED or inside.size % cycles.count:
+        return np.empty((0, 0))
+    rows = inside.reshape(cycles.count, -1)
+    since = rows - cycles.period_ms * np.arange(cycles.count)[:, None]
+    # Wanted times may lie in some cycles only.
+    return rows if np.ptp(since, axis=0).max() <= near_ms else np.empty((0, 0))
+
+
+def _with_jumps(
+    job: _Press, times: FloatArray, cycle_times: FloatArray, tolerance: float, where: np.ndarray
+) -> Iterator[_Moment]:
+    """Solved and interpolated times of a motion with many equal cycles."""
+    body, moment = job.body, job.unloaded()
+    first, last = np.searchsorted(times, [cycle_times[0, 0], cycle_times[-1, -1]])
+    jumps = CycleJumps(cycle_times, tolerance, where, body.table, body.mesh.layer, job.step, job.stopped)
+    for before in steps_at(moment, times[:first], job.step, job.stopped):
+        yield (moment := before)
+    for vibrated in jumps.moments(moment):
+        yield (moment := vibrated)
+    yield from steps_at(moment, times[last + 1 :], job.step, job.stopped)

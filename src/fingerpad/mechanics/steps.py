@@ -219,7 +219,7 @@ def _adapt(
         largest_kpa = max(largest_kpa, _largest(moment, where))
         allowed_kpa = SMOOTH_SHARE * tolerance * max(largest_kpa, growth * _largest(found, where))
         error_kpa = interpolation_error(before, moment, found, where, both=not judged)
-        step_ms = taken_ms * _change(error_kpa, allowed_kpa)
+        step_ms = taken_ms * change_of_length(error_kpa, allowed_kpa)
         if error_kpa > allowed_kpa:
             attempts.append(
                 f"step from {moment.time_ms:.4g} to {target_ms:.4g} ms: "
@@ -242,11 +242,11 @@ def _target(time_ms: float, step_ms: float, end_ms: float) -> float:
     return time_ms + (left_ms / 2 if left_ms < 2 * step_ms else step_ms)
 
 
-def _change(error_kpa: float, allowed_kpa: float) -> float:
+def change_of_length(error_kpa: float, allowed_kpa: float, lengthen: float = LENGTHEN) -> float:
     """Factor from a step's length to the next one's: the error grows as the square of the length."""
     if error_kpa <= 0.0:
-        return LENGTHEN
-    return float(np.clip(SAFETY * np.sqrt(allowed_kpa / error_kpa), SHORTEN, LENGTHEN))
+        return lengthen
+    return float(np.clip(SAFETY * np.sqrt(allowed_kpa / error_kpa), SHORTEN, lengthen))
 
 
 def interpolation_error(

@@ -24,6 +24,7 @@ from fingerpad.geometry.mesh import Mesh, finger_mesh
 from fingerpad.geometry.motion import Motion, RampAndHold, Stimulus
 from fingerpad.geometry.paths import CLEARANCE_TO_BONE, check_path
 from fingerpad.mechanics.contact import Placement, check_friction, place, rotation_of
+from fingerpad.mechanics.inertia import warn_of_inertia
 from fingerpad.mechanics.kernels import KERNELS
 from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.press import Deformation, PressSettings, press
@@ -73,6 +74,11 @@ class Touch:
         If the axis misses the finger, the depth reaches the bone, an axis beside the midline or a spin that
         breaks the symmetry meets half a finger, the elements are too long for a groove, or tilt, spin or
         friction is asked of a wire.
+
+    Warns
+    -----
+    InertiaWarning
+        If the motion is so fast that the inertia of the tissue, which is neglected, matters.
     """
 
     finger: Fingertip
@@ -124,6 +130,14 @@ class Touch:
         check_friction(self.friction, self.indenter)
         check_path(self.finger, self.stimulus, self.at_mm)
         self.settings.steps_ms(self.stimulus)
+
+        warn_of_inertia(self.stimulus, self.tissues.layers, self._layers_mm(), stacklevel=4)
+
+    def _layers_mm(self) -> FloatArray:
+        """Thickness of the layers below the indenter. [mm]"""
+        depths = self.finger.layer_depths_mm
+        to_bone_mm = float(self.finger.depth_available_mm(*self.at_mm))
+        return np.diff([0.0, *depths, max(to_bone_mm, depths[-1])])
 
     def _check_grooves(self) -> None:
         """Check that elements are small enough: a ridge or groove between two nodes would have no effect."""

@@ -1,0 +1,142 @@
+"""Inertia of the tissue, which a press neglects: when that is right, and the mass that an indenter moves.
+
+A column of tissue between indenter and bone, free at its sides, carries compression at the speed
+sqrt(E / rho) and has its first resonance when it is a quarter of a wavelength long,
+
+    f_0 = 1 / (4 t),    t = sum over layers of h / sqrt(E / rho),
+
+with thickness h, density rho and E, Young's modulus at once. Below it the force that accelerates the tissue
+is to the force that deforms it as (f / f_0)². This share is compared with that of real presses, m w² / k with
+the moved mass m and stiffness k, in docs/decisions/inertia.md.
+
+Another motion counts as the sine that has its way D from reversal to reversal and its largest speed v,
+f = v / (pi D).
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import FloatArray, float_array
+from fingerpad.core.errors import InertiaWarning
+from fingerpad.core.units import MS_PER_S
+from fingerpad.data.tissues import DENSITY
+from fingerpad.geometry.mesh import Mesh
+from fingerpad.geometry.motion import Motion
+from fingerpad.mechanics.materials import Material, MaterialTable
+from fingerpad.mechanics.viscoelastic import instantaneous_state
+
+LARGEST_SHARE = 0.1
+"""Force that accelerates the tissue, over the force of the indenter, above which a touch warns."""
+
+LEAST_WAY = 1e-3
+"""Way over the largest depth or force of a motion below which it counts as noise."""
+
+
+def resonance_hz(materials: Sequence[Material], thickness_mm: ArrayLike) -> float:
+    """First resonance of a column of tissue on bone. [Hz]
+
+    Parameters
+    ----------
+    materials : sequence of Material
+        Layers.
+    thickness_mm : array (n_layers,)
+        Their thicknesses. [mm]
+
+    Examples
+    --------
+    >>> soft = Material.neo_hooke(shear_kpa=5.0, poisson=0.48)
+    >>> round(resonance_hz([soft], [5.0]))
+    183
+    """
+    young_kpa = np.array([_young_at_once_kpa(material) for material in materials])
+    speed_m_per_s = np.sqrt(1e3 * young_kpa / DENSITY.value)
+    return float(MS_PER_S / (4.0 * (float_array("thickness_mm", thickness_mm, 1) / speed_m_per_s).sum()))
+
+
+def _young_at_once_kpa(material: Material) -> float:
+    """Young's modulus before any relaxation. [kPa]"""
+    shear = material.shear_modulus_kpa
+    if material.moduli == "long_term":
+        shear /= material.prony.long_term_share
+    return 9.0 * material.bulk_modulus_kpa * shear / (3.0 * material.bulk_modulus_kpa + shear)
+
+
+def fastest_hz(motion: Motion) -> float:
+    """Frequency of the sine that is as fast as the fastest part of a motion. [Hz]
+
+    Examples
+    --------
+    >>> from fingerpad.geometry.motion import RampAndHold
+    >>> round(fastest_hz(RampAndHold(ramp_ms=50.0)), 2)  # 1 / (pi 50 ms)
+    6.37
+    """
+    times_ms = np.array(motion.samples_ms)
+    steps, lengths_ms = np.diff(motion.prescribed_at(times_ms)), np.diff(times_ms)
+    run = np.cumsum(np.diff(np.sign(steps), prepend=np.sign(steps[:1])) != 0.0)
+    way, fastest = np.zeros(run[-1] + 1), np.zeros(run[-1] + 1)
+    np.add.at(way, run, np.abs(steps))
+    np.maximum.at(fastest, run, np.abs(steps) / lengths_ms)
+    counts = way > LEAST_WAY * motion.largest
+    # A vibration that begins or ends in its middle has half of its way there: the next part tells the whole.
+    way = np.maximum(way, np.maximum(np.append(way[1:], 0.0), np.append(0.0, way[:-1])))
+    return float(MS_PER_S * (fastest[counts] / (np.pi * way[counts])).max(initial=0.0))
+
+
+def warn_of_inertia(
+    motion: Motion, materials: Sequence[Material], thickness_mm: ArrayLike, stacklevel: int
+) -> None:
+    """Warn if a motion is so fast that the inertia of the tissue matters.
+
+    Parameters
+    ----------
+    motion : Motion
+        Motion of the indenter.
+    materials, thickness_mm
+        As in `resonance_hz`.
+    stacklevel : int
+        As in `warnings.warn`, counted from the caller.
+
+    Warns
+    -----
+    InertiaWarning
+        If the share of the force that accelerates the tissue is above `LARGEST_SHARE`.
+    """
+    resonance, fastest = resonance_hz(materials, thickness_mm), fastest_hz(motion)
+    share = (fastest / resonance) ** 2
+    if share > LARGEST_SHARE:
+        warnings.warn(
+            f"The fastest part of the motion is as fast as a vibration of {fastest:.3g} Hz, at which the "
+            f"inertia of the tissue, which is neglected, is about {share:.2g} of its elastic force: stay "
+            f"below {np.sqrt(LARGEST_SHARE) * resonance:.2g} Hz, or read the results as those of tissue "
+            "without mass.",
+            InertiaWarning,
+            stacklevel=stacklevel + 1,
+        )
+
+
+def moved_mass_mg(mesh: Mesh, way: FloatArray) -> float:
+    """Mass that moves with an indenter, rho integral |du/dd|² dV: twice its kinetic energy at unit speed.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The undeformed body.
+    way : array (n_nodes, 3)
+        Displacement of its nodes over that of the indenter, du/dd.
+
+    Returns
+    -------
+    float
+        Of the whole body also when half of it is meshed. [mg]
+    """
+    elastic = MaterialTable.of((Material.neo_hooke(1.0, 0.4),) * (int(mesh.layer.max()) + 1))
+    at_rest = np.zeros_like(mesh.nodes_mm)
+    volume_mm3 = instantaneous_state(mesh, at_rest, elastic).energies[:, :, 0].sum(axis=1)
+    parts = 2.0 if mesh.symmetry_nodes.size else 1.0
+    squares = (way[mesh.elements].mean(axis=1) ** 2).sum(axis=1)
+    return parts * DENSITY.value * 1e-3 * float(volume_mm3 @ squares)

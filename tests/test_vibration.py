@@ -1,0 +1,210 @@
+"""Vibration: cycles that are interpolated against all of them solved, and where inertia matters."""
+
+import warnings
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from fingerpad.core.errors import ConvergenceError, InertiaWarning, InputError
+from fingerpad.data.tissues import DENSITY
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.indenters import Plate, Sphere
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.motion import Cycles, RampAndHold
+from fingerpad.geometry.motions import SAMPLES_PER_CYCLE, sine
+from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.mechanics import cycles
+from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.cycles import PronyCycle
+from fingerpad.mechanics.inertia import fastest_hz, moved_mass_mg, resonance_hz
+from fingerpad.mechanics.materials import Material, MaterialTable, Prony
+from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.viscoelastic import StepCoefficients, StressHistory
+from fingerpad.skin.indentation import touch_of
+
+PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))
+LAYERS = tuple(Material.neo_hooke(shear, 0.45, PRONY) for shear in (40.0, 40.0, 20.0, 8.0))
+BALL = Sphere(curvature_per_m=500.0)
+
+
+def block():
+    lines = np.array([0.0, 0.5, 1.0, 1.7, 3.0])
+    both, depth = np.concatenate([-lines[:0:-1], lines]), np.array([0.0, 0.4, 1.0, 3.0])
+    return block_mesh(both, depth, lines, layers=[0, 1, 3], symmetric=True)
+
+
+def vibrated(motion, cycle_tolerance=0.01, friction=0.0):
+    mesh = block()
+    placement = place(BALL, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
+    settings = PressSettings(3, 3, cycle_tolerance=cycle_tolerance)
+    return press(mesh, LAYERS, BALL, placement, motion, settings, friction=friction)
+
+
+@pytest.fixture
+def solved(monkeypatch):
+    """Numbers of the cycles that are solved."""
+    numbers, solve = [], cycles.CycleJumps.solved
+
+    def counted(jumps, number, *rest):
+        numbers.append(number)
+        return solve(jumps, number, *rest)
+
+    monkeypatch.setattr(cycles.CycleJumps, "solved", counted)
+    return numbers
+
+
+@pytest.mark.parametrize("amplitude_mm", [0.02, 0.45])
+def test_few_solved_cycles_give_what_all_of_them_give(amplitude_mm, solved):
+    """Also when contact is lost in every cycle, and while the slow branch still relaxes."""
+    motion = sine(0.4, amplitude_mm, 50.0, cycles=24, hold_ms=50.0)
+    some, all_of_them = vibrated(motion), vibrated(motion, cycle_tolerance=None)
+    assert len(solved) <= 10
+    assert solved[-1] == 23
+    np.testing.assert_array_equal(some.times_ms, all_of_them.times_ms)
+    for name in ("sed_kpa", "force_mn", "displacement_mm", "depth_mm", "reaction_mn"):
+        got, expected = getattr(some, name), getattr(all_of_them, name)
+        assert np.abs(got - expected).max() <= 0.01 * np.abs(expected).max(), name
+    for name in ("external_uj", "stored_uj", "dissipated_uj"):
+        got, expected = getattr(some.energy, name), getattr(all_of_them.energy, name)
+        assert np.abs(got - expected).max() <= 0.01 * expected.max(), name
+    work = all_of_them.fields.work_kpa
+    assert np.abs(some.fields.work_kpa - work).max() <= 0.01 * work.max()
+    area = all_of_them.contact.area_mm2
+    assert np.abs(some.contact.area_mm2 - area).max() <= 0.02 * area.max()
+    # The next touch starts from the state that all cycles lead to.
+    np.testing.assert_allclose(some.stress_kpa, all_of_them.stress_kpa, atol=0.01 * all_of_them.sed_kpa.max())
+
+
+def test_a_tighter_tolerance_solves_more_cycles_and_errs_less(solved):
+    motion = sine(0.4, 0.1, 20.0, cycles=24, hold_ms=50.0)
+    truth, errors, counts = vibrated(motion, cycle_tolerance=None), [], []
+    for tolerance in (0.03, 0.001):
+        solved.clear()
+        errors.append(np.abs(vibrated(motion, tolerance).sed_kpa - truth.sed_kpa).max() / truth.sed_kpa.max())
+        counts.append(len(solved))
+        assert errors[-1] <= tolerance
+    assert errors[1] < errors[0]
+    assert counts[1] > counts[0]
+
+
+def test_motion_goes_on_after_the_cycles():
+    wave = sine(0.4, 0.1, 50.0, cycles=20, hold_ms=50.0)
+    motion = Trajectory(
+        (*wave.times_ms, wave.end_ms + 50.0, wave.end_ms + 200.0),
+        (*wave.prescribed, 0.0, 0.0),
+        cycles=wave.cycles,
+    )
+    some, all_of_them = vibrated(motion), vibrated(motion, cycle_tolerance=None)
+    np.testing.assert_array_equal(some.times_ms, all_of_them.times_ms)
+    np.testing.assert_allclose(some.force_mn, all_of_them.force_mn, atol=0.01 * some.force_mn.max())
+    assert some.force_mn[-1] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("motion", "friction"),
+    [
+        (sine(0.4, 0.1, 50.0, cycles=10, hold_ms=50.0), 0.0),
+        (sine(0.4, 0.02, 50.0, cycles=11, hold_ms=50.0), 0.3),
+    ],
+    ids=["ten cycles", "friction"],
+)
+def test_all_cycles_are_solved_when_they_are_few_or_the_skin_may_creep(motion, friction, solved):
+    vibrated(motion, friction=friction)
+    assert solved == []
+
+
+def test_a_later_cycle_that_fails_is_brought_nearer(solved, monkeypatch):
+    solve = cycles.CycleJumps.solved
+
+    def fails_after_long_gaps(jumps, number, *rest):
+        if number > 8 and solved[-1] < number - 2:
+            raise ConvergenceError("too far")
+        return solve(jumps, number, *rest)
+
+    monkeypatch.setattr(cycles.CycleJumps, "solved", fails_after_long_gaps)
+    done = vibrated(sine(0.4, 0.05, 50.0, cycles=14, hold_ms=50.0))
+    assert (np.diff(solved) <= 5).all()
+    assert solved[-1] == 13
+    assert (np.diff(done.times_ms) > 0.0).all()
+
+
+def test_closed_form_of_relaxation_over_cycles_is_that_of_the_steps():
+    """Cycles whose stress drifts evenly: the sum over them against the Prony update, step by step."""
+    table, layer = MaterialTable.of(LAYERS), np.array([0, 3])
+    generator, phases, period = np.random.default_rng(3), 5, 20.0
+    cycle, drift = generator.normal(size=(2, phases, 2, 8, 6))
+    # The stress of a cycle begins where that of the one before ends, so no drift may be at the border.
+    drift[-1] = 0.0
+    step, history, ends = StepCoefficients.of(table, period / phases), StressHistory.unloaded(2, 2), []
+    for number in range(9):
+        for phase in range(phases):
+            history = history.advanced(step, layer, cycle[phase] + number * drift[phase])
+        ends.append(history.relaxed)
+    prony = PronyCycle.of(table, layer, period)
+    added = [prony.added(before, after) for before, after in pairwise(ends)]
+    got = prony.after(ends[3], 5, added[2], added[2] - added[1])
+    np.testing.assert_allclose(got, ends[8], rtol=1e-10, atol=1e-12)
+
+
+def test_sine_knows_its_cycles_and_false_ones_are_refused():
+    motion = sine(0.8, 0.1, 20.0, cycles=4, hold_ms=100.0)
+    assert motion.cycles == Cycles(start_ms=150.0, period_ms=50.0, count=4)
+    assert motion.cycles.end_ms == motion.end_ms
+    assert sum(motion.cycles.start_ms < time for time in motion.times_ms) == 4 * SAMPLES_PER_CYCLE
+    for wrong in (Cycles(150.0, 50.0, 5), Cycles(151.0, 50.0, 3), Cycles(100.0, 50.0, 5)):
+        with pytest.raises(InputError, match="cycles must repeat the samples of the first"):
+            replace(motion, cycles=wrong)
+    grown = np.array(motion.depth_mm)
+    grown[-5] += 0.01
+    with pytest.raises(InputError, match="cycles must repeat the samples of the first"):
+        replace(motion, depth_mm=grown)
+
+
+def test_tolerance_of_cycles_is_checked():
+    with pytest.raises(InputError, match="cycle_tolerance must be below 1"):
+        PressSettings(cycle_tolerance=2.0)
+
+
+def test_column_of_one_layer_has_its_quarter_wave_resonance():
+    """f = c / (4 h) with c = sqrt(E / rho), and E at once whichever moduli are given."""
+    layer = Material.neo_hooke(10.0, 0.45, Prony((0.5,), (100.0,)))
+    shear, bulk = 2 * 10.0, layer.bulk_modulus_kpa
+    young = 9 * bulk * shear / (3 * bulk + shear)
+    expected = np.sqrt(1e3 * young / DENSITY.value) / (4 * 5e-3)
+    assert resonance_hz([layer], [5.0]) == pytest.approx(expected)
+    # Two halves are as one.
+    assert resonance_hz([layer, layer], [2.0, 3.0]) == pytest.approx(expected)
+    assert resonance_hz([replace(layer, moduli="instantaneous")], [5.0]) < 0.8 * expected
+
+
+def test_a_motion_is_as_fast_as_its_fastest_part():
+    assert fastest_hz(sine(0.8, 0.1, 30.0, cycles=3)) == pytest.approx(30.0, rel=0.02)
+    assert fastest_hz(sine(0.8, 0.001, 300.0, cycles=3)) == pytest.approx(300.0, rel=0.02)
+    assert fastest_hz(RampAndHold(1.0, 10.0, 100.0)) == pytest.approx(1e3 / (np.pi * 10.0))
+    # The slow beginning of a ramp does not hide its fast end, and noise on a hold does not count.
+    late = Trajectory((0.0, 1000.0, 1001.0), (0.0, 0.1, 1.0))
+    assert fastest_hz(late) == pytest.approx(1e3 * 0.9 / np.pi)
+    noisy = Trajectory((0.0, 50.0, 51.0, 52.0, 53.0), (0.0, 1.0, 1.0005, 1.0, 1.0005))
+    assert fastest_hz(noisy) < 10.0
+
+
+def test_moved_mass_of_a_body_that_moves_as_a_whole_is_its_mass():
+    mesh = block()
+    mass = moved_mass_mg(mesh, np.tile([0.0, 0.6, 0.8], (len(mesh.nodes_mm), 1)))
+    assert mass == pytest.approx(6.0 * 6.0 * 3.0 * DENSITY.value * 1e-3)
+
+
+def test_touch_warns_of_inertia_before_anything_is_pressed():
+    finger = Fingertip()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        touch_of(finger, Plate(), RampAndHold())
+        touch_of(finger, Plate(), sine(0.8, 0.1, 30.0, cycles=2))
+    for motion in (sine(0.8, 0.1, 200.0, cycles=2), RampAndHold(ramp_ms=2.0)):
+        with pytest.warns(
+            InertiaWarning, match=r"as fast as a vibration of .* Hz, at which the inertia"
+        ) as said:
+            touch_of(finger, Plate(), motion)
+        assert said[0].filename == __file__
