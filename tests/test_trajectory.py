@@ -13,7 +13,7 @@ from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Bar, FlatPunch, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
-from fingerpad.geometry.motions import repeated, sine
+from fingerpad.geometry.motions import repeated, sine, stroke
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics import newton
 from fingerpad.mechanics.contact import place
@@ -61,6 +61,27 @@ def test_corners_are_kept_and_a_smooth_curve_has_none_but_at_its_ends():
     assert straight.corners_ms == ()
 
 
+@pytest.mark.parametrize("per_cycle", [12, 20, 100])
+def test_a_smooth_curve_has_no_corners_however_it_is_sampled(per_cycle):
+    turns = np.arange(3 * per_cycle + 1) / per_cycle
+    wave = Trajectory(
+        100.0 * turns, 1.0 - np.cos(2.0 * np.pi * turns), z_mm=0.1 * np.sin(2.0 * np.pi * turns)
+    )
+    assert wave.corners_ms == ()
+
+
+def test_a_slow_part_beside_a_fast_one_has_its_corners():
+    """A stroke at a tenth of the speed of the ramp, to and fro; a slow second touch."""
+    strokes = stroke(0.5, speed_mm_per_s=2.0, x_mm=2.0, strokes=3, ramp_ms=25.0, hold_ms=200.0)
+    assert strokes.corners_ms == strokes.times_ms[1:-1]
+    slow = Trajectory((0, 10, 200, 210, 500, 700, 1900, 2100), (0, 1, 1, 0, 0, 0.5, 0.5, 0))
+    assert slow.corners_ms == slow.times_ms[1:-1]
+    moved = Trajectory(
+        (0, 60, 300, 597, 602, 659, 899), (0, 0.8, 0.8, 0.8, 0.77, -0.2, -0.2), x_mm=(0, 0, 0, 3, 3, 3, 3)
+    )
+    assert moved.corners_ms == moved.times_ms[1:-1]
+
+
 @given(
     steps=st.lists(st.tuples(st.floats(0.5, 500.0), st.floats(-0.5, 2.0)), min_size=1, max_size=8),
     ramp_steps=st.integers(1, 9),
@@ -92,7 +113,7 @@ def test_solved_times_increase_and_hold_all_samples(steps, ramp_steps, hold_step
         (((0.0, 1.0),), "either depth_mm or force_mn"),
         (
             ((0.0, 1.0, 2.0), None, (0.0, -1.0, 1.0)),
-            "force_mn must not be negative: got -1 mN at 1 ms, sample 2",
+            "force_mn must not be negative: got -1 mN at 1 ms",
         ),
     ],
 )

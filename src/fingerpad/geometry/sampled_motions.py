@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 from fingerpad.core.checks import FloatArray, positive, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase
-from fingerpad.geometry.trajectory import POSE_COLUMNS, Trajectory
+from fingerpad.geometry.trajectory import POSE_COLUMNS, Trajectory, samples_of_line
 
 Course = Callable[[float], float]
 """From the time [ms] to a depth, a force, a way or a rotation."""
@@ -131,7 +131,7 @@ def sampled(
 def reduced(motion: Trajectory, tolerance: float = TOLERANCE) -> Trajectory:
     """Leave out samples of a recording that lie close to a line between others; each is a step to solve at.
 
-    Samples are kept where the course deviates most from a line (Ramer-Douglas-Peucker), so that corners stay
+    Samples are kept where the course deviates most from a line (`samples_of_line`), so that corners stay
     samples. Choose a tolerance above the noise of the recording.
 
     Parameters
@@ -157,19 +157,7 @@ def reduced(motion: Trajectory, tolerance: float = TOLERANCE) -> Trajectory:
     names = ["force_mn" if motion.by_force else "depth_mm"]
     names += [name for name in POSE_COLUMNS if getattr(motion, name) is not None]
     times, table = np.array(motion.times_ms), np.array([getattr(motion, name) for name in names]).T
-    table = table / _extent(table)
-    keep = np.zeros(times.size, dtype=bool)
-    keep[[0, -1]] = True
-    waiting = [(0, times.size - 1)]
-    while waiting:
-        first, last = waiting.pop()
-        share = ((times[first : last + 1] - times[first]) / (times[last] - times[first]))[:, None]
-        line = table[first] + share * (table[last] - table[first])
-        found = np.abs(table[first : last + 1] - line).max(axis=1)
-        worst = int(found.argmax())
-        if found[worst] > tolerance:
-            keep[first + worst] = True
-            waiting += [(first, first + worst), (first + worst, last)]
+    keep = samples_of_line(times, table / _extent(table), tolerance)
     columns: dict[str, Any] = {name: tuple(np.array(getattr(motion, name))[keep]) for name in names}
     phases = motion.phases if motion.named_phases else ()
     return replace(motion, times_ms=tuple(times[keep]), **columns, phases=phases, cycles=None)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from itertools import groupby, pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from fingerpad.core.checks import FloatArray, float_array, increasing
 from fingerpad.core.errors import InputError
@@ -19,9 +19,12 @@ POSE_COLUMNS = ("x_mm", "z_mm", "tilt_deg", "spin_deg")
 SAME_SPEED = 1e-6
 """Change of speed, over the largest speed of a trajectory, below which it goes on at the same speed."""
 
-CORNER_SHARE, CORNER_OVER_NEIGHBOURS = 0.5, 3.0
-"""A sample is a corner if the speed changes there by more than this share of the largest speed, or by more
-than this many times its change at the samples beside it, as it does not along a smooth curve."""
+CORNER_SHARE = 0.8
+"""A sample is a corner if the speed changes there by more than this share of the largest speed."""
+
+MOST_JUMP, EVEN_STEPS = 0.6, 4.0
+"""A smaller change is a corner too, unless the acceleration is the same at a neighbour within this share, and
+the steps before and after it differ by at most this factor, as along a smooth curve."""
 
 SAME_VALUE = 0.02
 """Change over the largest depth, force or way of a trajectory below which it holds; recordings have noise."""
@@ -51,9 +54,9 @@ class Trajectory(Motion):
         How far it has turned about its tip since first touch, from 0, as `tilt_deg` and `spin_deg` of a
         `Touch`, to which they are added; it does not turn by default. [degrees]
     phases : sequence of Phase, optional
-        Names of its parts. By default it is divided where it changes its course: "ramp" goes deeper, "hold"
-        stays, "move" goes aside or turns, "release" comes back, "pause" stays out of contact and "course" is
-        any other part; from the second on they are numbered, as "ramp 2".
+        Names of its parts. By default "ramp" goes deeper, "hold" stays, "move" goes aside or turns, "release"
+        comes back and "pause" stays out of contact, where changes of 2 % do not count; from the second on
+        they are numbered, as "ramp 2".
     cycles : Cycles, optional
         The part that repeats itself. If it has many cycles, a press solves some of them and interpolates
         the others (`PressSettings.cycle_tolerance`).
@@ -208,18 +211,30 @@ class Trajectory(Motion):
     @property
     def corners_ms(self) -> tuple[float, ...]:
         """Samples at which the speed jumps, other than along a smooth curve; without start and end. [ms]"""
-        speed = np.diff(self._course, axis=0) / np.diff(self.times_ms)[:, None]
-        change = np.linalg.norm(np.diff(speed, axis=0, prepend=speed[:1], append=speed[-1:]), axis=1)
-        change /= np.linalg.norm(speed, axis=1).max()
-        corners = change > CORNER_SHARE
-        while True:
-            # A corner says nothing about the curve beside it, on which there may be another one.
-            smooth = np.where(corners, 0.0, change)
-            beside = np.maximum(np.roll(smooth, 1), np.roll(smooth, -1))
-            found = smooth > CORNER_OVER_NEIGHBOURS * beside + SAME_SPEED
-            if not found.any():
-                return tuple(np.array(self.times_ms)[corners].tolist())
-            corners |= found
+        lengths_ms = np.diff(self.times_ms)
+        speed = np.diff(self._course, axis=0) / lengths_ms[:, None]
+        changes = np.diff(speed, axis=0)
+        change = np.linalg.norm(changes, axis=1)
+        largest = np.linalg.norm(speed, axis=1).max()
+        smooth = self._goes_on(changes / (lengths_ms[1:] + lengths_ms[:-1])[:, None])
+        ratio = lengths_ms[1:] / lengths_ms[:-1]
+        smooth &= np.maximum(ratio, 1.0 / ratio) <= EVEN_STEPS
+        corners = (change > CORNER_SHARE * largest) | ((change > SAME_SPEED * largest) & ~smooth)
+        return tuple(np.array(self.times_ms)[1:-1][corners].tolist())
+
+    @staticmethod
+    def _goes_on(accelerations: FloatArray) -> NDArray[np.bool_]:
+        """Whether the acceleration at each sample is much like that at a neighbour, or like their mean."""
+        size = np.linalg.norm(accelerations, axis=1)
+        alike = np.linalg.norm(np.diff(accelerations, axis=0), axis=1) <= MOST_JUMP * np.maximum(
+            size[1:], size[:-1]
+        )
+        goes_on = np.zeros(size.size, dtype=bool)
+        goes_on[1:] |= alike
+        goes_on[:-1] |= alike
+        mean = (accelerations[2:] + accelerations[:-2]) / 2.0
+        goes_on[1:-1] |= np.linalg.norm(accelerations[1:-1] - mean, axis=1) <= MOST_JUMP * size[1:-1]
+        return goes_on
 
     @property
     def named_phases(self) -> bool:
@@ -227,11 +242,11 @@ class Trajectory(Motion):
         return self.phases != self._phases_of_course()
 
     def _phases_of_course(self) -> tuple[Phase, ...]:
-        """Phases named by what the indenter does between corners, adjacent equal ones as one."""
-        course, corners = self._course, np.searchsorted(self.times_ms, self.corners_ms).tolist()
-        parts = list(pairwise([0, *corners, len(self.times_ms) - 1]))
+        """Name phases by what the indenter does, apart from changes of `SAME_VALUE`."""
+        course = self._course / np.maximum(np.ptp(self._course, axis=0), 1.0)
+        bends = np.flatnonzero(samples_of_line(np.array(self.times_ms), course, SAME_VALUE)).tolist()
         phases: list[Phase] = []
-        for kind, group in groupby(parts, lambda part: self._kind(course[part[0] : part[1] + 1])):
+        for kind, group in groupby(pairwise(bends), lambda part: self._kind(*course[list(part)])):
             same = list(group)
             count = 1 + sum(phase.name.split()[0] == kind for phase in phases)
             name = kind if count == 1 else f"{kind} {count}"
@@ -239,17 +254,14 @@ class Trajectory(Motion):
         return tuple(phases)
 
     @staticmethod
-    def _kind(course: FloatArray) -> str:
-        """Say what the indenter does in a part of its `_course`."""
-        prescribed, ways = course[:, 0], course[:, 1:]
-        if np.ptp(prescribed) <= SAME_VALUE:
-            if np.ptp(ways, axis=0).max() > SAME_VALUE:
-                return "move"
-            return HOLD if prescribed.max() > SAME_VALUE else "pause"
-        if (np.maximum.accumulate(prescribed) - prescribed).max() <= SAME_VALUE:
-            return RAMP
-        released = (prescribed - np.minimum.accumulate(prescribed)).max() <= SAME_VALUE
-        return "release" if released else "course"
+    def _kind(start: FloatArray, end: FloatArray) -> str:
+        """Say what the indenter does between two states of its `_course`."""
+        change = end - start
+        if abs(change[0]) > SAME_VALUE:
+            return RAMP if change[0] > 0.0 else "release"
+        if np.abs(change[1:]).max() > SAME_VALUE:
+            return "move"
+        return HOLD if max(start[0], end[0]) > SAME_VALUE else "pause"
 
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
         """Depth [mm] or force [mN] at `times_ms`, any shape."""
@@ -283,3 +295,42 @@ class Trajectory(Motion):
             times += (start + since[:-1]).tolist()
             times.append(end)
         return np.array(times)
+
+
+def samples_of_line(times: FloatArray, table: FloatArray, tolerance: float) -> NDArray[np.bool_]:
+    """Find the samples between which lines miss none of the others by more than a tolerance.
+
+    A part is divided at the sample that its line misses most (Ramer-Douglas-Peucker).
+
+    Parameters
+    ----------
+    times : array (n_samples,)
+        Increasing.
+    table : array (n_samples, n_columns)
+        Values.
+    tolerance : float
+        Largest error of any column.
+
+    Returns
+    -------
+    bool array (n_samples,)
+        Whether a sample is kept, as the first and the last one are.
+
+    Examples
+    --------
+    >>> samples_of_line(np.arange(4.0), np.array([[0.0], [0.9], [2.0], [2.0]]), 0.2).tolist()
+    [True, False, True, True]
+    """
+    keep = np.zeros(times.size, dtype=bool)
+    keep[[0, -1]] = True
+    waiting = [(0, times.size - 1)]
+    while waiting:
+        first, last = waiting.pop()
+        share = ((times[first : last + 1] - times[first]) / (times[last] - times[first]))[:, None]
+        line = table[first] + share * (table[last] - table[first])
+        missed = np.abs(table[first : last + 1] - line).max(axis=1)
+        worst = first + int(missed.argmax())
+        if missed.max() > tolerance:
+            keep[worst] = True
+            waiting += [(first, worst), (worst, last)]
+    return keep
