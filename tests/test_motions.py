@@ -13,7 +13,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Sphere
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.motions import chirp, repeated, sine, staircase, stroke
 from fingerpad.geometry.paths import check_path
 from fingerpad.geometry.sampled_motions import reduced, sampled
@@ -279,13 +279,16 @@ def test_a_gap_in_a_recording_is_refused_and_a_few_lost_samples_are_not(tmp_path
         (partial(Trajectory, (0.0, 1.0), (0.0, math.nan)), "finite numbers only: 1 are not, first number 2"),
         (partial(Trajectory, (0.0, 0.05), (0.0, 1.0)), "faster than 10 m/s: got 20 m/s until 0.05 ms"),
         (partial(Trajectory, (0.0, 1.0), (0.0, 1.0), z_mm=(0.0, 11.0)), "z_mm must not change faster"),
-        (partial(RampAndHold, 1.0, ramp_ms=0.05), "depth_mm must not change faster than 10 m/s: got 20 m/s"),
     ],
 )  # fmt: skip
 def test_motions_that_no_finger_makes_are_refused(make, said):
     with pytest.raises(InputError, match=said):
         make()
-    assert ForceRampAndHold(100.0, ramp_ms=0.001).ramp_ms == 0.001  # a force has no speed
+
+
+def test_a_ramp_and_a_force_may_be_as_fast_as_the_limit_of_instantaneous_moduli_needs():
+    assert RampAndHold(1.0, ramp_ms=0.001).ramp_ms == 0.001
+    assert Trajectory((0.0, 0.001, 1.0), force_mn=(0.0, 50.0, 50.0)).by_force
 
 
 def test_the_fastest_vibration_of_a_stimulator_is_allowed():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -178,8 +177,6 @@ class _OneRamp(Motion):
         for name, unit in MOTION_UNITS.items():
             if hasattr(self, name):
                 positive(name, getattr(self, name), unit)
-        if not self.by_force:
-            check_speed("depth_mm", self.samples_ms, (0.0, self.largest, self.largest))
 
     @property
     def end_ms(self) -> float:
@@ -287,22 +284,6 @@ class ForceRampAndHold(_OneRamp):
     def largest(self) -> float:
         """Force of the hold. [mN]"""
         return self.force_mn
-
-
-def check_speed(
-    name: str, times_ms: ArrayLike, values_mm: ArrayLike, place: Callable[[int], str] = lambda _: ""
-) -> None:
-    """Raise `InputError` if values [mm] change between two times [ms] as fast as no indenter moves.
-
-    `place` says where the later of the two stands, from its number, and begins the message.
-    """
-    speed = np.abs(np.diff(values_mm)) / np.diff(times_ms)
-    fastest = int(speed.argmax())
-    if speed[fastest] > protocol.FASTEST.value:  # 1 mm/ms is 1 m/s
-        raise InputError(
-            f"{place(fastest + 1)}{name} must not change faster than {protocol.FASTEST.value:g} m/s: got "
-            f"{speed[fastest]:.4g} m/s until {np.asarray(times_ms)[fastest + 1]:g} ms; check the units."
-        )
 
 
 def hold_ends_ms(length_ms: float, first_ms: float, steps: int) -> FloatArray:

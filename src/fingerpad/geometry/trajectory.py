@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import groupby, pairwise
 
@@ -11,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from fingerpad.core.checks import FloatArray, float_array, increasing
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import HOLD, RAMP, Phase
-from fingerpad.geometry.motion import STILL, TURN_LIKE_MM, Cycles, Motion, Pose, check_speed, hold_ends_ms
+from fingerpad.data import protocol
+from fingerpad.geometry.motion import STILL, TURN_LIKE_MM, Cycles, Motion, Pose, hold_ends_ms
 
 POSE_COLUMNS = ("x_mm", "z_mm", "tilt_deg", "spin_deg")
 """Columns of a trajectory that say where the indenter stands, beside its depth or force."""
@@ -295,6 +297,22 @@ class Trajectory(Motion):
             times += (start + since[:-1]).tolist()
             times.append(end)
         return np.array(times)
+
+
+def check_speed(
+    name: str, times_ms: ArrayLike, values_mm: ArrayLike, place: Callable[[int], str] = lambda _: ""
+) -> None:
+    """Raise `InputError` if values [mm] change between two times [ms] as fast as no indenter moves.
+
+    `place` says where the later of the two stands, from its number, and begins the message.
+    """
+    speed = np.abs(np.diff(values_mm)) / np.diff(times_ms)
+    fastest = int(speed.argmax())
+    if speed[fastest] > protocol.FASTEST.value:  # 1 mm/ms is 1 m/s
+        raise InputError(
+            f"{place(fastest + 1)}{name} must not change faster than {protocol.FASTEST.value:g} m/s: got "
+            f"{speed[fastest]:.4g} m/s until {np.asarray(times_ms)[fastest + 1]:g} ms; check the units."
+        )
 
 
 def samples_of_line(times: FloatArray, table: FloatArray, tolerance: float) -> NDArray[np.bool_]:

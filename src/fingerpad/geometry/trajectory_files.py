@@ -13,8 +13,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.core.units import MN_PER_N, MS_PER_S
-from fingerpad.geometry.motion import check_speed
-from fingerpad.geometry.trajectory import SAME_VALUE, Trajectory
+from fingerpad.geometry.trajectory import SAME_VALUE, Trajectory, check_speed
 
 MM_PER_UM = 1e-3
 
