@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, not_negative, positive, whole
-from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase, ramp_and_hold
 from fingerpad.data import protocol
 
