@@ -22,7 +22,13 @@ def flat(symmetric):
 def unmoved(mesh, pressed_mn, gap_mm):
     """Contact at one time, in which nothing has moved."""
     still = np.zeros((1, *mesh.nodes_mm.shape))
-    return skin_contact(mesh, still, np.array([pressed_mn]), np.array([gap_mm]), E_STAR_KPA)
+    return without_friction(mesh, still, np.array([pressed_mn]), np.array([gap_mm]))
+
+
+def without_friction(mesh, displacement_mm, pressed_mn, gap_mm):
+    """Contact of skin on which nothing rubs."""
+    no_force, no_slip = np.zeros((*pressed_mn.shape, 3)), np.zeros_like(pressed_mn)
+    return skin_contact(mesh, displacement_mm, pressed_mn, no_force, no_slip, gap_mm, E_STAR_KPA)
 
 
 def test_pressure_and_area_of_a_stretched_skin():
@@ -35,8 +41,9 @@ def test_pressure_and_area_of_a_stretched_skin():
     middle = np.flatnonzero((skin == [1.0, 0.0, 1.0]).all(axis=1))[0]
     forces[1, middle] = 6.0
     gap = np.full(forces.shape, np.inf)
-    found = skin_contact(mesh, stretched, forces, gap, E_STAR_KPA)
+    found = without_friction(mesh, stretched, forces, gap)
     assert not found.pressure_kpa[0].any()
+    assert not found.shear_kpa.any()
     np.testing.assert_allclose(found.pressure_kpa[1].sum(), 6.0 / 1.5, rtol=1e-12)  # 1 mm² belongs to it
     # No node beside can be touched: triangles with one corner pressed are covered to a quarter, six of the
     # twelve halves of triangles about the node; both halves of the body.

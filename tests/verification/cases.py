@@ -10,12 +10,13 @@ from . import (
     oracles,
     patches,
     relaxation,
+    release,
     symmetry,
 )  # fmt: skip
 from .case import CASES
 
 THEMES = (
     patches.THEME, kernel.THEME, laws.THEME, manufactured.THEME, locking.THEME, half_space.THEME,
-    relaxation.THEME, balance.THEME, symmetry.THEME, oracles.THEME,
+    relaxation.THEME, release.THEME, balance.THEME, symmetry.THEME, oracles.THEME,
 )  # fmt: skip
 ORDERED = sorted(CASES, key=lambda case: THEMES.index(case.theme))

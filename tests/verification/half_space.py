@@ -184,7 +184,15 @@ def pressed_slice(mesh, indenter, depth_mm, poisson) -> Pressed:
         force_mn=found.contact.pressed_mn.sum(),
         sed_kpa=stored_energy_density(*where, history, now),
         stress_kpa=cauchy_stress(mesh, found.displacement_mm, solid.table, history),
-        contact=skin_contact(mesh, found.displacement_mm[None], on_skin, gap, material.contact_modulus_kpa),
+        contact=skin_contact(
+            mesh,
+            found.displacement_mm[None],
+            on_skin,
+            np.zeros((1, len(skin), 3)),
+            np.zeros((1, len(skin))),
+            gap,
+            material.contact_modulus_kpa,
+        ),
     )
 
 

@@ -8,6 +8,7 @@ same mesh and element are compared, and is what is left where they differ.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -17,6 +18,7 @@ from fingerpad.geometry.grading import graded_lines
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import RampAndHold
+from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.newton import NewtonSettings
@@ -29,6 +31,10 @@ BALL = Sphere(curvature_per_m=287.0)
 MOTION = RampAndHold(depth_mm=0.8, ramp_ms=40.0, hold_ms=1.0)
 STEPS = 8
 LIVING_EPIDERMIS = 1
+
+
+BACK = Trajectory((0.0, MOTION.ramp_ms, 2 * MOTION.ramp_ms), (0.0, MOTION.depth_mm, 0.0))
+"""In and out at the same speed."""
 
 
 @lru_cache(maxsize=1)
@@ -47,3 +53,17 @@ def ours() -> Deformation:
     """Our own solution, contact closed to 0.05 % of the depth."""
     settings = PressSettings(STEPS, 1, NewtonSettings(penetration_tolerance=5e-4))
     return press(job().mesh, job().materials, BALL, job().placement, MOTION, settings)
+
+
+@lru_cache(maxsize=1)
+def job_and_back() -> Job:
+    """The press and its release in two steps each."""
+    times = np.linspace(0.0, 2 * MOTION.ramp_ms, 5)
+    return replace(job(), times_ms=times, depths_mm=BACK.prescribed_at(times))
+
+
+@lru_cache(maxsize=1)
+def ours_and_back() -> Deformation:
+    """Our own solution of it."""
+    settings = PressSettings(2, 1, NewtonSettings(penetration_tolerance=5e-4))
+    return press(job().mesh, job().materials, BALL, job().placement, BACK, settings)

@@ -28,8 +28,8 @@ from fingerpad.mechanics.press import PressSettings, press
 from fingerpad.skin.indentation import Touch
 
 from . import calculix
-from .case import Row, at_most, case, near
-from .oracle_block import LIVING_EPIDERMIS, POISSON, YOUNG_KPA, job, ours
+from .case import Row, at_most, case, equal, near
+from .oracle_block import LIVING_EPIDERMIS, POISSON, YOUNG_KPA, job, job_and_back, ours, ours_and_back
 
 THEME = "Other solvers"
 CALCULIX = "CalculiX 2.20 (Dhondt), Debian package calculix-ccx, on the deck of `calculix_deck`"
@@ -97,6 +97,28 @@ def calculix_block() -> list[Row]:
         )
     np.testing.assert_allclose(found.times_ms, job().times_ms[1:])
     return compared(2.0 * found.force_mn @ job().placement.axis, found.sed_kpa[-1], OTHER_ELEMENT)
+
+
+@case(THEME, "FElupe, press and release", FELUPE, slow=True, runs=RUNS)
+def felupe_release() -> list[Row]:
+    """The same block and sphere, in by 0.8 mm and out again in two steps each. The layers are elastic: both
+    programs must take the same way back, and the loop must enclose no work. (CalculiX does not converge on a
+    retreat by steps of this size.)
+    """
+    from . import felupe_press  # GPL: only tests import it
+
+    mine, depths = ours_and_back().force_mn, job_and_back().depths_mm
+    theirs = np.concatenate([[0.0], 2.0 * felupe_press.press(job_and_back())[0]])
+    scale = theirs.max() * depths.max()
+    works = [np.trapezoid(force, depths) / scale for force in (theirs, mine)]
+    tolerance, _ = SAME_ELEMENT
+    return [
+        near("force at 0.4 mm, in", theirs[1], mine[1], tolerance, "mN"),
+        near("force at 0.8 mm", theirs[2], mine[2], tolerance, "mN"),
+        near("force at 0.4 mm, out", theirs[3], mine[3], tolerance, "mN"),
+        equal("force after release over the largest", theirs[4] / theirs[2], mine[4] / theirs[2], 1e-5),
+        equal("work that the loop encloses, over force times depth", *works, 1e-4),
+    ]
 
 
 TILTED = np.array([[0.96, -0.28, 0.0], [0.28, 0.96, 0.0], [0.0, 0.0, 1.0]])

@@ -34,7 +34,8 @@ LAWS = {
     "hyperfoam N = 2": Material.hyperfoam((2.0, 6.0), (7.0, 4.5), 0.4, PRONY),
     "Hencky": Material.linear_elastic(30.0, 0.45, PRONY, law="hencky"),
 }
-INSTANT_MS = 1e-6
+INSTANT_MS, INWARDS_MS = 1e-6, 0.05
+"""A time in which nothing relaxes, and a short one in which an indenter can be driven in. [ms]"""
 
 
 def shear(amount):
@@ -153,7 +154,7 @@ def limits_in_time() -> list[Row]:
 
 
 def pressed_block(poisson, hold_ms):
-    """Times of the hold [ms] and force over its first value: a sphere pressed 0.4 mm into a block at once."""
+    """Times of the hold [ms] and force over its first value: a sphere pressed 0.4 mm into a block quickly."""
     edges = np.array([0.0, 0.4, 0.8, 1.3, 2.0, 3.0])
     both = np.concatenate([-edges[:0:-1], edges])
     mesh = block_mesh(both, edges, edges, layers=[0, 1, 2, 3, 3], symmetric=True)
@@ -161,14 +162,14 @@ def pressed_block(poisson, hold_ms):
     ball = Sphere(curvature_per_m=500.0)
     placement = place(ball, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
     settings = PressSettings(3, 12, NewtonSettings(residual_tolerance=1e-6, penetration_tolerance=2e-4))
-    done = press(mesh, layers, ball, placement, RampAndHold(0.4, 1e-3, hold_ms), settings)
-    hold = done.times_ms[3:] - 1e-3
+    done = press(mesh, layers, ball, placement, RampAndHold(0.4, INWARDS_MS, hold_ms), settings)
+    hold = done.times_ms[3:] - INWARDS_MS
     return hold[1:], done.force_mn[4:] / done.force_mn[3]
 
 
 @case(THEME, "Relaxation of an indented block", "Prony series; exact for an incompressible body")
 def relaxing_block() -> list[Row]:
-    """A sphere of 2 mm indents a block of three stiffnesses by 0.4 mm within a microsecond and is held. All
+    """A sphere of 2 mm indents a block of three stiffnesses by 0.4 mm within 50 µs and is held. All
     stress of an incompressible body relaxes by g(t) at constant shape; the difference decreases with 1 - 2
     nu.
     """
