@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.fit.session import stimulus_touches
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar, TactileStimulus, read_stimuli
 from fingerpad.geometry.indenters import Bar, FlatPunch, Sphere
@@ -263,23 +261,3 @@ def test_a_unit_belongs_to_nwb(written):
     path = written("mine.csv", "stimulus,static_rate_hz\nedge,1\n")
     with pytest.raises(InputError, match="unit belongs to NWB files"):
         read_recordings(path, TWO, unit=1)
-
-
-def test_a_stimulus_may_be_a_recorded_motion(written):
-    times_ms = range(0, 1001)
-    rows = [f"{time},{min(time / 100.0, 1.0) * 600.0},{max(time - 500, 0) / 250.0}" for time in times_ms]
-    written("press.csv", "\n".join(["time_ms,depth_um,x_mm", *rows]))
-    path = written("stimuli.csv", "stimulus,indenter,trajectory\nslid,sphere,press.csv\nstill,sphere,\n")
-    slid, still = read_stimuli(path).stimuli.values()
-    assert slid.motion.times_ms == (0.0, 100.0, 500.0, 1000.0)
-    assert slid.motion.x_mm == (0.0, 0.0, 0.0, 2.0)
-    assert still.motion == RampAndHold()
-    touch = stimulus_touches({"slid": slid}, Conditions("quick"))["slid"]
-    assert touch.stimulus == slid.motion
-    assert touch.grading.centre_mm == pytest.approx(touch.at_mm[0] + 1.0)  # the fine mesh covers the way
-    both = written("both.csv", "stimulus,indenter,trajectory,ramp_ms\nslid,sphere,press.csv,50\n")
-    with pytest.raises(InputError, match=r"both.csv, line 2: trajectory and ramp_ms exclude each other"):
-        read_stimuli(both)
-    none = written("none.csv", "stimulus,indenter,trajectory\nslid,sphere,gone.csv\n")
-    with pytest.raises(InputError, match=r"none.csv, line 2: .*gone.csv"):
-        read_stimuli(none)

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
+from fingerpad.geometry.edged_indenters import Edge, Grating
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenter_grading import THIN_SIZE_MM, grading_about
-from fingerpad.geometry.indenters import Bar, Cylinder, Line, Plate, Sphere
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import place
@@ -206,7 +207,7 @@ def refused(said, **changes):
         refused("x = 50", at_mm=(50.0, 0.0)),
         refused("z = 12", at_mm=(17.37, 12.0)),
         refused("x = -1", at_mm=(-1.0, 0.0)),
-        refused("never touches a node", indenter=Sphere(curvature_per_m=1e6), at_mm=(17.0, 3.3)),
+        refused("go between the nodes", indenter=Sphere(curvature_per_m=1e6), at_mm=(17.0, 3.3)),
     ],
 )
 def test_unusable_arguments_are_refused_in_one_sentence(arguments, said):
@@ -237,3 +238,36 @@ def test_tilted_indenter_presses_along_its_axis_and_meets_its_point():
 def test_tilt_has_a_limit(tilt_deg):
     with pytest.raises(InputError, match="tilt_deg"):
         coarse_touch(tilt_deg=tilt_deg)
+
+
+@pytest.mark.parametrize("resolution", ["quick", "standard"])
+def test_bodies_of_the_paper_keep_their_meshes(resolution):
+    for body in (Line(), Cylinder(), Bar(), Plate(), *map(Sphere, (144.0, 287.0, 694.0))):
+        grading = grading_about(body, resolution, 17.37)
+        assert grading.finer_along == grading.finer_across == ()
+        assert touch_of(Fingertip(), body, resolution=resolution).body is body
+
+
+@pytest.mark.parametrize(
+    ("body", "size_mm"),
+    [
+        (Sphere(4000.0), 0.25 / 3), (Cylinder(0.5), 0.25 / 3), (FlatPunch(1.0, 0.1), 0.1),
+        (FlatPunch(10.0, 0.05), 0.2), (Bar(3.0, 0.05), 0.05), (Edge(0.0), 0.05),
+        (Grating(1.0, 1.0, 0.05), 0.05),
+    ],
+    ids=lambda value: type(value).__name__ if not isinstance(value, float) else "",
+)  # fmt: skip
+def test_small_bodies_and_sharp_edges_are_meshed_finer(body, size_mm):
+    """By their radius; an edge that the mesh cannot resolve is pressed as round as its elements are long."""
+    touch = touch_of(Fingertip(), body, RampAndHold(depth_mm=0.5))
+    assert touch.grading.finest_x_mm == pytest.approx(size_mm)
+    fillet = getattr(touch.body, "fillet_mm", getattr(touch.body, "lip_mm", np.inf))
+    assert fillet >= size_mm
+    assert touch.mesh.nodes_mm.shape[0] < 50_000
+
+
+def test_a_body_narrower_than_an_element_is_refused_before_it_is_pressed():
+    coarse = grading_about(Sphere(287.0), "quick", 17.37)
+    with pytest.raises(InputError, match=r"at most 0.1 mm, the width of the FlatPunch, .*: got 0.45 mm"):
+        touch_of(Fingertip(), FlatPunch(0.1, 0.01), grading=coarse)
+    touch_of(Fingertip(), FlatPunch(0.1, 0.01))

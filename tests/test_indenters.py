@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from fingerpad.core.errors import InputError
+from fingerpad.geometry.edged_indenters import Edge, Grating
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 
 RADIUS = 1.5
@@ -22,9 +23,8 @@ def beside(body, points):
 
 def profile(body, s):
     """Half of the outline: (beside, y) at arc length s from the middle of the face."""
-    if body in (CYLINDER, SPHERE):
-        return RADIUS * np.sin(s / RADIUS), RADIUS * (np.cos(s / RADIUS) - 1)
-    half, fillet = body.half_width_mm, body.fillet_mm
+    fillet = RADIUS if body in (CYLINDER, SPHERE) else body.fillet_mm
+    half = body.half_width_mm
     flat, turn = half - fillet, 0.5 * np.pi * fillet
     if s < flat:
         return s, 0.0
@@ -41,7 +41,7 @@ def brute_force_distance(body, width, height):
         at = profile(body, s)
         return np.hypot(at[0] - width, at[1] - height)
 
-    length = np.pi * RADIUS if body in (CYLINDER, SPHERE) else 6.0
+    length = 6.0
     scan = np.linspace(0.0, length, 1501)
     best = scan[np.argmin([distance(s) for s in scan])]
     step = scan[1]
@@ -53,7 +53,7 @@ def brute_force_distance(body, width, height):
 
 
 def points_about(body, seed=0, n=40):
-    """Random points around a body's face, none of them past the widest section of a ball."""
+    """Random points around a body's face."""
     generator = np.random.default_rng(seed)
     return generator.uniform([-2.5, -1.4, -2.5], [2.5, 0.8, 2.5], (n, 3))
 
@@ -65,7 +65,7 @@ def test_gap_is_the_distance_to_the_surface(body):
     width = beside(body, points)
     expected = [brute_force_distance(body, w, y) for w, y in zip(width, points[:, 1], strict=True)]
     np.testing.assert_allclose(np.abs(gap), expected, rtol=0, atol=1e-8)
-    within = points[:, 1] < body.front(points)  # below the face, and none is past the widest section
+    within = points[:, 1] < body.front(points)
     np.testing.assert_array_equal(gap < 0, within)
     assert within.any()
     assert (~within).any()
@@ -119,12 +119,34 @@ def test_bodies_are_mirror_symmetric(body):
 
 
 @pytest.mark.parametrize("body", [CYLINDER, SPHERE], ids=NAMES[:2])
-def test_node_that_a_ball_has_passed_is_pushed_out_in_front(body):
-    points = np.random.default_rng(4).uniform([-0.9, -6.0, -0.4], [0.9, -RADIUS, 0.4], (30, 3))
+def test_a_ball_goes_on_as_a_rod_behind_its_widest_section(body):
+    """The gap has no jump there and its slope is the normal, so that a contact force has a potential."""
+    points = np.random.default_rng(4).uniform([-2.5, -6.0, -2.5], [2.5, -RADIUS, 2.5], (30, 3))
     gap, normal = body.gap(points)
-    assert (gap < 0).all()
-    assert (normal[:, 1] > 0).all()
-    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0, rtol=1e-14)
+    np.testing.assert_allclose(gap, beside(body, points) - RADIUS, atol=1e-14)
+    assert not normal[:, 1].any()
+    step = 1e-6
+    slope = [
+        (body.gap(points + offset)[0] - body.gap(points - offset)[0]) / (2 * step)
+        for offset in step * np.eye(3)
+    ]
+    np.testing.assert_allclose(normal, np.transpose(slope), rtol=0, atol=1e-6)
+    widest = points * [1.0, 0.0, 1.0] - [0.0, RADIUS, 0.0]
+    up = np.array([0.0, 1e-9, 0.0])
+    for ahead, behind in zip(body.gap(widest + up), body.gap(widest - up), strict=True):
+        np.testing.assert_allclose(ahead, behind, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("body", "name"),
+    [(FlatPunch(3.0, 0.1), "fillet_mm"), (Bar(3.0, 0.1), "fillet_mm"), (Edge(0.1), "fillet_mm"),
+     (Grating(1.0, 1.0, 0.1), "lip_mm")],
+    ids=lambda value: type(value).__name__ if not isinstance(value, str) else "",
+)  # fmt: skip
+def test_edges_are_rounded_to_a_radius_but_never_sharpened(body, name):
+    assert getattr(body.rounded_to(0.25), name) == 0.25
+    assert body.rounded_to(0.05) == body
+    assert SPHERE.rounded_to(0.25) is SPHERE
 
 
 def test_bodies_across_the_finger_do_not_end_in_z_and_round_ones_have_no_preferred_direction():

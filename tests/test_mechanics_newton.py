@@ -12,8 +12,8 @@ from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony
-from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.newton import NewtonSettings, _Search
+from fingerpad.mechanics.press import PressSettings, _Press, press
 
 BALL = Sphere(curvature_per_m=500.0)
 SIX = [Line(), Cylinder(3.0), Bar(2.0, 0.3), BALL, FlatPunch(2.0, 0.3), Plate()]
@@ -77,6 +77,32 @@ def test_skin_that_slides_round_an_edge_is_followed(indenter):
     blunt = {"fillet_mm": 0.3} if isinstance(indenter, Bar) else {"lip_mm": 0.3}
     similar = pressed(block(), replace(indenter, **blunt), NewtonSettings())
     np.testing.assert_allclose(done.force_mn[-1], similar.force_mn[-1], rtol=0.25)
+
+
+def test_a_shifted_tangent_leads_to_the_same_equilibrium(monkeypatch):
+    """Every indefinite tangent is shifted, and none is taken without the curvature of the body."""
+    usual = pressed(block(), Bar(1.7, 0.1), NewtonSettings())
+    shifted = []
+    found = _Search.found
+    monkeypatch.setattr("fingerpad.mechanics.newton.MOST_STRAIGHT", 0)
+    monkeypatch.setattr(
+        _Search,
+        "found",
+        lambda search, *how: shifted.append(search.was_shifted) or found(search, *how),
+    )
+    done = pressed(block(), Bar(1.7, 0.1), NewtonSettings(persistent=True))
+    assert any(shifted)
+    np.testing.assert_allclose(done.force_mn[-1], usual.force_mn[-1], rtol=1e-3)
+    loss, usual_loss = (np.abs(each.energy.relative_imbalance).max() for each in (done, usual))
+    assert loss <= 1.01 * usual_loss
+
+
+def test_a_guess_that_folds_is_replaced_by_the_step_before(monkeypatch):
+    """A guess may turn an element inside out; the search then starts where the last step ended."""
+    usual = pressed(block(), BALL, NewtonSettings())
+    monkeypatch.setattr(_Press, "continued", lambda job, start, target_ms: 1e9)
+    folded = pressed(block(), BALL, NewtonSettings())
+    np.testing.assert_allclose(folded.force_mn, usual.force_mn, rtol=1e-3)
 
 
 def test_balance_holds_beside_the_middle_of_a_whole_block():

@@ -172,7 +172,7 @@ def test_tolerance_of_sed_is_a_small_positive_number(tolerance):
 
 def test_adaptive_press_that_does_not_converge_is_an_error_with_its_history():
     settings = PressSettings(sed_tolerance=0.1, newton=NewtonSettings(most_iterations=1))
-    with pytest.raises(ConvergenceError, match=r"The press stopped at 0 ms.* try a smaller depth") as failure:
+    with pytest.raises(ConvergenceError, match=r"The press stopped at 0 ms.* try more ramp steps") as failure:
         pressed(coarse_block(), settings=settings)
     assert all(line.startswith("step from 0 to") for line in failure.value.history)
 
@@ -287,11 +287,20 @@ def test_step_that_fails_is_cut_and_the_answer_stays():
     ids=["too few iterations", "nearly through the block"],
 )
 def test_press_that_does_not_converge_is_an_error_with_its_history(indenter, depth_mm, settings):
-    with pytest.raises(ConvergenceError, match=r"The press stopped at .* try a smaller depth") as failure:
+    with pytest.raises(ConvergenceError, match=r"The press stopped at .*; try .*\.$") as failure:
         pressed(block(), indenter=indenter, motion=RampAndHold(depth_mm, 50.0, 100.0), settings=settings)
     assert len(failure.value.history) >= 6  # the whole step and its cuts down to 1/32
     assert all(line.startswith("step from") for line in failure.value.history)
-    assert failure.value.history[0] in str(failure.value)
+    assert failure.value.history[-1].split(": ")[1].split(".")[0] in str(failure.value)  # the cause
+
+
+def test_press_that_does_not_converge_is_one_error_of_one_line_without_a_chain():
+    settings = PressSettings(4, 3, NewtonSettings(most_iterations=1))
+    with pytest.raises(ConvergenceError) as failure:
+        pressed(block(), indenter=BALL, motion=RampAndHold(0.4, 50.0, 100.0), settings=settings)
+    assert "\n" not in str(failure.value)
+    assert failure.value.__cause__ is None
+    assert failure.value.__suppress_context__
 
 
 def test_hopeless_press_names_the_element_that_it_squeezes_most():
@@ -299,8 +308,8 @@ def test_hopeless_press_names_the_element_that_it_squeezes_most():
     with pytest.raises(ConvergenceError) as failure:
         pressed(block(), indenter=Plate(), motion=RampAndHold(2.9, 50.0, 100.0), settings=settings)
     assert re.search(
-        r"The press stopped at .* ms, depth .* mm, where element \d+ "
-        r"\(.+, about x = .*, y = .*, z = .* mm\) has \d+% of its volume at a point: try",
+        r"The press stopped at .* ms, depth .* mm, on the way to 2.9 mm, where element \d+ "
+        r"\(.+, about x = .*, y = .*, z = .* mm\) has \d+% of its volume at a point: .*; try a smaller depth",
         str(failure.value),
     )
 

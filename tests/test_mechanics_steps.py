@@ -34,7 +34,7 @@ def exact_step(moment, target_ms):
     return known(target_ms)
 
 
-def stop(moment, attempts):
+def stop(moment, attempts, cause):
     return ConvergenceError(f"stopped at {moment.time_ms:g} ms", attempts)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from fingerpad.core.errors import InputError
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.grading import Grading, graded_lines, lines_along, resolution_grading
+from fingerpad.geometry.grading import Grading, graded_lines, lines_along, lines_of_sizes, resolution_grading
 from fingerpad.geometry.mesh import LAYERS, Mesh, block_mesh, finger_mesh
 from fingerpad.geometry.mesh_quality import jacobian_at_gauss, scaled_jacobian
 
@@ -270,3 +270,41 @@ def test_what_cannot_be_meshed_is_refused():
         block_mesh([0, 1], [0, 2], [0, 1], layers=[0, 1])
     with pytest.raises(InputError, match="must start at 0"):
         block_mesh([0, 1], [0, 2], [1, 2], layers=[0], symmetric=True)
+
+
+@pytest.mark.parametrize("length", [3.3, 6.0, 17.2])
+def test_strips_are_finer_and_sizes_grow_from_them(length):
+    """Between two strips and beyond them; the steps are even in number and end where they must."""
+    strips = [(0.4, 0.6, 0.05), (2.0, 2.2, 0.1), (20.0, 21.0, 0.01)]
+    lines = lines_of_sizes(3.0, 0.45, length, growth=1.3, largest=3.0, strips=strips)
+    steps, middles = np.diff(lines), 0.5 * (lines[1:] + lines[:-1])
+    assert lines[0] == 0.0
+    assert lines[-1] == length
+    assert steps.size % 2 == 0
+    for begin, end, size in strips[:2]:
+        within = (middles > begin) & (middles < end)
+        assert within.sum() >= (end - begin) / size - 1
+        assert steps[within].max() <= 1.05 * size
+    assert steps[middles < 3.0].max() <= 0.45
+    assert np.maximum(steps[1:] / steps[:-1], steps[:-1] / steps[1:]).max() <= 1.35
+    assert (
+        lines_of_sizes(3.0, 0.45, length, 1.3, 3.0, ()).size <= graded_lines(3.0, 0.45, length, 1.3, 3.0).size
+    )
+
+
+def test_a_mesh_is_fine_in_strips_and_only_there():
+    """By x and z of the skin, on the side that was asked for; the mesh without strips keeps its bits."""
+    plain = Grading(CONTACT_X, 2.0, 2.0, 0.45, 0.45, full=True)
+    finer = replace(plain, finer_along=((16.0, 16.4, 0.1),), finer_across=((1.0, 1.5, 0.1),))
+    mesh = finger_mesh(FINGER, finer)
+    x = mesh.nodes_mm[mesh.midline_nodes, 0]
+    assert np.diff(x)[(x[1:] > 16.0) & (x[:-1] < 16.4)].max() <= 0.13
+    assert np.diff(x)[(x[:-1] > 17.3) & (x[1:] < 18.3)].min() > 0.3
+    ring = mesh.nodes_mm[mesh.skin_grid[np.abs(x - CONTACT_X).argmin()]]
+    z = np.sort(ring[ring[:, 1] < 0.0, 2])
+    assert np.diff(z)[(z[1:] > 1.0) & (z[:-1] < 1.5)].max() <= 0.13
+    assert np.count_nonzero((z > -1.5) & (z < -1.0)) <= 2
+    assert (finer.finest_x_mm, finer.finest_z_mm, finer.finest_strip_mm) == (0.1, 0.1, 0.1)
+    assert plain.finest_strip_mm == np.inf
+    with pytest.raises(InputError, match="finer_along needs strips of from, to and size"):
+        replace(plain, finer_along=((2.0, 1.0, 0.1),))

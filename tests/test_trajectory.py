@@ -191,8 +191,10 @@ def test_line_search_refuses_a_step_that_drives_the_skin_into_the_indenter(monke
     free = SimpleNamespace(residual_mn=np.array([20.0]), residual_norm_mn=20.0, relative_residual=2e7)
     deep = SimpleNamespace(potential_uj=15_566.0, residual_norm_mn=9290.0, relative_residual=0.9, whole=True)
     monkeypatch.setattr(newton._Search, "moved", lambda search, start, step: deep)
+    search = object.__new__(newton._Search)
+    search.persistent = False
     with pytest.raises(ConvergenceError, match="found no better configuration"):
-        newton._Search.line_search(object.__new__(newton._Search), free, np.array([-1.0]), highest_uj=37.0)
+        newton._Search.line_search(search, free, np.array([-1.0]), [37.0])
 
 
 def test_finger_is_released_from_a_millimetre():

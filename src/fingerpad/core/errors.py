@@ -21,15 +21,12 @@ class ConvergenceError(FingerpadError, RuntimeError):
     message : str
         What failed, where, and what to try.
     history : tuple of str, optional
-        One line per attempt, oldest first.
+        One line per attempt, oldest first; no part of the text of the error.
     """
 
     def __init__(self, message: str, history: tuple[str, ...] = ()):
         super().__init__(message)
         self.history = history
-
-    def __str__(self) -> str:
-        return "\n  ".join((super().__str__(), *self.history))
 
 
 class MaterialWarning(UserWarning):

@@ -14,14 +14,11 @@ from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.geometry.indenters import Bar, Indenter
-from fingerpad.geometry.motion import MOTION_UNITS, ForceRampAndHold, Motion, RampAndHold
+from fingerpad.geometry.motion import MOTION_UNITS, ForceRampAndHold, RampAndHold, Stimulus
 from fingerpad.geometry.names import SIZE_UNITS
-from fingerpad.geometry.sampled_motions import reduced
-from fingerpad.geometry.trajectory_files import read_trajectory
 
 PLACE = {"x_mm": "mm", "z_mm": "mm", "tilt_deg": "degrees", "spin_deg": "degrees"}
-TRAJECTORY = "trajectory"
-COLUMNS = ("stimulus", "indenter", *SIZE_UNITS, *MOTION_UNITS, TRAJECTORY, *PLACE)
+COLUMNS = ("stimulus", "indenter", *SIZE_UNITS, *MOTION_UNITS, *PLACE)
 """Columns of a file of stimuli; only the first two are needed."""
 
 
@@ -33,7 +30,7 @@ class TactileStimulus:
     ----------
     indenter : Indenter
         The rigid body.
-    motion : Motion
+    motion : RampAndHold or ForceRampAndHold
         How it is pressed.
     x_mm, z_mm : float
         Where its axis meets the skin, from the centre of the receptive field: along the finger on the
@@ -45,7 +42,7 @@ class TactileStimulus:
     """
 
     indenter: Indenter
-    motion: Motion = field(default_factory=RampAndHold)
+    motion: Stimulus = field(default_factory=RampAndHold)
     x_mm: float = 0.0
     z_mm: float = 0.0
     tilt_deg: float | None = None
@@ -93,7 +90,7 @@ class ShiftedBar:
     """
 
     bar: Bar = field(default_factory=Bar)
-    motion: Motion = field(default_factory=RampAndHold)
+    motion: Stimulus = field(default_factory=RampAndHold)
     column: str = "shift_mm"
 
     def named(self, entry: str) -> tuple[str, TactileStimulus]:
@@ -134,9 +131,7 @@ def read_stimuli(path: Path) -> ListedStimuli:
     ----------
     path : Path
         A CSV file with columns among `COLUMNS`, or a YAML file (.yaml, .yml) that lists mappings with the
-        same names. A size, motion or place that is not given is the paper's. `trajectory` is a file as of
-        `fingerpad.read_trajectory`, by its path from the list's folder; it is reduced within 0.5 % of its
-        extent.
+        same names. A size, motion or place that is not given is the paper's.
 
     Returns
     -------
@@ -163,41 +158,32 @@ def read_stimuli(path: Path) -> ListedStimuli:
         name = line.text("stimulus")
         if name in stimuli:
             raise InputError(f"{line.place}: stimulus {name!r} is repeated, give each its own name.")
-        stimuli[name] = _stimulus(line, path.parent)
+        stimuli[name] = _stimulus(line)
     return ListedStimuli(stimuli, str(path))
 
 
-def _stimulus(line: TableRow, folder: Path) -> TactileStimulus:
+def _stimulus(line: TableRow) -> TactileStimulus:
     """Build the stimulus that a line describes."""
     kind, *inline = line.text("indenter").split(":")
     with line.placed():
         indenter = indenter_named(line.text("indenter"))
     sizes = {size.name: SIZE_UNITS[size.name] for size in fields(indenter)}  # type: ignore[arg-type]
-    line.refuse_others(("stimulus", "indenter", *sizes, *MOTION_UNITS, TRAJECTORY, *PLACE), kind)
+    line.refuse_others(("stimulus", "indenter", *sizes, *MOTION_UNITS, *PLACE), kind)
     given = _given(line, sizes)
     if inline and given:
         raise InputError(
             f"{line.place}: sizes must stand in indenter or in columns, not in both: leave "
             f"{next(iter(given))} empty."
         )
+    if line.has("depth_mm") and line.has("force_mn"):
+        raise InputError(f"{line.place}: depth_mm and force_mn exclude each other: leave one empty.")
+    motion = ForceRampAndHold if line.has("force_mn") else RampAndHold
     with line.placed():
         return TactileStimulus(
             replace(indenter, **given),  # type: ignore[type-var]
-            _motion(line, folder),
+            motion(**_given(line, MOTION_UNITS)),
             **_given(line, PLACE),
         )
-
-
-def _motion(line: TableRow, folder: Path) -> Motion:
-    """Build the motion that a line describes."""
-    given = _given(line, MOTION_UNITS)
-    if line.has(TRAJECTORY):
-        if given:
-            raise InputError(f"{TRAJECTORY} and {next(iter(given))} exclude each other: leave one empty.")
-        return reduced(read_trajectory(folder / line.text(TRAJECTORY)))
-    if "depth_mm" in given and "force_mn" in given:
-        raise InputError("depth_mm and force_mn exclude each other: leave one empty.")
-    return ForceRampAndHold(**given) if "force_mn" in given else RampAndHold(**given)
 
 
 def _given(line: TableRow, columns: Mapping[str, str]) -> dict[str, Any]:

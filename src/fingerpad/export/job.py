@@ -334,7 +334,7 @@ def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike
     return Job(
         touch.mesh,
         touch.tissues.layers,
-        touch.indenter,
+        touch.body,
         touch.placement,
         np.asarray(times_ms, dtype=float),
         np.asarray(depths_mm, dtype=float),

@@ -7,7 +7,7 @@ of their gaps. This is exact on both sides of its face if the flat between the t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,6 +59,14 @@ class Edge(Indenter):
     def edge_reach_mm(self) -> float:
         """Half-width about x = 0 within which skin bends about the edge. [mm]"""
         return self.fillet_mm + BESIDE_EDGE_MM
+
+    def edges_mm(self, reach_mm: float) -> tuple[tuple[float, float], ...]:
+        """Place along x and radius of the edge. [mm]"""
+        return ((0.0, self.fillet_mm),)
+
+    def rounded_to(self, radius_mm: float) -> Edge:
+        """Return the body with an edge of at least this radius. [mm]"""
+        return replace(self, fillet_mm=max(self.fillet_mm, radius_mm))
 
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
@@ -143,6 +151,12 @@ class Gap(Indenter):
         """Width of the gap; infinite without one. [mm]"""
         return self.gap_mm if self.gap_mm > 0.0 else np.inf
 
+    def edges_mm(self, reach_mm: float) -> tuple[tuple[float, float], ...]:
+        """Place along x and radius of the lips, if there is a gap, and of the outer edges. [mm]"""
+        half, lip = self.width_mm / 2, self.gap_mm / 2
+        lips = ((-lip, self.lip_radius_mm), (lip, self.lip_radius_mm)) if self.gap_mm > 0.0 else ()
+        return ((-half, self.fillet_mm), *lips, (half, self.fillet_mm))
+
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside and in the gap. [mm]"""
         u = np.abs(points_mm[:, 0])
@@ -214,6 +228,19 @@ class Grating(Indenter):
     def narrowest_mm(self) -> float:
         """Smaller of the widths of ridge and groove. [mm]"""
         return min(self.ridge_mm, self.groove_mm)
+
+    def edges_mm(self, reach_mm: float) -> tuple[tuple[float, float], ...]:
+        """Place along x and radius of the edges of all ridges within reach. [mm]"""
+        last = int(reach_mm / self.period_mm) + 1
+        return tuple(
+            (ridge * self.period_mm + side * self.ridge_mm / 2, self.lip_mm)
+            for ridge in range(-last, last + 1)
+            for side in (-1, 1)
+        )
+
+    def rounded_to(self, radius_mm: float) -> Grating:
+        """Return the grating with lips of at least this radius [mm], at most half of a ridge."""
+        return replace(self, lip_mm=max(self.lip_mm, min(radius_mm, self.ridge_mm / 2)))
 
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf over a groove. [mm]"""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,12 @@ from fingerpad.core.checks import FloatArray, finite, one_of, positive, whole
 from fingerpad.core.errors import InputError
 
 RESOLUTIONS = ("quick", "standard", "paper")
+
+Strip = tuple[float, float, float]
+"""From, to and size of the elements between them. [mm]"""
+
+STEPS_TO_SUM = 4000
+"""Intervals over which the number of elements is summed where their size varies."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +43,15 @@ class Grading:
     core_half_length_mm, core_size_mm : float
         Part of the fine zone with even smaller elements along the finger, under a wire: half-length about its
         middle, and size of the elements. Both 0 for none. [mm]
+    finer_along, finer_across : tuple of (from, to, size)
+        Strips with even smaller elements, about a small body or an edge: x on the volar midline of its
+        two sides or, across, z; and the largest size in it. Sizes grow from there by `growth`. [mm]
 
     Raises
     ------
     InputError
-        If a value is out of its range, or the core is not a part of the fine zone with smaller elements.
+        If a value is out of its range, the core is not a part of the fine zone with smaller elements, or a
+        strip ends before it begins.
     """
 
     centre_mm: float
@@ -58,6 +68,8 @@ class Grading:
     full: bool = False
     core_half_length_mm: float = 0.0
     core_size_mm: float = 0.0
+    finer_along: tuple[Strip, ...] = ()
+    finer_across: tuple[Strip, ...] = ()
 
     def __post_init__(self) -> None:
         finite("centre_mm", self.centre_mm, "mm")
@@ -75,6 +87,28 @@ class Grading:
                 f"core_half_length_mm and core_size_mm must both be 0, or lie between 0 and "
                 f"{self.half_length_mm:g} and {self.size_x_mm:g} mm: got {core[0]!r} and {core[1]!r}."
             )
+        for name in ("finer_along", "finer_across"):
+            for begin, end, size in getattr(self, name):
+                if not (np.isfinite([begin, end]).all() and begin < end and 0.0 < size < np.inf):
+                    raise InputError(
+                        f"{name} needs strips of from, to and size in mm, to above from and size above 0: "
+                        f"got {(begin, end, size)!r}."
+                    )
+
+    @property
+    def finest_x_mm(self) -> float:
+        """Size of the smallest elements along the finger. [mm]"""
+        return min([self.core_size_mm or self.size_x_mm, *(size for _, _, size in self.finer_along)])
+
+    @property
+    def finest_z_mm(self) -> float:
+        """Size of the smallest elements across the finger. [mm]"""
+        return min([self.size_z_mm, *(size for _, _, size in self.finer_across)])
+
+    @property
+    def finest_strip_mm(self) -> float:
+        """Size of the smallest elements in strips; infinite without any. [mm]"""
+        return min((size for _, _, size in self.finer_along + self.finer_across), default=np.inf)
 
     @property
     def counts(self) -> tuple[int, int, int, int]:
@@ -170,6 +204,8 @@ def covering(gradings: Sequence[Grading]) -> Grading:
         dermis=max(grading.dermis for grading in gradings),
         subcutis=max(grading.subcutis for grading in gradings),
         full=any(grading.full for grading in gradings),
+        finer_along=_joined(grading.finer_along for grading in gradings),
+        finer_across=_joined(grading.finer_across for grading in gradings),
     )
     if not cores or joint.size_x_mm <= core_size:
         return joint
@@ -178,7 +214,12 @@ def covering(gradings: Sequence[Grading]) -> Grading:
     return replace(joint, core_half_length_mm=core_reach, core_size_mm=core_size)
 
 
-def lines_along(grading: Grading, length: float) -> FloatArray:
+def _joined(strips: Iterable[tuple[Strip, ...]]) -> tuple[Strip, ...]:
+    """Return the strips of several gradings, each once."""
+    return tuple(dict.fromkeys(strip for each in strips for strip in each))
+
+
+def lines_along(grading: Grading, length: float, strips: Sequence[Strip] = ()) -> FloatArray:
     """Lines from the middle of the fine zone to one end of the finger.
 
     Parameters
@@ -187,6 +228,8 @@ def lines_along(grading: Grading, length: float) -> FloatArray:
         Sizes and zones along the finger.
     length : float
         Where the last line lies. [mm]
+    strips : sequence of (from, to, size)
+        `finer_along` as distances from the middle towards this end. [mm]
 
     Returns
     -------
@@ -201,13 +244,69 @@ def lines_along(grading: Grading, length: float) -> FloatArray:
     """
     fine, size = grading.half_length_mm, grading.size_x_mm
     growth, largest = grading.growth, grading.largest_mm
+    core = grading.core_half_length_mm, grading.core_size_mm
+    if strips:
+        within = [(0.0, *core)] if grading.core_size_mm else []
+        return lines_of_sizes(fine, size, length, growth, largest, [*strips, *within])
     if not grading.core_size_mm:
         return graded_lines(fine, size, length, growth, largest)
     if length < fine + size:  # no thin elements between the fine zone and the end of the finger
         fine = length
-    core = graded_lines(grading.core_half_length_mm, grading.core_size_mm, fine, growth, size)
+    inner = graded_lines(*core, fine, growth, size)
     beyond = graded_lines(0.0, size, length - fine, growth, largest)
-    return np.concatenate([core, fine + beyond[1:]])
+    return np.concatenate([inner, fine + beyond[1:]])
+
+
+def lines_across(grading: Grading, length: float, strips: Sequence[Strip] = ()) -> FloatArray:
+    """Lines from the midline around the finger to its dorsal side, as those of `lines_along`.
+
+    Examples
+    --------
+    >>> lines_across(Grading(17.0, 0.5, 1.0, 0.2, 0.5, 0.5), 2.0).round(3).tolist()
+    [0.0, 0.5, 1.0, 1.5, 2.0]
+    """
+    zone = grading.half_width_mm, grading.size_z_mm, length, grading.growth, grading.largest_mm
+    return lines_of_sizes(*zone, strips) if strips else graded_lines(*zone)
+
+
+def lines_of_sizes(
+    fine: float, size: float, length: float, growth: float, largest: float, strips: Sequence[Strip]
+) -> FloatArray:
+    """Lines from 0 to `length` as those of `graded_lines`, but closer together in strips.
+
+    The size h of the elements is a function of place: the least of that of the fine zone, of those of the
+    strips, and of what growth from there allows. The number of elements is the integral of 1/h, rounded up to
+    an even number.
+
+    Parameters
+    ----------
+    fine, size, length, growth, largest
+        As in `graded_lines`. [mm]
+    strips : sequence of (from, to, size)
+        Places of smaller elements, beyond the ends too, where they do not count. [mm]
+
+    Returns
+    -------
+    array (n_steps + 1,)
+        Lines, from 0. [mm]
+
+    Examples
+    --------
+    >>> lines_of_sizes(1.0, 0.5, 2.0, 1.3, 2.0, [(0.9, 1.1, 0.1)]).round(2).tolist()
+    [0.0, 0.31, 0.55, 0.74, 0.89, 1.0, 1.11, 1.26, 1.45, 1.7, 2.0]
+    """
+    places = np.linspace(0.0, length, STEPS_TO_SUM + 1)
+    slope = np.log(growth)
+    sizes = np.minimum(size + slope * np.maximum(places - fine, 0.0), largest)
+    for begin, end, smaller in strips:
+        beside = np.maximum(np.maximum(begin - places, places - end), 0.0)
+        sizes = np.minimum(sizes, smaller + slope * beside)
+    density = 1.0 / sizes
+    number = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(places))])
+    n_steps = 2 * int(np.ceil(0.5 * number[-1]))
+    lines = np.interp(np.linspace(0.0, number[-1], n_steps + 1), number, places)
+    lines[-1] = length
+    return lines
 
 
 def graded_lines(fine: float, size: float, length: float, growth: float, largest: float) -> FloatArray:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import cosine_and_sine
-from fingerpad.geometry.grading import Grading, covering, resolution_grading
+from fingerpad.geometry.grading import Grading, Strip, covering, resolution_grading
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.motion import Pose
 
@@ -22,6 +24,29 @@ OBLIQUE_SIZE_MM = {"quick": 0.3, "standard": 0.2, "paper": 0.1}
 
 ACROSS_GROOVE, FEWEST_ACROSS_GROOVE = 4, 2
 """Number of elements across the narrowest groove or ridge: in a mesh graded for it, and the least in any."""
+
+TIP_SHARE = {"quick": 1 / 3, "standard": 1 / 4, "paper": 1 / 4}
+"""Largest size of elements under a round tip, over its radius."""
+
+BEYOND_TIP = 1.1
+"""End of the small elements about a round tip or face, over its radius: skin is drawn in below it."""
+
+SHARPEST_MM, BESIDE_SHARP_MM = 0.05, 0.15
+"""Radius below which an edge is meshed as if it had this radius, and half-width of the strip of elements of
+the size of the edge's radius. [mm]"""
+
+RIM_SIZE_MM = {"quick": 0.2, "standard": 0.15, "paper": 0.1}
+"""Largest size of elements at the rim of a punch. [mm]"""
+
+MOST_ACROSS_FACE = {"quick": 40, "standard": 50, "paper": 100}
+"""Elements of the size at the rim across the face of a punch: a rim finer than this is not resolved."""
+
+RIM_STRIPS = ((0.7, 1.0), (0.4, 1.6), (0.0, 3.0))
+"""Where strips about a rim begin, over its radius, and the size there over that at the rim. At an angle a to
+the x axis the rim runs across lines of x that are 1 / cos a times as far apart."""
+
+LEAST_ACROSS_RADIUS = 5
+"""Least number of elements across the radius of a face, if those at the rim are no larger."""
 
 LONGEST_REACH_MM = 5.0
 """Largest half-extent of a fine zone: skin farther away curves away from any indenter. [mm]"""
@@ -61,23 +86,67 @@ def grading_about(
     grading = resolution_grading(resolution, x_mm, half_length_mm=reach, half_width_mm=abs(z_mm) + reach)
     if z_mm != 0.0 or not indenter.mirrors(spin_deg):
         grading = replace(grading, full=True)
-    if indenter.half_width_mm < grading.size_x_mm:
-        if spin_deg % 180.0 != 0.0:
-            raise InputError(
-                f"spin_deg must be 0 for {type(indenter).__name__}, because it is thinner than "
-                f"{2 * grading.size_x_mm:g} mm, two elements of {resolution}: got {spin_deg:g} degrees; "
-                "give a grading that is fine enough."
-            )
+    if indenter.rim_mm is not None:
+        return _about_rim(grading, resolution, *indenter.rim_mm, z_mm)
+    size = max(TIP_SHARE[resolution] * indenter.tip_radius_mm, THIN_SIZE_MM)
+    if indenter.symmetry_deg is None:
+        reach = BEYOND_TIP * indenter.tip_radius_mm
+        return _with_strips(grading, [(-reach, reach, size)], True, True, z_mm)
+    thin, edges = indenter.half_width_mm < grading.size_x_mm, indenter.edges_mm(reach)
+    if thin and spin_deg % 180.0 != 0.0:
+        raise InputError(
+            f"spin_deg must be 0 for {type(indenter).__name__}, because it is thinner than "
+            f"{2 * grading.size_x_mm:g} mm, two elements of {resolution}: got {spin_deg:g} degrees; "
+            "give a grading that is fine enough."
+        )
+    along, across = spin_deg % 180.0 == 0.0, spin_deg % 180.0 == 90.0
+    if thin and not np.isfinite(size) and not edges:
         # A wire needs a few elements of its own size below it, from which the sizes grow.
         few_mm = 4 * THIN_SIZE_MM
         if resolution == "paper":  # its fine zone is the whole pad
             return replace(grading, core_half_length_mm=few_mm, core_size_mm=THIN_SIZE_MM)
         return replace(grading, half_length_mm=few_mm, size_x_mm=THIN_SIZE_MM)
-    if indenter.edge_reach_mm == 0.0:
-        return grading
-    largest = EDGE_SIZE_MM if spin_deg % 90.0 == 0.0 else OBLIQUE_SIZE_MM
-    size = min(largest[resolution], indenter.narrowest_mm / ACROSS_GROOVE)
-    return _finer_across_edges(grading, size, indenter.edge_reach_mm, spin_deg)
+    if np.isfinite(size):
+        if not (along or across):
+            return _finer_across_edges(grading, size, 0.0, spin_deg)
+        reach = BEYOND_TIP * indenter.tip_radius_mm
+        return _with_strips(grading, [(-reach, reach, size)], along, across, z_mm)
+    if indenter.edge_reach_mm > 0.0:
+        largest = EDGE_SIZE_MM if along or across else OBLIQUE_SIZE_MM
+        size = min(largest[resolution], indenter.narrowest_mm / ACROSS_GROOVE)
+        grading = _finer_across_edges(grading, size, indenter.edge_reach_mm, spin_deg)
+    sharp = [
+        (place - BESIDE_SHARP_MM, place + BESIDE_SHARP_MM, max(radius, SHARPEST_MM))
+        for place, radius in edges
+        if abs(place) <= reach
+    ]
+    return _with_strips(grading, sharp, along, across, z_mm)
+
+
+def _about_rim(grading: Grading, resolution: str, radius_mm: float, rim_mm: float, z_mm: float) -> Grading:
+    """Grading about a round rim: fine where it runs at a right angle to the lines, coarser under the face."""
+    coarsest = 2 * radius_mm / MOST_ACROSS_FACE[resolution]
+    size = min(RIM_SIZE_MM[resolution], max(rim_mm, SHARPEST_MM, coarsest))
+    strips: list[Strip] = []
+    for inner, times in RIM_STRIPS:
+        begin, end = inner * radius_mm, BEYOND_TIP * radius_mm
+        largest = min(times * size, max(size, radius_mm / LEAST_ACROSS_RADIUS))
+        strips += [(begin, end, largest), (-end, -begin, largest)]
+    return _with_strips(grading, strips, True, True, z_mm)
+
+
+def _with_strips(
+    grading: Grading, strips: Sequence[Strip], along: bool, across: bool, z_mm: float
+) -> Grading:
+    """Add strips, given about the indenter's axis, that are finer than the grading is there."""
+    x = [(begin + grading.centre_mm, end + grading.centre_mm, size) for begin, end, size in strips]
+    z = [(begin + z_mm, end + z_mm, size) for begin, end, size in strips]
+    finest_x = grading.core_size_mm or grading.size_x_mm
+    return replace(
+        grading,
+        finer_along=tuple(strip for strip in x if along and strip[2] < finest_x),
+        finer_across=tuple(strip for strip in z if across and strip[2] < grading.size_z_mm),
+    )
 
 
 def grading_along(
@@ -109,7 +178,21 @@ def grading_along(
     gradings = [
         grading_about(indenter, resolution, x_mm + x, z_mm + z, spin_deg + spin) for x, z, spin in outermost
     ]
-    return covering(gradings)
+    joint = covering(gradings)
+    if not (joint.finer_along or joint.finer_across):
+        return joint
+    return replace(
+        joint,
+        finer_along=_swept([grading.finer_along for grading in gradings]),
+        finer_across=_swept([grading.finer_across for grading in gradings]),
+    )
+
+
+def _swept(strips: Sequence[tuple[Strip, ...]]) -> tuple[Strip, ...]:
+    """Return strips that cover each strip of a body on its way between places."""
+    together = zip(*strips, strict=True)
+    ends = [tuple(zip(*same, strict=True)) for same in together]
+    return tuple((min(begins), max(ends), min(sizes)) for begins, ends, sizes in ends)
 
 
 def _finer_across_edges(grading: Grading, size_mm: float, reach_mm: float, spin_deg: float) -> Grading:
@@ -126,7 +209,7 @@ def _finer_across_edges(grading: Grading, size_mm: float, reach_mm: float, spin_
 
 def sizes_across(grading: Grading, spin_deg: float) -> tuple[float, ...]:
     """Sizes of elements along x of an indenter turned by `spin_deg`, the finest of each direction. [mm]"""
-    size_x, size_z = grading.core_size_mm or grading.size_x_mm, grading.size_z_mm
+    size_x, size_z = grading.finest_x_mm, grading.finest_z_mm
     if spin_deg % 180.0 == 0.0:
         return (size_x,)
     return (size_z,) if spin_deg % 90.0 == 0.0 else (size_x, size_z)

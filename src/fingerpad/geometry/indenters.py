@@ -10,7 +10,7 @@ direction of the contact force without friction. Edge, bar with a gap and gratin
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -69,6 +69,24 @@ class Indenter(ABC):
         """Width of the narrowest groove or ridge, which a mesh must resolve; infinite without one. [mm]"""
         return np.inf
 
+    @property
+    def tip_radius_mm(self) -> float:
+        """Radius of a round tip, which a mesh must resolve; infinite without one. [mm]"""
+        return np.inf
+
+    def edges_mm(self, reach_mm: float) -> tuple[tuple[float, float], ...]:
+        """Place along x and radius of each edge across the finger within reach of the axis. [mm]"""
+        return ()
+
+    @property
+    def rim_mm(self) -> tuple[float, float] | None:
+        """Radius of a round face and of its rounded rim; None without one. [mm]"""
+        return None
+
+    def rounded_to(self, radius_mm: float) -> Indenter:
+        """Return the body with edges or a rim of at least this radius [mm], where it has any."""
+        return self
+
 
 def _norm_and_direction(offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Length and unit direction of each row; a zero row points along y, the direction of pressing."""
@@ -83,19 +101,15 @@ def round_front(beside: FloatArray, radius: float) -> FloatArray:
     return np.where(beside <= radius, height, -np.inf)
 
 
-def _ball(centred: FloatArray, lateral: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
+def _rod_end(centred: FloatArray, beside: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
     """Gap and normal of a ball or cylinder from offsets (n, 3) to its centre or axis.
 
-    A thin body can move past a node within one step. The gap of a node behind the widest section is therefore
-    measured along the direction of pressing, so that the contact force points to the front of the body.
+    Behind its widest section the body goes on with straight sides: `beside` (n, 3) are the offsets along the
+    finger and across only. Skin that has passed the widest section is then held beside the body, and the
+    normal is the gradient of the gap everywhere (docs/decisions/small-bodies.md).
     """
-    distance, normal = _norm_and_direction(centred)
-    passed = (centred[:, 1] < 0.0) & (lateral < radius)
-    forward = np.sqrt(np.maximum(radius**2 - lateral**2, 0.0)) / radius
-    front_normal = centred / radius
-    front_normal[:, 1] = forward
-    gap = np.where(passed, (centred[:, 1] - radius * forward) * forward, distance - radius)
-    return gap, np.where(passed[:, None], front_normal, normal)
+    distance, normal = _norm_and_direction(np.where(centred[:, 1:2] < 0.0, beside, centred))
+    return distance - radius, normal
 
 
 def rounded(
@@ -145,6 +159,11 @@ class Cylinder(Indenter):
         """Half of the body's extent along x. [mm]"""
         return self.diameter_mm / 2
 
+    @property
+    def tip_radius_mm(self) -> float:
+        """Radius. [mm]"""
+        return self.diameter_mm / 2
+
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return round_front(np.abs(points_mm[:, 0]), self.diameter_mm / 2)
@@ -153,7 +172,7 @@ class Cylinder(Indenter):
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         radius = self.diameter_mm / 2
         centred = (points_mm + np.array([0.0, radius, 0.0])) * [1.0, 1.0, 0.0]
-        return _ball(centred, np.abs(centred[:, 0]), radius)
+        return _rod_end(centred, centred * [1.0, 0.0, 0.0], radius)
 
 
 @dataclass(frozen=True)
@@ -234,6 +253,11 @@ class Sphere(Indenter):
         """Half of the body's extent along x. [mm]"""
         return self.radius_mm
 
+    @property
+    def tip_radius_mm(self) -> float:
+        """Radius. [mm]"""
+        return self.radius_mm
+
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return round_front(np.hypot(points_mm[:, 0], points_mm[:, 2]), self.radius_mm)
@@ -241,7 +265,7 @@ class Sphere(Indenter):
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         centred = points_mm + np.array([0.0, self.radius_mm, 0.0])
-        return _ball(centred, np.hypot(centred[:, 0], centred[:, 2]), self.radius_mm)
+        return _rod_end(centred, centred * [1.0, 0.0, 1.0], self.radius_mm)
 
 
 @dataclass(frozen=True)
@@ -280,6 +304,14 @@ class Bar(Indenter):
         """Half-width about x = 0 within which skin bends about the edges. [mm]"""
         return self.width_mm / 2 + BESIDE_EDGE_MM
 
+    def edges_mm(self, reach_mm: float) -> tuple[tuple[float, float], ...]:
+        """Place along x and radius of the two edges. [mm]"""
+        return ((-self.width_mm / 2, self.fillet_mm), (self.width_mm / 2, self.fillet_mm))
+
+    def rounded_to(self, radius_mm: float) -> Bar:
+        """Return the bar with edges of at least this radius [mm], at most half of its width."""
+        return replace(self, fillet_mm=max(self.fillet_mm, min(radius_mm, self.width_mm / 2)))
+
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return round_front(np.abs(points_mm[:, 0]) - self.width_mm / 2 + self.fillet_mm, self.fillet_mm)
@@ -317,6 +349,15 @@ class FlatPunch(Indenter):
     def half_width_mm(self) -> float:
         """Half of the diameter. [mm]"""
         return self.diameter_mm / 2
+
+    @property
+    def rim_mm(self) -> tuple[float, float]:
+        """Radius of the face and of its rim. [mm]"""
+        return self.diameter_mm / 2, self.fillet_mm
+
+    def rounded_to(self, radius_mm: float) -> FlatPunch:
+        """Return the punch with a rim of at least this radius [mm], at most half of its diameter."""
+        return replace(self, fillet_mm=max(self.fillet_mm, min(radius_mm, self.diameter_mm / 2)))
 
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""

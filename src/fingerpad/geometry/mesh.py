@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from fingerpad.core.checks import FloatArray, IntArray, float_array, increasing, whole
 from fingerpad.core.errors import InputError
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.grading import Grading, graded_lines, lines_along
+from fingerpad.geometry.grading import Grading, Strip, lines_across, lines_along
 
 LAYERS = ("stratum corneum", "living epidermis", "dermis", "subcutis")
 _LIVING_EPIDERMIS = 1
@@ -286,21 +286,40 @@ def finger_lines(finger: Fingertip, grading: Grading) -> GridLines:
     if not 0.0 < centre < x[-1]:
         raise InputError(f"centre_mm must lie between 0 and {x[-1]:.2f} mm: got {centre}.")
     middle = np.interp(centre, x, arc)
-    proximal, distal = (lines_along(grading, length) for length in (middle, arc[-1] - middle))
+    proximal, distal = (
+        lines_along(grading, length, _strips(grading.finer_along, x, way * (arc - middle)))
+        for way, length in ((-1.0, middle), (1.0, arc[-1] - middle))
+    )
     along = np.concatenate([middle - proximal[::-1], middle + distal[1:]])
     along[0] = 0.0
     angle = np.linspace(0.0, np.pi, _ARC_POINTS)
-    girth = _arc_length(_skin(finger, np.interp([centre], x, station), angle))
-    lines = graded_lines(
-        grading.half_width_mm, grading.size_z_mm, girth[-1], grading.growth, grading.largest_mm
+    section = _skin(finger, np.interp([centre], x, station), angle)
+    girth, z = _arc_length(section), section[:, 2]
+    volar = slice(int(z.argmax()) + 1)
+    right, left = (
+        np.interp(lines_across(grading, girth[-1], _strips(strips, z[volar], girth[volar])), girth, angle)
+        for strips in (grading.finer_across, _mirrored(grading.finer_across))
     )
-    around = np.interp(lines, girth, angle)
-    if grading.full:
-        around = np.concatenate([-around[:0:-1], around])
+    around = np.concatenate([-left[:0:-1], right]) if grading.full else right
     through = [np.zeros(1)]
     through += [layer + np.linspace(0.0, 1.0, n + 1)[1:] for layer, n in enumerate(grading.counts[:3])]
     through.append(3.0 + _subcutis_fractions(finger, grading))
     return GridLines(along, around, np.concatenate(through))
+
+
+def _strips(strips: Sequence[Strip], place_mm: FloatArray, arc_mm: FloatArray) -> list[Strip]:
+    """Return strips given by x or z as distances on the skin from the centre, without those beyond it."""
+    on_skin = []
+    for begin, end, size in strips:
+        near, far = sorted(np.interp([begin, end], place_mm, arc_mm).tolist())
+        if far > 0.0:
+            on_skin.append((near, far, size))
+    return on_skin
+
+
+def _mirrored(strips: Sequence[Strip]) -> list[Strip]:
+    """Return strips across on the other side of the midline."""
+    return [(-end, -begin, size) for begin, end, size in strips]
 
 
 def _subcutis_fractions(finger: Fingertip, grading: Grading) -> FloatArray:

@@ -271,22 +271,19 @@ def _relaxed_work(  # type: ignore[no-untyped-def]
     """Return the sum over elements of w_q S : 1/2 (C_n+1 - C_n), S being the mean relaxed stress."""
     weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
     start, end, inverse = small_array((N_POINTS, 3, 3)), small_array((N_POINTS, 3, 3)), small_array((3, 3))
-    reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3))
-    jacobians = small_array((2, N_POINTS))
+    reference, moved, jacobians = (
+        small_array((N_NODES, 3)),
+        small_array((N_NODES, 3)),
+        small_array((2, N_POINTS)),
+    )
     total = 0.0
     for e in range(first, last):
         material = layer[e]
         take_nodes(nodes, elements[e], reference)
-        take_nodes(now, elements[e], moved)
-        volume = gradients_at_points(reference, moved, weights, slopes, end)
         take_nodes(before, elements[e], moved)
-        for q in range(N_POINTS):
-            for i in range(3):
-                for j in range(3):
-                    gradient = 1.0 if i == j else 0.0
-                    for a in range(N_NODES):
-                        gradient += moved[a, i] * slopes[q, a, j]
-                    start[q, i, j] = gradient
+        volume = gradients_at_points(reference, moved, weights, slopes, start)
+        take_nodes(now, elements[e], moved)
+        gradients_at_points(reference, moved, weights, slopes, end)
         volume_before, volume_now = 0.0, 0.0
         for q in range(N_POINTS):
             jacobians[0, q], jacobians[1, q] = invert(start[q], inverse), invert(end[q], inverse)

@@ -47,6 +47,23 @@ RENEW_AT = 0.2
 """Residual, over that right after the last renewal, at which the limits of friction are renewed. Each renewal
 changes the equilibrium by about a fifth of what the last one did, so more accuracy between them is wasted."""
 
+PATIENCE = 15
+"""Newton steps of one search after which the potential must fall in each: nodes at an edge may change sides
+for ever, and the residual with them."""
+
+MOST_STRAIGHT = 5
+"""Newton steps of one search without the curvature of the indenter; then the tangent is shifted."""
+
+FIRST_SHIFT, RAISE_SHIFT, LOWER_SHIFT = 1e-4, 4.0, 8.0
+"""Smallest shift of a tangent, over its diagonal, and the factors by which it rises until the tangent is
+positive definite and falls after a step."""
+
+LARGEST_SHIFTS = {True: 0.05, False: 2.0}
+"""Largest shifts of a tangent with and without the curvature of the indenter."""
+
+MOST_FULL_AUGMENTATIONS = 5
+"""Augmentations after which multipliers change by half: nodes at a rim may alternate between two places."""
+
 AT_REST = 1e-2
 """Residual over contact force below which the depth is moved towards the given force."""
 DEPTH_FORCING = 1e-3
@@ -71,12 +88,16 @@ class NewtonSettings:
     balance_tolerance : float
         Difference between the force of the indenter and the reaction of the supports, over that force. A
         small residual does not imply it: many small nodal forces of one sign add up.
+    persistent : bool
+        Whether the search goes on through an indefinite tangent and insists on a falling potential, as skin
+        about a small body or a sharp edge needs. Elsewhere a shorter step in time is the faster remedy.
     """
 
     residual_tolerance: float = 1e-5
     penetration_tolerance: float = 5e-3
     most_iterations: int = 40
     balance_tolerance: float = 1e-4
+    persistent: bool = False
 
     def __post_init__(self) -> None:
         positive("residual_tolerance", self.residual_tolerance)
@@ -111,6 +132,8 @@ class Equilibrium:
         Energy that friction has turned into heat in this step. [µJ]
     pressure_kpa : array (n_elements,), optional
         Pressures for the next step of a mixed method. [kPa]
+    was_shifted : bool
+        Whether an indefinite tangent was shifted on the way: the skin may have snapped to another state.
     """
 
     displacement_mm: FloatArray
@@ -123,6 +146,7 @@ class Equilibrium:
     slid_mm: FloatArray | None = None
     rubbed_uj: float = 0.0
     pressure_kpa: FloatArray | None = None
+    was_shifted: bool = False
 
 
 def find_equilibrium(
@@ -132,6 +156,7 @@ def find_equilibrium(
     guess_mm: FloatArray,
     multipliers_mn: FloatArray,
     settings: NewtonSettings,
+    before_mm: FloatArray | None = None,
 ) -> Equilibrium:
     """Newton's method from a guess.
 
@@ -149,17 +174,19 @@ def find_equilibrium(
         Contact multipliers to start from. [mN]
     settings : NewtonSettings
         When to stop.
+    before_mm : array (n_nodes, 3), optional
+        Displacements to start from if the guess turns an element inside out. [mm]
 
     Raises
     ------
     ConvergenceError
         If no equilibrium is found; its history has one line per Newton step.
     """
-    search = _Search(body, load, solver, Lagging(multipliers_mn, load.anchors))
+    search = _Search(body, load, solver, Lagging(multipliers_mn, load.anchors), settings.persistent)
     try:
-        return search.run(guess_mm, settings)
+        return search.run(guess_mm, settings, before_mm)
     except ConvergenceError as error:
-        raise ConvergenceError(error.args[0], tuple(search.history)) from error
+        raise ConvergenceError(error.args[0], tuple(search.history)) from None
 
 
 @dataclass
@@ -170,19 +197,27 @@ class _Search:
     load: Load
     solver: LinearSolver
     lagging: Lagging
+    persistent: bool
     blocks: np.ndarray = field(init=False)
     history: list[str] = field(default_factory=list)
+    straightened: int = 0
+    shift: float = 0.0
+    was_shifted: bool = False
+    augmentations: int = 0
 
     def __post_init__(self) -> None:
         self.blocks = np.empty((self.body.sparsity.column.size, 3, 3), self.solver.number_type)
 
-    def run(self, guess_mm: FloatArray, settings: NewtonSettings) -> Equilibrium:
+    def run(
+        self, guess_mm: FloatArray, settings: NewtonSettings, before_mm: FloatArray | None
+    ) -> Equilibrium:
         """Repeat Newton steps, and renew what lags behind whenever the body is at rest."""
         load, rubs = self.load, self.load.anchors is not None
-        where = guess_mm, load.depth_mm
-        now = evaluate(self.body, load, *where, self.lagging, self.blocks, pressure_kpa=load.pressure_kpa)
+        now = self.beginning(guess_mm)
+        if not now.whole and before_mm is not None:
+            now = self.beginning(before_mm)
         if not now.whole:
-            raise ConvergenceError(f"The starting guess turns {self.folded(guess_mm)} inside out.")
+            raise ConvergenceError(f"The starting guess turns {self.folded(now.displacement_mm)} inside out.")
         potentials = [now.potential_uj]
         # Whether the limits of friction are those of the contact found.
         settled, renewed_at = not rubs, now.relative_residual
@@ -216,37 +251,84 @@ class _Search:
                 potentials, renewed_at = [now.potential_uj], now.relative_residual
             enough = ENOUGH * settings.residual_tolerance / now.relative_residual
             forcing = float(np.clip(max(FORCING * now.relative_residual, enough), *FORCING_RANGE))
-            highest_uj = max(potentials[-REMEMBERED_POTENTIALS:])
             try:
-                now = self.line_search(*self.newton_direction(self.with_tangent(now), forcing), highest_uj)
+                now = self.line_search(*self.newton_direction(self.with_tangent(now), forcing), potentials)
             except ConvergenceError:
                 if not self.is_set_free(now):
                     raise
-                now = self.line_search(*self.closed_direction(now, forcing), highest_uj)
+                now = self.line_search(*self.closed_direction(now, forcing), potentials)
             potentials.append(now.potential_uj)
             settled = not rubs
         raise ConvergenceError(f"No equilibrium after {settings.most_iterations} Newton steps.")
 
-    def with_tangent(self, now: Configuration) -> Configuration:
-        """Return the same configuration with its tangent in `blocks`."""
-        if now.has_tangent:
+    @property
+    def is_monotone(self) -> bool:
+        """Whether every Newton step must lower the potential."""
+        return self.persistent and (self.shift > 0.0 or len(self.history) > PATIENCE)
+
+    def beginning(self, displacement_mm: FloatArray) -> Configuration:
+        """Return the configuration that the search starts from, with its tangent."""
+        load, where = self.load, (displacement_mm, self.load.depth_mm)
+        return evaluate(self.body, load, *where, self.lagging, self.blocks, pressure_kpa=load.pressure_kpa)
+
+    def with_tangent(self, now: Configuration, curved: bool | None = None) -> Configuration:
+        """Return the same configuration with its tangent in `blocks`, with the body's curvature or not."""
+        if now.has_tangent and curved is None:
             return now
-        return evaluate(self.body, self.load, now.displacement_mm, now.depth_mm, self.lagging, self.blocks)
+        where = now.displacement_mm, now.depth_mm
+        return evaluate(self.body, self.load, *where, self.lagging, self.blocks, curved=curved is not False)
 
     def newton_direction(self, now: Configuration, forcing: float) -> tuple[Configuration, FloatArray]:
         """Solve for a Newton step, and return the configuration with the tangent that could be solved.
 
         Skin that is about to slide round a sharp edge has no stiffness along it. Without the curvature of
-        the indenter the tangent still leads downhill.
+        the indenter the tangent still leads downhill, but slowly. After some such steps, and where tissue
+        alone has no stiffness in some direction, the tangent is shifted along its diagonal.
         """
+        if self.shift > 0.0:
+            return self.shifted_direction(now, forcing)
+        most_straight = MOST_STRAIGHT if self.persistent else np.inf
         try:
+            try:
+                return now, self.solver.solve(self.blocks, now.residual_mn, forcing)
+            except NotPositiveDefiniteError:
+                if not now.is_curved or self.straightened >= most_straight:
+                    raise
+            self.straightened += 1
+            now = self.with_tangent(now, curved=False)
             return now, self.solver.solve(self.blocks, now.residual_mn, forcing)
-        except NotPositiveDefiniteError:
-            if not now.is_curved:
+        except ConvergenceError:
+            if not self.persistent:
                 raise
-        where = now.displacement_mm, now.depth_mm
-        straight = evaluate(self.body, self.load, *where, self.lagging, self.blocks, curved=False)
-        return straight, self.solver.solve(self.blocks, straight.residual_mn, forcing)
+            return self.shifted_direction(now, forcing)
+
+    def shifted_direction(self, now: Configuration, forcing: float) -> tuple[Configuration, FloatArray]:
+        """Solve with the smallest of some shifts of the tangent that makes it positive definite.
+
+        The step leads downhill, and `line_search` takes it only as far as the potential falls. Without the
+        curvature of the indenter a smaller shift suffices, but the step is further from Newton's.
+        """
+        first = FIRST_SHIFT if self.shift == 0.0 else self.shift / LOWER_SHIFT
+        if first < FIRST_SHIFT:
+            first = 0.0
+        where, axes = self.body.sparsity.diagonal, np.arange(3)
+        for curved, largest in LARGEST_SHIFTS.items():
+            now = self.with_tangent(now, curved)
+            own, shift = self.blocks[where], first
+            stiffness = np.abs(own[:, axes, axes])
+            while shift <= largest:
+                shifted = own.copy()
+                shifted[:, axes, axes] += shift * stiffness
+                self.blocks[where] = shifted
+                try:
+                    direction = self.solver.solve(self.blocks, now.residual_mn, forcing)
+                except ConvergenceError:
+                    shift = max(RAISE_SHIFT * shift, FIRST_SHIFT)
+                    continue
+                self.shift = shift
+                self.was_shifted |= shift > 0.0
+                return now, direction
+        raise NotPositiveDefiniteError
 
     def is_set_free(self, now: Configuration) -> bool:
         """Whether a node that was pressed before the step carries no force now."""
@@ -267,6 +349,9 @@ class _Search:
         """Multipliers and anchors of the contact found."""
         contact, anchors = self.load.contact, self.load.anchors
         multipliers = contact.augmented(now.contact) if augmented else self.lagging.multipliers_mn
+        self.augmentations += augmented
+        if self.persistent and self.augmentations > MOST_FULL_AUGMENTATIONS:
+            multipliers = 0.5 * (multipliers + self.lagging.multipliers_mn)
         if anchors is not None:
             anchors = contact.renewed(anchors, now.contact, now.depth_mm)
         return Lagging(multipliers, anchors)
@@ -290,6 +375,7 @@ class _Search:
             slid_mm=slid,
             rubbed_uj=heat_uj,
             pressure_kpa=None if now.pressures is None else now.pressures.pressure_kpa,
+            was_shifted=self.was_shifted,
         )
 
     def moved(self, start: Configuration, step: FloatArray, advance_mm: float = 0.0) -> Configuration:
@@ -304,12 +390,15 @@ class _Search:
         blocks = self.blocks if carries or start.relative_residual > LAST_STEP else self.blocks[:0]
         return evaluate(self.body, self.load, displacement, depth_mm, self.lagging, blocks, before, pressure)
 
-    def line_search(self, start: Configuration, direction: FloatArray, highest_uj: float) -> Configuration:
+    def line_search(
+        self, start: Configuration, direction: FloatArray, potentials: list[float]
+    ) -> Configuration:
         """Go along `direction`, halving until the potential falls below the highest remembered one.
 
         Nodes that come into contact raise the potential for a step or two until the next steps push them out
         again; a comparison with several earlier potentials allows this (Grippo, Lampariello & Lucidi 1986).
         """
+        highest_uj = max(potentials[-(1 if self.is_monotone else REMEMBERED_POTENTIALS) :])
         slope = -float(direction @ start.residual_mn)
         length = 1.0
         while length >= SHORTEST_STEP:
@@ -317,8 +406,10 @@ class _Search:
             falls = trial.potential_uj <= highest_uj + SUFFICIENT_DECREASE * length * slope
             # Near the solution the decrease of the potential is below round-off: compare residuals. They are
             # not compared relative to the contact force of each: a retreat sets all nodes free at first, and
-            # any step that drives skin into the indenter would then count as better.
-            if falls or trial.residual_norm_mn < 0.9 * start.residual_norm_mn:
+            # any step that drives skin into the indenter would then count as better. With a shifted tangent
+            # a smaller residual may be that of a saddle, so only the potential counts until near the end.
+            near = not self.is_monotone or start.relative_residual < LAST_STEP
+            if falls or (near and trial.residual_norm_mn < 0.9 * start.residual_norm_mn):
                 return trial
             length /= 2
         folds = "" if trial.whole else f": it turns {self.folded(trial.displacement_mm)} inside out"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 
 import numpy as np
 from scipy.optimize import brentq
@@ -27,7 +28,6 @@ from fingerpad.mechanics.balance import (
 )
 from fingerpad.mechanics.configuration import SMALLEST_FORCE_MN, Balance, Body, Load, Reached
 from fingerpad.mechanics.contact import Contact, Placement, check_friction
-from fingerpad.mechanics.cycles import CycleJumps
 from fingerpad.mechanics.fields import (
     ElementFields,
     FieldState,
@@ -69,6 +69,9 @@ MOST_CONTINUED = 4.0
 
 SAME_TIME = 1e-9
 """Times closer than this, over the end of the motion, are one."""
+
+LARGEST_DROP = 0.1
+"""Largest share by which the force may fall in a step that drives the indenter deeper."""
 
 
 LIFT_MM = 100.0
@@ -239,6 +242,7 @@ class _Press:
     solver: LinearSolver
     newton: NewtonSettings
     watched: Watched
+    longest_step_mm: float = np.inf
     newton_steps: int = 0
 
     def contact_at(self, time_ms: float) -> Contact:
@@ -268,13 +272,17 @@ class _Press:
             return None
         return self.contact.free_anchors(self.body.mesh.nodes_mm[self.contact.nodes])
 
-    def step(self, start: _Moment, target_ms: float) -> _Moment:
+    def step(self, start: _Moment, target_ms: float, persistent: bool = False) -> _Moment:
         """Solve one step; `start` stays as it is, so a step that fails or is too long can be repeated."""
         mesh, table = self.body.mesh, self.body.table
         step_ms = target_ms - start.time_ms
         load = self.load(start, target_ms)
         guess = start.found.displacement_mm + self.continued(start, target_ms) * start.step_mm
-        found = find_equilibrium(self.body, load, self.solver, guess, start.found.multipliers_mn, self.newton)
+        persistent = persistent or np.isfinite(self.longest_step_mm)
+        newton = replace(self.newton, persistent=True) if persistent else self.newton
+        before = start.found.multipliers_mn, newton, start.found.displacement_mm
+        found = find_equilibrium(self.body, load, self.solver, guess, *before)
+        self.check_that_it_holds(start, found)
         if self.stimulus.by_force and load.force_mn is None:
             found = replace(found, depth_mm=self.touching_mm(load.contact, found.displacement_mm))
         self.newton_steps += found.iterations
@@ -301,6 +309,30 @@ class _Press:
             start.reached.after(force_mn, found.depth_mm), history, sed_kpa, fields, ledger, slip,
         )  # fmt: skip
 
+    def last_resort(self, start: _Moment, target_ms: float) -> _Moment:
+        """Solve a step as `step` does, through states in which the tangent is indefinite."""
+        return self.step(start, target_ms, persistent=True)
+
+    def check_that_it_holds(self, start: _Moment, found: Equilibrium) -> None:
+        """Refuse a step with a shifted tangent after which less force drives the indenter deeper.
+
+        A shift leads through an unstable state, beyond which skin may lie beside or behind the indenter.
+        """
+        before_mn, after_mn = (
+            float(np.linalg.norm(each.contact.force_mn.sum(axis=0))) for each in (start.found, found)
+        )
+        deeper = found.depth_mm > start.found.depth_mm
+        if (
+            found.was_shifted
+            and self.stimulus.stays
+            and deeper
+            and after_mn < (1.0 - LARGEST_DROP) * before_mn
+        ):
+            raise ConvergenceError(
+                f"The skin slips past the indenter: its force falls from {before_mn:.3g} to {after_mn:.3g} "
+                "mN as it advances."
+            )
+
     def touching_mm(self, contact: Contact, displacement_mm: FloatArray) -> float:
         """Depth at which the indenter just touches the deformed skin. [mm]"""
         skin_mm = (self.body.mesh.nodes_mm + displacement_mm)[contact.nodes]
@@ -310,6 +342,13 @@ class _Press:
     def advance(self, start: _Moment, target_ms: float) -> FloatArray:
         """Change of the prescribed course in a step, as in `Motion.course_at`."""
         return self.stimulus.course_at(target_ms) - self.stimulus.course_at(start.time_ms)
+
+    def parts(self, begin_ms: float, end_ms: float) -> int:
+        """Return the number of equal steps between two times, none of them longer than allowed."""
+        if self.stimulus.by_force:
+            return 1
+        before_mm, after_mm = self.stimulus.prescribed_at([begin_ms, end_ms])
+        return max(1, int(np.ceil(abs(after_mm - before_mm) / self.longest_step_mm - 1e-9)))
 
     def continued(self, start: _Moment, target_ms: float) -> float:
         """Advance of the indenter in a step over that in the step before: how far the skin is expected to go.
@@ -369,19 +408,32 @@ class _Press:
             start.found.pressure_kpa, start.reached, start.found.contact.pressed_mn > 0.0,
         )  # fmt: skip
 
-    def stopped(self, last: _Moment, attempts: tuple[str, ...]) -> ConvergenceError:
-        """Error for a press that gets no further than `last`."""
+    def stopped(self, last: _Moment, attempts: tuple[str, ...], cause: str) -> ConvergenceError:
+        """Error for a press that gets no further than `last`: cause, place and time, and a remedy."""
         less = "force" if self.stimulus.by_force else "depth"
         element, ratio = squeezed_most(self.body.mesh, last.found.displacement_mm)
-        squeezed = (
-            f", where {element_place(self.body.mesh, element)} has {ratio:.0%} of its volume at a point"
-        )
+        place = f"{element_place(self.body.mesh, element)} has {ratio:.0%} of its volume at a point"
+        aim = f"{self.stimulus.largest:g} {'mN' if self.stimulus.by_force else 'mm'}"
+        if last.time_ms == 0.0:
+            remedy = "try more ramp steps, or check the moduli of the tissues, in kPa"
+        elif self.contact.friction == 0.0 and not self.contact.indenter.grips and self.has_edge:
+            remedy = (
+                "without friction skin slides round an edge: "
+                f"try friction=0.5, a larger fillet or a smaller {less}"
+            )
+        else:
+            remedy = f"try a smaller {less} or more ramp steps"
         return ConvergenceError(
-            f"The press stopped at {last.time_ms:.4g} ms, depth {last.found.depth_mm:.4g} mm"
-            f"{squeezed if last.time_ms > 0.0 else ''}: "
-            f"try a smaller {less}, a finer mesh or more ramp steps.",
+            f"The press stopped at {last.time_ms:.4g} ms, depth {last.found.depth_mm:.4g} mm, on the way to "
+            f"{aim}{f', where {place}' if last.time_ms > 0.0 else ''}: {cause.rstrip('.')}; {remedy}.",
             attempts,
         )
+
+    @property
+    def has_edge(self) -> bool:
+        """Whether the indenter has an edge or a rim, round which skin slides."""
+        indenter = self.contact.indenter
+        return indenter.rim_mm is not None or indenter.edge_reach_mm > 0.0
 
 
 def press(
@@ -394,6 +446,7 @@ def press(
     deepest_mm: float = np.inf,
     watched: np.ndarray | None = None,
     friction: float = 0.0,
+    longest_step_mm: float = np.inf,
 ) -> Deformation:
     """Solve a whole ramp and hold.
 
@@ -417,6 +470,8 @@ def press(
         Elements whose stress and strain are kept over time; all by default.
     friction : float
         Coulomb's coefficient between skin and indenter.
+    longest_step_mm : float
+        Largest change of a prescribed depth in one step: further, a small body may slip between nodes. [mm]
 
     Returns
     -------
@@ -450,7 +505,7 @@ def press(
 
     chosen = np.arange(len(mesh.elements)) if watched is None else watched
     follow = Watched(chosen, mesh.nodes_mm, mesh.elements[chosen], mesh.layer[chosen], table)
-    job = _Press(body, contact, stimulus, solver, _newton_settings(settings), follow)
+    job = _Press(body, contact, stimulus, solver, _newton_settings(settings), follow, longest_step_mm)
     moment = job.unloaded()
     reached, slips, values = [], [], [moment.fields.values]
     for moment in _moments(job, settings):
@@ -550,7 +605,7 @@ def _moments(job: _Press, settings: PressSettings) -> Iterator[_Moment]:
         cycle_times = _cycle_times(job, settings, times)
         if settings.cycle_tolerance is not None and cycle_times.size:
             return _with_jumps(job, times, cycle_times, settings.cycle_tolerance, where)
-        return steps_at(start, times, job.step, job.stopped)
+        return steps_at(start, times, job.step, job.stopped, job.parts, job.last_resort)
     relaxing = job.body.table.times_ms[job.body.table.shares > 0.0]
     phases, begin_ms = [], 0.0
     for end_ms in settings.smooth_ends_ms(stimulus).tolist():
@@ -586,6 +641,8 @@ def _with_jumps(
     job: _Press, times: FloatArray, cycle_times: FloatArray, tolerance: float, where: np.ndarray
 ) -> Iterator[_Moment]:
     """Solved and interpolated times of a motion with many equal cycles."""
+    # Loaded when it is asked for: most presses have no cycles.
+    CycleJumps = import_module("fingerpad.mechanics.cycles").CycleJumps
     body, moment = job.body, job.unloaded()
     first, last = np.searchsorted(times, [cycle_times[0, 0], cycle_times[-1, -1]])
     jumps = CycleJumps(cycle_times, tolerance, where, body.table, body.mesh.layer, job.step, job.stopped)

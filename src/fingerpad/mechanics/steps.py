@@ -58,12 +58,17 @@ Reached = TypeVar("Reached", bound=Moment)
 Step = Callable[[Reached, float], Reached]
 """Solves from a moment to a time [ms]; raises ConvergenceError."""
 
-Stop = Callable[[Reached, tuple[str, ...]], ConvergenceError]
-"""Error for a press that gets no further than a moment, from the history of attempts."""
+Stop = Callable[[Reached, tuple[str, ...], str], ConvergenceError]
+"""Error for a press that gets no further than a moment, from the history of attempts and the last cause."""
 
 
 def steps_at(
-    start: Reached, times_ms: Sequence[float] | FloatArray, step: Step[Reached], stop: Stop[Reached]
+    start: Reached,
+    times_ms: Sequence[float] | FloatArray,
+    step: Step[Reached],
+    stop: Stop[Reached],
+    parts: Callable[[float, float], int] = lambda begin_ms, end_ms: 1,
+    last_resort: Step[Reached] | None = None,
 ) -> Iterator[Reached]:
     """Reach each of the given times, in one step if it converges, else in halves, quarters ... of it.
 
@@ -77,6 +82,10 @@ def steps_at(
         Increasing, after `start`. [ms]
     step, stop : callable
         Solve a step; make the final error.
+    parts : callable
+        Number of equal steps to take between two times [ms], one by default.
+    last_resort : callable, optional
+        Solves the shortest steps in another way than `step`, which failed at them.
 
     Yields
     ------
@@ -91,18 +100,19 @@ def steps_at(
     moment, share, converged = start, 1.0, 0
     attempts: list[str] = []
     for until_ms in times_ms:
-        whole_ms = until_ms - moment.time_ms
+        whole_ms = (until_ms - moment.time_ms) / parts(moment.time_ms, until_ms)
         while moment.time_ms < until_ms:
             target_ms = moment.time_ms + share * whole_ms
             if target_ms >= until_ms - 1e-9 * whole_ms:
                 target_ms = float(until_ms)
+            solve = step if share > SMALLEST_CUT or last_resort is None else last_resort
             try:
-                moment = step(moment, target_ms)
+                moment = solve(moment, target_ms)
             except ConvergenceError as error:
                 attempts.append(_attempt(moment, target_ms, error))
                 share, converged = share / 2, 0
                 if share < SMALLEST_CUT:
-                    raise stop(moment, tuple(attempts)) from error
+                    raise stop(moment, tuple(attempts), error.args[0]) from None
                 continue
             converged += 1
             if share < 1.0 and converged == LENGTHEN_AFTER:
@@ -201,15 +211,17 @@ def _adapt(
     before: Reached | None = None
     moment, judged = start, False
     attempts: list[str] = []
+    cause = ""
     while moment.time_ms < phase.end_ms:
         if step_ms < SMALLEST_SHARE * whole_ms:
-            raise stop(moment, tuple(attempts))
+            raise stop(moment, tuple(attempts), cause)
         target_ms = _target(moment.time_ms, step_ms, phase.end_ms)
         taken_ms = target_ms - moment.time_ms
         try:
             found = step(moment, target_ms)
         except ConvergenceError as error:
             attempts.append(_attempt(moment, target_ms, error))
+            cause = error.args[0]
             step_ms = taken_ms / 2
             continue
         if before is None:
@@ -221,6 +233,7 @@ def _adapt(
         error_kpa = interpolation_error(before, moment, found, where, both=not judged)
         step_ms = taken_ms * change_of_length(error_kpa, allowed_kpa)
         if error_kpa > allowed_kpa:
+            cause = "SED jumps in time, so that no step meets sed_tolerance."
             attempts.append(
                 f"step from {moment.time_ms:.4g} to {target_ms:.4g} ms: "
                 f"error of SED {error_kpa:.3g} kPa, allowed {allowed_kpa:.3g} kPa."

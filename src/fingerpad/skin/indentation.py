@@ -36,6 +36,9 @@ CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
 STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
 """Steps in ramp and hold of each resolution."""
 
+LONGEST_STEP = 2.5
+"""Largest advance of an indenter in one step, over the size of the smallest elements in strips about it."""
+
 LARGEST_TILT_DEG = 45.0
 
 
@@ -72,8 +75,8 @@ class Touch:
     ------
     InputError
         If the axis misses the finger, the depth reaches the bone, an axis beside the midline or a spin that
-        breaks the symmetry meets half a finger, the elements are too long for a groove, or tilt, spin or
-        friction is asked of a wire.
+        breaks the symmetry meets half a finger, the elements are too long for the indenter or a groove, or
+        tilt, spin or friction is asked of a wire.
 
     Warns
     -----
@@ -126,7 +129,7 @@ class Touch:
                     f"spin_deg = {turned:g} degrees leaves {body} without symmetry across the midline, so "
                     "half a finger is not enough: give a grading with full=True."
                 )
-        self._check_grooves()
+        self._check_sizes()
         check_friction(self.friction, self.indenter)
         check_path(self.finger, self.stimulus, self.at_mm)
         self.settings.steps_ms(self.stimulus)
@@ -139,9 +142,16 @@ class Touch:
         to_bone_mm = float(self.finger.depth_available_mm(*self.at_mm))
         return np.diff([0.0, *depths, max(to_bone_mm, depths[-1])])
 
-    def _check_grooves(self) -> None:
-        """Check that elements are small enough: a ridge or groove between two nodes would have no effect."""
+    def _check_sizes(self) -> None:
+        """Check that elements are small enough: a body, ridge or groove between two nodes has no effect."""
         size_mm, narrowest_mm = max(sizes_across(self.grading, self.spin_deg)), self.indenter.narrowest_mm
+        width_mm = 2 * self.indenter.half_width_mm
+        if size_mm > width_mm:
+            raise InputError(
+                f"grading must have elements of at most {width_mm:g} mm, the width of the "
+                f"{type(self.indenter).__name__}, which would go between the nodes: got {size_mm:g} mm; "
+                "give a finer grading or a wider body."
+            )
         if size_mm > narrowest_mm / FEWEST_ACROSS_GROOVE:
             raise InputError(
                 f"grading must have elements of at most {narrowest_mm / FEWEST_ACROSS_GROOVE:g} mm across "
@@ -206,16 +216,25 @@ class Touch:
         # Libraries get one thread, since their sums depend on the number of threads; our loops' do not.
         with announce_compilation(KERNELS), compiled_threads(threads), threadpool_limits(limits=1):
             return press(
-                self.mesh, self.tissues.layers, self.indenter, self.placement, self.stimulus, self.settings,
-                self.deepest_mm, watched, self.friction,
+                self.mesh, self.tissues.layers, self.body, self.placement, self.stimulus, self.settings,
+                self.deepest_mm, watched, self.friction, LONGEST_STEP * self.grading.finest_strip_mm,
             )  # fmt: skip
+
+    @property
+    def body(self) -> Indenter:
+        """The indenter as its mesh resolves it (docs/decisions/small-bodies.md).
+
+        Contact is judged at nodes. A rim or edge that is sharper than the elements there has their size.
+        """
+        finest_mm = self.grading.finest_strip_mm
+        return self.indenter if np.isinf(finest_mm) else self.indenter.rounded_to(finest_mm)
 
     @property
     def placement(self) -> Placement:
         """Position and rotation of the indenter at first touch."""
         skin = self.mesh.nodes_mm[self.mesh.skin_nodes]
         at = self.finger.skin_point(*self.at_mm)
-        return place(self.indenter, skin, at, rotation_of(self.tilt_deg, self.spin_deg))
+        return place(self.body, skin, at, rotation_of(self.tilt_deg, self.spin_deg))
 
     @property
     def deepest_mm(self) -> float:

@@ -199,6 +199,7 @@ def stimulus_touches(stimuli: Mapping[str, TactileStimulus], conditions: Conditi
     along = float(np.cos(np.deg2rad(conditions.skin_tilt_deg)))
 
     def touch(stimulus: TactileStimulus) -> Touch:
+        wire = isinstance(stimulus.indenter, Line)
         return touch_of(
             conditions.finger,
             stimulus.indenter,
@@ -206,7 +207,7 @@ def stimulus_touches(stimuli: Mapping[str, TactileStimulus], conditions: Conditi
             conditions.materials,
             conditions.resolution,
             (RECEPTOR_X_MM + stimulus.x_mm * along, stimulus.z_mm),
-            _grading(stimulus, conditions),
+            None if wire else _grading(stimulus, conditions),
             conditions.tilt_deg(stimulus.indenter) if stimulus.tilt_deg is None else stimulus.tilt_deg,
             spin_deg=stimulus.spin_deg,
         )
@@ -220,13 +221,8 @@ def stimulus_touches(stimuli: Mapping[str, TactileStimulus], conditions: Conditi
     return found
 
 
-def _grading(stimulus: TactileStimulus, conditions: Conditions) -> Grading | None:
-    """Mesh that is fine about the receptor, the same for all stimuli of a kind, and about edges within it.
-
-    None, the mesh of `touch_of`, for a wire and for an indenter that moves along the skin.
-    """
-    if isinstance(stimulus.indenter, Line) or not stimulus.motion.stays:
-        return None
+def _grading(stimulus: TactileStimulus, conditions: Conditions) -> Grading:
+    """Mesh that is fine about the receptor, the same for all stimuli of a kind, and about edges within it."""
     indenter, spin_deg = stimulus.indenter, stimulus.spin_deg
     is_round = isinstance(indenter, Sphere | FlatPunch)
     grading = conditions.sphere_grading() if is_round else conditions.bar_grading()

@@ -1,0 +1,47 @@
+"""Presses of small bodies, which nodes of the usual mesh would slide past."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fingerpad.core.errors import ConvergenceError
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.indenters import FlatPunch, Sphere
+from fingerpad.geometry.motion import RampAndHold
+from fingerpad.mechanics.press import _Press
+from fingerpad.skin.indentation import touch_of
+
+
+@pytest.mark.parametrize(
+    ("body", "depth_mm", "friction", "force_mn"),
+    [
+        # Forces on meshes with elements half as long: 0.063 mm under the ball, 0.05 mm at the rim.
+        (Sphere(2000.0), 2.0, 0.0, 69.1),
+        (FlatPunch(1.0, 0.1), 1.0, 0.0, 36.9),
+    ],
+    ids=["ball of 0.5 mm radius", "punch of 1 mm"],
+)
+def test_small_bodies_are_pressed_deep(body, depth_mm, friction, force_mn):
+    touch = touch_of(Fingertip(), body, RampAndHold(depth_mm=depth_mm), friction=friction)
+    skin = touch.solve()
+    peak = int(skin.force_mn.argmax())
+    assert skin.force_mn[peak] == pytest.approx(force_mn, rel=0.05)
+    assert (np.diff(skin.force_mn[: peak + 1]) > 0.0).all()
+    assert skin.energy_imbalance <= 0.005
+
+
+def test_skin_that_slips_past_the_indenter_is_no_result():
+    """A step through an unstable state counts only if the indenter still meets resistance."""
+
+    def state(depth_mm, force_mn, was_shifted=False):
+        contact = SimpleNamespace(force_mn=np.array([[0.0, force_mn, 0.0]]))
+        return SimpleNamespace(depth_mm=depth_mm, contact=contact, was_shifted=was_shifted)
+
+    job = SimpleNamespace(stimulus=SimpleNamespace(stays=True))
+    start = SimpleNamespace(found=state(1.0, 20.0))
+    with pytest.raises(ConvergenceError, match="slips past the indenter: its force falls from 20 to 5 mN"):
+        _Press.check_that_it_holds(job, start, state(1.1, 5.0, was_shifted=True))
+    _Press.check_that_it_holds(job, start, state(1.1, 5.0))
+    _Press.check_that_it_holds(job, start, state(0.9, 5.0, was_shifted=True))
+    _Press.check_that_it_holds(job, start, state(1.1, 21.0, was_shifted=True))
