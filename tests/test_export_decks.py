@@ -825,6 +825,10 @@ def test_a_touch_becomes_a_job_and_decks():
     by_force = replace(touch, stimulus=fp.ForceRampAndHold(force_mn=100.0))
     with pytest.raises(InputError, match="ForceRampAndHold sets forces, and a deck moves its indenter"):
         job_of(by_force)
+    aside = fp.Trajectory((0.0, 20.0, 40.0), depth_mm=(0.0, 0.4, 0.4), x_mm=(0.0, 0.0, 1.0))
+    for pose in (aside, fp.Trajectory((0.0, 20.0), depth_mm=(0.0, 0.4), tilt_deg=(0.0, 5.0))):
+        with pytest.raises(InputError, match="Trajectory moves its indenter aside or turns it, and a deck"):
+            job_of(replace(touch, stimulus=pose))
     by_tolerance = replace(touch, settings=replace(touch.settings, sed_tolerance=0.01))
     with pytest.raises(InputError, match="A tolerance chooses the steps of this touch"):
         job_of(by_tolerance)

@@ -140,3 +140,18 @@ def test_bone_on_the_way_is_named_before_anything_is_pressed():
     deep = Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 1.9), tilt_deg=(0.0, 0.0, 30.0))
     with pytest.raises(InputError, match=r"depth_mm must stay below .* mm at sample 3"):
         press(mesh, ELASTIC, indenter, touching(indenter, mesh), deep, STEPS)
+
+
+def test_force_slides_a_sphere_whose_first_touch_is_off_its_axis():
+    """The node that touches first may lie in the sphere by round-off, which is no contact."""
+    mesh = block()
+    indenter = Sphere(500.0)
+    placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.array([0.15, 0.0, 0.07]), np.eye(3))
+    inside = Placement(placement.origin_mm + np.array([0.0, 4e-16, 0.0]), placement.rotation)
+    motion = Trajectory(
+        (0.0, 50.0, 100.0), force_mn=(0.0, 10.0, 10.0), x_mm=(0.0, 0.0, 0.8), z_mm=(0.0, 0.0, -0.4)
+    )
+    done = press(mesh, RELAXING, indenter, inside, motion, PressSettings(4, 2), friction=0.5)
+    np.testing.assert_allclose(done.force_mn[done.times_ms >= 50.0], 10.0, rtol=1e-4)
+    aside = np.linalg.norm(done.contact_force_mn[-1, [0, 2]])
+    assert 0.35 < aside / done.contact_force_mn[-1, 1] < 0.6

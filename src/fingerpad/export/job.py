@@ -306,7 +306,8 @@ def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike
     Raises
     ------
     InputError
-        If times or depths are needed and missing, or do not fit each other.
+        If the indenter moves aside or turns, or times or depths are needed and missing, or do not fit each
+        other.
 
     Examples
     --------
@@ -317,6 +318,11 @@ def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike
     """
     instance("touch", touch, Touch)
     stimulus, settings = touch.stimulus, touch.settings
+    if not stimulus.stays:
+        raise InputError(
+            f"{type(stimulus).__name__} moves its indenter aside or turns it, and a deck moves its indenter "
+            "only along its axis: leave out x_mm, z_mm, tilt_deg and spin_deg, or export vtu, csv or npz."
+        )
     if times_ms is None:
         if settings.sed_tolerance is not None:
             raise InputError(

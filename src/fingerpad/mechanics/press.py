@@ -400,7 +400,8 @@ class _Press:
             depth_mm = start.found.depth_mm - LIFT_MM
         elif self.stimulus.by_force:
             force_mn = depth_mm / (2.0 if self.body.mesh.symmetry_nodes.size else 1.0)
-            touches = start.found.contact.pressed_mn.any()
+            # The first node to touch may lie in the indenter by round-off.
+            touches = start.found.contact.pressed_mn.sum() > SMALLEST_FORCE_MN
             further_mm = self.continued(start, target_ms) * start.step_depth_mm
             depth_mm = start.found.depth_mm + (further_mm if touches else FIRST_DEPTH_MM)
         return Load(
