@@ -15,6 +15,7 @@ from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
+from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
 from fingerpad.neuron.response_maps import evoked_latency_ms
 from fingerpad.neuron.spikes import first_spike_latency_ms
 from fingerpad.skin.sampling import SkinResponse
@@ -142,7 +143,7 @@ def resting_response(afferent: Afferent) -> RestingResponse:
     """
     end_ms = protocol.RAMP.value + protocol.HOLD.value
     sed = SedTraces.at_rest(end_ms, afferent.dynamic_quantity, afferent.static_quantity)
-    dynamic_hz, static_hz = afferent.rates(sed)
+    dynamic_hz, static_hz = afferent.rates(sed, *PAPER_WINDOWS_MS)
     return RestingResponse(
         dynamic_rate_hz=float(dynamic_hz[0]),
         static_rate_hz=float(static_hz[0]),
