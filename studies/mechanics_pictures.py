@@ -53,7 +53,7 @@ def draw_one_result(skin: SkinResponse) -> Figure:
         axes.plot(skin.times_ms, values, color=BLUE, marker=".", markersize=4.0)
         axes.set_ylabel(label)
     for name, label, colour, line in (
-        ("external_uj", "work of the indenter", BLACK, "-"),
+        ("external_uj", "work done", BLACK, "-"),
         ("stored_uj", "stored", BLUE, "--"),
         ("dissipated_uj", "dissipated", ORANGE, ":"),
     ):
