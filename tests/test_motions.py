@@ -359,18 +359,6 @@ def test_wanted_times_are_solved_at_exactly_and_others_stay():
 
 
 @pytest.mark.parametrize(
-    "settings", [None, PressSettings(2, 2, sed_tolerance=0.2)], ids=["steps", "tolerance"]
-)
-def test_a_response_has_the_wanted_times(settings):
-    wanted = [20.0, 40.0, 130.0]
-    skin = touch_of(
-        Fingertip(), Sphere(), RampAndHold(0.2, 50.0, 100.0), settings=settings, times_ms=wanted
-    ).solve()
-    assert np.isin([*wanted, 50.0, 150.0], skin.times_ms).all()
-    assert (np.diff(skin.force_mn[skin.times_ms <= 50.0]) > 0.0).all()
-
-
-@pytest.mark.parametrize(
     ("times", "said"),
     [
         ((0.0, 5.0), "times_ms must lie above 0"),

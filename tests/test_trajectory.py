@@ -197,6 +197,15 @@ def test_line_search_refuses_a_step_that_drives_the_skin_into_the_indenter(monke
         newton._Search.line_search(search, free, np.array([-1.0]), [37.0])
 
 
+@pytest.mark.parametrize("tolerance", [None, 0.2], ids=["steps", "tolerance"])
+def test_a_response_has_the_wanted_times(tolerance):
+    wanted = (20.0, 40.0, 130.0)
+    settings = PressSettings(2, 2, sed_tolerance=tolerance, times_ms=wanted)
+    done = pressed(RampAndHold(0.2, 50.0, 100.0), settings=settings)
+    assert np.isin((*wanted, 50.0, 150.0), done.times_ms).all()
+    assert (np.diff(done.force_mn[done.times_ms <= 50.0]) > 0.0).all()
+
+
 def test_finger_is_released_from_a_millimetre():
     motion = Trajectory((0.0, 50.0, 100.0, 150.0), (0.0, 1.0, 0.0, 0.0))
     skin = touch_of(Fingertip(), Sphere(), motion).solve()
