@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from fingerpad.geometry.fingertip import Fingertip
     from fingerpad.geometry.grading import Grading
     from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
-    from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+    from fingerpad.geometry.motion import Cycles, ForceRampAndHold, RampAndHold
     from fingerpad.geometry.motions import chirp, repeated, sine, staircase, stroke
     from fingerpad.geometry.sampled_motions import reduced, sampled
     from fingerpad.geometry.trajectory import Trajectory
@@ -62,6 +62,7 @@ __all__ = [
     "Bar",
     "ConvergenceError",
     "CurrentTraces",
+    "Cycles",
     "Cylinder",
     "Edge",
     "Energy",
@@ -143,7 +144,7 @@ _HOMES = {
     "report.touch": ("save_figure",),
     "skin.sampling": ("SkinResponse", "SurfaceProfile"),
     "core.signals": ("CurrentTraces", "HitRates", "ResponseMap", "SedTraces", "SpikeTrains"),
-    "geometry.motion": ("ForceRampAndHold", "RampAndHold"),
+    "geometry.motion": ("Cycles", "ForceRampAndHold", "RampAndHold"),
     "geometry.motions": ("chirp", "repeated", "sine", "staircase", "stroke"),
     "core.phases": ("Phase",),
     "geometry.sampled_motions": ("reduced", "sampled"),

@@ -134,9 +134,10 @@ class Touch:
         check_path(self.finger, self.stimulus, self.at_mm)
         self.settings.steps_ms(self.stimulus)
 
-        warn_of_inertia(self.stimulus, self.tissues.layers, self._layers_mm(), stacklevel=4)
+        warn_of_inertia(self.stimulus, self.tissues.layers, self.layers_mm, stacklevel=4)
 
-    def _layers_mm(self) -> FloatArray:
+    @property
+    def layers_mm(self) -> FloatArray:
         """Thickness of the layers below the indenter. [mm]"""
         depths = self.finger.layer_depths_mm
         to_bone_mm = float(self.finger.depth_available_mm(*self.at_mm))
