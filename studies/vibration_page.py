@@ -21,6 +21,7 @@ from fingerpad.core.errors import InertiaWarning
 from fingerpad.core.files import write_atomically
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import FlatPunch, Indenter, Plate, Sphere
+from fingerpad.geometry.motion import Cycles
 from fingerpad.geometry.motions import sine
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.inertia import moved_mass_mg, resonance_hz
@@ -48,7 +49,7 @@ SITE = [(*CONTACT_POINT_MM,)]
 class Vibrated:
     """One vibration and how it was solved."""
 
-    motion: Trajectory
+    cycles: Cycles
     skin: SkinResponse
     seconds: float
 
@@ -63,14 +64,15 @@ def vibrated(frequency_hz: float, amplitude_mm: float, cycles: int, all_cycles: 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InertiaWarning)
         skin = touch_of(Fingertip(), BALL, motion, settings=settings).solve()
-    return Vibrated(motion, skin, time.perf_counter() - started)
+    assert motion.cycles is not None
+    return Vibrated(motion.cycles, skin, time.perf_counter() - started)
 
 
 def spikes_of(done: Vibrated) -> np.ndarray:
     """Spike times of an afferent below the sphere during the vibration. [ms]"""
     afferent = Afferent()
     (spikes,) = afferent.spikes(done.skin.sed(SITE, afferent.dynamic_quantity, afferent.static_quantity))
-    return spikes[spikes > done.motion.cycles.start_ms]
+    return spikes[spikes > done.cycles.start_ms]
 
 
 def range_rows() -> Iterable[Sequence[str]]:
@@ -78,7 +80,7 @@ def range_rows() -> Iterable[Sequence[str]]:
     for frequency in (1.0, 20.0, 100.0, 400.0):
         for amplitude in (0.001, 0.01, 0.1, 1.0):
             done = vibrated(frequency, amplitude, 2)
-            held = done.skin.force_mn[done.skin.times_ms >= done.motion.cycles.start_ms]
+            held = done.skin.force_mn[done.skin.times_ms >= done.cycles.start_ms]
             print(frequency, amplitude, done.skin.energy_imbalance, flush=True)
             yield (
                 f"{frequency:g}", f"{1e3 * amplitude:g}", f"{held.min():.1f}", f"{held.max():.1f}",
@@ -144,7 +146,7 @@ def draw(runs: Sequence[Vibrated]) -> Figure:
     shown = runs[2]
     figure = new_figure(8.0, 5.4)
     (loop, density), (counts, raster) = figure.subplots(2, 2)
-    skin, cycles, afferent = shown.skin, shown.motion.cycles, Afferent()
+    skin, cycles, afferent = shown.skin, shown.cycles, Afferent()
     vibrates = skin.times_ms >= cycles.start_ms
     loop.plot(
         skin.depth_mm[~vibrates], skin.force_mn[~vibrates], color=GREY, linestyle="--", label="ramp and hold"
@@ -158,14 +160,14 @@ def draw(runs: Sequence[Vibrated]) -> Figure:
     (spikes,) = afferent.spikes(traces)
     for time_ms in spikes:
         density.axvline(time_ms, ymax=0.06, color=BLACK, linewidth=0.6)
-    frequencies = [1e3 / run.motion.cycles.period_ms for run in runs]
-    per_cycle = [spikes_of(run).size / run.motion.cycles.count for run in runs]
+    frequencies = [1e3 / run.cycles.period_ms for run in runs]
+    per_cycle = [spikes_of(run).size / run.cycles.count for run in runs]
     counts.loglog(frequencies, per_cycle, color=ORANGE, marker="o")
     counts.set(xlabel="frequency [Hz]", ylabel="spikes per cycle")
     for row, run in enumerate(runs):
-        period = run.motion.cycles.period_ms
+        period = run.cycles.period_ms
         raster.plot(
-            (spikes_of(run) - run.motion.cycles.start_ms) % period / period,
+            (spikes_of(run) - run.cycles.start_ms) % period / period,
             np.full(spikes_of(run).size, row), color=BLACK, marker="|", linestyle="none", markersize=9.0,
         )  # fmt: skip
     raster.set(xlabel="phase of the cycle", ylabel="frequency [Hz]", xlim=(0.0, 1.0))
@@ -176,8 +178,8 @@ def draw(runs: Sequence[Vibrated]) -> Figure:
 TABLES = {
     "inertia": (
         DECISION,
-        ("tissues", "indenter", "moved mass [mg]", "stiffness [N/m]", "resonance [Hz]", "estimate [Hz]", "20 Hz",
-         "50 Hz", "100 Hz", "200 Hz"),
+        ("tissues", "indenter", "moved mass [mg]", "stiffness [N/m]", "resonance [Hz]", "estimate [Hz]",
+         "20 Hz", "50 Hz", "100 Hz", "200 Hz"),
         inertia_rows,
     ),
     "range": (
