@@ -71,7 +71,7 @@ def vibrated(frequency_hz: float, amplitude_mm: float, cycles: int, all_cycles: 
 def spikes_of(done: Vibrated) -> np.ndarray:
     """Spike times of an afferent below the sphere during the vibration. [ms]"""
     afferent = Afferent()
-    (spikes,) = afferent.spikes(done.skin.sed(SITE, afferent.dynamic_quantity, afferent.static_quantity))
+    spikes = afferent.spikes(done.skin.sed(SITE, afferent.dynamic_quantity, afferent.static_quantity))[0]
     return spikes[spikes > done.cycles.start_ms]
 
 
@@ -157,7 +157,7 @@ def draw(runs: Sequence[Vibrated]) -> Figure:
     traces = skin.sed(SITE, afferent.dynamic_quantity, afferent.static_quantity)
     density.plot(skin.times_ms, skin.sed(SITE).sed_kpa[:, 0], color=BLUE)
     density.set(xlabel="time [ms]", ylabel="stored energy density [kPa]")
-    (spikes,) = afferent.spikes(traces)
+    spikes = afferent.spikes(traces)[0]
     for time_ms in spikes:
         density.axvline(time_ms, ymax=0.06, color=BLACK, linewidth=0.6)
     frequencies = [1e3 / run.cycles.period_ms for run in runs]
