@@ -1,4 +1,4 @@
-"""Pictures of docs/mechanics.md: one press with all that it returns, and an afferent that falls silent.
+"""Pictures of docs/mechanics.md: one press with all it returns, a silent afferent, and a small probe.
 
 `python -m studies.mechanics_pictures` draws them again.
 """
@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.indenters import Sphere
+from fingerpad.geometry.indenters import FlatPunch, Sphere
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.motions import repeated
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.press import PressSettings
@@ -25,6 +27,8 @@ from fingerpad.skin.sampling import SkinResponse
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 BALL = Sphere(curvature_per_m=287.0)
 PRESSED = Trajectory((0.0, 40.0, 300.0, 340.0, 500.0), (0.0, 1.0, 1.0, 0.0, 0.0))
+PROBE = FlatPunch(diameter_mm=1.0, fillet_mm=0.1)
+PROBED = RampAndHold(depth_mm=1.0, ramp_ms=50.0, hold_ms=20.0)
 FINE = PressSettings(ramp_steps=20, hold_steps=6)
 TOUCHES = repeated(0.8, touches=2, ramp_ms=50.0, hold_ms=400.0, pause_ms=200.0)
 SITES_MM = [(CONTACT_POINT_MM[0] + along_mm, 0.0) for along_mm in (0.0, 1.0, 2.0)]
@@ -39,6 +43,31 @@ def touched_twice() -> tuple[SkinResponse, SpikeTrains]:
     """Touch twice with a pause, and let three afferents respond."""
     skin, afferent = indent(Fingertip(), BALL, TOUCHES), Afferent()
     return skin, afferent.spikes(skin.sed(SITES_MM, afferent.dynamic_quantity, afferent.static_quantity))
+
+
+def probed() -> SkinResponse:
+    """Press a small flat probe."""
+    return indent(Fingertip(), PROBE, PROBED, settings=PressSettings(ramp_steps=10, hold_steps=1))
+
+
+def draw_small_probe(skin: SkinResponse) -> Figure:
+    """Draw the deformed mesh below the probe with its energy density, and force over depth."""
+    figure = new_figure(8.0, 3.6)
+    section, curve = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
+    mesh = skin.mesh
+    nodes = (mesh.nodes_mm + skin.displacement_mm)[mesh.grid[:, 0]]
+    sed = skin.sed_kpa[-1].reshape(mesh.shape)[:, 0]
+    shown = section.pcolormesh(
+        nodes[..., 0], nodes[..., 1], sed, norm=LogNorm(0.01, 10.0), cmap="cividis", edgecolors="white",
+        linewidth=0.2,
+    )  # fmt: skip
+    figure.colorbar(shown, ax=section, label="stored energy density [kPa]")
+    section.set(xlim=(15.6, 19.2), ylim=(-7.2, -10.0), xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    section.grid(visible=False)
+    ramp = skin.times_ms <= PROBED.ramp_ms
+    curve.plot(skin.depth_mm[ramp], skin.force_mn[ramp], color=BLUE, marker=".")
+    curve.set(xlabel="depth [mm]", ylabel="force [mN]")
+    return figure
 
 
 def draw_one_result(skin: SkinResponse) -> Figure:
@@ -106,3 +135,4 @@ def _phases() -> list[tuple[float, float]]:
 if __name__ == "__main__":
     write_png(draw_one_result, pressed(), IMAGES / "one-result.png")
     write_png(draw_released, touched_twice(), IMAGES / "released-afferent.png")
+    write_png(draw_small_probe, probed(), IMAGES / "small-probe.png")

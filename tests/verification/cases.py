@@ -11,12 +11,13 @@ from . import (
     patches,
     relaxation,
     release,
+    small_bodies,
     symmetry,
 )  # fmt: skip
 from .case import CASES
 
 THEMES = (
     patches.THEME, kernel.THEME, laws.THEME, manufactured.THEME, locking.THEME, half_space.THEME,
-    relaxation.THEME, release.THEME, balance.THEME, symmetry.THEME, oracles.THEME,
+    relaxation.THEME, release.THEME, balance.THEME, symmetry.THEME, oracles.THEME, small_bodies.THEME,
 )  # fmt: skip
 ORDERED = sorted(CASES, key=lambda case: THEMES.index(case.theme))

@@ -91,6 +91,9 @@ class NewtonSettings:
     persistent : bool
         Whether the search goes on through an indefinite tangent and insists on a falling potential, as skin
         about a small body or a sharp edge needs. Elsewhere a shorter step in time is the faster remedy.
+    least_penetration_mm : float
+        Penetration that is accepted at any depth after two augmentations: about a small body, a share of its
+        elements. [mm]
     """
 
     residual_tolerance: float = 1e-5
@@ -98,6 +101,7 @@ class NewtonSettings:
     most_iterations: int = 40
     balance_tolerance: float = 1e-4
     persistent: bool = False
+    least_penetration_mm: float = 0.0
 
     def __post_init__(self) -> None:
         positive("residual_tolerance", self.residual_tolerance)
@@ -235,7 +239,10 @@ class _Search:
             balanced = balance.imbalance <= settings.balance_tolerance
             if now.relative_residual <= settings.residual_tolerance and balanced:
                 deepest_mm = max(now.depth_mm, load.reached.depth_mm)
-                close = now.contact.misfit_mm <= settings.penetration_tolerance * deepest_mm
+                accepted_mm = settings.penetration_tolerance * deepest_mm
+                if self.augmentations > 1:
+                    accepted_mm = max(accepted_mm, settings.least_penetration_mm)
+                close = now.contact.misfit_mm <= accepted_mm
                 if close and settled:
                     return self.found(now, iteration, balance)
                 self.lagging = self.renewed(now, augmented=not close)

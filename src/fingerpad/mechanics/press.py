@@ -70,6 +70,10 @@ MOST_CONTINUED = 4.0
 SAME_TIME = 1e-9
 """Times closer than this, over the end of the motion, are one."""
 
+PENETRATION_PER_STEP = 0.04
+"""Penetration accepted about a small body, over its longest step: a tenth of its smallest elements."""
+
+
 LARGEST_DROP = 0.1
 """Largest share by which the force may fall in a step that drives the indenter deeper."""
 
@@ -278,7 +282,6 @@ class _Press:
         step_ms = target_ms - start.time_ms
         load = self.load(start, target_ms)
         guess = start.found.displacement_mm + self.continued(start, target_ms) * start.step_mm
-        persistent = persistent or np.isfinite(self.longest_step_mm)
         newton = replace(self.newton, persistent=True) if persistent else self.newton
         before = start.found.multipliers_mn, newton, start.found.displacement_mm
         found = find_equilibrium(self.body, load, self.solver, guess, *before)
@@ -506,7 +509,9 @@ def press(
 
     chosen = np.arange(len(mesh.elements)) if watched is None else watched
     follow = Watched(chosen, mesh.nodes_mm, mesh.elements[chosen], mesh.layer[chosen], table)
-    job = _Press(body, contact, stimulus, solver, _newton_settings(settings), follow, longest_step_mm)
+    job = _Press(
+        body, contact, stimulus, solver, _newton_settings(settings, longest_step_mm), follow, longest_step_mm
+    )
     moment = job.unloaded()
     reached, slips, values = [], [], [moment.fields.values]
     for moment in _moments(job, settings):
@@ -588,12 +593,16 @@ def _check_bone(mesh: Mesh, indenter: Indenter, placement: Placement, stimulus: 
         )
 
 
-def _newton_settings(settings: PressSettings) -> NewtonSettings:
-    """Tolerances of each step, tight enough for the bound on SED."""
+def _newton_settings(settings: PressSettings, longest_step_mm: float) -> NewtonSettings:
+    """Tolerances of each step, tight enough for the bound on SED, and persistence about a small body."""
+    newton = settings.newton
+    if np.isfinite(longest_step_mm):
+        least_mm = PENETRATION_PER_STEP * longest_step_mm
+        newton = replace(newton, persistent=True, least_penetration_mm=least_mm)
     if settings.sed_tolerance is None:
-        return settings.newton
-    penetration = min(settings.newton.penetration_tolerance, PENETRATION_SHARE * settings.sed_tolerance)
-    return replace(settings.newton, penetration_tolerance=penetration)
+        return newton
+    penetration = min(newton.penetration_tolerance, PENETRATION_SHARE * settings.sed_tolerance)
+    return replace(newton, penetration_tolerance=penetration)
 
 
 def _moments(job: _Press, settings: PressSettings) -> Iterator[_Moment]:
