@@ -24,6 +24,7 @@ from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.geometry.indenters import Plate, Sphere
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.names import INDENTERS
+from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.skin.indentation import touch_of
 
@@ -109,6 +110,8 @@ def test_without_a_command_the_help_is_shown(call):
         (["export", "out", "--indenter", "punch:wide"], "diameter_mm must be a finite number", "'wide'"),
         (["export", "out", "--curvature", "round"], "'--curvature': must be a number", "'round'"),
         (["export", "out", "--depth", "-1"], "depth_mm must be greater than 0", "-1"),
+        (["export", "out", "--depth", "1", "--trajectory", "a.csv"], "--depth is that of a hold", "a.csv"),
+        (["export", "out", "--trajectory", "gone.csv"], "gone.csv must be a file", "No such file"),
         (["export", "out", "--materials", "steel"], "materials must be one of", "'steel'"),
         (["export", "out", "--resolution", "fine"], "resolution must be one of", "'fine'"),
         (["export", "out", "--format", "stl"], "format must be one of vtu", "'stl'"),
@@ -196,7 +199,10 @@ def test_options_reach_the_export(call, monkeypatch, tmp_path):
     assert call("export", "a/b", *given) == (0, "Open: a/b/touch.pvd\n", "")
     assert call("export", "c", "--indenter", "plate", "--format", "vtu")[0] == 0
     assert call("export", "d", "--format", "calculix", "--elastic-moduli", "long_term")[0] == 0
-    (touch, folder, format_name, _), (default, _, _, relaxing), (*_, elastic) = exported
+    (tmp_path / "press.csv").write_text("time_ms,depth_mm\n0,0\n50,0.5\n100,0\n", encoding="utf-8")
+    assert call("export", "e", "--trajectory", "press.csv")[0] == 0
+    (touch, folder, format_name, _), (default, _, _, relaxing), (*_, elastic), (played, *_) = exported
+    assert played.stimulus == Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 0.0))
     assert (relaxing, elastic) == (None, "long_term")
     assert touch == touch_of(Fingertip(), Sphere(340), RampAndHold(depth_mm=0.5), "trial1", "standard")
     assert (folder.resolve(), format_name) == (tmp_path / "a" / "b", "vtu")

@@ -22,7 +22,14 @@ def export_command(
         ),
     ] = "sphere",
     curvature: Annotated[float | None, number_option("Curvature of the sphere. Default: 287. [1/m]")] = None,
-    depth: Annotated[float, number_option("Depth of the hold. [mm]")] = 1.0,
+    depth: Annotated[float | None, number_option("Depth of the hold. Default: 1. [mm]")] = None,
+    trajectory: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV file with a motion instead of ramp and hold (docs/motions.md); samples within 0.5 % of "
+            "a line are left out."
+        ),
+    ] = None,
     materials: Materials = DEFAULT_TISSUES,
     resolution: Resolution = "quick",
     format_name: Annotated[
@@ -40,6 +47,8 @@ def export_command(
     from fingerpad.geometry.fingertip import Fingertip
     from fingerpad.geometry.indenters import Sphere
     from fingerpad.geometry.motion import RampAndHold
+    from fingerpad.geometry.sampled_motions import reduced
+    from fingerpad.geometry.trajectory_files import read_trajectory
     from fingerpad.skin.indentation import touch_of
 
     body = indenter_named(indenter)
@@ -51,7 +60,11 @@ def export_command(
                 "leave it out."
             )
         body = Sphere(curvature_per_m=curvature)
-    touch = touch_of(Fingertip(), body, RampAndHold(depth_mm=depth), materials, resolution)
+    if trajectory is not None and depth is not None:
+        raise InputError(f"--depth is that of a hold, and {trajectory} has its own: leave it out.")
+    held = RampAndHold() if depth is None else RampAndHold(depth_mm=depth)
+    motion = held if trajectory is None else reduced(read_trajectory(trajectory))
+    touch = touch_of(Fingertip(), body, motion, materials, resolution)
     make_writable(folder, "FOLDER")
     try:
         files = export_touch(touch, folder, format_name, elastic_moduli)
