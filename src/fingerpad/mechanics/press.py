@@ -419,7 +419,7 @@ class _Press:
         place = f"{element_place(self.body.mesh, element)} has {ratio:.0%} of its volume at a point"
         aim = f"{self.stimulus.largest:g} {'mN' if self.stimulus.by_force else 'mm'}"
         if last.time_ms == 0.0:
-            remedy = "try more ramp steps, or check the moduli of the tissues, in kPa"
+            remedy = f"try a smaller {less} or more ramp steps, and check the moduli of the tissues, in kPa"
         elif self.contact.friction == 0.0 and not self.contact.indenter.grips and self.has_edge:
             remedy = (
                 "without friction skin slides round an edge: "

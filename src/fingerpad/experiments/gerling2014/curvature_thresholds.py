@@ -290,13 +290,13 @@ def _thresholds_of(
     try:
         noise = _fitted_noise(curvatures, static, neighbours, draws) if noise_sigma is None else noise_sigma
     except ConvergenceError as error:
-        noise, missed = math.nan, [MissingThreshold(standard_per_m=None, why_not=_first_line(error))]
+        noise, missed = math.nan, [MissingThreshold(standard_per_m=None, why_not=str(error))]
     observer = Observer(interpolated(curvatures, static), neighbours, noise, draws)
     for standard in STANDARDS_PER_M if math.isfinite(noise) else ():
         try:
             found.append(threshold_at(observer, standard))
         except ConvergenceError as error:
-            missed.append(MissingThreshold(standard_per_m=standard, why_not=_first_line(error)))
+            missed.append(MissingThreshold(standard_per_m=standard, why_not=str(error)))
     return PopulationThresholds(
         layout=name,
         rows=LAYOUTS[name][0],
@@ -315,10 +315,6 @@ def _fitted_noise(
     spheres = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
     table = static[[int(np.flatnonzero(curvatures == sphere)[0]) for sphere in spheres]]
     return fit_noise_sigma(lambda sigma: expected_hit_rates(table, neighbours, sigma, draws)).noise_sigma
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).splitlines()[0]
 
 
 def interpolated(curvature_per_m: FloatArray, table: FloatArray) -> PchipInterpolator:
