@@ -11,7 +11,8 @@ from fingerpad.core.errors import StoreError
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.skin import behaviour
-from fingerpad.skin.behaviour import MECHANICAL_SOURCES, behaviour_of, class_tag, code_hash
+from fingerpad.skin.behaviour import MECHANICAL_SOURCES, behaviour_of, code_hash
+from fingerpad.skin.code_tags import class_tag
 from fingerpad.skin.indentation import touch_of
 from fingerpad.skin.store import touch_key
 

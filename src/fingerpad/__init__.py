@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
     from fingerpad.geometry.fingertip import Fingertip
     from fingerpad.geometry.grading import Grading
-    from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+    from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
     from fingerpad.geometry.motion import Cycles, ForceRampAndHold, RampAndHold
     from fingerpad.geometry.motions import chirp, repeated, sine, staircase, stroke
     from fingerpad.geometry.sampled_motions import reduced, sampled
@@ -76,6 +76,7 @@ __all__ = [
     "Hencky",
     "HitRates",
     "Hyperfoam",
+    "Indenter",
     "InertiaWarning",
     "InputError",
     "Line",
@@ -127,7 +128,7 @@ _HOMES = {
     "geometry.fingertip": ("Fingertip",),
     "geometry.grading": ("Grading",),
     "skin.indentation": ("Touch", "indent", "touch_of"),
-    "geometry.indenters": ("Bar", "Cylinder", "FlatPunch", "Line", "Plate", "Sphere"),
+    "geometry.indenters": ("Bar", "Cylinder", "FlatPunch", "Indenter", "Line", "Plate", "Sphere"),
     "mechanics.materials": (
         "Energy",
         "Hencky",

@@ -45,6 +45,7 @@ class Edge(Indenter):
     [0.2, 0.5]
     """
 
+    symmetry_deg = 180.0
     fillet_mm: float = protocol.BAR_FILLET.value
 
     def __post_init__(self) -> None:

@@ -10,7 +10,7 @@ direction of the contact force without friction. Edge, bar with a gap and gratin
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -19,29 +19,75 @@ from fingerpad.core.checks import FloatArray, not_negative, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import radius_mm
 from fingerpad.data import protocol
+from fingerpad.geometry.probing import mirrored, traced_front
 
 BESIDE_EDGE_MM = 0.4
 """Distance from the wall of an edge within which the skin bends sharply. [mm]"""
 
 
 class Indenter(ABC):
-    """A rigid body with a signed gap; derive from it to define another body."""
+    """A rigid body with a signed gap; derive from it to define a body of your own.
+
+    Only `gap` has to be written. Make the class a frozen dataclass, so that its sizes are fields: they are
+    checked, compared and part of the key of a stored press. Fields may be arrays; write
+    `@dataclass(frozen=True, eq=False)` then, and bodies are compared by their content. The code of the class
+    and of the functions that it calls is part of the key, too.
+
+    Whether half a finger is enough is found from `gap`. A class that declares `symmetry_deg` is trusted.
+
+    Examples
+    --------
+    A wedge with an angle of 90 degrees, its ridge along z, rounded with a radius of 0.5 mm:
+
+    >>> @dataclass(frozen=True)
+    ... class Wedge(Indenter):
+    ...     radius_mm: float = 0.5
+    ...
+    ...     def gap(self, points_mm):
+    ...         beside, below = points_mm[:, 0], points_mm[:, 1] + self.radius_mm
+    ...         angle = np.clip(np.arctan2(beside, below), -np.pi / 4, np.pi / 4)
+    ...         normal = np.column_stack([np.sin(angle), np.cos(angle), np.zeros(len(angle))])
+    ...         length = beside * normal[:, 0] + below * normal[:, 1]
+    ...         return length - self.radius_mm, normal
+    >>> wedge = Wedge()
+    >>> wedge.front(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 2.0]])).round(3).tolist()
+    [0.0, -0.793]
+    >>> wedge.mirrors(0.0), wedge.mirrors(30.0)
+    (True, False)
+    """
 
     symmetry_deg: ClassVar[float | None] = 180.0
     """Turn about y after which the body is again symmetric across z = 0; None if it always is. [degrees]"""
 
+    def __eq__(self, other: object) -> bool:
+        """Whether both are of one class with equal fields, arrays too."""
+        return type(self) is type(other) and _content(self) == _content(other)
+
+    def __hash__(self) -> int:
+        return hash((type(self), _content(self)))
+
     @abstractmethod
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed gap (n,) and outward unit normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        """Signed gap (n,) and outward unit normal (n, 3) at points (n, 3) of the indenter's frame. [mm]
 
-    @abstractmethod
+        The gap is positive outside the body and negative inside. Near the face it is the distance; the
+        normal is its gradient. Far away it may be less than the distance, with the same sign.
+        """
+
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """Y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]"""
+        """Y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]
+
+        By default it is found from `gap`.
+        """
+        return traced_front(self.gap, points_mm)
 
     @property
-    @abstractmethod
     def half_width_mm(self) -> float:
-        """Half of the body's extent along x where it can touch. [mm]"""
+        """Half of the body's extent along x where it can touch; infinite by default. [mm]
+
+        The mesh is fine over this width and 1 mm beyond, at most over 5 mm to either side.
+        """
+        return np.inf
 
     def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
         """Whether each undeformed point (n, 3) can come into contact; bool (n,)."""
@@ -55,9 +101,14 @@ class Indenter(ABC):
     def mirrors(self, spin_deg: float) -> bool:
         """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0.
 
-        Half a finger can be solved only then. By default a body is symmetric as long as it is not turned.
+        Half a finger can be solved only then. It follows from `symmetry_deg` where the class that defines
+        `gap`, or one derived from it, declares that; from `gap` itself otherwise.
         """
-        return self.symmetry_deg is None or spin_deg % self.symmetry_deg == 0.0
+        kinds = type(self).__mro__
+        definer = next(number for number, kind in enumerate(kinds) if "gap" in vars(kind))
+        if any("symmetry_deg" in vars(kind) for kind in kinds[: definer + 1]):
+            return self.symmetry_deg is None or spin_deg % self.symmetry_deg == 0.0
+        return mirrored(self.gap, spin_deg)
 
     @property
     def edge_reach_mm(self) -> float:
@@ -86,6 +137,15 @@ class Indenter(ABC):
     def rounded_to(self, radius_mm: float) -> Indenter:
         """Return the body with edges or a rim of at least this radius [mm], where it has any."""
         return self
+
+
+def _content(body: Indenter) -> tuple[object, ...]:
+    """Fields of a body as values that compare."""
+    values: list[object] = [getattr(body, part.name) for part in fields(body)] if is_dataclass(body) else []
+    return tuple(
+        (value.shape, tuple(value.ravel().tolist())) if isinstance(value, np.ndarray) else value
+        for value in values
+    )
 
 
 def _norm_and_direction(offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -194,6 +254,7 @@ class Line(Indenter):
     [True, False]
     """
 
+    symmetry_deg = 180.0
     diameter_mm: float = protocol.LINE_DIAMETER.value
 
     def __post_init__(self) -> None:

@@ -57,20 +57,9 @@ def code_hash() -> str:
     return _installed().code
 
 
-def class_tag(kind: type) -> str:
-    """Identify a class in the key of a stored indentation, whatever its name.
-
-    A class that is not part of the mechanical sources, such as an indenter of a user's own, is identified by
-    its name.
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.indenters import Cylinder, Sphere
-    >>> class_tag(Sphere) == class_tag(Cylinder), class_tag(dict)
-    (False, 'dict')
-    """
-    own = kind.__module__.partition(".")[0] == PACKAGE
-    return _installed().classes.get(kind.__name__, kind.__name__) if own else kind.__name__
+def own_class_tag(name: str) -> str | None:
+    """Tag of a class of the mechanical sources, None of another."""
+    return _installed().classes.get(name)
 
 
 def behaviour_of(sources: Sequence[str], modules: frozenset[str] = frozenset()) -> Behaviour:

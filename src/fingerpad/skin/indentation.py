@@ -23,6 +23,7 @@ from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh, finger_mesh
 from fingerpad.geometry.motion import Motion, RampAndHold, Stimulus
 from fingerpad.geometry.paths import CLEARANCE_TO_BONE, check_path
+from fingerpad.geometry.probing import check_gap
 from fingerpad.mechanics.contact import Placement, check_friction, place, rotation_of
 from fingerpad.mechanics.inertia import warn_of_inertia
 from fingerpad.mechanics.kernels import KERNELS
@@ -118,6 +119,8 @@ class Touch:
                 raise InputError(f"{name} must be 0 for {body}: got {angle:g} degrees.")
         if self.indenter.grips and not self.stimulus.stays:
             raise InputError(f"{body} may only be moved up and down: got a motion that moves or turns it.")
+        if not type(self.indenter).gap.__module__.startswith(f"{__package__.partition('.')[0]}."):
+            check_gap(self.indenter.gap, body)
         for pose in self.stimulus.poses:
             if self.grading.full:
                 break
@@ -326,7 +329,8 @@ def indent(
     finger : Fingertip
         The finger.
     indenter : Indenter
-        `Line`, `Cylinder`, `Bar`, `Sphere`, `FlatPunch`, `Plate`, `Edge`, `Gap` or `Grating`.
+        `Line`, `Cylinder`, `Bar`, `Sphere`, `FlatPunch`, `Plate`, `Edge`, `Gap`, `Grating`, or a body of your
+        own derived from `Indenter`.
     stimulus : RampAndHold, ForceRampAndHold or Trajectory, optional
         The motion, by depth or by force; the paper's by default.
     materials : str or Tissues

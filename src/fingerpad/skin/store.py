@@ -33,7 +33,8 @@ from fingerpad.core.errors import ConvergenceError, InputError, StoreError
 from fingerpad.core.files import write_atomically
 from fingerpad.core.threads import available_threads
 from fingerpad.mechanics.kernels import KERNELS
-from fingerpad.skin.behaviour import class_tag, code_hash
+from fingerpad.skin.behaviour import code_hash
+from fingerpad.skin.code_tags import array_digest, class_tag
 from fingerpad.skin.fields import Place, stored_fields
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
@@ -70,6 +71,8 @@ def touch_key(touch: Touch) -> str:
 
 def _plain(value: Any, is_float: bool = False) -> Any:
     """Nested lists and exact numbers, the same for equal values and different for different ones."""
+    if isinstance(value, np.ndarray) and not value.dtype.hasobject:
+        return array_digest(value)
     if is_dataclass(value):
         return [
             class_tag(type(value)),
@@ -86,7 +89,8 @@ def _plain(value: Any, is_float: bool = False) -> Any:
     if isinstance(value, str | int | bool) or value is None:
         return value
     raise InputError(
-        f"An indentation can only be stored if its parts are frozen values: got {type(value).__name__}."
+        "An indentation can only be stored if its parts are frozen dataclasses, numbers, text or arrays: got "
+        f"{type(value).__name__}."
     )
 
 

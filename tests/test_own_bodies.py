@@ -1,0 +1,181 @@
+"""Bodies of a user's own: only `gap` is written; symmetry, face and key of a stored press follow from it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Plate, Sphere
+from fingerpad.geometry.motion import RampAndHold
+from fingerpad.geometry.probing import check_gap, mirrored, traced_front
+from fingerpad.mechanics.press import PressSettings
+from fingerpad.skin.indentation import Touch, touch_of
+from fingerpad.skin.store import touch_key
+
+BODIES = [Sphere(), Cylinder(), Bar(), FlatPunch(), Edge(), Gap(), Grating(), Plate()]
+COARSE = Grading(17.37, 3.0, 3.0, 0.8, 0.8, 6.0, 1.3, 1, 1, 1, 1)
+
+
+@dataclass(frozen=True)
+class Dot(Indenter):
+    """A plate, 3 mm behind the top of one ball beside the midline."""
+
+    z_mm: float = 1.25
+    radius_mm: float = 1.5
+
+    def gap(self, points_mm):
+        offsets = points_mm - np.array([0.0, -self.radius_mm, self.z_mm])
+        distance = np.linalg.norm(offsets, axis=1)
+        ball, plate = distance - self.radius_mm, points_mm[:, 1] + 3.0
+        is_ball = (ball < plate)[:, None]
+        return np.minimum(ball, plate), np.where(is_ball, offsets / distance[:, None], [0.0, 1.0, 0.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Dots(Indenter):
+    """Balls in a row, their places in an array."""
+
+    places_mm: np.ndarray
+    radius_mm: float = 1.0
+
+    def gap(self, points_mm):
+        offsets = points_mm[:, None, :] - np.array([0.0, -self.radius_mm, 0.0]) - self.places_mm
+        distance = np.linalg.norm(offsets, axis=2)
+        nearest = distance.argmin(axis=1), np.arange(len(points_mm))
+        closest = distance[nearest[1], nearest[0]]
+        return closest - self.radius_mm, offsets[nearest[1], nearest[0]] / closest[:, None]
+
+
+def body_of(gap_text, **more):
+    """A class named Own, its gap written as text, as in a script that was edited."""
+    names = {"Indenter": Indenter, "dataclass": dataclass, "np": np, "__name__": "__main__"} | more
+    exec(
+        "@dataclass(frozen=True)\n"
+        "class Own(Indenter):\n"
+        "    size_mm: float = 1.0\n"
+        "    def gap(self, points):\n"
+        f"        {gap_text}\n",
+        names,
+    )
+    return names["Own"]
+
+
+PLATE = "return points[:, 1] + {} * points[:, 0] ** 2 * 0, np.tile([0.0, 1.0, 0.0], (len(points), 1))"
+
+
+def key(body):
+    return touch_key(
+        Touch(Fingertip(), body, RampAndHold(depth_mm=0.3), TISSUES, COARSE, PressSettings(1, 1))
+    )
+
+
+TISSUES = touch_of(Fingertip(), Plate()).tissues
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda body: type(body).__name__)
+def test_symmetry_found_from_the_gap_is_the_one_that_is_declared(body):
+    for spin_deg in (0.0, 30.0, 90.0, 180.0):
+        assert mirrored(body.gap, spin_deg) == body.mirrors(spin_deg)
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda body: type(body).__name__)
+def test_the_face_found_from_the_gap_is_the_one_in_closed_form(body):
+    points = np.random.default_rng(3).uniform(-3.0, 3.0, (300, 3))
+    traced, exact = traced_front(body.gap, points), body.front(points)
+    both = np.isfinite(traced) & np.isfinite(exact)
+    assert both.sum() > 100
+    np.testing.assert_allclose(traced[both], exact[both], rtol=0, atol=2e-3)
+    # Both end at the same walls, but for rays that run along one.
+    assert (np.isfinite(traced) != np.isfinite(exact)).mean() < 0.15
+    check_gap(body.gap, type(body).__name__)
+
+
+def test_a_dot_beside_the_midline_is_pressed_on_a_whole_finger():
+    for z_mm, is_half in ((1.25, False), (-1.25, False), (0.0, True)):
+        assert Dot(z_mm).mirrors(0.0) == is_half
+        assert touch_of(Fingertip(), Dot(z_mm)).grading.full != is_half
+    with pytest.raises(InputError, match="leaves Dot without symmetry"):
+        Touch(Fingertip(), Dot(), RampAndHold(depth_mm=0.3), TISSUES, COARSE, PressSettings(1, 1))
+
+
+def test_dots_to_either_side_are_mirror_images():
+    settings = PressSettings(2, 1)
+    left, right = (
+        replace(
+            touch_of(Fingertip(), Dot(z_mm), RampAndHold(depth_mm=0.5), settings=settings),
+            grading=replace(COARSE, full=True),
+        ).solve()
+        for z_mm in (-1.25, 1.25)
+    )
+    assert left.force_mn[-1] > 5.0
+    np.testing.assert_allclose(left.force_mn, right.force_mn, rtol=1e-4)
+
+
+def test_a_derived_class_with_another_gap_is_not_trusted():
+    @dataclass(frozen=True)
+    class Slanted(Sphere):
+        def gap(self, points_mm):
+            return super().gap(points_mm - [0.0, 0.0, 0.5])
+
+    assert not Slanted().mirrors(0.0)
+    assert type("Ball", (Sphere,), {})().mirrors(0.0)
+
+
+def test_arrays_are_fields_and_every_number_of_them_counts():
+    row = Dots(np.array([[0.0, 0.0, -2.0], [0.0, 0.0, 2.0]]))
+    same = Dots(np.array([[0.0, -0.0, -2.0], [0.0, 0.0, 2.0]]))
+    other = Dots(np.nextafter(row.places_mm, 9.0))
+    assert key(row) == key(same) != key(other)
+    assert row == same
+    assert row != other
+    assert len({row, same, other}) == 2
+
+
+def test_the_code_of_a_body_is_part_of_its_key():
+    assert key(body_of(PLATE.format(1))()) == key(body_of(PLATE.format(1))())
+    assert key(body_of(PLATE.format(1))()) != key(body_of(PLATE.format(2))())
+    described = body_of('"""Plate."""\n        ' + PLATE.format(1) + "  # flat")
+    assert key(described()) == key(body_of(PLATE.format(1))())
+
+
+def test_what_the_code_refers_to_is_part_of_the_key():
+    def helper_of(text):
+        names = {"np": np, "__name__": "__main__"}
+        exec(f"def helper(points):\n    return {text}\n", names)
+        return names["helper"]
+
+    by_constant = [body_of(PLATE.format("SLOPE"), SLOPE=slope)() for slope in (1.0, 2.0, np.array([1.0]))]
+    called = PLATE.format("helper(points)")
+    by_function = [body_of(called, helper=helper_of(text))() for text in ("1.0", "2.0", "np.pi")]
+    keys = [key(body) for body in by_constant + by_function]
+    assert len(set(keys)) == len(keys)
+    assert key(body_of(called, helper=helper_of("1.0"))()) == keys[3]
+
+
+def test_a_body_that_refers_to_an_open_file_cannot_be_stored(tmp_path):
+    with (
+        open(tmp_path / "log", "w") as log,
+        pytest.raises(InputError, match="fixed values: got TextIOWrapper"),
+    ):
+        key(body_of(PLATE.format("(LOG is None)"), LOG=log)())
+
+
+@pytest.mark.parametrize(
+    ("gap", "said"),
+    [
+        ("return points[:, 1], 2.0 * np.eye(3)[np.ones(len(points), int)]", "length 1: got length 2"),
+        ("return points[:, 1], np.eye(3)[np.zeros(len(points), int)]", "its own gradient as the normal"),
+        ("return points[:, 1]", "must return"),
+        ("return points[:, 1:2], points", "must return gap"),
+        ("return np.nan * points[:, 1], points", "finite numbers"),
+    ],
+)
+def test_a_gap_that_breaks_its_contract_is_refused_in_one_sentence(gap, said):
+    with pytest.raises(InputError, match=said) as raised:
+        key(body_of(gap)())
+    assert "\n" not in str(raised.value)
+    assert "Own" in str(raised.value)
