@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
+from fingerpad.geometry.dots import Dots, braille
 from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
@@ -36,7 +37,7 @@ class Dot(Indenter):
 
 
 @dataclass(frozen=True, eq=False)
-class Dots(Indenter):
+class Balls(Indenter):
     """Balls in a row, their places in an array."""
 
     places_mm: np.ndarray
@@ -126,9 +127,9 @@ def test_a_derived_class_with_another_gap_is_not_trusted():
 
 
 def test_arrays_are_fields_and_every_number_of_them_counts():
-    row = Dots(np.array([[0.0, 0.0, -2.0], [0.0, 0.0, 2.0]]))
-    same = Dots(np.array([[0.0, -0.0, -2.0], [0.0, 0.0, 2.0]]))
-    other = Dots(np.nextafter(row.places_mm, 9.0))
+    row = Balls(np.array([[0.0, 0.0, -2.0], [0.0, 0.0, 2.0]]))
+    same = Balls(np.array([[0.0, -0.0, -2.0], [0.0, 0.0, 2.0]]))
+    other = Balls(np.nextafter(row.places_mm, 9.0))
     assert key(row) == key(same) != key(other)
     assert row == same
     assert row != other
@@ -179,3 +180,34 @@ def test_a_gap_that_breaks_its_contract_is_refused_in_one_sentence(gap, said):
         key(body_of(gap)())
     assert "\n" not in str(raised.value)
     assert "Own" in str(raised.value)
+
+
+@pytest.mark.parametrize("body", [Dots([(0.0, 0.0)]), Dots([(0.0, -1.25), (0.5, 1.25)]), braille("k")])
+def test_the_normal_of_dots_is_the_gradient_of_their_gap(body):
+    check_gap(body.gap, "Dots")
+    points = np.random.default_rng(4).uniform([-3, -0.4, -3], [3, 0.6, 3], (300, 3))
+    step = 1e-6
+    slope = [
+        (body.gap(points + step * axis)[0] - body.gap(points - step * axis)[0]) / (2 * step)
+        for axis in np.eye(3)
+    ]
+    differs = np.abs(np.stack(slope, axis=1) - body.gap(points)[1]).max(axis=1) > 1e-4
+    assert differs.mean() < 0.02  # only where a creased seam lies within a step
+
+
+def test_braille_cells_have_their_dots_and_distances():
+    np.testing.assert_allclose(braille("a").at_mm, [[0.0, 0.0]])
+    cell = np.array(braille("q", along_finger=False).at_mm)  # dots 1 to 5
+    np.testing.assert_allclose(np.ptp(cell, axis=0), [2.34, 4.68])
+    two = np.array(braille("aa", along_finger=False).at_mm)
+    assert np.ptp(two[:, 0]) == pytest.approx(6.2)
+    with pytest.raises(InputError, match="letters a to z"):
+        braille("7")
+
+
+def test_a_mesh_resolves_dots_and_their_distances():
+    grading = touch_of(Fingertip(), braille("c")).grading
+    assert grading.full
+    assert max(grading.size_x_mm, grading.size_z_mm) <= (2.34 - 1.44) / 4
+    with pytest.raises(InputError, match="height_mm must not exceed"):
+        Dots([(0.0, 0.0)], height_mm=1.0)

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     )
     from fingerpad.core.phases import Phase
     from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
+    from fingerpad.geometry.dots import Dots, braille
     from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
     from fingerpad.geometry.fingertip import Fingertip
     from fingerpad.geometry.grading import Grading
@@ -64,6 +65,7 @@ __all__ = [
     "CurrentTraces",
     "Cycles",
     "Cylinder",
+    "Dots",
     "Edge",
     "Energy",
     "FingerpadError",
@@ -100,6 +102,7 @@ __all__ = [
     "Tissues",
     "Touch",
     "Trajectory",
+    "braille",
     "chirp",
     "indent",
     "named_tissues",
@@ -115,6 +118,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "geometry.dots": ("Dots", "braille"),
     "neuron.afferent": ("Afferent",),
     "geometry.edged_indenters": ("Edge", "Gap", "Grating"),
     "core.errors": (

@@ -86,6 +86,10 @@ def grading_about(
     grading = resolution_grading(resolution, x_mm, half_length_mm=reach, half_width_mm=abs(z_mm) + reach)
     if z_mm != 0.0 or not indenter.mirrors(spin_deg):
         grading = replace(grading, full=True)
+    if np.isfinite(indenter.relief_mm):
+        size = min(OBLIQUE_SIZE_MM[resolution], indenter.relief_mm / ACROSS_GROOVE)
+        along, across = min(size, grading.size_x_mm), min(size, grading.size_z_mm)
+        return replace(grading, size_x_mm=along, size_z_mm=across)
     if indenter.rim_mm is not None:
         return _about_rim(grading, resolution, *indenter.rim_mm, z_mm)
     size = max(TIP_SHARE[resolution] * indenter.tip_radius_mm, THIN_SIZE_MM)

@@ -121,6 +121,11 @@ class Indenter(ABC):
         return np.inf
 
     @property
+    def relief_mm(self) -> float:
+        """Width of the narrowest dot, ridge or groove of any direction; infinite without one. [mm]"""
+        return np.inf
+
+    @property
     def tip_radius_mm(self) -> float:
         """Radius of a round tip, which a mesh must resolve; infinite without one. [mm]"""
         return np.inf
@@ -143,7 +148,7 @@ def _content(body: Indenter) -> tuple[object, ...]:
     """Fields of a body as values that compare."""
     values: list[object] = [getattr(body, part.name) for part in fields(body)] if is_dataclass(body) else []
     return tuple(
-        (value.shape, tuple(value.ravel().tolist())) if isinstance(value, np.ndarray) else value
+        (value.shape, value.dtype.str, (value + 0).tobytes()) if isinstance(value, np.ndarray) else value
         for value in values
     )
 

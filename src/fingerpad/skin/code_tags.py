@@ -9,6 +9,7 @@ differs between versions of Python, so that another one presses such a body agai
 
 from __future__ import annotations
 
+import dis
 import hashlib
 import pickle
 import sys
@@ -157,22 +158,22 @@ class _Tagger:
         for cell in function.__closure__ or ():
             yield from self.lines(cell.cell_contents)
         names: list[str] = []
-        yield from self.code_lines(function.__code__, names, function.__doc__)
-        for name in names:
+        yield from self.code_lines(function.__code__, names)
+        for name in dict.fromkeys(names):
             if name in function.__globals__:
                 yield name
                 yield from self.lines(function.__globals__[name])
 
-    def code_lines(self, code: CodeType, names: list[str], doc: str | None) -> Iterator[str]:
-        """Lines of some code, without its docstring, and the names of globals that it may use."""
-        yield code.co_code.hex()
-        yield repr((code.co_names, code.co_argcount, code.co_kwonlyargcount, len(code.co_varnames)))
-        names += [name for name in code.co_names if name not in names]
-        for number, constant in enumerate(code.co_consts):
-            if isinstance(constant, CodeType):
-                yield from self.code_lines(constant, names, None)
-            elif number > 0 or constant not in (None, doc):  # the first is the docstring, or None
-                yield from self.lines(constant)
+    def code_lines(self, code: CodeType, names: list[str]) -> Iterator[str]:
+        """Instructions of some code, and into `names` those of globals that it may use."""
+        names += code.co_names
+        yield repr((code.co_argcount, code.co_kwonlyargcount, code.co_flags))
+        for step in dis.get_instructions(code):
+            yield step.opname
+            if isinstance(step.argval, CodeType):
+                yield from self.code_lines(step.argval, names)
+            else:
+                yield from self.lines(step.argval)
 
 
 def _named(value: Any) -> bool:
