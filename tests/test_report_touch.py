@@ -1,5 +1,6 @@
 """The picture of one touch shows the pressed finger, the body that presses it, and the spikes."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import fingerpad as fp
 from fingerpad.core.errors import InputError
 from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.motion import Pose
 from fingerpad.report import touch as touch_figure
 from fingerpad.report.style import new_figure
 from fingerpad.skin.section import middle_section
@@ -87,6 +89,21 @@ def test_the_body_is_drawn_where_it_was_pressed(touch, skin, tilt_deg):
     gap, _ = touch.indenter.gap((points - moved) @ placement.rotation)
     # Between two nodes the skin spans the sphere as a chord.
     assert_allclose(gap, 0.0, atol=0.03)
+
+
+def test_a_body_that_moved_is_drawn_where_it_is_at_the_end_if_that_is_on_the_middle_plane(touch, skin):
+    def drawn(pose):
+        axes = new_figure(4.0, 3.0).subplots()
+        touch_figure.draw_section(axes, replace(skin, pose=pose), touch.indenter)
+        return axes
+
+    middles = [
+        axes.patches[0].get_xy()[:-3, 0].mean() for axes in map(drawn, (Pose(), Pose(x_mm=2.0, tilt_deg=3.0)))
+    ]
+    # A tilt of 3 degrees lays the body of the sphere over by a little.
+    assert middles[1] - middles[0] == pytest.approx(2.0, abs=0.6)
+    assert not drawn(Pose(z_mm=1.0)).patches
+    assert drawn(Pose(x_mm=2.0)).get_xlim()[0] == pytest.approx(drawn(Pose()).get_xlim()[0] + 2.0)
 
 
 def test_trains_stand_in_the_order_of_their_distance_and_silent_ones_are_counted(skin):

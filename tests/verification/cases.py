@@ -11,6 +11,7 @@ from . import (
     patches,
     relaxation,
     release,
+    sliding,
     small_bodies,
     symmetry,
 )  # fmt: skip
@@ -18,6 +19,7 @@ from .case import CASES
 
 THEMES = (
     patches.THEME, kernel.THEME, laws.THEME, manufactured.THEME, locking.THEME, half_space.THEME,
-    relaxation.THEME, release.THEME, balance.THEME, symmetry.THEME, oracles.THEME, small_bodies.THEME,
+    relaxation.THEME, release.THEME, sliding.THEME, balance.THEME, symmetry.THEME, oracles.THEME,
+    small_bodies.THEME,
 )  # fmt: skip
 ORDERED = sorted(CASES, key=lambda case: THEMES.index(case.theme))

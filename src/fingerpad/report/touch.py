@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.signals import ResponseMap
+from fingerpad.core.units import cosine_and_sine
 from fingerpad.report.style import BLACK, BLUE, new_figure, say_nothing_to_draw, write_png
 
 if TYPE_CHECKING:
@@ -119,10 +120,10 @@ def draw_section(axes: Axes, skin: SkinResponse, indenter: Indenter | None = Non
         (section.nail_mm, BONE, 4.0),
     ):
         axes.add_collection(LineCollection(list(edges), colors=colour, linewidths=width, capstyle="round"))
-    x = section.corners_mm[..., 0]
+    x, axis_x_mm = section.corners_mm[..., 0], skin.axis_x_mm + skin.pose.x_mm
     low, high = section.corners_mm[..., 1].min(), section.corners_mm[..., 1].max()
     axes.set(
-        xlim=(max(x.min(), skin.axis_x_mm - REACH_MM), min(x.max(), skin.axis_x_mm + REACH_MM) + MARGIN_MM),
+        xlim=(max(x.min(), axis_x_mm - REACH_MM), min(x.max(), axis_x_mm + REACH_MM) + MARGIN_MM),
         ylim=(low - ROOM_BELOW_MM, high + MARGIN_MM),
         aspect="equal",
         xlabel="along the finger, x [mm]",
@@ -137,11 +138,15 @@ def draw_section(axes: Axes, skin: SkinResponse, indenter: Indenter | None = Non
 
 
 def _draw_indenter(axes: Axes, skin: SkinResponse, section: Section, indenter: Indenter) -> None:
-    """Draw the body where its face meets the deformed skin."""
-    towards = skin.direction[:2]
+    """Draw the body where its face meets the deformed skin, unless it has left the middle plane."""
+    if skin.pose.z_mm != 0.0:
+        return
+    cosine, sine = cosine_and_sine(skin.pose.tilt_deg)
+    towards = np.array([[cosine, -sine], [sine, cosine]]) @ skin.direction[:2]
     along = np.array([towards[1], -towards[0]])
     middle = skin.mesh.nodes_mm[skin.mesh.midline_nodes]
-    foot = np.array([skin.axis_x_mm, np.interp(skin.axis_x_mm, middle[:, 0], middle[:, 1])])
+    axis_x_mm = skin.axis_x_mm + skin.pose.x_mm
+    foot = np.array([axis_x_mm, np.interp(axis_x_mm, middle[:, 0], middle[:, 1])])
 
     def face(beside: FloatArray) -> FloatArray:
         return indenter.front(np.column_stack([beside, np.zeros((beside.size, 2))]))

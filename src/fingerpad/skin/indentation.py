@@ -210,6 +210,7 @@ class Touch:
             mesh=self.mesh,
             kinks_ms=self.stimulus.corners_ms,
             phases=self.stimulus.phases,
+            pose=self.stimulus.pose_at(self.stimulus.end_ms),
             axis_x_mm=self.at_mm[0],
             direction=rotation_of(self.tilt_deg, self.spin_deg)[:, 1].copy(),
             fields=fields,

@@ -15,6 +15,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase
 from fingerpad.core.signals import STORED_ENERGY, SedTraces
 from fingerpad.geometry.mesh import Mesh
+from fingerpad.geometry.motion import STILL, Pose
 from fingerpad.skin.fields import Place, sampled_fields, stored_fields
 from fingerpad.skin.receptor_sheet import ReceptorSheet
 from fingerpad.skin.section import Section, middle_section
@@ -75,6 +76,8 @@ class SkinResponse:
         All nodes and elements over time, of `Touch.solve(whole=True)`; stored files do not hold it.
     phases : tuple of Phase
         Named phases of the motion.
+    pose : Pose
+        How far the indenter has moved aside and turned since first touch, at the last time.
 
     Raises
     ------
@@ -95,6 +98,7 @@ class SkinResponse:
     linear_solver: str
     deformation: Deformation | None = None
     phases: tuple[Phase, ...] = ()
+    pose: Pose = STILL
 
     def __post_init__(self) -> None:
         declared = {field.name: field for field in stored_fields()}
