@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from fingerpad.mechanics.contact import Contact, place
 from fingerpad.mechanics.linear import KeptFactor, LinearSolver, free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material, MaterialTable, Prony
 from fingerpad.mechanics.newton import NewtonSettings, find_equilibrium
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import PressSettings, _Press, press
 from fingerpad.mechanics.viscoelastic import StepCoefficients
 
 PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))
@@ -303,6 +304,26 @@ def test_press_that_does_not_converge_is_one_error_of_one_line_without_a_chain()
     assert "\n" not in str(failure.value)
     assert failure.value.__cause__ is None
     assert failure.value.__suppress_context__
+
+
+@pytest.mark.parametrize(
+    ("friction", "is_sharp", "remedy"),
+    [
+        (0.0, True, "an edge: try friction=0.5, a larger fillet or a smaller depth."),
+        (0.5, True, "; try a smaller depth or more ramp steps."),
+        (0.0, False, "; try a smaller depth or more ramp steps."),
+    ],
+)
+def test_the_remedy_depends_on_what_stopped_the_press(friction, is_sharp, remedy):
+    mesh = block()
+    job = SimpleNamespace(
+        stimulus=RampAndHold(0.4), contact=SimpleNamespace(friction=friction), is_sharp=is_sharp,
+        body=SimpleNamespace(mesh=mesh),
+    )  # fmt: skip
+    found = SimpleNamespace(displacement_mm=np.zeros_like(mesh.nodes_mm), depth_mm=0.2)
+    error = _Press.stopped(job, SimpleNamespace(time_ms=10.0, found=found), (), "No equilibrium.")
+    assert str(error).endswith(remedy)
+    assert "The press stopped at 10 ms, depth 0.2 mm, on the way to 0.4 mm, where element" in str(error)
 
 
 def test_hopeless_press_names_the_element_that_it_squeezes_most():

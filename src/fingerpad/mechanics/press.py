@@ -420,9 +420,9 @@ class _Press:
         aim = f"{self.stimulus.largest:g} {'mN' if self.stimulus.by_force else 'mm'}"
         if last.time_ms == 0.0:
             remedy = f"try a smaller {less} or more ramp steps, and check the moduli of the tissues, in kPa"
-        elif self.contact.friction == 0.0 and not self.contact.indenter.grips and self.has_edge:
+        elif self.contact.friction == 0.0 and self.is_sharp:
             remedy = (
-                "without friction skin slides round an edge: "
+                "without friction skin slides round a small body or an edge: "
                 f"try friction=0.5, a larger fillet or a smaller {less}"
             )
         else:
@@ -434,10 +434,10 @@ class _Press:
         )
 
     @property
-    def has_edge(self) -> bool:
-        """Whether the indenter has an edge or a rim, round which skin slides."""
-        indenter = self.contact.indenter
-        return indenter.rim_mm is not None or indenter.edge_reach_mm > 0.0
+    def is_sharp(self) -> bool:
+        """Whether the indenter is small or has an edge, round which skin slides."""
+        body = self.contact.indenter
+        return np.isfinite(self.longest_step_mm) or body.rim_mm is not None or body.edge_reach_mm > 0.0
 
 
 def press(
