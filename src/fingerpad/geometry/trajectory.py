@@ -28,6 +28,12 @@ MOST_JUMP, EVEN_STEPS = 0.6, 4.0
 """A smaller change is a corner too, unless the acceleration is the same at a neighbour within this share, and
 the steps before and after it differ by at most this factor, as along a smooth curve."""
 
+STEPS_ASIDE = 2.0
+"""Steps per mm aside over those of a ramp: skin passes an edge within a few of them."""
+
+ONSET_SHARES = (0.25, 0.5)
+"""Where the first of several steps aside is divided, over its length: at 0.025 and 0.05 mm at quick."""
+
 SAME_VALUE = 0.02
 """Change over the largest depth, force or way of a trajectory below which it holds; recordings have noise."""
 
@@ -272,7 +278,8 @@ class Trajectory(Motion):
     def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
         """List the times to solve at: all samples, and times between them where they are far apart. [ms]
 
-        A part of the way takes its share of `ramp_steps`, which is also the number of steps per mm aside. A
+        A part of the way takes its share of `ramp_steps`, and a mm aside takes twice as many. The first step
+        aside is divided, because friction grows over about a tenth of a mm until skin slips. A
         hold longer than the step before it takes `hold_steps`, which grow geometrically, because relaxation
         is fastest at its beginning; a long part in which a recording drifts is a hold.
 
@@ -283,12 +290,15 @@ class Trajectory(Motion):
         """
         times, last_ms = [0.0], np.inf
         moved_by = np.linalg.norm(np.diff(self._course, axis=0), axis=1)
-        for start, end, moved in zip(self.times_ms, self.times_ms[1:], moved_by, strict=False):
+        aside = np.linalg.norm(np.diff(self._course[:, 1:3], axis=0), axis=1)
+        for start, end, moved, way in zip(self.times_ms, self.times_ms[1:], moved_by, aside, strict=False):
             length_ms = end - start
             drifts = moved <= SAME_VALUE and length_ms > hold_steps * last_ms
             if moved > SAME_SPEED and not drifts:
-                steps = int(np.ceil(ramp_steps * moved - SAME_SPEED))
+                steps = int(np.ceil(ramp_steps * max(moved, STEPS_ASIDE * way) - SAME_SPEED))
                 since = np.linspace(0.0, length_ms, steps + 1)[1:]
+                if steps > 1 and way > SAME_SPEED:
+                    since = np.concatenate([since[0] * np.array(ONSET_SHARES), since])
             elif length_ms > last_ms * (1.0 + SAME_SPEED):
                 since = hold_ends_ms(length_ms, last_ms, hold_steps)
             else:

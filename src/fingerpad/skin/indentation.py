@@ -119,7 +119,9 @@ class Touch:
                 raise InputError(f"{name} must be 0 for {body}: got {angle:g} degrees.")
         if self.indenter.grips and not self.stimulus.stays:
             raise InputError(f"{body} may only be moved up and down: got a motion that moves or turns it.")
-        if not type(self.indenter).gap.__module__.startswith(f"{__package__.partition('.')[0]}."):
+        # A class that was made by exec has no module.
+        home = type(self.indenter).gap.__module__ or ""
+        if not home.startswith(f"{__package__.partition('.')[0]}."):
             check_gap(self.indenter.gap, body)
         for pose in self.stimulus.poses:
             if self.grading.full:
