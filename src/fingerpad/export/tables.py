@@ -48,8 +48,8 @@ def write_touch_csv(path: Path, skin: SkinResponse) -> tuple[Path, ...]:
     >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(287), fp.RampAndHold(depth_mm=0.3))
     >>> with TemporaryDirectory() as folder:
     ...     (file,) = write_touch_csv(Path(folder) / "touch.csv", skin)
-    ...     print(file.read_text().split("external")[0])
-    times_ms,force_mn,depth_mm,contact_area_mm2,reaction_mn_x,reaction_mn_y,reaction_mn_z,
+    ...     print(file.read_text().split("contact_force")[0])
+    times_ms,force_mn,depth_mm,contact_area_mm2,
     """
     columns: dict[str, np.ndarray] = {}
     for name, field in FIELDS.items():

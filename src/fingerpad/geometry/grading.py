@@ -293,7 +293,7 @@ def lines_of_sizes(
     Examples
     --------
     >>> lines_of_sizes(1.0, 0.5, 2.0, 1.3, 2.0, [(0.9, 1.1, 0.1)]).round(2).tolist()
-    [0.0, 0.31, 0.55, 0.74, 0.89, 1.0, 1.11, 1.26, 1.45, 1.7, 2.0]
+    [0.0, 0.28, 0.5, 0.67, 0.8, 0.91, 1.0, 1.09, 1.2, 1.33, 1.5, 1.72, 2.0]
     """
     places = np.linspace(0.0, length, STEPS_TO_SUM + 1)
     slope = np.log(growth)

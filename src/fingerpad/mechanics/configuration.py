@@ -26,7 +26,8 @@ LEAST_SHARE_OF_FORCE = 1e-3
 """Least force that residuals are compared to, over the largest force of the press so far."""
 
 LEAST_DEPTH_MM = 0.02
-"""Least depth that a penetration is compared to: one that tilts may press at a depth below 0. [mm]"""
+"""Depth that a penetration is compared to under an indenter that presses at a depth of 0 or less, since it
+has turned or moved aside. [mm]"""
 
 CURVATURE_BELOW_RESIDUAL = 0.1
 """Residual over contact force below which the indenter's curvature is part of the tangent."""
@@ -69,11 +70,11 @@ class Reached:
     force_mn : float
         Largest contact force on the body as it is meshed. [mN]
     depth_mm : float
-        Largest depth, at least `LEAST_DEPTH_MM`. [mm]
+        Largest depth. [mm]
     """
 
     force_mn: float = 0.0
-    depth_mm: float = LEAST_DEPTH_MM
+    depth_mm: float = 0.0
 
     @property
     def least_force_mn(self) -> float:
@@ -82,7 +83,14 @@ class Reached:
 
     def after(self, force_mn: float, depth_mm: float) -> Reached:
         """Return the largest of both after one more step."""
+        presses_above_0 = force_mn > SMALLEST_FORCE_MN and depth_mm <= 0.0
+        depth_mm = LEAST_DEPTH_MM if presses_above_0 else depth_mm
         return Reached(max(self.force_mn, force_mn), max(self.depth_mm, depth_mm))
+
+    def deepest_mm(self, depth_mm: float) -> float:
+        """Depth to which a penetration at `depth_mm` is compared. [mm]"""
+        deepest_mm = max(self.depth_mm, depth_mm)
+        return deepest_mm if deepest_mm > 0.0 else LEAST_DEPTH_MM
 
 
 @dataclass(frozen=True)

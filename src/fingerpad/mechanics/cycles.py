@@ -277,7 +277,7 @@ def blended(early: Any, late: Any, share: float) -> Any:
     Examples
     --------
     >>> from fingerpad.mechanics.balance import Entry
-    >>> blended(Entry(force_mn=1.0), Entry(force_mn=3.0), 0.25).force_mn
+    >>> blended(Entry(stored_uj=1.0), Entry(stored_uj=3.0), 0.25).stored_uj
     1.5
     """
     if is_dataclass(early) and not isinstance(early, type):

@@ -238,7 +238,7 @@ class _Search:
                 continue
             balanced = balance.imbalance <= settings.balance_tolerance
             if now.relative_residual <= settings.residual_tolerance and balanced:
-                deepest_mm = max(now.depth_mm, load.reached.depth_mm)
+                deepest_mm = load.reached.deepest_mm(now.depth_mm)
                 accepted_mm = settings.penetration_tolerance * deepest_mm
                 if self.augmentations > 1:
                     accepted_mm = max(accepted_mm, settings.least_penetration_mm)
