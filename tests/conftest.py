@@ -10,8 +10,10 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# An example may take long while other processes have the cores: that is no failure.
-settings.register_profile("fingerpad", deadline=None)
+# An example may take long while other processes have the cores: that is no failure. Every run tries the same
+# examples, so that a commit passes or fails for good; `--hypothesis-profile=search` tries new ones.
+settings.register_profile("fingerpad", deadline=None, derandomize=True)
+settings.register_profile("search", deadline=None)
 settings.load_profile("fingerpad")
 
 LONGEST = (

@@ -34,8 +34,8 @@ class Pose:
 
     @property
     def way(self) -> FloatArray:
-        """Way [mm] and rotations [degrees], (4,)."""
-        return np.array([self.x_mm, self.z_mm, self.tilt_deg, self.spin_deg])
+        """Ways in mm and rotations over `TURN_LIKE_MM`, numbers of one order, (4,)."""
+        return np.array([self.x_mm, self.z_mm, self.tilt_deg / TURN_LIKE_MM, self.spin_deg / TURN_LIKE_MM])
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ STILL = Pose()
 """The pose at first touch."""
 
 TURN_LIKE_MM = 10.0
-"""Rotation that takes as many steps as a way of 1 mm. [degrees]"""
+"""Rotation that takes as many steps as all of the depth. [degrees]"""
 
 
 class Motion:
@@ -107,22 +107,13 @@ class Motion:
         return STILL
 
     def course_at(self, time_ms: float) -> FloatArray:
-        """Where the motion is at a time [ms], in numbers of one order, (5,).
-
-        Depth or force over the largest, ways in mm and rotations over `TURN_LIKE_MM`.
-        """
-        pose = self.pose_at(time_ms)
-        prescribed = float(self.prescribed_at(time_ms)) / self.largest
-        return np.array([prescribed, *(pose.way / [1.0, 1.0, TURN_LIKE_MM, TURN_LIKE_MM])])
+        """Where the motion is at a time [ms]: depth or force over the largest, and `Pose.way`, (5,)."""
+        return np.array([float(self.prescribed_at(time_ms)) / self.largest, *self.pose_at(time_ms).way])
 
     @property
     def stays(self) -> bool:
         """Whether the indenter only goes up and down."""
         return self.poses == (STILL,)
-
-    def keeps_symmetry(self) -> bool:
-        """Whether an indenter on the midline stays its own mirror image across z = 0, unless it spins."""
-        return all(pose.z_mm == 0.0 for pose in self.poses)
 
     @property
     def corners_ms(self) -> tuple[float, ...]:

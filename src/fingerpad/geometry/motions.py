@@ -106,7 +106,8 @@ def chirp(
     turns = np.arange(1, SAMPLES_PER_CYCLE * cycles + 1) / SAMPLES_PER_CYCLE
     # turns = first t + rate t^2 / 2, solved for t in the form that also holds for a rate of 0.
     rate = (last - first) / seconds
-    times_ms = MS_PER_S * 2.0 * turns / (first + np.sqrt(first**2 + 2.0 * rate * turns))
+    frequencies_hz = np.sqrt(np.maximum(first**2 + 2.0 * rate * turns, 0.0))
+    times_ms = np.minimum(MS_PER_S * 2.0 * turns / (first + frequencies_hz), sweep_ms)
     return _on_a_hold(depth_mm, amplitude_mm, times_ms, turns, ramp_ms, hold_ms, "sweep")
 
 
@@ -270,7 +271,7 @@ def _on_a_hold(
     positive("depth_mm", depth_mm, "mm")
     positive("amplitude_mm", amplitude_mm, "mm")
     before_ms = _before(ramp_ms, hold_ms)
-    times_ms = (*before_ms, *(before_ms[-1] + since_ms))
+    times_ms = (*before_ms, *(before_ms[-1] + since_ms).tolist())
     return Trajectory(
         times_ms,
         (0.0, *[depth_mm] * (len(before_ms) - 1), *(depth_mm + amplitude_mm * np.sin(2.0 * np.pi * turns))),

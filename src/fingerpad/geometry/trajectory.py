@@ -13,7 +13,7 @@ from fingerpad.core.checks import FloatArray, float_array, increasing
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import HOLD, RAMP, Phase
 from fingerpad.data import protocol
-from fingerpad.geometry.motion import STILL, TURN_LIKE_MM, Cycles, Motion, Pose, hold_ends_ms
+from fingerpad.geometry.motion import STILL, Cycles, Motion, Pose, hold_ends_ms
 
 POSE_COLUMNS = ("x_mm", "z_mm", "tilt_deg", "spin_deg")
 """Columns of a trajectory that say where the indenter stands, beside its depth or force."""
@@ -211,8 +211,8 @@ class Trajectory(Motion):
 
     @property
     def _course(self) -> FloatArray:
-        """Depth or force over the largest, way in mm and rotations over `TURN_LIKE_MM`: (n_samples, 5)."""
-        ways = np.array([pose.way for pose in self.poses]) / [1.0, 1.0, TURN_LIKE_MM, TURN_LIKE_MM]
+        """`course_at` of all samples, (n_samples, 5)."""
+        ways = np.array([pose.way for pose in self.poses])
         prescribed = np.array(self.prescribed) / self.largest
         return np.column_stack([prescribed, np.broadcast_to(ways, (prescribed.size, 4))])
 
