@@ -245,16 +245,12 @@ class _Search:
                 close = now.contact.misfit_mm <= accepted_mm
                 if close and settled:
                     return self.found(now, iteration, balance)
-                self.lagging = self.renewed(now, augmented=not close)
-                displacement, depth_mm = now.displacement_mm, now.depth_mm
-                now = evaluate(self.body, load, displacement, depth_mm, self.lagging, self.blocks)
+                now = self.renew(now, augmented=not close)
                 potentials, settled, renewed_at = [now.potential_uj], True, now.relative_residual
                 if close:
                     continue  # only friction was renewed: the body may still be at rest
             elif rubs and not settled and now.relative_residual < RENEW_AT * renewed_at:
-                self.lagging = self.renewed(now, augmented=False)
-                displacement, depth_mm = now.displacement_mm, now.depth_mm
-                now = evaluate(self.body, load, displacement, depth_mm, self.lagging, self.blocks)
+                now = self.renew(now, augmented=False)
                 potentials, renewed_at = [now.potential_uj], now.relative_residual
             enough = ENOUGH * settings.residual_tolerance / now.relative_residual
             forcing = float(np.clip(max(FORCING * now.relative_residual, enough), *FORCING_RANGE))
@@ -352,8 +348,8 @@ class _Search:
         closed = evaluate(self.body, self.load, *where, self.lagging, self.blocks, curved=False, closed=True)
         return closed, self.solver.solve(self.blocks, closed.residual_mn, forcing)
 
-    def renewed(self, now: Configuration, augmented: bool) -> Lagging:
-        """Multipliers and anchors of the contact found."""
+    def renew(self, now: Configuration, augmented: bool) -> Configuration:
+        """Take multipliers and anchors from the contact found; return the configuration under them."""
         contact, anchors = self.load.contact, self.load.anchors
         multipliers = contact.augmented(now.contact) if augmented else self.lagging.multipliers_mn
         self.augmentations += augmented
@@ -361,7 +357,8 @@ class _Search:
             multipliers = 0.5 * (multipliers + self.lagging.multipliers_mn)
         if anchors is not None:
             anchors = contact.renewed(anchors, now.contact, now.depth_mm)
-        return Lagging(multipliers, anchors)
+        self.lagging = Lagging(multipliers, anchors)
+        return evaluate(self.body, self.load, now.displacement_mm, now.depth_mm, self.lagging, self.blocks)
 
     def found(self, now: Configuration, iterations: int, balance: Balance) -> Equilibrium:
         """Gather the equilibrium, its anchors ready for the next step."""
