@@ -142,6 +142,19 @@ class Useless(KeptFactor):
         return residual
 
 
+@pytest.mark.parametrize("wrong", [np.nan, 1e200])
+def test_a_kept_factor_that_diverges_is_renewed_without_a_warning(wrong):
+    class Diverges(KeptFactor):
+        def apply(self, residual):
+            return super().apply(residual) * (wrong if solver.renewals == 1 and solver.iterations else 1.0)
+
+    blocks, residual = tangent(), residual_of()
+    solver = LinearSolver(Diverges(SPARSITY, FREE))
+    exact = solver.solve(blocks, residual, 1e-12)
+    np.testing.assert_allclose(solver.solve(blocks, residual, 1e-12), exact, rtol=1e-9)
+    assert solver.renewals == 2
+
+
 def test_solution_that_is_not_reached_is_refused():
     """Stiffness over ten decades: plain conjugate gradients do not get through in their iterations."""
     blocks = tangent()

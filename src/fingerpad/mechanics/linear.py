@@ -267,18 +267,25 @@ def _conjugate_gradients(
 
     def multiply(direction: FloatArray) -> FloatArray:
         product = approximate.multiply(direction)
+        curvature = direction @ product
         # Conjugate gradients may run through an indefinite tangent unnoticed, to no minimum.
-        if direction @ product < 0.0:
+        if curvature < 0.0:
             raise NotPositiveDefiniteError
+        if np.isnan(curvature):
+            raise FloatingPointError
         return product
 
     right = approximate.enter(residual)
     shape = (right.size, right.size)
-    solution, failed = cg(
-        LinearOperator(shape, matvec=multiply, dtype=right.dtype), right, rtol=relative_tolerance,
-        maxiter=MOST_ITERATIONS, M=LinearOperator(shape, matvec=approximate.apply, dtype=right.dtype),
-        callback=counted,
-    )  # fmt: skip
+    try:
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            solution, failed = cg(
+                LinearOperator(shape, matvec=multiply, dtype=right.dtype), right, rtol=relative_tolerance,
+                maxiter=MOST_ITERATIONS, M=LinearOperator(shape, matvec=approximate.apply, dtype=right.dtype),
+                callback=counted,
+            )  # fmt: skip
+    except FloatingPointError:  # with the preconditioner of another tangent they may diverge
+        return residual, count, True
     return approximate.leave(solution), count, bool(failed)
 
 
