@@ -1,4 +1,4 @@
-"""Run every case and write docs/verification.md: `python -m tests.verification`.
+"""Run every case and write docs/verification.md and docs/presses.md: `python -m tests.verification`.
 
 With names of cases, run only those, and print their rows instead.
 """
@@ -16,6 +16,7 @@ import fingerpad
 from .cases import ORDERED
 from .page import PAGE, expectation, number, page_text
 from .pictures import draw_all
+from .press_table import TABLE_PAGE, press_all
 from .stored_runs import closing
 
 
@@ -39,7 +40,9 @@ def run_all(names: list[str]) -> int:
         day = datetime.now(UTC).date().isoformat()
         stamp = f"Written on {day} by fingerpad {fingerpad.__version__}, {versions}."
         PAGE.write_text(page_text(ORDERED, draw_all(), stamp, closing()), encoding="utf-8")
-        print(f"wrote {PAGE}")
+        print(f"wrote {PAGE}", flush=True)
+        press_all(["quick", "standard"])
+        print(f"wrote {TABLE_PAGE}")
     return failed
 
 
