@@ -28,7 +28,7 @@ MOST_JUMP, EVEN_STEPS = 0.6, 4.0
 """A smaller change is a corner too, unless the acceleration is the same at a neighbour within this share, and
 the steps before and after it differ by at most this factor, as along a smooth curve."""
 
-STEPS_ASIDE = 2.0
+STEPS_ASIDE = 3.0
 """Steps per mm aside over those of a ramp: skin passes an edge within a few of them."""
 
 ONSET_SHARES = (0.25, 0.5)
@@ -278,7 +278,7 @@ class Trajectory(Motion):
     def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
         """List the times to solve at: all samples, and times between them where they are far apart. [ms]
 
-        A part of the way takes its share of `ramp_steps`, and a mm aside takes twice as many. The first step
+        A part of the way takes its share of `ramp_steps`, and a mm aside takes three times as many. The first step
         aside is divided, because friction grows over about a tenth of a mm until skin slips. A
         hold longer than the step before it takes `hold_steps`, which grow geometrically, because relaxation
         is fastest at its beginning; a long part in which a recording drifts is a hold.
