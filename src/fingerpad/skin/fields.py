@@ -47,6 +47,8 @@ class Field:
         Name in `SkinResponse.fields` and in stored files.
     unit : str
         Unit; empty for a pure number.
+    long_name : str
+        What it is, in words for an axis or a legend.
     place : Place
         Where it has values.
     of : callable
@@ -70,6 +72,7 @@ class Field:
 
     name: str
     unit: str
+    long_name: str
     place: Place
     of: Callable[[Deformation, Mesh], FloatArray]
     components: int = 1
@@ -104,23 +107,39 @@ def _von_mises_at_last_time(deformation: Deformation, _: Mesh) -> FloatArray:
 def _of_press(
     name: str,
     unit: str,
+    long_name: str,
     of: Callable[[Deformation], FloatArray],
     components: int = 1,
     exported: str = "",
 ) -> Field:
     """Field of the whole press over time, stored and exported."""
     return Field(
-        name, unit, Place.PRESS, lambda d, _: of(d), components, stored=Times.ALL, exported=exported or name
+        name,
+        unit,
+        long_name,
+        Place.PRESS,
+        lambda d, _: of(d),
+        components,
+        stored=Times.ALL,
+        exported=exported or name,
     )
 
 
 def _watched(
-    name: str, unit: str, attribute: str, *, components: int = 1, sampled: bool = False, exported: str = ""
+    name: str,
+    unit: str,
+    long_name: str,
+    attribute: str,
+    *,
+    components: int = 1,
+    sampled: bool = False,
+    exported: str = "",
 ) -> Field:
     """Field of elements that `ElementFields` computes; those that are sampled are stored."""
     return Field(
         name,
         unit,
+        long_name,
         Place.WATCHED,
         lambda deformation, _: getattr(deformation.fields, attribute),
         components,
@@ -133,19 +152,43 @@ def _watched(
 FIELDS: dict[str, Field] = {
     field.name: field
     for field in (
-        _of_press("times_ms", "ms", lambda d: d.times_ms, exported="TimeValue"),
-        _of_press("force_mn", "mN", lambda d: d.force_mn),
-        _of_press("depth_mm", "mm", lambda d: d.depth_mm),
-        _of_press("contact_area_mm2", "mm²", lambda d: d.contact.area_mm2),
-        _of_press("contact_force_mn", "mN", lambda d: d.contact_force_mn, components=3),
-        _of_press("reaction_mn", "mN", lambda d: d.reaction_mn, components=3),
-        _of_press("external_uj", "µJ", lambda d: d.energy.external_uj),
-        _of_press("stored_uj", "µJ", lambda d: d.energy.stored_uj),
-        _of_press("dissipated_uj", "µJ", lambda d: d.energy.dissipated_uj),
-        _of_press("contact_uj", "µJ", lambda d: d.energy.contact_uj),
+        _of_press("times_ms", "ms", "time", lambda d: d.times_ms, exported="TimeValue"),
+        _of_press(
+            "force_mn",
+            "mN",
+            "force of the indenter along its axis, on the whole finger",
+            lambda d: d.force_mn,
+        ),
+        _of_press("depth_mm", "mm", "advance of the indenter since first touch", lambda d: d.depth_mm),
+        _of_press(
+            "contact_area_mm2",
+            "mm²",
+            "undeformed skin that the indenter touches, on the whole finger",
+            lambda d: d.contact.area_mm2,
+        ),
+        _of_press(
+            "contact_force_mn",
+            "mN",
+            "force of the indenter on the skin, with friction",
+            lambda d: d.contact_force_mn,
+            components=3,
+        ),
+        _of_press(
+            "reaction_mn", "mN", "force of the tissue on bone and nail", lambda d: d.reaction_mn, components=3
+        ),
+        _of_press("external_uj", "µJ", "work of the indenter", lambda d: d.energy.external_uj),
+        _of_press("stored_uj", "µJ", "stored energy", lambda d: d.energy.stored_uj),
+        _of_press(
+            "dissipated_uj",
+            "µJ",
+            "energy dissipated by relaxation and friction",
+            lambda d: d.energy.dissipated_uj,
+        ),
+        _of_press("contact_uj", "µJ", "energy in the springs of the contact", lambda d: d.energy.contact_uj),
         Field(
             "skin_displacement_mm",
             "mm",
+            "displacement of the skin",
             Place.SKIN_NODE,
             lambda d, mesh: d.displacement_mm[:, mesh.skin_nodes],
             components=3,
@@ -154,6 +197,7 @@ FIELDS: dict[str, Field] = {
         Field(
             "displacement_mm",
             "mm",
+            "displacement",
             Place.NODE,
             lambda d, _: d.displacement_mm,
             components=3,
@@ -163,6 +207,7 @@ FIELDS: dict[str, Field] = {
         Field(
             "contact_pressure_kpa",
             "kPa",
+            "pressure of the indenter on the skin",
             Place.SKIN_NODE,
             lambda d, _: d.contact.pressure_kpa,
             stored=Times.ALL,
@@ -171,6 +216,7 @@ FIELDS: dict[str, Field] = {
         Field(
             "shear_kpa",
             "kPa",
+            "friction over the area of the skin",
             Place.SKIN_NODE,
             lambda d, _: d.contact.shear_kpa,
             components=3,
@@ -180,6 +226,7 @@ FIELDS: dict[str, Field] = {
         Field(
             "slip_mm",
             "mm",
+            "way that skin in contact has slid",
             Place.SKIN_NODE,
             lambda d, _: d.contact.slip_mm,
             stored=Times.ALL,
@@ -188,24 +235,61 @@ FIELDS: dict[str, Field] = {
         Field(
             "sed_kpa",
             "kPa",
+            "strain energy density",
             Place.ELEMENT,
             lambda d, _: d.sed_kpa,
             stored=Times.ALL,
             sampled="stored",
             exported="sed_stored_kpa",
         ),
-        Field("von_mises_kpa", "kPa", Place.ELEMENT, _von_mises_at_last_time, stored=Times.LAST),
-        _watched("instantaneous", "kPa", "instantaneous_kpa", sampled=True, exported="sed_instantaneous_kpa"),
-        _watched("work", "kPa", "work_kpa", sampled=True, exported="sed_work_kpa"),
-        _watched("von_mises", "kPa", "von_mises_kpa", sampled=True),
-        _watched("compressive_strain", "", "compressive_strain", sampled=True),
-        _watched("compressive_stress", "kPa", "compressive_stress_kpa", sampled=True),
-        _watched("stress", "kPa", "stress_kpa", components=6),
-        _watched("strain", "", "strain", components=6),
-        _watched("green_lagrange_strain", "", "green_lagrange_strain", components=6),
-        _watched("principal_stress", "kPa", "principal_stress_kpa", components=3),
-        _watched("principal_strain", "", "principal_strain", components=3),
-        _watched("pressure", "kPa", "pressure_kpa"),
+        Field(
+            "von_mises_kpa",
+            "kPa",
+            "von Mises stress at the last time",
+            Place.ELEMENT,
+            _von_mises_at_last_time,
+            stored=Times.LAST,
+        ),
+        _watched(
+            "instantaneous",
+            "kPa",
+            "strain energy density without relaxation",
+            "instantaneous_kpa",
+            sampled=True,
+            exported="sed_instantaneous_kpa",
+        ),
+        _watched(
+            "work", "kPa", "work of the stress per volume", "work_kpa", sampled=True, exported="sed_work_kpa"
+        ),
+        _watched("von_mises", "kPa", "von Mises stress", "von_mises_kpa", sampled=True),
+        _watched(
+            "compressive_strain",
+            "",
+            "largest compressive logarithmic strain",
+            "compressive_strain",
+            sampled=True,
+        ),
+        _watched(
+            "compressive_stress", "kPa", "largest compressive stress", "compressive_stress_kpa", sampled=True
+        ),
+        _watched("stress", "kPa", "Cauchy stress", "stress_kpa", components=6),
+        _watched("strain", "", "logarithmic strain", "strain", components=6),
+        _watched("green_lagrange_strain", "", "Green-Lagrange strain", "green_lagrange_strain", components=6),
+        _watched(
+            "principal_stress",
+            "kPa",
+            "principal Cauchy stresses, smallest first",
+            "principal_stress_kpa",
+            components=3,
+        ),
+        _watched(
+            "principal_strain",
+            "",
+            "principal logarithmic strains, smallest first",
+            "principal_strain",
+            components=3,
+        ),
+        _watched("pressure", "kPa", "mean compressive stress", "pressure_kpa"),
     )
 }
 """All fields by their names."""

@@ -216,6 +216,7 @@ class Touch:
             axis_x_mm=self.at_mm[0],
             direction=rotation_of(self.tilt_deg, self.spin_deg)[:, 1].copy(),
             fields=fields,
+            touch=self,
             **solution,
         )
 

@@ -22,6 +22,7 @@ from fingerpad.skin.section import Section, middle_section
 
 if TYPE_CHECKING:
     from fingerpad.mechanics.press import Deformation
+    from fingerpad.skin.indentation import Touch
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,8 @@ class SkinResponse:
         Named phases of the motion.
     pose : Pose
         How far the indenter has moved aside and turned since first touch, at the last time.
+    touch : Touch, optional
+        What was solved: indenter, motion, tissues.
 
     Raises
     ------
@@ -99,6 +102,7 @@ class SkinResponse:
     deformation: Deformation | None = None
     phases: tuple[Phase, ...] = ()
     pose: Pose = STILL
+    touch: Touch | None = None
 
     def __post_init__(self) -> None:
         declared = {field.name: field for field in stored_fields()}
