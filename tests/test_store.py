@@ -257,6 +257,7 @@ def test_one_declaration_is_stored_loaded_sampled_and_exported(tmp_path, monkeyp
     declared = Field(
         "pore_pressure",
         "kPa",
+        "pressure of the fluid in the pores",
         Place.WATCHED,
         lambda deformation, _: deformation.fields.pressure_kpa,
         stored=Times.ALL,
