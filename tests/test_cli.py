@@ -190,7 +190,7 @@ def test_options_reach_the_run(call, monkeypatch, tmp_path):
 def test_options_reach_the_export(call, monkeypatch, tmp_path):
     exported = []
 
-    def note(touch, folder, format_name, elastic_moduli):
+    def note(folder, touch, format_name, elastic_moduli):
         exported.append((touch, folder, format_name, elastic_moduli))
         return (folder / "touch.pvd",)
 

@@ -794,13 +794,13 @@ def test_an_invalid_job_is_refused_with_its_reason():
 )
 def test_a_touch_is_exported_by_name(tmp_path, format_name, moduli, suffix):
     touch = fp.touch_of(Fingertip(), BALL, fp.RampAndHold(depth_mm=0.4), "trial1", grading=COARSE)
-    (path,) = export_touch(touch, tmp_path, format_name, moduli)
+    (path,) = export_touch(tmp_path, touch, format_name, moduli)
     assert path == tmp_path / f"touch.{suffix}"
     decks = {"abaqus": abaqus_deck, "febio": febio_deck, "calculix": lambda job: calculix_deck(job, moduli)}
     assert path.read_text() == decks[format_name](job_of(touch))
     if format_name != "calculix":
         with pytest.raises(InputError, match=f"elastic_moduli is for calculix, .* not for {format_name}"):
-            export_touch(touch, tmp_path, format_name, "long_term")
+            export_touch(tmp_path, touch, format_name, "long_term")
 
 
 def test_a_touch_becomes_a_job_and_decks():

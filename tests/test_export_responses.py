@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+import fingerpad as fp
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.signals import ResponseMap, SpikeTrains
 from fingerpad.experiments.recording_files import read_recordings
@@ -17,6 +18,15 @@ from fingerpad.experiments.stimuli import read_stimuli
 from fingerpad.export.responses import write_response_csv
 from fingerpad.export.responses_nwb import write_responses_nwb
 from fingerpad.neuron.response_maps import recruitment_rank
+
+TOUCH = fp.Touch(
+    finger=fp.Fingertip(),
+    indenter=fp.Sphere(curvature_per_m=287),
+    stimulus=fp.RampAndHold(depth_mm=0.3),
+    tissues=fp.named_tissues("trial3"),
+    grading=fp.Grading(17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=4.0, stratum_corneum=1, dermis=1, subcutis=1),
+    settings=fp.PressSettings(ramp_steps=2, hold_steps=1),
+)
 
 
 def random_response(columns: int) -> ResponseMap:
@@ -29,13 +39,14 @@ def random_response(columns: int) -> ResponseMap:
         dynamic_rate_hz=generator.exponential(100.0, 40),
         static_rate_hz=generator.exponential(30.0, 40),
         first_spike_latency_ms=[train[0] if train.size else np.nan for train in trains],
+        duration_ms=1000.0,
     )
 
 
 @pytest.mark.parametrize(("columns", "places"), [(2, ["x_mm", "z_mm"]), (3, ["x_mm", "y_mm", "z_mm"])])
 def test_every_number_comes_back_to_the_last_bit(tmp_path, columns, places):
     response = random_response(columns)
-    with open(write_response_csv(response, tmp_path / "deeper" / "map.csv"), encoding="utf-8") as file:
+    with open(write_response_csv(tmp_path / "deeper" / "map.csv", response), encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["receptor"]) for row in rows] == list(range(40))
 
@@ -53,14 +64,14 @@ def test_every_number_comes_back_to_the_last_bit(tmp_path, columns, places):
 
 def test_what_is_no_response_is_refused_and_nothing_is_written(tmp_path):
     with pytest.raises(InputError, match="response must be of type ResponseMap"):
-        write_response_csv([1.0], tmp_path / "map.csv")
+        write_response_csv(tmp_path / "map.csv", [1.0])
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_in_the_way_of_a_folder_is_named(tmp_path):
     (tmp_path / "taken").write_text("")
     with pytest.raises(StoreError, match="taken"):
-        write_response_csv(random_response(2), tmp_path / "taken" / "map.csv")
+        write_response_csv(tmp_path / "taken" / "map.csv", random_response(2))
 
 
 def responses_to_two_touches() -> dict[str, ResponseMap]:
@@ -72,7 +83,7 @@ def responses_to_two_touches() -> dict[str, ResponseMap]:
 def test_a_session_is_read_back_as_recordings_of_every_receptor(tmp_path):
     (tmp_path / "two.csv").write_text("stimulus,indenter\nedge,bar\nflat,bar\n", encoding="utf-8")
     responses = responses_to_two_touches()
-    path = write_responses_nwb(responses, tmp_path / "deeper" / "session.nwb", pause_ms=250.0)
+    path = write_responses_nwb(tmp_path / "deeper" / "session.nwb", responses, pause_ms=250.0)
     assert [entry.name for entry in path.parent.iterdir()] == ["session.nwb"]
     stimuli = read_stimuli(tmp_path / "two.csv")
     receptor = next(n for n in range(40) if all(answer.spikes[n].size > 1 for answer in responses.values()))
@@ -86,7 +97,7 @@ def test_a_session_is_read_back_as_recordings_of_every_receptor(tmp_path):
 def test_a_session_holds_the_positions_of_its_receptors(tmp_path):
     responses = responses_to_two_touches()
     started = datetime(2026, 3, 1, 12, tzinfo=UTC)
-    path = write_responses_nwb(responses, tmp_path / "session.nwb", started=started)
+    path = write_responses_nwb(tmp_path / "session.nwb", responses, started=started)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from pynwb import NWBHDF5IO
@@ -104,19 +115,72 @@ def test_a_session_holds_the_positions_of_its_receptors(tmp_path):
     [
         (lambda touches: {}, {}, "at least one touch"),
         (lambda touches: {**touches, "other": random_response(2)}, {}, "those of 'other' lie elsewhere"),
-        (lambda touches: touches, {"duration_ms": 1.0}, "duration_ms must reach to the last spike"),
+        (lambda touches: touches, {"duration_ms": 1.0}, "duration_ms must reach to the last spike and phase"),
+        (
+            lambda touches: {name: replace(touch, duration_ms=None) for name, touch in touches.items()},
+            {},
+            "duration_ms must be given: the response to 'edge' does not know its own",
+        ),
+        (lambda touches: touches, {"duration_ms": 0.0}, "duration_ms must be greater than 0"),
         (lambda touches: touches, {"pause_ms": -1.0}, "pause_ms must not be negative"),
         (lambda touches: touches, {"started": datetime(2026, 3, 1)}, "started must have a time zone"),
     ],
 )
 def test_a_session_that_cannot_be_is_refused_and_nothing_is_written(tmp_path, change, options, message):
     with pytest.raises(InputError, match=message):
-        write_responses_nwb(change(responses_to_two_touches()), tmp_path / "session.nwb", **options)
+        write_responses_nwb(tmp_path / "session.nwb", change(responses_to_two_touches()), **options)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_missing_library_is_named_with_the_extra_that_brings_it(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pynwb", None)
     with pytest.raises(InputError, match=r"pip install 'fingerpad\[nwb\]'"):
-        write_responses_nwb(responses_to_two_touches(), tmp_path / "session.nwb")
+        write_responses_nwb(tmp_path / "session.nwb", responses_to_two_touches())
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_session_takes_times_from_the_motions(tmp_path):
+    """A sine of 300 ms, then a ramp and hold of force of 150 ms: trials and epochs follow the motions."""
+    motions = {
+        "sine": fp.sine(depth_mm=0.3, amplitude_mm=0.1, frequency_hz=20.0, cycles=2, hold_ms=100.0),
+        "force": fp.ForceRampAndHold(force_mn=20.0, ramp_ms=50.0, hold_ms=100.0),
+    }
+    afferent = fp.Afferent.for_tissues("trial3")
+    population = fp.Population.grid(100.0, rows=1, columns=2, afferent=afferent)
+    responses = {}
+    for name, motion in motions.items():
+        skin = replace(TOUCH, stimulus=motion).solve()
+        windows = [phase.window_ms for phase in (skin.phases[0], skin.phases[-1])]
+        responses[name] = population.respond(skin, *windows)
+    path = write_responses_nwb(tmp_path / "session.nwb", responses, pause_ms=500.0)
+    ends = {name: motion.end_ms for name, motion in motions.items()}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from pynwb import NWBHDF5IO
+
+        with NWBHDF5IO(str(path), mode="r") as file:
+            session = file.read()
+            starts, stops = (1e3 * session.trials[name][:] for name in ("start_time", "stop_time"))
+            onsets = dict(zip(motions, starts, strict=True))
+            epochs = [
+                (1e3 * start, 1e3 * stop, list(tags))
+                for start, stop, tags in zip(
+                    session.epochs["start_time"][:],
+                    session.epochs["stop_time"][:],
+                    session.epochs["tags"][:],
+                    strict=True,
+                )
+            ]
+            spikes = 1e3 * session.units["spike_times"][0]
+    np.testing.assert_allclose(starts, [0.0, ends["sine"] + 500.0])
+    np.testing.assert_allclose(stops - starts, list(ends.values()))
+    expected = [
+        (onsets[name] + phase.start_ms, onsets[name] + phase.end_ms, [phase.name, name])
+        for name, motion in motions.items()
+        for phase in motion.phases
+    ]
+    assert [tags for *_, tags in epochs] == [tags for *_, tags in expected]
+    np.testing.assert_allclose([epoch[:2] for epoch in epochs], [epoch[:2] for epoch in expected])
+    both = [onsets[name] + response.spikes[0] for name, response in responses.items()]
+    assert all(train.size for train in both)
+    np.testing.assert_allclose(spikes, np.concatenate(both))

@@ -14,6 +14,7 @@ from vtkmodules.vtkFiltersVerdict import vtkCellSizeFilter
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 from fingerpad.core.errors import InputError, StoreError
+from fingerpad.export.dataset import read_touch
 from fingerpad.export.formats import FORMATS, export_touch
 from fingerpad.export.vtu import HEXAHEDRON, WEDGE, cells_of, write_vtu_series
 from fingerpad.geometry.fingertip import Fingertip
@@ -162,7 +163,14 @@ def test_without_vtk_nothing_is_pressed(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "vtkmodules.vtkIOXML", None)
     monkeypatch.setattr(Touch, "solve", lambda touch, **_: pytest.fail("the touch was solved for nothing"))
     with pytest.raises(InputError, match="need the package vtk"):
-        export_touch(TOUCH, tmp_path, "vtu")
+        export_touch(tmp_path, TOUCH, "vtu")
+
+
+def test_without_xarray_nothing_is_pressed(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    monkeypatch.setattr(Touch, "solve", lambda touch, **_: pytest.fail("the touch was solved for nothing"))
+    with pytest.raises(InputError, match=r"pip install 'fingerpad\[netcdf\]'"):
+        export_touch(tmp_path, TOUCH, "netcdf")
 
 
 def test_a_folder_that_cannot_be_made_is_named(skin, tmp_path):
@@ -172,24 +180,24 @@ def test_a_folder_that_cannot_be_made_is_named(skin, tmp_path):
 
 
 def test_a_touch_is_exported_by_the_name_of_a_format(files, tmp_path):
-    written = export_touch(TOUCH, tmp_path, "vtu")
+    written = export_touch(tmp_path, TOUCH, "vtu")
     assert written[0] == tmp_path / "touch.pvd"
     assert [path.read_bytes() for path in written[1:]] == [path.read_bytes() for path in files[1:]]
     with pytest.raises(InputError, match="format must be one of vtu"):
-        export_touch(TOUCH, tmp_path, "stl")
+        export_touch(tmp_path, TOUCH, "stl")
 
 
 @pytest.mark.parametrize(("format_name", "file_name"), [("abaqus", "touch.inp"), ("febio", "touch.feb")])
 def test_decks_are_exported_without_a_press(monkeypatch, tmp_path, format_name, file_name):
     monkeypatch.setattr(Touch, "solve", pytest.fail)
-    (written,) = export_touch(TOUCH, tmp_path, format_name)
+    (written,) = export_touch(tmp_path, TOUCH, format_name)
     assert written == tmp_path / file_name
     assert written.stat().st_size > 10_000
     assert format_name in FORMATS
 
 
 def test_table_of_a_touch_has_one_row_per_time_and_loses_no_digit(skin, tmp_path):
-    (written,) = export_touch(TOUCH, tmp_path, "csv")
+    (written,) = export_touch(tmp_path, TOUCH, "csv")
     with written.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     for name in ("times_ms", "force_mn", "depth_mm", "contact_area_mm2", "external_uj", "dissipated_uj"):
@@ -198,8 +206,16 @@ def test_table_of_a_touch_has_one_row_per_time_and_loses_no_digit(skin, tmp_path
         assert [float(row[f"reaction_mn_{name}"]) for row in rows] == skin.reaction_mn[:, axis].tolist()
 
 
+@pytest.mark.parametrize(("format_name", "file_name"), [("netcdf", "touch.nc"), ("zarr", "touch.zarr")])
+def test_a_labelled_data_set_is_exported_with_all_displacements(done, tmp_path, format_name, file_name):
+    assert export_touch(tmp_path, TOUCH, format_name) == (tmp_path / file_name,)
+    np.testing.assert_array_equal(
+        read_touch(tmp_path).displacement_mm, done.displacement_mm.astype(np.float32)
+    )
+
+
 def test_one_file_holds_force_depth_contact_surface_and_energy_density_with_their_mesh(skin, tmp_path):
-    (written,) = export_touch(TOUCH, tmp_path, "npz")
+    (written,) = export_touch(tmp_path, TOUCH, "npz")
     with np.load(written) as file:
         units = json.loads(str(file["units"]))
         assert set(units) == set(skin.fields)

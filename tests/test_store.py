@@ -14,6 +14,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 from fingerpad.core.errors import ConvergenceError, InputError, StoreError
+from fingerpad.export.dataset import touch_dataset
 from fingerpad.export.vtu import write_vtu_series
 from fingerpad.geometry.edged_indenters import Edge
 from fingerpad.geometry.fingertip import Fingertip
@@ -282,6 +283,7 @@ def test_one_declaration_is_stored_loaded_sampled_and_exported(tmp_path, monkeyp
     reader.Update()
     written = vtk_to_numpy(reader.GetOutput().GetCellData().GetArray("pore_pressure_kpa"))
     np.testing.assert_array_equal(written, skin.deformation.fields.pressure_kpa[-1].astype(np.float32))
+    np.testing.assert_array_equal(touch_dataset(back)["pore_pressure"], pressure)
 
 
 def test_fields_that_are_not_declared_or_have_another_shape_are_refused(skin):

@@ -20,7 +20,7 @@ MATERIAL_CHOICES = (
     "wu2007",
     "gerling2014_fit",
 )
-FORMAT_CHOICES = ("vtu", "csv", "npz", "abaqus", "calculix", "febio")
+FORMAT_CHOICES = ("vtu", "csv", "npz", "netcdf", "zarr", "abaqus", "calculix", "febio")
 METHOD_CHOICES = ("least_squares", "response_surface", "closed_form", "cma_es", "likelihood")
 QUANTITY_CHOICES = tuple(sampled_fields())
 KIND_CHOICES = ("force", "deflection", "rate_curvature", "rate_position", "grating")

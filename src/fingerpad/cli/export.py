@@ -67,7 +67,7 @@ def export_command(
     touch = touch_of(Fingertip(), body, motion, materials, resolution)
     make_writable(folder, "FOLDER")
     try:
-        files = export_touch(touch, folder, format_name, elastic_moduli)
+        files = export_touch(folder, touch, format_name, elastic_moduli)
     except KeyboardInterrupt as error:
         typer.echo(
             "fingerpad: stopped. Files that exist are complete; the others were not written.", err=True

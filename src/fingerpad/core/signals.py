@@ -364,6 +364,10 @@ class ResponseMap:
         Firing rates in the two windows, Eqs. 6-10; 0 without an interval. [spikes/s]
     first_spike_latency_ms : array (n_receptors,)
         Time of the first spike after onset; NaN without a spike. [ms]
+    duration_ms : float, optional
+        How long the touch lasted, if that is known. [ms]
+    phases : tuple of Phase
+        Named parts of the touch.
     """
 
     positions_mm: FloatArray
@@ -372,8 +376,12 @@ class ResponseMap:
     dynamic_rate_hz: FloatArray
     static_rate_hz: FloatArray
     first_spike_latency_ms: FloatArray
+    duration_ms: float | None = None
+    phases: tuple[Phase, ...] = ()
 
     def __post_init__(self) -> None:
+        if self.duration_ms is not None:
+            positive("duration_ms", self.duration_ms, "ms")
         positions = float_array("positions_mm", self.positions_mm, 2)
         if positions.shape[1] not in (2, 3):
             raise InputError(

@@ -10,11 +10,13 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
 from fingerpad.export.abaqus import abaqus_deck
 from fingerpad.export.calculix import calculix_deck
+from fingerpad.export.dataset import require_netcdf, write_touch
 from fingerpad.export.febio import febio_deck
 from fingerpad.export.job import Job, job_of
 from fingerpad.export.tables import write_touch_csv, write_touch_npz
 from fingerpad.export.vtu import require_vtk, write_vtu_series
 from fingerpad.skin.indentation import Touch
+from fingerpad.skin.sampling import SkinResponse
 
 DECKS: dict[str, tuple[str, Callable[[Job], str]]] = {
     "abaqus": ("touch.inp", abaqus_deck),
@@ -23,23 +25,32 @@ DECKS: dict[str, tuple[str, Callable[[Job], str]]] = {
 }
 """Name of the input file of each solver, and the function that returns its text."""
 
-TABLES = {"csv": write_touch_csv, "npz": write_touch_npz}
-"""Functions that write the result of a touch as one file."""
+RESULTS: dict[str, tuple[str, Callable[[Path, SkinResponse], tuple[Path, ...]]]] = {
+    "vtu": ("touch.pvd", write_vtu_series),
+    "csv": ("touch.csv", write_touch_csv),
+    "npz": ("touch.npz", write_touch_npz),
+    "netcdf": ("touch.nc", write_touch),
+    "zarr": ("touch.zarr", write_touch),
+}
+"""Name of the file that holds the result of a touch, and the function that writes it."""
 
-FORMATS = ("vtu", *TABLES, *DECKS)
+REQUIRED = {"vtu": require_vtk, "netcdf": require_netcdf, "zarr": require_netcdf}
+"""Formats that hold all nodes and elements over time, and what raises if their library is missing."""
+
+FORMATS = (*RESULTS, *DECKS)
 
 
 def export_touch(
-    touch: Touch, folder: Path, format_name: str, elastic_moduli: str | None = None
+    folder: Path, touch: Touch, format_name: str, elastic_moduli: str | None = None
 ) -> tuple[Path, ...]:
     """Write an indentation for another program.
 
     Parameters
     ----------
-    touch : Touch
-        The indentation to export; "vtu", "csv" and "npz" also solve it.
     folder : Path
         Folder for the files; it is created if needed.
+    touch : Touch
+        The indentation to export; all but the input files of solvers also solve it.
     format_name : str
         One of `FORMATS`.
     elastic_moduli : {"long_term", "instantaneous"}, optional
@@ -60,11 +71,11 @@ def export_touch(
         raise InputError(
             f"elastic_moduli is for calculix, which has no relaxation, not for {format_name}: leave it out."
         )
-    if format_name == "vtu":
-        require_vtk()  # first, since solving takes its time
-        return write_vtu_series(Path(folder) / "touch.pvd", touch.solve(whole=True))
-    if format_name in TABLES:
-        return TABLES[format_name](Path(folder) / f"touch.{format_name}", touch.solve())
+    if format_name in RESULTS:
+        if whole := format_name in REQUIRED:
+            REQUIRED[format_name]()  # first, since solving takes its time
+        name, write = RESULTS[format_name]
+        return write(Path(folder) / name, touch.solve(whole=whole))
     name, deck = DECKS[format_name]
     job, path = job_of(touch), Path(folder) / name
     text = deck(job) if elastic_moduli is None else calculix_deck(job, elastic_moduli)

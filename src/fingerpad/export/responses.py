@@ -27,7 +27,7 @@ ANSWERS = (
 """Columns of the response of a receptor."""
 
 
-def write_response_csv(response: ResponseMap, path: Path) -> Path:
+def write_response_csv(path: Path, response: ResponseMap) -> Path:
     """Write one row per receptor: position, rates, latency of the first spike, and all spike times.
 
     Spike times are one entry, separated by spaces, as `fingerpad fit` reads them. A value that does not
@@ -36,10 +36,10 @@ def write_response_csv(response: ResponseMap, path: Path) -> Path:
 
     Parameters
     ----------
-    response : ResponseMap
-        Responses of a population to one indentation.
     path : Path
         The file, in UTF-8, written as a whole; folders are created if needed.
+    response : ResponseMap
+        Responses of a population to one indentation.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def write_response_csv(response: ResponseMap, path: Path) -> Path:
     >>> trains = SpikeTrains.from_lists([[12.5, 40.0], []])
     >>> response = ResponseMap([[17.0, 0.5], [17.0, 1.5]], 1.0, trains, [36.4, 0], [0, 0], [12.5, np.nan])
     >>> with TemporaryDirectory() as folder:
-    ...     print(write_response_csv(response, Path(folder) / "response.csv").read_text(encoding="utf-8"))
+    ...     print(write_response_csv(Path(folder) / "response.csv", response).read_text(encoding="utf-8"))
     receptor,x_mm,z_mm,dynamic_rate_hz,static_rate_hz,first_spike_latency_ms,recruitment_rank,spike_times_ms
     0,17.0,0.5,36.4,0.0,12.5,1.0,12.5 40.0
     1,17.0,1.5,0.0,0.0,,,

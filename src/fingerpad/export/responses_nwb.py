@@ -17,35 +17,32 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
 from fingerpad.core.signals import ResponseMap
 from fingerpad.core.units import MS_PER_S
-from fingerpad.data import protocol
 from fingerpad.export.responses import PLACES
-
-DURATION_MS = protocol.RAMP.value + protocol.HOLD.value
 
 
 def write_responses_nwb(
-    responses: Mapping[str, ResponseMap],
     path: Path,
-    duration_ms: float = DURATION_MS,
+    responses: Mapping[str, ResponseMap],
+    duration_ms: float | None = None,
     pause_ms: float = 1000.0,
     started: datetime | None = None,
 ) -> Path:
-    """Write a session: one trial per indentation, one unit per receptor.
+    """Write a session: one trial per touch, one epoch per phase of its motion, one unit per receptor.
 
-    The column `stimulus` of the trials holds the name of the indentation; a unit has its position and all its
-    spike times. `fingerpad fit` reads the file like recordings, one unit at a time. The extra
-    `fingerpad[nwb]` is required.
+    The column `stimulus` of the trials holds the name of the touch, the tags of an epoch are the names of the
+    phase and of the touch; a unit has its position and all its spike times. `fingerpad fit` reads the file
+    like recordings, one unit at a time. The extra `fingerpad[nwb]` is required.
 
     Parameters
     ----------
-    responses : mapping of str to ResponseMap
-        Responses of the same receptors, by the names of the indentations.
     path : Path
         The file, written as a whole; folders are created if needed.
+    responses : mapping of str to ResponseMap
+        Responses of the same receptors, by the names of the touches. Each lasts as long as its motion.
     duration_ms : float, optional
-        Duration of each indentation. [ms]
+        Duration of all touches, for responses that do not know their own. [ms]
     pause_ms : float, optional
-        From the end of an indentation to the onset of the next. [ms]
+        From the end of a touch to the onset of the next. [ms]
     started : datetime, optional
         Begin of the session, with its time zone. Default: now.
 
@@ -68,24 +65,28 @@ def write_responses_nwb(
     >>> trains = SpikeTrains.from_lists([[12.5, 40.0], []])
     >>> response = ResponseMap([[17.0, 0.5], [17.0, 1.5]], 1.0, trains, [36.4, 0], [0, 0], [12.5, np.nan])
     >>> with TemporaryDirectory() as folder:
-    ...     write_responses_nwb({"ball": response}, Path(folder) / "session.nwb").name
+    ...     write_responses_nwb(Path(folder) / "session.nwb", {"ball": response}, 1000.0).name
     'session.nwb'
     """
-    positive("duration_ms", duration_ms, "ms")
     not_negative("pause_ms", pause_ms, "ms")
     began = started or datetime.now(UTC)
     if began.tzinfo is None:
         raise InputError(f"started must have a time zone, such as datetime.UTC: got {began.isoformat()}.")
-    positions_mm = _places(responses, duration_ms)
-    onsets_ms = np.arange(len(responses)) * (duration_ms + pause_ms)
+    positions_mm, durations_ms = _places(responses), _durations(responses, duration_ms)
+    onsets_ms = np.cumsum(durations_ms + pause_ms) - durations_ms - pause_ms
     # Warnings of the library do not concern the content of the file.
     with warnings.catch_warnings(), TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
         pynwb = _pynwb()
         session = pynwb.NWBFile(f"simulated by fingerpad {__version__}", Path(path).stem, began)
         session.add_trial_column("stimulus", "name of the touch")
-        for name, onset_ms in zip(responses, onsets_ms, strict=True):
-            session.add_trial(onset_ms / MS_PER_S, (onset_ms + duration_ms) / MS_PER_S, stimulus=name)
+        for (name, answer), onset_ms, lasts_ms in zip(
+            responses.items(), onsets_ms, durations_ms, strict=True
+        ):
+            session.add_trial(onset_ms / MS_PER_S, (onset_ms + lasts_ms) / MS_PER_S, stimulus=name)
+            for phase in answer.phases:
+                start, end = ((onset_ms + time_ms) / MS_PER_S for time_ms in phase.window_ms)
+                session.add_epoch(start, end, tags=[phase.name, name])
         columns = PLACES[positions_mm.shape[1]]
         for column in columns:
             session.add_unit_column(column, f"{column[0]} of the receptor on the undeformed skin, in mm")
@@ -104,7 +105,7 @@ def write_responses_nwb(
     return Path(path)
 
 
-def _places(responses: Mapping[str, ResponseMap], duration_ms: float) -> np.ndarray:
+def _places(responses: Mapping[str, ResponseMap]) -> np.ndarray:
     """Places of the receptors, after a check that all touches have the same ones. [mm]"""
     if not responses:
         raise InputError("responses must hold at least one touch: it is empty.")
@@ -113,13 +114,27 @@ def _places(responses: Mapping[str, ResponseMap], duration_ms: float) -> np.ndar
         instance(f"responses[{name!r}]", response, ResponseMap)
         if not np.array_equal(response.positions_mm, first.positions_mm):
             raise InputError(f"responses must come from the same receptors: those of {name!r} lie elsewhere.")
-        latest_ms = response.spikes.times_ms.max(initial=0.0)
-        if latest_ms > duration_ms:
-            raise InputError(
-                f"duration_ms must reach to the last spike, at {latest_ms:g} ms under {name!r}: got "
-                f"{duration_ms:g} ms."
-            )
     return first.positions_mm
+
+
+def _durations(responses: Mapping[str, ResponseMap], duration_ms: float | None) -> np.ndarray:
+    """Duration of each touch, after a check that its spikes lie within. [ms]"""
+    durations_ms = []
+    for name, response in responses.items():
+        lasts_ms = response.duration_ms if duration_ms is None else duration_ms
+        if lasts_ms is None:
+            raise InputError(f"duration_ms must be given: the response to {name!r} does not know its own.")
+        positive("duration_ms", lasts_ms, "ms")
+        latest_ms = max(
+            response.spikes.times_ms.max(initial=0.0), *(phase.end_ms for phase in response.phases), 0.0
+        )
+        if latest_ms > lasts_ms:
+            raise InputError(
+                f"duration_ms must reach to the last spike and phase, at {latest_ms:g} ms under {name!r}: "
+                f"got {lasts_ms:g} ms."
+            )
+        durations_ms.append(lasts_ms)
+    return np.array(durations_ms)
 
 
 def _pynwb() -> Any:

@@ -244,4 +244,6 @@ class Population:
             dynamic_rate_hz=firing_rate_hz(spikes, dynamic),
             static_rate_hz=firing_rate_hz(spikes, static),
             first_spike_latency_ms=first_spike_latency_ms(spikes),
+            duration_ms=float(sed.times_ms[-1]),
+            phases=sed.phases,
         )
