@@ -11,7 +11,7 @@ from studies.pages.markdown import markdown_table as table
 
 INTRODUCTION = """# Command line
 
-`fingerpad` has five commands. The option `--help` of each shows the same text.
+`fingerpad` has six commands. The option `--help` of each shows the same text.
 `make reproduce ARGS="--resolution quick"` runs `fingerpad reproduce` in the environment of the repository.
 `python -m studies results` writes this page.
 """
@@ -21,6 +21,7 @@ GUIDES = {
     "discriminate": "Format and results: [discriminate.md](discriminate.md).",
     "validate": "Format and scores: [validate.md](validate.md).",
     "export": "What is exported: [mechanics.md](mechanics.md#export).",
+    "view": "Pictures and films: [view.md](view.md).",
     "reproduce": "Results of a run: [results.md](results.md).",
 }
 """Pages that explain a command."""

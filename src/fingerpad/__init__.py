@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     )
     from fingerpad.core.phases import Phase
     from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
+    from fingerpad.export.dataset import read_touch, touch_dataset, write_touch
+    from fingerpad.export.view import save_view
     from fingerpad.geometry.dots import Dots, braille
     from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
     from fingerpad.geometry.fingertip import Fingertip
@@ -106,19 +108,25 @@ __all__ = [
     "chirp",
     "indent",
     "named_tissues",
+    "read_touch",
     "read_trajectory",
     "reduced",
     "repeated",
     "sampled",
     "save_figure",
+    "save_view",
     "sine",
     "staircase",
     "stroke",
+    "touch_dataset",
     "touch_of",
+    "write_touch",
 ]
 
 _HOMES = {
     "geometry.dots": ("Dots", "braille"),
+    "export.dataset": ("read_touch", "touch_dataset", "write_touch"),
+    "export.view": ("save_view",),
     "neuron.afferent": ("Afferent",),
     "geometry.edged_indenters": ("Edge", "Gap", "Grating"),
     "core.errors": (

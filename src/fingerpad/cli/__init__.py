@@ -1,4 +1,4 @@
-"""The command line: `reproduce`, `fit`, `discriminate`, `validate` and `export`."""
+"""The command line: `reproduce`, `fit`, `discriminate`, `validate`, `export` and `view`."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from fingerpad.cli.fit import fit_command
 from fingerpad.cli.options import Command
 from fingerpad.cli.reproduce import reproduce_command
 from fingerpad.cli.validate import validate_command
+from fingerpad.cli.view import view_command
 from fingerpad.core.errors import FingerpadError
 
 # What a command runs is imported where it runs: help and version need none of it and come at once.
@@ -53,6 +54,7 @@ app.command("fit", cls=Command)(fit_command)
 app.command("discriminate", cls=Command)(discriminate_command)
 app.command("validate", cls=Command)(validate_command)
 app.command("export", cls=Command)(export_command)
+app.command("view", cls=Command)(view_command)
 
 
 def main() -> None:

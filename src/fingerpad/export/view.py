@@ -1,0 +1,542 @@
+"""A touch in three dimensions and through time: finger, object, field and afferents.
+
+The picture is drawn from the labelled data set of `fingerpad.export.dataset`, in memory or from a file.
+PyVista renders it without a window, in parallel projection, so that lengths can be measured; Matplotlib adds
+the colour bar, three arrows of known length, afferents, motion and spikes. A field of elements is shown on
+the plane of symmetry, one of the skin from below, through the object. The extra `fingerpad[view]` is needed.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import matplotlib
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Colormap, LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from PIL import Image
+from scipy.spatial import cKDTree
+
+from fingerpad.core.checks import FloatArray, finite, one_of, whole
+from fingerpad.core.errors import InputError
+from fingerpad.core.files import write_atomically
+from fingerpad.export.dataset import check_touch, read_touch, spike_trains
+from fingerpad.report.style import BLACK, BLUE, STYLE, new_figure, say_nothing_to_draw
+from fingerpad.report.touch import BONE, DECADES, SKIN
+
+if TYPE_CHECKING:
+    import xarray
+
+SHORT_NAMES = {
+    "sed": "sed_kpa",
+    "displacement": "displacement_mm",
+    "pressure": "contact_pressure_kpa",
+    "shear": "shear_kpa",
+    "slip": "slip_mm",
+}
+"""Short names of fields; any other variable at nodes or elements goes by its own."""
+
+SUFFIXES = (".png", ".gif", ".mp4")
+
+RECENT_MS = 25.0
+"""An afferent is drawn dark if it fired a spike at most so long ago. [ms]"""
+
+THICKNESS_MM = 3.0
+"""How much of the object is drawn behind the foremost point of its face. [mm]"""
+
+ARROW_MM = 5.0
+"""Length of the three arrows that give the scale. [mm]"""
+
+FRAMES_PER_S = 12
+PIXELS, VIEW_HEIGHT_MM = (1240, 820), 22.5
+OBJECT, NAIL = "#8fa3b5", "#e6e0b8"
+
+_NAIL_MM = 0.6
+_ON_PLANE_MM = 1e-6
+_FROM_THE_SIDE = (np.array([0.35, -0.5, 1.0]), np.array([0.0, 1.0, 0.0]))
+"""Offset of the camera and its upward direction where the plane of symmetry is shown."""
+_FROM_BELOW = (np.array([0.10, -1.0, -0.22]), np.array([0.0, 0.0, 1.0]))
+"""The same where the skin is shown."""
+
+
+def save_view(
+    path: str | Path,
+    touch: xarray.Dataset | str | Path,
+    *,
+    field: str = "sed",
+    time_ms: float | None = None,
+    frames: int = 40,
+) -> tuple[Path, ...]:
+    """Draw a touch in three dimensions: a picture at one time, or a film.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file: .png, .gif, or .mp4, which the program ffmpeg has to be installed for.
+    touch : xarray.Dataset, str or Path
+        From `touch_dataset`, or what `write_touch` wrote.
+    field : str
+        "sed", "displacement" (on the plane of symmetry), "pressure", "shear", "slip" (on the skin), or the
+        name of another variable at nodes or elements. Of a vector its length is shown.
+    time_ms : float, optional
+        Time of a picture; by default that of the largest depth. [ms]
+    frames : int
+        Number of pictures of a film. They follow the steps of the press, which are short where much happens.
+
+    Returns
+    -------
+    tuple of Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If a library is missing, the ending, field or time is unknown, or the inside is to be shown at a time
+        at which the data set does not have it.
+    StoreError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> import fingerpad as fp
+    >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(287), fp.RampAndHold(depth_mm=0.5), whole=True)
+    >>> (picture,) = save_view(Path(mkdtemp()) / "touch.png", fp.touch_dataset(skin), time_ms=50.0)
+    >>> picture.name
+    'touch.png'
+    """
+    path = Path(path)
+    one_of("ending of the file", path.suffix.lower(), SUFFIXES)
+    film = path.suffix.lower() != ".png"
+    if film and time_ms is not None:
+        raise InputError(f"time_ms belongs to a picture: leave it out for {path.name}, or write a .png.")
+    if path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
+        raise InputError("A film as .mp4 needs the program ffmpeg, which is not installed: write a .gif.")
+    require_pyvista()
+    if isinstance(touch, str | Path):
+        data = read_touch(touch)
+    else:
+        check_touch("touch", touch)
+        data = touch
+    view = _View(data, _variable(data, field))
+    if not film:
+        write_atomically(path, view.png(view.checked(_deepest_ms(data) if time_ms is None else time_ms)))
+        return (path,)
+    times = data["time"].values
+    steps = np.linspace(0.0, times.size - 1.0, whole("frames", frames, at_least=2))
+    shown = np.interp(steps, np.arange(times.size), times)
+    view.checked(float(times[0]))
+    pictures = (Image.open(io.BytesIO(view.png(float(time)))).convert("RGB") for time in shown)
+    write_atomically(path, _gif(pictures) if path.suffix.lower() == ".gif" else _mp4(pictures))
+    return (path,)
+
+
+def require_pyvista() -> None:
+    """Raise `InputError` if PyVista is not installed."""
+    _pyvista()
+
+
+def fields_of(data: xarray.Dataset) -> tuple[str, ...]:
+    """Names of the fields of a data set that can be shown, short ones where there are."""
+    short = {name: alias for alias, name in SHORT_NAMES.items()}
+    return tuple(short.get(str(name), str(name)) for name in data.data_vars if _can_be_shown(data[name]))
+
+
+def _can_be_shown(values: xarray.DataArray) -> bool:
+    dims = [str(name) for name in values.dims if name != "time"]
+    return dims in (["node", "axis"], ["node"], ["element"], ["skin_node"], ["skin_node", "axis"]) and (
+        str(values.name) not in ("node_mm", "layer")
+    )
+
+
+def _variable(data: xarray.Dataset, field: str) -> str:
+    """Name of the variable of a field."""
+    one_of("field", field, tuple(dict.fromkeys([*fields_of(data), *SHORT_NAMES.values()])))
+    return SHORT_NAMES.get(field, field) if field not in data else field
+
+
+def _deepest_ms(data: xarray.Dataset) -> float:
+    return float(data["time"].values[data["depth_mm"].values.argmax()])
+
+
+@dataclass(frozen=True)
+class _View:
+    """A data set and the variable of it that is shown."""
+
+    data: xarray.Dataset
+    variable: str
+
+    def checked(self, time_ms: float) -> float:
+        """Return a time at which the touch can be shown."""
+        times = self.data["time"].values
+        if not 0.0 <= finite("time_ms", time_ms, "ms") <= times[-1]:
+            raise InputError(f"time_ms must lie within 0 ... {times[-1]:g} ms: got {time_ms:g} ms.")
+        lacking = [
+            name
+            for name in {self.variable, *(() if self.on_skin else ("displacement_mm",))}
+            if "time" not in self.data[name].dims
+        ]
+        if lacking and time_ms != times[-1]:
+            raise InputError(
+                f"{lacking[0]} is known at {times[-1]:g} ms only: choose that time, pressure, shear or slip, "
+                "or write the touch after solving it with whole=True."
+            )
+        return time_ms
+
+    @property
+    def on_skin(self) -> bool:
+        """Whether the field belongs to the skin."""
+        return "skin_node" in self.data[self.variable].dims
+
+    @property
+    def _half(self) -> bool:
+        return bool(self.data.attrs["half_finger"])
+
+    @cached_property
+    def norm(self) -> Normalize:
+        """Scale of the field, one for all times; energies span orders of magnitude."""
+        values = self.data[self.variable]
+        vector = "axis" in values.dims
+        largest = float((np.linalg.norm(values, axis=-1) if vector else np.abs(values)).max())
+        if largest <= 0.0:
+            return Normalize(0.0, 1.0)
+        if self.variable.startswith("sed"):
+            return LogNorm(largest / 10.0**DECADES, largest)
+        return Normalize(0.0, largest)
+
+    @property
+    def colours(self) -> Colormap:
+        """Colours, from pale to dark."""
+        return SKIN
+
+    def at(self, name: str, time_ms: float) -> FloatArray:
+        """Values of a variable at a time, linear between those that were solved."""
+        values = self.data[name]
+        if "time" not in values.dims:
+            return np.asarray(values.values, dtype=np.float64)
+        times = self.data["time"].values
+        later = int(np.clip(np.searchsorted(times, time_ms), 1, times.size - 1))
+        share = (time_ms - times[later - 1]) / (times[later] - times[later - 1])
+        return (1.0 - share) * values.values[later - 1] + share * values.values[later]
+
+    @cached_property
+    def _plotter(self) -> Any:
+        return _pyvista().Plotter(off_screen=True, window_size=PIXELS)
+
+    @cached_property
+    def _camera(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Focal point, unit offset of the camera, and upward direction."""
+        offset, up = _FROM_BELOW if self.on_skin else _FROM_THE_SIDE
+        points = self.data["node_mm"].values
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        focus = np.array([middle[0], middle[1] - (0.0 if self.on_skin else 3.0), 0.0])
+        return focus, offset / np.linalg.norm(offset), up
+
+    def _screen(self, vectors: FloatArray) -> FloatArray:
+        """Vectors of the finger's frame [mm] on the picture, right and down, in pixels."""
+        _, offset, up = self._camera
+        right = np.cross(up, offset)
+        right /= np.linalg.norm(right)
+        return vectors @ np.column_stack([right, np.cross(right, offset)]) * PIXELS[1] / VIEW_HEIGHT_MM
+
+    def _spots(self, points: FloatArray) -> FloatArray:
+        """Points of the finger's frame [mm] on the picture, from its upper left corner, in pixels."""
+        return self._screen(points - self._camera[0]) + 0.5 * np.array(PIXELS)
+
+    def png(self, time_ms: float) -> bytes:
+        """Render the picture of a time."""
+        buffer = io.BytesIO()
+        with matplotlib.rc_context(STYLE):
+            self.figure(time_ms).savefig(buffer, format="png", metadata={"Software": None})
+        return buffer.getvalue()
+
+    def scene(self, time_ms: float) -> np.ndarray:
+        """Render finger, object and afferents, (height, width, 3)."""
+        plotter = self._plotter
+        plotter.clear_actors()
+        plotter.set_background("white")
+        self._add_finger(plotter, time_ms)
+        if "object_front_mm" in self.data:
+            solid = self._object(time_ms)
+            plotter.add_mesh(
+                solid, color=OBJECT, opacity=0.16 if self.on_skin else 1.0, smooth_shading=False, specular=0.1
+            )
+        focus, offset, up = self._camera
+        plotter.camera.parallel_projection = True
+        plotter.camera.focal_point = focus
+        plotter.camera.position = focus + 100.0 * offset
+        plotter.camera.up = up
+        plotter.camera.parallel_scale = VIEW_HEIGHT_MM / 2
+        plotter.renderer.ResetCameraClippingRange()
+        return np.asarray(plotter.screenshot(return_img=True))
+
+    def _add_finger(self, plotter: Any, time_ms: float) -> None:
+        pyvista = _pyvista()
+        data, points = self.data, self.data["node_mm"].values.copy()
+        shades = {"cmap": self.colours, "clim": (self.norm.vmin, self.norm.vmax), "show_scalar_bar": False,
+                  "log_scale": isinstance(self.norm, LogNorm), "ambient": 0.35, "diffuse": 0.7}  # fmt: skip
+        values = self.at(self.variable, time_ms)
+        values = np.linalg.norm(values, axis=-1) if "axis" in data[self.variable].dims else values
+        if self.on_skin:
+            skin_nodes = data["skin_node"].values
+            points[skin_nodes] += self.at("skin_displacement_mm", time_ms)
+            shown = np.zeros(len(points))
+            shown[skin_nodes] = values
+            skin = pyvista.PolyData.from_regular_faces(points, data["facet_nodes"].values)
+            skin.point_data["shown"] = shown
+            for each in [skin, self._mirrored(skin)] if self._half else [skin]:
+                plotter.add_mesh(
+                    each, scalars="shown", smooth_shading=True, split_sharp_edges=False, **shades
+                )
+        else:
+            points += self.at("displacement_mm", time_ms)
+            bricks = data["element_nodes"].values
+            body = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: bricks}, points)
+            by_node = "node" in data[self.variable].dims
+            (body.point_data if by_node else body.cell_data)["shown"] = values
+            body = (
+                self._mirrored(body) if self._half else body.clip("z", origin=(0.0, 0.0, 0.0), crinkle=False)
+            )
+            plotter.add_mesh(body.extract_surface(algorithm="dataset_surface"), scalars="shown", **shades)
+            plotter.add_mesh(self._bone(points), color=BONE, ambient=0.4)
+        nail = self._nail(points)
+        sides = [nail, self._mirrored(nail)] if self._half else [nail]
+        for each in sides if self.on_skin else [self._mirrored(nail) if self._half else nail.clip("z")]:
+            plotter.add_mesh(each, color=NAIL, ambient=0.3)
+
+    @staticmethod
+    def _mirrored(mesh: Any) -> Any:
+        copied = mesh.copy()
+        copied.points[:, 2] *= -1.0
+        return copied
+
+    def _nail(self, points: FloatArray) -> Any:
+        """Plate on the faces of the skin that are held by the nail."""
+        faces = self.data["facet_nodes"].values
+        held = np.isin(faces, self.data["nail"].values).all(axis=1)
+        plate = _pyvista().PolyData.from_regular_faces(points, faces[held])
+        return plate.extrude((0.0, _NAIL_MM, 0.0), capping=True)
+
+    def _bone(self, points: FloatArray) -> Any:
+        """Section of the bone on the plane of symmetry."""
+        section = points[self.data["bone"].values]
+        section = section[np.abs(section[:, 2]) < _ON_PLANE_MM][:, :2]
+        around = section - section.mean(axis=0)
+        section = section[np.argsort(np.arctan2(around[:, 1], around[:, 0]))]
+        flat = np.column_stack([section, np.zeros(len(section))])
+        return _pyvista().PolyData(flat, faces=[len(flat), *range(len(flat))]).triangulate()
+
+    def _object(self, time_ms: float) -> Any:
+        """Object as a solid behind its face, on the plane of symmetry cut in two."""
+        data = self.data
+        x, z = data["object_x"].values[::2], data["object_z"].values[::2]
+        front = np.nan_to_num(data["object_front_mm"].values[::2, ::2], nan=-np.inf)
+        floor = float(front.max()) - THICKNESS_MM
+        top = np.maximum(front, floor)
+        heights = np.stack([np.full_like(top, floor), top], axis=-1)
+        grid = np.stack(
+            [
+                np.broadcast_to(x[:, None, None], heights.shape),
+                heights,
+                np.broadcast_to(z[None, :, None], heights.shape),
+            ],
+            axis=-1,
+        )
+        axes = self.at("object_axes", time_ms)
+        placed = grid @ axes.T + self.at("object_tip_mm", time_ms)
+        solid = _pyvista().StructuredGrid(*np.moveaxis(placed, -1, 0))
+        high = np.maximum.reduce([top[:-1, :-1], top[1:, :-1], top[:-1, 1:], top[1:, 1:]]) > floor
+        solid = solid.extract_cells(np.flatnonzero(high.ravel(order="F")))
+        if not self.on_skin:
+            solid = solid.clip("z", origin=(0.0, 0.0, 0.0))
+        return solid.extract_surface(algorithm="dataset_surface")
+
+    @cached_property
+    def _sites(self) -> tuple[FloatArray, np.ndarray]:
+        """Points of the undeformed skin above the receptors, and the face of the skin that each lies on."""
+        data = self.data
+        corners = data["node_mm"].values[data["facet_nodes"].values]
+        middles = corners.mean(axis=1)
+        receptors = data["receptor_mm"].values
+        mirrored = receptors * ([1.0] * (receptors.shape[1] - 1) + [-1.0 if self._half else 1.0])
+        side = np.where(self._half & (receptors[:, -1] < 0.0), -1.0, 1.0)
+        target = np.where((side < 0.0)[:, None], mirrored, receptors)
+        volar = np.arange(len(middles))
+        if receptors.shape[1] == 2:
+            normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+            volar = np.flatnonzero(normal[:, 1] < 0.0)
+        columns = [0, 2] if receptors.shape[1] == 2 else [0, 1, 2]
+        facets = volar[cKDTree(middles[volar][:, columns]).query(target)[1]]
+        points = middles[facets].copy()
+        points[:, columns] = target
+        points[:, 2] *= side
+        return points, facets
+
+    def _draw_afferents(self, axes: Any, time_ms: float) -> None:
+        """Draw the skin above each receptor, on the near half, through what is before it."""
+        if "receptor_mm" not in self.data:
+            return
+        data, (points, facets) = self.data, self._sites
+        moved = np.zeros_like(data["node_mm"].values)
+        moved[data["skin_node"].values] = self.at("skin_displacement_mm", time_ms)
+        shift = moved[data["facet_nodes"].values[facets]].mean(axis=1)
+        shift[:, 2] *= np.where(self._half & (points[:, 2] < 0.0), -1.0, 1.0)
+        near = np.ones(len(points), dtype=bool) if self.on_skin else points[:, 2] <= _ON_PLANE_MM
+        spots = self._spots((points + shift)[near])
+        colours = np.where(self._fires(time_ms)[near], BLACK, "white")
+        axes.scatter(*spots.T, s=8.0 if self.on_skin else 14.0, c=colours, edgecolors=BLACK, linewidths=0.7)
+
+    def _fires(self, time_ms: float) -> np.ndarray:
+        """Which receptors fired a spike within `RECENT_MS`, bool (n_receptors,)."""
+        recent = [(train <= time_ms) & (train > time_ms - RECENT_MS) for train in self._trains]
+        return np.array([spikes.any() for spikes in recent])
+
+    @property
+    def _trains(self) -> list[FloatArray]:
+        trains = spike_trains(self.data)
+        return [trains[receptor] for receptor in range(len(trains))]
+
+    def figure(self, time_ms: float) -> Figure:
+        """Draw the scene with colour bar, scale, motion and spikes."""
+        figure = new_figure(9.6, 4.4)
+        grid = figure.add_gridspec(2, 2, width_ratios=(2.1, 1.0), height_ratios=(1.0, 1.6))
+        scene = figure.add_subplot(grid[:, 0])
+        scene.imshow(self.scene(time_ms), interpolation="antialiased")
+        scene.autoscale(enable=False)
+        scene.set_axis_off()
+        self._draw_arrows(scene)
+        self._draw_names(scene, time_ms)
+        self._draw_afferents(scene, time_ms)
+        values = self.data[self.variable]
+        vector = " (length)" if "axis" in values.dims else ""
+        bar = figure.colorbar(
+            ScalarMappable(self.norm, self.colours), ax=scene, orientation="horizontal", shrink=0.6,
+            aspect=30, pad=0.01, extend="min" if isinstance(self.norm, LogNorm) else "neither",
+        )  # fmt: skip
+        bar.set_label(f"{values.long_name}{vector} [{_printed(values.units)}]")
+        bar.ax.xaxis.set_major_formatter("{x:g}")
+        motion = figure.add_subplot(grid[0, 1])
+        motion.plot(self.data["time"], self.data["depth_mm"], color=BLUE)
+        motion.set(ylabel="depth [mm]", title=f"{time_ms:.0f} ms")
+        motion.tick_params(labelbottom=False)
+        spikes = figure.add_subplot(grid[1, 1], sharex=motion)
+        self._draw_spikes(spikes)
+        for axes in (motion, spikes):
+            axes.axvline(time_ms, color=BLACK, linewidth=1.0, linestyle=":")
+            axes.grid(visible=False)
+        return figure
+
+    def _draw_arrows(self, axes: Any) -> None:
+        """Three arrows of `ARROW_MM` along the axes of the finger: the scale of the picture."""
+        start = np.array([0.03, 0.90]) * PIXELS
+        arrow = {"arrowstyle": "-|>", "color": BLACK, "shrinkA": 0, "shrinkB": 0}
+        vectors = self._screen(ARROW_MM * np.eye(3))
+        for label, vector in zip(("distal", "dorsal", "lateral"), vectors, strict=True):
+            if np.linalg.norm(vector) < 0.05 * PIXELS[0]:
+                continue  # it points at the camera
+            axes.annotate("", start + vector, start, arrowprops=arrow)
+            axes.annotate(label, start + vector, fontsize=7.5, ha="left", va="bottom", color=BLACK)
+        below = start + np.array([0.0, 0.055 * PIXELS[1]])
+        axes.annotate(f"arrows: {ARROW_MM:g} mm", below, fontsize=8.0, color=BLACK)
+
+    def _draw_names(self, axes: Any, time_ms: float) -> None:
+        """Name bone, nail and object where they are seen."""
+        data, places = self.data, {}
+        if not self.on_skin:
+            for name, beside in (("bone", [0.0, 0.0, 0.0]), ("nail", [0.0, 1.8, 0.0])):
+                nodes = data["node_mm"].values[data[name].values]
+                places[name] = 0.5 * (nodes.min(axis=0) + nodes.max(axis=0)) * [1.0, 1.0, 0.0] + beside
+        if "object_tip_mm" in data and "indenter" in data.attrs:
+            name = json.loads(data.attrs["indenter"]).get("class", "object")
+            tip, axes_now = self.at("object_tip_mm", time_ms), self.at("object_axes", time_ms)
+            behind = axes_now[:, 2] if self.on_skin else axes_now[:, 1]
+            places[name] = tip - (THICKNESS_MM + 2.4) * behind
+        for name, place in places.items():
+            axes.annotate(name, self._spots(place), fontsize=8.0, ha="center", va="center", color=BLACK)
+
+    def _draw_spikes(self, axes: Any) -> None:
+        if "spike_count" not in self.data:
+            axes.plot(self.data["time"], self.data["force_mn"], color=BLUE)
+            axes.set(xlabel="time [ms]", ylabel="force [mN]")
+            return
+        trains = [train for train in self._trains if train.size]
+        if trains:
+            axes.eventplot(trains, colors=BLACK, linewidths=0.8, linelengths=0.8)
+        else:
+            say_nothing_to_draw(axes, "no afferent fires a spike")
+        count = self.data.sizes["receptor"]
+        axes.set(xlabel="time [ms]", ylabel=f"{len(trains)} of {count} afferents fire", yticks=[])
+        fires, silent = (
+            Line2D([], [], marker="o", linestyle="", color=colour, markeredgecolor=BLACK, markersize=4.0)
+            for colour in (BLACK, "white")
+        )
+        axes.legend(
+            [fires, silent], [f"spike in the last {RECENT_MS:g} ms", "none"], loc="upper center",
+            bbox_to_anchor=(0.5, -0.32), ncols=2, handletextpad=0.1, columnspacing=0.8,
+        )  # fmt: skip
+
+
+def _printed(unit: str) -> str:
+    return {"1": "-"}.get(unit, unit)
+
+
+def _gif(pictures: Iterator[Image.Image]) -> bytes:
+    """Film that repeats itself."""
+    first, *others = (picture.quantize(128) for picture in pictures)
+    buffer = io.BytesIO()
+    first.save(
+        buffer, "GIF", save_all=True, append_images=others, duration=round(1000 / FRAMES_PER_S), loop=0,
+        optimize=True,
+    )  # fmt: skip
+    return buffer.getvalue()
+
+
+def _mp4(pictures: Iterator[Image.Image]) -> bytes:
+    """Film that the program ffmpeg encodes."""
+    with TemporaryDirectory() as folder:
+        for number, picture in enumerate(pictures):
+            width, height = (size // 2 * 2 for size in picture.size)  # encoders ask for even sizes
+            picture.crop((0, 0, width, height)).save(Path(folder) / f"{number:05d}.png")
+        film = Path(folder) / "film.mp4"
+        command = [
+            "ffmpeg",
+            "-loglevel",
+            "error",
+            "-framerate",
+            str(FRAMES_PER_S),
+            "-i",
+            f"{folder}/%05d.png",
+        ]
+        done = subprocess.run([*command, "-pix_fmt", "yuv420p", str(film)], capture_output=True, check=False)
+        if done.returncode or not film.exists():
+            said = done.stderr.decode(errors="replace").strip().splitlines() or ["no reason given"]
+            raise InputError(f"ffmpeg could not write the film ({said[-1].rstrip('.')}): write a .gif.")
+        return film.read_bytes()
+
+
+def _pyvista() -> Any:
+    """Return PyVista, which draws without a window and without messages about missing displays."""
+    try:
+        pyvista = import_module("pyvista")
+        logger = import_module("vtkmodules.vtkCommonCore").vtkLogger
+    except ImportError as error:
+        raise InputError(
+            "A view in three dimensions needs pyvista: install the extra, pip install 'fingerpad[view]'."
+        ) from error
+    if not os.environ.get("DISPLAY"):
+        logger.SetStderrVerbosity(logger.VERBOSITY_OFF)
+    return pyvista
