@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 from scipy.stats import binom
 
 from fingerpad import cli
@@ -20,7 +20,7 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.discrimination import run as task_run
-from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse
+from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse, forced_choice_of
 from fingerpad.experiments.discrimination.decoding import SESSION, side_curves
 from fingerpad.experiments.discrimination.task import CurveSettings
 from fingerpad.experiments.discrimination.task_files import example_tasks, parse_task
@@ -32,7 +32,7 @@ from fingerpad.psychophysics.discrimination import (
     discriminate_euclidean,
     discriminate_gradient_sum,
 )
-from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
+from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
 from fingerpad.report import discrimination_task as report
 from fingerpad.report import discrimination_task_figures as figures
 
@@ -248,6 +248,51 @@ def test_stimuli_without_levels_have_hit_rates_and_no_curve():
     for draw in (figures.draw_task_curves, figures.draw_task_statistics, figures.draw_task_responses):
         (*_, last) = draw(found).axes
         assert last.get_figure()
+
+
+def test_two_stimuli_give_a_forced_choice_and_no_missing_threshold():
+    """Proportion correct is the area under the ROC of the code's statistic; trials give the interval."""
+    two = {"vary": "curvature_per_m", "values": [200, 220]}
+    question = asked(stimuli=two, measure="static", code=["gradient_sum", "ideal"])
+    found = analyse(question, bumps(question))
+    for decoding in found.decodings:
+        assert decoding.curves == ()
+        choice = decoding.forced_choice
+        proportion, low, high = choice.proportions[:, 0]
+        trials = question.task.experiment.trials
+        assert choice.trials == trials
+        assert 0.5 < low < proportion < high < 1.0
+        # As many correct answers as observed, or more, have a probability of 2.5 % at the lower end.
+        correct = round(proportion * trials)
+        assert binom.sf(correct - 1, trials, low) == pytest.approx(0.025, abs=1e-6)
+        assert binom.cdf(correct, trials, high) == pytest.approx(0.025, abs=1e-6)
+        np.testing.assert_allclose(choice.d_primes[:, 0], np.sqrt(2.0) * ndtri([proportion, low, high]))
+        assert choice.d_primes[0] == pytest.approx(decoding.d_prime)
+    table, neighbours = taking_part(found.responses["static"], question.neighbours)
+    (presented,) = noisy_presentations(table, 0.1, question.task.experiment.seed, session=2)
+    sums = [gradient_sum(each, neighbours) for each in (presented.standard, presented.comparison)]
+    greater = (sums[1][:, None] > sums[0]).mean()
+    proportion = found.decodings[0].forced_choice.proportions[0, 0]
+    assert proportion == pytest.approx(max(greater, 1 - greater), abs=1e-9)
+    said = report.task_summary(found)
+    assert len(said) == 2
+    assert re.search(
+        r"forced choice between 200 and 220 it is correct in \d+ % of trials \(\d+ % … \d+ %\)", said[1]
+    )
+    assert "threshold" not in " ".join(said)
+    titles = [table.title for table in report.task_tables(found)]
+    assert "Two-alternative forced choice" in titles
+    assert "Thresholds" not in titles
+
+
+def test_a_certain_answer_has_no_finite_d_prime_and_no_noise_no_forced_choice():
+    choice = forced_choice_of(np.array([np.inf, 0.0]), trials=100)
+    assert choice.proportions[:, 0].tolist() == [1.0, pytest.approx(0.025**0.01), 1.0]
+    assert np.isnan(choice.d_primes[[0, 2], 0]).all()
+    assert choice.d_primes[1, 0] > 2.0
+    assert choice.d_primes[0, 1] == 0.0
+    question = asked(noise=0.0, measure="static")
+    assert all(one.forced_choice is None for one in analyse(question, bumps(question)).decodings)
 
 
 # The page

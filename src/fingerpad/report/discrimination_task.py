@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from fingerpad.experiments.discrimination.analysis import TaskResult
+from fingerpad.experiments.discrimination.analysis import ForcedChoice, TaskResult
 from fingerpad.experiments.discrimination.decoding import SideCurve
 from fingerpad.experiments.discrimination.run import DiscriminationFile
 from fingerpad.report.discrimination_task_figures import (
@@ -32,7 +32,13 @@ SEVERAL = {"static": "static rates", "dynamic": "dynamic rates", "latency": "fir
 
 def task_tables(found: TaskResult) -> list[Table]:
     """Tables of thresholds, hit rates, efficiencies and the population."""
-    every = (_thresholds(found), _hit_rates(found), _efficiencies(found), _population(found))
+    every = (
+        _thresholds(found),
+        _hit_rates(found),
+        _forced_choices(found),
+        _efficiencies(found),
+        _population(found),
+    )
     return [table for table in every if table.rows]
 
 
@@ -84,7 +90,21 @@ def task_summary(found: TaskResult) -> list[str]:
         f"{CODE_LABELS[main.code]} of {SEVERAL[main.measure]} discriminates {joined(rates)} of trials{of}, "
         f"with noise σ₁ = {number(noise.sigma)}{fitted}."
     )
-    return [sentence, *(_threshold_sentence(found, side) for side in main.curves)]
+    choice = main.forced_choice
+    answers = [_forced_choice_sentence(found, choice)] if choice and len(others) == 1 else []
+    return [sentence, *answers, *(_threshold_sentence(found, side) for side in main.curves)]
+
+
+def _forced_choice_sentence(found: TaskResult, choice: ForcedChoice) -> str:
+    """Say what a two-alternative forced choice between two stimuli would find."""
+    standard, comparison = found.stimulus
+    rate, low, high = (whole_percent(share) for share in choice.proportions[:, 0])
+    d_prime, d_low, d_high = (number(value) for value in choice.d_primes[:, 0])
+    return (
+        f"In a two-alternative forced choice between {standard} and {comparison} it is correct in {rate} of "
+        f"trials ({low} … {high}), d′ = {d_prime} ({d_low} … {d_high}); 95 % intervals of "
+        f"{number(choice.trials)} trials."
+    )
 
 
 def _threshold_sentence(found: TaskResult, side: SideCurve) -> str:
@@ -152,6 +172,24 @@ def _hit_rates(found: TaskResult) -> Table:
     ]
     columns = ("decoding", *found.stimulus[1:])
     return Table("Hit rates, mean ± standard deviation", columns, rows, "; ".join(silent))
+
+
+def _forced_choices(found: TaskResult) -> Table:
+    rows = []
+    for decoding in found.decodings:
+        if decoding.forced_choice is None:
+            continue
+        shares, d_primes = decoding.forced_choice.proportions.T, decoding.forced_choice.d_primes.T
+        for name, share, d_prime in zip(found.stimulus[1:], shares, d_primes, strict=True):
+            within = (" … ".join(fixed(end, 3) for end in share[1:]), _interval(d_prime[1:]))
+            cells = (fixed(share[0], 3), within[0], number(d_prime[0]), within[1])
+            rows.append(Row((titled(decoding), name, *cells)))
+    columns = ("decoding", "comparison", "proportion correct", "95 %", "d′", "95 %")
+    note = (
+        "Each trial presents the standard and the comparison once. Intervals: exact, of an experiment with "
+        "the trials per comparison of the task. A dash where d′ is infinite."
+    )
+    return Table("Two-alternative forced choice", columns, rows, note)
 
 
 def _efficiencies(found: TaskResult) -> Table:

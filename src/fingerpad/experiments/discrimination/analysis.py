@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
@@ -124,6 +125,55 @@ class TaskNoise:
 
 
 @result_class
+class ForcedChoice:
+    """Two presentations per trial, one of them the comparison: how often it is identified.
+
+    Parameters
+    ----------
+    trials : int
+        Trials per comparison behind the intervals, those of the task.
+    proportions : array (3, n_comparisons)
+        Proportion correct, and the ends of the exact 95 % interval that so many trials leave about it. [0-1]
+    d_primes : array (3, n_comparisons)
+        sqrt(2) times the normal quantile of these; NaN where it is infinite, negative below chance.
+    """
+
+    trials: int
+    proportions: Matrix
+    d_primes: Matrix
+
+
+def forced_choice_of(d_prime: FloatArray, trials: int) -> ForcedChoice:
+    """Two-alternative forced choice at some d', with the intervals of an experiment.
+
+    Parameters
+    ----------
+    d_prime : array (n_comparisons,)
+        As of `Decoding`; infinite where the comparison is always identified.
+    trials : int
+        Per comparison.
+
+    Returns
+    -------
+    ForcedChoice
+
+    Examples
+    --------
+    >>> choice = forced_choice_of(np.array([1.0]), trials=200)
+    >>> choice.proportions[:, 0].round(3).tolist(), choice.d_primes[:, 0].round(2).tolist()
+    ([0.76, 0.695, 0.817], [1.0, 0.72, 1.28])
+    """
+    proportion = ndtr(np.asarray(d_prime) / np.sqrt(2.0))
+    proportions = np.array([proportion, *binomial_interval(proportion, trials)])
+    d_primes = np.sqrt(2.0) * ndtri(proportions)
+    return ForcedChoice(
+        trials=trials,
+        proportions=proportions,
+        d_primes=np.where(np.isfinite(d_primes), d_primes, np.nan),
+    )
+
+
+@result_class
 class Decoding:
     """One measure of the population, decoded by one code.
 
@@ -139,6 +189,8 @@ class Decoding:
         What the code computes for each stimulus; absent for the ideal observer.
     d_prime : array (n_comparisons,), optional
         Discriminability; NaN where it is infinite.
+    forced_choice : ForcedChoice, optional
+        The same as proportion correct, with intervals; absent without noise.
     efficiency, efficiency_error : array (n_comparisons,), optional
         Against the ideal observer; NaN where it cannot be estimated.
     curves : tuple of SideCurve
@@ -152,6 +204,7 @@ class Decoding:
     hit_rate_sd: Vector | None = None
     statistic: TaskStatistic | None = None
     d_prime: Vector | None = None
+    forced_choice: ForcedChoice | None = None
     efficiency: Vector | None = None
     efficiency_error: Vector | None = None
     curves: tuple[SideCurve, ...] = ()
@@ -483,8 +536,11 @@ def _decoding(
                 efficiency=np.array([one.efficiency for one in compared]),
                 efficiency_error=np.array([one.efficiency_error for one in compared]),
             )
+    if decoding.d_prime is not None:
+        decoding = replace(decoding, forced_choice=forced_choice_of(decoding.d_prime, settings.trials))
     levels = [stimulus.level for stimulus in prepared.stimuli if stimulus.level is not None]
-    if not levels or decoding.hit_rate is None:
+    # One comparison has no curve: what is asked of two stimuli is how well they are told apart.
+    if len(levels) < 3 or decoding.hit_rate is None:
         return decoding
     found = side_curves(levels, decoding.hit_rate, settings.trials, prepared.task.curve, settings.seed)
     return replace(decoding, curves=found)

@@ -41,7 +41,7 @@ class DiscriminationFile:
     """
 
     format: Literal["fingerpad discrimination"] = "fingerpad discrimination"
-    format_version: Literal[1] = 1
+    format_version: Literal[2] = 2
     discrimination: TaskResult
     task: DiscriminationTask
     afferent: dict[str, float | str]
