@@ -205,6 +205,14 @@ def test_braille_cells_have_their_dots_and_distances():
         braille("7")
 
 
+@pytest.mark.parametrize("along_finger", [True, False])
+def test_braille_is_not_its_mirror_image(along_finger):
+    # Dots 1, 4 and 5: from the first to the others is a turn to the right, which "f" (1, 2, 4) lacks.
+    first, beside, below = np.array(braille("d", along_finger).at_mm)
+    (along, across), (along_down, across_down) = beside - first, below - beside
+    assert along * across_down - across * along_down > 0.0  # clockwise as seen by the skin, x up and z right
+
+
 def test_a_mesh_resolves_dots_and_their_distances():
     grading = touch_of(Fingertip(), braille("c")).grading
     assert not grading.full  # two dots side by side, mirror images of each other

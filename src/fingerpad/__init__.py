@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from fingerpad.export.view import save_view
     from fingerpad.geometry.dots import Dots, braille
     from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
+    from fingerpad.geometry.embossed import Embossed, embossed_text
     from fingerpad.geometry.fingertip import Fingertip
     from fingerpad.geometry.grading import Grading
     from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
@@ -69,6 +70,7 @@ __all__ = [
     "Cylinder",
     "Dots",
     "Edge",
+    "Embossed",
     "Energy",
     "FingerpadError",
     "Fingertip",
@@ -106,6 +108,7 @@ __all__ = [
     "Trajectory",
     "braille",
     "chirp",
+    "embossed_text",
     "indent",
     "named_tissues",
     "read_touch",
@@ -129,6 +132,7 @@ _HOMES = {
     "export.view": ("save_view",),
     "neuron.afferent": ("Afferent",),
     "geometry.edged_indenters": ("Edge", "Gap", "Grating"),
+    "geometry.embossed": ("Embossed", "embossed_text"),
     "core.errors": (
         "ConvergenceError",
         "FingerpadError",

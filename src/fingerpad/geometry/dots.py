@@ -112,7 +112,7 @@ def braille(text: str, along_finger: bool = True) -> Dots:
     Examples
     --------
     >>> braille("l").at_mm
-    ((-2.34, 0.0), (0.0, 0.0), (2.34, 0.0))
+    ((2.34, 0.0), (0.0, 0.0), (-2.34, 0.0))
     """
     unknown = sorted(set(text) - set(_LETTERS) - {" "})
     if unknown or not text.strip():
@@ -127,5 +127,6 @@ def braille(text: str, along_finger: bool = True) -> Dots:
     ]
     line, down = np.array(places).T
     line, down = (each - 0.5 * (each.min() + each.max()) for each in (line, down))
-    at = np.column_stack([down, line] if along_finger else [line, down]).round(9) + 0.0
+    # Seen from the skin, z runs to the right where x, to the tip, runs up; a mirror image is another letter.
+    at = np.column_stack([-down, line] if along_finger else [line, down]).round(9) + 0.0
     return Dots(tuple(map(tuple, at.tolist())))

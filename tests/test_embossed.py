@@ -1,0 +1,198 @@
+"""Raised shapes against closed forms: distance, walls, edges, orientation of letters, widths, refusals."""
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.embossed import MOST_CORNERS, Embossed, embossed_text
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenters import Bar, FlatPunch
+from fingerpad.geometry.probing import check_gap
+from fingerpad.skin.indentation import touch_of
+from fingerpad.skin.store import touch_key
+
+COARSE = Grading(17.37, 3.0, 3.0, 0.8, 0.8, 6.0, 1.3, 1, 1, 1, 1, full=True)
+
+
+def rectangle(half_x, half_z, x=0.0, z=0.0):
+    return [
+        (x - half_x, z - half_z),
+        (x + half_x, z - half_z),
+        (x + half_x, z + half_z),
+        (x - half_x, z + half_z),
+    ]
+
+
+def circle(radius, corners=400, x=0.0):
+    angle = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)
+    return np.column_stack([x + radius * np.cos(angle), radius * np.sin(angle)])
+
+
+def points_about(count=400, seed=3):
+    return np.random.default_rng(seed).uniform([-3.0, -0.6, -3.0], [3.0, 0.6, 3.0], (count, 3))
+
+
+def is_raised(body, x, z):
+    return body.front(np.array([[x, 0.0, z]]))[0] > -0.5 * body.height_mm
+
+
+def test_a_long_rectangle_is_the_bar():
+    ridge, bar, points = Embossed([rectangle(1.5, 40.0)], 4.0, 0.3), Bar(3.0, 0.3), points_about()
+    gap, normal = ridge.gap(points)
+    expected, direction = bar.gap(points)
+    np.testing.assert_allclose(gap, expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(normal, direction, rtol=0, atol=1e-9)
+    assert ridge.relief_mm == 3.0
+
+
+def test_a_circle_is_the_flat_punch():
+    disc, punch, points = Embossed([circle(2.0)], 4.0, 0.3), FlatPunch(4.0, 0.3), points_about()
+    np.testing.assert_allclose(disc.gap(points)[0], punch.gap(points)[0], rtol=0, atol=1e-4)
+    assert disc.stroke_mm == pytest.approx(4.0, rel=1e-3)
+
+
+def test_an_outline_within_another_is_a_hole():
+    ring = Embossed([rectangle(2.0, 2.0), rectangle(1.2, 1.2)], 0.5, 0.1)
+    assert is_raised(ring, 1.6, 0.0)
+    assert not is_raised(ring, 0.0, 0.0)
+    assert ring.stroke_mm == pytest.approx(0.8)
+    assert replace(ring, outlines_mm=[rectangle(2.0, 2.0), rectangle(1.8, 1.8)]).relief_mm == pytest.approx(
+        0.2
+    )
+
+
+def test_the_narrowest_gap_between_shapes_is_told():
+    pair = Embossed([rectangle(0.5, 2.0, x=-0.7), rectangle(0.5, 2.0, x=0.7)], 0.5, 0.1)
+    assert pair.relief_mm == pytest.approx(0.4)
+    assert pair.stroke_mm == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("text", ["S", "a8", "i"])
+def test_the_normal_is_the_gradient_of_the_gap(text):
+    body = embossed_text(text)
+    check_gap(body.gap, text)
+    points, step = points_about(), 1e-6
+    slope = [
+        (body.gap(points + step * axis)[0] - body.gap(points - step * axis)[0]) / (2 * step)
+        for axis in np.eye(3)
+    ]
+    differs = np.abs(np.stack(slope, axis=1) - body.gap(points)[1]).max(axis=1) > 1e-4
+    assert differs.mean() < 0.02  # only where a crease lies within a step
+
+
+def test_the_distance_is_that_to_the_outline():
+    body, points = embossed_text("g"), points_about()
+    points[:, 1] = -0.2  # beside the walls, above the plate: the gap is the distance in the plane
+    dense = np.concatenate([np.linspace(*piece, 200) for piece in body._pieces])
+    distance = np.array([np.hypot(*(dense - point[[0, 2]]).T).min() for point in points])
+    gap = body.gap(points)[0]
+    outside = (gap > 0.0) & (distance < 0.25)  # farther away the plate is nearer
+    assert outside.sum() > 20
+    np.testing.assert_allclose(gap[outside], distance[outside], rtol=0, atol=5e-3)
+
+
+def test_letters_are_read_by_a_finger_that_points_up():
+    across = embossed_text("L")  # as seen from the skin: x up, z to the right
+    assert is_raised(across, -2.6, 1.2)
+    assert not is_raised(across, 2.6, 1.2)
+    assert is_raised(across, 2.6, -1.6)
+    along = embossed_text("L", along_finger=True)  # the line runs up: its top lies to the left, at -z
+    assert is_raised(along, 1.2, 2.6)
+    assert not is_raised(along, 1.2, -2.6)
+    assert is_raised(along, -1.6, -2.6)
+
+
+@pytest.mark.parametrize(
+    ("text", "stroke", "relief"), [("H", 1.17, 1.17), ("i", 1.17, 0.58), ("n", 1.44, 1.44)]
+)
+def test_strokes_of_letters_are_measured(text, stroke, relief):
+    letter = embossed_text(text)
+    assert letter.stroke_mm == pytest.approx(stroke, abs=0.01)
+    assert letter.relief_mm == pytest.approx(relief, abs=0.01)
+
+
+def test_a_capital_has_its_height():
+    letter = np.concatenate(embossed_text("H", capital_mm=7.0).outlines_mm)
+    assert np.ptp(letter[:, 0]) == pytest.approx(7.0)
+    np.testing.assert_allclose(letter.min(axis=0), -letter.max(axis=0), atol=1e-8)
+
+
+def test_symmetry_is_that_of_the_letters():
+    across, along = embossed_text("U"), embossed_text("U", along_finger=True)
+    assert across.mirrors(0.0)
+    assert along.mirrors(90.0)
+    assert not across.mirrors(90.0)
+    assert not along.mirrors(0.0)
+
+
+def test_a_mesh_must_resolve_the_strokes():
+    letter = embossed_text("i", capital_mm=5.0)
+    assert touch_of(Fingertip(), letter).grading.size_x_mm <= letter.relief_mm / 4
+    with pytest.raises(InputError, match="grading must have elements of at most"):
+        touch_of(Fingertip(), letter, grading=COARSE)
+
+
+def test_equal_letters_are_one_body():
+    one, same, other = embossed_text("ab"), embossed_text("ab"), embossed_text("ba")
+    one.gap(points_about(3))
+    assert one == same == pickle.loads(pickle.dumps(one))
+    assert hash(one) == hash(same)
+    assert one != other
+    keys = [touch_key(touch_of(Fingertip(), body)) for body in (one, same, other)]
+    assert keys[0] == keys[1] != keys[2]
+
+
+SQUARE = rectangle(1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("outlines", "sizes", "said"),
+    [
+        ([], {}, "at least one outline: got none"),
+        ([SQUARE[:2]], {}, r"outlines_mm\[0\] must have at least three corners"),
+        ([SQUARE, [SQUARE[0], *SQUARE]], {}, r"outlines_mm\[1\] must not have one corner twice"),
+        ([[(0.0, 0.0), (1.0, np.nan), (1.0, 1.0)]], {}, r"outlines_mm\[0\]"),
+        ([[("a", "b"), ("c", "d"), ("e", "f")]], {}, r"outlines_mm\[0\]"),
+        ([[(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0)]], {}, "corners x, z: got shape"),
+        ([[SQUARE[0], SQUARE[2], SQUARE[1], SQUARE[3]]], {}, "must not touch or cross"),
+        ([SQUARE, rectangle(1.0, 1.0, x=0.5)], {}, "must not touch or cross"),
+        ([SQUARE, rectangle(1.0, 1.0, x=2.0)], {}, "must not touch or cross"),
+        ([SQUARE, SQUARE], {}, "must not touch or cross"),
+        ([circle(3.0, MOST_CORNERS + 1)], {}, f"at most {MOST_CORNERS} corners"),
+        ([SQUARE], {"height_mm": 0.0}, "height_mm must be greater than 0"),
+        ([SQUARE], {"height_mm": "high"}, "height_mm must be a finite number"),
+        ([SQUARE], {"edge_radius_mm": -0.1}, "edge_radius_mm must be greater than 0"),
+        ([SQUARE], {"edge_radius_mm": np.nan}, "edge_radius_mm must be a finite number"),
+        ([SQUARE], {"height_mm": 0.2, "edge_radius_mm": 0.3}, "must not exceed height_mm, 0.2 mm"),
+        ([rectangle(0.1, 2.0)], {"edge_radius_mm": 0.2}, "half of the narrowest stroke, 0.1 mm"),
+    ],
+)  # fmt: skip
+def test_bad_outlines_are_refused_in_one_sentence(outlines, sizes, said):
+    with pytest.raises(InputError, match=said) as raised:
+        Embossed(outlines, **sizes)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        ("", {}, "at least one letter"),
+        ("  ", {}, "at least one letter"),
+        (7, {}, "at least one letter: got 7"),
+        ("a\nb", {}, r"characters of DejaVu Sans: got '\\n'"),
+        ("a\U0001f984", {}, "characters of DejaVu Sans"),
+        ("Ç", {}, "must not touch or cross"),
+        ("a", {"weight": "heavy"}, "weight must be one of"),
+        ("a", {"capital_mm": -1.0}, "capital_mm must be greater than 0"),
+        ("a", {"capital_mm": 0.5}, "half of the narrowest stroke"),
+        ("x" * 700, {}, "must have at most 4000 corners"),
+    ],
+)  # fmt: skip
+def test_text_that_cannot_be_embossed_is_refused_in_one_sentence(text, options, said):
+    with pytest.raises(InputError, match=said) as raised:
+        embossed_text(text, **options)
+    assert "\n" not in str(raised.value)
