@@ -5,7 +5,11 @@ import pytest
 
 from fingerpad.core.errors import InputError
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import Contact, Placement, place
+from fingerpad.mechanics.materials import Material
+from fingerpad.mechanics.press import PressSettings, press
 
 RADIUS = 2.0
 SPHERE = Sphere(curvature_per_m=1000.0 / RADIUS)
@@ -151,3 +155,31 @@ def test_no_contact_no_force():
     assert away.penetration_mm == 0.0
     assert away.misfit_mm == 0.0
     assert not contact.curvature_stiffness(away, positions, depth).any()
+
+
+def force_of_a_bar(size_mm, wider_mm=0.0):
+    """Force of a bar of 2.4 mm, 0.6 mm deep in a block with rows of nodes at both of its edges. [mN]"""
+    beside = np.cumsum(size_mm * 1.4 ** np.arange(1, 40))
+    beside = 3.0 + beside[beside < 7.0]
+    fine = size_mm * np.arange(-round(3.0 / size_mm), round(3.0 / size_mm) + 1)
+    depths = np.cumsum(np.concatenate([[0.0], min(size_mm, 0.3) * 1.25 ** np.arange(20)]))
+    depths = depths[: np.searchsorted(depths, 4.0) + 1] * (4.0 / depths[np.searchsorted(depths, 4.0)])
+    mesh = block_mesh(
+        np.concatenate([-beside[::-1], fine, beside]), depths, [0.0, 0.5], [2] * (depths.size - 1), True
+    )
+    motion, steps = RampAndHold(depth_mm=0.6, ramp_ms=50, hold_ms=10), PressSettings(6, 1)
+    still = Placement(np.zeros(3), np.eye(3))
+    tissue = (Material.neo_hooke(30.0, 0.4),) * 4
+    return press(mesh, tissue, Bar(2.4 + wider_mm, 0.05), still, motion, steps).force_mn[-1]
+
+
+def test_a_row_on_an_edge_does_not_touch_on_a_coarse_mesh_and_this_error_converges():
+    """The edge belongs to the contact: with its row the force is nearer to the limit of 60.5 mN.
+
+    The numbers are those of docs/decisions/edge-on-a-row.md.
+    """
+    missing = np.array([force_of_a_bar(size) for size in (0.6, 0.3, 0.15)]) / 60.5 - 1.0
+    np.testing.assert_allclose(missing, [-0.23, -0.08, -0.02], atol=0.01)
+    touching = np.array([force_of_a_bar(size, 0.8 * size) for size in (0.6, 0.3)]) / 60.5 - 1.0
+    np.testing.assert_allclose(touching, [0.06, 0.03], atol=0.01)
+    assert (np.abs(touching) < np.abs(missing[:2])).all()

@@ -84,3 +84,8 @@ def test_a_train_that_runs_backwards_is_refused_but_trains_may_overlap():
     assert len(SpikeTrains.from_lists([[5.0, 6.0], [], [1.0, 2.0], []])) == 4
     with pytest.raises(InputError, match="increase within each afferent"):
         SpikeTrains.from_lists([[], [1.0, 3.0, 2.0]])
+
+
+def test_offsets_with_a_fraction_are_refused_not_cut():
+    with pytest.raises(InputError, match="offsets must be whole numbers"):
+        SpikeTrains([1.0, 2.0], [0, 0.5, 2])

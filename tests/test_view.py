@@ -135,6 +135,13 @@ def test_a_touch_without_afferents_and_object_is_drawn(data, tmp_path):
     assert save_view(tmp_path / "bare.png", bare, time_ms=1000.0)
 
 
+def test_what_is_no_data_set_is_refused_and_a_changed_description_is_not(data, tmp_path):
+    with pytest.raises(fp.InputError, match="touch must be of type Dataset"):
+        save_view(tmp_path / "a.png", 5)
+    assert view._named("Sphere") == view._named("[1]") == "object"
+    assert view._named(data.attrs["indenter"]) == "Sphere"
+
+
 def test_a_missing_library_says_what_to_install(file, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyvista", None)
     with pytest.raises(fp.InputError, match=r"needs pyvista: .*fingerpad\[view\]"):
@@ -160,11 +167,16 @@ WRONG = {
     "an inner time": (("{file}", "--time", "30"), "displacement_mm", "1000 ms"),
     "an ending": (("{file}", "--out", "a.jpg"), "ending", ".jpg"),
     "no ending": (("{file}", "--out", "a"), "ending", "''"),
-    "no name": (("{file}", "--out", ""), "--out", "'.'"),
-    "a folder to write": (("{file}", "--out", ".."), "--out", "'..'"),
+    "no name": (("{file}", "--out", ""), "--out", "must not be empty"),
+    "a folder to write": (("{file}", "--out", ".."), "--out", "folder"),
     "a film at a time": (("{file}", "--out", "a.gif", "--time", "5"), "time_ms", "a.gif"),
     "one picture for a film": (
         ("{file}", "--out", "a.gif", "--field", "pressure", "--frames", "1"), "frames", "1"),
+    "endless pictures": (
+        ("{file}", "--out", "a.gif", "--field", "slip", "--frames", "1" + 12 * "0"), "frames", "most 2000"),
+    "an empty name": (("",), "An argument", "must not be empty"),
+    "a long name": (("a" * 300,), "file or folder", "name too long"),
+    "a device": (("/dev/zero",), "/dev/zero", "neither"),
     "half a picture": (("{file}", "--frames", "2.5"), "--frames", "2.5"),
     "no place to write": (
         ("{file}", "--field", "slip", "--out", "/dev/null/a.png"), "/dev/null/a.png", "cannot be written"),

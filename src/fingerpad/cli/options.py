@@ -19,6 +19,10 @@ class Command(typer.core.TyperCommand):
         options = [each for each in self.get_params(ctx) if isinstance(each, typer.core.TyperOption)]
         names = {name for option in options for name in (*option.opts, *option.secondary_opts)}
         with_argument = {name for option in options if not option.is_flag for name in option.opts}
+        for before, word in pairwise(["An argument", *args]):
+            # As a path an empty word would mean the current folder.
+            if not word and (before == "--out" or before not in with_argument):
+                ctx.fail(f"{before} must not be empty: write a name, or leave it out")
         for word, following in pairwise(args[: args.index("--")] if "--" in args else args):
             if word in with_argument and following in names:
                 ctx.fail(f"Option {word!r} requires an argument: got {following!r}; write its value first")

@@ -32,8 +32,8 @@ def view_command(
     from fingerpad.export.view import save_view
 
     path = Path("view.png") if out is None else out
-    if path.name == "" or path.is_dir():
-        raise InputError(f"--out must be a file: got {str(out)!r}.")
+    if path.is_dir():
+        raise InputError(f"--out must be a file: {path} is a folder.")
     try:
         (written,) = save_view(path, result, field=field, time_ms=time, frames=frames)
     except KeyboardInterrupt as error:

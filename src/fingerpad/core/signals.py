@@ -303,6 +303,8 @@ class SpikeTrains:
     def __post_init__(self) -> None:
         times = float_array("times_ms", self.times_ms, 1)
         offsets = np.array(self.offsets, dtype=np.int64)
+        if not np.array_equal(offsets, self.offsets):
+            raise InputError(f"offsets must be whole numbers: got {self.offsets}.")
         if offsets.ndim != 1 or offsets.size == 0 or offsets[0] != 0 or offsets[-1] != times.size:
             raise InputError(f"offsets must run from 0 to the number of spikes, {times.size}: got {offsets}.")
         if (np.diff(offsets) < 0).any():

@@ -294,15 +294,19 @@ def touch_file(path: Path) -> Path:
     InputError
         If there is none.
     """
-    if path.is_dir() and path.suffix != ".zarr":
-        held = [path / name for name in FILE_NAMES if (path / name).exists()]
-        if not held:
-            raise InputError(f"{path} must hold {' or '.join(FILE_NAMES)}: there is neither.")
-        return held[0]
-    if not path.exists():
-        raise InputError(f"{path} must be a touch that fingerpad wrote: there is no such file.")
-    if not (path.is_dir() or path.is_file()):
-        raise InputError(f"{path} must be a file or a folder: it is neither.")
+    try:
+        if path.is_dir() and path.suffix != ".zarr":
+            held = [path / name for name in FILE_NAMES if (path / name).exists()]
+            if not held:
+                raise InputError(f"{path} must hold {' or '.join(FILE_NAMES)}: there is neither.")
+            return held[0]
+        if not path.exists():
+            raise InputError(f"{path} must be a touch that fingerpad wrote: there is no such file.")
+        if not (path.is_dir() or path.is_file()):
+            raise InputError(f"{path} must be a file or a folder: it is neither.")
+    except (OSError, ValueError) as error:  # no right to look, or no possible name
+        said = getattr(error, "strerror", None) or error
+        raise InputError(f"{str(path)[:200]!r} must be a file or folder that can be read: {said}.") from error
     return path
 
 
@@ -481,6 +485,10 @@ def check_touch(path: str, data: xarray.Dataset) -> None:
         raise InputError(
             f"{path} must have format_version {FORMAT_VERSION}: got {data.attrs.get('format_version')}; "
             "read it with the version of fingerpad that wrote it."
+        )
+    if data.attrs.get("half_finger") not in (0, 1):
+        raise InputError(
+            f"{path}, attribute half_finger must be 0 or 1: got {data.attrs.get('half_finger')}."
         )
     groups = [MESH_PARTS] + [
         part for part in (OBJECT_PARTS, RESPONSE_PARTS) if set(part) & set(data.variables)

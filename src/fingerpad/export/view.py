@@ -30,7 +30,7 @@ from matplotlib.lines import Line2D
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from fingerpad.core.checks import FloatArray, finite, one_of, whole
+from fingerpad.core.checks import FloatArray, finite, instance, one_of, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
 from fingerpad.export.dataset import check_touch, read_touch, spike_trains
@@ -60,7 +60,7 @@ THICKNESS_MM = 3.0
 ARROW_MM = 5.0
 """Length of the three arrows that give the scale. [mm]"""
 
-FRAMES_PER_S = 12
+FRAMES_PER_S, MOST_FRAMES = 12, 2000
 PIXELS, VIEW_HEIGHT_MM = (1240, 820), 22.5
 OBJECT, NAIL = "#8fa3b5", "#e6e0b8"
 
@@ -130,14 +130,16 @@ def save_view(
     if isinstance(touch, str | Path):
         data = read_touch(touch)
     else:
-        check_touch("touch", touch)
-        data = touch
+        data = instance("touch", touch, import_module("xarray").Dataset)
+        check_touch("touch", data)
     view = _View(data, _variable(data, field))
     if not film:
         write_atomically(path, view.png(view.checked(_deepest_ms(data) if time_ms is None else time_ms)))
         return (path,)
+    if whole("frames", frames, at_least=2) > MOST_FRAMES:
+        raise InputError(f"frames must be at most {MOST_FRAMES}: got {frames}.")
     times = data["time"].values
-    steps = np.linspace(0.0, times.size - 1.0, whole("frames", frames, at_least=2))
+    steps = np.linspace(0.0, times.size - 1.0, frames)
     shown = np.interp(steps, np.arange(times.size), times)
     view.checked(float(times[0]))
     pictures = (Image.open(io.BytesIO(view.png(float(time)))).convert("RGB") for time in shown)
@@ -291,6 +293,7 @@ class _View:
                   "log_scale": isinstance(self.norm, LogNorm), "ambient": 0.35, "diffuse": 0.7}  # fmt: skip
         values = self.at(self.variable, time_ms)
         values = np.linalg.norm(values, axis=-1) if "axis" in data[self.variable].dims else values
+        values = np.clip(values, self.norm.vmin, self.norm.vmax)
         if self.on_skin:
             skin_nodes = data["skin_node"].values
             points[skin_nodes] += self.at("skin_displacement_mm", time_ms)
@@ -461,7 +464,7 @@ class _View:
                 nodes = data["node_mm"].values[data[name].values]
                 places[name] = 0.5 * (nodes.min(axis=0) + nodes.max(axis=0)) * [1.0, 1.0, 0.0] + beside
         if "object_tip_mm" in data and "indenter" in data.attrs:
-            name = json.loads(data.attrs["indenter"]).get("class", "object")
+            name = _named(data.attrs["indenter"])
             tip, axes_now = self.at("object_tip_mm", time_ms), self.at("object_axes", time_ms)
             behind = axes_now[:, 2] if self.on_skin else axes_now[:, 1]
             places[name] = tip - (THICKNESS_MM + 2.4) * behind
@@ -488,6 +491,14 @@ class _View:
             [fires, silent], [f"spike in the last {RECENT_MS:g} ms", "none"], loc="upper center",
             bbox_to_anchor=(0.5, -0.32), ncols=2, handletextpad=0.1, columnspacing=0.8,
         )  # fmt: skip
+
+
+def _named(description: str) -> str:
+    """Class of an indenter, from its description."""
+    try:
+        return str(json.loads(description)["class"])
+    except (ValueError, TypeError, KeyError):  # somebody has changed it
+        return "object"
 
 
 def _printed(unit: str) -> str:
