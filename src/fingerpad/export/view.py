@@ -317,9 +317,9 @@ class _View:
             plotter.add_mesh(body.extract_surface(algorithm="dataset_surface"), scalars="shown", **shades)
             plotter.add_mesh(self._bone(points), color=BONE, ambient=0.4)
         nail = self._nail(points)
-        sides = [nail, self._mirrored(nail)] if self._half else [nail]
-        for each in sides if self.on_skin else [self._mirrored(nail) if self._half else nail.clip("z")]:
-            plotter.add_mesh(each, color=NAIL, ambient=0.3)
+        plotter.add_mesh(self._mirrored(nail) if self._half else nail, color=NAIL, ambient=0.3)
+        if self._half and self.on_skin:
+            plotter.add_mesh(nail, color=NAIL, ambient=0.3)
 
     @staticmethod
     def _mirrored(mesh: Any) -> Any:
@@ -328,9 +328,11 @@ class _View:
         return copied
 
     def _nail(self, points: FloatArray) -> Any:
-        """Plate on the faces of the skin that are held by the nail."""
+        """Plate on the faces of the skin that are held by the nail; of a finger that is cut, on one half."""
         faces = self.data["facet_nodes"].values
         held = np.isin(faces, self.data["nail"].values).all(axis=1)
+        if not (self._half or self.on_skin):
+            held &= points[faces][..., 2].mean(axis=1) <= 0.0
         plate = _pyvista().PolyData.from_regular_faces(points, faces[held])
         return plate.extrude((0.0, _NAIL_MM, 0.0), capping=True)
 
