@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
     from fingerpad.export.dataset import read_touch, touch_dataset, write_touch
     from fingerpad.export.view import save_view
+    from fingerpad.geometry.composed import Union, ridges
     from fingerpad.geometry.dots import Dots, braille
     from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
     from fingerpad.geometry.embossed import Embossed, embossed_text
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
     from fingerpad.geometry.motion import Cycles, ForceRampAndHold, RampAndHold
     from fingerpad.geometry.motions import chirp, repeated, sine, staircase, stroke
     from fingerpad.geometry.sampled_motions import reduced, sampled
+    from fingerpad.geometry.surface import Surface, height_surface
+    from fingerpad.geometry.surface_files import read_height_map, read_surface
     from fingerpad.geometry.trajectory import Trajectory
     from fingerpad.geometry.trajectory_files import read_trajectory
     from fingerpad.mechanics.materials import (
@@ -102,19 +105,25 @@ __all__ = [
     "Sphere",
     "SpikeTrains",
     "StoreError",
+    "Surface",
     "SurfaceProfile",
     "Tissues",
     "Touch",
     "Trajectory",
+    "Union",
     "braille",
     "chirp",
     "embossed_text",
+    "height_surface",
     "indent",
     "named_tissues",
+    "read_height_map",
+    "read_surface",
     "read_touch",
     "read_trajectory",
     "reduced",
     "repeated",
+    "ridges",
     "sampled",
     "save_figure",
     "save_view",
@@ -127,7 +136,10 @@ __all__ = [
 ]
 
 _HOMES = {
+    "geometry.composed": ("Union", "ridges"),
     "geometry.dots": ("Dots", "braille"),
+    "geometry.surface": ("Surface", "height_surface"),
+    "geometry.surface_files": ("read_height_map", "read_surface"),
     "export.dataset": ("read_touch", "touch_dataset", "write_touch"),
     "export.view": ("save_view",),
     "neuron.afferent": ("Afferent",),

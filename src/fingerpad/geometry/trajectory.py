@@ -278,8 +278,8 @@ class Trajectory(Motion):
     def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
         """List the times to solve at: all samples, and times between them where they are far apart. [ms]
 
-        A part of the way takes its share of `ramp_steps`, and a mm aside takes three times as many. The first step
-        aside is divided, because friction grows over about a tenth of a mm until skin slips. A
+        A part of the way takes its share of `ramp_steps`, and a mm aside takes three times as many. The
+        first step aside is divided, because friction grows over about a tenth of a mm until skin slips. A
         hold longer than the step before it takes `hold_steps`, which grow geometrically, because relaxation
         is fastest at its beginning; a long part in which a recording drifts is a hold.
 

@@ -1,0 +1,126 @@
+"""Bodies made of others: unions with rounded seams, and gratings of any ridges."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray, float_array, instance, not_negative, positive
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.indenters import Bar, Indenter, Plate
+
+LEAST_SLOPE = 0.2
+"""Least length of the gradient in a seam by which a gap is divided: parts that face each other have none."""
+
+
+@dataclass(frozen=True)
+class Union(Indenter):
+    """Several bodies as one, each moved, with rounded seams between them.
+
+    Parameters
+    ----------
+    parts : sequence of Indenter
+        The bodies.
+    at_mm : sequence of (x, y, z)
+        How far each is moved: along the finger, towards the skin, across. [mm]
+    seam_mm : float
+        Width over which concave seams are filled; 0 for sharp ones. [mm]
+
+    Examples
+    --------
+    >>> from fingerpad.geometry.indenters import Sphere
+    >>> pair = Union([Sphere(1000.0), Sphere(1000.0)], [(-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)])
+    >>> pair.front(np.array([[1.5, 0.0, 0.0], [0.7, 0.0, 0.0]])).round(3).tolist()
+    [0.0, -0.4]
+    """
+
+    parts: tuple[Indenter, ...]
+    at_mm: tuple[tuple[float, float, float], ...]
+    seam_mm: float = 0.0
+
+    def __post_init__(self) -> None:
+        parts = tuple(instance("a part", part, Indenter) for part in self.parts)
+        at = float_array("at_mm", self.at_mm, 2)
+        if not parts or at.shape != (len(parts), 3):
+            raise InputError(
+                f"A union needs one (x, y, z) of at_mm for each of its parts: got {len(parts)} parts and "
+                f"shape {at.shape}."
+            )
+        not_negative("seam_mm", self.seam_mm, "mm")
+        object.__setattr__(self, "parts", parts)
+        object.__setattr__(self, "at_mm", tuple(map(tuple, at.tolist())))
+
+    @property
+    def half_width_mm(self) -> float:
+        """Half of the extent along x about the axis. [mm]"""
+        return max(
+            part.half_width_mm + abs(x) for part, (x, _, _) in zip(self.parts, self.at_mm, strict=True)
+        )
+
+    @property
+    def relief_mm(self) -> float:
+        """Width of the narrowest dot, ridge or groove of a part; infinite without one. [mm]"""
+        return min(min(part.relief_mm, part.narrowest_mm) for part in self.parts)
+
+    @property
+    def narrowest_mm(self) -> float:
+        """The same. [mm]"""
+        return self.relief_mm
+
+    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        gap, normal = self.parts[0].gap(points_mm - np.array(self.at_mm[0]))
+        for part, at in zip(self.parts[1:], self.at_mm[1:], strict=True):
+            gap, normal = self._joined(gap, normal, *part.gap(points_mm - np.array(at)))
+        return gap, normal
+
+    def _joined(
+        self, gap: FloatArray, normal: FloatArray, other: FloatArray, other_normal: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Join two gaps by their minimum, or by a quadratic minimum over `seam_mm`, and its gradient."""
+        if self.seam_mm == 0.0:
+            return np.minimum(gap, other), np.where((gap <= other)[:, None], normal, other_normal)
+        share = np.clip(0.5 + 0.5 * (other - gap) / self.seam_mm, 0.0, 1.0)
+        both = other + share * (gap - other) - self.seam_mm * share * (1.0 - share)
+        slope = share[:, None] * normal + (1.0 - share[:, None]) * other_normal
+        # The gradient is shorter than 1 in a seam. Divided by its length, the gap is a distance near the face.
+        length = np.maximum(np.linalg.norm(slope, axis=1), LEAST_SLOPE)
+        return both / length, slope / np.linalg.norm(slope, axis=1)[:, None]
+
+
+def ridges(
+    centres_mm: Sequence[float], widths_mm: Sequence[float], fillet_mm: float = 0.1, height_mm: float = 1.0
+) -> Union:
+    """Grating of any ridges across the finger on a flat plate, periodic or not.
+
+    Parameters
+    ----------
+    centres_mm, widths_mm : sequence of float
+        Middle of each ridge along the finger, from the indenter's axis, and its width. [mm]
+    fillet_mm : float
+        Radius of the edges. [mm]
+    height_mm : float
+        Height of the ridges above the plate. [mm]
+
+    Returns
+    -------
+    Union
+        Bars and a plate.
+
+    Examples
+    --------
+    >>> uneven = ridges([-2.0, 0.0, 1.5], [1.0, 0.6, 0.8])
+    >>> uneven.front(np.array([[-2.0, 0.0, 3.0], [-1.0, 0.0, 3.0]])).round(3).tolist()
+    [0.0, -1.0]
+    """
+    centres, widths = float_array("centres_mm", centres_mm, 1), float_array("widths_mm", widths_mm, 1)
+    if centres.shape != widths.shape or not centres.size:
+        raise InputError(
+            f"ridges needs one of widths_mm for each of centres_mm: got {widths.size} and {centres.size}."
+        )
+    positive("height_mm", height_mm, "mm")
+    bars = [Bar(width, fillet_mm) for width in widths.tolist()]
+    at = [(centre, 0.0, 0.0) for centre in centres.tolist()]
+    return Union((*bars, Plate()), (*at, (0.0, -height_mm, 0.0)))

@@ -1,0 +1,218 @@
+"""Surfaces, height maps and compositions against closed forms and against bodies that are exact."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.closest_point import Triangles
+from fingerpad.geometry.composed import Union, ridges
+from fingerpad.geometry.edged_indenters import Grating
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.indenter_grading import grading_about
+from fingerpad.geometry.indenters import Bar, Plate, Sphere
+from fingerpad.geometry.motion import RampAndHold
+from fingerpad.geometry.probing import check_gap
+from fingerpad.geometry.surface import Surface, height_surface
+from fingerpad.geometry.surface_files import MOST_HEIGHTS, read_height_map, read_surface
+from fingerpad.mechanics.press import PressSettings
+from fingerpad.skin.indentation import touch_of
+from fingerpad.skin.store import touch_key
+
+CUBE = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-2.0, 0.0) for z in (-1.5, 1.5)])
+SIDES = np.array(
+    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6],
+     [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+)  # fmt: skip
+COARSE = Grading(17.37, 3.0, 3.0, 0.8, 0.8, 6.0, 1.3, 1, 1, 1, 1)
+
+
+def map_of(body, half_mm=2.6, pitch_mm=0.05, floor_mm=-2.0):
+    """Heights of a body's face on a grid."""
+    line = np.arange(-half_mm, half_mm + pitch_mm / 2, pitch_mm)
+    x, z = np.meshgrid(line, line)
+    points = np.column_stack([x.ravel(), np.zeros(x.size), z.ravel()])
+    return np.maximum(body.front(points), floor_mm).reshape(x.shape)
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return height_surface(map_of(Sphere(curvature_per_m=400.0), 2.2), 0.05)
+
+
+def test_distance_to_a_box_is_the_closed_form():
+    points = np.random.default_rng(1).uniform(-4.0, 4.0, (2000, 3))
+    beyond = np.abs(points - [0.0, -1.0, 0.0]) - [1.0, 1.0, 1.5]
+    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+    expected = np.where(outside > 0.0, outside, beyond.max(axis=1))
+    assert (expected < 0.0).sum() > 10
+    triangles = Triangles.of(CUBE, SIDES)
+    gap, normal = triangles.gap(points)
+    np.testing.assert_allclose(gap, expected, rtol=0, atol=1e-12)
+    out = np.maximum(beyond, 0.0)[outside > 0.0] * np.sign(points - [0.0, -1.0, 0.0])[outside > 0.0]
+    np.testing.assert_allclose(normal[outside > 0.0] * outside[outside > 0.0, None], out, rtol=0, atol=1e-12)
+
+
+def test_a_surface_is_as_near_as_the_ball_that_it_follows(ball):
+    exact, generator = Sphere(curvature_per_m=400.0), np.random.default_rng(2)
+    radius = exact.radius_mm
+    way = generator.normal(size=(500, 3)) * [0.6, 0.0, 0.6] + [0.0, 1.0, 0.0]
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    points = way * generator.uniform(radius - 0.05, radius + 0.2, (500, 1)) - [0.0, radius, 0.0]
+    points = points[(np.abs(points[:, [0, 2]]) < 1.6).all(axis=1)]
+    gap, normal = ball.gap(points)
+    expected, direction = exact.gap(points)
+    np.testing.assert_allclose(gap, expected, rtol=0, atol=2e-3)
+    np.testing.assert_allclose(normal, direction, rtol=0, atol=2e-2)
+    check_gap(ball.gap, "ball")
+
+
+def test_a_ball_from_a_height_map_presses_as_the_ball(ball):
+    touch = touch_of(
+        Fingertip(), Sphere(curvature_per_m=400.0), RampAndHold(depth_mm=0.6), settings=PressSettings(2, 1),
+        grading=replace(COARSE, full=True, size_x_mm=0.5, size_z_mm=0.5),
+    )  # fmt: skip
+    exact, mapped = touch.solve(), replace(touch, indenter=ball).solve()
+    np.testing.assert_allclose(mapped.force_mn, exact.force_mn, rtol=5e-3)
+    largest = exact.sed_kpa.max()
+    np.testing.assert_allclose(mapped.sed_kpa, exact.sed_kpa, rtol=0, atol=0.02 * largest)
+
+
+def test_the_content_of_a_surface_is_its_key():
+    same, other = CUBE.copy(), CUBE.copy()
+    other[3, 0] = np.nextafter(other[3, 0], 9.0)
+    keys = [
+        touch_key(touch_of(Fingertip(), Surface(vertices, SIDES), grading=replace(COARSE, full=True)))
+        for vertices in (CUBE, same, other)
+    ]
+    assert keys[0] == keys[1] != keys[2]
+
+
+def test_fine_relief_asks_for_a_mesh_that_resolves_it():
+    rippled = height_surface(map_of(Grating(ridge_mm=0.8, groove_mm=0.8, lip_mm=0.1), 2.4, 0.05), 0.05)
+    assert 0.6 <= rippled.relief_mm <= 1.25
+    assert grading_about(rippled, "quick", 17.37).size_x_mm <= rippled.relief_mm / 4
+    with pytest.raises(InputError, match="grading must have elements of at most"):
+        touch_of(Fingertip(), rippled, grading=replace(COARSE, full=True))
+    assert height_surface(map_of(Sphere(curvature_per_m=287.0), 2.0), 0.1).relief_mm > 1.5
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "said"),
+    [
+        (CUBE * np.nan, SIDES, "finite numbers"),
+        (CUBE, np.zeros((0, 3), int), "at least one triangle"),
+        (CUBE * [1.0, 0.0, 0.0], SIDES, "triangles with an area"),
+        (CUBE * 1e-4, SIDES, "check the unit"),
+        (CUBE * 1e4, SIDES, "check the unit"),
+        (CUBE, SIDES + 1, "numbers of vertices, 0 to 7"),
+        (CUBE[:3] * [1, 0, 1] + [[0, 0, 0], [0, 0, 3], [3, 0, 0]], np.array([[0, 2, 1]]), "outer side"),
+    ],
+)
+def test_a_surface_that_cannot_be_pressed_is_refused_in_one_sentence(vertices, faces, said):
+    with pytest.raises(InputError, match=said):
+        Surface(vertices, faces)
+
+
+@pytest.mark.parametrize("ending", ["stl", "obj", "ply"])
+def test_a_file_is_read_in_its_unit_and_turned_to_the_skin(tmp_path, ending):
+    trimesh = pytest.importorskip("trimesh")
+    path = tmp_path / f"block.{ending}"
+    upright = trimesh.Trimesh(CUBE[:, [0, 2, 1]] * [0.1, -0.1, 0.1], SIDES, process=False)
+    path.write_bytes(_bytes(upright.export(file_type=ending)))
+    read = read_surface(path, unit="cm", up="+z", at_mm=(0.5, 0.0))
+    np.testing.assert_allclose(read.vertices_mm.min(axis=0), [-0.5, -2.0, -1.5], atol=1e-6)
+    np.testing.assert_allclose(read.vertices_mm.max(axis=0), [1.5, 0.0, 1.5], atol=1e-6)
+    assert len(read.vertices_mm) == 8
+    assert read.front(np.array([[0.5, 0.0, 0.2]])) == pytest.approx(0.0, abs=1e-3)
+
+
+def _bytes(content):
+    return content if isinstance(content, bytes) else content.encode()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("a.stl", b"", "is empty"),
+        ("a.step", b"x", "must end in .stl"),
+        ("a.stl", b"\x00" * 80 + b"\x10\x00\x00\x00" + b"\x00" * 30, "a.stl"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\n", "a.obj"),
+        ("a.obj", b"v 0 0 nan\nv 10 0 0\nv 0 10 0\nf 1 2 3\n", "a.obj must have finite vertices: 1 of 3"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 9\n", "a.ply"),
+        ("a.obj", b"v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nf 1 2 3\n", "check the unit"),
+    ],
+)
+def test_a_bad_file_of_triangles_gives_one_sentence(tmp_path, name, content, said):
+    pytest.importorskip("trimesh")
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=said) as raised:
+        read_surface(tmp_path / name)
+    assert "\n" not in str(raised.value)
+
+
+def test_height_maps_of_all_formats_agree(tmp_path):
+    heights = np.rint(map_of(Bar(1.6, 0.3), 1.5, 0.1, -1.0) * 255) / 255 + 1.0
+    Image.fromarray((heights * 255).astype(np.uint8)).save(tmp_path / "a.png")
+    Image.fromarray(heights.astype(np.float32)).save(tmp_path / "a.tif")
+    np.save(tmp_path / "a.npy", heights)
+    np.savetxt(tmp_path / "a.csv", heights, delimiter=",")
+    maps = [read_height_map(tmp_path / f"a.{end}", 0.1, 0.5) for end in ("png", "tif", "npy", "csv")]
+    for each in maps:
+        np.testing.assert_allclose(each.vertices_mm, maps[2].vertices_mm, rtol=0, atol=1e-6)
+    assert np.ptp(maps[0].vertices_mm[:, 1]) == pytest.approx(0.5)
+
+
+def test_a_bad_height_map_gives_one_sentence(tmp_path):
+    def said(name, content=b"", **options):
+        if content is not None:
+            (tmp_path / name).write_bytes(content)
+        with pytest.raises(InputError) as raised:
+            read_height_map(tmp_path / name, 0.1, **options)
+        assert "\n" not in str(raised.value)
+        return str(raised.value)
+
+    assert "is empty" in said("a.png")
+    assert "cannot be read" in said("a.png", b"\x89PNG\r\n\x1a\nxx")
+    assert "does not exist" in said("none.csv", None)
+    assert "row 2 and column 1" in said("a.csv", b"1,2\nnan,3\n")
+    assert "cannot be read" in said("a.csv", b"1,2\n3\n")
+    assert "at least 2 rows" in said("a.csv", b"1,2\n")
+    np.save(tmp_path / "cube.npy", np.zeros((3, 3, 3)))
+    assert "rows and columns" in said("cube.npy", None)
+    Image.new("1", (30_000, 30_000)).save(tmp_path / "huge.png")
+    assert f"at most {MOST_HEIGHTS:,} heights" in said("huge.png", None)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        ridges([-2.0, 0.0, 1.4], [1.0, 0.6, 0.8]),
+        Union([Sphere(1000.0), Plate()], [(0.2, 0.0, 0.0), (0.0, -0.6, 0.0)], seam_mm=0.4),
+    ],
+    ids=lambda body: type(body).__name__,
+)
+def test_the_normal_of_a_composed_body_is_the_gradient_of_its_gap(body):
+    check_gap(body.gap, type(body).__name__)
+    points = np.random.default_rng(4).uniform([-3, -0.4, -3], [3, 0.6, 3], (300, 3))
+    if isinstance(body, Union) and body.seam_mm:  # its gap is a distance on the face alone
+        points[:, 1] = body.front(points)
+    step = 1e-6
+    slope = np.stack(
+        [
+            (body.gap(points + step * axis)[0] - body.gap(points - step * axis)[0]) / (2 * step)
+            for axis in np.eye(3)
+        ],
+        axis=1,
+    )
+    _, normal = body.gap(points)
+    assert (np.abs(slope - normal).max(axis=1) < 1e-4).mean() > 0.98
+
+
+def test_ridges_at_equal_distances_are_the_grating():
+    even = ridges(np.arange(-8, 9) * 2.0, np.ones(17), fillet_mm=0.1, height_mm=3.0)
+    points = np.random.default_rng(5).uniform([-4, -1.0, -4], [4, 0.5, 4], (200, 3))
+    np.testing.assert_allclose(even.gap(points)[0], Grating(1.0, 1.0, 0.1).gap(points)[0], atol=1e-12)
