@@ -85,7 +85,7 @@ class Union(Indenter):
         share = np.clip(0.5 + 0.5 * (other - gap) / self.seam_mm, 0.0, 1.0)
         both = other + share * (gap - other) - self.seam_mm * share * (1.0 - share)
         slope = share[:, None] * normal + (1.0 - share[:, None]) * other_normal
-        # The gradient is shorter than 1 in a seam. Divided by its length, the gap is a distance near the face.
+        # The gradient is shorter than 1 in a seam. Divided by its length, the gap is a distance at the face.
         length = np.maximum(np.linalg.norm(slope, axis=1), LEAST_SLOPE)
         return both / length, slope / np.linalg.norm(slope, axis=1)[:, None]
 
