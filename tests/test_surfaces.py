@@ -71,7 +71,7 @@ def test_a_surface_is_as_near_as_the_ball_that_it_follows(ball):
 
 
 def profile_surface(body, fillet_mm, step_deg, path):
-    """Face of a body that is the same all along z, every few degrees of its edges, as a file that stands on end."""
+    """Face of a body that is the same all along z, every few degrees of its edges, from a file."""
     flat = np.linspace(-4.0, 4.0, 33)
     round_mm = fillet_mm * (1 - np.cos(np.radians(np.arange(0.0, 90.1, step_deg))))
     edges = [
@@ -99,9 +99,16 @@ GRATING = ridges([-2.5, 0.0, 2.5], [1.5, 1.5, 1.5], fillet_mm=0.2)
 RIDGES = {Bar: ((0.0, 3.0),), Union: ((-2.5, 1.5), (0.0, 1.5), (2.5, 1.5))}
 
 
-@pytest.mark.parametrize("body", [Sphere(287.0), Bar(), GRATING], ids=lambda body: type(body).__name__)
-def test_a_body_from_triangles_presses_as_its_analytic_twin(body, tmp_path):
-    """Two triangulations of a file and two of a map: force within 0.5 %, SED within 2 % of its peak."""
+@pytest.mark.parametrize(
+    ("body", "size_mm"),
+    [(Sphere(287.0), 0.3), (Bar(), 0.27), (GRATING, 0.3)],
+    ids=["sphere", "bar", "grating"],
+)
+def test_a_body_from_triangles_presses_as_its_analytic_twin(body, size_mm, tmp_path):
+    """Two triangulations of a file and two of a map: force within 0.5 %, SED within 2 % of its peak.
+
+    No row of nodes stands on an edge: there the last µm of the shape decide which nodes touch.
+    """
     if isinstance(body, Sphere):
         files = [ball_surface(subdivisions, tmp_path / "a.stl") for subdivisions in (5, 6)]
     else:
@@ -110,7 +117,7 @@ def test_a_body_from_triangles_presses_as_its_analytic_twin(body, tmp_path):
     maps = [height_surface(map_of(body, 3.4, pitch), pitch) for pitch in (0.05, 0.025)]
     touch = touch_of(
         Fingertip(), body, RampAndHold(depth_mm=0.6), settings=PressSettings(2, 1),
-        grading=replace(COARSE, full=True, size_x_mm=0.27, size_z_mm=0.6),
+        grading=replace(COARSE, full=True, size_x_mm=size_mm, size_z_mm=0.6),
     )  # fmt: skip
     exact = touch.solve()
     for surface in (*files, *maps):
