@@ -224,7 +224,7 @@ def test_a_bad_height_map_gives_one_sentence(tmp_path):
     assert "cannot be read" in said("a.png", b"\x89PNG\r\n\x1a\nxx")
     assert "does not exist" in said("none.csv", None)
     assert "row 2 and column 1" in said("a.csv", b"1,2\nnan,3\n")
-    assert "cannot be read" in said("a.csv", b"1,2\n3\n")
+    assert "line 2 has 1 of them instead of 2" in said("a.csv", b"1,2\n3\n")
     assert "at least 2 rows" in said("a.csv", b"1,2\n")
     np.save(tmp_path / "cube.npy", np.zeros((3, 3, 3)))
     assert "rows and columns" in said("cube.npy", None)

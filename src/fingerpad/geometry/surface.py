@@ -62,7 +62,8 @@ class Surface(Indenter):
     ------
     InputError
         If vertices are not finite, faces name no vertex, no triangle has an area, the surface is larger than
-        1000 mm or smaller than 0.1 mm (a wrong unit), or it shows the skin its inner side.
+        1000 mm or smaller than 0.1 mm (a wrong unit), neighbouring triangles turn different sides out, more
+        than two share an edge, or it shows the skin its inner side.
 
     Examples
     --------
@@ -108,6 +109,7 @@ class Surface(Indenter):
                 "or reverse the order of the corners."
             )
         faces = faces[kept]
+        _check_sides(faces, vertices)
         vertices = vertices - [0.0, vertices[np.unique(faces), 1].max(), 0.0]
         for name, value in (("vertices_mm", vertices), ("faces", faces)):
             value.setflags(write=False)
@@ -202,6 +204,20 @@ class Surface(Indenter):
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         return self._triangles.gap(points_mm)
+
+
+def _check_sides(faces: IntArray, vertices_mm: FloatArray) -> None:
+    """Raise an error unless neighbours turn the same side out and at most two triangles share an edge."""
+    begin, end = faces.T, faces[:, [1, 2, 0]].T
+    ways, count = np.unique(begin * len(vertices_mm) + end, return_counts=True)
+    twice = ways[count > 1]
+    if twice.size:
+        x, y, z = 0.5 * (vertices_mm[twice[0] // len(vertices_mm)] + vertices_mm[twice[0] % len(vertices_mm)])
+        raise InputError(
+            "A surface must have two triangles at most along each edge, with their outer sides on one side: "
+            f"{twice.size:,} edges do not, one at ({x:.4g}, {y:.4g}, {z:.4g}) mm; repair it, for example "
+            "with trimesh.repair."
+        )
 
 
 def _is_steep(height: FloatArray, spacing: float) -> np.ndarray:

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, finite, one_of, positive
+from fingerpad.core.checks import FloatArray, IntArray, float_array, one_of, positive
 from fingerpad.core.errors import InputError
-from fingerpad.geometry.surface import Surface, height_surface
+from fingerpad.geometry.surface import LARGEST_MM, SMALLEST_MM, Surface, height_surface
 
 UNITS_MM = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
 """Units of length of a file. [mm]"""
@@ -65,11 +65,15 @@ def read_surface(
     file = Path(path)
     factor = UNITS_MM[one_of("unit", unit, tuple(UNITS_MM))] * positive("scale", scale)
     number, sign = _AXES[one_of("up", up, tuple(_AXES))]
+    at = float_array("at_mm", at_mm, 1)
+    if at.shape != (2,):
+        raise InputError(f"at_mm must be two numbers, along and across the finger in mm: got {at_mm!r}.")
     _check_file(file, MESHES)
     try:
         import trimesh
     except ImportError as error:
         raise InputError("Reading surfaces needs trimesh: pip install 'fingerpad[surfaces]'.") from error
+    _check_length(file)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -81,13 +85,20 @@ def read_surface(
         ) from error
     if not len(faces):
         raise InputError(f"{file.name} must hold at least one triangle: got none.")
+    if vertices.shape[1:] != (3,):
+        raise InputError(f"{file.name} must have vertices with x, y and z: got shape {vertices.shape}.")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError(
+            f"{file.name} must have triangles of its vertices, 0 to {len(vertices) - 1}: got numbers "
+            f"{faces.min()} to {faces.max()}."
+        )
     wrong = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
     if wrong.size:
         raise InputError(
             f"{file.name} must have finite vertices: {wrong.size} of {len(vertices)} are not, first number "
             f"{wrong[0] + 1}."
         )
-    vertices, welded = np.unique(vertices, axis=0, return_inverse=True)
+    vertices, faces = _welded(vertices, faces)
     # x, y, z of the indenter from the file's axes; a rotation keeps the side of the triangles.
     turned = np.zeros((3, 3))
     turned[0 if number != 0 else 1, 0] = 1.0
@@ -95,11 +106,23 @@ def read_surface(
     turned[:, 2] = np.cross(turned[:, 0], turned[:, 1])
     placed = factor * vertices @ turned
     middle = 0.5 * (placed.min(axis=0) + placed.max(axis=0))
-    x, z = (finite("at_mm", value, "mm") for value in at_mm)
     try:
-        return Surface(placed - middle + [x, 0.0, z], welded.ravel()[faces])
+        return Surface(placed - middle + [at[0], 0.0, at[1]], faces)
     except InputError as error:
         raise InputError(f"{file.name}: {error}") from error
+
+
+def _welded(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """Vertices without a second one at the same place, sorted, and the triangles of them.
+
+    Several times as fast for a million triangles as `numpy.unique` by rows.
+    """
+    order = np.lexsort(vertices.T[::-1])
+    ahead = vertices[order]
+    is_new = np.r_[True, (ahead[1:] != ahead[:-1]).any(axis=1)]
+    number = np.empty(len(vertices), dtype=np.int64)
+    number[order] = np.cumsum(is_new) - 1
+    return ahead[is_new], number[faces]
 
 
 def read_height_map(path: str | Path, pitch_mm: float, height_mm: float = 1.0) -> Surface:
@@ -110,7 +133,7 @@ def read_height_map(path: str | Path, pitch_mm: float, height_mm: float = 1.0) -
     Parameters
     ----------
     path : str or Path
-        PNG or TIFF, 8 or 16 bit or float, colours as their brightness; NPY or CSV with numbers.
+        PNG or TIFF, 8 or 16 bit or float, in shades of grey; NPY or CSV with numbers.
     pitch_mm : float
         Distance between neighbouring heights. [mm]
     height_mm : float
@@ -131,7 +154,9 @@ def read_height_map(path: str | Path, pitch_mm: float, height_mm: float = 1.0) -
     positive("height_mm", height_mm, "mm")
     _check_file(file, MAPS)
     try:
-        heights = _heights(file)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            heights = _heights(file)
     except InputError:
         raise
     except Exception as error:  # a file of unknown content may fail in any way
@@ -139,6 +164,12 @@ def read_height_map(path: str | Path, pitch_mm: float, height_mm: float = 1.0) -
     if heights.ndim != 2:
         raise InputError(f"{file.name} must hold rows and columns of heights: got shape {heights.shape}.")
     _check_size(file, heights.size)
+    side_mm = pitch_mm * (max(heights.shape) - 1)
+    if side_mm and not SMALLEST_MM <= side_mm <= LARGEST_MM:
+        raise InputError(
+            f"{file.name} must be {SMALLEST_MM:g} to {LARGEST_MM:g} mm long or wide: got {side_mm:.4g} mm; "
+            "check pitch_mm."
+        )
     wrong = np.argwhere(~np.isfinite(heights))
     if len(wrong):
         raise InputError(
@@ -154,28 +185,88 @@ def read_height_map(path: str | Path, pitch_mm: float, height_mm: float = 1.0) -
 def _heights(file: Path) -> FloatArray:
     """Numbers of a file, from 0 to 1 for the shades of an image."""
     if file.suffix.lower() == ".npy":
+        with file.open("rb") as content:
+            if content.read(6) != b"\x93NUMPY":
+                raise InputError(f"{file.name} must be an array that numpy.save wrote: it is not.")
         stored = np.load(file, mmap_mode="r", allow_pickle=False)
         _check_size(file, stored.size)
+        if stored.dtype.kind not in "buif":
+            raise InputError(f"{file.name} must hold real numbers: got {stored.dtype}.")
         return np.array(stored, dtype=np.float64)
     if file.suffix.lower() == ".csv":
-        return np.loadtxt(file, delimiter=",", ndmin=2, dtype=np.float64)
-    from PIL import Image
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
         try:
-            opened = Image.open(file)
-        except Image.DecompressionBombError as error:
+            return np.loadtxt(
+                file, delimiter=",", ndmin=2, dtype=np.float64, comments=None, encoding="utf-8-sig"
+            )
+        except ValueError as error:
             raise InputError(
-                f"{file.name} must have at most {MOST_HEIGHTS:,} heights: got far more; crop it."
+                f"{file.name} must hold rows of numbers with commas between: {_fault(file)}."
             ) from error
-        with opened as image:
-            _check_size(file, image.width * image.height)
-            if image.mode == "F":
-                return np.array(image, dtype=np.float64)
-            if image.mode.startswith("I"):
-                return np.array(image, dtype=np.float64) / 65535.0
-            return np.array(image.convert("L"), dtype=np.float64) / 255.0
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        opened = Image.open(file)
+    except UnidentifiedImageError as error:
+        raise InputError(
+            f"{file.name} cannot be read as a PNG or TIFF image: its content is of no known kind."
+        ) from error
+    except Image.DecompressionBombError as error:
+        raise InputError(
+            f"{file.name} must have at most {MOST_HEIGHTS:,} heights: got far more; crop it."
+        ) from error
+    with opened as image:
+        _check_size(file, image.width * image.height)
+        if image.mode == "F":
+            return np.array(image, dtype=np.float64)
+        if image.mode.startswith("I"):
+            return np.array(image, dtype=np.float64) / 65535.0
+        return _shades(file, np.array(image.convert("RGBA"), dtype=np.float64)) / 255.0
+
+
+def _shades(file: Path, pixels: FloatArray) -> FloatArray:
+    """Shades of pixels (n_rows, n_columns, 4) that are red, green, blue and opacity, if they are grey."""
+    for what, wrong in (
+        ("opaque", pixels[..., 3] < 255.0),
+        ("grey", np.ptp(pixels[..., :3], axis=2) > 0.0),
+    ):
+        if wrong.any():
+            row, column = np.argwhere(wrong)[0] + 1
+            raise InputError(
+                f"{file.name} must have {what} pixels, whose shades are heights: {wrong.sum():,} are not, "
+                f"first in row {row} and column {column}."
+            )
+    return pixels[..., 0]
+
+
+def _fault(file: Path) -> str:
+    """Say what is wrong in the first bad line of a CSV file."""
+    columns = 0
+    for number, line in enumerate(file.read_text(encoding="utf-8-sig", errors="replace").splitlines(), 1):
+        cells = line.split(",") if line.strip() else []
+        for column, cell in enumerate(cells, 1):
+            try:
+                float(cell)
+            except ValueError:
+                return f"got {cell[:40]!r} in line {number} and column {column}"
+        columns = columns or len(cells)
+        if cells and len(cells) != columns:
+            return f"line {number} has {len(cells)} of them instead of {columns}"
+    return "it does not"
+
+
+def _check_length(file: Path) -> None:
+    """Raise an error if a binary STL file is not as long as its number of triangles says."""
+    size = file.stat().st_size
+    with file.open("rb") as opened:
+        begin = opened.read(84)
+    if file.suffix.lower() != ".stl" or begin.lstrip()[:5].lower() == b"solid":
+        return
+    count = int.from_bytes(begin[80:84], "little")
+    if size != 84 + 50 * count:
+        raise InputError(
+            f"{file.name} must be an STL file of text that begins with 'solid', or have "
+            f"{84 + 50 * count:,} bytes for {count:,} triangles: got {size:,} bytes."
+        )
 
 
 def _check_file(file: Path, endings: tuple[str, ...]) -> None:

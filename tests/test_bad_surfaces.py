@@ -1,0 +1,265 @@
+"""Malformed surfaces and heights: one sentence with the file, what was expected and what came."""
+
+import struct
+import warnings
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fingerpad.core.errors import InputError
+from fingerpad.geometry.surface_files import read_height_map, read_surface
+
+TRIANGLE = "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2 3\n"
+PLY = (
+    "ply\nformat ascii 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face {faces}\nproperty list uchar int vertex_indices\nend_header\n{body}"
+)
+FOLDED = "v 0 0 0\nv 10 0 0\nv 0 10 0\nv 10 10 0\n"
+CORNERS = "0 0 0\n10 0 0\n0 10 0\n"
+
+
+def binary_stl(triangles, count=None, cut=0):
+    content = bytes(80) + struct.pack("<I", len(triangles) if count is None else count)
+    for triangle in triangles:
+        content += struct.pack("<12f", 0.0, 0.0, 1.0, *np.ravel(triangle)) + bytes(2)
+    return content[: len(content) - cut]
+
+
+def ascii_stl(*corners):
+    lines = "\n".join(f"vertex {corner}" for corner in corners)
+    return f"solid a\nfacet normal 0 0 1\nouter loop\n{lines}\nendloop\nendfacet\nendsolid a\n"
+
+
+def ply(vertices=3, faces=1, body=CORNERS + "3 0 1 2\n"):
+    return PLY.format(vertices=vertices, faces=faces, body=body)
+
+
+ONE = [[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [0.0, 10.0, 0.0]]
+
+SAID = {
+    "truncated.stl": "234 bytes for 3 triangles: got 214 bytes",
+    "too-few.stl": "434 bytes for 7 triangles: got 134 bytes",
+    "beyond.ply": "0 to 2: got numbers 0 to 7",
+    "turned.obj": "outer sides on one side: 1 edges do not, one at",
+    "three.obj": "two triangles at most along each edge",
+    "same.obj": "3 edges do not",
+    "ragged.csv": "line 2 has 2 of them instead of 3",
+    "words.csv": "got 'three' in line 2 and column 1",
+    "header.csv": "got 'x' in line 1 and column 1",
+    "hole.csv": "got '' in line 2 and column 2",
+    "semicolon.csv": "got '1;2' in line 1",
+    "nan.csv": "first in row 2 and column 1",
+    "text.npy": "numpy.save",
+    "text.png": "cannot be read as a PNG or TIFF image",
+}
+
+SURFACES = {
+    "empty.stl": "",
+    "header.stl": bytes(80),
+    "spaces.stl": "   \n \n",
+    "no-triangle.stl": binary_stl([]),
+    "truncated.stl": binary_stl([ONE] * 3, cut=20),
+    "too-few.stl": binary_stl([ONE], count=7),
+    "far-too-few.stl": binary_stl([ONE], count=4_000_000_000),
+    "nan.stl": binary_stl([[[0.0, 0.0, np.nan], *ONE[1:]]]),
+    "infinite.stl": binary_stl([[[0.0, 0.0, np.inf], *ONE[1:]]]),
+    "huge.stl": binary_stl([np.multiply(ONE, 3e37)]),
+    "point.stl": binary_stl([[ONE[0]] * 3]),
+    "line.stl": binary_stl([[[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [10.0, 0.0, 0.0]]]),
+    "metres.stl": binary_stl([np.multiply(ONE, 1e-3)]),
+    "microns.stl": binary_stl([np.multiply(ONE, 1e3)]),
+    "down.stl": binary_stl([ONE[::-1]]),
+    "wall.stl": binary_stl([[[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [0.0, 0.0, 10.0]]]),
+    "text.stl": ascii_stl("0 0 0", "ten 0 0", "0 10 0"),
+    "two-numbers.stl": ascii_stl("0 0 0", "10 0", "0 10 0"),
+    "two-corners.stl": ascii_stl("0 0 0", "10 0 0"),
+    "nan-text.stl": ascii_stl("0 0 0", "nan 0 0", "0 10 0"),
+    "prose.stl": "solid as a rock, and no triangle in it",
+    "image.stl": b"\x89PNG\r\n\x1a\n" + bytes(200),
+    "empty.obj": "",
+    "comments.obj": "# nothing\n# here\n",
+    "vertices.obj": "v 0 0 0\nv 10 0 0\nv 0 10 0\n",
+    "letters.obj": "v 0 0 0\nv x 0 0\nv 0 10 0\nf 1 2 3\n",
+    "short.obj": "v 0 0 0\nv 10 0\nv 0 10 0\nf 1 2 3\n",
+    "nan.obj": "v 0 0 0\nv nan 0 0\nv 0 10 0\nf 1 2 3\n",
+    "infinite.obj": "v 0 0 0\nv inf 0 0\nv 0 10 0\nf 1 2 3\n",
+    "beyond.obj": "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2 9\n",
+    "zero.obj": "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 0 1 2\n",
+    "edge.obj": "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2\n",
+    "flat.obj": "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 1 2\n",
+    "face-first.obj": "f 1 2 3\n",
+    "words.obj": "this is no object\n",
+    "bytes.obj": bytes(range(256)),
+    "down.obj": "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 3 2 1\n",
+    "tiny.obj": "v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nf 1 2 3\n",
+    "empty.ply": "",
+    "magic.ply": "plywood\n",
+    "header.ply": "ply\nformat ascii 1.0\nelement vertex 9\n",
+    "format.ply": ply().replace("ascii 1.0", "roman 2.0"),
+    "no-faces.ply": ply(faces=0, body=CORNERS),
+    "truncated.ply": ply(vertices=9, body=CORNERS),
+    "beyond.ply": ply(body=CORNERS + "3 0 1 7\n"),
+    "negative.ply": ply(body=CORNERS + "3 0 1 -7\n"),
+    "letters.ply": ply(body="0 0 0\nten 0 0\n0 10 0\n3 0 1 2\n"),
+    "nan.ply": ply(body="0 0 0\nnan 0 0\n0 10 0\n3 0 1 2\n"),
+    "cut.ply": ply().replace("ascii", "binary_little_endian"),
+    "down.ply": ply(body=CORNERS + "3 2 1 0\n"),
+    "turned.obj": FOLDED + "f 1 2 3\nf 2 3 4\n",
+    "three.obj": FOLDED + "v 5 5 9\nf 1 2 3\nf 3 2 4\nf 3 2 5\n",
+    "same.obj": FOLDED + "f 1 2 3\nf 1 2 3\n",
+    "solid.step": "ISO-10303-21;",
+    "noending": TRIANGLE,
+}
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_a_malformed_surface_is_refused_in_one_sentence(tmp_path, name):
+    pytest.importorskip("trimesh")
+    content = SURFACES[name]
+    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    assert SAID.get(name, "") in _refused(name, lambda: read_surface(tmp_path / name))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"unit": "furlong"}, "unit must be one of"),
+        ({"unit": 3}, "unit must be one of"),
+        ({"unit": "m"}, "check the unit"),
+        ({"unit": "um"}, "check the unit"),
+        ({"scale": 0.0}, "scale must be greater than 0"),
+        ({"scale": -1.0}, "scale must be greater than 0"),
+        ({"scale": "twice"}, "scale must be a finite number"),
+        ({"scale": np.nan}, "scale must be a finite number"),
+        ({"up": "z"}, "up must be one of"),
+        ({"up": "-z"}, "outer side"),
+        ({"at_mm": (np.nan, 0.0)}, "at_mm"),
+        ({"at_mm": ("left", 0.0)}, "at_mm"),
+        ({"at_mm": (1.0, 2.0, 3.0)}, "at_mm must be two numbers"),
+        ({"at_mm": 3.0}, "at_mm"),
+    ],
+    ids=str,
+)
+def test_a_wrong_placement_is_refused_in_one_sentence(tmp_path, options, said):
+    pytest.importorskip("trimesh")
+    (tmp_path / "good.obj").write_text(TRIANGLE.replace("10", "20"))
+    assert said in _refused(None, lambda: read_surface(tmp_path / "good.obj", **options))
+
+
+@pytest.mark.parametrize(
+    "reader", [read_surface, lambda path: read_height_map(path, 0.1)], ids=["stl", "map"]
+)
+def test_a_folder_and_a_missing_file_are_told(tmp_path, reader):
+    for name in ("folder.stl", "folder.png"):
+        (tmp_path / name).mkdir()
+    for name in ("folder.stl", "folder.png", "missing.stl", "missing.png"):
+        _refused(name, lambda name=name: reader(tmp_path / name))
+
+
+MAPS = {
+    "empty.csv": "",
+    "blank.csv": "\n\n\n",
+    "ragged.csv": "1,2,3\n4,5\n6,7,8\n",
+    "words.csv": "1,2\nthree,4\n",
+    "header.csv": "x,z\n1,2\n3,4\n",
+    "semicolon.csv": "1;2\n3;4\n",
+    "comma.csv": '"1,5","2,5"\n"3,5","4,5"\n',
+    "hole.csv": "1,2\n3,\n",
+    "nan.csv": "1,2\nnan,4\n",
+    "infinite.csv": "1,2\n3,inf\n",
+    "row.csv": "1,2,3\n",
+    "column.csv": "1\n2\n3\n",
+    "one.csv": "1\n",
+    "bytes.csv": bytes(range(256)),
+    "units.csv": "1mm,2mm\n3mm,4mm\n",
+    "mountain.csv": "0,1e9\n0,0\n",
+    "empty.npy": "",
+    "magic.npy": b"\x93NUMPY\x01\x00",
+    "text.npy": "1 2 3",
+    "empty.png": "",
+    "magic.png": b"\x89PNG\r\n\x1a\nxx",
+    "text.png": "a picture of a dot",
+    "text.tif": "a picture of a dot",
+    "cut.tif": b"II*\x00\x08\x00\x00\x00",
+    "photo.jpg": b"\xff\xd8\xff",
+    "map.txt": "1 2\n3 4\n",
+}
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_a_malformed_height_map_is_refused_in_one_sentence(tmp_path, name):
+    content = MAPS[name]
+    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    assert SAID.get(name, "") in _refused(name, lambda: read_height_map(tmp_path / name, 0.1))
+
+
+ARRAYS = {
+    "complex": np.ones((4, 4), dtype=complex),
+    "text": np.array([["a", "b"], ["c", "d"]]),
+    "objects": np.array([[1, None], [2, 3]], dtype=object),
+    "line": np.ones(9),
+    "number": np.array(3.0),
+    "cube": np.ones((3, 3, 3)),
+    "none": np.ones((0, 5)),
+    "nan": np.full((4, 4), np.nan),
+    "row": np.ones((1, 40)),
+    "times": np.zeros((3, 3), dtype="datetime64[s]"),
+    "fields": np.zeros((3, 3), dtype=[("height", float)]),
+}
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_an_array_that_is_no_map_is_refused_in_one_sentence(tmp_path, name):
+    np.save(tmp_path / f"{name}.npy", ARRAYS[name], allow_pickle=True)
+    _refused(f"{name}.npy", lambda: read_height_map(tmp_path / f"{name}.npy", 0.1))
+
+
+def test_images_that_do_not_hold_heights_are_refused(tmp_path):
+    grey = Image.new("L", (20, 20))
+    grey.putpixel((10, 10), 255)
+    content = tmp_path / "whole.png"
+    Image.effect_noise((200, 200), 80).save(content)
+    (tmp_path / "cut.png").write_bytes(content.read_bytes()[:900])
+    Image.new("1", (9000, 9000)).save(tmp_path / "large.png")
+    Image.new("L", (20, 1)).save(tmp_path / "row.png")
+    Image.new("RGB", (20, 20), (200, 40, 10)).save(tmp_path / "colour.png")
+    translucent = grey.convert("RGBA")
+    translucent.putpixel((3, 3), (0, 0, 0, 0))
+    translucent.save(tmp_path / "alpha.png")
+    for name in ("cut.png", "large.png", "row.png", "colour.png", "alpha.png"):
+        _refused(name, lambda name=name: read_height_map(tmp_path / name, 0.1))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"pitch_mm": 0.0}, "pitch_mm must be greater than 0"),
+        ({"pitch_mm": -0.1}, "pitch_mm must be greater than 0"),
+        ({"pitch_mm": np.nan}, "pitch_mm must be a finite number"),
+        ({"pitch_mm": "fine"}, "pitch_mm must be a finite number"),
+        ({"pitch_mm": 1e-5}, "0.1 to 1000 mm"),
+        ({"pitch_mm": 1e3}, "0.1 to 1000 mm"),
+        ({"pitch_mm": 0.1, "height_mm": 0.0}, "height_mm must be greater than 0"),
+        ({"pitch_mm": 0.1, "height_mm": np.inf}, "height_mm must be a finite number"),
+        ({"pitch_mm": 0.1, "height_mm": 1e6}, "0.1 to 1000 mm"),
+        ({"pitch_mm": 0.1, "height_mm": "1 mm"}, "height_mm must be a finite number"),
+    ],
+    ids=str,
+)
+def test_a_wrong_pitch_or_height_is_refused_in_one_sentence(tmp_path, options, said):
+    np.save(tmp_path / "map.npy", np.outer(np.hanning(20), np.hanning(20)))
+    assert said in _refused(None, lambda: read_height_map(tmp_path / "map.npy", **options))
+
+
+def _refused(name, read):
+    """Sentence of the refusal: one line, an end, the file's name, and no warning beside it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(InputError) as raised:
+            read()
+    said = str(raised.value)
+    assert "\n" not in said
+    assert said.endswith((".", "'fingerpad[surfaces]'."))
+    assert name is None or name in said
+    return said
