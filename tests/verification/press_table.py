@@ -98,7 +98,8 @@ def presses() -> Iterator[Press]:
         if not body.grips:
             yield Press(body, friction=0.5)
     for body in HARD:
-        yield from (Press(body, tissues=tissues) for tissues in TISSUES)
+        for tissues in TISSUES:
+            yield from (Press(body, friction, tissues) for friction in (0.0, 0.5))
         yield from (Press(body, at_mm=at_mm) for at_mm in PLACES_MM)
 
 
