@@ -8,6 +8,7 @@ import pytest
 from studies.pages.mesh_refinement import MESH_REFINEMENT
 from studies.pages.paper_size import PAPER_SIZE, summary
 
+from . import press_table
 from .case import at_least, at_most, equal, near
 from .cases import ORDERED, THEMES
 from .page import PAGE, allowance, case_text, expectation, page_text, rows_shown
@@ -40,6 +41,12 @@ def test_the_page_shows_what_is_measured(case):
     assert [(cells[0], cells[1], cells[5]) for cells in SHOWN[case.name]] == measured
     bounds = [(row.quantity, expectation(row)) for row in case.rows if "≤" in expectation(row)]
     assert [(cells[0], cells[2]) for cells in SHOWN[case.name] if "≤" in cells[2]] == bounds
+
+
+def test_the_page_of_presses_shows_the_stored_rows():
+    assert press_table.TABLE_PAGE.read_text(encoding="utf-8") == press_table.page_text(
+        press_table.read_rows()
+    )
 
 
 def test_the_page_ends_with_the_stored_runs_which_belong_to_no_case():
