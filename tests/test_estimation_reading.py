@@ -114,7 +114,7 @@ def test_recordings_that_cannot_be_are_named_by_line_and_column(written, content
     with pytest.raises(InputError) as refused:
         read_recordings(path, TWO)
     assert said in str(refused.value)
-    assert str(refused.value).endswith(".")
+    assert str(refused.value)[-1] in ".?"
 
 
 def test_a_shift_must_be_a_number(written):

@@ -294,7 +294,7 @@ stimuli: {vary: curvature_per_m, values: 287}
 stimuli: {vary: colour, values: [1, 2]}
     stimuli.vary must be one of curvature_per_m,
 stimuli: {vary: width_mm, values: [1, 2]}
-    stimuli.values[1].width_mm must not be given: a sphere has curvature_per_m.
+    stimuli.values[1].width_mm must not be given: a sphere has curvature_per_m, radius_mm, diameter_mm.
 {stimuli: {vary: depth_mm, values: [1, 50]}, standard: 1}
     stimulus '50' cannot be used: depth_mm must stay below
 stimuli: {vary: curvature_per_m}

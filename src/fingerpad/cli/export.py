@@ -18,7 +18,7 @@ def export_command(
     indenter: Annotated[
         str,
         typer.Option(
-            help=f"One of {', '.join(INDENTER_CHOICES)}, with sizes as in punch:6.35 or sphere:287."
+            help=f"One of {', '.join(INDENTER_CHOICES)}, with sizes as in punch:6.35 or sphere:radius_mm=3.5."
         ),
     ] = "sphere",
     curvature: Annotated[float | None, number_option("Curvature of the sphere. Default: 287. [1/m]")] = None,

@@ -1,5 +1,8 @@
 """Errors of the package: one sentence with the expected value, the actual value and the remedy."""
 
+import sys
+from itertools import count
+
 
 class FingerpadError(Exception):
     """Base class of every error that fingerpad raises deliberately."""
@@ -35,3 +38,13 @@ class MaterialWarning(UserWarning):
 
 class InertiaWarning(UserWarning):
     """A motion so fast that the inertia of the tissue, which is neglected, matters."""
+
+
+def level_of_caller() -> int:
+    """`stacklevel` of `warnings.warn` with which a warning names the line that called the package."""
+    package = __name__.partition(".")[0]
+    for level in count(1):
+        home = str(sys._getframe(level).f_globals.get("__name__", ""))
+        if home.partition(".")[0] != package or sys._getframe(level).f_back is None:
+            break
+    return level

@@ -13,6 +13,7 @@ from typing import Any
 from fingerpad.core.checks import finite
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
+from fingerpad.core.keywords import did_you_mean
 
 Check = Callable[[str, Any, str], float]
 
@@ -119,8 +120,8 @@ def read_csv(path: Path, known: Sequence[str]) -> list[TableRow]:
             separator = next((each for each in (";", "\t") if each in column), "")
             hint = f" Separate entries by commas, not by {separator!r}." if separator else ""
             raise InputError(
-                f"{path}, line {header_line}: column {column!r} is unknown, only {', '.join(known)} can be."
-                f"{hint}"
+                f"{path}, line {header_line}: column {column!r} is unknown: "
+                f"{did_you_mean(column, known, 'a table')}{hint}"
             )
         if columns.count(column) > 1:
             raise InputError(f"{path}, line {header_line}: column {column} is repeated, keep one.")

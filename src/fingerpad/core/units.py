@@ -22,6 +22,17 @@ def radius_mm(curvature_per_m: float) -> float:
     return MM_PER_M / curvature_per_m
 
 
+def curvature_per_m(radius_mm: float) -> float:
+    """Curvature of a sphere from its radius. [1/m]
+
+    Examples
+    --------
+    >>> curvature_per_m(2.0)
+    500.0
+    """
+    return MM_PER_M / radius_mm
+
+
 def cosine_and_sine(angle_deg: float) -> tuple[float, float]:
     """Cosine and sine of an angle in degrees, without rounding at quarter turns.
 

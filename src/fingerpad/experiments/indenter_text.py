@@ -18,8 +18,8 @@ def indenter_named(text: str) -> Indenter:
     Parameters
     ----------
     text : str
-        A name of `INDENTERS`. Sizes follow after colons in the order of the parameters of its class, each in
-        its unit of `SIZE_UNITS`; those that are left out are the paper's.
+        A name of `INDENTERS`. Sizes follow after colons, in the order of the parameters of its class or by
+        name, each in its unit of `SIZE_UNITS`; those that are left out are the paper's.
 
     Returns
     -------
@@ -28,7 +28,7 @@ def indenter_named(text: str) -> Indenter:
     Raises
     ------
     InputError
-        If the name is unknown, a size is no number or cannot be, or there are more sizes than the body has.
+        If a name is unknown, a size is no number or cannot be, or there are more sizes than the body has.
 
     Examples
     --------
@@ -36,6 +36,8 @@ def indenter_named(text: str) -> Indenter:
     FlatPunch(diameter_mm=6.35, fillet_mm=0.3)
     >>> indenter_named("sphere:287"), indenter_named("plate")
     (Sphere(curvature_per_m=287.0), Plate())
+    >>> indenter_named("grating:period_mm=2:duty=0.25")
+    Grating(ridge_mm=0.5, groove_mm=1.5, lip_mm=0.2)
     """
     name, *given = (part.strip() for part in text.split(":"))
     body = INDENTERS[one_of("indenter", name, tuple(INDENTERS))]
@@ -45,7 +47,13 @@ def indenter_named(text: str) -> Indenter:
             f"indenter must be written {':'.join([name, *sizes])}, sizes from the right may be left out: "
             f"got {text!r}."
         )
-    return body(**{
-        size: finite(size, value, SIZE_UNITS[size])  # type: ignore[arg-type]
-        for size, value in zip(sizes, given, strict=False)
-    })  # fmt: skip
+    written: dict[str, str] = {}
+    for place, part in enumerate(given):
+        size, equals, value = (word.strip() for word in part.rpartition("="))
+        size = size if equals else sizes[place]
+        if size in written:
+            raise InputError(f"indenter must have {size} once: got {text!r}.")
+        written[size] = value
+    return body(
+        **{size: finite(size, value, SIZE_UNITS.get(size, "")) for size, value in written.items()}  # type: ignore[arg-type]
+    )

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
 from fingerpad.core.checks import finite
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
+from fingerpad.core.keywords import did_you_mean
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.geometry.indenters import Bar, Indenter
 from fingerpad.geometry.motion import MOTION_UNITS, ForceRampAndHold, RampAndHold, Stimulus
-from fingerpad.geometry.names import SIZE_UNITS
+from fingerpad.geometry.names import INDENTERS, SIZE_UNITS, sizes_of
 
 PLACE = {"x_mm": "mm", "z_mm": "mm", "tilt_deg": "degrees", "spin_deg": "degrees"}
 COLUMNS = ("stimulus", "indenter", *SIZE_UNITS, *MOTION_UNITS, *PLACE)
@@ -164,10 +165,10 @@ def read_stimuli(path: Path) -> ListedStimuli:
 
 def _stimulus(line: TableRow) -> TactileStimulus:
     """Build the stimulus that a line describes."""
-    kind, *inline = line.text("indenter").split(":")
+    kind, *inline = (part.strip() for part in line.text("indenter").split(":"))
     with line.placed():
         indenter = indenter_named(line.text("indenter"))
-    sizes = {size.name: SIZE_UNITS[size.name] for size in fields(indenter)}  # type: ignore[arg-type]
+    sizes = {size: SIZE_UNITS[size] for size in sizes_of(kind)}
     line.refuse_others(("stimulus", "indenter", *sizes, *MOTION_UNITS, *PLACE), kind)
     given = _given(line, sizes)
     if inline and given:
@@ -180,7 +181,7 @@ def _stimulus(line: TableRow) -> TactileStimulus:
     motion = ForceRampAndHold if line.has("force_mn") else RampAndHold
     with line.placed():
         return TactileStimulus(
-            replace(indenter, **given),  # type: ignore[type-var]
+            INDENTERS[kind](**given) if given else indenter,
             motion(**_given(line, MOTION_UNITS)),
             **_given(line, PLACE),
         )
@@ -203,6 +204,8 @@ def _yaml_lines(path: Path) -> list[TableRow]:
             raise InputError(f"{place}: must be a mapping such as {{stimulus: edge, indenter: bar}}.")
         for key in entry:
             if key not in COLUMNS:
-                raise InputError(f"{place}: {key!r} is unknown, only {', '.join(COLUMNS)} can be.")
+                raise InputError(
+                    f"{place}: {key!r} is unknown: {did_you_mean(str(key), COLUMNS, 'a stimulus')}"
+                )
         lines.append(TableRow(place, entry))
     return lines

@@ -8,11 +8,13 @@ of their gaps. This is exact on both sides of its face if the flat between the t
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, not_negative, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import OtherName
 from fingerpad.data import protocol
 from fingerpad.geometry.indenters import BESIDE_EDGE_MM, Bar, Indenter, fillet_within, round_front, rounded
 
@@ -36,7 +38,7 @@ class Edge(Indenter):
     Parameters
     ----------
     fillet_mm : float
-        Radius of the edge. [mm]
+        Radius of the edge; `edge_radius_mm` is another name of it. [mm]
 
     Examples
     --------
@@ -47,14 +49,14 @@ class Edge(Indenter):
 
     symmetry_deg = 180.0
     fillet_mm: float = protocol.BAR_FILLET.value
+    edge_radius_mm = OtherName("fillet_mm")
+
+    if TYPE_CHECKING:
+
+        def __init__(self, fillet_mm: float = ..., *, edge_radius_mm: float = ...) -> None: ...
 
     def __post_init__(self) -> None:
         not_negative("fillet_mm", self.fillet_mm, "mm")
-
-    @property
-    def half_width_mm(self) -> float:
-        """Half of the extent along x: infinite."""
-        return np.inf
 
     @property
     def edge_reach_mm(self) -> float:
@@ -93,9 +95,10 @@ class Gap(Indenter):
     width_mm : float
         Full width along x, gap and fillets included. [mm]
     fillet_mm : float
-        Radius of the two outer edges. [mm]
+        Radius of the two outer edges; `edge_radius_mm` is another name of it. [mm]
     lip_mm : float
-        Radius of the two lips of the gap, if the gap is at least twice as wide. [mm]
+        Radius of the two lips of the gap, if the gap is at least twice as wide; `lip_radius_mm` is another
+        name of it. [mm]
 
     Raises
     ------
@@ -119,6 +122,21 @@ class Gap(Indenter):
     width_mm: float = protocol.GAPPED_BAR_WIDTH.value
     fillet_mm: float = protocol.BAR_FILLET.value
     lip_mm: float = protocol.LIP_RADIUS.value
+    edge_radius_mm = OtherName("fillet_mm")
+    lip_radius_mm = OtherName("lip_mm", lambda body: min(body.lip_mm, body.gap_mm / 2))
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            gap_mm: float = ...,
+            width_mm: float = ...,
+            fillet_mm: float = ...,
+            lip_mm: float = ...,
+            *,
+            edge_radius_mm: float = ...,
+            lip_radius_mm: float = ...,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         not_negative("gap_mm", self.gap_mm, "mm")
@@ -131,11 +149,6 @@ class Gap(Indenter):
                 f"gap_mm must leave two flat ridges of the bar, so be below {widest:g} mm: "
                 f"got {self.gap_mm:g} mm."
             )
-
-    @property
-    def lip_radius_mm(self) -> float:
-        """Radius of the lips, at most half of the gap. [mm]"""
-        return min(self.lip_mm, self.gap_mm / 2)
 
     @property
     def half_width_mm(self) -> float:
@@ -177,6 +190,14 @@ class Gap(Indenter):
         return np.maximum(inner, outer), np.where((inner > outer)[:, None], inner_normal, outer_normal)
 
 
+def _of_period(period_mm: float = 2 * protocol.RIDGE_WIDTH.value, duty: float = 0.5) -> dict[str, float]:
+    """Widths of ridge and groove from the period of a grating and the share of a ridge in it."""
+    if positive("duty", duty) >= 1.0:
+        raise InputError(f"duty must be below 1, the share of a ridge in the period: got {duty!r}.")
+    ridge = positive("period_mm", period_mm, "mm") * duty
+    return {"ridge_mm": ridge, "groove_mm": period_mm - ridge}
+
+
 @dataclass(frozen=True)
 class Grating(Indenter):
     """Grating larger than the finger: flat ridges across it with grooves between them, one ridge at x = 0.
@@ -188,10 +209,15 @@ class Grating(Indenter):
     groove_mm : float
         Width of a groove between its walls; grooves are deeper than skin can bulge. [mm]
     lip_mm : float
-        Radius of the lips, at most half of a ridge. [mm]
+        Radius of the lips, at most half of a ridge; `edge_radius_mm` is another name of it. [mm]
+    period_mm, duty : float, keywords
+        Instead of ridge and groove: from one ridge to the next, and the share of the ridge in it, by default
+        a half. [mm, 1]
 
     Examples
     --------
+    >>> Grating(period_mm=2.0, duty=0.25, edge_radius_mm=0.1)
+    Grating(ridge_mm=0.5, groove_mm=1.5, lip_mm=0.1)
     >>> gap, _ = Grating(ridge_mm=1.0, groove_mm=1.0).gap(np.array([[2.0, 0.3, 0.0], [1.0, -0.5, 0.0]]))
     >>> gap.round(3).tolist()
     [0.3, 0.5]
@@ -201,6 +227,22 @@ class Grating(Indenter):
     ridge_mm: float = protocol.RIDGE_WIDTH.value
     groove_mm: float = protocol.RIDGE_WIDTH.value
     lip_mm: float = protocol.LIP_RADIUS.value
+    edge_radius_mm = OtherName("lip_mm")
+    period_mm = OtherName(_of_period, lambda body: body.ridge_mm + body.groove_mm)
+    duty = OtherName(_of_period, lambda body: body.ridge_mm / body.period_mm, unit="")
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            ridge_mm: float = ...,
+            groove_mm: float = ...,
+            lip_mm: float = ...,
+            *,
+            edge_radius_mm: float = ...,
+            period_mm: float = ...,
+            duty: float = ...,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         positive("ridge_mm", self.ridge_mm, "mm")
@@ -209,16 +251,6 @@ class Grating(Indenter):
             raise InputError(
                 f"lip_mm must not exceed half of ridge_mm, {self.ridge_mm / 2:g} mm: got {self.lip_mm:g} mm."
             )
-
-    @property
-    def period_mm(self) -> float:
-        """From one ridge to the next. [mm]"""
-        return self.ridge_mm + self.groove_mm
-
-    @property
-    def half_width_mm(self) -> float:
-        """Half of the extent along x: infinite."""
-        return np.inf
 
     @property
     def edge_reach_mm(self) -> float:

@@ -17,6 +17,7 @@ from scipy.interpolate import BSpline, make_smoothing_spline
 
 from fingerpad.core.checks import FloatArray, finite, float_array, increasing, not_negative, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.data import fingertip as published
 
 # Readings have two decimals. Interpolation of this rounding would tilt the skin's normals by degrees. This
@@ -100,7 +101,7 @@ class Profile:
 
 
 @dataclass(frozen=True)
-class Fingertip:
+class Fingertip(metaclass=KnownKeywords):
     """Outline, layers, bone and nail of a fingertip.
 
     Parameters

@@ -9,15 +9,16 @@ direction of the contact force without friction. Edge, bar with a gap and gratin
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, not_negative, positive
 from fingerpad.core.errors import InputError
-from fingerpad.core.units import radius_mm
+from fingerpad.core.keywords import KnownKeywords, OtherName
+from fingerpad.core.units import curvature_per_m, radius_mm
 from fingerpad.data import protocol
 from fingerpad.geometry.probing import mirrored, traced_front
 
@@ -25,13 +26,14 @@ BESIDE_EDGE_MM = 0.4
 """Distance from the wall of an edge within which the skin bends sharply. [mm]"""
 
 
-class Indenter(ABC):
+class Indenter(metaclass=KnownKeywords):
     """A rigid body with a signed gap; derive from it to define a body of your own.
 
     Only `gap` has to be written. Make the class a frozen dataclass, so that its sizes are fields: they are
     checked, compared and part of the key of a stored press. Fields may be arrays; write
     `@dataclass(frozen=True, eq=False)` then, and bodies are compared by their content. The code of the class
-    and of the functions that it calls is part of the key, too.
+    and of the functions that it calls is part of the key, too. A keyword that the class does not have raises
+    `InputError` with the closest one.
 
     Whether half a finger is enough is found from `gap`. A class that declares `symmetry_deg` is trusted.
 
@@ -197,6 +199,11 @@ def rounded(
     return gap, normal
 
 
+def _of_diameter(radius_mm: float) -> dict[str, float]:
+    """Diameter of a round body from its radius."""
+    return {"diameter_mm": 2 * positive("radius_mm", radius_mm, "mm")}
+
+
 @dataclass(frozen=True)
 class Cylinder(Indenter):
     """Cylinder that lies across the finger, its axis along z.
@@ -205,6 +212,8 @@ class Cylinder(Indenter):
     ----------
     diameter_mm : float
         Diameter; the paper's is 3.17 mm. [mm]
+    radius_mm : float, keyword
+        Half of it, instead. [mm]
 
     Examples
     --------
@@ -215,6 +224,11 @@ class Cylinder(Indenter):
 
     symmetry_deg = 90.0
     diameter_mm: float = protocol.CYLINDER_DIAMETER.value
+    radius_mm = OtherName(_of_diameter, lambda body: body.diameter_mm / 2)
+
+    if TYPE_CHECKING:
+
+        def __init__(self, diameter_mm: float = ..., *, radius_mm: float = ...) -> None: ...
 
     def __post_init__(self) -> None:
         positive("diameter_mm", self.diameter_mm, "mm")
@@ -296,23 +310,36 @@ class Sphere(Indenter):
     ----------
     curvature_per_m : float
         1/radius; the paper writes "RC ... 1/m" and means this. [1/m]
+    radius_mm, diameter_mm : float, keywords
+        Instead of the curvature. [mm]
 
     Examples
     --------
-    >>> round(Sphere(curvature_per_m=287).radius_mm, 3)
-    3.484
+    >>> round(Sphere(curvature_per_m=287).radius_mm, 3), Sphere(radius_mm=2.0)
+    (3.484, Sphere(curvature_per_m=500.0))
     """
 
     symmetry_deg = None
     curvature_per_m: float = protocol.STANDARD_CURVATURE.value
+    radius_mm = OtherName(
+        lambda radius_mm: {"curvature_per_m": curvature_per_m(positive("radius_mm", radius_mm, "mm"))},
+        lambda body: radius_mm(body.curvature_per_m),
+    )
+    diameter_mm = OtherName(
+        lambda diameter_mm: {
+            "curvature_per_m": curvature_per_m(positive("diameter_mm", diameter_mm, "mm") / 2)
+        },
+        lambda body: 2 * radius_mm(body.curvature_per_m),
+    )
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self, curvature_per_m: float = ..., *, radius_mm: float = ..., diameter_mm: float = ...
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         positive("curvature_per_m", self.curvature_per_m, "1/m")
-
-    @property
-    def radius_mm(self) -> float:
-        """Radius. [mm]"""
-        return radius_mm(self.curvature_per_m)
 
     @property
     def half_width_mm(self) -> float:
@@ -343,7 +370,7 @@ class Bar(Indenter):
     width_mm : float
         Full width along x, fillets included. [mm]
     fillet_mm : float
-        Radius of the two edges. [mm]
+        Radius of the two edges; `edge_radius_mm` is another name of it. [mm]
 
     Examples
     --------
@@ -355,6 +382,13 @@ class Bar(Indenter):
     symmetry_deg = 90.0
     width_mm: float = protocol.BAR_WIDTH.value
     fillet_mm: float = protocol.BAR_FILLET.value
+    edge_radius_mm = OtherName("fillet_mm")
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self, width_mm: float = ..., fillet_mm: float = ..., *, edge_radius_mm: float = ...
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         positive("width_mm", self.width_mm, "mm")
@@ -400,12 +434,32 @@ class FlatPunch(Indenter):
     diameter_mm : float
         Full diameter, rim included. [mm]
     fillet_mm : float
-        Radius of the rim. [mm]
+        Radius of the rim; `edge_radius_mm` is another name of it. [mm]
+    radius_mm : float, keyword
+        Half of the diameter, instead. [mm]
+
+    Examples
+    --------
+    >>> FlatPunch(radius_mm=1.0, edge_radius_mm=0.2)
+    FlatPunch(diameter_mm=2.0, fillet_mm=0.2)
     """
 
     symmetry_deg = None
     diameter_mm: float = protocol.PUNCH_DIAMETER.value
     fillet_mm: float = protocol.BAR_FILLET.value
+    edge_radius_mm = OtherName("fillet_mm")
+    radius_mm = OtherName(_of_diameter, lambda body: body.diameter_mm / 2)
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            diameter_mm: float = ...,
+            fillet_mm: float = ...,
+            *,
+            edge_radius_mm: float = ...,
+            radius_mm: float = ...,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         positive("diameter_mm", self.diameter_mm, "mm")
@@ -445,11 +499,6 @@ class Plate(Indenter):
     """Flat plate without edges, larger than the finger."""
 
     symmetry_deg = None
-
-    @property
-    def half_width_mm(self) -> float:
-        """Half of the extent along x: infinite."""
-        return np.inf
 
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""

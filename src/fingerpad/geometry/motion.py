@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, not_negative, positive, whole
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.phases import Phase, ramp_and_hold
 from fingerpad.data import protocol
 
@@ -77,7 +78,7 @@ TURN_LIKE_MM = 10.0
 """Rotation that takes as many steps as all of the depth. [degrees]"""
 
 
-class Motion:
+class Motion(metaclass=KnownKeywords):
     """What an indenter does over time: common part of all motions.
 
     A motion prescribes the depth of the indenter, or its force. It is linear in time between some times.

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
+from fingerpad.core.keywords import other_names
 from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
 
@@ -18,6 +21,25 @@ INDENTERS: dict[str, type[Indenter]] = {
 }
 """Classes of indenters by name."""
 
-_LENGTHS = ("diameter_mm", "width_mm", "gap_mm", "ridge_mm", "groove_mm", "fillet_mm", "lip_mm")
-SIZE_UNITS = {"curvature_per_m": "1/m"} | dict.fromkeys(_LENGTHS, "mm")
-"""Units of the sizes of indenters."""
+_FIELDS = {
+    name: [size.name for size in fields(kind)]  # type: ignore[arg-type]
+    for name, kind in INDENTERS.items()
+}
+
+SIZE_UNITS = (
+    dict.fromkeys((size for sizes in _FIELDS.values() for size in sizes), "mm")
+    | {"curvature_per_m": "1/m"}
+    | {name: other.unit for kind in INDENTERS.values() for name, other in other_names(kind).items()}
+)
+"""Units of the sizes of indenters, other names of sizes included."""
+
+
+def sizes_of(indenter: str) -> tuple[str, ...]:
+    """Sizes that an indenter has: fields of its class, then other names.
+
+    Examples
+    --------
+    >>> sizes_of("sphere")
+    ('curvature_per_m', 'radius_mm', 'diameter_mm')
+    """
+    return tuple(dict.fromkeys([*_FIELDS[indenter], *other_names(INDENTERS[indenter])]))

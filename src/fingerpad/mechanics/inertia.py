@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array
-from fingerpad.core.errors import InertiaWarning
+from fingerpad.core.errors import InertiaWarning, level_of_caller
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data.tissues import DENSITY
 from fingerpad.geometry.mesh import Mesh
@@ -87,9 +87,7 @@ def fastest_hz(motion: Motion) -> float:
     return float(MS_PER_S * (fastest[counts] / (np.pi * way[counts])).max(initial=0.0))
 
 
-def warn_of_inertia(
-    motion: Motion, materials: Sequence[Material], thickness_mm: ArrayLike, stacklevel: int
-) -> None:
+def warn_of_inertia(motion: Motion, materials: Sequence[Material], thickness_mm: ArrayLike) -> None:
     """Warn if a motion is so fast that the inertia of the tissue matters.
 
     Parameters
@@ -98,8 +96,6 @@ def warn_of_inertia(
         Motion of the indenter.
     materials, thickness_mm
         As in `resonance_hz`.
-    stacklevel : int
-        As in `warnings.warn`, counted from the caller.
 
     Warns
     -----
@@ -115,7 +111,7 @@ def warn_of_inertia(
             f"below {np.sqrt(LARGEST_SHARE) * resonance:.2g} Hz, or read the results as those of tissue "
             "without mass.",
             InertiaWarning,
-            stacklevel=stacklevel + 1,
+            stacklevel=level_of_caller(),
         )
 
 

@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from fingerpad.core.checks import FloatArray, finite, instance, one_of
 from fingerpad.core.compilation import announce_compilation
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.threads import compiled_threads
 from fingerpad.data import fingertip as published
 from fingerpad.data.tissues import DEFAULT_TISSUES
@@ -44,7 +45,7 @@ LARGEST_TILT_DEG = 45.0
 
 
 @dataclass(frozen=True)
-class Touch:
+class Touch(metaclass=KnownKeywords):
     """Everything that determines one indentation; its value is the key of the stored result.
 
     Parameters
@@ -138,8 +139,7 @@ class Touch:
         check_friction(self.friction, self.indenter)
         check_path(self.finger, self.stimulus, self.at_mm)
         self.settings.steps_ms(self.stimulus)
-
-        warn_of_inertia(self.stimulus, self.tissues.layers, self.layers_mm, stacklevel=4)
+        warn_of_inertia(self.stimulus, self.tissues.layers, self.layers_mm)
 
     @property
     def layers_mm(self) -> FloatArray:
@@ -260,6 +260,7 @@ def _mesh(finger: Fingertip, grading: Grading) -> Mesh:
     return finger_mesh(finger, grading)
 
 
+@known_keywords
 def touch_of(
     finger: Fingertip,
     indenter: Indenter,
@@ -315,6 +316,7 @@ def touch_of(
     )
 
 
+@known_keywords
 def indent(
     finger: Fingertip,
     indenter: Indenter,

@@ -91,8 +91,9 @@ class StimulusSettings(TaskPart):
         Where a listed stimulus stands on the axis of the psychometric curve.
     indenter : str
         Body that is pressed in.
-    curvature_per_m, diameter_mm, width_mm, gap_mm, ridge_mm, groove_mm, fillet_mm, lip_mm : float
-        Sizes, those that the indenter has. [1/m, mm]
+    curvature_per_m, radius_mm, diameter_mm, width_mm, gap_mm, ridge_mm, groove_mm, period_mm, duty : float
+    fillet_mm, edge_radius_mm, lip_mm, lip_radius_mm : float
+        Sizes, those that the indenter has. [1/m, mm, 1]
     spin_deg : float
         Turn about the direction of pressing: the orientation of a bar, an edge, a gap or a grating. [degrees]
     tilt_deg : float
@@ -112,13 +113,18 @@ class StimulusSettings(TaskPart):
     level: FiniteNumber | None = None
     indenter: Annotated[str, choice_of(INDENTERS)] | None = None
     curvature_per_m: Positive | None = None
+    radius_mm: Positive | None = None
     diameter_mm: Positive | None = None
     width_mm: Positive | None = None
     gap_mm: NotNegative | None = None
     ridge_mm: Positive | None = None
     groove_mm: Positive | None = None
+    period_mm: Positive | None = None
+    duty: Positive | None = None
     fillet_mm: NotNegative | None = None
+    edge_radius_mm: NotNegative | None = None
     lip_mm: NotNegative | None = None
+    lip_radius_mm: NotNegative | None = None
     spin_deg: FiniteNumber | None = None
     tilt_deg: FiniteNumber | None = None
     offset_mm: Pair | None = None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 from collections.abc import Sequence
 from importlib.resources import files
@@ -13,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
+from fingerpad.core.keywords import did_you_mean
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.experiments.discrimination.task import (
     DEFAULT,
@@ -181,9 +181,7 @@ def error_sentence(error: ValidationError) -> str:
         return f"{where} must be given: it is missing."
     if first["type"] == "extra_forbidden":
         known = _keys_at(path[:-1])
-        near = difflib.get_close_matches(str(path[-1]), known, n=1)
-        hint = f"did you mean {near[0]}?" if near else f"{_spelled(path[:-1])} has {', '.join(known)}."
-        return f"{where} is unknown: {hint}"
+        return f"{where} is unknown: {did_you_mean(str(path[-1]), known, _spelled(path[:-1]))}"
     return f"{where} {_EXPECTED.get(first['type'], first['msg'])}: got {came}."
 
 

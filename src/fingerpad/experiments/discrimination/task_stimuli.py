@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pydantic import ValidationError
@@ -17,7 +17,7 @@ from fingerpad.geometry.grading import Grading, covering
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Indenter, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Stimulus
-from fingerpad.geometry.names import INDENTERS
+from fingerpad.geometry.names import INDENTERS, sizes_of
 from fingerpad.skin.indentation import Touch, touch_of
 
 _NEAR_MM = max(protocol.SPHERE_POSITIONS.value)
@@ -164,7 +164,7 @@ def _presented(
             f"{place}.indenter must be given, there or in common, one of {', '.join(INDENTERS)}: it is "
             "missing."
         )
-    sizes = [size.name for size in fields(INDENTERS[kind])]  # type: ignore[arg-type]
+    sizes = sizes_of(kind)
     for key in given:
         if key not in (*sizes, *_HANDLING):
             raise InputError(

@@ -1,0 +1,196 @@
+"""Keywords of classes and functions: other names of a class's sizes, and "did you mean" for a wrong one."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import re
+from abc import ABCMeta
+from collections.abc import Callable, Collection, Iterator, Mapping
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
+
+from fingerpad.core.errors import InputError
+
+_Given = ParamSpec("_Given")
+_Made = TypeVar("_Made")
+
+_CLOSE = 0.6
+"""Similarity of two names from which one is taken for the other, of `difflib`."""
+
+
+def did_you_mean(wrong: str, known: Collection[str], owner: str = "") -> str:
+    """Name the known word that is closest to a wrong one, or all of them.
+
+    Examples
+    --------
+    >>> did_you_mean("radius", ["curvature_per_m", "radius_mm"], "Sphere")
+    'did you mean radius_mm?'
+    >>> did_you_mean("colour", ["curvature_per_m", "radius_mm"], "Sphere")
+    'Sphere has curvature_per_m, radius_mm.'
+    """
+    near = difflib.get_close_matches(wrong, known, n=1, cutoff=_CLOSE)
+    # A name without its unit, such as `edge`, is less similar than that.
+    near = near or [name for name in known if wrong and name.startswith(f"{wrong}_")]
+    if near:
+        return f"did you mean {near[0]}?"
+    return f"{owner or 'it'} has {', '.join(known) or 'no keyword'}."
+
+
+def known_keywords(function: Callable[_Given, _Made]) -> Callable[_Given, _Made]:
+    """Make a function raise `InputError` for a keyword that it does not have.
+
+    Examples
+    --------
+    >>> @known_keywords
+    ... def area_mm2(width_mm, height_mm):
+    ...     return width_mm * height_mm
+    >>> area_mm2(2.0, heigth_mm=3.0)
+    Traceback (most recent call last):
+    fingerpad.core.errors.InputError: area_mm2 has no heigth_mm: did you mean height_mm?
+    """
+    names = tuple(inspect.signature(function).parameters)
+
+    @wraps(function)
+    def checked(*args: _Given.args, **given: _Given.kwargs) -> _Made:
+        _refuse_unknown(given, names, function.__name__)
+        return function(*args, **given)
+
+    return checked
+
+
+def _refuse_unknown(given: Collection[str], known: Collection[str], owner: str) -> None:
+    for name in given:
+        if name not in known:
+            raise InputError(f"{owner} has no {name}: {did_you_mean(name, known, owner)}")
+
+
+class OtherName:
+    """A size under another name than its field: a class takes it as a keyword, an instance has it.
+
+    Parameters
+    ----------
+    meaning : str or callable
+        The field that it is; or a function whose parameters are names like this one, and which returns values
+        of fields.
+    read : callable, optional
+        Value of an instance. By default that of the field.
+    unit : str
+        Of the values; empty for a ratio.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Ball(metaclass=KnownKeywords):
+    ...     radius_mm: float = 1.0
+    ...     diameter_mm = OtherName(
+    ...         lambda diameter_mm: {"radius_mm": diameter_mm / 2}, lambda ball: 2 * ball.radius_mm
+    ...     )
+    >>> Ball(diameter_mm=3.0), Ball(diameter_mm=3.0).diameter_mm
+    (Ball(radius_mm=1.5), 3.0)
+    >>> Ball(diametre_mm=3.0)
+    Traceback (most recent call last):
+    fingerpad.core.errors.InputError: Ball has no diametre_mm: did you mean diameter_mm?
+    """
+
+    def __init__(
+        self,
+        meaning: str | Callable[..., Mapping[str, float]],
+        read: Callable[[Any], float] | None = None,
+        unit: str = "mm",
+    ):
+        self.meaning, self.read, self.unit = meaning, read, unit
+
+    def __get__(self, instance: Any, owner: type | None = None) -> Any:
+        """Value of an instance; this object from the class."""
+        if instance is None:
+            return self
+        if self.read is not None:
+            return self.read(instance)
+        return getattr(instance, str(self.meaning))
+
+
+class KnownKeywords(ABCMeta):
+    """Metaclass of classes that refuse unknown keywords with a hint, and take each `OtherName`."""
+
+    def __call__(cls, *args: Any, **given: Any) -> Any:
+        """Make an instance from fields and other names."""
+        if not given:
+            return super().__call__(*args)
+        fields, others = _fields(cls), other_names(cls)
+        if not any(part.kind is part.VAR_KEYWORD for part in fields):
+            names = [part.name for part in fields]
+            _refuse_unknown(given, [*names, *(name for name in others if name not in names)], cls.__name__)
+        spelled = {name: others[name] for name in given if name in others}
+        if not spelled:
+            return super().__call__(*args, **given)
+        made = {name: value for name, value in given.items() if name not in spelled}
+        taken = {part.name: part.name for part in fields[: len(args)]} | dict.fromkeys(made, "")
+        for names, values in _meanings(spelled, given):
+            for name in values:
+                if name in taken:
+                    beside = taken[name] or name
+                    raise InputError(f"{' and '.join(names)} and {beside} exclude each other: give one.")
+                taken[name] = names[0]
+            made |= values
+        try:
+            return super().__call__(*args, **made)
+        except InputError as error:
+            raise InputError(_in_words_of(spelled, str(error))) from error
+
+    @property
+    def __signature__(cls) -> inspect.Signature:
+        """Fields, then the other names as keywords: what editors show."""
+        fields = _fields(cls)
+        names = {part.name for part in fields}
+        keyword = inspect.Parameter.KEYWORD_ONLY
+        others = [
+            inspect.Parameter(name, keyword, default=None) for name in other_names(cls) if name not in names
+        ]
+        rest = [part for part in fields if part.kind is part.VAR_KEYWORD]
+        return inspect.Signature([*(part for part in fields if part not in rest), *others, *rest])
+
+
+_FIELDS: WeakKeyDictionary[type, tuple[inspect.Parameter, ...]] = WeakKeyDictionary()
+
+
+def _fields(kind: type) -> tuple[inspect.Parameter, ...]:
+    """Parameters of the constructor of a class."""
+    if kind not in _FIELDS:
+        _FIELDS[kind] = tuple(inspect.signature(kind.__init__).parameters.values())[1:]  # type: ignore[misc]
+    return _FIELDS[kind]
+
+
+def other_names(kind: type) -> dict[str, OtherName]:
+    """Return the other names of a class, inherited ones included.
+
+    Examples
+    --------
+    >>> from fingerpad.geometry.indenters import Sphere
+    >>> list(other_names(Sphere))
+    ['radius_mm', 'diameter_mm']
+    """
+    found = {name: part for home in reversed(kind.__mro__) for name, part in vars(home).items()}
+    return {name: part for name, part in found.items() if isinstance(part, OtherName)}
+
+
+def _meanings(
+    spelled: Mapping[str, OtherName], given: Mapping[str, Any]
+) -> Iterator[tuple[list[str], Mapping[str, Any]]]:
+    """Other names that were given, those of one function together, and the fields that they mean."""
+    for name, other in spelled.items():
+        if isinstance(other.meaning, str):
+            yield [name], {other.meaning: given[name]}
+    for meaning in {other.meaning for other in spelled.values() if not isinstance(other.meaning, str)}:
+        names = [name for name, other in spelled.items() if other.meaning is meaning]
+        yield names, meaning(**{name: given[name] for name in names})
+
+
+def _in_words_of(spelled: Mapping[str, OtherName], message: str) -> str:
+    """Message with the names that were given in the place of the fields."""
+    for name, other in spelled.items():
+        if isinstance(other.meaning, str):
+            message = re.sub(rf"\b{other.meaning}\b", name, message)
+    return message

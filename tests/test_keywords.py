@@ -1,0 +1,163 @@
+"""Other names of sizes, and keywords that a class or a function does not have."""
+
+import inspect
+import pickle
+from dataclasses import dataclass, fields, replace
+
+import pytest
+
+import fingerpad as fp
+from fingerpad.core.keywords import OtherName, other_names
+from fingerpad.experiments.indenter_text import indenter_named
+from fingerpad.experiments.stimuli import read_stimuli
+from fingerpad.geometry.names import INDENTERS, SIZE_UNITS, sizes_of
+from fingerpad.skin.store import touch_key
+
+SAME = [
+    (fp.Sphere(radius_mm=4.0), fp.Sphere(250.0), "sphere:radius_mm=4"),
+    (fp.Sphere(diameter_mm=8.0), fp.Sphere(250.0), "sphere:diameter_mm=8.0"),
+    (fp.Cylinder(radius_mm=1.5), fp.Cylinder(3.0), "cylinder: radius_mm = 1.5"),
+    (fp.Bar(4.0, edge_radius_mm=0.2), fp.Bar(4.0, 0.2), "bar:4:edge_radius_mm=0.2"),
+    (
+        fp.FlatPunch(radius_mm=2.0, edge_radius_mm=0.1),
+        fp.FlatPunch(4.0, 0.1),
+        "punch:radius_mm=2:fillet_mm=.1",
+    ),
+    (fp.Edge(edge_radius_mm=0.4), fp.Edge(0.4), "edge:edge_radius_mm=0.4"),
+    (
+        fp.Gap(gap_mm=1.0, edge_radius_mm=0.3, lip_radius_mm=0.1),
+        fp.Gap(1.0, fillet_mm=0.3, lip_mm=0.1),
+        "gap:1:edge_radius_mm=0.3:lip_radius_mm=0.1",
+    ),
+    (fp.Grating(period_mm=2.0), fp.Grating(1.0, 1.0), "grating:period_mm=2"),
+    (
+        fp.Grating(period_mm=2.0, duty=0.25, edge_radius_mm=0.1),
+        fp.Grating(0.5, 1.5, 0.1),
+        "grating:duty=0.25:period_mm=2:edge_radius_mm=0.1",
+    ),
+    (fp.Grating(duty=0.5), fp.Grating(1.5, 1.5), "grating:duty=0.5"),
+]
+
+
+@pytest.mark.parametrize(("friendly", "stored", "text"), SAME, ids=[text for _, _, text in SAME])
+def test_a_body_is_the_same_by_either_name_in_python_and_in_text(friendly, stored, text):
+    assert friendly == stored
+    assert repr(friendly) == repr(stored)
+    assert hash(friendly) == hash(stored)
+    assert vars(friendly) == vars(stored)
+    assert indenter_named(text) == stored
+    assert pickle.loads(pickle.dumps(friendly)) == stored
+
+
+def test_the_store_finds_a_body_by_either_name():
+    keys = {
+        touch_key(fp.touch_of(fp.Fingertip(), body)) for body in (fp.Sphere(radius_mm=4.0), fp.Sphere(250.0))
+    }
+    assert len(keys) == 1
+
+
+def test_every_other_name_reads_back_what_was_given():
+    values = {"duty": 0.3, "period_mm": 3.0, "lip_radius_mm": 0.2, "edge_radius_mm": 0.25}
+    for name, kind in INDENTERS.items():
+        for other in other_names(kind):
+            given = values.get(other, 1.75)
+            body = kind(**{other: given})
+            assert getattr(body, other) == pytest.approx(given, rel=1e-15), (name, other)
+
+
+def test_fields_are_the_papers_and_units_cover_every_name():
+    assert [size.name for size in fields(fp.Sphere)] == ["curvature_per_m"]
+    assert [size.name for size in fields(fp.Grating)] == ["ridge_mm", "groove_mm", "lip_mm"]
+    assert {size for name in INDENTERS for size in sizes_of(name)} == set(SIZE_UNITS)
+    for name, unit in SIZE_UNITS.items():
+        assert (unit == "mm") == name.endswith("_mm"), name
+
+
+def test_editors_see_every_name():
+    for name, kind in INDENTERS.items():
+        assert tuple(inspect.signature(kind).parameters) == sizes_of(name)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: fp.Sphere(raduis_mm=4.0), "Sphere has no raduis_mm: did you mean radius_mm?"),
+        (lambda: fp.Sphere(radius=4.0), "Sphere has no radius: did you mean radius_mm?"),
+        (lambda: fp.Bar(edge=0.2), "Bar has no edge: did you mean edge_radius_mm?"),
+        (lambda: fp.Plate(width_mm=3.0), "Plate has no width_mm: Plate has no keyword."),
+        (
+            lambda: fp.Sphere(colour=1),
+            "Sphere has no colour: Sphere has curvature_per_m, radius_mm, diameter_mm.",
+        ),
+        (
+            lambda: fp.Sphere(250.0, radius_mm=4.0),
+            "radius_mm and curvature_per_m exclude each other: give one.",
+        ),
+        (lambda: fp.Sphere(radius_mm=4.0, diameter_mm=8.0), "radius_mm and diameter_mm exclude each other"),
+        (
+            lambda: fp.Bar(fillet_mm=0.2, edge_radius_mm=0.2),
+            "edge_radius_mm and fillet_mm exclude each other",
+        ),
+        (lambda: fp.Grating(groove_mm=1.0, duty=0.5), "duty and groove_mm exclude each other: give one."),
+        (lambda: fp.Sphere(radius_mm=-1.0), "radius_mm must be greater than 0 [mm]: got -1.0."),
+        (
+            lambda: fp.Bar(edge_radius_mm=2.0),
+            "edge_radius_mm must not exceed half of width_mm, 1.5 mm: got 2 mm.",
+        ),
+        (lambda: fp.Gap(edge_radius_mm=-0.1), "edge_radius_mm must not be negative [mm]: got -0.1."),
+        (lambda: fp.Grating(period_mm=2.0, duty=1.0), "duty must be below 1"),
+        (lambda: fp.Grating(period_mm=0.0), "period_mm must be greater than 0 [mm]: got 0.0."),
+        (lambda: fp.indent(fp.Fingertip(), fp.Sphere(), resolutoin="quick"), "did you mean resolution?"),
+        (lambda: fp.touch_of(fp.Fingertip(), fp.Sphere(), tilt=3.0), "did you mean tilt_deg?"),
+        (lambda: fp.RampAndHold(depth=1.0), "RampAndHold has no depth: did you mean depth_mm?"),
+        (lambda: fp.sine(0.8, 0.1, 20.0, cycels=3), "sine has no cycels: did you mean cycles?"),
+        (lambda: fp.Fingertip(lenght_mm=30.0), "Fingertip has no lenght_mm: did you mean length_mm?"),
+        (lambda: fp.Trajectory([0, 1], depths_mm=[0, 1]), "did you mean depth_mm?"),
+        (lambda: indenter_named("sphere:raduis_mm=4"), "Sphere has no raduis_mm: did you mean radius_mm?"),
+        (
+            lambda: indenter_named("bar:3:width_mm=4"),
+            "indenter must have width_mm once: got 'bar:3:width_mm=4'.",
+        ),
+        (lambda: indenter_named("sphere:=4"), "Sphere has no :"),
+    ],
+)
+def test_what_a_class_or_function_does_not_have_is_refused_in_one_sentence(make, said):
+    with pytest.raises(fp.InputError) as refused:
+        make()
+    assert said in str(refused.value)
+    assert str(refused.value)[-1] in ".?"
+    assert "\n" not in str(refused.value)
+
+
+def test_a_body_of_ones_own_has_the_hint_and_its_own_other_names():
+    @dataclass(frozen=True)
+    class Cone(fp.Indenter):
+        opening_deg: float = 90.0
+        slope_deg = OtherName(lambda slope_deg: {"opening_deg": 180.0 - 2 * slope_deg}, unit="degrees")
+
+        def gap(self, points_mm):
+            raise NotImplementedError
+
+    assert Cone(slope_deg=45.0) == Cone(90.0)
+    with pytest.raises(fp.InputError, match="Cone has no openning_deg: did you mean opening_deg"):
+        Cone(openning_deg=80.0)
+
+
+def test_a_copy_with_another_size_is_made_by_the_field():
+    assert replace(fp.Sphere(radius_mm=4.0), curvature_per_m=200.0) == fp.Sphere(radius_mm=5.0)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "yaml"])
+def test_files_of_stimuli_take_either_name(tmp_path, suffix):
+    path = tmp_path / f"stimuli.{suffix}"
+    path.write_text(
+        {
+            "csv": "stimulus,indenter,radius_mm,period_mm,duty\nball,sphere,4,,\nrows,grating,,2,0.25\n",
+            "yaml": "- {stimulus: ball, indenter: sphere, radius_mm: 4}\n"
+            "- {stimulus: rows, indenter: grating, period_mm: 2, duty: 0.25}\n",
+        }[suffix],
+        encoding="utf-8",
+    )
+    stimuli = read_stimuli(path).stimuli
+    assert stimuli["ball"].indenter == fp.Sphere(250.0)
+    assert stimuli["rows"].indenter == fp.Grating(0.5, 1.5)
