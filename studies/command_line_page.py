@@ -11,12 +11,15 @@ from studies.pages.markdown import markdown_table as table
 
 INTRODUCTION = """# Command line
 
-`fingerpad` has six commands. The option `--help` of each shows the same text.
+`fingerpad` has nine commands. The option `--help` of each shows the same text.
 `make reproduce ARGS="--resolution quick"` runs `fingerpad reproduce` in the environment of the repository.
 `python -m studies results` writes this page.
 """
 
 GUIDES = {
+    "touch": "Format and outputs: [touch.md](touch.md).",
+    "init": "What it holds: [touch.md](touch.md).",
+    "check": "How good the estimate is: [touch.md](touch.md#before-a-press).",
     "fit": "Formats and results: [fit.md](fit.md).",
     "discriminate": "Format and results: [discriminate.md](discriminate.md).",
     "validate": "Format and scores: [validate.md](validate.md).",

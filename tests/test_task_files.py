@@ -13,11 +13,11 @@ from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.results import file_format
 from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.descriptions.reading import parts_in
 from fingerpad.experiments.discrimination.analysis import PreparedTask
 from fingerpad.experiments.discrimination.task import DiscriminationTask, StimulusSettings
 from fingerpad.experiments.discrimination.task_files import example_tasks, input_hashes, parse_task, read_task
-from fingerpad.experiments.discrimination.task_population import task_afferent, task_population
-from fingerpad.experiments.discrimination.task_stimuli import task_stimuli, task_touches
+from fingerpad.experiments.discrimination.task_stimuli import task_population, task_stimuli, task_touches
 from fingerpad.experiments.fit.session import FitFile
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import discrimination_touches
@@ -179,9 +179,9 @@ def test_seed_and_spread_make_another_finger():
 
 
 def test_an_afferent_is_ours_or_ones_own_numbers_or_of_a_file_of_results(tmp_path, monkeypatch):
-    assert task_afferent(parse_task(SPHERES)) == Afferent()
+    assert task_population(parse_task(SPHERES)).afferent == Afferent()
     own = parse_task(changed(SPHERES, afferent={"static_gain": 1.1e-6, "dynamic_quantity": "von_mises"}))
-    assert task_afferent(own) == Afferent(static_gain=1.1e-6, dynamic_quantity="von_mises")
+    assert task_population(own).afferent == Afferent(static_gain=1.1e-6, dynamic_quantity="von_mises")
     six = dict(zip(PARAMETER_NAMES, [2e-7, 1e-4, 9e-7, 60.0, 1e-6, 50.0], strict=True))
     expected = Afferent.from_parameters(list(six.values()))
     # The parts of a file that an afferent needs; the rest is left to the schemas' own tests.
@@ -193,7 +193,7 @@ def test_an_afferent_is_ours_or_ones_own_numbers_or_of_a_file_of_results(tmp_pat
     ):
         named, version = file_format(kind)
         (tmp_path / name).write_text(json.dumps(results | {"format": named, "format_version": version}))
-        found = task_afferent(parse_task(changed(SPHERES, afferent=name)), tmp_path)
+        found = task_population(parse_task(changed(SPHERES, afferent=name)), tmp_path).afferent
         assert found == replace(expected, **quantities)
 
 
@@ -276,7 +276,7 @@ noise: fitted
 nois: 0.1
     nois is unknown: did you mean noise?
 colour: red
-    colour is unknown: a task has question, axis,
+    colour is unknown: the file has question, axis,
 stimuli: null
     stimuli must be given
 stimuli: []
@@ -431,8 +431,8 @@ def test_invalid_values_are_refused_in_one_sentence_with_their_position(parts, s
     [
         ("question: a\nquestion: b\n", "mine.yaml, line 1: question is repeated, keep one."),
         ("question: [a\n", "mine.yaml cannot be read as YAML"),
-        ("- 1\n- 2\n", "mine.yaml, a task must be a mapping of keys to values: got [1, 2]."),
-        ("", "mine.yaml, a task must be a mapping of keys to values: got None."),
+        ("- 1\n- 2\n", "mine.yaml, the file must be a mapping of keys to values: got [1, 2]."),
+        ("", "mine.yaml, the file must be a mapping of keys to values: got None."),
         ("question: &a [*a]\n", "mine.yaml, question must be a text"),
         ("[" * 600, "mine.yaml cannot be read as YAML"),
         ("{[1]: 2}", "mine.yaml cannot be read as YAML"),
@@ -469,7 +469,7 @@ def test_a_file_without_fitted_parameters_is_refused(tmp_path, content):
     (tmp_path / "fit.json").write_text(content)
     question = parse_task(changed(SPHERES, afferent="fit.json"))
     with pytest.raises(InputError, match=r"^afferent.*fit\.json"):
-        task_afferent(question, tmp_path)
+        task_population(question, tmp_path)
 
 
 def test_null_is_as_good_as_nothing():
@@ -492,13 +492,11 @@ def test_what_the_guide_shows_can_be_asked(block):
 
 
 def test_the_guide_names_every_key():
-    def keys(part, path=""):
+    def keys(part):
         for name, field in part.model_fields.items():
             yield name
-            for inner in re.findall(r"\w+Settings|VariedStimuli|ObservedPoint", str(field.annotation)):
-                yield from keys(
-                    getattr(__import__("fingerpad.experiments.discrimination.task", fromlist=[inner]), inner)
-                )
+            for inner in parts_in(field.annotation):
+                yield from keys(inner)
 
     guide = (ROOT / "docs" / "discriminate.md").read_text(encoding="utf-8")
     assert [key for key in dict.fromkeys(keys(DiscriminationTask)) if f"`{key}`" not in guide] == []

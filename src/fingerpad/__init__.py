@@ -30,7 +30,9 @@ if TYPE_CHECKING:
     )
     from fingerpad.core.phases import Phase
     from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
+    from fingerpad.experiments.descriptions.touch import TouchDescription, read_touch_description
     from fingerpad.export.dataset import read_touch, touch_dataset, write_touch
+    from fingerpad.export.touch_outputs import run_touch
     from fingerpad.export.view import save_view
     from fingerpad.geometry.composed import Union, ridges
     from fingerpad.geometry.dots import Dots, braille
@@ -109,6 +111,7 @@ __all__ = [
     "SurfaceProfile",
     "Tissues",
     "Touch",
+    "TouchDescription",
     "Trajectory",
     "Union",
     "braille",
@@ -120,10 +123,12 @@ __all__ = [
     "read_height_map",
     "read_surface",
     "read_touch",
+    "read_touch_description",
     "read_trajectory",
     "reduced",
     "repeated",
     "ridges",
+    "run_touch",
     "sampled",
     "save_figure",
     "save_view",
@@ -137,6 +142,8 @@ __all__ = [
 
 _HOMES = {
     "geometry.composed": ("Union", "ridges"),
+    "experiments.descriptions.touch": ("TouchDescription", "read_touch_description"),
+    "export.touch_outputs": ("run_touch",),
     "geometry.dots": ("Dots", "braille"),
     "geometry.surface": ("Surface", "height_surface"),
     "geometry.surface_files": ("read_height_map", "read_surface"),

@@ -1,4 +1,4 @@
-"""The command line: `reproduce`, `fit`, `discriminate`, `validate`, `export` and `view`."""
+"""The command line: its commands in the order of the help, and its errors."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from fingerpad.cli.export import export_command
 from fingerpad.cli.fit import fit_command
 from fingerpad.cli.options import Command
 from fingerpad.cli.reproduce import reproduce_command
+from fingerpad.cli.touch import check_command, init_command, touch_command
 from fingerpad.cli.validate import validate_command
 from fingerpad.cli.view import view_command
 from fingerpad.core.errors import FingerpadError
@@ -49,6 +50,9 @@ def _options(
 
 
 # In the order of the help.
+app.command("touch", cls=Command)(touch_command)
+app.command("init", cls=Command)(init_command)
+app.command("check", cls=Command)(check_command)
 app.command("reproduce", cls=Command)(reproduce_command)
 app.command("fit", cls=Command)(fit_command)
 app.command("discriminate", cls=Command)(discriminate_command)

@@ -42,9 +42,9 @@ class InertiaWarning(UserWarning):
 
 def level_of_caller() -> int:
     """`stacklevel` of `warnings.warn` with which a warning names the line that called the package."""
-    package = __name__.partition(".")[0]
+    inside = __name__.partition(".")[0], "functools", "contextlib"
     for level in count(1):
         home = str(sys._getframe(level).f_globals.get("__name__", ""))
-        if home.partition(".")[0] != package or sys._getframe(level).f_back is None:
+        if home.partition(".")[0] not in inside or sys._getframe(level).f_back is None:
             break
     return level

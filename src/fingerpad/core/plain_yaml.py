@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import yaml
@@ -39,12 +40,43 @@ def read_yaml(text: str, source: str) -> Any:
     try:
         return yaml.load(text, _Loader)  # a SafeLoader: plain values only
     except yaml.YAMLError as error:
-        said = " ".join(str(error).split()).rstrip(".")
+        mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None) or str(error)
+        said = " ".join(problem.split()).rstrip(".") + (f", line {mark.line + 1}" if mark else "")
         raise InputError(f"{source} cannot be read as YAML ({said}): correct it there.") from error
     except InputError as error:
         raise InputError(f"{source}, {error}") from error
     except RecursionError as error:
         raise InputError(f"{source} cannot be read as YAML (nested too deep): correct it there.") from error
+
+
+def line_at(text: str, place: Sequence[int | str]) -> int | None:
+    r"""Line at which a place of a text in YAML begins; that of the last part that is there.
+
+    Parameters
+    ----------
+    text : str
+        One document, which `read_yaml` can read.
+    place : sequence of int or str
+        Keys and indices that lead there.
+
+    Examples
+    --------
+    >>> line_at("object:\n  kind: sphere\n  radius_mm: 3", ["object", "radius_mm"])
+    3
+    """
+    node, line = yaml.compose(text, _Loader), None
+    for part in place:
+        if isinstance(node, yaml.MappingNode):
+            found = [(key, value) for key, value in node.value if key.value == str(part)]
+        elif isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
+            found = [(node.value[part], node.value[part])]
+        else:
+            found = []
+        if not found:
+            break
+        key, node = found[0]
+        line = key.start_mark.line + 1
+    return line
 
 
 class _Loader(yaml.SafeLoader):

@@ -76,8 +76,12 @@ def export_touch(
             REQUIRED[format_name]()  # first, since solving takes its time
         name, write = RESULTS[format_name]
         return write(Path(folder) / name, touch.solve(whole=whole))
+    return (write_deck(folder, job_of(touch), format_name, elastic_moduli),)
+
+
+def write_deck(folder: Path, job: Job, format_name: str, elastic_moduli: str | None = None) -> Path:
+    """Write the input file of a solver; arguments as of `export_touch`, with what `job_of` returns."""
     name, deck = DECKS[format_name]
-    job, path = job_of(touch), Path(folder) / name
     text = deck(job) if elastic_moduli is None else calculix_deck(job, elastic_moduli)
-    write_atomically(path, text.encode())
-    return (path,)
+    write_atomically(Path(folder) / name, text.encode())
+    return Path(folder) / name

@@ -77,7 +77,7 @@ def write_responses_nwb(
     # Warnings of the library do not concern the content of the file.
     with warnings.catch_warnings(), TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
-        pynwb = _pynwb()
+        pynwb = require_pynwb()
         session = pynwb.NWBFile(f"simulated by fingerpad {__version__}", Path(path).stem, began)
         session.add_trial_column("stimulus", "name of the touch")
         for (name, answer), onset_ms, lasts_ms in zip(
@@ -137,7 +137,8 @@ def _durations(responses: Mapping[str, ResponseMap], duration_ms: float | None) 
     return np.array(durations_ms)
 
 
-def _pynwb() -> Any:
+def require_pynwb() -> Any:
+    """Return the package pynwb, or raise `InputError` if it is not installed."""
     try:
         import pynwb
     except ImportError as error:

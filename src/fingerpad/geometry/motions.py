@@ -10,6 +10,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, positive, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.phases import HOLD, RAMP, Phase
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data import protocol
@@ -20,6 +21,7 @@ SAMPLES_PER_CYCLE = 20
 """Samples of a sine per cycle; a line between two of them misses it by up to 1.2 % of the amplitude."""
 
 
+@known_keywords
 def sine(
     depth_mm: float,
     amplitude_mm: float,
@@ -61,6 +63,7 @@ def sine(
     return replace(motion, cycles=Cycles(ramp_ms + hold_ms, period_ms, cycles))
 
 
+@known_keywords
 def chirp(
     depth_mm: float,
     amplitude_mm: float,
@@ -96,6 +99,8 @@ def chirp(
     >>> len(motion.times_ms), round(motion.end_ms, 1)
     (543, 1490.0)
     """
+    if len(frequencies_hz) != 2:
+        raise InputError(f"frequencies_hz must be a pair, first and last: got {len(frequencies_hz)}.")
     first, last = (positive("frequencies_hz", each, "Hz") for each in frequencies_hz)
     seconds = positive("sweep_ms", sweep_ms, "ms") / MS_PER_S
     cycles = int((first + last) / 2.0 * seconds)
@@ -106,11 +111,12 @@ def chirp(
     turns = np.arange(1, SAMPLES_PER_CYCLE * cycles + 1) / SAMPLES_PER_CYCLE
     # turns = first t + rate t^2 / 2, solved for t in the form that also holds for a rate of 0.
     rate = (last - first) / seconds
-    now_hz = np.sqrt(np.maximum(first**2 + 2.0 * rate * turns, 0.0))
-    times_ms = np.minimum(MS_PER_S * 2.0 * turns / (first + now_hz), sweep_ms)
+    then_hz = np.sqrt(np.maximum(first**2 + 2.0 * rate * turns, 0.0))
+    times_ms = np.minimum(MS_PER_S * 2.0 * turns / (first + then_hz), sweep_ms)
     return _on_a_hold(depth_mm, amplitude_mm, times_ms, turns, ramp_ms, hold_ms, "sweep")
 
 
+@known_keywords
 def repeated(depth_mm: float, touches: int, ramp_ms: float, hold_ms: float, pause_ms: float) -> Trajectory:
     """Press several times to the same depth, with pauses at first touch of the undeformed skin.
 
@@ -147,6 +153,7 @@ def repeated(depth_mm: float, touches: int, ramp_ms: float, hold_ms: float, paus
     return Trajectory((0.0, *np.cumsum(n * lengths_ms)), (0.0, *n * (depth_mm, depth_mm, 0.0, 0.0)))
 
 
+@known_keywords
 def staircase(
     depths_mm: Sequence[float] | None = None,
     forces_mn: Sequence[float] | None = None,
@@ -192,6 +199,7 @@ def staircase(
     return Trajectory((0.0, *np.cumsum(lengths_ms).tolist()), depths, forces)
 
 
+@known_keywords
 def stroke(
     depth_mm: float | None = None,
     force_mn: float | None = None,

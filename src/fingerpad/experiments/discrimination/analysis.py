@@ -13,6 +13,7 @@ from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.results import Matrix, Vector, result_class
 from fingerpad.core.signals import ResponseMap, Skin
+from fingerpad.experiments.descriptions.parts import GRID, NAIL_ROWS
 from fingerpad.experiments.discrimination.decoding import (
     SideCurve,
     TaskStatistic,
@@ -25,9 +26,7 @@ from fingerpad.experiments.discrimination.decoding import (
 )
 from fingerpad.experiments.discrimination.task import (
     FITTED,
-    GRID,
     IDEAL,
-    NAIL_ROWS,
     UNITS,
     DiscriminationTask,
     ObservedPoint,

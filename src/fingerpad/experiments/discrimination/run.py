@@ -15,8 +15,11 @@ from fingerpad.core.results import result_class
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.discrimination.analysis import PreparedTask, TaskResult, analyse
 from fingerpad.experiments.discrimination.task import DiscriminationTask
-from fingerpad.experiments.discrimination.task_population import task_population
-from fingerpad.experiments.discrimination.task_stimuli import task_stimuli, task_touches
+from fingerpad.experiments.discrimination.task_stimuli import (
+    task_population,
+    task_stimuli,
+    task_touches,
+)
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.skin.indentation import Touch

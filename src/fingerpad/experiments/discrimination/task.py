@@ -9,20 +9,22 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 
-from fingerpad.core.layouts import PATTERNS
 from fingerpad.data import psychophysics
 from fingerpad.data.tissues import DEFAULT_TISSUES
-from fingerpad.experiments.discrimination.task_types import (
+from fingerpad.experiments.descriptions.parts import DEFAULT, AfferentChoice, PopulationSettings
+from fingerpad.experiments.descriptions.values import (
+    LISTED,
+    VARIED,
     Count,
     FiniteNumber,
     LevelOrName,
     NotNegative,
     Pair,
+    Part,
     Positive,
     Seed,
     Several,
     Share,
-    TaskPart,
     Text,
     as_list,
     choice_of,
@@ -34,26 +36,13 @@ from fingerpad.geometry.names import INDENTERS, SIZE_UNITS
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.psychophysics.discrimination import CRITERION_MOVES
 from fingerpad.psychophysics.functions import SIGMOIDS
-from fingerpad.skin.fields import sampled_fields
 
 IDEAL = "ideal"
 CODES = ("gradient_sum", "euclidean", IDEAL)
 MEASURES = ("static", "dynamic", "latency")
 FREE = "free"
-DEFAULT = "default"
-"""Value of `afferent` for the one that was fitted with the tissues."""
-
 FITTED = "fitted"
 """Value of `noise` where it is fitted to observed hit rates."""
-
-GRID = "grid"
-NAIL_ROWS = "nail rows"
-LAYOUT_NAMES = (GRID, *PATTERNS, NAIL_ROWS)
-PAD = "pad"
-SHAPES = ("rectangle", "ellipse", "polygon", PAD)
-
-LISTED, VARIED, NAMED, SPELLED = "listed", "varied", "named", "spelled"
-"""Forms that a part of a task may have; pydantic puts them into the places of errors."""
 
 UNITS = SIZE_UNITS | MOTION_UNITS | {"spin_deg": "degrees", "tilt_deg": "degrees", "friction": ""}
 """What can be varied from stimulus to stimulus, and in which unit."""
@@ -61,7 +50,7 @@ UNITS = SIZE_UNITS | MOTION_UNITS | {"spin_deg": "degrees", "tilt_deg": "degrees
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
 
 
-class SkinSettings(TaskPart):
+class SkinSettings(Part):
     """The finger that is pressed.
 
     Parameters
@@ -80,7 +69,7 @@ class SkinSettings(TaskPart):
     reach_mm: Positive | None = None
 
 
-class StimulusSettings(TaskPart):
+class StimulusSettings(Part):
     """One stimulus, or what all have in common. What is absent is the paper's.
 
     Parameters
@@ -139,7 +128,7 @@ VARIABLE = tuple(name for name in StimulusSettings.model_fields if name in UNITS
 """What may differ from stimulus to stimulus by a number."""
 
 
-class VariedStimuli(TaskPart):
+class VariedStimuli(Part):
     """Stimuli that differ in one number.
 
     Parameters
@@ -154,88 +143,7 @@ class VariedStimuli(TaskPart):
     values: Annotated[tuple[FiniteNumber, ...], Strict(False)]
 
 
-class RegionSettings(TaskPart):
-    """Part of the skin that afferents lie in, unrolled; an area there is the same area of skin.
-
-    Parameters
-    ----------
-    shape : {"rectangle", "ellipse", "polygon", "pad"}
-        Kind of shape.
-    length_mm, width_mm : float
-        Extent of a rectangle or an ellipse along the finger and across. [mm]
-    corners_mm : list of (float, float)
-        Of a polygon: along the finger, distal positive, and across, from the middle of the pad. [mm]
-    """
-
-    shape: Annotated[str, choice_of(SHAPES)]
-    length_mm: Positive | None = None
-    width_mm: Positive | None = None
-    corners_mm: Annotated[tuple[Pair, ...], Strict(False)] | None = None
-
-
-class PopulationSettings(TaskPart):
-    """The afferents.
-
-    Parameters
-    ----------
-    layout : str
-        "grid": the paper's rows and columns; a pattern that fills a region; or "nail rows", along the edge of
-        the nail.
-    density_per_cm2 : float
-        Afferents per area of skin. [1/cm2]
-    rows, columns : int
-        Of a grid: along the finger and across, the paper's by default; or how many rows along the nail.
-    region : RegionSettings
-        What any other layout fills.
-    offset_mm : (float, float)
-        Middle of grid, rectangle or ellipse from the middle of the pad, along the finger and across. [mm]
-    jitter : float
-        Displacement of afferents in a jittered layout: standard deviation over the pitch.
-    separation : float
-        Least distance in a Poisson-disc layout over 1/sqrt(density).
-    seed : int
-        Of random places and sensitivities; another one is another finger.
-    sensitivity_spread : float
-        How much afferents differ in their gains, as of `fingerpad.neuron.population.sensitivities`.
-    """
-
-    layout: Annotated[str, choice_of(LAYOUT_NAMES)] = GRID
-    density_per_cm2: Positive = psychophysics.RECEPTOR_DENSITY.value
-    rows: Count | None = None
-    columns: Count | None = None
-    region: RegionSettings | None = None
-    offset_mm: Pair = (0.0, 0.0)
-    jitter: NotNegative | None = None
-    separation: NotNegative | None = None
-    seed: Seed = 0
-    sensitivity_spread: NotNegative = 0.0
-
-
-class AfferentSettings(TaskPart):
-    """The afferent by its numbers; what is absent is as in the afferent of the tissues.
-
-    Parameters
-    ----------
-    intercept_ma, dynamic_gain, static_gain, time_constant_ms, capacitance_mf, threshold_mv : float
-        As of `fingerpad.Afferent`.
-    refractory_ms : float
-        Rest after each spike. [ms]
-    dynamic_quantity, static_quantity : str
-        What the two terms follow.
-    """
-
-    intercept_ma: FiniteNumber | None = None
-    dynamic_gain: FiniteNumber | None = None
-    static_gain: FiniteNumber | None = None
-    time_constant_ms: Positive | None = None
-    capacitance_mf: Positive | None = None
-    threshold_mv: Positive | None = None
-    refractory_ms: NotNegative | None = None
-    dynamic_quantity: Annotated[str, choice_of(sampled_fields())] | None = None
-    static_quantity: Annotated[str, choice_of(sampled_fields())] | None = None
-
-
-class WindowSettings(TaskPart):
+class WindowSettings(Part):
     """Windows in which spikes count.
 
     Parameters
@@ -253,7 +161,7 @@ class WindowSettings(TaskPart):
     latency: Positive | None = None
 
 
-class ExperimentSettings(TaskPart):
+class ExperimentSettings(Part):
     """Repetitions, decision criterion and seed.
 
     Parameters
@@ -287,7 +195,7 @@ class ExperimentSettings(TaskPart):
     trials: Count = _REPETITIONS
 
 
-class CurveSettings(TaskPart):
+class CurveSettings(Part):
     """The psychometric curve through the hit rates.
 
     Parameters
@@ -308,7 +216,7 @@ class CurveSettings(TaskPart):
     proportion: Annotated[float, Field(gt=0.5, lt=1.0), with_message("a number between 0.5 and 1")] = 0.75
 
 
-class ObservedPoint(TaskPart):
+class ObservedPoint(Part):
     """How often people discriminated one stimulus from the standard.
 
     Parameters
@@ -326,7 +234,7 @@ class ObservedPoint(TaskPart):
     trials: Count | None = None
 
 
-class ObservedSettings(TaskPart):
+class ObservedSettings(Part):
     """Observations in people.
 
     Parameters
@@ -341,7 +249,7 @@ class ObservedSettings(TaskPart):
     source: Text = "people"
 
 
-class DiscriminationTask(TaskPart):
+class DiscriminationTask(Part):
     """All that a file of a task holds.
 
     Parameters
@@ -391,10 +299,7 @@ class DiscriminationTask(TaskPart):
     ]
     standard: LevelOrName
     population: PopulationSettings = PopulationSettings()
-    afferent: Annotated[
-        Annotated[Text, Tag(NAMED)] | Annotated[AfferentSettings, Tag(SPELLED)],
-        Discriminator(lambda value: NAMED if isinstance(value, str) else SPELLED),
-    ] = DEFAULT
+    afferent: AfferentChoice = DEFAULT
     code: Annotated[
         tuple[Annotated[str, choice_of(CODES)], ...],
         Strict(False),

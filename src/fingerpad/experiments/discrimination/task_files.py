@@ -3,30 +3,19 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
-
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
-from fingerpad.core.keywords import did_you_mean
 from fingerpad.core.plain_yaml import read_yaml
-from fingerpad.experiments.discrimination.task import (
-    DEFAULT,
-    LISTED,
-    NAMED,
-    SPELLED,
-    VARIED,
-    DiscriminationTask,
-)
+from fingerpad.experiments.descriptions.parts import DEFAULT
+from fingerpad.experiments.descriptions.reading import parsed
+from fingerpad.experiments.discrimination.task import DiscriminationTask
 from fingerpad.experiments.manifest import sha256
 
 SUFFIX = ".yaml"
-_FORMS = (LISTED, VARIED, NAMED, SPELLED)
-_LONGEST_VALUE = 60
 
 
 def example_tasks() -> dict[str, str]:
@@ -155,65 +144,4 @@ def parse_task(content: Any, source: str = "task") -> DiscriminationTask:
     Traceback (most recent call last):
     fingerpad.core.errors.InputError: task, noise must be a number not below 0, or fitted: got -0.1.
     """
-    try:
-        return DiscriminationTask.model_validate(content)
-    except ValidationError as error:
-        raise InputError(f"{source}, {error_sentence(error)}") from error
-
-
-def error_sentence(error: ValidationError) -> str:
-    """Describe the first error that pydantic found: where, what was expected, what came.
-
-    Parameters
-    ----------
-    error : pydantic.ValidationError
-        Of a part of a task.
-
-    Returns
-    -------
-    str
-        One sentence.
-    """
-    first = error.errors(include_url=False)[0]
-    path = [part for part in first["loc"] if part not in _FORMS]
-    where, came = _spelled(path), _shown(first.get("input"))
-    if first["type"] == "missing":
-        return f"{where} must be given: it is missing."
-    if first["type"] == "extra_forbidden":
-        known = _keys_at(path[:-1])
-        return f"{where} is unknown: {did_you_mean(str(path[-1]), known, _spelled(path[:-1]))}"
-    return f"{where} {_EXPECTED.get(first['type'], first['msg'])}: got {came}."
-
-
-_EXPECTED = {
-    "model_type": "must be a mapping of keys to values",
-    "tuple_type": "must be a list",
-    "too_short": "must have at least one entry",
-}
-
-
-def _spelled(path: Sequence[int | str]) -> str:
-    """Spell a place in a file, such as stimuli[2].width_mm, entries counted from 1."""
-    text = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in path)
-    return text.lstrip(".") or "a task"
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}..."
-
-
-def _keys_at(path: Sequence[int | str]) -> list[str]:
-    """Keys that the part of a task at `path` may have."""
-    parts: list[type[BaseModel]] = [DiscriminationTask]
-    for key in path:
-        if isinstance(key, str):
-            parts = [found for part in parts for found in _parts_in(part.model_fields[key].annotation)]
-    return list(dict.fromkeys(key for part in parts for key in part.model_fields))
-
-
-def _parts_in(annotation: Any) -> list[type[BaseModel]]:
-    """Parts of a task that an annotation names."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    return [found for inner in getattr(annotation, "__args__", ()) for found in _parts_in(inner)]
+    return parsed(DiscriminationTask, content, source)

@@ -1,9 +1,10 @@
-"""The stimuli of a discrimination task, and the touches that indent with them."""
+"""The stimuli of a discrimination task, the touches that indent with them, and the afferents."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
@@ -11,13 +12,15 @@ from pydantic import ValidationError
 from fingerpad.core.errors import InputError
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.descriptions.population import afferent_of, population_of
+from fingerpad.experiments.descriptions.reading import error_sentence
 from fingerpad.experiments.discrimination.task import DiscriminationTask, StimulusSettings, VariedStimuli
-from fingerpad.experiments.discrimination.task_files import error_sentence
 from fingerpad.geometry.grading import Grading, covering
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Indenter, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Stimulus
 from fingerpad.geometry.names import INDENTERS, sizes_of
+from fingerpad.neuron.population import Population
 from fingerpad.skin.indentation import Touch, touch_of
 
 _NEAR_MM = max(protocol.SPHERE_POSITIONS.value)
@@ -134,7 +137,7 @@ def _varied(task: DiscriminationTask) -> list[TaskStimulus]:
         try:
             own = StimulusSettings.model_validate({vary: value})
         except ValidationError as error:
-            raise InputError(f"{place}: {error_sentence(error)}") from error
+            raise InputError(f"{place}: {error_sentence(error, StimulusSettings)}") from error
         found.append(_presented(place, task.common, own, f"{value:g}", value))
     return found
 
@@ -197,6 +200,12 @@ def _merged(place: str, common: StimulusSettings, own: StimulusSettings) -> dict
 
 def _chosen(given: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:
     return {key: value for key, value in given.items() if key in keys}
+
+
+def task_population(task: DiscriminationTask, beside: Path = Path()) -> Population:
+    """Lay out the afferents of a task; a file of results that it names is searched in `beside`."""
+    afferent = afferent_of(task.afferent, task.skin.materials, beside)
+    return population_of(task.population, afferent)
 
 
 def task_touches(task: DiscriminationTask) -> dict[str, Touch]:

@@ -13,6 +13,9 @@ from typing import Any
 
 from fingerpad.core.results import ResultFile, check_schema, read_format, write_results
 
+TOUCH_SCHEMA = "fingerpad-touch.schema.json"
+"""Schema of the description of a touch, from which editors complete."""
+
 
 @cache
 def schema(file_format: str) -> dict[str, Any]:
@@ -23,7 +26,16 @@ def schema(file_format: str) -> dict[str, Any]:
     file_format : str
         The field `format` of a file of results.
     """
-    return json.loads((files(__name__) / file_name(file_format)).read_text(encoding="utf-8"))
+    return _packaged(file_name(file_format))
+
+
+def touch_schema() -> dict[str, Any]:
+    """JSON schema of the description of a touch."""
+    return _packaged(TOUCH_SCHEMA)
+
+
+def _packaged(name: str) -> dict[str, Any]:
+    return json.loads((files(__name__) / name).read_text(encoding="utf-8"))
 
 
 def file_name(file_format: str) -> str:

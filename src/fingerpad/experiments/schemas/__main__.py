@@ -1,4 +1,4 @@
-"""`python -m fingerpad.experiments.schemas`: rewrite the JSON schema of every file of results."""
+"""`python -m fingerpad.experiments.schemas`: rewrite the JSON schemas of files of results and of touches."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ from typing import Any
 
 from fingerpad.core.files import write_atomically
 from fingerpad.core.results import file_format, schema_of
+from fingerpad.experiments.descriptions.explained import explained_schema
+from fingerpad.experiments.descriptions.pressed import TouchFile
+from fingerpad.experiments.descriptions.touch import TouchDescription
 from fingerpad.experiments.discrimination.run import DiscriminationFile
 from fingerpad.experiments.fit.session import FitFile
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
-from fingerpad.experiments.schemas import file_name
+from fingerpad.experiments.schemas import TOUCH_SCHEMA, file_name
 from fingerpad.experiments.validation.validation import ValidationFile
 
-RESULT_FILES: tuple[type, ...] = (ReproductionResult, FitFile, DiscriminationFile, ValidationFile)
+RESULT_FILES: tuple[type, ...] = (ReproductionResult, FitFile, DiscriminationFile, ValidationFile, TouchFile)
 """Classes of results that are written to a file of their own."""
 
 
@@ -23,6 +26,8 @@ def write_schemas(folder: Path = Path(__file__).parent) -> None:
     for results in RESULT_FILES:
         content = json.dumps(structure(schema_of(results)), indent=1).encode()
         write_atomically(folder / file_name(file_format(results)[0]), content)
+    content = json.dumps(explained_schema(TouchDescription), indent=1).encode()
+    write_atomically(folder / TOUCH_SCHEMA, content)
 
 
 def structure(schema: Any) -> Any:

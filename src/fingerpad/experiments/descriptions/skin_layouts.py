@@ -1,4 +1,4 @@
-"""Afferents of a discrimination task along the edge of the nail, or in a region of the unrolled skin."""
+"""Afferents along the edge of the nail, or in a region of the unrolled skin."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fingerpad.core.layouts import Layout
 from fingerpad.core.patterns import hexagonal, jittered, poisson_disc, rectangular, uniform
 from fingerpad.core.regions import Ellipse, Polygon, Rectangle, Region
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
-from fingerpad.experiments.discrimination.task import NAIL_ROWS, PAD, PopulationSettings, RegionSettings
+from fingerpad.experiments.descriptions.parts import NAIL_ROWS, PAD, PopulationSettings, RegionSettings
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.skin.nail_edge import NailEdge
@@ -24,15 +24,17 @@ _OF_SHAPE = {
 }
 
 
-def lay(settings: PopulationSettings, afferent: Afferent) -> Population:
+def lay(settings: PopulationSettings, afferent: Afferent, place: str) -> Population:
     """Lay out afferents by any layout but the paper's grid.
 
     Parameters
     ----------
     settings : PopulationSettings
-        Of the task.
+        Of a file.
     afferent : Afferent
         Each of them.
+    place : str
+        Key of the settings in the file, for errors.
 
     Returns
     -------
@@ -43,42 +45,42 @@ def lay(settings: PopulationSettings, afferent: Afferent) -> Population:
     InputError
         If the region is missing, a key does not belong to its shape, or no receptor falls into it.
     """
-    return (_along_nail if settings.layout == NAIL_ROWS else _in_region)(settings, afferent)
+    return (_along_nail if settings.layout == NAIL_ROWS else _in_region)(settings, afferent, place)
 
 
-def _along_nail(settings: PopulationSettings, afferent: Afferent) -> Population:
+def _along_nail(settings: PopulationSettings, afferent: Afferent, place: str) -> Population:
     """Lay rows along the edge of the nail."""
     nail = NailEdge()
-    with _placed("population"):
+    with _placed(place):
         rows = nail.rows(settings.rows or 1, settings.density_per_cm2)
     return Population.of_layout(rows, nail.points, afferent)
 
 
-def _in_region(settings: PopulationSettings, afferent: Afferent) -> Population:
+def _in_region(settings: PopulationSettings, afferent: Afferent, place: str) -> Population:
     """Fill a region of the unrolled skin."""
     if settings.region is None:
-        raise InputError(f"population.region must be given for the layout {settings.layout}: it is missing.")
+        raise InputError(f"{place}.region must be given for the layout {settings.layout}: it is missing.")
     skin = UnrolledSkin(origin_x_mm=RECEPTOR_X_MM)
-    region = _region(settings.region, settings.offset_mm, skin)
-    with _placed("population"):
+    region = _region(settings.region, settings.offset_mm, skin, place)
+    with _placed(place):
         return Population.of_layout(_layout(settings, region, skin), skin.points, afferent)
 
 
-def _region(settings: RegionSettings, offset_mm: tuple[float, ...], skin: UnrolledSkin) -> Region:
+def _region(settings: RegionSettings, offset_mm: tuple[float, ...], skin: UnrolledSkin, place: str) -> Region:
     """Part of the unrolled skin that is meant."""
     wanted = _OF_SHAPE[settings.shape]
     for key in wanted:
         if key not in settings.given:
-            raise InputError(f"population.region.{key} must be given for a {settings.shape}: it is missing.")
+            raise InputError(f"{place}.region.{key} must be given for a {settings.shape}: it is missing.")
     for key in settings.given:
         if key not in ("shape", *wanted):
             raise InputError(
-                f"population.region.{key} must not be given: a {settings.shape} has "
+                f"{place}.region.{key} must not be given: a {settings.shape} has "
                 f"{', '.join(wanted) or 'no size'}."
             )
     along, across = offset_mm
     length, width = settings.length_mm or 0.0, settings.width_mm or 0.0
-    with _placed("population.region"):
+    with _placed(f"{place}.region"):
         if settings.shape == PAD:
             return skin.pad()
         if settings.shape == "polygon":

@@ -1,21 +1,39 @@
-"""Types of the values of a task, each with the words of its error."""
+"""Types of the values of a description, each with the words of its error."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    GetJsonSchemaHandler,
     SerializerFunctionWrapHandler,
     Strict,
     ValidationError,
     WrapValidator,
     model_serializer,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import CoreSchema, PydanticCustomError
+
+_FORM = "form "
+LISTED, VARIED, NAMED, SPELLED, UNKNOWN = (
+    f"{_FORM}{form}" for form in ("listed", "varied", "named", "spelled", "unknown")
+)
+"""Forms that a part may have; pydantic puts them into the places of errors."""
+
+
+def form_of(kind: str) -> str:
+    """Form of a part of some kind."""
+    return f"{_FORM}{kind}"
+
+
+def kind_of(form: int | str) -> str | None:
+    """Kind that a form is of; None of a key or an index."""
+    return form.removeprefix(_FORM) if isinstance(form, str) and form.startswith(_FORM) else None
 
 
 def with_message(words: str, allowed: Collection[Any] | None = None) -> WrapValidator:
@@ -64,7 +82,17 @@ def choice_of(allowed: Collection[str]) -> WrapValidator:
     >>> TypeAdapter(Annotated[str, choice_of(("mean", "sum"))]).validate_python("sum")
     'sum'
     """
-    return with_message(f"one of {', '.join(allowed)}", allowed)
+    return _Choice(with_message(f"one of {', '.join(allowed)}", allowed).func, names=tuple(allowed))
+
+
+@dataclass(frozen=True)
+class _Choice(WrapValidator):
+    """Check of a name, which a JSON schema lists."""
+
+    names: tuple[str, ...] = ()
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return handler(core) | {"enum": list(self.names)}
 
 
 Text = Annotated[str, Field(min_length=1), with_message("a text")]
@@ -81,6 +109,11 @@ Pair = Annotated[
     Field(min_length=2, max_length=2),
     with_message("a pair of numbers"),
 ]
+Whole = Annotated[int, with_message("a whole number")]
+Truth = Annotated[bool, with_message("true or false")]
+Numbers = Annotated[tuple[FiniteNumber, ...], Strict(False), with_message("a list of finite numbers")]
+Pairs = Annotated[tuple[Pair, ...], Strict(False), with_message("a list of pairs of numbers")]
+Outlines = Annotated[tuple[Pairs, ...], Strict(False), with_message("a list of lists of pairs of numbers")]
 LevelOrName = Annotated[float | str, Field(union_mode="left_to_right"), with_message("a number or a name")]
 
 
@@ -89,7 +122,7 @@ def as_list(value: Any) -> Any:
     return [value] if isinstance(value, str) else value
 
 
-class TaskPart(BaseModel):
+class Part(BaseModel):
     """Base of all parts: unknown keys are refused, nothing is converted, values are frozen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)

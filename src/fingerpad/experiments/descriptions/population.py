@@ -1,4 +1,4 @@
-"""The afferents of a discrimination task, and where they end in the skin."""
+"""The afferents that a file describes, and where they end in the skin."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import PATTERNS
 from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
-from fingerpad.experiments.discrimination.task import (
+from fingerpad.experiments.descriptions.parts import (
     DEFAULT,
     GRID,
     NAIL_ROWS,
     AfferentSettings,
-    DiscriminationTask,
     PopulationSettings,
 )
 from fingerpad.neuron.afferent import Afferent
@@ -31,13 +30,15 @@ _OF_LAYOUT = {
 }
 
 
-def task_afferent(task: DiscriminationTask, beside: Path = Path()) -> Afferent:
-    """Make the afferent of a task.
+def afferent_of(chosen: AfferentSettings | str, tissues: str, beside: Path = Path()) -> Afferent:
+    """Make the afferent of a file.
 
     Parameters
     ----------
-    task : DiscriminationTask
-        From `read_task`.
+    chosen : AfferentSettings or str
+        Numbers, "default", or a file of results.
+    tissues : str
+        Tissues by name: the default afferent was fitted with them.
     beside : Path, optional
         Folder from which a file of results is named.
 
@@ -50,21 +51,23 @@ def task_afferent(task: DiscriminationTask, beside: Path = Path()) -> Afferent:
     InputError
         If the file cannot be read or holds no fitted parameters.
     """
-    chosen, fitted = task.afferent, Afferent.for_tissues(task.skin.materials)
+    fitted = Afferent.for_tissues(tissues)
     if isinstance(chosen, AfferentSettings):
         return replace(fitted, **chosen.given)
     return fitted if chosen == DEFAULT else fitted_afferent(Path(beside) / chosen)
 
 
-def task_population(task: DiscriminationTask, beside: Path = Path()) -> Population:
-    """Lay out the afferents of a task.
+def population_of(settings: PopulationSettings, afferent: Afferent, place: str = "population") -> Population:
+    """Lay out the afferents of a file.
 
     Parameters
     ----------
-    task : DiscriminationTask
-        From `read_task`.
-    beside : Path, optional
-        As in `task_afferent`.
+    settings : PopulationSettings
+        Layout, density, region.
+    afferent : Afferent
+        Each of them.
+    place : str, optional
+        Key of the settings in the file, for errors.
 
     Returns
     -------
@@ -73,23 +76,24 @@ def task_population(task: DiscriminationTask, beside: Path = Path()) -> Populati
     Raises
     ------
     InputError
-        As `task_afferent`, or if a key is given that the layout does not have, the region is missing or
-        has no area, or no receptor falls into it.
+        If a key is given that the layout does not have, the region is missing or has no area, or no receptor
+        falls into it.
     """
-    settings, afferent = task.population, task_afferent(task, beside)
     for key, layouts in _OF_LAYOUT.items():
         if key in settings.given and settings.layout not in layouts:
             raise InputError(
-                f"population.{key} must not be given: it belongs to the layout {' or '.join(layouts)}, and "
+                f"{place}.{key} must not be given: it belongs to the layout {' or '.join(layouts)}, and "
                 f"this one is {settings.layout}."
             )
-    laid = _grid(settings, afferent) if settings.layout == GRID else _on_skin(settings, afferent)
+    # Only what needs them loads the modules that unroll the skin.
+    lay = _grid if settings.layout == GRID else resolve_name(f"{__package__}.skin_layouts:lay")
+    laid: Population = lay(settings, afferent, place)
     if settings.sensitivity_spread == 0.0:
         return laid
     return replace(laid, sensitivity=sensitivities(len(laid), settings.sensitivity_spread, settings.seed))
 
 
-def _grid(settings: PopulationSettings, afferent: Afferent) -> Population:
+def _grid(settings: PopulationSettings, afferent: Afferent, place: str) -> Population:
     """Lay the paper's rows and columns."""
     along, across = settings.offset_mm
     return Population.grid(
@@ -98,10 +102,3 @@ def _grid(settings: PopulationSettings, afferent: Afferent) -> Population:
         centre_mm=(RECEPTOR_X_MM + along, across),
         afferent=afferent,
     )
-
-
-def _on_skin(settings: PopulationSettings, afferent: Afferent) -> Population:
-    """Lay afferents along the nail or in a region; only such tasks load the modules that unroll the skin."""
-    lay = resolve_name("fingerpad.experiments.discrimination.skin_layouts:lay")
-    laid: Population = lay(settings, afferent)
-    return laid

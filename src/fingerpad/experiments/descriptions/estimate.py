@@ -1,0 +1,81 @@
+"""Time and memory of a described touch, from its mesh and its steps, without pressing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fingerpad.experiments.descriptions.touch import DescribedTouch
+
+NODE_S = 7.5e-6
+"""Time of a Newton step per node on two cores, kernels compiled: benchmarks/results/growth.json. [s]"""
+
+NEWTON_STEPS, MORE_BY_FORCE, MORE_BY_FRICTION = 2.6, 2.2, 3.2
+"""Newton steps per step of a press by depth without friction; factors for a press by force, for friction."""
+
+BASE_MB, NODE_MB, NODE_EXPONENT = 200.0, 0.043, 0.865
+"""Memory of a process: with its libraries, and of n nodes, `NODE_MB` n^`NODE_EXPONENT`. [MB]"""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a press will take.
+
+    Parameters
+    ----------
+    nodes, elements, steps : int
+        Size of the mesh, and number of steps that are solved at least.
+    time_s, memory_mb : float
+        Time on two cores with compiled kernels, and memory of the process. [s], [MB]
+    """
+
+    nodes: int
+    elements: int
+    steps: int
+    time_s: float
+    memory_mb: float
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The estimate in words."""
+        return (
+            f"The touch is possible: {self.nodes} nodes, {self.elements} elements, {self.steps} steps.",
+            f"A press will take about {self.time_s:.0f} s on two cores and {self.memory_mb:.0f} MB.",
+        )
+
+
+def estimate(described: DescribedTouch) -> Estimate:
+    """Estimate a press from the sizes of its mesh and its steps; the mesh is built for it.
+
+    Parameters
+    ----------
+    described : DescribedTouch
+        The description.
+
+    Returns
+    -------
+    Estimate
+
+    Raises
+    ------
+    InputError
+        If a part is impossible.
+
+    Examples
+    --------
+    >>> from fingerpad.experiments.descriptions.touch import described_touch
+    >>> estimate(described_touch({"object": {"kind": "sphere", "radius_mm": 4}})).steps
+    10
+    """
+    touch, _ = described.touch, described.population
+    nodes = len(touch.mesh.nodes_mm)
+    steps = touch.settings.steps_ms(touch.stimulus).size - 1
+    newton = NEWTON_STEPS * steps
+    newton *= MORE_BY_FORCE if touch.stimulus.by_force else 1.0
+    newton *= MORE_BY_FRICTION if touch.friction else 1.0
+    return Estimate(
+        nodes=nodes,
+        elements=len(touch.mesh.elements),
+        steps=steps,
+        time_s=NODE_S * nodes * newton,
+        memory_mb=BASE_MB + NODE_MB * nodes**NODE_EXPONENT,
+    )

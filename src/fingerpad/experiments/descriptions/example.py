@@ -1,0 +1,69 @@
+"""The commented example of a description that `fingerpad init` writes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from fingerpad.core.errors import InputError
+from fingerpad.core.files import write_atomically
+from fingerpad.experiments import schemas
+
+EXAMPLE = f"""\
+# yaml-language-server: $schema={schemas.TOUCH_SCHEMA}
+#
+# One touch. Try: fingerpad check touch.yaml, then fingerpad touch touch.yaml --out touch
+# Keys that are left out have the paper's values. docs/touch.md explains every key.
+
+title: A ball on the finger pad
+
+resolution: quick          # quick for a first look, standard for results
+tissues: human             # a set of tissues; all others: fingerpad touch --help
+# finger: {{stratum_corneum_mm: 0.5}}
+
+object:
+  kind: sphere             # cylinder, bar, line, punch, plate, edge, gap, grating, dots, braille,
+                           # embossed, embossed_text
+  radius_mm: 4             # [mm]
+
+motion:
+  kind: ramp_and_hold      # sine, chirp, repeated, staircase, stroke, recorded, trajectory
+  depth_mm: 0.8            # [mm]; or force_mn, in mN
+  ramp_ms: 50
+  hold_ms: 450
+
+place:                     # from the middle of the finger pad
+  x_mm: 0                  # along the finger, towards the tip
+  z_mm: 0                  # across it
+  spin_deg: 0              # turn about the direction of pressing
+
+friction: 0                # Coulomb's coefficient between skin and object
+
+afferents:
+  layout: grid             # rectangular, hexagonal, uniform, jittered, poisson-disc, nail rows
+  density_per_cm2: 100
+  afferent: default        # the one that was fitted with the tissues, or fit.json of fingerpad fit
+  noise: 0                 # width of a soft threshold over the threshold; 0 is without randomness
+  seed: 0
+
+outputs: [figures, csv, spikes]   # npz, netcdf, zarr, nwb, vtu, abaqus, calculix, febio
+"""
+
+
+def write_example(path: Path) -> Path:
+    """Write the example, and beside it the JSON schema from which editors complete its keys.
+
+    Raises
+    ------
+    InputError
+        If the file exists.
+    StoreError
+        If the folder cannot be written.
+    """
+    path = Path(path)
+    if path.exists():
+        raise InputError(f"{path} exists and is not overwritten: choose another name.")
+    schema = json.dumps(schemas.touch_schema(), indent=1)
+    write_atomically(path.parent / schemas.TOUCH_SCHEMA, schema.encode())
+    write_atomically(path, EXAMPLE.encode())
+    return path

@@ -1,0 +1,80 @@
+"""JSON schema of a description for editors: every key with its explanation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel
+
+from fingerpad.experiments.descriptions.pressing import RAMP_AND_HOLD
+from fingerpad.experiments.descriptions.reading import parts_in
+from fingerpad.experiments.descriptions.signatures import UNKNOWN_MODEL, described
+from fingerpad.experiments.descriptions.values import Part
+
+
+def explained_schema(kind: type[Part]) -> dict[str, Any]:
+    """JSON schema of a description as it is written, with the explanations of the docstrings.
+
+    Parameters
+    ----------
+    kind : type
+        The whole description.
+
+    Returns
+    -------
+    dict
+        A schema by which an editor completes and checks YAML.
+    """
+    made = {"$schema": "https://json-schema.org/draft/2020-12/schema"} | kind.model_json_schema()
+    definitions = made["$defs"]
+    for name in [name for name in definitions if name.startswith(UNKNOWN_MODEL)]:
+        del definitions[name]
+    for part in _parts_of(kind):
+        schema = made if part is kind else definitions.get(part.__name__)
+        told: dict[str, str] = {}
+        for home in reversed(part.__mro__):
+            told |= described(home.__doc__ or "") if issubclass(home, Part) else {}
+        properties = (schema or {}).get("properties", {})
+        for name, value in properties.items():
+            if name in told:
+                value.setdefault("description", told[name])
+        if properties.get("kind", {}).get("const", RAMP_AND_HOLD) != RAMP_AND_HOLD:
+            schema["required"] = [*schema.get("required", ()), "kind"]
+    return _tidied(made)
+
+
+def _parts_of(
+    kind: type[BaseModel], found: dict[type[BaseModel], None] | None = None
+) -> list[type[BaseModel]]:
+    """List a part and all parts in it, each once."""
+    found = {} if found is None else found
+    if kind not in found:
+        found[kind] = None
+        for field in kind.model_fields.values():
+            for part in parts_in(field.annotation):
+                _parts_of(part, found)
+    return list(found)
+
+
+def _serves_errors(item: Any) -> bool:
+    return isinstance(item, dict) and str(item.get("$ref")).startswith(f"#/$defs/{UNKNOWN_MODEL}")
+
+
+def _tidied(schema: Any) -> Any:
+    """Return a schema without titles, null as a value to write, and the form that only serves errors."""
+    if isinstance(schema, list):
+        return [_tidied(item) for item in schema if not _serves_errors(item)]
+    if not isinstance(schema, dict):
+        return schema
+    kept = {
+        key: {name: _tidied(item) for name, item in value.items()}
+        if key in ("properties", "$defs")
+        else _tidied(value)
+        for key, value in schema.items()
+        if key not in ("title", "discriminator") and (key, value) != ("default", None)
+    }
+    options = [option for option in kept.get("anyOf", ()) if option != {"type": "null"}]
+    if len(options) == 1:
+        kept.pop("anyOf")
+        return options[0] | kept
+    return kept | {"anyOf": options} if options else kept

@@ -1,0 +1,200 @@
+"""A described touch pressed: the skin's response, stored, and the afferents' responses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from fingerpad.core.progress import Progress
+from fingerpad.core.results import Number, result_class
+from fingerpad.core.signals import ResponseMap
+from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.descriptions.touch import DescribedTouch, TouchDescription
+from fingerpad.experiments.manifest import Manifest
+from fingerpad.experiments.runner import Runner
+from fingerpad.neuron.escape_rate import EscapeRate
+from fingerpad.neuron.rate_windows import rate_windows_ms
+from fingerpad.neuron.spikes import firing_rate_hz, first_spike_latency_ms
+from fingerpad.skin.sampling import SkinResponse
+
+
+@result_class
+class TouchSummary:
+    """What a touch did, in a few numbers.
+
+    Parameters
+    ----------
+    nodes, times : int
+        Size of the mesh, and number of times.
+    end_ms : float
+        End of the motion. [ms]
+    largest_force_mn, largest_depth_mm, largest_contact_mm2 : float
+        Over time. [mN], [mm], [mm²]
+    afferents, firing : int
+        How many, and how many fire at all.
+    dynamic_rate_hz, static_rate_hz : float
+        Largest firing rates in the two windows. [spikes/s]
+    """
+
+    nodes: int
+    times: int
+    end_ms: Number
+    largest_force_mn: Number
+    largest_depth_mm: Number
+    largest_contact_mm2: Number
+    afferents: int
+    firing: int
+    dynamic_rate_hz: Number
+    static_rate_hz: Number
+
+
+@result_class
+class TouchFile:
+    """The file `touch.json`.
+
+    Parameters
+    ----------
+    format, format_version
+        By which a reader knows the file.
+    touch : TouchDescription
+        What was described.
+    summary : TouchSummary
+        What it did.
+    manifest : Manifest
+        What ran.
+    """
+
+    format: Literal["fingerpad touch result"] = "fingerpad touch result"
+    format_version: Literal[1] = 1
+    touch: TouchDescription
+    summary: TouchSummary
+    manifest: Manifest
+
+
+@dataclass(frozen=True)
+class PressedTouch:
+    """A described touch with the responses of skin and afferents.
+
+    Parameters
+    ----------
+    described : DescribedTouch
+        The description.
+    skin : SkinResponse
+        Response of the skin; with all nodes and elements if it was pressed `whole`.
+    response : ResponseMap
+        Responses of the afferents.
+    manifest : Manifest
+        What ran.
+    """
+
+    described: DescribedTouch
+    skin: SkinResponse
+    response: ResponseMap
+    manifest: Manifest
+
+    @property
+    def summary(self) -> TouchSummary:
+        """The touch in a few numbers."""
+        skin, response = self.skin, self.response
+        return TouchSummary(
+            nodes=len(skin.mesh.nodes_mm),
+            times=skin.times_ms.size,
+            end_ms=float(skin.times_ms[-1]),
+            largest_force_mn=float(skin.force_mn.max()),
+            largest_depth_mm=float(skin.depth_mm.max()),
+            largest_contact_mm2=float(skin.fields["contact_area_mm2"].max()),
+            afferents=len(response.positions_mm),
+            firing=int(np.count_nonzero(np.isfinite(response.first_spike_latency_ms))),
+            dynamic_rate_hz=float(response.dynamic_rate_hz.max()),
+            static_rate_hz=float(response.static_rate_hz.max()),
+        )
+
+    @property
+    def result(self) -> TouchFile:
+        """Content of `touch.json`."""
+        return TouchFile(touch=self.described.description, summary=self.summary, manifest=self.manifest)
+
+
+def press_described(
+    described: DescribedTouch,
+    folder: Path,
+    progress: Progress | None = None,
+    command: str | None = None,
+    whole: bool = False,
+) -> PressedTouch:
+    """Press a described touch, or load it from where it is stored, and let the afferents respond.
+
+    Parameters
+    ----------
+    described : DescribedTouch
+        From `read_touch_description` or `described_touch`.
+    folder : Path
+        Where the finished indentation is stored, in a folder `indentations`.
+    progress : Progress, optional
+        Shown each finished part.
+    command : str, optional
+        The command line, for the manifest.
+    whole : bool, optional
+        Whether to keep all nodes and elements over time, which the store does not: it is pressed again then.
+
+    Returns
+    -------
+    PressedTouch
+
+    Raises
+    ------
+    InputError
+        If a part is impossible; this is found before anything is pressed.
+    ConvergenceError
+        If the mechanics cannot be solved.
+    StoreError
+        If the folder cannot be written.
+    """
+    touch, _ = described.touch, described.population
+    asked = described.description
+    runner = Runner(folder, progress=progress)
+    if whole:
+        with runner.stage("press", 1) as advance:
+            skin = touch.solve(whole=True)
+            runner.store.save(touch, skin)
+            advance()
+    else:
+        skin = runner.responses({"press": {"touch": touch}})["press"]["touch"]
+    with runner.stage("afferents", 1) as advance:
+        response = respond(described, skin)
+        advance()
+    manifest = runner.manifest(
+        Conditions(asked.resolution, asked.afferents.seed, asked.tissues),
+        {"touch": skin.mesh},
+        half_model=not touch.grading.full,
+        command=command,
+        inputs=described.input_hashes(),
+    )
+    return PressedTouch(described, skin, response, manifest)
+
+
+def respond(described: DescribedTouch, skin: SkinResponse) -> ResponseMap:
+    """Responses of the described afferents to a skin, random if they have noise."""
+    asked, population = described.description.afferents, described.population
+    windows = asked.windows_ms.dynamic, asked.windows_ms.static
+    if asked.noise == 0.0:
+        return population.respond(skin, *windows)
+    afferent = population.afferent
+    sed = skin.sed(population.positions_mm, afferent.dynamic_quantity, afferent.static_quantity)
+    sed = sed if population.sensitivity is None else sed.scaled(population.sensitivity)
+    current = afferent.transduction.current(sed)
+    spikes = EscapeRate(afferent.membrane, asked.noise).spikes(current, asked.seed)
+    dynamic, static = rate_windows_ms(sed.phases, *windows)
+    return ResponseMap(
+        positions_mm=population.positions_mm,
+        pitch_mm=population.pitch_mm,
+        spikes=spikes,
+        dynamic_rate_hz=firing_rate_hz(spikes, dynamic),
+        static_rate_hz=firing_rate_hz(spikes, static),
+        first_spike_latency_ms=first_spike_latency_ms(spikes),
+        duration_ms=float(sed.times_ms[-1]),
+        phases=sed.phases,
+    )

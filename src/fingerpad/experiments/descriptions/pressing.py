@@ -1,0 +1,113 @@
+"""Objects and motions as files describe them: a `kind`, and the parameters of what it names in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from fingerpad.core.errors import InputError
+from fingerpad.data import protocol
+from fingerpad.experiments.descriptions.signatures import made_by, one_of_kinds
+from fingerpad.experiments.descriptions.values import Text
+from fingerpad.experiments.indenter_text import indenter_named
+from fingerpad.geometry.dots import Dots, braille
+from fingerpad.geometry.embossed import Embossed, embossed_text
+from fingerpad.geometry.indenters import Indenter
+from fingerpad.geometry.motion import ForceRampAndHold, Motion, RampAndHold
+from fingerpad.geometry.motions import chirp, repeated, sine, staircase, stroke
+from fingerpad.geometry.names import INDENTERS
+from fingerpad.geometry.sampled_motions import TOLERANCE, reduced
+from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.geometry.trajectory_files import read_trajectory
+
+RAMP_AND_HOLD = "ramp_and_hold"
+
+
+def ramp_and_hold(
+    depth_mm: float | None = None,
+    force_mn: float | None = None,
+    ramp_ms: float = protocol.RAMP.value,
+    hold_ms: float = protocol.HOLD.value,
+) -> Motion:
+    """Indent at a constant rate to a depth or a force, then hold it.
+
+    Parameters
+    ----------
+    depth_mm : float, optional
+        Depth of the hold; the paper's without depth and force. [mm]
+    force_mn : float, optional
+        Instead of a depth, the force of the hold on the whole finger. [mN]
+    ramp_ms, hold_ms : float, optional
+        Durations. [ms]
+
+    Raises
+    ------
+    InputError
+        If both are given, or a value is not above 0.
+    """
+    if depth_mm is not None and force_mn is not None:
+        raise InputError("depth_mm and force_mn exclude each other: leave one out.")
+    if force_mn is not None:
+        return ForceRampAndHold(force_mn, ramp_ms, hold_ms)
+    return RampAndHold(protocol.DEPTH.value if depth_mm is None else depth_mm, ramp_ms, hold_ms)
+
+
+def recorded(file: Path, first_touch_mm: float = 0.0, tolerance: float = TOLERANCE) -> Motion:
+    """Play a motion from a CSV file (docs/motions.md).
+
+    Parameters
+    ----------
+    file : Path
+        The file; columns name what they hold and its unit.
+    first_touch_mm : float, optional
+        Reading of the depth at first touch. [mm]
+    tolerance : float, optional
+        Samples this close to a line, relative to the extent of the motion, are left out; 0 keeps all.
+    """
+    motion = read_trajectory(file, first_touch_mm=first_touch_mm)
+    return reduced(motion, tolerance) if tolerance else motion
+
+
+OBJECTS: dict[str, Callable[..., Indenter]] = {
+    **INDENTERS,
+    "dots": Dots,
+    "braille": braille,
+    "embossed": Embossed,
+    "embossed_text": embossed_text,
+}
+"""What can be pressed in, by kind."""
+
+MOTIONS: dict[str, Callable[..., Motion]] = {
+    RAMP_AND_HOLD: ramp_and_hold,
+    "sine": sine,
+    "chirp": chirp,
+    "repeated": repeated,
+    "staircase": staircase,
+    "stroke": stroke,
+    "recorded": recorded,
+    "trajectory": Trajectory,
+}
+"""How it can move, by kind."""
+
+_WITHOUT: Mapping[str, Sequence[str]] = {"trajectory": ("phases", "cycles")}
+"""Parameters that a file does not have."""
+
+ObjectPart = one_of_kinds({kind: made_by(kind, makes) for kind, makes in OBJECTS.items()}, text=Text)
+MotionPart = one_of_kinds(
+    {kind: made_by(kind, makes, _WITHOUT.get(kind, ())) for kind, makes in MOTIONS.items()},
+    default=RAMP_AND_HOLD,
+)
+
+
+def object_of(part: Any, beside: Path = Path()) -> Indenter:
+    """Make the object of a file: a part, or a text such as `punch:6.35`."""
+    body: Indenter = indenter_named(part) if isinstance(part, str) else part.made(beside)
+    return body
+
+
+def motion_of(content: Mapping[str, Any]) -> Any:
+    """Part of a motion from plain values."""
+    return TypeAdapter(MotionPart).validate_python(content)

@@ -1,0 +1,182 @@
+"""Parts whose keys are the parameters of a function or a class: objects and motions.
+
+A part has the same names, defaults and explanations in a file as its function has in Python. The values of
+its keys are checked by type here, and by the function itself.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
+
+from pydantic import Discriminator, Field, Tag, create_model
+
+from fingerpad.core.keywords import other_names
+from fingerpad.experiments.descriptions.values import (
+    NAMED,
+    UNKNOWN,
+    FiniteNumber,
+    Numbers,
+    Outlines,
+    Pairs,
+    Part,
+    Text,
+    Truth,
+    Whole,
+    choice_of,
+    form_of,
+)
+
+UNKNOWN_MODEL = "Unknown_"
+"""Beginning of the name of a part that only serves the error of an unknown kind."""
+
+File = Annotated[Text, "file"]
+"""Name of a file, from the folder of the description."""
+
+_VALUES: dict[Any, Any] = {float: FiniteNumber, int: Whole, bool: Truth, str: Text, Path: File}
+_LISTS: dict[Any, Any] = {float: Numbers, tuple[float, float]: Pairs}
+
+
+class Made(Part):
+    """Part that a function makes from its keys."""
+
+    makes: ClassVar[Callable[..., Any]]
+    files: ClassVar[frozenset[str]]
+    """Keys that name files."""
+
+    def made(self, beside: Path = Path()) -> Any:
+        """Return what the function makes.
+
+        Parameters
+        ----------
+        beside : Path, optional
+            Folder from which files are named.
+
+        Raises
+        ------
+        InputError
+            As of the function.
+        """
+        given = {key: value for key, value in self.given.items() if key != "kind"}
+        named = {key: beside / value for key, value in given.items() if key in self.files}
+        return type(self).makes(**given | named)
+
+
+def made_by(kind: str, makes: Callable[..., Any], without: Sequence[str] = ()) -> type[Made]:
+    """Make the part whose keys are `kind` and the parameters of a function.
+
+    Parameters
+    ----------
+    kind : str
+        Value of the key `kind`; without one there is no such key.
+    makes : callable
+        A function or a class with annotated parameters and a docstring.
+    without : sequence of str, optional
+        Parameters that a file does not have.
+
+    Returns
+    -------
+    type
+        A part.
+
+    Examples
+    --------
+    >>> def box(width_mm: float, open_at_top: bool = False) -> str:
+    ...     return f"{width_mm:g} mm"
+    >>> made_by("box", box).model_validate({"kind": "box", "width_mm": 3}).made()
+    '3 mm'
+    """
+    hints = get_type_hints(getattr(makes, "__init__") if isinstance(makes, type) else makes)  # noqa: B009
+    told = _of_other_names(makes) | described(makes.__doc__ or "")
+    fields: dict[str, Any] = {}
+    if kind:
+        fields["kind"] = (Annotated[Literal[kind], Field(description=_first_sentence(makes))], kind)
+    files = set()
+    for name, parameter in inspect.signature(makes).parameters.items():
+        if name in without:
+            continue
+        value = _value_of(hints.get(name, float | None))
+        if value is File:
+            files.add(name)
+        required = parameter.default is parameter.empty
+        kept: Any = Annotated[value, Field(description=told.get(name))]
+        fields[name] = (kept, ...) if required else (kept | None, None)
+    name = "".join(word.capitalize() for word in (kind or getattr(makes, "__name__", "part")).split("_"))
+    made: type[Made] = create_model(name, __base__=Made, **fields)
+    made.makes, made.files = staticmethod(makes), frozenset(files)
+    return made
+
+
+def _of_other_names(makes: Callable[..., Any]) -> dict[str, str]:
+    """Explanation of each parameter that is another name of a field."""
+    others = other_names(makes) if isinstance(makes, type) else {}
+    return {name: f"Another name of {other.meaning}. [{other.unit}]" for name, other in others.items()}
+
+
+def _value_of(hint: Any) -> Any:
+    """Type of the value in a file, for the type of a parameter."""
+    options = [option for option in get_args(hint) if option is not type(None)]
+    if get_origin(hint) in (tuple, Sequence, list) or get_origin(hint) is Sequence:
+        inner = options[0]
+        return Outlines if get_origin(inner) and get_origin(get_args(inner)[0]) else _LISTS[inner]
+    if options:  # a union: a file names what may be a path
+        return File if Path in options else _value_of(options[0])
+    return _VALUES[hint]
+
+
+def described(docstring: str) -> dict[str, str]:
+    """Explanation of each parameter in a docstring of NumPy's style.
+
+    Examples
+    --------
+    >>> described(made_by.__doc__)["makes"]
+    'A function or a class with annotated parameters and a docstring.'
+    """
+    section = re.search(r"\n *Parameters\n *-+\n(.*?)(\n\n|\Z)", inspect.cleandoc(docstring) + "\n\n", re.S)
+    found: dict[str, str] = {}
+    for entry in re.split(r"\n(?=\S)", section[1] if section else ""):
+        names, _, text = entry.partition("\n")
+        for name in names.partition(" :")[0].split(","):
+            found[name.strip()] = " ".join(text.split())
+    return found
+
+
+def _first_sentence(makes: Callable[..., Any]) -> str:
+    return (makes.__doc__ or "").strip().partition("\n")[0]
+
+
+def one_of_kinds(parts: Mapping[str, type[Made]], default: str | None = None, text: Any = None) -> Any:
+    """Type of a value that is one of several parts, by its key `kind`.
+
+    Parameters
+    ----------
+    parts : mapping of str to type
+        By kind.
+    default : str, optional
+        Kind of a mapping that names none.
+    text : type, optional
+        Type of a text in the place of the mapping.
+    """
+
+    def tag(value: Any) -> str:
+        if isinstance(value, Part):
+            return form_of(str(getattr(value, "kind", default)))
+        if isinstance(value, Mapping):
+            kind = value.get("kind", default)
+            return form_of(kind) if isinstance(kind, str) and kind in parts else UNKNOWN
+        return NAMED if isinstance(value, str) and text is not None else UNKNOWN
+
+    # Named after its kinds: two models of one name would get longer names in a schema.
+    unknown = create_model(
+        f"{UNKNOWN_MODEL}{'_'.join(parts)}",
+        __base__=Part,
+        kind=(Annotated[str, choice_of(tuple(parts))], ...),
+    )
+    tagged = [Annotated[part, Tag(form_of(kind))] for kind, part in parts.items()]
+    if text is not None:
+        tagged.append(Annotated[text, Tag(NAMED)])
+    tagged.append(Annotated[unknown, Tag(UNKNOWN)])
+    return Annotated[Union[tuple(tagged)], Discriminator(tag)]  # noqa: UP007

@@ -1,0 +1,493 @@
+"""Descriptions of a touch: what they mean, what is refused, and what their commands write."""
+
+import json
+import re
+from pathlib import Path
+
+import fastjsonschema
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import fingerpad as fp
+from fingerpad import cli
+from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.core.results import from_json, to_json
+from fingerpad.experiments import schemas
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.descriptions.estimate import estimate
+from fingerpad.experiments.descriptions.example import EXAMPLE
+from fingerpad.experiments.descriptions.pressed import TouchFile, respond
+from fingerpad.experiments.descriptions.pressing import MOTIONS, OBJECTS
+from fingerpad.experiments.descriptions.touch import OUTPUTS, described_touch
+from fingerpad.export.touch_outputs import WRITERS, as_described, check_described, run_touch
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad.skin.indentation import touch_of
+
+ROOT = Path(__file__).parents[1]
+FULL = {
+    "title": "A ball",
+    "resolution": "quick",
+    "finger": {"stratum_corneum_mm": 0.5},
+    "tissues": "human",
+    "object": {"kind": "sphere", "radius_mm": 4.0},
+    "motion": {"kind": "ramp_and_hold", "depth_mm": 0.5, "ramp_ms": 50.0, "hold_ms": 950.0},
+    "place": {"x_mm": 0.5, "z_mm": 0.0, "tilt_deg": 3.0, "spin_deg": 10.0},
+    "friction": 0.1,
+    "times_ms": [20.0, 400.0],
+    "afferents": {"density_per_cm2": 80.0, "rows": 2, "noise": 0.1, "seed": 3},
+    "outputs": ["csv", "spikes"],
+}
+
+
+@pytest.fixture
+def call(run_program):
+    from functools import partial
+
+    return partial(run_program, cli.main, "fingerpad")
+
+
+# What a description means
+
+
+def test_a_description_is_the_touch_that_python_makes():
+    assert described_touch(FULL).touch == touch_of(
+        fp.Fingertip(stratum_corneum_mm=0.5),
+        fp.Sphere(radius_mm=4.0),
+        fp.RampAndHold(0.5),
+        "human",
+        "quick",
+        (RECEPTOR_X_MM + 0.5, 0.0),
+        tilt_deg=3.0,
+        friction=0.1,
+        spin_deg=10.0,
+        times_ms=(20.0, 400.0),
+    )
+
+
+def test_what_is_left_out_is_the_papers_perpendicular_to_the_skin():
+    touch = described_touch({"object": "sphere"}).touch
+    assert (touch.indenter, touch.stimulus, touch.friction) == (fp.Sphere(), RampAndHold(), 0.0)
+    assert touch.tilt_deg == Conditions().skin_tilt_deg
+    assert described_touch({"object": "line"}).touch.tilt_deg == 0.0
+
+
+@pytest.mark.parametrize(
+    ("content", "body"),
+    [
+        ("sphere:radius_mm=4", fp.Sphere(250.0)),
+        ({"kind": "bar", "width_mm": 4, "edge_radius_mm": 0.2}, fp.Bar(4.0, 0.2)),
+        ({"kind": "grating", "period_mm": 2, "duty": 0.25}, fp.Grating(0.5, 1.5)),
+        (
+            {"kind": "dots", "at_mm": [[0, 0], [2.5, 0]], "height_mm": 0.3},
+            fp.Dots([(0, 0), (2.5, 0)], height_mm=0.3),
+        ),
+        ({"kind": "braille", "text": "ab", "along_finger": False}, fp.braille("ab", along_finger=False)),
+        ({"kind": "plate"}, fp.Plate()),
+        (
+            {"kind": "embossed_text", "text": "T", "capital_mm": 5, "weight": "normal"},
+            fp.embossed_text("T", capital_mm=5.0, weight="normal"),
+        ),
+        (
+            {"kind": "embossed", "outlines_mm": [[[0, 0], [3, 0], [0, 3]]], "height_mm": 0.4},
+            fp.Embossed([[(0.0, 0.0), (3.0, 0.0), (0.0, 3.0)]], 0.4),
+        ),
+    ],
+)
+def test_an_object_is_what_its_class_makes(content, body):
+    assert described_touch({"object": content, "motion": {"depth_mm": 0.4}}).touch.indenter == body
+
+
+@pytest.mark.parametrize(
+    ("content", "motion"),
+    [
+        ({"force_mn": 80}, ForceRampAndHold(80.0)),
+        ({"kind": "sine", "depth_mm": 0.5, "amplitude_mm": 0.05, "frequency_hz": 20, "cycles": 3},
+         fp.sine(0.5, 0.05, 20.0, 3)),
+        ({"kind": "chirp", "depth_mm": 0.5, "amplitude_mm": 0.02, "frequencies_hz": [5, 20], "sweep_ms": 400},
+         fp.chirp(0.5, 0.02, (5.0, 20.0), 400.0)),
+        ({"kind": "repeated", "depth_mm": 0.5, "touches": 2, "ramp_ms": 50, "hold_ms": 99, "pause_ms": 20},
+         fp.repeated(0.5, 2, 50.0, 99.0, 20.0)),
+        ({"kind": "staircase", "forces_mn": [20, 50]}, fp.staircase(forces_mn=[20.0, 50.0])),
+        ({"kind": "stroke", "depth_mm": 0.4, "speed_mm_per_s": 20, "x_mm": 2},
+         fp.stroke(0.4, speed_mm_per_s=20.0, x_mm=2.0)),
+        ({"kind": "trajectory", "times_ms": [0, 50, 500], "depth_mm": [0, 0.5, 0.5]},
+         fp.Trajectory((0.0, 50.0, 500.0), (0.0, 0.5, 0.5))),
+    ],
+    ids=lambda value: value.get("kind", "") if isinstance(value, dict) else "",
+)  # fmt: skip
+def test_a_motion_is_what_its_function_makes(content, motion):
+    assert described_touch({"object": "sphere", "motion": content}).touch.stimulus == motion
+
+
+def test_a_recorded_motion_is_named_from_the_folder_of_the_description(tmp_path):
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "deep" / "press.csv").write_text("time_ms,depth_mm\n0,0\n50,0.6\n500,0.6\n", encoding="utf-8")
+    path = tmp_path / "touch.yaml"
+    path.write_text("object: plate\nmotion: {kind: recorded, file: deep/press.csv}\n", encoding="utf-8")
+    described = fp.read_touch_description(path)
+    assert described.touch.stimulus.depth_mm == (0.0, 0.6, 0.6)
+    assert set(described.input_hashes()) == {str(path), str(tmp_path / "deep" / "press.csv")}
+
+
+def test_afferents_are_those_of_a_task_with_the_same_words():
+    described = described_touch(
+        FULL | {"afferents": {"layout": "nail rows", "rows": 2, "afferent": {"static_gain": 1e-6}}}
+    )
+    assert len(described.population) > 10
+    assert described.population.afferent == fp.Afferent(static_gain=1e-6)
+
+
+def test_every_object_motion_and_output_is_known_to_docs_example_and_writers():
+    page = (ROOT / "docs" / "touch.md").read_text(encoding="utf-8")
+    assert set(WRITERS) == set(OUTPUTS)
+    for name in (*OBJECTS, *MOTIONS, *OUTPUTS):
+        assert f"`{name}`" in page, name
+        assert name in EXAMPLE, name
+
+
+def test_the_files_on_the_page_are_possible():
+    page = (ROOT / "docs" / "touch.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```yaml\n(.*?)```", page, re.S)
+    assert blocks
+    for block in blocks:
+        described = described_touch(read_yaml(block, "page"), "page", block)
+        check_described(described)
+        assert len(described.population)
+
+
+def test_a_description_is_frozen_compares_and_survives_json():
+    described = described_touch(FULL).description
+    assert from_json(fp.TouchDescription, to_json(described)) == described
+    assert json.loads(to_json(described)) == FULL
+    assert as_described(described).touch == as_described(FULL).touch
+    with pytest.raises(ValueError, match="frozen"):
+        described.friction = 0.3
+
+
+def test_the_schema_accepts_what_is_accepted_and_explains_every_key():
+    schema = schemas.touch_schema()
+    check = fastjsonschema.compile(schema)
+    check(FULL)
+    check(read_yaml(EXAMPLE, "example"))
+    for wrong in (
+        {"object": {"kind": "sphere", "raduis_mm": 3}},
+        {"object": {"kind": "ball"}},
+        {},
+        {"object": 3},
+    ):
+        with pytest.raises(fastjsonschema.JsonSchemaValueException):
+            check(wrong)
+    silent = [
+        f"{part}.{key}"
+        for part, made in {"": schema, **schema["$defs"]}.items()
+        for key, value in made.get("properties", {}).items()
+        if not value.get("description")
+    ]
+    assert silent == []
+
+
+# What is refused
+
+BALL = "object: {kind: sphere, radius_mm: 4}\n"
+WRONG = [
+    ("", "the file must be a mapping of keys to values: got None"),
+    ("# nothing\n", "must be a mapping of keys to values"),
+    ("- object: sphere\n", "must be a mapping of keys to values"),
+    ("just words\n", "must be a mapping of keys to values: got 'just words'"),
+    ("42\n", "must be a mapping of keys to values: got 42"),
+    ("object: [\n", "cannot be read as YAML"),
+    (
+        "object:\n\tkind: sphere\n",
+        "cannot be read as YAML (found character '\\t' that cannot start any token, line 2)",
+    ),
+    ("object: sphere\nobject: plate\n", "line 1: object is repeated, keep one"),
+    ("object: {kind: sphere, kind: plate}\n", "kind is repeated"),
+    ("[" * 600, "cannot be read as YAML"),
+    ("{[1]: 2}\n", "cannot be read as YAML"),
+    ("object: sphere\n--- \nobject: plate\n", "cannot be read as YAML"),
+    ("object: !!python/object:os.system {}\n", "cannot be read as YAML"),
+    ("object: *nothing\n", "cannot be read as YAML"),
+    ("1: 2\n", "must have texts as keys"),
+    ("motion: {depth_mm: 1}\n", "object must be given: it is missing"),
+    ("objct: sphere\n", "line 1, objct is unknown: did you mean object?"),
+    (BALL + "frictoin: 0.1\n", "line 2, frictoin is unknown: did you mean friction?"),
+    (BALL + "colour: red\n", "line 2, colour is unknown: the file has title, resolution, finger"),
+    ("object:\n", "line 1, object must be a mapping of keys to values: got None"),
+    ("object: 3\n", "object must be a mapping of keys to values: got 3"),
+    ("object: [sphere]\n", "object must be a mapping of keys to values"),
+    ("object: cone\n", "line 1, object: indenter must be one of sphere"),
+    ("object: 'sphere:raduis_mm=3'\n", "line 1, object: Sphere has no raduis_mm: did you mean radius_mm?"),
+    ("object: {kind: shpere}\n", "line 1, object.kind must be one of sphere, cylinder, bar"),
+    ("object: {kind: 3}\n", "object.kind must be one of sphere"),
+    ("object: {radius_mm: 3}\n", "object.kind must be given: it is missing"),
+    (
+        "object:\n  kind: sphere\n  raduis_mm: 3\n",
+        "line 3, object.raduis_mm is unknown: did you mean radius_mm?",
+    ),
+    ("object: {kind: plate, width_mm: 3}\n", "object.width_mm is unknown: object has kind"),
+    ("object: {kind: sphere, radius_mm: wide}\n", "object.radius_mm must be a finite number: got 'wide'"),
+    ("object: {kind: sphere, radius_mm: .nan}\n", "object.radius_mm must be a finite number: got nan"),
+    ("object: {kind: sphere, radius_mm: .inf}\n", "object.radius_mm must be a finite number: got inf"),
+    ("object: {kind: sphere, radius_mm: true}\n", "object.radius_mm must be a finite number: got True"),
+    ("object: {kind: sphere, radius_mm: 2020-01-01}\n", "object.radius_mm must be a finite number"),
+    (
+        "object: {kind: sphere, radius_mm: -3}\n",
+        "line 1, object: radius_mm must be greater than 0 [mm]: got -3",
+    ),
+    ("object: {kind: sphere, radius_mm: 0}\n", "radius_mm must be greater than 0"),
+    (
+        "object: {kind: sphere, radius_mm: 4, curvature_per_m: 250}\n",
+        "radius_mm and curvature_per_m exclude each other",
+    ),
+    ("object: {kind: sphere, radius_mm: 0.01}\n", "grading must have elements"),
+    (
+        "object: {kind: bar, width_mm: 1, edge_radius_mm: 2}\n",
+        "edge_radius_mm must not exceed half of width_mm",
+    ),
+    ("object: {kind: grating, period_mm: 2, duty: 1.5}\n", "duty must be below 1"),
+    ("object: {kind: grating, groove_mm: 1, duty: 0.5}\n", "duty and groove_mm exclude each other"),
+    ("object: {kind: dots}\n", "object.at_mm must be given: it is missing"),
+    ("object: {kind: dots, at_mm: [[0, 0, 0]]}\n", "object.at_mm must be a list of pairs of numbers"),
+    ("object: {kind: dots, at_mm: []}\n", "object: at_mm must"),
+    (
+        "object: {kind: braille, text: A}\n",
+        "line 1, object: text must have letters a to z and spaces: got 'A'",
+    ),
+    ("object: {kind: braille, text: 7}\n", "object.text must be a text: got 7"),
+    (
+        "object: {kind: braille, text: a, along_finger: maybe}\n",
+        "object.along_finger must be true or false: got 'maybe'",
+    ),
+    (BALL + "motion: deep\n", "motion must be a mapping of keys to values: got 'deep'"),
+    (BALL + "motion: {kind: jump}\n", "line 2, motion.kind must be one of ramp_and_hold, sine"),
+    (BALL + "motion: {depth: 1}\n", "line 2, motion.depth is unknown: did you mean depth_mm?"),
+    (
+        BALL + "motion: {depth_mm: 1, force_mn: 100}\n",
+        "line 2, motion: depth_mm and force_mn exclude each other",
+    ),
+    (BALL + "motion: {depth_mm: -1}\n", "motion: depth_mm must be greater than 0"),
+    (BALL + "motion: {depth_mm: 1, ramp_ms: 0}\n", "motion: ramp_ms must be greater than 0"),
+    (BALL + "motion: {depth_mm: 9}\n", "depth_mm must stay below"),
+    (BALL + "motion: {depth_mm: 1 mm}\n", "motion.depth_mm must be a finite number: got '1 mm'"),
+    (BALL + "motion: {kind: sine, depth_mm: 0.5}\n", "motion.amplitude_mm must be given: it is missing"),
+    (
+        BALL + "motion: {kind: sine, depth_mm: 0.5, amplitude_mm: 0.1, frequency_hz: 20, cycles: 2.5}\n",
+        "motion.cycles must be a whole number: got 2.5",
+    ),
+    (
+        BALL
+        + "motion: {kind: chirp, depth_mm: 0.5, amplitude_mm: 0.1, frequencies_hz: [5], sweep_ms: 100}\n",
+        "line 2, motion: frequencies_hz must be a pair",
+    ),
+    (BALL + "motion: {kind: staircase}\n", "line 2, motion: "),
+    (BALL + "motion: {kind: staircase, depths_mm: [0.5], forces_mn: [5]}\n", "line 2, motion: "),
+    (
+        BALL + "motion: {kind: stroke, depth_mm: 0.5, speed_mm_per_s: 20, x_mm: 30}\n",
+        "The indenter must not leave the finger",
+    ),
+    (
+        BALL + "motion: {kind: trajectory, times_ms: [0, 20, 10], depth_mm: [0, 1, 1]}\n",
+        "times_ms must increase strictly",
+    ),
+    (BALL + "motion: {kind: trajectory, times_ms: [0, 20], depth_mm: [0, 1, 1]}\n", "one value per time"),
+    (
+        BALL + "motion: {kind: trajectory, times_ms: [0, 20], depth_mm: [0, .nan]}\n",
+        "depth_mm must be a list of finite numbers",
+    ),
+    (BALL + "motion: {kind: recorded, file: none.csv}\n", "line 2, motion: "),
+    (BALL + "motion: {kind: recorded, file: 3}\n", "motion.file must be a text: got 3"),
+    (BALL + "motion: {kind: recorded, file: touch.yaml}\n", "line 2, motion: "),
+    (BALL + "place: {x_mm: 40}\n", "must lie on the finger"),
+    (BALL + "place: {z_mm: 12}\n", "must lie on the finger"),
+    (BALL + "place: {tilt_deg: 80}\n", "tilt_deg must lie within 45 degrees: got 80"),
+    (BALL + "place: [0, 0]\n", "place must be a mapping of keys to values"),
+    (BALL + "place: {y_mm: 1}\n", "place.y_mm is unknown: did you mean"),
+    ("object: line\nplace: {spin_deg: 30}\n", "spin_deg must be 0 for Line"),
+    (BALL + "friction: -0.1\n", "line 2, friction must be a number not below 0: got -0.1"),
+    (BALL + "friction: rough\n", "friction must be a number not below 0: got 'rough'"),
+    ("object: line\nfriction: 0.3\n", "friction"),
+    (BALL + "tissues: humn\n", "line 2, tissues must be one of human, paper"),
+    (BALL + "tissues: [human]\n", "tissues must be one of human"),
+    (BALL + "resolution: fine\n", "line 2, resolution must be one of quick, standard, paper: got 'fine'"),
+    (BALL + "title: ''\n", "title must be a text: got ''"),
+    (BALL + "finger: {length_mm: 3}\n", "line 2, finger: "),
+    (BALL + "finger: {lenght_mm: 30}\n", "finger.lenght_mm is unknown: did you mean length_mm?"),
+    (BALL + "finger: {dermis_mm: 9}\n", "line 2, finger: Bone and skin layers"),
+    (BALL + "times_ms: [400, 20]\n", "times_ms must increase strictly"),
+    (BALL + "times_ms: [4000]\n", "times_ms must lie within the motion"),
+    (BALL + "times_ms: 20\n", "times_ms must be a list of finite numbers: got 20"),
+    (BALL + "afferents: {layout: hexagon}\n", "afferents.layout must be one of grid"),
+    (BALL + "afferents: {layout: hexagonal}\n", "afferents.region must be given for the layout hexagonal"),
+    (BALL + "afferents: {jitter: 0.1}\n", "afferents.jitter must not be given"),
+    (BALL + "afferents: {rows: 0}\n", "afferents.rows must be a whole number of at least 1: got 0"),
+    (BALL + "afferents: {seed: 1.5}\n", "afferents.seed must be a whole number"),
+    (BALL + "afferents: {noise: -1}\n", "afferents.noise must be a number not below 0: got -1"),
+    (BALL + "afferents: {afferent: fit.json}\n", "afferent: "),
+    (
+        BALL + "afferents: {afferent: {static_gian: 1}}\n",
+        "afferents.afferent.static_gian is unknown: did you mean static_gain?",
+    ),
+    (BALL + "afferents: {windows_ms: {static: [900, 600]}}\n", "afferents.windows_ms: "),
+    (BALL + "outputs: []\n", "outputs must have at least one entry: got []"),
+    (BALL + "outputs: [csv, figure]\n", "line 2, outputs[2] must be one of figures, csv"),
+    (BALL + "outputs: 3\n", "outputs must be a list: got 3"),
+    (
+        BALL + "motion: {kind: stroke, depth_mm: 0.4, speed_mm_per_s: 20, x_mm: 2}\noutputs: febio\n",
+        "line 3, outputs[1]: febio decks move the indenter only along its axis",
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "said"), WRONG, ids=[f"{n}" for n in range(len(WRONG))])
+def test_a_malformed_description_is_refused_in_one_sentence_and_nothing_is_written(call, text, said):
+    Path("touch.yaml").write_text(text, encoding="utf-8")
+    for command in (["check", "touch.yaml"], ["touch", "touch.yaml", "--out", "out"]):
+        status, printed, error = call(*command)
+        assert (status, printed) == (2, "")
+        assert said in error
+        assert error.startswith("fingerpad: touch.yaml")
+        assert error.count("\n") == 1
+        assert len(error) < 600
+        assert [path.name for path in Path().iterdir()] == ["touch.yaml"]
+
+
+def test_files_that_are_no_text_are_refused(call):
+    Path("touch.yaml").write_bytes(bytes(range(256)))
+    status, _, error = call("check", "touch.yaml")
+    assert (status, error.count("\n")) == (2, 1)
+    assert "touch.yaml must be text in UTF-8" in error
+    assert call("check", "none.yaml")[0] == 2
+    Path("folder").mkdir()
+    assert "folder must be a file that can be read" in call("touch", "folder")[2]
+    Path("zero.yaml").write_bytes(b"object: \x00sphere\n")
+    assert "cannot be read as YAML" in call("check", "zero.yaml")[2]
+
+
+VALUES = st.one_of(
+    st.none(), st.booleans(), st.integers(-(10**400), 10**400), st.integers(-5, 5), st.floats(),
+    st.text(max_size=5),
+    st.lists(st.floats(), max_size=3),
+    st.dictionaries(st.text(max_size=5), st.integers(), max_size=2),
+    st.sampled_from(["sphere", "sine", "grid", "kind", "csv"]),
+)  # fmt: skip
+
+
+def places(content, place=()):
+    """Every place in nested mappings and lists."""
+    yield place
+    items = (
+        content.items()
+        if isinstance(content, dict)
+        else enumerate(content)
+        if isinstance(content, list)
+        else ()
+    )
+    for key, value in items:
+        yield from places(value, (*place, key))
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    st.sampled_from([place for place in places(FULL) if place]),
+    VALUES,
+    st.sampled_from(["set", "drop", "rename"]),
+)
+def test_any_change_of_a_description_is_possible_or_refused_in_one_sentence(place, value, change):
+    content = json.loads(json.dumps(FULL))
+    holder = content
+    for part in place[:-1]:
+        holder = holder[part]
+    if change == "set" or not isinstance(holder, dict):
+        holder[place[-1]] = value
+    else:
+        kept = holder.pop(place[-1])
+        if change == "rename":
+            holder[str(value)[:20]] = kept
+    try:
+        check_described(described_touch(content))
+    except fp.InputError as error:
+        said = str(error)
+    else:
+        said = "touch, possible."
+    assert said.startswith("touch, ")
+    assert "\n" not in said
+    assert said[-1] in ".?"
+
+
+# Commands
+
+
+def test_the_example_runs_as_it_is_and_is_never_overwritten(call):
+    assert call("init", "mine/touch.yaml") == (0, "Try: fingerpad check mine/touch.yaml\n", "")
+    first = Path("mine/touch.yaml").read_text(encoding="utf-8")
+    assert first.startswith(f"# yaml-language-server: $schema={schemas.TOUCH_SCHEMA}\n")
+    assert (
+        json.loads(Path("mine", schemas.TOUCH_SCHEMA).read_text(encoding="utf-8")) == schemas.touch_schema()
+    )
+    status, printed, error = call("init", "mine/touch.yaml")
+    assert (status, printed) == (2, "")
+    assert "mine/touch.yaml exists and is not overwritten" in error
+    status, printed, error = call("check", "mine/touch.yaml")
+    assert (status, error) == (0, "")
+    assert re.search(r"\d+ nodes, \d+ elements, 10 steps", printed)
+    assert re.search(r"about \d+ s on two cores and \d+ MB", printed)
+    assert sorted(path.name for path in Path("mine").iterdir()) == [schemas.TOUCH_SCHEMA, "touch.yaml"]
+
+
+def test_a_touch_is_pressed_once_and_its_outputs_are_what_python_computes(call, monkeypatch):
+    content = FULL | {"friction": 0.0, "times_ms": [], "finger": {}, "outputs": list(OUTPUTS)}
+    content["motion"] = {"depth_mm": 0.3, "hold_ms": 200}
+    Path("touch.yaml").write_text(json.dumps(content), encoding="utf-8")
+    status, printed, error = call("touch", "touch.yaml", "--out", "out")
+    assert (status, error) == (0, "")
+    assert "afferents fire" in printed
+    written = {str(path.relative_to("out")) for path in Path("out").rglob("*") if path.is_file()}
+    assert {
+        "touch.html", "figures/touch.png", "touch.json", "touch.csv", "touch.npz", "spikes.csv", "touch.nwb",
+        "touch.pvd", "abaqus/touch.inp", "touch.nc", "touch.zarr/zarr.json",
+        "calculix/touch.inp", "febio/touch.feb",
+    } <= written  # fmt: skip
+    result = from_json(TouchFile, Path("out/touch.json").read_bytes())
+    described = fp.read_touch_description("touch.yaml")
+    assert result.touch == described.description
+    skin = described.touch.solve()
+    np.testing.assert_allclose(result.summary.largest_force_mn, skin.force_mn.max(), rtol=1e-12)
+    assert result.manifest.inputs.keys() == {"touch.yaml"}
+    # The indentation is stored: the same touch with other afferents is not pressed again.
+    monkeypatch.setattr(fp.Touch, "solve", pytest.fail)
+    again = run_touch(content | {"afferents": {"density_per_cm2": 200}, "outputs": ["spikes"]}, "out")
+    assert again.summary.largest_force_mn == result.summary.largest_force_mn
+    assert len(Path("out/spikes.csv").read_text(encoding="utf-8").splitlines()) == 19
+    # Noise makes spikes random, and a seed repeats them.
+    noisy = described_touch(content)
+    first, second = respond(noisy, again.skin), respond(noisy, again.skin)
+    other = respond(described_touch(content | {"afferents": {"noise": 0.1, "seed": 4}}), again.skin)
+    assert first.spikes.times_ms.tolist() == second.spikes.times_ms.tolist()
+    assert first.spikes.times_ms.tolist() != other.spikes.times_ms.tolist()
+
+
+def test_the_estimate_grows_with_mesh_steps_force_and_friction():
+    ball = {"object": "sphere"}
+    base = estimate(described_touch(ball))
+    more = [
+        estimate(described_touch(ball | change))
+        for change in (
+            {"resolution": "standard"},
+            {"motion": {"force_mn": 100}},
+            {"friction": 0.3},
+            {
+                "motion": {
+                    "kind": "repeated",
+                    "depth_mm": 1,
+                    "touches": 3,
+                    "ramp_ms": 50,
+                    "hold_ms": 99,
+                    "pause_ms": 9,
+                }
+            },
+        )
+    ]
+    assert all(other.time_s > 1.5 * base.time_s for other in more)
+    assert more[0].memory_mb > base.memory_mb
