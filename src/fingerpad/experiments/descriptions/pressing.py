@@ -13,6 +13,7 @@ from fingerpad.data import protocol
 from fingerpad.experiments.descriptions.signatures import made_by, one_of_kinds
 from fingerpad.experiments.descriptions.values import Text
 from fingerpad.experiments.indenter_text import indenter_named
+from fingerpad.geometry.composed import ridges
 from fingerpad.geometry.dots import Dots, braille
 from fingerpad.geometry.embossed import Embossed, embossed_text
 from fingerpad.geometry.indenters import Indenter
@@ -20,6 +21,7 @@ from fingerpad.geometry.motion import ForceRampAndHold, Motion, RampAndHold
 from fingerpad.geometry.motions import chirp, repeated, sine, staircase, stroke
 from fingerpad.geometry.names import INDENTERS
 from fingerpad.geometry.sampled_motions import TOLERANCE, reduced
+from fingerpad.geometry.surface_files import read_height_map, read_surface
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.geometry.trajectory_files import read_trajectory
 
@@ -77,6 +79,9 @@ OBJECTS: dict[str, Callable[..., Indenter]] = {
     "braille": braille,
     "embossed": Embossed,
     "embossed_text": embossed_text,
+    "ridges": ridges,
+    "surface": read_surface,
+    "height_map": read_height_map,
 }
 """What can be pressed in, by kind."""
 
