@@ -23,7 +23,7 @@ tissues: human             # a set of tissues; all others: fingerpad touch --hel
 
 object:
   kind: sphere             # cylinder, bar, line, punch, plate, edge, gap, grating, dots, braille,
-                           # embossed, embossed_text
+                           # embossed, embossed_text, ridges, surface, height_map
   radius_mm: 4             # [mm]
 
 motion:
