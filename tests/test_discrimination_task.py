@@ -502,7 +502,7 @@ def test_an_example_task_runs_by_name_or_as_a_file_of_ones_own(call, tmp_path, a
         (["bumps"], "bumps must be a YAML file or one of the example tasks"),
         (["bad.yaml"], "bad.yaml, standard must be one of the stimuli"),
         (["broken.yaml"], "broken.yaml cannot be read as YAML"),
-        (["empty.yaml"], "empty.yaml, a task must be a mapping"),
+        (["empty.yaml"], "empty.yaml, the file must be a mapping"),
         (["mine.yaml", "--jobs", "0"], "jobs must be a whole number of at least 1"),
         (["mine.yaml", "--resolution", "high"], "skin.resolution must be one of quick"),
         (["--example", "bumps"], "--example must be one of"),

@@ -230,7 +230,7 @@ def test_what_is_written_is_read(tmp_path_factory, steps, start_s):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("time_ms,depth_inch\n0,0\n1,1\n", "line 1: column 'depth_inch' is unknown, only time_ms, time_s"),
+        ("time_ms,depth_inch\n0,0\n1,1\n", "line 1: column 'depth_inch' is unknown: did you mean depth_um"),
         ("time_ms;depth_mm\n0;0\n", "Separate entries by commas"),
         ("depth_mm,x_mm\n0,0\n1,1\n", "must have the column time_ms or time_s: it has depth_mm, x_mm"),
         ("time_ms,x_mm\n0,0\n1,1\n", "motion.csv: A trajectory needs either depth_mm or force_mn"),

@@ -111,8 +111,8 @@ def chirp(
     turns = np.arange(1, SAMPLES_PER_CYCLE * cycles + 1) / SAMPLES_PER_CYCLE
     # turns = first t + rate t^2 / 2, solved for t in the form that also holds for a rate of 0.
     rate = (last - first) / seconds
-    then_hz = np.sqrt(np.maximum(first**2 + 2.0 * rate * turns, 0.0))
-    times_ms = np.minimum(MS_PER_S * 2.0 * turns / (first + then_hz), sweep_ms)
+    now_hz = np.sqrt(np.maximum(first**2 + 2.0 * rate * turns, 0.0))
+    times_ms = np.minimum(MS_PER_S * 2.0 * turns / (first + now_hz), sweep_ms)
     return _on_a_hold(depth_mm, amplitude_mm, times_ms, turns, ramp_ms, hold_ms, "sweep")
 
 
