@@ -112,8 +112,10 @@ def test_without_a_command_the_help_is_shown(call):
         (["export", "out", "--depth", "-1"], "depth_mm must be greater than 0", "-1"),
         (["export", "out", "--depth", "1", "--trajectory", "a.csv"], "--depth is that of a hold", "a.csv"),
         (["export", "out", "--trajectory", "gone.csv"], "gone.csv must be a file", "No such file"),
-        (["export", "out", "--materials", "steel"], "materials must be one of", "'steel'"),
+        (["export", "out", "--materials", "steel"], "tissues must be one of", "'steel'"),
         (["export", "out", "--resolution", "fine"], "resolution must be one of", "'fine'"),
+        (["export", "out", "--touch", "gone.yaml"], "gone.yaml must be a file", "No such file"),
+        (["export", "out", "--touch", "a.yaml", "--depth", "1"], "leave the other options", "a.yaml"),
         (["export", "out", "--format", "stl"], "format must be one of vtu", "'stl'"),
         (["reproduce", "twice"], "unexpected extra argument", "twice"),
         (["reproduse"], "No such command", "'reproduse'"),
@@ -201,7 +203,11 @@ def test_options_reach_the_export(call, monkeypatch, tmp_path):
     assert call("export", "d", "--format", "calculix", "--elastic-moduli", "long_term")[0] == 0
     (tmp_path / "press.csv").write_text("time_ms,depth_mm\n0,0\n50,0.5\n100,0\n", encoding="utf-8")
     assert call("export", "e", "--trajectory", "press.csv")[0] == 0
-    (touch, folder, format_name, _), (default, _, _, relaxing), (*_, elastic), (played, *_) = exported
+    (tmp_path / "touch.yaml").write_text("object: plate\nplace: {tilt_deg: 0}\n", encoding="utf-8")
+    assert call("export", "f", "--touch", "touch.yaml")[0] == 0
+    (touch, folder, format_name, _), (default, _, _, relaxing), (*_, elastic), *rest = exported
+    (played, *_), (same, *_) = rest
+    assert same == default
     assert played.stimulus == Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 0.0))
     assert (relaxing, elastic) == (None, "long_term")
     assert touch == touch_of(Fingertip(), Sphere(340), RampAndHold(depth_mm=0.5), "trial1", "standard")

@@ -93,7 +93,7 @@ def test_editors_see_every_name():
             lambda: fp.Sphere(250.0, radius_mm=4.0),
             "radius_mm and curvature_per_m exclude each other: give one.",
         ),
-        (lambda: fp.Sphere(radius_mm=4.0, diameter_mm=8.0), "radius_mm and diameter_mm exclude each other"),
+        (lambda: fp.Sphere(radius_mm=4.0, diameter_mm=8.0), "diameter_mm and radius_mm exclude each other"),
         (
             lambda: fp.Bar(fillet_mm=0.2, edge_radius_mm=0.2),
             "edge_radius_mm and fillet_mm exclude each other",

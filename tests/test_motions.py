@@ -251,7 +251,7 @@ def test_what_is_written_is_read(tmp_path_factory, steps, start_s):
 def test_files_that_cannot_be_are_refused_with_row_and_column(tmp_path, text, said):
     with pytest.raises(InputError, match=said) as refusal:
         read_trajectory(written(tmp_path, text))
-    assert str(refusal.value).endswith(".")
+    assert str(refusal.value)[-1] in ".?"
     assert "\n" not in str(refusal.value)
     assert "motion.csv" in str(refusal.value)
 

@@ -12,6 +12,8 @@ from fingerpad.cli.options import Materials, Resolution, number_option
 from fingerpad.cli.running import INTERRUPTED, make_writable
 from fingerpad.core.errors import InputError
 
+SPHERE, QUICK = "sphere", "quick"
+
 
 def export_command(
     folder: Annotated[Path, typer.Argument(help="Folder for the files; it is created if needed.")],
@@ -20,7 +22,7 @@ def export_command(
         typer.Option(
             help=f"One of {', '.join(INDENTER_CHOICES)}, with sizes as in punch:6.35 or sphere:radius_mm=3.5."
         ),
-    ] = "sphere",
+    ] = SPHERE,
     curvature: Annotated[float | None, number_option("Curvature of the sphere. Default: 287. [1/m]")] = None,
     depth: Annotated[float | None, number_option("Depth of the hold. Default: 1. [mm]")] = None,
     trajectory: Annotated[
@@ -31,10 +33,16 @@ def export_command(
         ),
     ] = None,
     materials: Materials = DEFAULT_TISSUES,
-    resolution: Resolution = "quick",
+    resolution: Resolution = QUICK,
     format_name: Annotated[
         str, typer.Option("--format", help=f"One of {', '.join(FORMAT_CHOICES)}.")
     ] = "vtu",
+    described: Annotated[
+        Path | None,
+        typer.Option(
+            "--touch", help="YAML file of a touch (format: docs/touch.md) instead of the options above."
+        ),
+    ] = None,
     elastic_moduli: Annotated[
         str | None,
         typer.Option(help="For calculix, whose materials do not relax: long_term or instantaneous."),
@@ -42,29 +50,37 @@ def export_command(
 ) -> None:
     """Press an indenter into the finger and write the touch as a table, for ParaView or another solver."""
     from fingerpad.core.checks import one_of
-    from fingerpad.experiments.indenter_text import indenter_named
+    from fingerpad.experiments.descriptions.touch import described_touch, read_touch_description
     from fingerpad.export.formats import export_touch
-    from fingerpad.geometry.fingertip import Fingertip
-    from fingerpad.geometry.indenters import Sphere
-    from fingerpad.geometry.motion import RampAndHold
-    from fingerpad.geometry.sampled_motions import reduced
-    from fingerpad.geometry.trajectory_files import read_trajectory
-    from fingerpad.skin.indentation import touch_of
 
-    body = indenter_named(indenter)
     one_of("format", format_name, FORMAT_CHOICES)
-    if curvature is not None:
-        if indenter != "sphere":
-            raise InputError(
-                f"--curvature is that of a sphere, --indenter sphere without a size: got {indenter}; "
-                "leave it out."
-            )
-        body = Sphere(curvature_per_m=curvature)
+    if curvature is not None and indenter != SPHERE:
+        raise InputError(
+            f"--curvature is that of a sphere, --indenter sphere without a size: got {indenter}; "
+            "leave it out."
+        )
     if trajectory is not None and depth is not None:
         raise InputError(f"--depth is that of a hold, and {trajectory} has its own: leave it out.")
-    held = RampAndHold() if depth is None else RampAndHold(depth_mm=depth)
-    motion = held if trajectory is None else reduced(read_trajectory(trajectory))
-    touch = touch_of(Fingertip(), body, motion, materials, resolution)
+    if described is not None:
+        given = (indenter, curvature, depth, trajectory, materials, resolution)
+        if given != (SPHERE, None, None, None, DEFAULT_TISSUES, QUICK):
+            raise InputError(
+                f"--touch {described} has its own object, motion, tissues and resolution: leave the other "
+                "options of the touch out."
+            )
+        touch = read_touch_description(described).touch
+    else:
+        held = {} if depth is None else {"depth_mm": depth}
+        touch = described_touch(
+            {
+                "object": indenter if curvature is None else {"kind": SPHERE, "curvature_per_m": curvature},
+                "motion": held if trajectory is None else {"kind": "recorded", "file": str(trajectory)},
+                "tissues": materials,
+                "resolution": resolution,
+                "place": {"tilt_deg": 0.0},
+            },
+            "the touch",
+        ).touch
     make_writable(folder, "FOLDER")
     try:
         files = export_touch(folder, touch, format_name, elastic_moduli)

@@ -183,7 +183,8 @@ def _meanings(
     for name, other in spelled.items():
         if isinstance(other.meaning, str):
             yield [name], {other.meaning: given[name]}
-    for meaning in {other.meaning for other in spelled.values() if not isinstance(other.meaning, str)}:
+    functions = [other.meaning for other in spelled.values() if not isinstance(other.meaning, str)]
+    for meaning in dict.fromkeys(functions):
         names = [name for name, other in spelled.items() if other.meaning is meaning]
         yield names, meaning(**{name: given[name] for name in names})
 

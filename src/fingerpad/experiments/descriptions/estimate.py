@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 from fingerpad.experiments.descriptions.touch import DescribedTouch
 
-NODE_S = 7.5e-6
-"""Time of a Newton step per node on two cores, kernels compiled: benchmarks/results/growth.json. [s]"""
+STEP_S = 1.8e-5
+"""Time of a step per node, by depth, straight and without friction, on two cores with compiled kernels: mean
+of benchmarks/results/growth.json. [s]"""
 
-NEWTON_STEPS, MORE_BY_FORCE, MORE_BY_FRICTION = 2.6, 2.2, 3.2
-"""Newton steps per step of a press by depth without friction; factors for a press by force, for friction."""
+BY_FORCE, WITH_FRICTION, ASIDE, ASIDE_WITH_FRICTION = 3.0, 3.1, 3.2, 5.1
+"""Factors of that time for a press by force, with friction, and aside; measured on ten presses."""
 
 BASE_MB, NODE_MB, NODE_EXPONENT = 200.0, 0.043, 0.865
 """Memory of a process: with its libraries, and of n nodes, `NODE_MB` n^`NODE_EXPONENT`. [MB]"""
@@ -69,13 +70,15 @@ def estimate(described: DescribedTouch) -> Estimate:
     touch, _ = described.touch, described.population
     nodes = len(touch.mesh.nodes_mm)
     steps = touch.settings.steps_ms(touch.stimulus).size - 1
-    newton = NEWTON_STEPS * steps
-    newton *= MORE_BY_FORCE if touch.stimulus.by_force else 1.0
-    newton *= MORE_BY_FRICTION if touch.friction else 1.0
+    factor = BY_FORCE if touch.stimulus.by_force else 1.0
+    if touch.friction:
+        factor *= WITH_FRICTION if touch.stimulus.stays else ASIDE_WITH_FRICTION
+    elif not touch.stimulus.stays:
+        factor *= ASIDE
     return Estimate(
         nodes=nodes,
         elements=len(touch.mesh.elements),
         steps=steps,
-        time_s=NODE_S * nodes * newton,
+        time_s=STEP_S * nodes * steps * factor,
         memory_mb=BASE_MB + NODE_MB * nodes**NODE_EXPONENT,
     )
