@@ -59,6 +59,9 @@ _PLACES = {
 }
 _COMPONENTS: dict[int, tuple[str, ...]] = {1: (), 3: ("axis",), 6: ("component",)}
 _UDUNITS = {"": "1", "mm²": "mm2", "µJ": "uJ"}
+Attributes = dict[str, str | float | list[float] | np.ndarray]
+"""Attributes of a variable or of the whole data set."""
+
 _LONGEST_LIST = 200
 """Longer lists of numbers in a description are given by their length alone: an attribute is not for data."""
 
@@ -181,7 +184,8 @@ def touch_dataset(
         values |= _response_values(instance("response", response, ResponseMap))
     for name, value in values.items():
         part = PARTS[name]
-        attributes = {"long_name": part.long_name} | ({"units": part.unit} if part.unit else {})
+        attributes: Attributes = {"long_name": part.long_name}
+        attributes |= {"units": part.unit} if part.unit else {}
         (coordinates if part.dims == (name,) else variables)[name] = (part.dims, value, attributes)
     variables["layer"][2].update(
         flag_values=np.arange(len(LAYERS), dtype=np.int32),
@@ -273,7 +277,7 @@ def read_touch(path: str | Path) -> xarray.Dataset:
     xarray = _library("xarray")
     engine = "zarr" if found.is_dir() else "h5netcdf"
     _library(engine)
-    options: dict[str, Any] = {"consolidated": False} if engine == "zarr" else {}
+    options = {"consolidated": False} if engine == "zarr" else {}
     try:
         with xarray.open_dataset(found, engine=engine, decode_times=False, **options) as opened:
             data = opened.load()
@@ -318,7 +322,7 @@ def spike_trains(data: xarray.Dataset) -> SpikeTrains:
 
 def _fields(
     skin: SkinResponse, quantities: Sequence[str]
-) -> Iterator[tuple[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]]:
+) -> Iterator[tuple[str, tuple[tuple[str, ...], np.ndarray, Attributes]]]:
     """Variables of the fields of a press: dimensions, values and attributes, by name."""
     n_times, deformation = skin.times_ms.size, skin.deformation
     names = dict.fromkeys([*(field.name for field in stored_fields()), *quantities])
@@ -339,7 +343,7 @@ def _fields(
         yield name, (dims, values if field.place is Place.PRESS else values.astype(np.float32), attributes)
 
 
-def _field_attributes(field: Field) -> dict[str, Any]:
+def _field_attributes(field: Field) -> Attributes:
     return {"long_name": field.long_name, "units": _UDUNITS.get(field.unit, field.unit)}
 
 
@@ -402,9 +406,9 @@ def _response_values(response: ResponseMap) -> dict[str, np.ndarray]:
     }
 
 
-def _attributes(skin: SkinResponse, response: ResponseMap | None, seed: int | None) -> dict[str, Any]:
+def _attributes(skin: SkinResponse, response: ResponseMap | None, seed: int | None) -> Attributes:
     """Attributes of the whole data set; descriptions are JSON."""
-    attributes: dict[str, Any] = {
+    attributes: Attributes = {
         "Conventions": "CF-1.11",
         "title": "Touch of a fingertip",
         "source": f"fingerpad {__version__}",

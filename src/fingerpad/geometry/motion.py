@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,34 +118,35 @@ class Motion(metaclass=KnownKeywords):
         return self.poses == (STILL,)
 
     @property
+    @abstractmethod
     def corners_ms(self) -> tuple[float, ...]:
         """Times after the start at which the speed jumps, without the end. [ms]"""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def phases(self) -> tuple[Phase, ...]:
         """Named phases, in order; rates are counted in "ramp" and "hold"."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def end_ms(self) -> float:
         """End of the motion. [ms]"""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def largest(self) -> float:
         """Largest depth [mm] or force [mN]."""
-        raise NotImplementedError
 
     @property
     def depths_mm(self) -> tuple[float, ...]:
         """Prescribed depth in each of `poses`, the largest if there is only one. [mm]"""
         return (self.largest,)
 
+    @abstractmethod
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
         """Depth [mm] or force [mN] at `times_ms`, any shape."""
-        raise NotImplementedError
 
+    @abstractmethod
     def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
         """List the times to solve at, from 0. [ms]
 
@@ -155,7 +157,6 @@ class Motion(metaclass=KnownKeywords):
         hold_steps : int
             Steps of a hold.
         """
-        raise NotImplementedError
 
 
 class _OneRamp(Motion):

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numba import njit
@@ -91,10 +90,11 @@ class Surface(Indenter):
                 f"faces must hold numbers of vertices, 0 to {len(vertices) - 1}: got {faces.min()} to "
                 f"{faces.max()}."
             )
-        first, second, third = vertices[faces].transpose(1, 0, 2)
+        corners = vertices[faces]
+        first, second, third = corners.transpose(1, 0, 2)
         normal = np.cross(second - first, third - first)
         area = np.linalg.norm(normal, axis=1)
-        extent = float(np.ptp(vertices[np.unique(faces)], axis=0).max())
+        extent = float(np.ptp(corners, axis=(0, 1)).max())
         if not area.max() > 0.0:
             raise InputError(f"A surface needs triangles with an area: all {len(faces)} have none.")
         if not SMALLEST_MM <= extent <= LARGEST_MM:
@@ -110,7 +110,7 @@ class Surface(Indenter):
             )
         faces = faces[kept]
         _check_sides(faces, vertices)
-        vertices = vertices - [0.0, vertices[np.unique(faces), 1].max(), 0.0]
+        vertices = vertices - [0.0, corners[kept, :, 1].max(), 0.0]
         for name, value in (("vertices_mm", vertices), ("faces", faces)):
             value.setflags(write=False)
             object.__setattr__(self, name, value)
@@ -119,7 +119,7 @@ class Surface(Indenter):
         extents = " x ".join(f"{extent:.4g}" for extent in np.ptp(self.vertices_mm[self.faces], axis=(0, 1)))
         return f"Surface({len(self.faces)} triangles, {extents} mm)"
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, np.ndarray]:
         # The tree is large and is made anew where it is needed.
         return {"vertices_mm": self.vertices_mm, "faces": self.faces}
 

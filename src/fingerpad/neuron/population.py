@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,7 +13,7 @@ from fingerpad.core.checks import FloatArray, finite, float_array, not_negative,
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.signals import ResponseMap, Skin, traces_below
+from fingerpad.core.signals import ResponseMap, SedTraces, Skin, SpikeTrains, traces_below
 from fingerpad.data import fingertip, psychophysics
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.rate_windows import Window, rate_windows_ms
@@ -207,6 +208,7 @@ class Population:
         skin: Skin,
         dynamic_window_ms: Window | None = None,
         static_window_ms: Window | None = None,
+        fire: Callable[[SedTraces], SpikeTrains] | None = None,
     ) -> ResponseMap:
         """Sample the skin at every receptor and simulate each afferent.
 
@@ -216,6 +218,8 @@ class Population:
             Any object with `sed(sites)`, such as a solved indentation.
         dynamic_window_ms, static_window_ms : (float, float), optional
             Windows of the two firing rates, by default as of `Afferent.rates`. [ms]
+        fire : callable, optional
+            Spikes under the traces below the receptors, by default `Afferent.spikes`: another membrane, say.
 
         Returns
         -------
@@ -236,7 +240,9 @@ class Population:
             )
         dynamic, static = rate_windows_ms(sed.phases, dynamic_window_ms, static_window_ms)
         # Both terms of the current are proportional to what they follow: scaling it scales both gains.
-        spikes = self.afferent.spikes(sed if self.sensitivity is None else sed.scaled(self.sensitivity))
+        spikes = (fire or self.afferent.spikes)(
+            sed if self.sensitivity is None else sed.scaled(self.sensitivity)
+        )
         return ResponseMap(
             positions_mm=self.positions_mm,
             pitch_mm=self.pitch_mm,

@@ -16,8 +16,6 @@ from fingerpad.experiments.descriptions.touch import DescribedTouch, TouchDescri
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.neuron.escape_rate import EscapeRate
-from fingerpad.neuron.rate_windows import rate_windows_ms
-from fingerpad.neuron.spikes import firing_rate_hz, first_spike_latency_ms
 from fingerpad.skin.sampling import SkinResponse
 
 
@@ -183,18 +181,7 @@ def respond(described: DescribedTouch, skin: SkinResponse) -> ResponseMap:
     if asked.noise == 0.0:
         return population.respond(skin, *windows)
     afferent = population.afferent
-    sed = skin.sed(population.positions_mm, afferent.dynamic_quantity, afferent.static_quantity)
-    sed = sed if population.sensitivity is None else sed.scaled(population.sensitivity)
-    current = afferent.transduction.current(sed)
-    spikes = EscapeRate(afferent.membrane, asked.noise).spikes(current, asked.seed)
-    dynamic, static = rate_windows_ms(sed.phases, *windows)
-    return ResponseMap(
-        positions_mm=population.positions_mm,
-        pitch_mm=population.pitch_mm,
-        spikes=spikes,
-        dynamic_rate_hz=firing_rate_hz(spikes, dynamic),
-        static_rate_hz=firing_rate_hz(spikes, static),
-        first_spike_latency_ms=first_spike_latency_ms(spikes),
-        duration_ms=float(sed.times_ms[-1]),
-        phases=sed.phases,
+    membrane = EscapeRate(afferent.membrane, asked.noise)
+    return population.respond(
+        skin, *windows, lambda sed: membrane.spikes(afferent.transduction.current(sed), asked.seed)
     )
