@@ -19,7 +19,7 @@ from fingerpad.experiments import gerling2014
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.discrimination.task import SkinSettings
 from fingerpad.export import formats
-from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.fingertip import FINGERS, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.geometry.indenters import Plate, Sphere
 from fingerpad.geometry.motion import RampAndHold
@@ -56,6 +56,7 @@ def test_the_help_names_what_the_modules_know():
     assert tuple(TISSUES) == choices.MATERIAL_CHOICES
     assert tuple(formats.FORMATS) == choices.FORMAT_CHOICES
     assert tuple(INDENTERS) == choices.INDENTER_CHOICES
+    assert tuple(FINGERS) == choices.FINGER_CHOICES
     assert all(getattr(fp, body.__name__) is body for body in INDENTERS.values())
 
 

@@ -10,6 +10,7 @@ from fingerpad.data import (
     STATUSES,
     Published,
     all_published,
+    fingers,
     fingertip,
     neuron,
     paper,
@@ -23,7 +24,7 @@ NAMES = {"SPHERES", "HUMAN_QUANTITY", "DEFAULT_TISSUES"}
 
 
 def test_every_constant_of_every_module_is_collected_once() -> None:
-    modules = (fingertip, tissues, protocol, neuron, psychophysics, paper)
+    modules = (fingers, fingertip, tissues, protocol, neuron, psychophysics, paper)
     constants = [
         getattr(module, name)
         for module in modules

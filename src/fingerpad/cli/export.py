@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.choices import DEFAULT_TISSUES, FORMAT_CHOICES, INDENTER_CHOICES
+from fingerpad.cli.choices import DEFAULT_TISSUES, FINGER_CHOICES, FORMAT_CHOICES, INDENTER_CHOICES
 from fingerpad.cli.options import Materials, Resolution, number_option
 from fingerpad.cli.running import INTERRUPTED, make_writable
 from fingerpad.core.errors import InputError
 
-SPHERE, QUICK = "sphere", "quick"
+SPHERE, QUICK, ADULT = "sphere", "quick", "adult"
 
 
 def export_command(
@@ -32,6 +32,9 @@ def export_command(
             "a line are left out."
         ),
     ] = None,
+    finger: Annotated[
+        str, typer.Option(help=f"One of {', '.join(FINGER_CHOICES)}, with measures as in adult:width_mm=18.")
+    ] = ADULT,
     materials: Materials = DEFAULT_TISSUES,
     resolution: Resolution = QUICK,
     format_name: Annotated[
@@ -62,11 +65,11 @@ def export_command(
     if trajectory is not None and depth is not None:
         raise InputError(f"--depth is that of a hold, and {trajectory} has its own: leave it out.")
     if described is not None:
-        given = (indenter, curvature, depth, trajectory, materials, resolution)
-        if given != (SPHERE, None, None, None, DEFAULT_TISSUES, QUICK):
+        given = (indenter, curvature, depth, trajectory, finger, materials, resolution)
+        if given != (SPHERE, None, None, None, ADULT, DEFAULT_TISSUES, QUICK):
             raise InputError(
-                f"--touch {described} has its own object, motion, tissues and resolution: leave the other "
-                "options of the touch out."
+                f"--touch {described} has its own finger, object, motion, tissues and resolution: leave the "
+                "other options of the touch out."
             )
         touch = read_touch_description(described).touch
     else:
@@ -75,6 +78,7 @@ def export_command(
             {
                 "object": indenter if curvature is None else {"kind": SPHERE, "curvature_per_m": curvature},
                 "motion": held if trajectory is None else {"kind": "recorded", "file": str(trajectory)},
+                "finger": finger,
                 "tissues": materials,
                 "resolution": resolution,
                 "place": {"tilt_deg": 0.0},

@@ -1,12 +1,12 @@
 """Published parameters and reference observations, each with unit, source and status; no algorithm.
 
-`fingertip`, `tissues`, `neuron`, `protocol` and `psychophysics` are inputs of the model; `paper` contains the
-results for comparison.
+`fingertip`, `fingers`, `tissues`, `neuron`, `protocol` and `psychophysics` are inputs of the model; `paper`
+contains the results for comparison.
 """
 
 from types import ModuleType
 
-from fingerpad.data import fingertip, neuron, paper, protocol, psychophysics, tissues
+from fingerpad.data import fingers, fingertip, neuron, paper, protocol, psychophysics, tissues
 from fingerpad.data.observations import (
     BarObservations,
     DeflectionObservations,
@@ -26,6 +26,7 @@ __all__ = [
     "all_published",
     "bar_firing_rates",
     "cylinder_deflection",
+    "fingers",
     "fingertip",
     "goodwin_hit_rates",
     "neuron",
@@ -35,7 +36,7 @@ __all__ = [
     "tissues",
 ]
 
-_MODULES: tuple[ModuleType, ...] = (fingertip, tissues, protocol, neuron, psychophysics, paper)
+_MODULES: tuple[ModuleType, ...] = (fingertip, fingers, tissues, protocol, neuron, psychophysics, paper)
 
 
 def all_published() -> tuple[Published, ...]:

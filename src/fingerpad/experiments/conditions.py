@@ -19,7 +19,7 @@ from fingerpad.skin.indentation import CONTACT_POINT_MM, touch_of
 from fingerpad.skin.indentation import Touch as Touch
 
 RECEPTOR_X_MM = CONTACT_POINT_MM[0]
-"""Where the single receptor of the bar study lies, and the middle of the population. [mm]"""
+"""`Conditions.receptor_x_mm` of the paper's finger. [mm]"""
 
 BAR_REACH_MM = 2.6
 """Fine zone about the receptor in the bar study: an edge farther away hardly reaches it. [mm]"""
@@ -70,9 +70,14 @@ class Conditions:
         return self.afferent.static_quantity
 
     @property
+    def receptor_x_mm(self) -> float:
+        """Where the single receptor lies on the midline, and the middle of the population. [mm]"""
+        return self.finger.contact_mm[0]
+
+    @property
     def skin_tilt_deg(self) -> float:
         """Tilt at which an indenter presses along the inward normal of the skin at the receptor. [degrees]"""
-        x, y, _ = np.ravel(self.finger.skin_normal(self.finger.skin_point(RECEPTOR_X_MM, 0.0)))
+        x, y, _ = np.ravel(self.finger.skin_normal(self.finger.skin_point(self.receptor_x_mm, 0.0)))
         return float(np.rad2deg(np.arctan2(x, -y)))
 
     def touch(
@@ -114,7 +119,7 @@ class Conditions:
         """
         return self.touch(
             Sphere(curvature_per_m),
-            RECEPTOR_X_MM + position_mm,
+            self.receptor_x_mm + position_mm,
             grading or self.sphere_grading(),
             tilt_deg=self.skin_tilt_deg,
         )
@@ -125,11 +130,12 @@ class Conditions:
 
     def deflection_grading(self, indenter: Indenter) -> Grading:
         """Mesh of the skin deflection study: fine about the indenter."""
-        return grading_about(indenter, self.resolution, RECEPTOR_X_MM)
+        place = self.receptor_x_mm
+        return grading_about(indenter, self.resolution, place, finger_size=self.finger.relative_size)
 
     def bar_grading(self) -> Grading:
         """Mesh of the single-unit study: fine about the receptor, the same for all shifts."""
-        grading = resolution_grading(self.resolution, RECEPTOR_X_MM, BAR_REACH_MM, half_width_mm=0.6)
+        grading = resolution_grading(self.resolution, self.receptor_x_mm, BAR_REACH_MM, half_width_mm=0.6)
         if self.resolution in BAR_SIZE_MM:
             size_x, size_z = BAR_SIZE_MM[self.resolution]
             grading = replace(grading, size_x_mm=size_x, size_z_mm=size_z)
@@ -137,4 +143,4 @@ class Conditions:
 
     def sphere_grading(self) -> Grading:
         """Mesh of the population study: fine about both positions, the same for all spheres."""
-        return resolution_grading(self.resolution, RECEPTOR_X_MM, SPHERE_REACH_MM, SPHERE_REACH_MM)
+        return resolution_grading(self.resolution, self.receptor_x_mm, SPHERE_REACH_MM, SPHERE_REACH_MM)

@@ -8,22 +8,39 @@ function of s; the level function below is written without the factor s, so it s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_smoothing_spline
 
-from fingerpad.core.checks import FloatArray, finite, float_array, increasing, not_negative, positive
+from fingerpad.core.checks import (
+    FloatArray,
+    finite,
+    float_array,
+    increasing,
+    not_negative,
+    one_of,
+    positive,
+)
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords
+from fingerpad.core.keywords import KnownKeywords, known_keywords
+from fingerpad.data import fingers
 from fingerpad.data import fingertip as published
 
 # Readings have two decimals. Interpolation of this rounding would tilt the skin's normals by degrees. This
 # smoothing moves the profiles by about 0.01 mm; on the pad slopes are accurate to a quarter of a degree.
 SMOOTHING = 5e-7
 _MOST_RAY_STEPS = 60
+
+SIZES_MM = 2.0, 100.0
+"""Smallest and largest length, width or height of a fingertip: other values are in another unit. [mm]"""
+
+_CREASE_SHARE = 1.0 - fingers.CREASE_TO_TIP.value / published.LENGTH.value
+_STATIONS_OF_SIZE = 401
 
 Readings = tuple[tuple[float, float], ...]
 
@@ -150,6 +167,7 @@ class Fingertip(metaclass=KnownKeywords):
     nail_half_width_mm: float = published.NAIL_HALF_WIDTH.value
 
     def __post_init__(self) -> None:
+        _size("length_mm", self.length_mm)
         for name in ("stratum_corneum_mm", "living_epidermis_mm", "dermis_mm", "spine_end_x_mm"):
             positive(name, getattr(self, name), "mm")
         for name in ("bone_height_mm", "bone_width_mm", "nail_half_width_mm"):
@@ -178,6 +196,139 @@ class Fingertip(metaclass=KnownKeywords):
                 f"Bone and skin layers of {layers:.3f} mm must fit into the outline: "
                 f"only {room.min():.3f} mm are left at x = {x[room.argmin()]:.1f} mm."
             )
+
+    @classmethod
+    @known_keywords
+    def of(
+        cls,
+        like: str = "adult",
+        length_mm: float | None = None,
+        width_mm: float | None = None,
+        height_mm: float | None = None,
+        stratum_corneum_mm: float | None = None,
+        living_epidermis_mm: float | None = None,
+        dermis_mm: float | None = None,
+    ) -> Fingertip:
+        """Fingertip by what a ruler and a calliper measure.
+
+        Outline, bone and nail are stretched along, across and in height. A measure that is not given is
+        stretched by the geometric mean of those that are. Thicknesses of the layers do not follow the
+        outline.
+
+        Parameters
+        ----------
+        like : {"adult", "small", "large", "child", "macaque", "aged"}, optional
+            Preset from which everything comes that is not given, see `FINGERS`.
+        length_mm : float, optional
+            From the crease of the last joint to the tip. [mm]
+        width_mm, height_mm : float, optional
+            Largest width from side to side and largest height from pad to back, from that crease on. [mm]
+        stratum_corneum_mm, living_epidermis_mm, dermis_mm : float, optional
+            Thicknesses of the layers. [mm]
+
+        Returns
+        -------
+        Fingertip
+
+        Raises
+        ------
+        InputError
+            If the preset is unknown, a measure is in another unit, or bone and layers do not fit.
+
+        Examples
+        --------
+        >>> narrow = Fingertip.of(length_mm=22.0, width_mm=16.0)
+        >>> [round(size, 1) for size in narrow.measures_mm]
+        [22.0, 16.0, 13.7]
+        >>> Fingertip.of() == Fingertip()
+        True
+        """
+        preset = FINGERS[one_of("like", like, tuple(FINGERS))]()
+        given = {"length_mm": length_mm, "width_mm": width_mm, "height_mm": height_mm}
+        factors = {
+            name: _size(name, size) / own
+            for (name, size), own in zip(given.items(), preset.measures_mm, strict=True)
+            if size is not None
+        }
+        mean = float(np.prod(list(factors.values())) ** (1.0 / len(factors))) if factors else 1.0
+        layers = {
+            "stratum_corneum_mm": stratum_corneum_mm,
+            "living_epidermis_mm": living_epidermis_mm,
+            "dermis_mm": dermis_mm,
+        }
+        return preset._stretched(
+            *(factors.get(name, mean) for name in given),
+            **{name: size for name, size in layers.items() if size is not None},
+        )
+
+    def scaled(self, factor: float) -> Fingertip:
+        """Return the same finger in another size: outline, layers, bone and nail times a factor.
+
+        Parameters
+        ----------
+        factor : float
+            Above 0.
+
+        Returns
+        -------
+        Fingertip
+
+        Examples
+        --------
+        >>> Fingertip().scaled(0.5).dermis_mm
+        0.5765
+        """
+        k = positive("factor", factor)
+        layers = ("stratum_corneum_mm", "living_epidermis_mm", "dermis_mm")
+        return self._stretched(k, k, k, **{name: k * getattr(self, name) for name in layers})
+
+    def _stretched(self, along: float, across: float, up: float, **layers: float) -> Fingertip:
+        """Return the finger with outline, bone and nail stretched each way, and other layers."""
+
+        def readings(table: Readings, by: float) -> Readings:
+            return tuple((along * x, by * value) for x, value in table)
+
+        return replace(
+            self,
+            length_mm=along * self.length_mm,
+            volar_readings_mm=readings(self.volar_readings_mm, up),
+            dorsal_readings_mm=readings(self.dorsal_readings_mm, up),
+            half_width_readings_mm=readings(self.half_width_readings_mm, across),
+            spine_y_mm=up * self.spine_y_mm,
+            spine_end_x_mm=along * self.spine_end_x_mm,
+            bone_height_mm=up * self.bone_height_mm,
+            bone_width_mm=across * self.bone_width_mm,
+            bone_tip_x_mm=along * self.bone_tip_x_mm,
+            nail_x_mm=tuple(along * x for x in self.nail_x_mm),
+            nail_half_width_mm=across * self.nail_half_width_mm,
+            **layers,
+        )
+
+    @cached_property
+    def measures_mm(self) -> tuple[float, float, float]:
+        """Length, width and height as of `Fingertip.of` [mm]."""
+        crease = _CREASE_SHARE * self.length_mm
+        volar, dorsal, half_width = self.section(np.linspace(crease, self.length_mm, _STATIONS_OF_SIZE))
+        return (
+            fingers.CREASE_TO_TIP.value * (self.length_mm / published.LENGTH.value),
+            2.0 * float(half_width.max()),
+            float((volar + dorsal).max()),
+        )
+
+    @cached_property
+    def relative_size(self) -> float:
+        """Geometric mean of length, width and height over those of the paper's finger."""
+        own, of_paper = self.measures_mm, _paper().measures_mm
+        return float(np.prod([size / other for size, other in zip(own, of_paper, strict=True)])) ** (1 / 3)
+
+    @property
+    def contact_mm(self) -> tuple[float, float]:
+        """X and z of the middle of the pad, where an indenter presses by default [mm].
+
+        On the paper's finger it is the point that the laboratory indented, and on others the same share of
+        the length.
+        """
+        return published.CONTACT_POINT.value[0] * (self.length_mm / published.LENGTH.value), 0.0
 
     @cached_property
     def profiles(self) -> tuple[Profile, Profile, Profile]:
@@ -363,3 +514,43 @@ class Fingertip(metaclass=KnownKeywords):
         x, y, z = np.moveaxis(np.asarray(skin_points_mm, dtype=np.float64), -1, 0)
         proximal, distal = self.nail_x_mm
         return (y > 0.0) & (x >= proximal) & (x <= distal) & (np.abs(z) <= self.nail_half_width_mm)
+
+
+def _size(name: str, value: float) -> float:
+    """Check a length, width or height of a whole fingertip."""
+    smallest, largest = SIZES_MM
+    if not smallest <= finite(name, value, "mm") <= largest:
+        raise InputError(
+            f"{name} of a fingertip must lie between {smallest:g} and {largest:g} mm: got {value:g} mm; "
+            "check its unit."
+        )
+    return float(value)
+
+
+@cache
+def _paper() -> Fingertip:
+    return Fingertip()
+
+
+def _aged() -> Fingertip:
+    """Thinner living epidermis and dermis."""
+    finger, decades = _paper(), fingers.AGED_DECADES.value
+    return replace(
+        finger,
+        living_epidermis_mm=finger.living_epidermis_mm * (1.0 - decades * fingers.EPIDERMIS_LOSS.value),
+        dermis_mm=finger.dermis_mm * (1.0 - decades * fingers.DERMIS_LOSS.value),
+    )
+
+
+FINGERS: Mapping[str, Callable[[], Fingertip]] = MappingProxyType(
+    {
+        "adult": _paper,
+        "small": lambda: Fingertip.of(width_mm=fingers.SMALL_WIDTH.value),
+        "large": lambda: Fingertip.of(width_mm=fingers.LARGE_WIDTH.value),
+        "child": lambda: Fingertip.of(width_mm=fingers.CHILD_WIDTH.value),
+        "macaque": lambda: _paper().scaled(fingers.MACAQUE_WIDTH.value / _paper().measures_mm[1]),
+        "aged": _aged,
+    }
+)
+"""Fingertips by name (docs/finger.md): the paper's adult; people's with its layers, stretched to a width; a
+macaque's, scaled with its layers; and the adult's with the thinner skin of old age."""

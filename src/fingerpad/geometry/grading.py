@@ -117,7 +117,11 @@ class Grading:
 
 
 def resolution_grading(
-    resolution: str, centre_mm: float, half_length_mm: float = 5.0, half_width_mm: float = 1.0
+    resolution: str,
+    centre_mm: float,
+    half_length_mm: float = 5.0,
+    half_width_mm: float = 1.0,
+    finger_size: float = 1.0,
 ) -> Grading:
     """Grading of a named resolution.
 
@@ -129,6 +133,9 @@ def resolution_grading(
         and at the epidermal-dermal border.
     centre_mm, half_length_mm, half_width_mm : float
         The fine zone, as in `Grading`; "paper" widens it to the whole pad. [mm]
+    finger_size : float
+        `Fingertip.relative_size`: elements of a smaller finger are smaller, those of a larger one are not
+        larger.
 
     Returns
     -------
@@ -140,14 +147,15 @@ def resolution_grading(
     0.45
     """
     one_of("resolution", resolution, RESOLUTIONS)
-    zone = Grading(centre_mm, half_length_mm, half_width_mm, 0.25, 0.25)
+    k = min(positive("finger_size", finger_size), 1.0)
+    zone = Grading(centre_mm, half_length_mm, half_width_mm, 0.25 * k, 0.25 * k, largest_mm=3.0 * k)
     if resolution == "quick":
-        return replace(zone, size_x_mm=0.45, size_z_mm=0.45, stratum_corneum=2, dermis=3, subcutis=3)
+        return replace(zone, size_x_mm=0.45 * k, size_z_mm=0.45 * k, stratum_corneum=2, dermis=3, subcutis=3)
     if resolution == "standard":
         return zone
-    length, width = max(half_length_mm, 6.0), max(half_width_mm, 5.0)
+    length, width = max(half_length_mm, 6.0 * k), max(half_width_mm, 5.0 * k)
     pad = replace(zone, half_length_mm=length, half_width_mm=width)
-    return replace(pad, size_x_mm=0.1, size_z_mm=0.1, full=True)
+    return replace(pad, size_x_mm=0.1 * k, size_z_mm=0.1 * k, full=True)
 
 
 def covering(gradings: Sequence[Grading]) -> Grading:

@@ -53,7 +53,12 @@ LONGEST_REACH_MM = 5.0
 
 
 def grading_about(
-    indenter: Indenter, resolution: str, x_mm: float, z_mm: float = 0.0, spin_deg: float = 0.0
+    indenter: Indenter,
+    resolution: str,
+    x_mm: float,
+    z_mm: float = 0.0,
+    spin_deg: float = 0.0,
+    finger_size: float = 1.0,
 ) -> Grading:
     """Grading that is fine under an indenter at (x, z) and 1 mm beyond, and finer about its edges.
 
@@ -67,6 +72,8 @@ def grading_about(
         Position at which its axis meets the skin. [mm]
     spin_deg : float
         Rotation about its direction of pressing, as of a `Touch`. [degrees]
+    finger_size : float
+        `Fingertip.relative_size`, see `resolution_grading`.
 
     Returns
     -------
@@ -82,8 +89,8 @@ def grading_about(
     reach = indenter.half_width_mm + 1.0
     if not indenter.mirrors(spin_deg):  # extent of a turned square along and across
         reach *= sum(map(abs, cosine_and_sine(spin_deg)))
-    reach = min(reach, LONGEST_REACH_MM)
-    grading = resolution_grading(resolution, x_mm, half_length_mm=reach, half_width_mm=abs(z_mm) + reach)
+    reach = min(reach, LONGEST_REACH_MM * min(finger_size, 1.0))
+    grading = resolution_grading(resolution, x_mm, reach, abs(z_mm) + reach, finger_size)
     if z_mm != 0.0 or not indenter.mirrors(spin_deg):
         grading = replace(grading, full=True)
     if np.isfinite(indenter.relief_mm):
@@ -154,7 +161,13 @@ def _with_strips(
 
 
 def grading_along(
-    indenter: Indenter, resolution: str, x_mm: float, z_mm: float, spin_deg: float, poses: Sequence[Pose]
+    indenter: Indenter,
+    resolution: str,
+    x_mm: float,
+    z_mm: float,
+    spin_deg: float,
+    poses: Sequence[Pose],
+    finger_size: float = 1.0,
 ) -> Grading:
     """Grading that is fine under an indenter wherever it goes.
 
@@ -164,6 +177,8 @@ def grading_along(
         As for `grading_about`, at first touch.
     poses : sequence of Pose
         Poses between which it moves along straight lines.
+    finger_size : float
+        `Fingertip.relative_size`, see `resolution_grading`.
 
     Returns
     -------
@@ -180,7 +195,8 @@ def grading_along(
     places = {(pose.x_mm, pose.z_mm, pose.spin_deg) for pose in poses}
     outermost = sorted(places, key=lambda place: (place[2], place[0], place[1]))
     gradings = [
-        grading_about(indenter, resolution, x_mm + x, z_mm + z, spin_deg + spin) for x, z, spin in outermost
+        grading_about(indenter, resolution, x_mm + x, z_mm + z, spin_deg + spin, finger_size)
+        for x, z, spin in outermost
     ]
     joint = covering(gradings)
     if not (joint.finer_along or joint.finer_across):

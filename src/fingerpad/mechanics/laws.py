@@ -16,9 +16,9 @@ The polynomial has its own compiled kernel; every other law is differentiated fr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -43,6 +43,10 @@ class Law(Protocol):
     @property
     def energy(self) -> Energy:
         """The law as a formula."""
+        ...
+
+    def scaled(self, factor: float) -> Law:
+        """Return the same law with its energy times a factor."""
         ...
 
 
@@ -103,6 +107,10 @@ class Energy:
         """The law itself."""
         return self
 
+    def scaled(self, factor: float) -> Energy:
+        """Return the same law with its energy times a factor."""
+        return Energy(f"{factor!r} * ({self.formula})", self.coefficients)
+
     @cached_property
     def program(self) -> FloatArray:
         """Operations of the formula, (n_operations, 4)."""
@@ -141,7 +149,27 @@ _PROBES = np.array([[0.3, -0.1, -0.2, 0.1], [-0.4, 0.25, 0.15, -0.2], [0.05, 0.1
 
 
 @dataclass(frozen=True)
-class Polynomial:
+class _OfModuli:
+    """Common part of laws whose energy is proportional to their coefficients in kPa."""
+
+    def scaled(self, factor: float) -> Self:
+        """Return the same law with its energy times a factor."""
+        moduli = {
+            item.name: getattr(self, item.name)
+            for item in fields(self)
+            if item.name not in ("exponents", "poisson")
+        }
+        return replace(
+            self,
+            **{
+                name: tuple(factor * each for each in value) if isinstance(value, tuple) else factor * value
+                for name, value in moduli.items()
+            },
+        )
+
+
+@dataclass(frozen=True)
+class Polynomial(_OfModuli):
     """Polynomial N = 2 in the isochoric invariants; neo-Hooke and Mooney-Rivlin among them.
 
     Parameters
@@ -199,7 +227,7 @@ class Polynomial:
 
 
 @dataclass(frozen=True)
-class _Powers:
+class _Powers(_OfModuli):
     """Common part of laws that are a sum of up to three powers of stretches."""
 
     moduli_kpa: tuple[float, ...]
@@ -325,7 +353,7 @@ class Hyperfoam(_Powers):
 
 
 @dataclass(frozen=True)
-class Hencky:
+class Hencky(_OfModuli):
     """Quadratic in the logarithmic strain: Hooke's law between Kirchhoff stress and logarithmic strain.
 
     Parameters

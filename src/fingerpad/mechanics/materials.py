@@ -227,6 +227,10 @@ class Material:
         """Factor from the given coefficients to the instantaneous ones."""
         return 1.0 / self.prony.long_term_share if self.moduli == "long_term" else 1.0
 
+    def scaled(self, factor: float) -> Material:
+        """Return the same tissue with all moduli times a factor."""
+        return replace(self, law=self.law.scaled(positive("factor", factor)))
+
     def with_prony(self, prony: Prony) -> Material:
         """Return the same tissue with another relaxation."""
         return replace(self, prony=prony)
@@ -251,6 +255,31 @@ class Tissues:
     def layers(self) -> tuple[Material, ...]:
         """Materials in the order of `mesh.LAYERS`."""
         return tuple(getattr(self, field.name) for field in fields(self))
+
+    def scaled(self, factor: float) -> Tissues:
+        """Return the same tissues, stiffer or softer: all moduli times a factor.
+
+        Parameters
+        ----------
+        factor : float
+            Above 0; Poisson's ratios and relaxation are kept.
+
+        Returns
+        -------
+        Tissues
+
+        Raises
+        ------
+        InputError
+            If the factor is not above 0.
+
+        Examples
+        --------
+        >>> tissue = Material.neo_hooke(10.0, 0.4)
+        >>> Tissues(tissue, tissue, tissue, tissue).scaled(1.5).dermis.shear_modulus_kpa
+        15.0
+        """
+        return Tissues(*(layer.scaled(factor) for layer in self.layers))
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +22,16 @@ from fingerpad.neuron.spikes import firing_rate_hz, first_spike_latency_ms
 
 MM_PER_CM = 10.0
 CENTRE_MM = (fingertip.CONTACT_POINT.value[0], 0.0)
-"""Centre of the default layout: the contact point, on the midline. [mm]"""
+"""Centre of the default layout: the contact point of the paper's finger, on the midline. [mm]"""
+
+
+class HasContact(Protocol):
+    """A finger with a place of contact."""
+
+    @property
+    def contact_mm(self) -> tuple[float, float]:
+        """X and z of the middle of the pad. [mm]"""
+        ...
 
 
 def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
@@ -162,8 +172,9 @@ class Population:
         density_per_cm2: float = psychophysics.RECEPTOR_DENSITY.value,
         rows: int = 3,
         columns: int = 6,
-        centre_mm: tuple[float, float] = CENTRE_MM,
+        centre_mm: tuple[float, float] | None = None,
         afferent: Afferent | None = None,
+        finger: HasContact | None = None,
     ) -> Population:
         """Place afferents on a square lattice that is symmetric about a point.
 
@@ -176,9 +187,11 @@ class Population:
         rows, columns : int, optional
             Receptors along x and along z.
         centre_mm : (float, float), optional
-            x and z of the centre of the lattice. [mm]
+            x and z of the centre of the lattice; by default the middle of the finger's pad. [mm]
         afferent : Afferent, optional
             Default: `Afferent()`.
+        finger : Fingertip, optional
+            The finger in whose pad they lie; default: the paper's.
 
         Returns
         -------
@@ -197,7 +210,8 @@ class Population:
         (1.0, [[17.0, -0.5], [17.0, 0.5]])
         """
         pitch_mm = MM_PER_CM / math.sqrt(positive("density_per_cm2", density_per_cm2, "1/cm2"))
-        centre_x, centre_z = (finite("centre_mm", value, "mm") for value in centre_mm)
+        centre = centre_mm or (CENTRE_MM if finger is None else finger.contact_mm)
+        centre_x, centre_z = (finite("centre_mm", value, "mm") for value in centre)
         x = centre_x + pitch_mm * around_zero(whole("rows", rows, 1))
         z = centre_z + pitch_mm * around_zero(whole("columns", columns, 1))
         positions = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)

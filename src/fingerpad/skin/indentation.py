@@ -62,8 +62,9 @@ class Touch(metaclass=KnownKeywords):
         Fine zone and element sizes of the mesh.
     settings : PressSettings
         Steps and tolerances.
-    at_mm : (float, float)
-        x and z of the skin point that the indenter's axis goes through. [mm]
+    at_mm : (float, float), optional
+        x and z of the skin point that the indenter's axis goes through; by default the middle of the
+        finger's pad, `Fingertip.contact_mm`. [mm]
     tilt_deg : float
         Rotation of the indenter about z. At 0 it presses along y, perpendicular to the finger's long axis;
         a positive tilt turns the direction of pressing towards the proximal end. [degrees]
@@ -92,7 +93,7 @@ class Touch(metaclass=KnownKeywords):
     tissues: Tissues
     grading: Grading
     settings: PressSettings = field(default_factory=PressSettings)
-    at_mm: tuple[float, float] = CONTACT_POINT_MM
+    at_mm: tuple[float, float] = None  # type: ignore[assignment]  # a pair after initialisation
     tilt_deg: float = 0.0
     friction: float = 0.0
     spin_deg: float = 0.0
@@ -107,7 +108,7 @@ class Touch(metaclass=KnownKeywords):
             ("settings", PressSettings),
         ):
             instance(name, getattr(self, name), kind)
-        x, z = _check_position(self.at_mm)
+        x, z = _position(self.at_mm, self.finger)
         object.__setattr__(self, "at_mm", (x, z))
         if abs(finite("tilt_deg", self.tilt_deg, "degrees")) > LARGEST_TILT_DEG:
             raise InputError(f"tilt_deg must lie within {LARGEST_TILT_DEG:g} degrees: got {self.tilt_deg:g}.")
@@ -267,7 +268,7 @@ def touch_of(
     stimulus: Stimulus | None = None,
     materials: str | Tissues = DEFAULT_TISSUES,
     resolution: str = "quick",
-    at_mm: Sequence[float] = CONTACT_POINT_MM,
+    at_mm: Sequence[float] | None = None,
     grading: Grading | None = None,
     tilt_deg: float = 0.0,
     settings: PressSettings | None = None,
@@ -295,10 +296,10 @@ def touch_of(
         A value that can be solved, stored and compared.
     """
     one_of("resolution", resolution, RESOLUTIONS)
-    x, z = _check_position(at_mm)
+    x, z = _position(at_mm, instance("finger", finger, Fingertip))
     stimulus = instance("stimulus", stimulus or RampAndHold(), Motion)
     # The grading depends on this point, so finger, indenter and point are checked first.
-    check_path(instance("finger", finger, Fingertip), stimulus, (x, z))
+    check_path(finger, stimulus, (x, z))
     instance("indenter", indenter, Indenter)
     finite("spin_deg", spin_deg, "degrees")
     settings = settings or settings_of(resolution)
@@ -307,7 +308,8 @@ def touch_of(
         indenter=indenter,
         stimulus=stimulus,
         tissues=materials if isinstance(materials, Tissues) else named_tissues(materials),
-        grading=grading or grading_along(indenter, resolution, x, z, spin_deg, stimulus.poses),
+        grading=grading
+        or grading_along(indenter, resolution, x, z, spin_deg, stimulus.poses, finger.relative_size),
         settings=replace(settings, times_ms=tuple(times_ms)) if len(times_ms) else settings,
         at_mm=(x, z),
         tilt_deg=tilt_deg,
@@ -323,7 +325,7 @@ def indent(
     stimulus: Stimulus | None = None,
     materials: str | Tissues = DEFAULT_TISSUES,
     resolution: str = "quick",
-    at_mm: Sequence[float] = CONTACT_POINT_MM,
+    at_mm: Sequence[float] | None = None,
     settings: PressSettings | None = None,
     whole: bool = False,
     times_ms: Sequence[float] = (),
@@ -346,8 +348,9 @@ def indent(
         afferent was fitted with the default tissues; `Afferent.for_tissues` has the one for others.
     resolution : {"quick", "standard", "paper"}
         How fine the mesh and the steps are.
-    at_mm : (float, float)
-        x and z of the indenter's axis on the finger; half of the finger is solved on the midline. [mm]
+    at_mm : (float, float), optional
+        x and z of the indenter's axis on the finger; by default the middle of its pad. Half of the finger is
+        solved on the midline. [mm]
     settings : PressSettings, optional
         Steps and tolerances instead of those of `resolution`; `PressSettings(sed_tolerance=0.01)` chooses
         steps that keep the error of SED in time below 1 % of its largest value.
@@ -388,7 +391,10 @@ def settings_of(resolution: str) -> PressSettings:
     return PressSettings(ramp_steps, hold_steps)
 
 
-def _check_position(at_mm: Sequence[float]) -> tuple[float, float]:
+def _position(at_mm: Sequence[float] | None, finger: Fingertip) -> tuple[float, float]:
+    """Check a place of contact; without one it is the finger's."""
+    if at_mm is None:
+        return finger.contact_mm
     try:
         x, z = at_mm
     except (TypeError, ValueError) as error:

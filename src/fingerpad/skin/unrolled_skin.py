@@ -30,7 +30,7 @@ from fingerpad.data import fingertip as published
 from fingerpad.geometry.fingertip import Fingertip
 
 PAD_X_MM = (8.0, 26.0)
-"""Proximal and distal end of the pad: where the subcutis is thick. [mm]"""
+"""Proximal and distal end of the paper's pad: where the subcutis is thick. [mm]"""
 
 PAD_FACES_DEG = 45.0
 """Largest angle between the skin's normal and the volar direction on the pad. [degrees]"""
@@ -103,8 +103,9 @@ class UnrolledSkin:
     ----------
     finger : Fingertip
         The finger.
-    origin_x_mm : float
-        x of the point of the volar midline at which `along` is 0, distal positive. [mm]
+    origin_x_mm : float, optional
+        x of the point of the volar midline at which `along` is 0, distal positive; by default the middle of
+        the pad, `Fingertip.contact_mm`. [mm]
 
     Raises
     ------
@@ -121,9 +122,11 @@ class UnrolledSkin:
     """
 
     finger: Fingertip = field(default_factory=Fingertip)
-    origin_x_mm: float = published.CONTACT_POINT.value[0]
+    origin_x_mm: float = None  # type: ignore[assignment]  # a number after initialisation
 
     def __post_init__(self) -> None:
+        if self.origin_x_mm is None:
+            object.__setattr__(self, "origin_x_mm", self.finger.contact_mm[0])
         if not 0.0 < finite("origin_x_mm", self.origin_x_mm, "mm") < self.finger.length_mm:
             raise InputError(
                 f"origin_x_mm must lie between 0 and {self.finger.length_mm} mm: got {self.origin_x_mm}."
@@ -204,13 +207,13 @@ class UnrolledSkin:
         phi = np.arctan2(z / half_width, -y / np.where(y < 0.0, volar, dorsal))
         return np.stack([self._along(s), np.copysign(self._around(s, np.abs(phi)), phi)], axis=1)
 
-    def pad(self, x_mm: tuple[float, float] = PAD_X_MM, faces_deg: float = PAD_FACES_DEG) -> Polygon:
+    def pad(self, x_mm: tuple[float, float] | None = None, faces_deg: float = PAD_FACES_DEG) -> Polygon:
         """Return the pad as a region of the plane.
 
         Parameters
         ----------
         x_mm : (float, float), optional
-            Its proximal and distal end on the midline. [mm]
+            Its proximal and distal end on the midline; by default in proportion to the finger's length. [mm]
         faces_deg : float, optional
             Largest angle between its normals and the volar direction, above 0 and at most 90. [degrees]
 
@@ -228,6 +231,9 @@ class UnrolledSkin:
         >>> round(UnrolledSkin().pad().area_mm2)
         272
         """
+        if x_mm is None:
+            first, last = (x * (self.finger.length_mm / published.LENGTH.value) for x in PAD_X_MM)
+            x_mm = first, last
         ends = increasing("x_mm", float_array("x_mm", x_mm, 1))
         if ends.size != 2 or ends[0] < 0.0 or ends[1] > self.finger.length_mm:
             raise InputError(f"x_mm must be two ends within 0 ... {self.finger.length_mm} mm: got {x_mm}.")

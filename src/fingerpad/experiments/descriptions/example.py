@@ -19,7 +19,8 @@ title: A ball on the finger pad
 
 resolution: quick          # quick for a first look, standard for results
 tissues: human             # a set of tissues; all others: fingerpad touch --help
-# finger: {{stratum_corneum_mm: 0.5}}
+finger: adult              # small, large, child, macaque, aged; or measures:
+# finger: {{length_mm: 24, width_mm: 18, height_mm: 15, stratum_corneum_mm: 0.5}}
 
 object:
   kind: sphere             # cylinder, bar, line, punch, plate, edge, gap, grating, dots, braille,

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from fingerpad.experiments.descriptions.pressing import RAMP_AND_HOLD
+from fingerpad.experiments.descriptions.pressing import MEASURED, RAMP_AND_HOLD
 from fingerpad.experiments.descriptions.reading import parts_in
 from fingerpad.experiments.descriptions.signatures import UNKNOWN_MODEL, described
 from fingerpad.experiments.descriptions.values import Part
@@ -38,7 +38,7 @@ def explained_schema(kind: type[Part]) -> dict[str, Any]:
         for name, value in properties.items():
             if name in told:
                 value.setdefault("description", told[name])
-        if properties.get("kind", {}).get("const", RAMP_AND_HOLD) != RAMP_AND_HOLD:
+        if properties.get("kind", {}).get("const", MEASURED) not in (MEASURED, RAMP_AND_HOLD):
             schema["required"] = [*schema.get("required", ()), "kind"]
     return _tidied(made)
 

@@ -9,7 +9,6 @@ from pkgutil import resolve_name
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import PATTERNS
 from fingerpad.experiments.afferent_files import fitted_afferent
-from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.descriptions.parts import (
     DEFAULT,
     GRID,
@@ -17,6 +16,7 @@ from fingerpad.experiments.descriptions.parts import (
     AfferentSettings,
     PopulationSettings,
 )
+from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population, sensitivities
 
@@ -57,7 +57,12 @@ def afferent_of(chosen: AfferentSettings | str, tissues: str, beside: Path = Pat
     return fitted if chosen == DEFAULT else fitted_afferent(Path(beside) / chosen)
 
 
-def population_of(settings: PopulationSettings, afferent: Afferent, place: str = "population") -> Population:
+def population_of(
+    settings: PopulationSettings,
+    afferent: Afferent,
+    place: str = "population",
+    finger: Fingertip | None = None,
+) -> Population:
     """Lay out the afferents of a file.
 
     Parameters
@@ -68,6 +73,8 @@ def population_of(settings: PopulationSettings, afferent: Afferent, place: str =
         Each of them.
     place : str, optional
         Key of the settings in the file, for errors.
+    finger : Fingertip, optional
+        The finger in which they lie; by default the paper's.
 
     Returns
     -------
@@ -87,18 +94,18 @@ def population_of(settings: PopulationSettings, afferent: Afferent, place: str =
             )
     # Only what needs them loads the modules that unroll the skin.
     lay = _grid if settings.layout == GRID else resolve_name(f"{__package__}.skin_layouts:lay")
-    laid: Population = lay(settings, afferent, place)
+    laid: Population = lay(settings, afferent, place, finger or Fingertip())
     if settings.sensitivity_spread == 0.0:
         return laid
     return replace(laid, sensitivity=sensitivities(len(laid), settings.sensitivity_spread, settings.seed))
 
 
-def _grid(settings: PopulationSettings, afferent: Afferent, place: str) -> Population:
+def _grid(settings: PopulationSettings, afferent: Afferent, place: str, finger: Fingertip) -> Population:
     """Lay the paper's rows and columns."""
-    along, across = settings.offset_mm
+    (x, z), (along, across) = finger.contact_mm, settings.offset_mm
     return Population.grid(
         settings.density_per_cm2,
         **settings.chosen("rows", "columns"),
-        centre_mm=(RECEPTOR_X_MM + along, across),
+        centre_mm=(x + along, z + across),
         afferent=afferent,
     )

@@ -1,4 +1,4 @@
-"""Objects and motions as files describe them: a `kind`, and the parameters of what it names in Python."""
+"""Fingers, objects and motions as files describe them: a `kind`, and the parameters of what it names."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from fingerpad.core.checks import finite
 from fingerpad.core.errors import InputError
 from fingerpad.data import protocol
 from fingerpad.experiments.descriptions.signatures import made_by, one_of_kinds
@@ -16,6 +17,7 @@ from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.geometry.composed import ridges
 from fingerpad.geometry.dots import Dots, braille
 from fingerpad.geometry.embossed import Embossed, embossed_text
+from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.motion import ForceRampAndHold, Motion, RampAndHold
 from fingerpad.geometry.motions import chirp, repeated, sine, staircase, stroke
@@ -26,6 +28,7 @@ from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.geometry.trajectory_files import read_trajectory
 
 RAMP_AND_HOLD = "ramp_and_hold"
+MEASURED = "measured"
 
 
 def ramp_and_hold(
@@ -73,6 +76,9 @@ def recorded(file: Path, first_touch_mm: float = 0.0, tolerance: float = TOLERAN
     return reduced(motion, tolerance) if tolerance else motion
 
 
+FINGERS: dict[str, Callable[..., Fingertip]] = {MEASURED: Fingertip.of, "outline": Fingertip}
+"""How a finger can be given, by kind."""
+
 OBJECTS: dict[str, Callable[..., Indenter]] = {
     **INDENTERS,
     "dots": Dots,
@@ -100,11 +106,27 @@ MOTIONS: dict[str, Callable[..., Motion]] = {
 _WITHOUT: Mapping[str, Sequence[str]] = {"trajectory": ("phases", "cycles")}
 """Parameters that a file does not have."""
 
+FingerPart = one_of_kinds(
+    {kind: made_by(kind, makes) for kind, makes in FINGERS.items()}, default=MEASURED, text=Text
+)
 ObjectPart = one_of_kinds({kind: made_by(kind, makes) for kind, makes in OBJECTS.items()}, text=Text)
 MotionPart = one_of_kinds(
     {kind: made_by(kind, makes, _WITHOUT.get(kind, ())) for kind, makes in MOTIONS.items()},
     default=RAMP_AND_HOLD,
 )
+
+
+def finger_of(part: Any, beside: Path = Path()) -> Fingertip:
+    """Make the finger of a file: a part, or a text such as `child` or `adult:width_mm=18`."""
+    if not isinstance(part, str):
+        made: Fingertip = part.made(beside)
+        return made
+    like, *given = (word.strip() for word in part.split(":"))
+    sizes = [tuple(word.strip() for word in size.partition("=")) for size in given]
+    for _, equals, _ in sizes:
+        if not equals:
+            raise InputError(f"finger must be written like:name=mm, as adult:width_mm=18: got {part!r}.")
+    return Fingertip.of(like, **{name: finite(name, value, "mm") for name, _, value in sizes})  # type: ignore[arg-type]
 
 
 def object_of(part: Any, beside: Path = Path()) -> Indenter:
@@ -116,3 +138,8 @@ def object_of(part: Any, beside: Path = Path()) -> Indenter:
 def motion_of(content: Mapping[str, Any]) -> Any:
     """Part of a motion from plain values."""
     return TypeAdapter(MotionPart).validate_python(content)
+
+
+def finger_part(content: Mapping[str, Any]) -> Any:
+    """Part of a finger from plain values."""
+    return TypeAdapter(FingerPart).validate_python(content)

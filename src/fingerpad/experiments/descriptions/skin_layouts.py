@@ -9,8 +9,8 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Layout
 from fingerpad.core.patterns import hexagonal, jittered, poisson_disc, rectangular, uniform
 from fingerpad.core.regions import Ellipse, Polygon, Rectangle, Region
-from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.descriptions.parts import NAIL_ROWS, PAD, PopulationSettings, RegionSettings
+from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.skin.nail_edge import NailEdge
@@ -24,7 +24,7 @@ _OF_SHAPE = {
 }
 
 
-def lay(settings: PopulationSettings, afferent: Afferent, place: str) -> Population:
+def lay(settings: PopulationSettings, afferent: Afferent, place: str, finger: Fingertip) -> Population:
     """Lay out afferents by any layout but the paper's grid.
 
     Parameters
@@ -35,6 +35,8 @@ def lay(settings: PopulationSettings, afferent: Afferent, place: str) -> Populat
         Each of them.
     place : str
         Key of the settings in the file, for errors.
+    finger : Fingertip
+        The finger in which they lie.
 
     Returns
     -------
@@ -45,22 +47,24 @@ def lay(settings: PopulationSettings, afferent: Afferent, place: str) -> Populat
     InputError
         If the region is missing, a key does not belong to its shape, or no receptor falls into it.
     """
-    return (_along_nail if settings.layout == NAIL_ROWS else _in_region)(settings, afferent, place)
+    return (_along_nail if settings.layout == NAIL_ROWS else _in_region)(settings, afferent, place, finger)
 
 
-def _along_nail(settings: PopulationSettings, afferent: Afferent, place: str) -> Population:
+def _along_nail(
+    settings: PopulationSettings, afferent: Afferent, place: str, finger: Fingertip
+) -> Population:
     """Lay rows along the edge of the nail."""
-    nail = NailEdge()
+    nail = NailEdge(finger)
     with _placed(place):
         rows = nail.rows(settings.rows or 1, settings.density_per_cm2)
     return Population.of_layout(rows, nail.points, afferent)
 
 
-def _in_region(settings: PopulationSettings, afferent: Afferent, place: str) -> Population:
+def _in_region(settings: PopulationSettings, afferent: Afferent, place: str, finger: Fingertip) -> Population:
     """Fill a region of the unrolled skin."""
     if settings.region is None:
         raise InputError(f"{place}.region must be given for the layout {settings.layout}: it is missing.")
-    skin = UnrolledSkin(origin_x_mm=RECEPTOR_X_MM)
+    skin = UnrolledSkin(finger)
     region = _region(settings.region, settings.offset_mm, skin, place)
     with _placed(place):
         return Population.of_layout(_layout(settings, region, skin), skin.points, afferent)

@@ -19,12 +19,19 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
 from fingerpad.core.plain_yaml import line_at, read_yaml
 from fingerpad.data.tissues import DEFAULT_TISSUES
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.parts import DEFAULT, AfferentChoice, PopulationSettings
 from fingerpad.experiments.descriptions.population import afferent_of, population_of
-from fingerpad.experiments.descriptions.pressing import MotionPart, ObjectPart, motion_of, object_of
+from fingerpad.experiments.descriptions.pressing import (
+    FingerPart,
+    MotionPart,
+    ObjectPart,
+    finger_of,
+    finger_part,
+    motion_of,
+    object_of,
+)
 from fingerpad.experiments.descriptions.reading import error_sentence, place_of, spelled
-from fingerpad.experiments.descriptions.signatures import made_by
 from fingerpad.experiments.descriptions.values import (
     FiniteNumber,
     NotNegative,
@@ -57,8 +64,6 @@ OUTPUTS = (
     "febio",
 )
 """What can be written of a touch."""
-
-FingerSettings = made_by("", Fingertip)
 
 
 class PlaceSettings(Part):
@@ -123,8 +128,9 @@ class TouchDescription(Part):
         What it is, in words: the title of the page.
     resolution : {"quick", "standard", "paper"}
         How fine mesh and steps are.
-    finger : mapping
-        Sizes that differ from those of the standard finger, as of `fingerpad.Fingertip`.
+    finger : mapping or str
+        Whose: a preset such as "child", the sizes of `fingerpad.Fingertip.of`, or `kind: outline` with those
+        of `fingerpad.Fingertip`.
     tissues : str
         A set of tissues by name, as of `fingerpad.indent`.
     object : mapping or str
@@ -151,7 +157,7 @@ class TouchDescription(Part):
 
     title: Text = "One touch"
     resolution: Annotated[str, choice_of(RESOLUTIONS)] = "quick"
-    finger: FingerSettings = FingerSettings()  # type: ignore[valid-type]
+    finger: FingerPart = Field(default_factory=lambda: finger_part({}))
     tissues: Annotated[str, choice_of(TISSUES)] = DEFAULT_TISSUES
     object: ObjectPart
     motion: MotionPart = Field(default_factory=lambda: motion_of({}))
@@ -200,6 +206,18 @@ class DescribedTouch:
             raise InputError(f"{_located(self.source, self.text, place)}, {key}{error}") from error
 
     @cached_property
+    def finger(self) -> Fingertip:
+        """The finger.
+
+        Raises
+        ------
+        InputError
+            If it is impossible, with its place in the file.
+        """
+        with self.placed("finger"):
+            return finger_of(self.description.finger, self.beside)
+
+    @cached_property
     def touch(self) -> Touch:
         """The touch, described for the solver.
 
@@ -208,9 +226,7 @@ class DescribedTouch:
         InputError
             If a part is impossible, with its place in the file.
         """
-        asked = self.description
-        with self.placed("finger"):
-            finger: Fingertip = asked.finger.made()  # type: ignore[attr-defined]
+        asked, finger = self.description, self.finger
         with self.placed("object"):
             indenter = object_of(asked.object, self.beside)
         with self.placed("motion"):
@@ -224,7 +240,7 @@ class DescribedTouch:
                 motion,
                 asked.tissues,
                 asked.resolution,
-                (RECEPTOR_X_MM + asked.place.x_mm, asked.place.z_mm),
+                (conditions.receptor_x_mm + asked.place.x_mm, asked.place.z_mm),
                 tilt_deg=conditions.tilt_deg(indenter) if tilt_deg is None else tilt_deg,
                 friction=asked.friction,
                 spin_deg=asked.place.spin_deg,
@@ -243,7 +259,7 @@ class DescribedTouch:
         asked = self.description.afferents
         with self.placed():
             afferent = afferent_of(asked.afferent, self.description.tissues, self.beside)
-            laid = population_of(asked, afferent, "afferents")
+            laid = population_of(asked, afferent, "afferents", self.finger)
         with self.placed("afferents", "windows_ms"):
             phases = self.touch.stimulus.phases
             for window in rate_windows_ms(phases, asked.windows_ms.dynamic, asked.windows_ms.static):

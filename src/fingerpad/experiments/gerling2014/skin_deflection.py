@@ -6,7 +6,7 @@ import numpy as np
 
 from fingerpad.core.results import Number, TruthVector, Vector, result_class
 from fingerpad.data import cylinder_deflection
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.experiments.conditions import Conditions, Touch
 from fingerpad.experiments.scores import coefficient_of_determination
 from fingerpad.geometry.indenters import Cylinder, Indenter, Line
 from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
@@ -109,7 +109,7 @@ def deflection_touches(conditions: Conditions) -> dict[tuple[str, str], Touch]:
     """Six touches: three trials, two indenters."""
     return {
         (trial, name): conditions.touch(
-            indenter, RECEPTOR_X_MM, conditions.deflection_grading(indenter), materials=trial
+            indenter, conditions.receptor_x_mm, conditions.deflection_grading(indenter), materials=trial
         )
         for trial in TRIALS
         for name, indenter in INDENTERS.items()

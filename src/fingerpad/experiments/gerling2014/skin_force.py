@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from fingerpad.core.results import Number, result_class
 from fingerpad.core.units import MN_PER_N
 from fingerpad.data import protocol
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.experiments.conditions import Conditions, Touch
 from fingerpad.experiments.gerling2014.skin_deflection import deflection_r2
 from fingerpad.geometry.indenters import Cylinder, FlatPunch, Plate
 from fingerpad.geometry.motion import RampAndHold
@@ -48,7 +48,9 @@ def force_touches(conditions: Conditions) -> dict[str, Touch]:
         f"plate {depth_mm:g} mm": (Plate(), RampAndHold(depth_mm=depth_mm)) for depth_mm in PLATE_DEPTHS_MM
     } | {"disc": (FlatPunch(), RampAndHold(depth_mm=protocol.DEPTH.value))}
     return {
-        "cylinder": conditions.touch(cylinder, RECEPTOR_X_MM, conditions.deflection_grading(cylinder))
+        "cylinder": conditions.touch(
+            cylinder, conditions.receptor_x_mm, conditions.deflection_grading(cylinder)
+        )
     } | {
         name: touch_of(conditions.finger, body, motion, conditions.materials, conditions.resolution)
         for name, (body, motion) in flat.items()

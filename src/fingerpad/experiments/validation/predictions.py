@@ -12,7 +12,7 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.core.units import MN_PER_N
 from fingerpad.data import protocol
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.validation.observations import Kind, Observations, Value
@@ -251,9 +251,9 @@ def _rate(given: Mapping[str, Value], model: FingertipModel) -> Reading:
         curvature = _number(given["curvature_per_m"])
         body = Sphere(curvature) if curvature > 0.0 else Plate()
         # One mesh for all curvatures, so that no difference between them is one between meshes.
-        grading = grading_about(Plate(), conditions.resolution, RECEPTOR_X_MM)
+        grading = grading_about(Plate(), conditions.resolution, conditions.receptor_x_mm)
     along = np.cos(np.deg2rad(conditions.skin_tilt_deg))
-    site = (RECEPTOR_X_MM - position_mm * along, 0.0)
+    site = (conditions.receptor_x_mm - position_mm * along, 0.0)
     conditions.finger.skin_point(*site)
     if force_n == 0.0:
         return Reading(None, lambda _: _resting_rate(model))
