@@ -19,6 +19,7 @@ from fingerpad.core.files import write_atomically
 BENCHMARKS = (
     "startup",
     "population",
+    "mixed_population",
     "receptors",
     "sphere",
     "fitting",

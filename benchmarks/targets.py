@@ -73,6 +73,9 @@ TARGETS = (
     Target("growth_time_exponent", "growth", f"{_GROWTH} of time", 1.15, ""),
     # "Linear" is read as an exponent of at most 1.05; the memory of Python itself would reduce the exponent.
     Target("growth_memory_exponent", "growth", f"{_GROWTH} of memory", 1.05, ""),
+    Target(
+        "mixed_s", "mixed_population", "4,000 mixed afferents, 1 s of touch, solved skin to spikes", 1.0, "s"
+    ),
     Target("afferents_s", "population", "100,000 afferents, 1 s, exact spikes", 1.0, "s"),
     Target("receptors_s", "receptors", "responses of 10,000 receptors to one touch, skin solved", 1.0, "s"),
     Target("gradient_sum_s", "population", "Gradient Sum, 7 spheres x 100 x 100 x 100", 0.1, "s"),

@@ -9,6 +9,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.data import (
     STATUSES,
     Published,
+    afferents,
     all_published,
     fingers,
     fingertip,
@@ -19,12 +20,13 @@ from fingerpad.data import (
     tissues,
 )
 
-NAMES = {"SPHERES", "HUMAN_QUANTITY", "DEFAULT_TISSUES"}
+QUANTITIES = {"HUMAN_QUANTITY", "RA_QUANTITY", "PC_QUANTITY", "SAII_QUANTITY"}
+NAMES = {"SPHERES", "DEFAULT_TISSUES", "TYPES", *QUANTITIES}
 """Constants that are no published numbers."""
 
 
 def test_every_constant_of_every_module_is_collected_once() -> None:
-    modules = (fingers, fingertip, tissues, protocol, neuron, psychophysics, paper)
+    modules = (afferents, fingers, fingertip, tissues, protocol, neuron, psychophysics, paper)
     constants = [
         getattr(module, name)
         for module in modules

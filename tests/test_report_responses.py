@@ -7,6 +7,7 @@ from numpy.testing import assert_array_equal
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import ResponseMap, SpikeTrains
 from fingerpad.report import responses
+from fingerpad.report.mixed_responses import draw_mixed_responses
 from fingerpad.report.style import png, write_png
 
 
@@ -74,3 +75,17 @@ def test_nobody_is_refused():
 def test_a_picture_is_written_as_it_is_drawn(tmp_path):
     path = write_png(responses.draw_responses, {"mine": response()}, tmp_path / "deeper" / "map.png")
     assert path.read_bytes() == png(responses.draw_responses, {"mine": response()})
+
+
+def test_a_mixed_population_has_a_raster_and_a_map_per_touch():
+    maps = {"SAI": response(), "RA": response(columns=3)}
+    figure = draw_mixed_responses({"press": maps, "hold": maps})
+    raster, places = figure.axes[:2]
+    lines = [line for line in raster.lines if line.get_marker() == "|"]
+    assert [line.get_xdata().tolist() for line in lines] == [[5.0] * 8, [5.0] * 8]
+    assert [set(np.floor(line.get_ydata())) for line in lines] == [{0.0}, {1.0}]
+    assert [len(dots.get_offsets()) for dots in places.collections] == [4, 8, 4, 8]
+    assert len(figure.axes) == 4
+    assert [text.get_text() for text in places.get_legend().get_texts()] == ["SAI", "RA"]
+    with pytest.raises(InputError, match="at least one response"):
+        draw_mixed_responses({})

@@ -126,7 +126,8 @@ def test_another_quantity_may_take_the_place_of_energy_in_the_static_term_or_in_
 
 @pytest.mark.parametrize("quantity", ["heat", "", "work"])
 def test_unknown_quantity_is_refused(quantity):
-    with pytest.raises(InputError, match="quantity must be one of stored, von_mises: got"):
+    known = "stored, von_mises, skin_displacement, skin_stretch"
+    with pytest.raises(InputError, match=f"quantity must be one of {known}: got"):
         response(layered_block()).sample(quantity, SITES)
 
 
@@ -280,3 +281,27 @@ def test_profile_is_the_deflection_towards_the_bone_along_the_midline():
 def test_profile_between_nodes_is_linear():
     profile = SurfaceProfile(np.array([-1.0, 0.0, 2.0]), np.array([0.0, 1.0, 0.5]))
     np.testing.assert_allclose(profile.at([-0.5, 0.0, 1.0]), [0.5, 1.0, 0.75], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("gradient", "stretch"),
+    [
+        (np.diag([0.1, 0.0, -0.05]), np.log(1.1)),
+        (np.diag([-0.1, 0.3, -0.05]), 0.0),
+        # A simple shear by g within the surface: squares of the stretches are roots of s² - (2 + g²) s + 1.
+        (0.4 * np.outer([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]), 0.5 * np.log(1.08 + np.sqrt(1.08**2 - 1.0))),
+        # A rotation by 90 degrees about z stretches nothing.
+        (np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 0.0]]), 0.0),
+    ],
+)
+def test_stretch_of_the_surface_is_exact_under_uniform_deformation(gradient, stretch):
+    skin = response(layered_block(symmetric=False), displacement=lambda nodes: nodes @ gradient.T)
+    assert skin.sample("skin_stretch", SITES)[-1] == pytest.approx(stretch, abs=1e-12)
+    assert not skin.sample("skin_stretch", SITES)[0].any()
+
+
+def test_displacement_of_the_surface_is_its_length():
+    skin = response(layered_block(), displacement=lambda nodes: 0.0 * nodes + [0.3, -0.4, 0.0])
+    assert skin.sample("skin_displacement", SITES)[:, 0] == pytest.approx([0.0, 0.25, 0.5])
+    traces = skin.sed(SITES, "skin_displacement", "skin_displacement")
+    assert traces.dynamic_quantity == "skin_displacement"

@@ -61,12 +61,18 @@ if TYPE_CHECKING:
     from fingerpad.mechanics.press import PressSettings
     from fingerpad.mechanics.tissues import named_tissues
     from fingerpad.neuron.afferent import Afferent
+    from fingerpad.neuron.afferent_types import PC, RA, SAII, OwnAfferent
+    from fingerpad.neuron.end_organs import EndOrgans
+    from fingerpad.neuron.mixed_population import MixedPopulation, MixedResponse
     from fingerpad.neuron.population import Population
     from fingerpad.report.touch import save_figure
     from fingerpad.skin.indentation import Touch, indent, touch_of
     from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
 
 __all__ = [
+    "PC",
+    "RA",
+    "SAII",
     "Afferent",
     "Bar",
     "ConvergenceError",
@@ -76,6 +82,7 @@ __all__ = [
     "Dots",
     "Edge",
     "Embossed",
+    "EndOrgans",
     "Energy",
     "FingerpadError",
     "Fingertip",
@@ -93,7 +100,10 @@ __all__ = [
     "Line",
     "Material",
     "MaterialWarning",
+    "MixedPopulation",
+    "MixedResponse",
     "Ogden",
+    "OwnAfferent",
     "Phase",
     "Plate",
     "Polynomial",
@@ -150,6 +160,9 @@ _HOMES = {
     "export.dataset": ("read_touch", "touch_dataset", "write_touch"),
     "export.view": ("save_view",),
     "neuron.afferent": ("Afferent",),
+    "neuron.afferent_types": ("PC", "RA", "SAII", "OwnAfferent"),
+    "neuron.end_organs": ("EndOrgans",),
+    "neuron.mixed_population": ("MixedPopulation", "MixedResponse"),
     "geometry.edged_indenters": ("Edge", "Gap", "Grating"),
     "geometry.embossed": ("Embossed", "embossed_text"),
     "core.errors": (

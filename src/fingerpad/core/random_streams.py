@@ -57,6 +57,8 @@ class Purpose(IntEnum):
     """Variation of an observer's criterion."""
     JUDGEMENT = 10
     """Correct or incorrect judgements that follow a psychometric function."""
+    END_ORGAN = 12
+    """Position of one of several end organs of an afferent."""
     SPIKE_COUNT = 11
     """Spike counts of a Poisson process in a window."""
 

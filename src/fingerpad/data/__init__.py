@@ -6,7 +6,7 @@ contains the results for comparison.
 
 from types import ModuleType
 
-from fingerpad.data import fingers, fingertip, neuron, paper, protocol, psychophysics, tissues
+from fingerpad.data import afferents, fingers, fingertip, neuron, paper, protocol, psychophysics, tissues
 from fingerpad.data.observations import (
     BarObservations,
     DeflectionObservations,
@@ -23,6 +23,7 @@ __all__ = [
     "DeflectionObservations",
     "HitRateObservations",
     "Published",
+    "afferents",
     "all_published",
     "bar_firing_rates",
     "cylinder_deflection",
@@ -36,7 +37,16 @@ __all__ = [
     "tissues",
 ]
 
-_MODULES: tuple[ModuleType, ...] = (fingertip, fingers, tissues, protocol, neuron, psychophysics, paper)
+_MODULES: tuple[ModuleType, ...] = (
+    fingertip,
+    fingers,
+    tissues,
+    protocol,
+    neuron,
+    psychophysics,
+    paper,
+    afferents,
+)
 
 
 def all_published() -> tuple[Published, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from numpy.typing import ArrayLike
 
@@ -28,6 +29,53 @@ PARAMETER_NAMES = (
 
 PARAMETER_UNITS = ("mA", "mA ms/kPa", "mA/kPa", "ms", "mF", "mV")
 """Units of the six fitted numbers."""
+
+
+class Follows(Protocol):
+    """Anything that has two terms, each with the quantity of the skin that it follows or holds."""
+
+    @property
+    def dynamic_quantity(self) -> str:
+        """Quantity of the dynamic term, by the names of `SkinResponse.sample`."""
+        ...
+
+    @property
+    def static_quantity(self) -> str:
+        """Quantity of the static term."""
+        ...
+
+
+class AnyAfferent(Follows, Protocol):
+    """What a population needs of an afferent: the quantities that it follows, and spikes."""
+
+    def spikes(self, sed: SedTraces) -> SpikeTrains:
+        """Simulate the spikes at every site."""
+        ...
+
+
+def checked_afferent(afferent: AnyAfferent) -> AnyAfferent:
+    """Return an afferent, or raise `InputError` if it is none: a class without parameters, for example."""
+    if isinstance(afferent, type) or not all(hasattr(afferent, name) for name in _NEEDED):
+        raise InputError(
+            "afferent must be one such as Afferent(), RA(), PC(), SAII() or OwnAfferent(...): "
+            f"got {afferent!r}."
+        )
+    return afferent
+
+
+def check_quantities(afferent: Follows, traces: Follows) -> None:
+    """Raise `InputError` if traces hold other quantities than an afferent follows."""
+    for name in ("dynamic_quantity", "static_quantity"):
+        needed, got = getattr(afferent, name), getattr(traces, name)
+        if needed != got:
+            raise InputError(
+                f"The {name.partition('_')[0]} term of this afferent needs {needed!r}: got traces of "
+                f"{got!r}; sample the skin with {name}={needed!r}, or use an afferent that follows "
+                f"{got!r}, such as Afferent.for_tissues('paper') for {STORED_ENERGY!r}."
+            )
+
+
+_NEEDED = ("dynamic_quantity", "static_quantity", "spikes")
 
 
 @dataclass(frozen=True)
@@ -216,14 +264,7 @@ class Afferent:
         InputError
             If the quantities of the two terms are not those of `sed`.
         """
-        for name in ("dynamic_quantity", "static_quantity"):
-            needed, got = getattr(self, name), getattr(sed, name)
-            if needed != got:
-                raise InputError(
-                    f"The {name.partition('_')[0]} term of this afferent needs {needed!r}: got traces of "
-                    f"{got!r}; sample the skin with {name}={needed!r}, or use an afferent that follows "
-                    f"{got!r}, such as Afferent.for_tissues('paper') for {STORED_ENERGY!r}."
-                )
+        check_quantities(self, sed)
 
         def trains(sites: slice) -> SpikeTrains:
             return self.membrane.spikes(self.transduction.current(sed.part(sites)))
@@ -259,3 +300,10 @@ class Afferent:
         dynamic, static = rate_windows_ms(sed.phases, dynamic_window_ms, static_window_ms)
         spikes = self.spikes(sed)
         return firing_rate_hz(spikes, dynamic), firing_rate_hz(spikes, static)
+
+
+def as_sai(afferent: AnyAfferent) -> Afferent:
+    """Return an afferent if it has the chain of SAI, or raise `InputError`."""
+    if not isinstance(afferent, Afferent):
+        raise InputError(f"afferent must have the chain of Afferent() here: got {afferent!r}.")
+    return afferent

@@ -1,9 +1,8 @@
-"""A population of afferents: positions of the end organs and responses to one indentation."""
+"""A population of afferents of one type: positions of the end organs and responses to one indentation."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -14,9 +13,10 @@ from fingerpad.core.checks import FloatArray, finite, float_array, not_negative,
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.signals import ResponseMap, SedTraces, Skin, SpikeTrains, traces_below
+from fingerpad.core.signals import ResponseMap, Skin, traces_below
 from fingerpad.data import fingertip, psychophysics
-from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
+from fingerpad.neuron.end_organs import EndOrgans
 from fingerpad.neuron.rate_windows import Window, rate_windows_ms
 from fingerpad.neuron.spikes import firing_rate_hz, first_spike_latency_ms
 
@@ -73,7 +73,7 @@ def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class Population:
-    """Afferents at different positions of the skin that differ in their sensitivity only.
+    """Afferents of one type at different positions of the skin, with their sensitivities and end organs.
 
     Parameters
     ----------
@@ -82,12 +82,14 @@ class Population:
         above it on any side. [mm]
     pitch_mm : float
         Distance between neighbours of the layout. [mm]
-    afferent : Afferent, optional
-        Parameters of all afferents.
+    afferent : AnyAfferent, optional
+        All afferents: `Afferent()` (SAI), `RA()`, `PC()`, `SAII()` or an `OwnAfferent`.
     sensitivity : array (n_receptors,), optional
-        Factor of each afferent's gains k_d and k_s, as from `sensitivities`; default: 1. [1]
+        Factor of each afferent on what it follows, as from `sensitivities`; default: 1. [1]
     places_mm : array (n_receptors, 2), optional
         Positions in the plane of the layout, by which neighbours are found; default: x and z. [mm]
+    ends : EndOrgans, optional
+        Several end organs of each afferent; by default it has one, at its position.
 
     Raises
     ------
@@ -98,9 +100,10 @@ class Population:
 
     positions_mm: FloatArray
     pitch_mm: float
-    afferent: Afferent = field(default_factory=Afferent)
+    afferent: AnyAfferent = field(default_factory=Afferent)
     sensitivity: FloatArray | None = None
     places_mm: FloatArray | None = None
+    ends: EndOrgans | None = None
 
     def __post_init__(self) -> None:
         positions = float_array("positions_mm", self.positions_mm, 2)
@@ -109,6 +112,9 @@ class Population:
                 f"positions_mm must have rows of x and z, or of x, y and z: got shape {positions.shape}."
             )
         positive("pitch_mm", self.pitch_mm, "mm")
+        checked_afferent(self.afferent)
+        if self.ends is not None and len(self.ends) != len(positions):
+            raise InputError(f"ends needs one row per afferent, {len(positions)}: got {len(self.ends)}.")
         if self.sensitivity is not None:
             factors = float_array("sensitivity", self.sensitivity, 1)
             if factors.size != len(positions) or (factors <= 0.0).any():
@@ -133,8 +139,9 @@ class Population:
         cls,
         layout: Layout,
         place: Place | None = None,
-        afferent: Afferent | None = None,
+        afferent: AnyAfferent | None = None,
         sensitivity: ArrayLike | None = None,
+        ends: EndOrgans | None = None,
     ) -> Population:
         """Place an afferent at each position of a layout.
 
@@ -145,10 +152,12 @@ class Population:
         place : callable, optional
             From positions in the plane of the layout (n, 2) to points of the skin (n, 3), such as
             `UnrolledSkin.points`; by default the plane is x and z, the volar view of the skin.
-        afferent : Afferent, optional
+        afferent : AnyAfferent, optional
             Default: `Afferent()`.
         sensitivity : array_like (n_receptors,), optional
             As in `Population`.
+        ends : EndOrgans, optional
+            As in `Population`, such as `EndOrgans.scattered(layout.places_mm, ..., place=place)`.
 
         Returns
         -------
@@ -164,7 +173,7 @@ class Population:
         """
         positions = layout.places_mm if place is None else place(layout.places_mm)
         factors = None if sensitivity is None else float_array("sensitivity", sensitivity, 1)
-        return cls(positions, layout.pitch_mm, afferent or Afferent(), factors, layout.places_mm)
+        return cls(positions, layout.pitch_mm, afferent or Afferent(), factors, layout.places_mm, ends)
 
     @classmethod
     def grid(
@@ -173,7 +182,7 @@ class Population:
         rows: int = 3,
         columns: int = 6,
         centre_mm: tuple[float, float] | None = None,
-        afferent: Afferent | None = None,
+        afferent: AnyAfferent | None = None,
         finger: HasContact | None = None,
     ) -> Population:
         """Place afferents on a square lattice that is symmetric about a point.
@@ -222,7 +231,6 @@ class Population:
         skin: Skin,
         dynamic_window_ms: Window | None = None,
         static_window_ms: Window | None = None,
-        fire: Callable[[SedTraces], SpikeTrains] | None = None,
     ) -> ResponseMap:
         """Sample the skin at every receptor and simulate each afferent.
 
@@ -232,8 +240,6 @@ class Population:
             Any object with `sed(sites)`, such as a solved indentation.
         dynamic_window_ms, static_window_ms : (float, float), optional
             Windows of the two firing rates, by default as of `Afferent.rates`. [ms]
-        fire : callable, optional
-            Spikes under the traces below the receptors, by default `Afferent.spikes`: another membrane, say.
 
         Returns
         -------
@@ -247,16 +253,17 @@ class Population:
             window is not given and the touch has no ramp or no hold.
         """
         quantities = (self.afferent.dynamic_quantity, self.afferent.static_quantity)
-        sed = traces_below(skin, self.positions_mm, *quantities)
-        if sed.n_sites != len(self.positions_mm):
+        sites = self.positions_mm if self.ends is None else self.ends.sites_mm
+        sed = traces_below(skin, sites, *quantities)
+        if sed.n_sites != len(sites):
             raise InputError(
-                f"skin.sed must give one trace per receptor: got {sed.n_sites} for {len(self.positions_mm)}."
+                f"skin.sed must give one trace per receptor: got {sed.n_sites} for {len(sites)}."
             )
+        if self.ends is not None:
+            sed = self.ends.combined(sed)
         dynamic, static = rate_windows_ms(sed.phases, dynamic_window_ms, static_window_ms)
-        # Both terms of the current are proportional to what they follow: scaling it scales both gains.
-        spikes = (fire or self.afferent.spikes)(
-            sed if self.sensitivity is None else sed.scaled(self.sensitivity)
-        )
+        # What an afferent follows and its gains enter as a product: scaling the one scales the others.
+        spikes = self.afferent.spikes(sed if self.sensitivity is None else sed.scaled(self.sensitivity))
         return ResponseMap(
             positions_mm=self.positions_mm,
             pitch_mm=self.pitch_mm,

@@ -19,6 +19,7 @@ from fingerpad.geometry.motion import STILL, Pose
 from fingerpad.skin.fields import Place, sampled_fields, stored_fields
 from fingerpad.skin.receptor_sheet import ReceptorSheet
 from fingerpad.skin.section import Section, middle_section
+from fingerpad.skin.surface_motion import SURFACE_QUANTITIES
 
 if TYPE_CHECKING:
     from fingerpad.mechanics.press import Deformation
@@ -256,7 +257,8 @@ class SkinResponse:
         quantity : str
             One of `skin.fields.sampled_fields`: "stored", "instantaneous" or "work" (energy densities by
             their three definitions), "von_mises", "compressive_stress" [all kPa] or "compressive_strain"
-            (logarithmic).
+            (logarithmic); or of `skin.surface_motion.SURFACE_QUANTITIES`: "skin_displacement" (how far the
+            skin above has moved, in mm) or "skin_stretch" (largest tensile strain within the surface).
         sites : array (n_sites, 2) or (n_sites, 3)
             x and z of end organs on the volar side, or x, y and z of the skin above them on any side. [mm]
 
@@ -284,9 +286,12 @@ class SkinResponse:
         return [np.maximum(self._receptors.read(places, values), 0.0) for values in known]
 
     def _of_sheet(self, quantity: str) -> FloatArray:
-        """One quantity in the elements `mesh.living_epidermis`, (n_times, n_sheet)."""
+        """One quantity in the elements `mesh.living_epidermis` or above them, (n_times, n_sheet)."""
         held = {name: field for name, field in sampled_fields().items() if field.name in self.fields}
-        field = held[one_of("quantity", quantity, tuple(held))]
+        one_of("quantity", quantity, (*held, *SURFACE_QUANTITIES))
+        if quantity in SURFACE_QUANTITIES:
+            return SURFACE_QUANTITIES[quantity](self.mesh, self.skin_displacement_mm)
+        field = held[quantity]
         values = self.fields[field.name]
         return values if field.place is Place.WATCHED else values[:, self.mesh.living_epidermis.ravel()]
 

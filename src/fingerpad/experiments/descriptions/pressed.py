@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -15,6 +15,8 @@ from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.touch import DescribedTouch, TouchDescription
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
+from fingerpad.neuron.afferent import as_sai
+from fingerpad.neuron.afferent_types import OwnAfferent
 from fingerpad.neuron.escape_rate import EscapeRate
 from fingerpad.skin.sampling import SkinResponse
 
@@ -180,8 +182,11 @@ def respond(described: DescribedTouch, skin: SkinResponse) -> ResponseMap:
     windows = asked.windows_ms.dynamic, asked.windows_ms.static
     if asked.noise == 0.0:
         return population.respond(skin, *windows)
-    afferent = population.afferent
+    afferent = as_sai(population.afferent)
     membrane = EscapeRate(afferent.membrane, asked.noise)
-    return population.respond(
-        skin, *windows, lambda sed: membrane.spikes(afferent.transduction.current(sed), asked.seed)
+    noisy = OwnAfferent(
+        lambda sed: membrane.spikes(afferent.transduction.current(sed), asked.seed),
+        dynamic_quantity=afferent.dynamic_quantity,
+        static_quantity=afferent.static_quantity,
     )
+    return replace(population, afferent=noisy).respond(skin, *windows)

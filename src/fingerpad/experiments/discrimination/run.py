@@ -22,6 +22,7 @@ from fingerpad.experiments.discrimination.task_stimuli import (
 )
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
+from fingerpad.neuron.afferent import as_sai
 from fingerpad.skin.indentation import Touch
 
 
@@ -140,6 +141,6 @@ def discriminate(
     return DiscriminationFile(
         discrimination=found,
         task=task,
-        afferent=asdict(run.prepared.population.afferent),
+        afferent=asdict(as_sai(run.prepared.population.afferent)),
         manifest=runner.manifest(conditions, meshes, command=command, inputs=inputs),
     )

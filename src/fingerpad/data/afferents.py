@@ -1,0 +1,104 @@
+"""Types of afferents in the fingertip: parameters of RA, PC and SAII, and published observations.
+
+Parameters with the status *assumed* were fitted by us to the observations below them, as
+docs/afferents.md describes.
+"""
+
+from fingerpad.data.published import Published, Source
+
+_SINUSOIDS = Source(
+    "our fit to the recalled thresholds of one impulse per cycle (RA_TUNING, PC_TUNING), 1 mm punch on a "
+    "hold of 0.5 mm, default tissues, quick resolution",
+    "assumed",
+)
+_SHARED_REFRACTORY = Source("shorter than any interval in RA and PC trains that are entrained", "assumed")
+
+RA_QUANTITY = "compressive_stress"
+"""Quantity that RA afferents follow: Meissner corpuscles lie at the depth of the Merkel cells."""
+RA_THRESHOLD = _SINUSOIDS("RA: band-passed stress at the threshold of the membrane", 0.082, "kPa")
+RA_CORNER = _SINUSOIDS("RA: corner frequency of the band pass", 60.0, "Hz")
+RA_RISE = _SINUSOIDS("RA: power of the frequency below the corner", 1.0, "1")
+RA_FALL = _SINUSOIDS("RA: power of the frequency above the corner", 1.0, "1")
+RA_RETRACTION = _SINUSOIDS("RA: share of the response to retraction", 0.3, "1")
+RA_MEMBRANE = _SINUSOIDS("RA: time constant of the membrane", 5.0, "ms")
+RA_REFRACTORY = _SHARED_REFRACTORY("RA: refractory period", 2.0, "ms")
+
+PC_QUANTITY = "skin_displacement"
+"""Quantity that PC afferents follow: the corpuscle lies deep; its thresholds are known as displacements."""
+PC_THRESHOLD = _SINUSOIDS("PC: band-passed displacement at the threshold of the membrane", 1.41e-4, "mm")
+PC_CORNER = _SINUSOIDS("PC: corner frequency of the band pass", 500.0, "Hz")
+PC_RISE = _SINUSOIDS("PC: power of the frequency below the corner", 2.0, "1")
+PC_FALL = _SINUSOIDS("PC: power of the frequency above the corner", 2.0, "1")
+PC_RETRACTION = _SINUSOIDS("PC: share of the response to retraction", 0.5, "1")
+PC_MEMBRANE = _SINUSOIDS("PC: time constant of the membrane", 1.0, "ms")
+PC_REFRACTORY = _SHARED_REFRACTORY("PC: refractory period", 1.0, "ms")
+
+SAII_QUANTITY = "skin_stretch"
+"""Quantity that SAII afferents follow: Knibestöl 1975 tells them from SAI by their response to stretch."""
+_STRETCH = Source(
+    "set so that the afferent first fires at the published indentation threshold (INDENTATION_THRESHOLDS), "
+    "1 mm punch, default tissues; rates of tens per second at strains of some per cent",
+    "assumed",
+)
+SAII_STATIC_GAIN = _STRETCH("SAII: static gain, inverse of the strain at threshold", 80.0, "1")
+SAII_DYNAMIC_GAIN = _STRETCH("SAII: dynamic gain", 4000.0, "ms")
+SAII_MEMBRANE = _STRETCH("SAII: time constant of the membrane", 80.0, "ms")
+
+TYPES = ("SAI", "RA", "PC", "SAII")
+"""The four types, in the order of the rows below."""
+
+_DENSITY_TOTAL = Source("Johansson & Vallbo 1979, J Physiol 286:283, abstract", "read")
+DENSITY_TOTAL = _DENSITY_TOTAL("density of all tactile afferents in the fingertip", 241.0, "1/cm2")
+DENSITIES = Published(
+    "density of SAI, RA, PC and SAII afferents in the fingertip",
+    (70.0, 140.0, 21.0, 10.0),
+    "1/cm2",
+    "Johansson & Vallbo 1979, J Physiol 286:283: SAI, RA and PC; SAII is what is left of their total of 241 "
+    "(49 is also quoted, with which the sum would be 280)",
+    "recalled",
+)
+INDENTATION_THRESHOLDS = Published(
+    "median indentation that makes a unit fire: SAI, RA, PC, SAII",
+    (56.5, 13.8, 9.2, 331.0),
+    "um",
+    "Johansson & Vallbo 1979, J Physiol 297:405, abstract",
+    "read",
+)
+FIELD_AREAS = Published(
+    "median area of receptive fields at four to five times the threshold: SAI, RA, PC, SAII",
+    (11.0, 12.6, 101.0, 59.0),
+    "mm2",
+    "Johansson & Vallbo 1980, Brain Res 184:353 (a review by Delhaye, Long & Bensmaia 2018 has 10 for SAI "
+    "and 50 for SAII)",
+    "recalled",
+)
+
+TUNING_FREQUENCIES = Published(
+    "frequencies of the thresholds of one impulse per cycle",
+    (1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 60.0, 100.0, 150.0, 200.0, 300.0, 400.0),
+    "Hz",
+    "chosen by us",
+    "assumed",
+)
+_TUNING = Source(
+    "read off our memory of figures in Talbot, Darian-Smith, Kornhuber & Mountcastle 1968, Mountcastle, "
+    "LaMotte & Carli 1972 and Johansson, Landgren & Lundström 1982; certain to a factor of two at best",
+    "recalled",
+)
+RA_TUNING = _TUNING(
+    "RA: amplitude for one impulse per cycle at these frequencies",
+    (250.0, 130.0, 50.0, 26.0, 15.0, 11.0, 12.0, 22.0, 42.0, 70.0, 150.0, 250.0),
+    "um",
+)
+PC_TUNING = _TUNING(
+    "PC: amplitude for one impulse per cycle at these frequencies from 10 Hz on",
+    (400.0, 120.0, 28.0, 11.0, 4.0, 1.9, 1.2, 1.0, 1.3),
+    "um",
+)
+BEST_FREQUENCIES = Published(
+    "range of frequencies at which RA units are most easily excited, and lower limit for PC units",
+    (8.0, 64.0, 64.0),
+    "Hz",
+    "Johansson, Landgren & Lundström 1982, Brain Res 244:17, abstract",
+    "read",
+)

@@ -1,0 +1,292 @@
+"""Types of afferents beside SAI: RA, PC, SAII, and any of one's own.
+
+Whatever names the quantities of the skin that it follows and makes spikes of their traces is an afferent
+(`fingerpad.neuron.afferent.AnyAfferent`). RA and PC share one chain:
+
+    quantity Q -> band pass -> rectification -> leaky membrane -> spikes
+    i = max(q, 0) + r max(-q, 0),    tau du/dt = i / threshold - u,    spike and reset at u = 1,
+
+with the band-passed quantity q, and r the share of retraction. Both are silent in a hold, because a band pass
+transmits no constant. SAII has the chain of SAI (Eqs. 1-5), but follows the stretch of the skin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from fingerpad.core.checks import instance, not_negative, positive
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import STORED_ENERGY, CurrentTraces, SedTraces, SpikeTrains
+from fingerpad.data import afferents
+from fingerpad.neuron.afferent import Afferent, check_quantities
+from fingerpad.neuron.band_pass import BandPass
+from fingerpad.neuron.lif import LeakyIntegrateAndFire
+
+
+@dataclass(frozen=True)
+class RapidlyAdapting:
+    """Afferent that follows the band-passed and rectified course of one quantity: the chain of RA and PC.
+
+    Parameters
+    ----------
+    threshold : float
+        Band-passed quantity that, if it stayed, would just bring the membrane to its threshold. [kPa, or the
+        unit of the quantity]
+    corner_hz : float
+        Corner frequency of the band pass. [Hz]
+    rise, fall : int
+        Its powers of the frequency below and above the corner.
+    retraction : float
+        Share of the response to a decreasing quantity, 0 to 1. [1]
+    membrane_ms : float
+        Time constant of the membrane. [ms]
+    refractory_ms : float
+        Refractory period. [ms]
+    quantity : str
+        What is followed, by the names of `SkinResponse.sample`.
+
+    Raises
+    ------
+    InputError
+        If a number is not positive, or the share of retraction not within 0 ... 1.
+    """
+
+    threshold: float
+    corner_hz: float
+    rise: int
+    fall: int
+    retraction: float
+    membrane_ms: float
+    refractory_ms: float
+    quantity: str
+
+    def __post_init__(self) -> None:
+        positive("threshold", self.threshold)
+        if not_negative("retraction", self.retraction) > 1.0:
+            raise InputError(f"retraction must lie within 0 ... 1: got {self.retraction:g}.")
+        # Both stages check their parameters when they are made.
+        self.band_pass, self.membrane  # noqa: B018
+
+    @property
+    def band_pass(self) -> BandPass:
+        """The first stage."""
+        return BandPass(self.corner_hz, self.rise, self.fall)
+
+    @property
+    def membrane(self) -> LeakyIntegrateAndFire:
+        """The last stage; with its capacitance equal to the time constant, its resistance is 1."""
+        return LeakyIntegrateAndFire(self.membrane_ms, self.membrane_ms, 1.0, self.refractory_ms)
+
+    @property
+    def dynamic_quantity(self) -> str:
+        """What is followed; both terms have the same quantity."""
+        return self.quantity
+
+    @property
+    def static_quantity(self) -> str:
+        """What is followed."""
+        return self.quantity
+
+    def current(self, sed: SedTraces) -> CurrentTraces:
+        """Band-passed and rectified quantity over the threshold at every site, in place of a current."""
+        times_ms, passed = self.band_pass.of(sed)
+        rectified = np.maximum(passed, 0.0) + self.retraction * np.maximum(-passed, 0.0)
+        return CurrentTraces(times_ms, rectified / self.threshold)
+
+    def spikes(self, sed: SedTraces) -> SpikeTrains:
+        """Simulate the spikes of this afferent at every site.
+
+        Parameters
+        ----------
+        sed : SedTraces
+            Traces of `quantity`.
+
+        Returns
+        -------
+        SpikeTrains
+            One train per site.
+
+        Raises
+        ------
+        InputError
+            If the traces are those of another quantity.
+        """
+        check_quantities(self, sed)
+        return self.membrane.spikes(self.current(sed))
+
+
+@dataclass(frozen=True)
+class RA(RapidlyAdapting):
+    """A rapidly adapting afferent (RA, FA-I), which ends in Meissner corpuscles.
+
+    It responds to the speed at which the compressive stress at its end organ changes, most to 8 to 64 Hz, and
+    is silent in a hold. The defaults, their sources and status are in `fingerpad.data.afferents`.
+
+    Parameters
+    ----------
+    threshold, corner_hz, rise, fall, retraction, membrane_ms, refractory_ms, quantity
+        As in `RapidlyAdapting`.
+
+    Examples
+    --------
+    Compressive stress rises by 5 kPa in 50 ms and stays:
+
+    >>> stress = SedTraces([0.0, 50.0, 1000.0], [[0.0], [5.0], [5.0]], kinks_ms=[50.0],
+    ...                    dynamic_quantity="compressive_stress", static_quantity="compressive_stress")
+    >>> spikes = RA().spikes(stress)[0]
+    >>> bool(spikes.size > 2), bool((spikes < 60.0).all())
+    (True, True)
+    """
+
+    threshold: float = afferents.RA_THRESHOLD.value
+    corner_hz: float = afferents.RA_CORNER.value
+    rise: int = int(afferents.RA_RISE.value)
+    fall: int = int(afferents.RA_FALL.value)
+    retraction: float = afferents.RA_RETRACTION.value
+    membrane_ms: float = afferents.RA_MEMBRANE.value
+    refractory_ms: float = afferents.RA_REFRACTORY.value
+    quantity: str = afferents.RA_QUANTITY
+
+
+@dataclass(frozen=True)
+class PC(RapidlyAdapting):
+    """A Pacinian afferent (PC, FA-II).
+
+    It responds to vibration of the skin above 64 Hz, most at 200 to 400 Hz, and is silent in a hold. It
+    follows how far the skin above has moved: its corpuscle lies deep, and skin moves over a wide area. The
+    defaults, their sources and status are in `fingerpad.data.afferents`.
+
+    Parameters
+    ----------
+    threshold, corner_hz, rise, fall, retraction, membrane_ms, refractory_ms, quantity
+        As in `RapidlyAdapting`; the threshold is in mm.
+
+    Examples
+    --------
+    The skin vibrates by 5 µm about 0.5 mm, at 250 Hz and at 10 Hz:
+
+    >>> times_ms = np.arange(0.0, 400.0, 0.2)
+    >>> def moved(frequency_hz):
+    ...     course = 0.5 + 0.005 * np.sin(2e-3 * np.pi * frequency_hz * times_ms)
+    ...     return SedTraces(times_ms, course[:, None], dynamic_quantity="skin_displacement",
+    ...                      static_quantity="skin_displacement")
+    >>> PC().spikes(moved(250.0))[0].size > 80, PC().spikes(moved(10.0))[0].size
+    (True, 0)
+    """
+
+    threshold: float = afferents.PC_THRESHOLD.value
+    corner_hz: float = afferents.PC_CORNER.value
+    rise: int = int(afferents.PC_RISE.value)
+    fall: int = int(afferents.PC_FALL.value)
+    retraction: float = afferents.PC_RETRACTION.value
+    membrane_ms: float = afferents.PC_MEMBRANE.value
+    refractory_ms: float = afferents.PC_REFRACTORY.value
+    quantity: str = afferents.PC_QUANTITY
+
+
+@dataclass(frozen=True)
+class SAII(Afferent):
+    """A slowly adapting type II (SAII) afferent, which follows the stretch of the skin.
+
+    Its chain is that of `Afferent`, with the largest tensile strain within the skin in both terms. The
+    defaults, their sources and status are in `fingerpad.data.afferents`.
+
+    Parameters
+    ----------
+    intercept_ma, dynamic_gain, static_gain, time_constant_ms, capacitance_mf, threshold_mv, refractory_ms
+        As in `Afferent`; the gains refer to strain.
+    dynamic_quantity, static_quantity : str
+        As in `Afferent`.
+
+    Examples
+    --------
+    The skin is stretched by 5 % in 50 ms and stays:
+
+    >>> stretch = SedTraces([0.0, 50.0, 1000.0], [[0.0], [0.05], [0.05]], kinks_ms=[50.0],
+    ...                     dynamic_quantity="skin_stretch", static_quantity="skin_stretch")
+    >>> dynamic_hz, static_hz = SAII().rates(stretch)
+    >>> bool(dynamic_hz[0] > static_hz[0] > 5.0)
+    True
+    """
+
+    intercept_ma: float = 0.0
+    dynamic_gain: float = afferents.SAII_DYNAMIC_GAIN.value
+    static_gain: float = afferents.SAII_STATIC_GAIN.value
+    time_constant_ms: float = afferents.SAII_MEMBRANE.value
+    capacitance_mf: float = afferents.SAII_MEMBRANE.value
+    threshold_mv: float = 1.0
+    dynamic_quantity: str = afferents.SAII_QUANTITY
+    static_quantity: str = afferents.SAII_QUANTITY
+
+
+@dataclass(frozen=True)
+class OwnAfferent:
+    """An afferent of one's own: a function of the traces of the skin that returns current or spikes.
+
+    Parameters
+    ----------
+    respond : callable
+        From `SedTraces`, a column per site, to `CurrentTraces` or to `SpikeTrains` of the same sites.
+    membrane : LeakyIntegrateAndFire, optional
+        Membrane that a current charges; needed if `respond` returns a current.
+    dynamic_quantity, static_quantity : str, optional
+        What the traces hold, by the names of `SkinResponse.sample`; SED, unless another one is given.
+
+    Raises
+    ------
+    InputError
+        If `respond` cannot be called, or returns something else than it must.
+
+    Examples
+    --------
+    One spike when strain energy density first exceeds 1 kPa:
+
+    >>> def first(sed):
+    ...     return SpikeTrains.from_lists([
+    ...         sed.times_ms[course > 1.0][:1] for course in sed.sed_kpa.T
+    ...     ])
+    >>> sed = SedTraces([0.0, 25.0, 50.0], [[0.0, 0.0], [0.5, 1.5], [0.9, 3.0]])
+    >>> [train.tolist() for train in OwnAfferent(first).spikes(sed)]
+    [[], [25.0]]
+
+    A current in proportion to its root, and a membrane:
+
+    >>> def root(sed):
+    ...     return CurrentTraces(sed.times_ms, 1e-6 * sed.sed_kpa**0.5)
+    >>> membrane = LeakyIntegrateAndFire(10.0, 1e-6, 5.0, 1.0)
+    >>> [train.size for train in OwnAfferent(root, membrane).spikes(sed)]
+    [3, 6]
+    """
+
+    respond: Callable[[SedTraces], CurrentTraces | SpikeTrains]
+    membrane: LeakyIntegrateAndFire | None = None
+    dynamic_quantity: str = STORED_ENERGY
+    static_quantity: str = STORED_ENERGY
+
+    MUST_RETURN: ClassVar[str] = "respond must return CurrentTraces or SpikeTrains, an entry per site"
+
+    def __post_init__(self) -> None:
+        if not callable(self.respond):
+            raise InputError(f"respond must be a function of SedTraces: got {self.respond!r}.")
+        if self.membrane is not None:
+            instance("membrane", self.membrane, LeakyIntegrateAndFire)
+
+    def spikes(self, sed: SedTraces) -> SpikeTrains:
+        """Spikes at every site."""
+        check_quantities(self, sed)
+        given = self.respond(sed)
+        if isinstance(given, CurrentTraces):
+            if self.membrane is None:
+                raise InputError(
+                    "OwnAfferent needs a membrane because respond returns a current: got none; give "
+                    "membrane=LeakyIntegrateAndFire(...), or let respond return SpikeTrains."
+                )
+            given = self.membrane.spikes(given)
+        if not isinstance(given, SpikeTrains) or len(given) != sed.n_sites:
+            got = f"{len(given)} trains" if isinstance(given, SpikeTrains) else type(given).__name__
+            raise InputError(f"{self.MUST_RETURN}, {sed.n_sites} in all: got {got}.")
+        return given

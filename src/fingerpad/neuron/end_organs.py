@@ -1,0 +1,136 @@
+"""Several end organs per afferent: an RA or SAI fibre branches and ends at several places of the skin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import FloatArray, float_array, positive, whole
+from fingerpad.core.errors import InputError
+from fingerpad.core.layouts import Place
+from fingerpad.core.random_streams import Purpose, uniforms
+from fingerpad.core.signals import SedTraces
+
+_SUM_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class EndOrgans:
+    """Positions and weights of the end organs of every afferent.
+
+    What the afferent follows is the weighted sum of what its end organs follow. With equal weights its
+    response is that to the mean over its field.
+
+    Parameters
+    ----------
+    positions_mm : array (n_afferents, n_ends, 2) or (n_afferents, n_ends, 3)
+        x and z of each end organ on the volar side, or x, y and z of the skin above it. [mm]
+    weights : array (n_ends,) or (n_afferents, n_ends), optional
+        Share of each end organ, not negative; those of an afferent sum to 1. Default: equal. [1]
+
+    Raises
+    ------
+    InputError
+        If the positions have another shape, or weights are negative or do not sum to 1.
+
+    Examples
+    --------
+    >>> ends = EndOrgans([[[17.0, 0.0], [18.0, 0.0]]], weights=[0.75, 0.25])
+    >>> ends.combined(SedTraces([0.0, 50.0], [[0.0, 0.0], [2.0, 4.0]])).sed_kpa.tolist()
+    [[0.0], [2.5]]
+    """
+
+    positions_mm: FloatArray
+    weights: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        positions = float_array("positions_mm", self.positions_mm, 3)
+        n_afferents, n_ends, columns = positions.shape
+        if columns not in (2, 3) or positions.size == 0:
+            raise InputError(
+                "positions_mm of EndOrgans must be afferents by end organs by x, z, or x, y, z: got shape "
+                f"{positions.shape}."
+            )
+        shares = np.full(n_ends, 1.0 / n_ends) if self.weights is None else np.asarray(self.weights)
+        weights = float_array("weights", np.atleast_2d(shares), 2)
+        if weights.shape not in ((1, n_ends), (n_afferents, n_ends)):
+            raise InputError(
+                f"weights needs one number per end organ, {n_ends}, or a row of them per afferent, "
+                f"{n_afferents}: got shape {weights.shape}."
+            )
+        if (weights < 0.0).any():
+            raise InputError(f"weights must not be negative: the smallest is {weights.min():g}.")
+        totals = weights.sum(axis=1)
+        if (np.abs(totals - 1.0) > _SUM_TOLERANCE).any():
+            worst = totals[np.argmax(np.abs(totals - 1.0))]
+            raise InputError(
+                f"weights of an afferent must sum to 1: got {worst:g}; divide them by their sum."
+            )
+        object.__setattr__(self, "positions_mm", positions)
+        object.__setattr__(self, "weights", np.broadcast_to(weights, (n_afferents, n_ends)))
+
+    def __len__(self) -> int:
+        return len(self.positions_mm)
+
+    @classmethod
+    def scattered(
+        cls, places_mm: ArrayLike, count: int, reach_mm: float, seed: int, place: Place | None = None
+    ) -> EndOrgans:
+        """Scatter end organs about the places of afferents, uniformly within a disc.
+
+        Parameters
+        ----------
+        places_mm : array_like (n_afferents, 2)
+            In the plane of the layout. [mm]
+        count : int
+            End organs per afferent.
+        reach_mm : float
+            Radius of the disc. [mm]
+        seed : int
+            Seed of the random numbers; those of an afferent depend on its number only.
+        place : callable, optional
+            From the plane to points of the skin, as in `Population.of_layout`.
+
+        Returns
+        -------
+        EndOrgans
+
+        Raises
+        ------
+        InputError
+            If there is not at least one end organ, or the reach is not positive.
+
+        Examples
+        --------
+        >>> EndOrgans.scattered([[17.0, 0.0], [18.0, 0.0]], count=5, reach_mm=1.5, seed=1).positions_mm.shape
+        (2, 5, 2)
+        """
+        centres = float_array("places_mm", places_mm, 2)
+        whole("count", count, 1)
+        radius_mm = positive("reach_mm", reach_mm, "mm")
+        drawn = uniforms(seed, 1, len(centres), Purpose.END_ORGAN, 2 * count)[0]
+        distance, angle = radius_mm * np.sqrt(drawn[:, :count]), 2.0 * np.pi * drawn[:, count:]
+        offsets = np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=-1)
+        ends = centres[:, None] + offsets
+        if place is not None:
+            ends = place(ends.reshape(-1, 2)).reshape(len(centres), count, 3)
+        return cls(ends)
+
+    @property
+    def sites_mm(self) -> FloatArray:
+        """All end organs, afferent by afferent, (n_afferents n_ends, 2 or 3). [mm]"""
+        return self.positions_mm.reshape(-1, self.positions_mm.shape[-1])
+
+    def combined(self, traces: SedTraces) -> SedTraces:
+        """Traces of the afferents from those of `sites_mm`."""
+        return replace(
+            traces,
+            sed_kpa=self._sum(traces.sed_kpa),
+            dynamic_kpa=None if traces.dynamic_kpa is None else self._sum(traces.dynamic_kpa),
+        )
+
+    def _sum(self, values: FloatArray) -> FloatArray:
+        shaped = values.reshape(len(values), *self.positions_mm.shape[:2])
+        return np.sum(shaped * np.asarray(self.weights), axis=2)

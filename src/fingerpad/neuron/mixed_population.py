@@ -1,0 +1,206 @@
+"""Afferents of several types in one skin, at the published densities or others, and their common response."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray, positive, whole
+from fingerpad.core.errors import InputError
+from fingerpad.core.layouts import Place
+from fingerpad.core.patterns import poisson_disc
+from fingerpad.core.regions import Region
+from fingerpad.core.signals import ResponseMap, Skin, SpikeTrains
+from fingerpad.data import afferents as published
+from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
+from fingerpad.neuron.afferent_types import PC, RA, SAII
+from fingerpad.neuron.population import Population, sensitivities
+from fingerpad.neuron.rate_windows import Window
+
+PUBLISHED_DENSITIES: Mapping[str, float] = MappingProxyType(
+    dict(zip(published.TYPES, published.DENSITIES.value, strict=True))
+)
+"""Densities in the human fingertip. [1/cm2]"""
+
+
+def types_of_afferents() -> dict[str, AnyAfferent]:
+    """Return the four types with their default parameters, by their names.
+
+    Examples
+    --------
+    >>> list(types_of_afferents())
+    ['SAI', 'RA', 'PC', 'SAII']
+    """
+    return dict(zip(published.TYPES, (Afferent(), RA(), PC(), SAII()), strict=True))
+
+
+@dataclass(frozen=True)
+class MixedResponse:
+    """Responses of a mixed population to one touch.
+
+    Parameters
+    ----------
+    maps : mapping of str to ResponseMap
+        One per type.
+
+    Examples
+    --------
+    `response["RA"].spikes` are the spikes of the RA afferents, `for name in response` goes through the types.
+    """
+
+    maps: Mapping[str, ResponseMap]
+
+    def __getitem__(self, name: str) -> ResponseMap:
+        if name not in self.maps:
+            raise InputError(f"type must be one of {', '.join(self.maps)}: got {name!r}.")
+        return self.maps[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.maps)
+
+    def __len__(self) -> int:
+        return len(self.maps)
+
+    @property
+    def spikes(self) -> SpikeTrains:
+        """Spikes of all afferents, type after type."""
+        return SpikeTrains.joined([each.spikes for each in self.maps.values()])
+
+    @property
+    def types(self) -> np.ndarray:
+        """Type of each of these afferents, (n_afferents,)."""
+        return np.repeat(list(self.maps), [len(each.spikes) for each in self.maps.values()])
+
+    @property
+    def positions_mm(self) -> FloatArray:
+        """Position of each of these afferents, (n_afferents, 2 or 3). [mm]"""
+        return np.concatenate([each.positions_mm for each in self.maps.values()])
+
+
+@dataclass(frozen=True)
+class MixedPopulation:
+    """Populations of several types in the same skin.
+
+    Parameters
+    ----------
+    parts : mapping of str to Population
+        One per type, by any name.
+
+    Raises
+    ------
+    InputError
+        If there is no part, or one is not a `Population`.
+
+    Examples
+    --------
+    >>> from fingerpad.core.regions import Ellipse
+    >>> pad = Ellipse(5.0, 5.0, centre_mm=(17.37, 0.0))
+    >>> population = MixedPopulation.at_densities(pad, seed=1)
+    >>> {name: len(part) for name, part in population.parts.items()}
+    {'SAI': 55, 'RA': 110, 'PC': 16, 'SAII': 8}
+    """
+
+    parts: Mapping[str, Population]
+
+    def __post_init__(self) -> None:
+        if not self.parts:
+            raise InputError("MixedPopulation needs at least one Population: got none.")
+        for name, part in self.parts.items():
+            if not isinstance(part, Population):
+                raise InputError(f"parts[{name!r}] must be a Population: got {part!r}.")
+        object.__setattr__(self, "parts", MappingProxyType(dict(self.parts)))
+
+    def __len__(self) -> int:
+        return sum(len(part) for part in self.parts.values())
+
+    @classmethod
+    def at_densities(
+        cls,
+        region: Region,
+        densities_per_cm2: Mapping[str, float] = PUBLISHED_DENSITIES,
+        afferents: Mapping[str, AnyAfferent] | None = None,
+        place: Place | None = None,
+        spread: float = 0.0,
+        seed: int = 0,
+    ) -> MixedPopulation:
+        """Place afferents of each type at random, evenly, at a density each.
+
+        Parameters
+        ----------
+        region : Region
+            Part of a plane, from `fingerpad.core.regions` or `UnrolledSkin.pad`.
+        densities_per_cm2 : mapping of str to float, optional
+            Density of each type; the published ones by default. A type that is left out has no afferents.
+            [1/cm2]
+        afferents : mapping of str to AnyAfferent, optional
+            Afferents of types whose parameters are not the default ones, or of types of one's own.
+        place : callable, optional
+            From the plane to points of the skin, as in `Population.of_layout`.
+        spread : float, optional
+            Standard deviation of the logarithm of the sensitivity, as in `sensitivities`; 0 for equal ones.
+        seed : int, optional
+            Seed of positions and sensitivities. Each type has random numbers of its own.
+
+        Returns
+        -------
+        MixedPopulation
+
+        Raises
+        ------
+        InputError
+            If a type is unknown and has no afferent, a density is not positive, or none is given.
+
+        Examples
+        --------
+        >>> from fingerpad.core.regions import Rectangle
+        >>> square = Rectangle(10.0, 10.0, centre_mm=(17.0, 0.0))
+        >>> len(MixedPopulation.at_densities(square, {"RA": 140.0, "PC": 20.0}))
+        160
+        """
+        known = types_of_afferents() | dict(afferents or {})
+        whole("seed", seed, 0)
+        parts = {}
+        for number, (name, density) in enumerate(densities_per_cm2.items()):
+            if name not in known:
+                raise InputError(
+                    f"densities_per_cm2 has type {name!r} without an afferent: the types are "
+                    f"{', '.join(known)}; give one in afferents={{{name!r}: ...}}."
+                )
+            positive(f"densities_per_cm2[{name!r}] of a type that is not left out", density, "1/cm2")
+            afferent = checked_afferent(known[name])
+            layout = poisson_disc(region, density, seed=_seed_of(seed, number))
+            unequal = sensitivities(len(layout), spread, _seed_of(seed, number)) if spread else None
+            parts[name] = Population.of_layout(layout, place, afferent, unequal)
+        return cls(parts)
+
+    def respond(
+        self, skin: Skin, dynamic_window_ms: Window | None = None, static_window_ms: Window | None = None
+    ) -> MixedResponse:
+        """Sample the skin at every afferent and simulate all of them.
+
+        Parameters
+        ----------
+        skin, dynamic_window_ms, static_window_ms
+            As in `Population.respond`.
+
+        Returns
+        -------
+        MixedResponse
+
+        Raises
+        ------
+        InputError
+            As `Population.respond`.
+        """
+        windows = dynamic_window_ms, static_window_ms
+        return MixedResponse(
+            MappingProxyType({name: part.respond(skin, *windows) for name, part in self.parts.items()})
+        )
+
+
+def _seed_of(seed: int, number: int) -> int:
+    """Seed of one type, so that one more type leaves the others where they are."""
+    return int(np.random.SeedSequence([seed, number]).generate_state(1)[0])

@@ -1,0 +1,137 @@
+"""Tuning curve of an afferent: the amplitude of a vibration at which it fires once per cycle.
+
+A small vibration on a hold changes the quantities at an end organ in proportion to its amplitude. Skin hardly
+relaxes within a cycle of 1 Hz or more, so that one press with one small step gives this proportion for all
+frequencies.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import FloatArray, float_array, not_negative, positive
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SedTraces
+from fingerpad.core.units import MS_PER_S
+from fingerpad.neuron.afferent import AnyAfferent
+
+SAMPLES_PER_CYCLE = 40
+CYCLES, COUNTED_CYCLES = 30, 20
+"""Cycles of the vibration, and those at its end in which impulses are counted."""
+
+SETTLING_MS = 1000.0
+"""Hold before the vibration. [ms]"""
+
+_RANGE_UM = (1e-2, 1e4)
+_AMPLITUDES, _ROUNDS = 41, 3
+
+
+def vibration(
+    frequency_hz: float, amplitudes_um: ArrayLike, per_um: float, hold: float, quantity: str
+) -> SedTraces:
+    """Traces of one quantity under a vibration on a hold, a column per amplitude; none falls below 0.
+
+    Parameters
+    ----------
+    frequency_hz : float
+        Frequency. [Hz]
+    amplitudes_um : array_like (n_amplitudes,)
+        From the middle to a peak. [µm]
+    per_um : float
+        Change of the quantity per indentation. [unit of the quantity per µm]
+    hold : float
+        Quantity in the hold.
+    quantity : str
+        Its name.
+
+    Returns
+    -------
+    SedTraces
+
+    Examples
+    --------
+    >>> vibration(100.0, [1.0, 10.0], 0.02, 5.0, "compressive_stress").sed_kpa[-31].round(3).tolist()
+    [5.02, 5.2]
+    """
+    period_ms = MS_PER_S / positive("frequency_hz", frequency_hz, "Hz")
+    phase = np.arange(CYCLES * SAMPLES_PER_CYCLE + 1) / SAMPLES_PER_CYCLE
+    wave = np.outer(np.sin(2.0 * np.pi * phase), per_um * float_array("amplitudes_um", amplitudes_um, 1))
+    times_ms = np.append(0.0, SETTLING_MS + period_ms * phase)
+    values = np.maximum(not_negative("hold", hold) + np.vstack([0.0 * wave[:1], wave]), 0.0)
+    return SedTraces(
+        times_ms,
+        values,
+        kinks_ms=np.array([SETTLING_MS]),
+        dynamic_quantity=quantity,
+        static_quantity=quantity,
+    )
+
+
+def impulses_per_cycle(afferent: AnyAfferent, traces: SedTraces) -> FloatArray:
+    """Impulses in the counted cycles of `vibration`, over their number, (n_amplitudes,)."""
+    end_ms = float(traces.times_ms[-1])
+    from_ms = end_ms - (end_ms - SETTLING_MS) * COUNTED_CYCLES / CYCLES
+    spikes = afferent.spikes(traces)
+    counts = [np.count_nonzero(spikes[site] > from_ms) for site in range(traces.n_sites)]
+    return np.array(counts) / COUNTED_CYCLES
+
+
+def tuning_curve(
+    afferent: AnyAfferent, frequencies_hz: ArrayLike, per_um: float, hold: float = 0.0, impulses: float = 1.0
+) -> FloatArray:
+    """Smallest amplitude at which an afferent fires a given number of impulses per cycle.
+
+    Parameters
+    ----------
+    afferent : AnyAfferent
+        One that follows a single quantity.
+    frequencies_hz : array_like (n_frequencies,)
+        Frequencies. [Hz]
+    per_um : float
+        Change of its quantity per indentation. [unit of the quantity per µm]
+    hold : float, optional
+        Its quantity in the hold.
+    impulses : float, optional
+        Impulses per cycle; 1 is entrainment, if they are equally distributed.
+
+    Returns
+    -------
+    array (n_frequencies,)
+        From the middle to a peak, within 1 %; NaN where 10 mm do not suffice. [µm]
+
+    Raises
+    ------
+    InputError
+        If the afferent follows two quantities, or a number is not positive.
+
+    Examples
+    --------
+    Compressive stress changes by 20 Pa per µm under a punch of 1 mm, about 10 kPa:
+
+    >>> from fingerpad.neuron.afferent_types import RA
+    >>> tuning_curve(RA(), [5.0, 40.0, 200.0], per_um=0.02, hold=10.0).round().tolist()
+    [50.0, 12.0, 56.0]
+    """
+    if afferent.dynamic_quantity != afferent.static_quantity:
+        raise InputError(
+            "tuning_curve needs an afferent that follows one quantity: got "
+            f"{afferent.dynamic_quantity!r} and {afferent.static_quantity!r}."
+        )
+    positive("per_um", per_um)
+    positive("impulses", impulses)
+
+    def threshold_um(frequency_hz: float) -> float:
+        low, high = _RANGE_UM
+        for _ in range(_ROUNDS):
+            amplitudes = np.geomspace(low, high, _AMPLITUDES)
+            traces = vibration(frequency_hz, amplitudes, per_um, hold, afferent.static_quantity)
+            enough = impulses_per_cycle(afferent, traces) >= impulses
+            if not enough.any():
+                return float("nan")
+            first = int(np.argmax(enough))
+            low, high = amplitudes[max(first - 1, 0)], amplitudes[first]
+        return float(high)
+
+    frequencies = float_array("frequencies_hz", frequencies_hz, 1)
+    return np.array([threshold_um(frequency) for frequency in frequencies.tolist()])

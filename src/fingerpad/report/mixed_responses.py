@@ -1,0 +1,89 @@
+"""Figure of a mixed population under touches: a raster of all spikes, and a map of those that fire."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import ResponseMap
+from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure
+
+ROW_IN = (9.5, 3.4)
+STYLES = ((BLUE, "o"), (ORANGE, "^"), (BLACK, "s"), (GREEN, "D"), (GREY, "v"))
+"""Colour and marker of the types, in their order."""
+
+LARGEST_MARK, SILENT_MARK = 60.0, 4.0
+"""Area of the mark of the most active afferent of a type, and of a silent one. [points²]"""
+
+
+def draw_mixed_responses(touches: Mapping[str, Mapping[str, ResponseMap]]) -> Figure:
+    """Draw the responses to touches, one per row: all spikes over time, and where the afferents lie.
+
+    A raster has a band per type, in which afferents are sorted by the distance from the middle. In the map
+    the area of a mark grows with the number of spikes over the largest of its type; silent ones are dots.
+
+    Parameters
+    ----------
+    touches : mapping of str to mapping of str to ResponseMap
+        Responses by the name of the touch and by type, such as `MixedResponse.maps`.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InputError
+        If there is no touch.
+    """
+    if not touches:
+        raise InputError("touches must hold at least one response: it is empty.")
+    width, height = ROW_IN
+    figure = new_figure(width, height * len(touches))
+    grid = figure.subplots(len(touches), 2, squeeze=False, width_ratios=(1.7, 1.0))
+    for (raster, places), (name, maps) in zip(grid, touches.items(), strict=True):
+        raster.set_title(name)
+        _raster(raster, maps)
+        _map(places, maps)
+    grid[0, 1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return figure
+
+
+def _raster(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
+    for band, (response, (colour, _)) in enumerate(zip(maps.values(), _styles(len(maps)), strict=True)):
+        middle = response.positions_mm.mean(axis=0)
+        order = np.argsort(np.linalg.norm(response.positions_mm - middle, axis=1))
+        row_of = np.empty(order.size)
+        row_of[order] = band + (0.5 + np.arange(order.size)) / order.size
+        rows = np.repeat(row_of, np.diff(response.spikes.offsets))
+        axes.plot(
+            response.spikes.times_ms, rows, "|", color=colour, markersize=2.0, markeredgewidth=0.6,
+        )  # fmt: skip
+        axes.axhline(band, color=GREY, linewidth=0.5)
+    labels = [f"{name}\n{len(response.spikes)}" for name, response in maps.items()]
+    axes.set(xlabel="time [ms]", ylabel="afferents", ylim=(len(maps), 0.0))
+    axes.set_yticks(0.5 + np.arange(len(maps)), labels)
+    axes.grid(visible=False)
+
+
+def _map(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
+    for (name, response), (colour, marker) in zip(maps.items(), _styles(len(maps)), strict=True):
+        counts = np.diff(response.spikes.offsets)
+        x, z = response.positions_mm[:, 0], response.positions_mm[:, -1]
+        axes.scatter(x[counts == 0], z[counts == 0], SILENT_MARK, color=colour, marker=".", linewidths=0.0)
+        fires = counts > 0
+        area = SILENT_MARK + LARGEST_MARK * counts[fires] / max(counts.max(initial=1), 1)
+        axes.scatter(
+            x[fires], z[fires], area, facecolors="none", edgecolors=colour, marker=marker, linewidths=0.9,
+            label=name,
+        )  # fmt: skip
+    axes.set(xlabel="x, distal [mm]", ylabel="z [mm]", aspect="equal")
+
+
+def _styles(count: int) -> list[tuple[str, Any]]:
+    return [STYLES[number % len(STYLES)] for number in range(count)]

@@ -1,0 +1,269 @@
+"""RA, PC, SAII and own afferents, end organs and mixed populations."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import fingerpad as fp
+from fingerpad.core.regions import Rectangle
+from fingerpad.data import afferents as published
+from fingerpad.neuron.band_pass import BandPass
+from fingerpad.neuron.lif import LeakyIntegrateAndFire
+from fingerpad.neuron.population import sensitivities
+from fingerpad.neuron.transduction import drive
+from fingerpad.neuron.tuning import impulses_per_cycle, tuning_curve, vibration
+
+PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA = 0.0200, 10.4
+"""Compressive stress below a 1 mm punch on a hold of 0.5 mm (docs/afferents.md, table of the probe)."""
+
+FREQUENCIES_HZ = np.array(published.TUNING_FREQUENCIES.value)
+SKIN_QUANTITIES = {"SAI": "compressive_stress", "RA": "compressive_stress", "PC": "skin_displacement"}
+
+
+def traces(quantity: str, times_ms: object, values: object, kinks_ms: object = ()) -> fp.SedTraces:
+    columns = np.array(values, np.float64).reshape(len(np.array(times_ms)), -1)
+    return fp.SedTraces(
+        times_ms, columns, np.array(kinks_ms), dynamic_quantity=quantity, static_quantity=quantity
+    )
+
+
+def press(quantity: str, height: float, ramp_ms: float = 50.0) -> fp.SedTraces:
+    return traces(quantity, [0.0, ramp_ms, 1000.0], [0.0, height, height], [ramp_ms])
+
+
+class Pressed:
+    """Every quantity rises in 50 ms to a height that falls with the distance from a point, and stays."""
+
+    def __init__(self, heights: dict[str, float]) -> None:
+        self.heights = heights
+
+    def sed(
+        self, sites: object, dynamic_quantity: str = "stored", static_quantity: str = "stored"
+    ) -> fp.SedTraces:
+        places = np.array(sites)
+        assert dynamic_quantity == static_quantity
+        away = np.hypot(places[:, 0] - 17.0, places[:, -1])
+        peak = self.heights[dynamic_quantity] * np.exp(-((away / 3.0) ** 2))
+        return traces(dynamic_quantity, [0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 1.0], peak), [50.0])
+
+
+FINGER = Pressed({"compressive_stress": 15.0, "skin_displacement": 1.0, "skin_stretch": 0.1, "stored": 2.0})
+SQUARE = Rectangle(10.0, 10.0, centre_mm=(17.0, 0.0))
+
+
+@pytest.mark.parametrize(("rise", "fall"), [(1, 1), (2, 2), (3, 1)])
+@pytest.mark.parametrize("frequency_hz", [10.0, 100.0, 400.0])
+def test_the_band_pass_has_the_gain_of_its_transfer_function(
+    rise: int, fall: int, frequency_hz: float
+) -> None:
+    band = BandPass(120.0, rise, fall)
+    times_ms = np.arange(0.0, 400.0, 0.05)
+    wave = 5.0 + np.sin(2e-3 * np.pi * frequency_hz * times_ms)
+    at_ms, passed = band.of(drive(traces("stored", times_ms, wave), pieces=1))
+    settled = passed[at_ms > 200.0, 0]
+    assert_allclose(settled.max(), band.gain(np.array([frequency_hz]))[0], rtol=0.01)
+    assert_allclose(settled.min(), -band.gain(np.array([frequency_hz]))[0], rtol=0.01)
+
+
+def test_the_band_pass_of_a_step_of_speed_is_the_closed_form() -> None:
+    band = BandPass(50.0, 1, 1)
+    tau = band.time_constant_ms
+    at_ms, passed = band.of(traces("stored", [0.0, 40.0], [0.0, 8.0]))
+    x = at_ms / tau
+    # s tau / (1 + s tau)^2 of a ramp of 0.2 per ms: 0.2 tau (1 - (1 + x) e^-x).
+    assert_allclose(passed[:, 0], 0.2 * tau * (1.0 - (1.0 + x) * np.exp(-x)), atol=0.004 * 0.2 * tau)
+
+
+def test_the_band_pass_does_not_depend_on_the_number_of_sites() -> None:
+    many = traces("stored", [0.0, 30.0, 60.0], np.outer([0.0, 1.0, 0.5], np.linspace(0.0, 2.0, 1500)))
+    _, passed = BandPass(80.0, 1, 2).of(many)
+    for site in (0, 700, 1499):
+        assert_array_equal(passed[:, [site]], BandPass(80.0, 1, 2).of(many.part(slice(site, site + 1)))[1])
+
+
+@pytest.mark.parametrize(
+    ("afferent", "first_hz", "observed_um", "per_um", "hold"),
+    [
+        (fp.RA(), 0, published.RA_TUNING, PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA),
+        (fp.PC(), 3, published.PC_TUNING, 1e-3, 0.46),
+    ],
+)
+def test_tuning_curves_lie_within_a_factor_of_two_of_the_published_ones(
+    afferent: fp.RA, first_hz: int, observed_um: object, per_um: float, hold: float
+) -> None:
+    found = tuning_curve(afferent, FREQUENCIES_HZ[first_hz:], per_um, hold)
+    ratio = found / np.array(observed_um.value)
+    assert ratio.min() > 0.5
+    assert ratio.max() < 2.0
+
+
+def test_the_best_frequencies_are_those_of_the_recordings() -> None:
+    low, high, pacinian = published.BEST_FREQUENCIES.value
+    ra = tuning_curve(fp.RA(), FREQUENCIES_HZ, PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA)
+    pc = tuning_curve(fp.PC(), FREQUENCIES_HZ, 1e-3, 0.46)
+    assert low <= FREQUENCIES_HZ[np.argmin(ra)] <= high
+    assert FREQUENCIES_HZ[np.argmin(pc)] > pacinian
+    assert pc[FREQUENCIES_HZ == 200.0] < 0.1 * ra[FREQUENCIES_HZ == 200.0]
+    assert pc[FREQUENCIES_HZ == 10.0] > 2.0 * ra[FREQUENCIES_HZ == 10.0]
+
+
+def test_thresholds_of_a_curve_separate_silence_from_entrainment() -> None:
+    (threshold_um,) = tuning_curve(fp.RA(), [40.0], PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA)
+    beside = vibration(
+        40.0, threshold_um * np.array([0.98, 1.0]), PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA, "compressive_stress"
+    )
+    below, above = impulses_per_cycle(fp.RA(), beside)
+    assert below < 1.0 <= above
+
+
+@pytest.mark.parametrize(("afferent", "height"), [(fp.RA(), 15.0), (fp.PC(), 1.0)])
+def test_ra_and_pc_respond_to_a_press_and_are_silent_in_its_hold(afferent: fp.RA, height: float) -> None:
+    (spikes,) = afferent.spikes(press(afferent.quantity, height))
+    assert spikes.size > 1
+    assert spikes[-1] < 100.0
+
+
+def test_ra_rates_grow_with_the_speed_of_the_press() -> None:
+    counts = [
+        fp.RA().spikes(press("compressive_stress", 10.0, ramp_ms))[0].size / ramp_ms
+        for ramp_ms in (20.0, 80.0)
+    ]
+    assert counts[0] > 1.5 * counts[1]
+
+
+def test_retraction_alone_elicits_spikes_by_its_share() -> None:
+    released = traces(
+        "compressive_stress", [0.0, 500.0, 550.0, 900.0], [10.0, 10.0, 0.0, 0.0], [500.0, 550.0]
+    )
+    assert fp.RA().spikes(released)[0].size > 0
+    assert replace(fp.RA(), retraction=0.0).spikes(released)[0].size == 0
+
+
+def test_saii_fires_regularly_while_the_skin_is_stretched() -> None:
+    (spikes,) = fp.SAII().spikes(press("skin_stretch", 0.06))
+    intervals = np.diff(spikes[spikes > 600.0])
+    assert intervals.size > 5
+    assert np.ptp(intervals) < 1e-6
+    assert fp.SAII().spikes(press("skin_stretch", 0.005))[0].size == 0
+
+
+def test_an_own_afferent_returns_current_or_spikes() -> None:
+    membrane = LeakyIntegrateAndFire(20.0, 1e-6, 5.0, 1.0)
+
+    def current(sed: fp.SedTraces) -> fp.CurrentTraces:
+        return fp.CurrentTraces(sed.times_ms, 1e-6 * sed.sed_kpa)
+
+    own = fp.OwnAfferent(current, membrane)
+    sed = press("stored", 2.0)
+    assert_array_equal(own.spikes(sed)[0], membrane.spikes(current(sed))[0])
+    response = fp.Population.grid(afferent=own).respond(FINGER)
+    assert (response.static_rate_hz > 0.0).any()
+
+
+def test_one_end_organ_is_the_afferent_itself_and_two_are_their_weighted_sum() -> None:
+    layout = fp.Population.grid(rows=2, columns=3).positions_mm
+    alone = fp.Population(layout, 1.0, fp.RA()).respond(FINGER)
+    single = fp.Population(layout, 1.0, fp.RA(), ends=fp.EndOrgans(layout[:, None])).respond(FINGER)
+    assert_array_equal(alone.spikes.times_ms, single.spikes.times_ms)
+    far = np.stack([layout, layout + np.array([100.0, 0.0])], axis=1)
+    halved = fp.Population(layout, 1.0, fp.RA(), ends=fp.EndOrgans(far, [0.5, 0.5])).respond(FINGER)
+    half = fp.Population(layout, 1.0, fp.RA(), sensitivity=np.full(6, 0.5)).respond(FINGER)
+    assert_allclose(halved.spikes.times_ms, half.spikes.times_ms, rtol=1e-12)
+
+
+def test_scattered_end_organs_lie_within_reach_and_depend_on_seed_and_number_only() -> None:
+    places = np.zeros((400, 2))
+    ends = fp.EndOrgans.scattered(places, count=6, reach_mm=1.5, seed=3)
+    away = np.linalg.norm(ends.positions_mm, axis=2)
+    assert away.max() < 1.5
+    assert (away > 1.5 / np.sqrt(2.0)).mean() == pytest.approx(0.5, abs=0.03)
+    assert_array_equal(ends.positions_mm[:5], fp.EndOrgans.scattered(places[:5], 6, 1.5, 3).positions_mm)
+    lifted = fp.EndOrgans.scattered(places[:2], 6, 1.5, 3, place=lambda flat: np.insert(flat, 1, 7.0, axis=1))
+    assert_array_equal(lifted.positions_mm[..., [0, 2]], ends.positions_mm[:2])
+
+
+def test_a_mixed_population_has_the_published_densities_and_one_response() -> None:
+    population = fp.MixedPopulation.at_densities(SQUARE, seed=4)
+    assert {name: len(part) for name, part in population.parts.items()} == {
+        "SAI": 70,
+        "RA": 140,
+        "PC": 21,
+        "SAII": 10,
+    }
+    assert sum(published.DENSITIES.value) == published.DENSITY_TOTAL.value == len(population)
+    response = population.respond(FINGER)
+    assert list(response) == ["SAI", "RA", "PC", "SAII"]
+    assert len(response) == 4
+    assert len(response.spikes) == response.types.size == len(response.positions_mm) == len(population)
+    assert_array_equal(response.spikes[70], response["RA"].spikes[0])
+    assert (response["SAI"].static_rate_hz > 0.0).any()
+    assert not response["RA"].static_rate_hz.any()
+    alone = fp.MixedPopulation.at_densities(SQUARE, {"SAI": 70.0}, seed=4).respond(FINGER)
+    assert_array_equal(alone["SAI"].spikes.times_ms, response["SAI"].spikes.times_ms)
+
+
+def test_a_spread_makes_afferents_of_a_type_unequal() -> None:
+    population = fp.MixedPopulation.at_densities(SQUARE, {"RA": 140.0}, spread=0.4, seed=4)
+    factors = population.parts["RA"].sensitivity
+    assert factors is not None
+    assert np.log(factors).std() == pytest.approx(0.4, abs=0.06)
+    assert not np.array_equal(factors, sensitivities(140, 0.4, seed=4))
+
+
+ENDS = np.array([[[0.0, 0.0], [1.0, 0.0]]])
+ENERGY = press("stored", 1.0)
+SPARSE = fp.MixedPopulation.at_densities
+
+
+BAD: list[tuple[Callable[[], object], str]] = [
+    (lambda: fp.RA(threshold=0.0), "threshold must be greater than 0"),
+    (lambda: fp.RA(retraction=1.5), "retraction must lie within 0 ... 1: got 1.5"),
+    (lambda: fp.RA(rise=0), "rise must be a whole number of at least 1"),
+    (lambda: fp.PC(corner_hz=-1.0), "corner_hz must be greater than 0"),
+    (lambda: fp.PC(membrane_ms=0.0), "time_constant_ms must be greater than 0"),
+    (lambda: fp.RA().spikes(ENERGY), "needs 'compressive_stress': got traces of 'stored'"),
+    (lambda: fp.OwnAfferent("sum"), "respond must be a function of SedTraces: got 'sum'"),
+    (lambda: fp.OwnAfferent(lambda sed: sed).spikes(ENERGY), "respond must return .* got SedTraces"),
+    (
+        lambda: fp.OwnAfferent(lambda sed: fp.SpikeTrains.from_lists([])).spikes(ENERGY),
+        "respond must return .* 1 in all: got 0 trains",
+    ),
+    (
+        lambda: fp.OwnAfferent(lambda sed: fp.CurrentTraces(sed.times_ms, sed.sed_kpa)).spikes(ENERGY),
+        "needs a membrane",
+    ),
+    (lambda: fp.EndOrgans(ENDS, [0.5, 0.6]), "must sum to 1: got 1.1"),
+    (lambda: fp.EndOrgans(ENDS, [1.5, -0.5]), "must not be negative: the smallest is -0.5"),
+    (lambda: fp.EndOrgans(ENDS, [1.0]), "one number per end organ, 2"),
+    (lambda: fp.EndOrgans([[0.0, 0.0]]), "positions_mm must"),
+    (lambda: fp.EndOrgans(np.zeros((1, 0, 2))), "afferents by end organs"),
+    (lambda: fp.EndOrgans.scattered([[0.0, 0.0]], 0, 1.0, 1), "count must be a whole number of at least 1"),
+    (
+        lambda: fp.Population([[17.0, 0.0]], 1.0, ends=fp.EndOrgans(np.zeros((2, 1, 2)))),
+        "ends needs one row per afferent, 1: got 2",
+    ),
+    (lambda: fp.Population([[17.0, 0.0]], 1.0, fp.RA), "afferent must be one such as"),
+    (lambda: fp.Population([[17.0, 0.0]], 1.0, None), "afferent must be one such as"),
+    (lambda: fp.MixedPopulation({}), "at least one Population"),
+    (lambda: fp.MixedPopulation({"RA": fp.RA()}), r"parts\['RA'\] must be a Population"),
+    (lambda: SPARSE(SQUARE, {"RA": 0.0}), r"densities_per_cm2\['RA'\].*greater than 0"),
+    (lambda: SPARSE(SQUARE, {"RA": -1.0}), r"densities_per_cm2\['RA'\].*greater than 0"),
+    (lambda: SPARSE(SQUARE, {"FA": 10.0}), "type 'FA' without an afferent"),
+    (lambda: SPARSE(SQUARE, {}), "at least one Population"),
+    (lambda: SPARSE(SQUARE, {"X": 50.0}, {"X": None}), "afferent must be one such as"),
+    (lambda: SPARSE(SQUARE, seed=-1), "seed must be a whole number"),
+    (lambda: SPARSE(SQUARE, {"RA": 9.0}).respond(FINGER)["SAI"], "must be one of RA: got 'SAI'"),
+    (lambda: tuning_curve(fp.RA(), [0.0], 0.02), "frequency_hz must be greater than 0"),
+    (lambda: tuning_curve(fp.Afferent(static_quantity="stored"), [1.0], 0.02), "follows one quantity"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("make", "said"), BAD)
+def test_bad_input_is_refused_in_one_sentence(make: Callable[[], object], said: str) -> None:
+    with pytest.raises(fp.InputError, match=said) as refused:
+        make()
+    assert "\n" not in str(refused.value)
+    assert str(refused.value).endswith(".")
