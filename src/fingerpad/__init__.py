@@ -39,8 +39,10 @@ if TYPE_CHECKING:
     from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
     from fingerpad.geometry.embossed import Embossed, embossed_text
     from fingerpad.geometry.fingertip import Fingertip
+    from fingerpad.geometry.free_mesh import FingerMesh
     from fingerpad.geometry.grading import Grading
     from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+    from fingerpad.geometry.mesh_files import read_finger
     from fingerpad.geometry.motion import Cycles, ForceRampAndHold, RampAndHold
     from fingerpad.geometry.motions import chirp, repeated, sine, staircase, stroke
     from fingerpad.geometry.sampled_motions import reduced, sampled
@@ -84,6 +86,7 @@ __all__ = [
     "Embossed",
     "EndOrgans",
     "Energy",
+    "FingerMesh",
     "FingerpadError",
     "Fingertip",
     "FlatPunch",
@@ -130,6 +133,7 @@ __all__ = [
     "height_surface",
     "indent",
     "named_tissues",
+    "read_finger",
     "read_height_map",
     "read_surface",
     "read_touch",
@@ -174,6 +178,8 @@ _HOMES = {
         "StoreError",
     ),
     "geometry.fingertip": ("Fingertip",),
+    "geometry.free_mesh": ("FingerMesh",),
+    "geometry.mesh_files": ("read_finger",),
     "geometry.grading": ("Grading",),
     "skin.indentation": ("Touch", "indent", "touch_of"),
     "geometry.indenters": ("Bar", "Cylinder", "FlatPunch", "Indenter", "Line", "Plate", "Sphere"),

@@ -51,10 +51,11 @@ def known_keywords(function: Callable[_Given, _Made]) -> Callable[_Given, _Made]
     fingerpad.core.errors.InputError: area_mm2 has no heigth_mm: did you mean height_mm?
     """
     names = tuple(inspect.signature(function).parameters)
+    owner = function.__qualname__.rpartition("<locals>.")[2]
 
     @wraps(function)
     def checked(*args: _Given.args, **given: _Given.kwargs) -> _Made:
-        _refuse_unknown(given, names, function.__name__)
+        _refuse_unknown(given, names, owner)
         return function(*args, **given)
 
     return checked

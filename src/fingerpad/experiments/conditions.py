@@ -8,7 +8,7 @@ import numpy as np
 
 from fingerpad.core.checks import one_of, whole
 from fingerpad.data.tissues import DEFAULT_TISSUES
-from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Indenter, Sphere
@@ -30,6 +30,17 @@ an edge looks the same from shift to shift. [mm]"""
 
 SPHERE_REACH_MM = 2.8
 """Fine zone about the spheres, along and across: the contact and the population's outermost receptor. [mm]"""
+
+
+def skin_tilt_deg(finger: Finger) -> float:
+    """Tilt at which an indenter presses along the inward normal of the middle of the pad. [degrees]"""
+    x, y, _ = np.ravel(finger.skin_normal(finger.skin_point(*finger.contact_mm)))
+    return float(np.rad2deg(np.arctan2(x, -y)))
+
+
+def straight_tilt_deg(finger: Finger, indenter: Indenter) -> float:
+    """Tilt of an indenter that presses straight: none of a wire, which grips the skin. [degrees]"""
+    return 0.0 if indenter.grips else skin_tilt_deg(finger)
 
 
 @dataclass(frozen=True)
@@ -77,8 +88,7 @@ class Conditions:
     @property
     def skin_tilt_deg(self) -> float:
         """Tilt at which an indenter presses along the inward normal of the skin at the receptor. [degrees]"""
-        x, y, _ = np.ravel(self.finger.skin_normal(self.finger.skin_point(self.receptor_x_mm, 0.0)))
-        return float(np.rad2deg(np.arctan2(x, -y)))
+        return skin_tilt_deg(self.finger)
 
     def touch(
         self,
@@ -125,8 +135,8 @@ class Conditions:
         )
 
     def tilt_deg(self, indenter: Indenter) -> float:
-        """Tilt of an indenter that presses straight: none of a wire, which grips the skin. [degrees]"""
-        return 0.0 if indenter.grips else self.skin_tilt_deg
+        """Tilt of an indenter that presses straight, see `straight_tilt_deg`. [degrees]"""
+        return straight_tilt_deg(self.finger, indenter)
 
     def deflection_grading(self, indenter: Indenter) -> Grading:
         """Mesh of the skin deflection study: fine about the indenter."""

@@ -49,6 +49,10 @@ def abaqus_deck(job: Job) -> str:
     for layer, name in job.layer_names.items():
         lines += _layer(job, layer, name)
     lines += cards.support_sets(job)
+    # Not needed by Abaqus: with these sets `read_finger` reads the deck as a finger.
+    for name in ("skin", "bone", "nail"):
+        numbers = getattr(job.mesh, f"{name}_nodes") + 1
+        lines += cards.node_set(name.upper(), numbers) if numbers.size else []
     lines += _skin(job)
     lines += _rigid_surface(job, reference)
     lines += [f"*SURFACE INTERACTION, NAME={CONTACT}", "1.", "*FRICTION", cards.digits(job.friction),

@@ -349,15 +349,12 @@ def _field_attributes(field: Field) -> Attributes:
 
 def _mesh_values(mesh: Mesh) -> dict[str, np.ndarray]:
     """Values of `MESH_PARTS`."""
-    grid = mesh.skin_grid
-    faces = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
-    outermost = np.arange(len(mesh.elements)).reshape(mesh.shape)[:, :, 0].ravel()
     numbers = {
         "element_nodes": mesh.elements,
         "layer": mesh.layer,
         "skin_node": mesh.skin_nodes,
-        "facet_nodes": faces,
-        "facet_element": outermost,
+        "facet_nodes": mesh.skin_faces,
+        "facet_element": mesh.skin_elements,
         "sheet": mesh.living_epidermis.ravel(),
         "bone": mesh.bone_nodes,
         "nail": mesh.nail_nodes,

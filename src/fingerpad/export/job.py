@@ -191,8 +191,15 @@ class Job:
     def touching_elements(self) -> IntArray:
         """Elements whose skin face may come to touch the indenter; all of an element that is gripped."""
         mesh = self.mesh
-        top = np.arange(len(mesh.elements)).reshape(mesh.shape)[:, :, 0].ravel()
-        faces = mesh.elements[top, 4:]
+        top, faces = mesh.skin_elements, mesh.skin_faces
+        strange = np.flatnonzero(
+            (np.sort(faces, axis=1) != np.sort(mesh.elements[top, 4:], axis=1)).any(axis=1)
+        )
+        if strange.size:
+            raise InputError(
+                f"A deck needs skin on one face of an element, and a triangle of a wedge: element "
+                f"{top[strange[0]]} has another; export vtu, csv or npz."
+            )
         local = self._local(mesh.nodes_mm[faces].reshape(-1, 3)).reshape(*faces.shape, 3)
         if self.indenter.grips:
             may = self.indenter.may_touch(local.reshape(-1, 3)).reshape(faces.shape).all(axis=1)

@@ -316,6 +316,8 @@ class _View:
             )
             plotter.add_mesh(body.extract_surface(algorithm="dataset_surface"), scalars="shown", **shades)
             plotter.add_mesh(self._bone(points), color=BONE, ambient=0.4)
+        if not self.data["nail"].size:
+            return
         nail = self._nail(points)
         plotter.add_mesh(self._mirrored(nail) if self._half else nail, color=NAIL, ambient=0.3)
         if self._half and self.on_skin:
@@ -464,6 +466,8 @@ class _View:
         if not self.on_skin:
             for name, beside in (("bone", [0.0, 0.0, 0.0]), ("nail", [0.0, 1.8, 0.0])):
                 nodes = data["node_mm"].values[data[name].values]
+                if not len(nodes):
+                    continue  # a mesh of one's own may lack it
                 places[name] = 0.5 * (nodes.min(axis=0) + nodes.max(axis=0)) * [1.0, 1.0, 0.0] + beside
         if "object_tip_mm" in data and "indenter" in data.attrs:
             name = _named(data.attrs["indenter"])

@@ -8,10 +8,12 @@ function of s; the level function below is written without the factor s, so it s
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,6 +32,10 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.data import fingers
 from fingerpad.data import fingertip as published
+
+if TYPE_CHECKING:
+    from fingerpad.geometry.grading import Grading
+    from fingerpad.geometry.mesh import Mesh
 
 # Readings have two decimals. Interpolation of this rounding would tilt the skin's normals by degrees. This
 # smoothing moves the profiles by about 0.01 mm; on the pad slopes are accurate to a quarter of a degree.
@@ -117,8 +123,48 @@ class Profile:
         return s * self.over_s(s)[0]
 
 
+class Finger(metaclass=KnownKeywords):
+    """What can be pressed: a `Fingertip` by its outline, or a `FingerMesh` by its mesh."""
+
+    @property
+    @abstractmethod
+    def contact_mm(self) -> tuple[float, float]:
+        """X and z of the middle of the pad, where an indenter presses by default [mm]."""
+
+    @property
+    @abstractmethod
+    def relative_size(self) -> float:
+        """Size over that of the paper's finger, for the size of elements that are made."""
+
+    @property
+    @abstractmethod
+    def layer_depths_mm(self) -> tuple[float, float, float]:
+        """Depth of the lower border of stratum corneum, living epidermis and dermis [mm]."""
+
+    @abstractmethod
+    def skin_point(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
+        """Point of the volar skin at each (x, z), (..., 3); InputError beside the finger [mm]."""
+
+    @abstractmethod
+    def skin_normal(self, points_mm: ArrayLike) -> FloatArray:
+        """Outward unit normal of the skin at its points, (..., 3)."""
+
+    @abstractmethod
+    def depth_available_mm(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
+        """Distance along y from the volar skin at (x, z) to the bone or, beside it, the dorsal skin [mm]."""
+
+    @property
+    def own_mesh(self) -> Mesh | None:
+        """Mesh of a finger that is one."""
+        return None
+
+    def own_grading(self, x_mm: float, z_mm: float) -> Grading | None:
+        """Sizes of the elements that a finger has already, about a place of its skin."""
+        return None
+
+
 @dataclass(frozen=True)
-class Fingertip(metaclass=KnownKeywords):
+class Fingertip(Finger):
     """Outline, layers, bone and nail of a fingertip.
 
     Parameters

@@ -84,6 +84,25 @@ class Mesh:
         through = np.arange(self.shape[2] + 1)
         return self.skin_grid[:, :, None] + through
 
+    @property
+    def is_grid(self) -> bool:
+        """Whether the elements lie in rows along, around and through; a `FreeMesh` has none."""
+        return True
+
+    @cached_property
+    def skin_faces(self) -> IntArray:
+        """Corners of the faces on the skin, (n_faces, 4), counter-clockwise seen from outside.
+
+        A triangle repeats a corner.
+        """
+        grid = self.skin_grid
+        return np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
+
+    @property
+    def skin_elements(self) -> IntArray:
+        """Element of each of `skin_faces`, (n_faces,)."""
+        return np.arange(len(self.elements)).reshape(self.shape)[:, :, 0].ravel()
+
     @cached_property
     def skin_nodes(self) -> IntArray:
         """Nodes of the skin, each once, increasing."""
@@ -104,8 +123,7 @@ class Mesh:
 
         The integral of each node's bilinear shape function over the faces of the mesh.
         """
-        grid = self.skin_grid
-        faces = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
+        faces = self.skin_faces
         area = np.zeros(len(nodes_mm))
         for point in CORNERS[:4, :2] / np.sqrt(3.0):
             signs = CORNERS[:4, :2]

@@ -6,7 +6,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
-from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.fingertip import Finger
 from fingerpad.geometry.motion import Motion
 
 CLEARANCE_TO_BONE = 0.8
@@ -16,12 +16,12 @@ STEP_MM = 0.25
 """Distance between places at which a way along the skin is looked at. [mm]"""
 
 
-def check_path(finger: Fingertip, motion: Motion, at_mm: tuple[float, float]) -> None:
+def check_path(finger: Finger, motion: Motion, at_mm: tuple[float, float]) -> None:
     """Check every place of a motion before anything is pressed.
 
     Parameters
     ----------
-    finger : Fingertip
+    finger : Fingertip or FingerMesh
         The finger.
     motion : Motion
         Depths are checked if it prescribes them.
@@ -36,6 +36,7 @@ def check_path(finger: Fingertip, motion: Motion, at_mm: tuple[float, float]) ->
 
     Examples
     --------
+    >>> from fingerpad.geometry.fingertip import Fingertip
     >>> from fingerpad.geometry.motion import RampAndHold
     >>> check_path(Fingertip(), RampAndHold(depth_mm=9.0), (17.37, 0.0))
     Traceback (most recent call last):
@@ -70,7 +71,7 @@ def check_path(finger: Fingertip, motion: Motion, at_mm: tuple[float, float]) ->
 
 
 def _skin_y_mm(
-    finger: Fingertip, motion: Motion, times_ms: FloatArray, x_mm: FloatArray, z_mm: FloatArray
+    finger: Finger, motion: Motion, times_ms: FloatArray, x_mm: FloatArray, z_mm: FloatArray
 ) -> FloatArray:
     """Return y of the skin at every place, or raise `InputError` that names the first outside. [mm]"""
     try:

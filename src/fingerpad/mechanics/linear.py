@@ -158,7 +158,7 @@ def choose_preconditioner(
             "where a force is within 0.05 % of that of tissue that keeps its volume."
         )
     n_nodes = len(mesh.nodes_mm)
-    shallow = mesh.grid.shape[2] <= MOST_LANES
+    shallow = mesh.is_grid and mesh.grid.shape[2] <= MOST_LANES
     if n_nodes >= MULTIGRID_NODES and shallow and poisson <= MULTIGRID_POISSON + 1e-9:
         multigrid = Multigrid(sparsity, free, mesh.nodes_mm, mesh.grid)
         reason = (
@@ -173,6 +173,11 @@ def choose_preconditioner(
             f"Poisson's ratio {poisson:.4g} is within {DIRECT_POISSON}."
         )
         return KeptFactor(sparsity, free), reason
+    if not mesh.is_grid:
+        raise InputError(
+            f"A mesh that is no grid must have at most {DIRECT_NODES} nodes: got {n_nodes}; use a coarser "
+            "mesh."
+        )
     raise InputError(
         f"Poisson's ratio must not exceed {MULTIGRID_POISSON} for a mesh of more than {DIRECT_NODES} nodes: "
         f"got {poisson:.6g} and {n_nodes} nodes; use a smaller ratio or a coarser mesh."

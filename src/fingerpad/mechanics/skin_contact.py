@@ -163,8 +163,7 @@ def _share_of_way(
 
 def _triangles(mesh: Mesh) -> np.ndarray:
     """Each face of the skin cut along one diagonal and along the other, as rows of `mesh.skin_nodes`."""
-    grid = np.searchsorted(mesh.skin_nodes, mesh.skin_grid)
-    a, b, c, d = (corners.ravel() for corners in (grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]))
+    a, b, c, d = np.searchsorted(mesh.skin_nodes, mesh.skin_faces).T
     return np.concatenate([np.stack(cut, axis=1) for cut in ((a, b, c), (a, c, d), (a, b, d), (b, c, d))])
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -17,7 +17,7 @@ from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.threads import compiled_threads
 from fingerpad.data import fingertip as published
 from fingerpad.data.tissues import DEFAULT_TISSUES
-from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
 from fingerpad.geometry.indenter_grading import FEWEST_ACROSS_GROOVE, grading_along, sizes_across
 from fingerpad.geometry.indenters import Indenter
@@ -50,7 +50,7 @@ class Touch(metaclass=KnownKeywords):
 
     Parameters
     ----------
-    finger : Fingertip
+    finger : Fingertip or FingerMesh
         The finger.
     indenter : Indenter
         The rigid body.
@@ -59,7 +59,7 @@ class Touch(metaclass=KnownKeywords):
     tissues : Tissues
         Laws of the four layers.
     grading : Grading
-        Fine zone and element sizes of the mesh.
+        Fine zone and element sizes of the mesh; those that a `FingerMesh` has.
     settings : PressSettings
         Steps and tolerances.
     at_mm : (float, float), optional
@@ -87,7 +87,7 @@ class Touch(metaclass=KnownKeywords):
         If the motion is so fast that the inertia of the tissue, which is neglected, matters.
     """
 
-    finger: Fingertip
+    finger: Finger
     indenter: Indenter
     stimulus: Stimulus
     tissues: Tissues
@@ -100,7 +100,7 @@ class Touch(metaclass=KnownKeywords):
 
     def __post_init__(self) -> None:
         for name, kind in (
-            ("finger", Fingertip),
+            ("finger", Finger),
             ("indenter", Indenter),
             ("stimulus", Motion),
             ("tissues", Tissues),
@@ -253,17 +253,17 @@ class Touch(metaclass=KnownKeywords):
     @property
     def mesh(self) -> Mesh:
         """Mesh of the undeformed finger."""
-        return _mesh(self.finger, self.grading)
+        return self.finger.own_mesh or _mesh(self.finger, self.grading)
 
 
 @lru_cache(maxsize=4)
-def _mesh(finger: Fingertip, grading: Grading) -> Mesh:
-    return finger_mesh(finger, grading)
+def _mesh(finger: Finger, grading: Grading) -> Mesh:
+    return finger_mesh(cast(Fingertip, finger), grading)
 
 
 @known_keywords
 def touch_of(
-    finger: Fingertip,
+    finger: Finger,
     indenter: Indenter,
     stimulus: Stimulus | None = None,
     materials: str | Tissues = DEFAULT_TISSUES,
@@ -296,7 +296,7 @@ def touch_of(
         A value that can be solved, stored and compared.
     """
     one_of("resolution", resolution, RESOLUTIONS)
-    x, z = _position(at_mm, instance("finger", finger, Fingertip))
+    x, z = _position(at_mm, instance("finger", finger, Finger))
     stimulus = instance("stimulus", stimulus or RampAndHold(), Motion)
     # The grading depends on this point, so finger, indenter and point are checked first.
     check_path(finger, stimulus, (x, z))
@@ -309,6 +309,7 @@ def touch_of(
         stimulus=stimulus,
         tissues=materials if isinstance(materials, Tissues) else named_tissues(materials),
         grading=grading
+        or finger.own_grading(x, z)
         or grading_along(indenter, resolution, x, z, spin_deg, stimulus.poses, finger.relative_size),
         settings=replace(settings, times_ms=tuple(times_ms)) if len(times_ms) else settings,
         at_mm=(x, z),
@@ -320,7 +321,7 @@ def touch_of(
 
 @known_keywords
 def indent(
-    finger: Fingertip,
+    finger: Finger,
     indenter: Indenter,
     stimulus: Stimulus | None = None,
     materials: str | Tissues = DEFAULT_TISSUES,
@@ -334,7 +335,7 @@ def indent(
 
     Parameters
     ----------
-    finger : Fingertip
+    finger : Fingertip or FingerMesh
         The finger.
     indenter : Indenter
         `Line`, `Cylinder`, `Bar`, `Sphere`, `FlatPunch`, `Plate`, `Edge`, `Gap`, `Grating`, or a body of your
@@ -391,7 +392,7 @@ def settings_of(resolution: str) -> PressSettings:
     return PressSettings(ramp_steps, hold_steps)
 
 
-def _position(at_mm: Sequence[float] | None, finger: Fingertip) -> tuple[float, float]:
+def _position(at_mm: Sequence[float] | None, finger: Finger) -> tuple[float, float]:
     """Check a place of contact; without one it is the finger's."""
     if at_mm is None:
         return finger.contact_mm

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, positive, whole
+from fingerpad.core.checks import FloatArray, float_array, instance, positive, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Layout, mean_spacing_mm
 from fingerpad.core.regions import Polygon
@@ -63,6 +63,7 @@ class NailEdge:
     reach_mm: float = REACH_MM
 
     def __post_init__(self) -> None:
+        instance("finger", self.finger, Fingertip)
         positive("reach_mm", self.reach_mm, "mm")
         narrowest = float(np.min(self.finger.section(np.array(self.finger.nail_x_mm))[2]))
         if self.finger.nail_half_width_mm >= narrowest:

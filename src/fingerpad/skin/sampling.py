@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,6 +25,22 @@ from fingerpad.skin.surface_motion import SURFACE_QUANTITIES
 if TYPE_CHECKING:
     from fingerpad.mechanics.press import Deformation
     from fingerpad.skin.indentation import Touch
+
+
+class Receptors(Protocol):
+    """Places of end organs in a mesh, and values there."""
+
+    def below(self, sites_mm: FloatArray) -> Any:
+        """Find end organs below points of the skin, (n_sites, 3)."""
+        ...
+
+    def under(self, organs_mm: FloatArray) -> Any:
+        """Find end organs by their own x and z on the volar side, (n_sites, 2)."""
+        ...
+
+    def read(self, places: Any, values: FloatArray) -> FloatArray:
+        """Interpolate values of `mesh.living_epidermis`, (n_times, n_sheet), at places found."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -296,5 +313,9 @@ class SkinResponse:
         return values if field.place is Place.WATCHED else values[:, self.mesh.living_epidermis.ravel()]
 
     @cached_property
-    def _receptors(self) -> ReceptorSheet:
-        return ReceptorSheet(self.mesh)
+    def _receptors(self) -> Receptors:
+        if self.mesh.is_grid:
+            return ReceptorSheet(self.mesh)
+        # Loaded for those who have a mesh of their own.
+        free: Receptors = resolve_name("fingerpad.skin.free_receptors:FreeReceptors")(self.mesh)
+        return free

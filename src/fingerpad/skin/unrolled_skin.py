@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from fingerpad.core.checks import FloatArray, finite, float_array, increasing
+from fingerpad.core.checks import FloatArray, finite, float_array, increasing, instance
 from fingerpad.core.errors import InputError
 from fingerpad.core.regions import Polygon
 from fingerpad.data import fingertip as published
@@ -125,6 +125,7 @@ class UnrolledSkin:
     origin_x_mm: float = None  # type: ignore[assignment]  # a number after initialisation
 
     def __post_init__(self) -> None:
+        instance("finger", self.finger, Fingertip)
         if self.origin_x_mm is None:
             object.__setattr__(self, "origin_x_mm", self.finger.contact_mm[0])
         if not 0.0 < finite("origin_x_mm", self.origin_x_mm, "mm") < self.finger.length_mm:

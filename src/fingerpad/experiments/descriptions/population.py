@@ -16,7 +16,7 @@ from fingerpad.experiments.descriptions.parts import (
     AfferentSettings,
     PopulationSettings,
 )
-from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population, sensitivities
 
@@ -61,7 +61,7 @@ def population_of(
     settings: PopulationSettings,
     afferent: Afferent,
     place: str = "population",
-    finger: Fingertip | None = None,
+    finger: Finger | None = None,
 ) -> Population:
     """Lay out the afferents of a file.
 
@@ -73,7 +73,7 @@ def population_of(
         Each of them.
     place : str, optional
         Key of the settings in the file, for errors.
-    finger : Fingertip, optional
+    finger : Fingertip or FingerMesh, optional
         The finger in which they lie; by default the paper's.
 
     Returns
@@ -100,7 +100,7 @@ def population_of(
     return replace(laid, sensitivity=sensitivities(len(laid), settings.sensitivity_spread, settings.seed))
 
 
-def _grid(settings: PopulationSettings, afferent: Afferent, place: str, finger: Fingertip) -> Population:
+def _grid(settings: PopulationSettings, afferent: Afferent, place: str, finger: Finger) -> Population:
     """Lay the paper's rows and columns."""
     (x, z), (along, across) = finger.contact_mm, settings.offset_mm
     return Population.grid(

@@ -17,8 +17,9 @@ from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.geometry.composed import ridges
 from fingerpad.geometry.dots import Dots, braille
 from fingerpad.geometry.embossed import Embossed, embossed_text
-from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.indenters import Indenter
+from fingerpad.geometry.mesh_files import MESH_FILES, read_finger
 from fingerpad.geometry.motion import ForceRampAndHold, Motion, RampAndHold
 from fingerpad.geometry.motions import chirp, repeated, sine, staircase, stroke
 from fingerpad.geometry.names import INDENTERS
@@ -76,7 +77,11 @@ def recorded(file: Path, first_touch_mm: float = 0.0, tolerance: float = TOLERAN
     return reduced(motion, tolerance) if tolerance else motion
 
 
-FINGERS: dict[str, Callable[..., Fingertip]] = {MEASURED: Fingertip.of, "outline": Fingertip}
+FINGERS: dict[str, Callable[..., Finger]] = {
+    MEASURED: Fingertip.of,
+    "outline": Fingertip,
+    "mesh": read_finger,
+}
 """How a finger can be given, by kind."""
 
 OBJECTS: dict[str, Callable[..., Indenter]] = {
@@ -116,11 +121,13 @@ MotionPart = one_of_kinds(
 )
 
 
-def finger_of(part: Any, beside: Path = Path()) -> Fingertip:
-    """Make the finger of a file: a part, or a text such as `child` or `adult:width_mm=18`."""
+def finger_of(part: Any, beside: Path = Path()) -> Finger:
+    """Make the finger of a file: a part, or a text such as `child`, `adult:width_mm=18` or `own.inp`."""
     if not isinstance(part, str):
-        made: Fingertip = part.made(beside)
+        made: Finger = part.made(beside)
         return made
+    if Path(part).suffix.lower() in MESH_FILES:
+        return read_finger(beside / part)
     like, *given = (word.strip() for word in part.split(":"))
     sizes = [tuple(word.strip() for word in size.partition("=")) for size in given]
     for _, equals, _ in sizes:

@@ -119,6 +119,8 @@ def _of_other_names(makes: Callable[..., Any]) -> dict[str, str]:
 def _value_of(hint: Any) -> Any:
     """Type of the value in a file, for the type of a parameter."""
     options = [option for option in get_args(hint) if option is not type(None)]
+    if any(get_origin(option) is Mapping for option in (hint, *options)):
+        return dict[str, Text]
     if get_origin(hint) in (tuple, Sequence, list) or get_origin(hint) is Sequence:
         inner = options[0]
         return Outlines if get_origin(inner) and get_origin(get_args(inner)[0]) else _LISTS[inner]

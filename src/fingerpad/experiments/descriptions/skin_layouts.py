@@ -10,7 +10,7 @@ from fingerpad.core.layouts import Layout
 from fingerpad.core.patterns import hexagonal, jittered, poisson_disc, rectangular, uniform
 from fingerpad.core.regions import Ellipse, Polygon, Rectangle, Region
 from fingerpad.experiments.descriptions.parts import NAIL_ROWS, PAD, PopulationSettings, RegionSettings
-from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.skin.nail_edge import NailEdge
@@ -24,7 +24,7 @@ _OF_SHAPE = {
 }
 
 
-def lay(settings: PopulationSettings, afferent: Afferent, place: str, finger: Fingertip) -> Population:
+def lay(settings: PopulationSettings, afferent: Afferent, place: str, finger: Finger) -> Population:
     """Lay out afferents by any layout but the paper's grid.
 
     Parameters
@@ -35,7 +35,7 @@ def lay(settings: PopulationSettings, afferent: Afferent, place: str, finger: Fi
         Each of them.
     place : str
         Key of the settings in the file, for errors.
-    finger : Fingertip
+    finger : Fingertip or FingerMesh
         The finger in which they lie.
 
     Returns
@@ -47,6 +47,10 @@ def lay(settings: PopulationSettings, afferent: Afferent, place: str, finger: Fi
     InputError
         If the region is missing, a key does not belong to its shape, or no receptor falls into it.
     """
+    if not isinstance(finger, Fingertip):
+        raise InputError(
+            f"{place}.layout must be grid on a mesh, whose skin has no plane: got {settings.layout}."
+        )
     return (_along_nail if settings.layout == NAIL_ROWS else _in_region)(settings, afferent, place, finger)
 
 

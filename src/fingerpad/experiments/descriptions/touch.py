@@ -19,7 +19,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
 from fingerpad.core.plain_yaml import line_at, read_yaml
 from fingerpad.data.tissues import DEFAULT_TISSUES
-from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.conditions import straight_tilt_deg
 from fingerpad.experiments.descriptions.parts import DEFAULT, AfferentChoice, PopulationSettings
 from fingerpad.experiments.descriptions.population import afferent_of, population_of
 from fingerpad.experiments.descriptions.pressing import (
@@ -42,7 +42,7 @@ from fingerpad.experiments.descriptions.values import (
     as_list,
     choice_of,
 )
-from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.fingertip import Finger
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.neuron.population import Population
@@ -129,8 +129,8 @@ class TouchDescription(Part):
     resolution : {"quick", "standard", "paper"}
         How fine mesh and steps are.
     finger : mapping or str
-        Whose: a preset such as "child", the sizes of `fingerpad.Fingertip.of`, or `kind: outline` with those
-        of `fingerpad.Fingertip`.
+        Whose: a preset such as "child", the sizes of `fingerpad.Fingertip.of`, `kind: outline` with those of
+        `fingerpad.Fingertip`, or `kind: mesh` with the parameters of `fingerpad.read_finger`.
     tissues : str
         A set of tissues by name, as of `fingerpad.indent`.
     object : mapping or str
@@ -206,7 +206,7 @@ class DescribedTouch:
             raise InputError(f"{_located(self.source, self.text, place)}, {key}{error}") from error
 
     @cached_property
-    def finger(self) -> Fingertip:
+    def finger(self) -> Finger:
         """The finger.
 
         Raises
@@ -232,7 +232,7 @@ class DescribedTouch:
         with self.placed("motion"):
             motion = asked.motion.made(self.beside)
         tilt_deg = asked.place.tilt_deg
-        conditions = Conditions(asked.resolution, materials=asked.tissues, finger=finger)
+        x, z = finger.contact_mm
         with self.placed():
             return touch_of(
                 finger,
@@ -240,8 +240,8 @@ class DescribedTouch:
                 motion,
                 asked.tissues,
                 asked.resolution,
-                (conditions.receptor_x_mm + asked.place.x_mm, asked.place.z_mm),
-                tilt_deg=conditions.tilt_deg(indenter) if tilt_deg is None else tilt_deg,
+                (x + asked.place.x_mm, z + asked.place.z_mm),
+                tilt_deg=straight_tilt_deg(finger, indenter) if tilt_deg is None else tilt_deg,
                 friction=asked.friction,
                 spin_deg=asked.place.spin_deg,
                 times_ms=asked.times_ms,
