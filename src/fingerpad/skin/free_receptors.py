@@ -21,9 +21,12 @@ _NEIGHBOURS = 25
 _OFF_THE_SKIN = 0.25
 """How far beside the skin a site may lie, over the size of the element there."""
 
-_MOST_STEPS = 30
-_EXACT_MM = 1e-9
+_MOST_STEPS = 20
+_EXACT_MM = 1e-7
+_LEAST_SLOPE = 0.1
 _LEAST_PIVOT = 1e-10
+_LARGEST_WEIGHT = 1e3
+"""Weight above which the places of elements do not determine a plane: they lie on a line."""
 
 
 @dataclass(frozen=True)
@@ -71,21 +74,22 @@ class FreeReceptors:
     def under(self, organs_mm: FloatArray) -> Interpolation:
         """Find end organs by their own x and z on the volar side; InputError if there is none."""
         target = self._in_mesh(organs_mm)
-        place = self._volar_tree.query(target)[1]
-        feet = self._volar_mm[place]
-        depth = self.mesh.receptor_depth_mm
+        feet = self._volar_mm[self._volar_tree.query(target)[1]]
+        organs, normals = np.empty_like(feet), np.empty_like(feet)
+        unsolved = np.arange(len(feet))
         for _ in range(_MOST_STEPS):
-            feet, normals, _ = self.mesh.on_skin(feet)
-            organs = feet - depth * normals
-            step = target - organs[:, [0, 2]]
-            if np.abs(step).max(initial=0.0) < _EXACT_MM:
+            feet[unsolved], normals[unsolved], _ = self.mesh.on_skin(feet[unsolved])
+            organs[unsolved] = feet[unsolved] - self.mesh.receptor_depth_mm * normals[unsolved]
+            step = target[unsolved] - organs[unsolved][:, [0, 2]]
+            far = np.abs(step).max(axis=1) > _EXACT_MM
+            unsolved, step = unsolved[far], step[far]
+            if not unsolved.size:
                 break
             # Along the skin, so that a step in x and z is made.
-            moved = np.zeros_like(feet)
-            moved[:, [0, 2]] = step
-            upright = np.where(np.abs(normals[:, 1]) > 0.1, normals[:, 1], -0.1)
-            moved[:, 1] = -(moved * normals).sum(axis=1) / upright
-            feet = feet + moved
+            normal = normals[unsolved]
+            upright = np.where(np.abs(normal[:, 1]) > _LEAST_SLOPE, normal[:, 1], -_LEAST_SLOPE)
+            rise = -(step[:, 0] * normal[:, 0] + step[:, 1] * normal[:, 2]) / upright
+            feet[unsolved] += np.column_stack([step[:, 0], rise, step[:, 1]])
         missed = np.linalg.norm(organs[:, [0, 2]] - target, axis=1) > self._size_mm
         missed |= normals[:, 1] >= 0.0
         if missed.any():
@@ -154,7 +158,17 @@ class FreeReceptors:
         system[:, :count, count:], system[:, count:, :count] = plane, np.swapaxes(plane, 1, 2)
         # At the end organ u and v are 0; the system is symmetric, so its solution is the row of weights.
         wanted = np.concatenate([np.hypot(u, v) ** 3, np.tile([1.0, 0.0, 0.0], (len(organs), 1))], axis=1)
-        weights = (np.linalg.pinv(system, rcond=_LEAST_PIVOT, hermitian=True) @ wanted[..., None])[
-            :, :count, 0
-        ]
-        return Interpolation(rows[near], weights)
+        return Interpolation(rows[near], _solved(system, wanted)[:, :count])
+
+
+def _solved(systems: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Solve symmetric systems (n, m, m); those without a unique solution, for the shortest one."""
+    try:
+        found = np.asarray(np.linalg.solve(systems, wanted[..., None])[..., 0], dtype=np.float64)
+    except np.linalg.LinAlgError:
+        found = np.full_like(wanted, np.inf)
+    wild = ~(np.abs(found).max(axis=1, initial=0.0) < _LARGEST_WEIGHT)
+    if wild.any():
+        inverse = np.linalg.pinv(systems[wild], rcond=_LEAST_PIVOT, hermitian=True)
+        found[wild] = (inverse @ wanted[wild][..., None])[..., 0]
+    return found
