@@ -21,6 +21,7 @@ from fingerpad.experiments.discrimination.task_stimuli import task_population, t
 from fingerpad.experiments.fit.session import FitFile
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import discrimination_touches
+from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Bar, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.geometry.names import INDENTERS
@@ -335,6 +336,8 @@ common: {indenter: sphere, tilt_deg: 80}
     tilt_deg must lie within 45 degrees
 skin: {materials: wood}
     skin.materials must be one of human
+skin: {finger: baby}
+    skin.finger must be one of adult, small, large, child, macaque, aged: got 'baby'.
 skin: {resolution: high}
     skin.resolution must be one of quick, standard, paper: got 'high'.
 skin: 3
@@ -500,3 +503,14 @@ def test_the_guide_names_every_key():
 
     guide = (ROOT / "docs" / "discriminate.md").read_text(encoding="utf-8")
     assert [key for key in dict.fromkeys(keys(DiscriminationTask)) if f"`{key}`" not in guide] == []
+
+
+def test_a_task_on_a_child_presses_and_samples_the_child_s_pad():
+    task = DiscriminationTask.model_validate(SPHERES | {"skin": {"finger": "child", "resolution": "quick"}})
+    child = Fingertip.of("child")
+    touches = task_touches(task)
+    assert {touch.finger for touch in touches.values()} == {child}
+    assert {touch.at_mm for touch in touches.values()} == {child.contact_mm}
+    assert next(iter(touches.values())).grading.size_x_mm < 0.45
+    middle = task_population(task).positions_mm.mean(axis=0)
+    assert middle == pytest.approx(child.contact_mm, abs=1e-9)

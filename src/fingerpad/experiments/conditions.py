@@ -145,7 +145,9 @@ class Conditions:
 
     def bar_grading(self) -> Grading:
         """Mesh of the single-unit study: fine about the receptor, the same for all shifts."""
-        grading = resolution_grading(self.resolution, self.receptor_x_mm, BAR_REACH_MM, half_width_mm=0.6)
+        grading = resolution_grading(
+            self.resolution, self.receptor_x_mm, BAR_REACH_MM, 0.6, self.finger.relative_size
+        )
         if self.resolution in BAR_SIZE_MM:
             size_x, size_z = BAR_SIZE_MM[self.resolution]
             grading = replace(grading, size_x_mm=size_x, size_z_mm=size_z)
@@ -153,4 +155,5 @@ class Conditions:
 
     def sphere_grading(self) -> Grading:
         """Mesh of the population study: fine about both positions, the same for all spheres."""
-        return resolution_grading(self.resolution, self.receptor_x_mm, SPHERE_REACH_MM, SPHERE_REACH_MM)
+        reach_mm, size = SPHERE_REACH_MM, self.finger.relative_size
+        return resolution_grading(self.resolution, self.receptor_x_mm, reach_mm, reach_mm, size)

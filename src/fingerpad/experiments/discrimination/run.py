@@ -12,10 +12,10 @@ from fingerpad.core.checks import whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
-from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.discrimination.analysis import PreparedTask, TaskResult, analyse
 from fingerpad.experiments.discrimination.task import DiscriminationTask
 from fingerpad.experiments.discrimination.task_stimuli import (
+    conditions_of,
     task_population,
     task_stimuli,
     task_touches,
@@ -136,11 +136,10 @@ def discriminate(
     with runner.stage("discrimination", 1) as advance:
         found = analyse(run.prepared, skins)
         advance()
-    conditions = Conditions(task.skin.resolution, task.experiment.seed, task.skin.materials)
     meshes = {"stimuli": next(iter(skins.values())).mesh}
     return DiscriminationFile(
         discrimination=found,
         task=task,
         afferent=asdict(as_sai(run.prepared.population.afferent)),
-        manifest=runner.manifest(conditions, meshes, command=command, inputs=inputs),
+        manifest=runner.manifest(conditions_of(task), meshes, command=command, inputs=inputs),
     )

@@ -30,6 +30,7 @@ from fingerpad.experiments.descriptions.values import (
     choice_of,
     with_message,
 )
+from fingerpad.geometry.fingertip import FINGERS
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.geometry.motion import MOTION_UNITS
 from fingerpad.geometry.names import INDENTERS, SIZE_UNITS
@@ -55,6 +56,8 @@ class SkinSettings(Part):
 
     Parameters
     ----------
+    finger : str
+        Whose, by the name of a preset of `fingerpad.Fingertip.of`.
     materials : str
         A set of tissues by name, as of `fingerpad.indent`.
     resolution : {"quick", "standard", "paper"}
@@ -64,6 +67,7 @@ class SkinSettings(Part):
         it, as far as the indenters need. [mm]
     """
 
+    finger: Annotated[str, choice_of(FINGERS)] = "adult"
     materials: Annotated[str, choice_of(TISSUES)] = DEFAULT_TISSUES
     resolution: Annotated[str, choice_of(RESOLUTIONS)] = "standard"
     reach_mm: Positive | None = None

@@ -11,10 +11,11 @@ from pydantic import ValidationError
 
 from fingerpad.core.errors import InputError
 from fingerpad.data import protocol
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.population import afferent_of, population_of
 from fingerpad.experiments.descriptions.reading import error_sentence
 from fingerpad.experiments.discrimination.task import DiscriminationTask, StimulusSettings, VariedStimuli
+from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading, covering
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Indenter, Sphere
@@ -202,10 +203,16 @@ def _chosen(given: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:
     return {key: value for key, value in given.items() if key in keys}
 
 
+def conditions_of(task: DiscriminationTask) -> Conditions:
+    """Finger, tissues and accuracy of a task."""
+    skin = task.skin
+    return Conditions(skin.resolution, task.experiment.seed, skin.materials, Fingertip.of(skin.finger))
+
+
 def task_population(task: DiscriminationTask, beside: Path = Path()) -> Population:
     """Lay out the afferents of a task; a file of results that it names is searched in `beside`."""
     afferent = afferent_of(task.afferent, task.skin.materials, beside)
-    return population_of(task.population, afferent)
+    return population_of(task.population, afferent, finger=Fingertip.of(task.skin.finger))
 
 
 def task_touches(task: DiscriminationTask) -> dict[str, Touch]:
@@ -227,7 +234,7 @@ def task_touches(task: DiscriminationTask) -> dict[str, Touch]:
         As `task_stimuli`, or if one cannot be used, with its name.
     """
     stimuli = task_stimuli(task)
-    conditions = Conditions(task.skin.resolution, task.experiment.seed, task.skin.materials)
+    conditions = conditions_of(task)
     grading = _grading(stimuli, conditions, task.skin.reach_mm)
     found = {}
     for stimulus in stimuli:
@@ -239,7 +246,7 @@ def task_touches(task: DiscriminationTask) -> dict[str, Touch]:
                 stimulus.motion,
                 conditions.materials,
                 conditions.resolution,
-                (RECEPTOR_X_MM + along, across),
+                (conditions.receptor_x_mm + along, across),
                 grading,
                 conditions.tilt_deg(stimulus.indenter) if stimulus.tilt_deg is None else stimulus.tilt_deg,
                 friction=stimulus.friction,
@@ -271,6 +278,7 @@ def _zone(stimulus: TaskStimulus, conditions: Conditions) -> Grading:
     along, across = stimulus.offset_mm
     if isinstance(stimulus.indenter, Sphere) and abs(along) <= _NEAR_MM and across == 0.0:
         return conditions.sphere_grading()
+    x_mm, size = conditions.receptor_x_mm + along, conditions.finger.relative_size
     return grading_about(
-        stimulus.indenter, conditions.resolution, RECEPTOR_X_MM + along, across, stimulus.spin_deg
+        stimulus.indenter, conditions.resolution, x_mm, across, stimulus.spin_deg, finger_size=size
     )
