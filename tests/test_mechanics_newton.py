@@ -1,11 +1,12 @@
 """Conditions that an equilibrium meets before it is returned: supports balance the force of the indenter."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.geometry.edged_indenters import Gap
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
@@ -118,3 +119,25 @@ def test_balance_holds_beside_the_middle_of_a_whole_block():
 def test_balance_tolerance_is_a_number_above_zero(tolerance):
     with pytest.raises(InputError, match="balance_tolerance must be"):
         NewtonSettings(balance_tolerance=tolerance)
+
+
+def test_a_search_with_friction_about_a_small_body_may_take_more_newton_steps(monkeypatch):
+    """Nodes find their place one after the other, and friction is renewed after each."""
+
+    mesh, few = block(), NewtonSettings(most_iterations=5)
+    placement = place(BALL, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
+    small_body = partial(
+        press,
+        mesh,
+        RELAXING,
+        BALL,
+        placement,
+        MOTION,
+        PressSettings(1, 1, few),
+        friction=0.5,
+        longest_step_mm=0.2,
+    )
+    assert small_body().force_mn[-1] > 0.0
+    monkeypatch.setattr("fingerpad.mechanics.press.RENEWED", 1)
+    with pytest.raises(ConvergenceError, match="after 5 Newton steps"):
+        small_body()

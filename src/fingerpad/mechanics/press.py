@@ -74,6 +74,11 @@ PENETRATION_PER_STEP = 0.04
 """Penetration accepted about a small body, over its longest step: a tenth of its smallest elements."""
 
 
+RENEWED = 3
+"""Newton steps of one search about a small body with friction, over those of others. Nodes find their place one
+after the other there, and friction is renewed after each. Without friction a shorter step is the remedy: a
+long search ends in another branch."""
+
 LARGEST_DROP = 0.1
 """Largest share by which the force may fall in a step that drives the indenter deeper."""
 
@@ -509,9 +514,8 @@ def press(
 
     chosen = np.arange(len(mesh.elements)) if watched is None else watched
     follow = Watched(chosen, mesh.nodes_mm, mesh.elements[chosen], mesh.layer[chosen], table)
-    job = _Press(
-        body, contact, stimulus, solver, _newton_settings(settings, longest_step_mm), follow, longest_step_mm
-    )
+    newton = _newton_settings(settings, longest_step_mm, contact.friction)
+    job = _Press(body, contact, stimulus, solver, newton, follow, longest_step_mm)
     moment = job.unloaded()
     reached, slips, values = [], [], [moment.fields.values]
     for moment in _moments(job, settings):
@@ -593,12 +597,13 @@ def _check_bone(mesh: Mesh, indenter: Indenter, placement: Placement, stimulus: 
         )
 
 
-def _newton_settings(settings: PressSettings, longest_step_mm: float) -> NewtonSettings:
+def _newton_settings(settings: PressSettings, longest_step_mm: float, friction: float) -> NewtonSettings:
     """Tolerances of each step, tight enough for the bound on SED, and persistence about a small body."""
     newton = settings.newton
     if np.isfinite(longest_step_mm):
         least_mm = PENETRATION_PER_STEP * longest_step_mm
-        newton = replace(newton, persistent=True, least_penetration_mm=least_mm)
+        most = newton.most_iterations * (1 if friction == 0.0 else RENEWED)
+        newton = replace(newton, persistent=True, most_iterations=most, least_penetration_mm=least_mm)
     if settings.sed_tolerance is None:
         return newton
     penetration = min(newton.penetration_tolerance, PENETRATION_SHARE * settings.sed_tolerance)
