@@ -76,8 +76,8 @@ PENETRATION_PER_STEP = 0.04
 
 RENEWED = 3
 """Newton steps of one search about a small body with friction, over those of others. There nodes find their
-place one after the other, and friction is renewed after each. Without friction a shorter step is the remedy: a
-long search ends in another branch."""
+place one after the other, and friction is renewed after each. Without friction a shorter step is the remedy:
+a long search ends in another branch."""
 
 LARGEST_DROP = 0.1
 """Largest share by which the force may fall in a step that drives the indenter deeper."""
