@@ -35,7 +35,9 @@ COLOURS = {"adult": (BLUE, "-", "o"), "child": (ORANGE, "--", "s")}
 CURVATURES_PER_M = (287.0, 305.0, 328.0, 365.0, 410.0)
 RADIUS_MM = 4.0
 PROFILE_MM = 5.0
-SEED = 1
+SEED, TRIALS = 1, 1000
+MEASURES = {"dynamic_rate_hz": ("", "ramp"), "static_rate_hz": ("white", "hold")}
+"""Responses that the observer uses: fill of their markers, and phase."""
 
 
 @dataclass(frozen=True)
@@ -50,17 +52,17 @@ class Pressed:
         One per sphere.
     responses : tuple of ResponseMap
         Of the afferents, one per sphere.
-    hit_rate : array (n_spheres - 1,)
-        Share of trials in which the observer tells each comparison from the standard.
-    threshold_per_m : float
+    hit_rate : mapping of str to array (n_spheres - 1,)
+        Share of trials in which the observer tells each comparison from the standard, by measure.
+    threshold_per_m : mapping of str to float
         Curvature at which it is 0.75. [1/m]
     """
 
     finger: Fingertip
     skins: tuple[SkinResponse, ...]
     responses: tuple[ResponseMap, ...]
-    hit_rate: FloatArray
-    threshold_per_m: float
+    hit_rate: dict[str, FloatArray]
+    threshold_per_m: dict[str, float]
 
     def along_mm(self, reach_mm: float = PROFILE_MM) -> tuple[FloatArray, FloatArray]:
         """Places along the midline from the middle of the pad, and sites there. [mm]"""
@@ -87,16 +89,16 @@ def pressed(name: str, resolution: str = "quick") -> Pressed:
         for k in CURVATURES_PER_M
     )
     responses = tuple(population.respond(skin) for skin in skins)
-    judged = discriminate_gradient_sum(
-        [response.dynamic_rate_hz for response in responses],
-        neighbour_pairs(population.positions_mm, population.pitch_mm),
-        psychophysics.NOISE_SIGMA.value,
-        SEED,
-    )
-    fitted = fit_psychometric(
-        CURVATURES_PER_M[1:], np.round(1000 * judged.hit_rate), [1000] * len(judged.hit_rate), guess=0.0
-    )
-    return Pressed(finger, skins, responses, judged.hit_rate, float(fitted.threshold(0.75)))
+    neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
+    hit_rate, threshold = {}, {}
+    for measure in MEASURES:
+        values = [getattr(response, measure) for response in responses]
+        judged = discriminate_gradient_sum(values, neighbours, psychophysics.NOISE_SIGMA.value, SEED)
+        hit_rate[measure] = judged.hit_rate
+        n_correct = np.round(TRIALS * judged.hit_rate)
+        fitted = fit_psychometric(CURVATURES_PER_M[1:], n_correct, [TRIALS] * len(n_correct), guess=0.0)
+        threshold[measure] = float(fitted.threshold(0.75))
+    return Pressed(finger, skins, responses, hit_rate, threshold)
 
 
 def draw(fingers: dict[str, Pressed]) -> Figure:
@@ -128,15 +130,21 @@ def draw(fingers: dict[str, Pressed]) -> Figure:
                 markersize=5.0,
                 label=f"{name}, {what}",
             )
-        label = f"{name}: 75 % at {found.threshold_per_m:.0f} /m"
-        percept.plot(CURVATURES_PER_M[1:], found.hit_rate, marker=marker, label=label, **style)
+        for code, (face, phase) in MEASURES.items():
+            label = f"{name}, {phase}: 75 % at {found.threshold_per_m[code]:.0f} /m"
+            marks = {"marker": marker, "markerfacecolor": face or colour}
+            percept.plot(CURVATURES_PER_M[1:], found.hit_rate[code], label=label, **style, **marks)
     percept.axhline(0.75, color="grey", linewidth=0.8)
     shape.set(
         xlabel="along the finger, from the middle of the pad [mm]", ylabel="height [mm]", aspect="equal"
     )
     energy.set(xlabel="along the midline [mm]", ylabel=f"{quantity.replace('_', ' ')} in the hold [kPa]")
     rates.set(xlabel="distance from the middle of the pad [mm]", ylabel="rate [spikes/s]")
-    percept.set(xlabel="curvature of the comparison [1/m]", ylabel="told from 287 /m [share of trials]")
+    percept.set(
+        xlabel="curvature of the comparison [1/m]",
+        ylabel="told from 287 /m [share of trials]",
+        ylim=(0.3, 1.02),
+    )
     for axes, title in zip((shape, energy, rates, percept), ("(a)", "(b)", "(c)", "(d)"), strict=True):
         axes.set_title(title, loc="left")
         axes.legend(fontsize=8.0)
@@ -155,7 +163,7 @@ def main() -> None:
             f"{afferent.static_quantity} {skin.sample(afferent.static_quantity, sites)[-1, 0]:.2f} kPa, "
             f"rates {response.dynamic_rate_hz.max():.0f} and {response.static_rate_hz.max():.0f} spikes/s, "
             f"{np.count_nonzero(response.static_rate_hz)} of {len(response.static_rate_hz)} in the hold, "
-            f"hit rates {found.hit_rate.round(3).tolist()}, threshold {found.threshold_per_m:.1f} /m"
+            f"hit rates {found.hit_rate}, thresholds {found.threshold_per_m} /m"
         )
     write_png(draw, fingers, IMAGES / "child_and_adult.png")
 
