@@ -186,7 +186,7 @@ def _read_inp(file: Path) -> MeshParts:
         elif keyword in ("PART", "INSTANCE"):
             parts += keyword == "PART"
             if parts > 1 or (keyword == "INSTANCE" and rows):
-                read.wrong("one part that is not moved is read: flatten the assembly", number)
+                read.wrong("one part that is not moved is read: write the mesh as one part", number)
         elif keyword == "NODE":
             for line, words in rows:
                 if len(words) < 4:
