@@ -1,6 +1,6 @@
 """Surfaces, height maps and compositions against closed forms and against bodies that are exact."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -11,9 +11,9 @@ from fingerpad.geometry.closest_point import Triangles
 from fingerpad.geometry.composed import Union, ridges
 from fingerpad.geometry.edged_indenters import Grating
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.grading import Grading
+from fingerpad.geometry.grading import Grading, resolution_grading
 from fingerpad.geometry.indenter_grading import grading_about
-from fingerpad.geometry.indenters import Bar, Plate, Sphere
+from fingerpad.geometry.indenters import Bar, Indenter, Plate, Sphere
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.probing import check_gap
 from fingerpad.geometry.surface import Surface, height_surface
@@ -68,6 +68,89 @@ def test_a_surface_is_as_near_as_the_ball_that_it_follows(ball):
     np.testing.assert_allclose(gap, expected, rtol=0, atol=2e-3)
     np.testing.assert_allclose(normal, direction, rtol=0, atol=2e-2)
     check_gap(ball.gap, "ball")
+
+
+def cup(half_mm, pitch_mm=0.1, radius_mm=12.0, **options):
+    """Map of a hollow paraboloid."""
+    line = np.arange(-half_mm, half_mm + pitch_mm / 2, pitch_mm)
+    return height_surface((line**2 + line[:, None] ** 2) / (2 * radius_mm), pitch_mm, **options)
+
+
+def test_the_normal_in_a_hollow_is_the_gradient_of_the_gap_and_does_not_jump():
+    hollow, generator = cup(3.0), np.random.default_rng(6)
+    points = generator.uniform([-2.5, 0.0, -2.5], [2.5, 0.0, 2.5], (400, 3))
+    points[:, 1] = hollow.front(points) + generator.uniform(-0.02, 0.02, 400)
+    _, normal = hollow.gap(points)
+    ahead, behind = (
+        np.stack([hollow.gap(points + step * axis)[0] for axis in np.eye(3)], axis=1)
+        for step in (1e-6, -1e-6)
+    )
+    slope = (ahead - behind) / 2e-6
+    np.testing.assert_allclose(np.linalg.norm(slope, axis=1), 1.0, rtol=0, atol=1e-3)
+    slope /= np.linalg.norm(slope, axis=1)[:, None]
+    np.testing.assert_allclose(normal, slope, rtol=0, atol=1e-6)
+    way = np.linspace([-2.0, 0.0, 0.37], [2.0, 0.0, 0.9], 40_001)
+    way[:, 1] = hollow.front(way)
+    jump = {
+        below: np.abs(np.diff(cup(3.0, smooth_below_deg=below).gap(way)[1], axis=0)).max()
+        for below in (0.0, 30.0)
+    }
+    assert jump[30.0] < 5e-5 < 5e-3 < jump[0.0]
+
+
+@dataclass(frozen=True)
+class Trough(Indenter):
+    """A parabolic valley along the finger; its gap is a distance at the face."""
+
+    symmetry_deg = 180.0
+    radius_mm: float = 9.0
+
+    def gap(self, points_mm):
+        _, y, z = points_mm.T
+        slope = z / self.radius_mm
+        length = np.sqrt(1.0 + slope**2)
+        gap = (y - 0.5 * slope * z) / length
+        normal = np.column_stack(
+            [0.0 * z, 1.0 / length, -slope / length - gap * slope / length**2 / self.radius_mm]
+        )
+        return gap, normal / np.linalg.norm(normal, axis=1)[:, None]
+
+
+def test_skin_in_a_trough_of_triangles_is_pressed_as_in_the_smooth_one():
+    """Newton's method takes 18 steps; 45 where the normal jumps at the creases."""
+    touch = touch_of(
+        Fingertip(), Trough(), RampAndHold(depth_mm=1.2), settings=PressSettings(2, 1),
+        grading=resolution_grading("quick", 17.37),
+    )  # fmt: skip
+    heights = np.tile((np.linspace(-12.0, 12.0, 241) ** 2 / 18.0)[:, None], (1, 401))
+    exact, found = touch.solve(), replace(touch, indenter=height_surface(heights, 0.1)).solve()
+    assert found.newton_steps <= 25
+    np.testing.assert_allclose(found.force_mn, exact.force_mn, rtol=0, atol=5e-3 * exact.force_mn.max())
+    np.testing.assert_allclose(found.sed_kpa, exact.sed_kpa, rtol=0, atol=0.02 * exact.sed_kpa.max())
+
+
+def test_only_hollow_creases_below_the_angle_are_rounded():
+    """A valley of 20 degrees is filled by microns within 0.1 mm; one of 40 and a ridge of 20 stay."""
+    beside = np.column_stack([np.linspace(-0.3, 0.3, 61), np.zeros(61), np.zeros(61)])
+    for angle, filled in ((20.0, True), (40.0, False), (-20.0, False)):
+        x = np.array([-3.0, 0.0, 3.0])
+        side = np.tan(np.radians(angle / 2)) * 3.0
+        vertices = np.array([[a, side * abs(a) / 3.0, z] for a in x for z in (-5.0, 5.0)])
+        faces = np.array([[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]])
+        bent, flat = (Surface(vertices, faces, below).front(beside) for below in (30.0, 0.0))
+        rise = bent - flat
+        np.testing.assert_allclose(rise[np.abs(beside[:, 0]) > 0.11], 0.0, rtol=0, atol=1e-8)
+        assert rise.min() > -1e-8
+        assert 5e-3 < rise.max() < 7e-3 if filled else rise.max() < 1e-8
+
+
+def test_far_above_a_hollow_the_gap_is_a_bound():
+    far = np.array([[0.0, 5.0, 0.0], [1.0, 3.0, 1.0]])
+    gap, normal = cup(3.0).gap(far)
+    assert gap.tolist() == [2.0, 2.0]
+    assert normal.tolist() == [[0.0, 1.0, 0.0]] * 2
+    below, _ = cup(3.0).gap(far - [0.0, 10.0, 0.0])
+    assert (below < -1.9).all()
 
 
 def profile_surface(body, fillet_mm, step_deg, path):
@@ -143,6 +226,7 @@ def test_fine_relief_asks_for_a_mesh_that_resolves_it():
     with pytest.raises(InputError, match="grading must have elements of at most"):
         touch_of(Fingertip(), rippled, grading=replace(COARSE, full=True))
     assert height_surface(map_of(Sphere(curvature_per_m=287.0), 2.0), 0.1).relief_mm > 1.5
+    assert cup(8.0).relief_mm == 2.0  # its borders are slopes, not ridges
 
 
 @pytest.mark.parametrize(

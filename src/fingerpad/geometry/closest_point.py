@@ -14,9 +14,16 @@ from numba import njit
 
 from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.threads import run_kernel
+from fingerpad.geometry.creases import HOLLOW, SHARP, kinds_of_edges, moments_in_ball, share_of_edges
 
 _LEAF = 4
 """Triangles in a box without children."""
+
+_COPY = -1
+"""Kind of the edges of a triangle that fills a slot a second time."""
+
+SHARP_SHARE = 1.5
+"""Distance from sharp edges from which on creases are blunted, over the radius."""
 
 _ON_SURFACE_MM = 1e-9
 """Distance from which on its direction is known. [mm]"""
@@ -34,32 +41,72 @@ class Triangles:
         Outward normals at the three corners, on the three edges (opposite to each corner) and on the face.
     low_mm, high_mm : array (n_boxes, 3)
         Boxes; the first is not used. [mm]
+    kinds : int8 array (n_slots, 3)
+        Kinds of edges (`fingerpad.geometry.creases`), opposite to each corner.
+    hollow : bool array (n_boxes,)
+        Whether a box has triangles with hollow creases.
+    radius_mm : float
+        Distance over which hollow creases are blunted. [mm]
+    far_mm : float
+        Distance beyond which points above the triangles have this one, along y; it need not be sought. [mm]
     """
 
     corners_mm: FloatArray
     normals: FloatArray
     low_mm: FloatArray
     high_mm: FloatArray
+    kinds: np.ndarray
+    hollow: np.ndarray
+    radius_mm: float
+    far_mm: float
 
     @classmethod
-    def of(cls, vertices_mm: FloatArray, faces: IntArray) -> Triangles:
-        """Sort triangles with area into a tree."""
+    def of(
+        cls,
+        vertices_mm: FloatArray,
+        faces: IntArray,
+        smooth_below_deg: float = 0.0,
+        radius_mm: float = 0.0,
+        far_mm: float = np.inf,
+    ) -> Triangles:
+        """Sort triangles with area into a tree.
+
+        Hollow creases below an angle are blunted over `radius_mm`, or three of their usual lengths if that is
+        less: the work grows with the number of triangles within.
+        """
         corners = vertices_mm[faces]
         order = np.argsort(_morton(corners.mean(axis=1)), kind="stable")
         slots = _LEAF << max(0, int(np.ceil(np.log2(max(1.0, len(faces) / _LEAF)))))
         order = np.concatenate([order, np.full(slots - len(order), order[-1])])
-        corners, normals = corners[order], _normals(corners, faces, len(vertices_mm))[order]
+        edge = _edges(faces, len(vertices_mm))
+        normals = _normals(corners, faces, edge, len(vertices_mm))
+        kinds = kinds_of_edges(corners, normals[:, 6], edge, smooth_below_deg)[order]
+        if (kinds == HOLLOW).any():
+            sides = np.linalg.norm(np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1), axis=2)[order]
+            radius_mm = min(radius_mm, 3.0 * float(np.median(sides[kinds == HOLLOW])))
+        kinds[len(faces) :] = _COPY
+        corners, normals = corners[order], normals[order]
         n_leaves = slots // _LEAF
         low, high = np.empty((2, 2 * n_leaves, 3))
         grouped = corners.reshape(n_leaves, 3 * _LEAF, 3)
         low[n_leaves:], high[n_leaves:] = grouped.min(axis=1), grouped.max(axis=1)
+        hollow = np.empty(2 * n_leaves, dtype=bool)
+        hollow[n_leaves:] = (kinds.reshape(n_leaves, 3 * _LEAF) == HOLLOW).any(axis=1)
         level = n_leaves // 2
         while level:
             children = slice(2 * level, 4 * level)
             low[level : 2 * level] = low[children].reshape(level, 2, 3).min(axis=1)
             high[level : 2 * level] = high[children].reshape(level, 2, 3).max(axis=1)
+            hollow[level : 2 * level] = hollow[children].reshape(level, 2).any(axis=1)
             level //= 2
-        return cls(corners, normals, low, high)
+        return cls(corners, normals, low, high, kinds, hollow, radius_mm, far_mm)
+
+    def heights(self, points_mm: FloatArray) -> FloatArray:
+        """Height y of the highest triangle above or below each point (n, 3), -inf beside all. [mm]"""
+        points_mm = np.ascontiguousarray(points_mm, dtype=np.float64)
+        height = np.empty(len(points_mm))
+        run_kernel(_heights, len(points_mm), points_mm, self.corners_mm, self.low_mm, self.high_mm, height)
+        return height
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed distance (n,) and its gradient (n, 3) at points (n, 3). [mm]
@@ -78,8 +125,16 @@ class Triangles:
         gap, normal = np.empty(len(points_mm)), np.empty((len(points_mm), 3))
         run_kernel(
             _closest, len(points_mm), points_mm, self.corners_mm, self.normals, self.low_mm, self.high_mm,
-            gap, normal,
+            self.far_mm, gap, normal,
         )  # fmt: skip
+        if self.hollow[1]:
+            near = np.flatnonzero(np.abs(gap) < self.radius_mm)
+            there = points_mm[near], gap[near], normal[near]
+            run_kernel(
+                _blunt, len(near), there[0], self.corners_mm, self.normals, self.low_mm, self.high_mm,
+                self.kinds, self.hollow, self.radius_mm, there[1], there[2],
+            )  # fmt: skip
+            gap[near], normal[near] = there[1:]
         return gap, normal
 
 
@@ -94,13 +149,19 @@ def _morton(points: FloatArray) -> IntArray:
     return code
 
 
-def _normals(corners: FloatArray, faces: IntArray, n_vertices: int) -> FloatArray:
-    """Return normals at corners, edges and face of each triangle, (n, 7, 3), not all of length 1."""
+def _edges(faces: IntArray, n_vertices: int) -> IntArray:
+    """Return the number of the edge opposite to each corner, which neighbours share, (n, 3)."""
+    sides = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]], axis=2)
+    _, edge = np.unique((sides[..., 0] * n_vertices + sides[..., 1]).ravel(), return_inverse=True)
+    return edge.reshape(faces.shape)
+
+
+def _normals(corners: FloatArray, faces: IntArray, edge: IntArray, n_vertices: int) -> FloatArray:
+    """Return normals at corners, edges and face of each triangle, (n, 7, 3), the face's of length 1."""
     first, second, third = corners.transpose(1, 0, 2)
     face = np.cross(second - first, third - first)
     face /= np.linalg.norm(face, axis=1)[:, None]
     at_vertex = np.zeros((n_vertices, 3))
-    along_edge = np.empty((len(faces), 3, 2), dtype=np.int64)
     for corner in range(3):
         here, ahead, behind = (corners[:, (corner + step) % 3] for step in range(3))
         one, other = ahead - here, behind - here
@@ -108,10 +169,6 @@ def _normals(corners: FloatArray, faces: IntArray, n_vertices: int) -> FloatArra
         angle = np.arccos(np.clip((one * other).sum(axis=1) / lengths, -1.0, 1.0))
         for axis in range(3):
             at_vertex[:, axis] += np.bincount(faces[:, corner], angle * face[:, axis], n_vertices)
-        along_edge[:, corner] = np.sort(faces[:, [(corner + 1) % 3, (corner + 2) % 3]], axis=1)
-    keys = along_edge[..., 0] * n_vertices + along_edge[..., 1]
-    _, edge = np.unique(keys.ravel(), return_inverse=True)
-    edge = edge.reshape(keys.shape)
     at_edge = np.stack([np.bincount(edge.ravel(), np.repeat(face[:, axis], 3)) for axis in range(3)], axis=1)
     return np.concatenate([at_vertex[faces], at_edge[edge], face[:, None]], axis=1)
 
@@ -161,12 +218,57 @@ def _to_box(p: FloatArray, low: FloatArray, high: FloatArray) -> float:
 
 
 @njit(cache=True, nogil=True)
+def _height(p: FloatArray, corners: FloatArray, low: FloatArray, high: FloatArray) -> float:
+    """Height y of the highest triangle along y through a point, -inf if there is none."""
+    n_leaves = len(low) // 2
+    stack = np.empty(64, dtype=np.int64)
+    highest = -np.inf
+    stack[0], top = 1, 1
+    while top:
+        top -= 1
+        box = stack[top]
+        beside = p[0] < low[box, 0] or p[0] > high[box, 0] or p[2] < low[box, 2] or p[2] > high[box, 2]
+        if beside or high[box, 1] <= highest:
+            continue
+        if box < n_leaves:
+            stack[top], stack[top + 1] = 2 * box, 2 * box + 1
+            top += 2
+            continue
+        for slot in range((box - n_leaves) * _LEAF, (box - n_leaves + 1) * _LEAF):
+            a, b, c = corners[slot, 0], corners[slot, 1], corners[slot, 2]
+            abx, abz, acx, acz = b[0] - a[0], b[2] - a[2], c[0] - a[0], c[2] - a[2]
+            area = abx * acz - abz * acx
+            if area == 0.0:
+                continue
+            x, z = p[0] - a[0], p[2] - a[2]
+            v, w = (x * acz - z * acx) / area, (abx * z - abz * x) / area
+            if v >= -1e-9 and w >= -1e-9 and v + w <= 1.0 + 1e-9:
+                highest = max(highest, a[1] + v * (b[1] - a[1]) + w * (c[1] - a[1]))
+    return highest
+
+
+@njit(cache=True, nogil=True)
+def _heights(
+    points: FloatArray,
+    corners: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    height: FloatArray,
+    begin: int,
+    end: int,
+) -> None:  # pragma: no cover (compiled)
+    for number in range(begin, end):
+        height[number] = _height(points[number], corners, low, high)
+
+
+@njit(cache=True, nogil=True)
 def _closest(
     points: FloatArray,
     corners: FloatArray,
     normals: FloatArray,
     low: FloatArray,
     high: FloatArray,
+    far: float,
     gap: FloatArray,
     normal: FloatArray,
     begin: int,
@@ -179,10 +281,12 @@ def _closest(
     for number in range(begin, end):
         p = points[number]
         nearest = np.inf
+        if far < np.inf and p[1] > _height(p, corners, low, high):
+            nearest = far * far
         if number > begin:  # a neighbour's distance bounds this one
             apart = np.sqrt(((p - points[number - 1]) ** 2).sum())
-            nearest = (last + apart) ** 2 * (1.0 + 1e-9) + 1e-18
-        side, slot_found, feature_found = 1.0, 0, 6
+            nearest = min(nearest, (last + apart) ** 2 * (1.0 + 1e-9) + 1e-18)
+        side, slot_found, feature_found = 1.0, -1, 6
         stack[0], top = 1, 1
         while top:
             top -= 1
@@ -207,8 +311,111 @@ def _closest(
                     slot_found, feature_found = slot, feature
         last = np.sqrt(nearest)
         gap[number] = side * last
+        if slot_found < 0:
+            last = np.inf
+            normal[number, 0], normal[number, 1], normal[number, 2] = 0.0, 1.0, 0.0
+            continue
         if last > _ON_SURFACE_MM:
             normal[number] /= last
         else:
             normal[number] = normals[slot_found, feature_found]
             normal[number] /= np.sqrt((normal[number] ** 2).sum())
+
+
+@njit(cache=True, nogil=True)
+def _blunt(
+    points: FloatArray,
+    corners: FloatArray,
+    normals: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    kinds: np.ndarray,
+    hollow: np.ndarray,
+    radius: float,
+    gap: FloatArray,
+    normal: FloatArray,
+    begin: int,
+    end: int,
+) -> None:  # pragma: no cover (compiled)
+    """Replace exact gaps and normals near hollow creases by those of the blunted surface."""
+    n_leaves = len(low) // 2
+    stack = np.empty(64, dtype=np.int64)
+    found, turns = np.empty(16), np.empty((256, 6))
+    for number in range(begin, end):
+        p = points[number]
+        away, away_slope = 1.0, np.zeros(3)
+        sharp, sharp_slope = 1.0, np.zeros(3)
+        total, mean_normal = np.zeros(16), np.zeros(3)
+        n_turns = 0
+        for search in range(2):
+            reach = radius if search == 0 else SHARP_SHARE * radius
+            stack[0], top = 1, 1
+            while top:
+                top -= 1
+                box = stack[top]
+                if (search == 0 and not hollow[box]) or _to_box(p, low[box], high[box]) > reach * reach:
+                    continue
+                if box < n_leaves:
+                    stack[top], stack[top + 1] = 2 * box, 2 * box + 1
+                    top += 2
+                    continue
+                first = (box - n_leaves) * _LEAF
+                for slot in range(first, first + _LEAF):
+                    if search == 0:
+                        away *= share_of_edges(
+                            p, corners[slot], kinds[slot], HOLLOW, 0.5 * radius, radius, away_slope
+                        )
+                        continue
+                    if kinds[slot, 0] == _COPY:
+                        continue
+                    sharp *= share_of_edges(
+                        p, corners[slot], kinds[slot], SHARP, radius, SHARP_SHARE * radius, sharp_slope
+                    )
+                    face = normals[slot, 6]
+                    facing = (
+                        face[0] * normal[number, 0]
+                        + face[1] * normal[number, 1]
+                        + face[2] * normal[number, 2]
+                    )
+                    if facing <= 0.0 or _to_triangle(p, corners[slot])[0] >= radius * radius:
+                        continue
+                    if not moments_in_ball(p, corners[slot], face, radius, found):
+                        continue
+                    total += found
+                    mean_normal += found[0] * face
+                    if n_turns == len(turns):
+                        longer = np.empty((2 * n_turns, 6))
+                        longer[:n_turns] = turns
+                        turns = longer
+                    turns[n_turns, :3], turns[n_turns, 3:] = face, found[4:7]
+                    n_turns += 1
+            if away == 1.0 or (search == 1 and sharp == 0.0) or (search == 1 and total[0] <= 0.0):
+                break
+        else:
+            length = np.sqrt((mean_normal**2).sum())
+            n, centre = mean_normal / length, total[1:4] / total[0]
+            mean_gap = -(n * centre).sum()
+            slope = n.copy()
+            square = 2.0 / (radius * radius)
+            for i in range(3):
+                row = 0.0
+                for k in range(3):
+                    row += total[7 + 3 * i + k] * n[k]
+                slope[i] -= square / total[0] * (row + mean_gap * total[4 + i])
+            for turn in range(n_turns):
+                tilt = 0.0
+                for k in range(3):
+                    tilt += turns[turn, k] * (centre[k] + mean_gap * n[k])
+                for i in range(3):
+                    slope[i] -= square / length * tilt * turns[turn, 3 + i]
+            # share = (1 - away) sharp
+            share = (1.0 - away) * sharp
+            for i in range(3):
+                share_slope = share * sharp_slope[i] - away * sharp * away_slope[i]
+                slope[i] = (
+                    normal[number, i]
+                    + share * (slope[i] - normal[number, i])
+                    + (mean_gap - gap[number]) * share_slope
+                )
+            gap[number] += share * (mean_gap - gap[number])
+            normal[number] = slope / np.sqrt((slope**2).sum())

@@ -53,11 +53,12 @@ def mirrored(gap: Gap, spin_deg: float) -> bool:
     return bool((np.abs(here - there) <= SYMMETRIC_MM + FAR_SHARE * near_mm).all())
 
 
-def traced_front(gap: Gap, points_mm: FloatArray) -> FloatArray:
+def traced_front(gap: Gap, points_mm: FloatArray, above_mm: FloatArray | float = ABOVE_MM) -> FloatArray:
     """Y of a face above the x and z of points (n, 3), -inf beside the body, where its gap is 0. [mm]
 
     From above each height is lowered by its gap, which is the distance to the body or less. Where a gap is
-    more than the distance, the last step is halved until the face is found.
+    more than the distance, the last step is halved until the face is found. `above_mm` are heights above the
+    face from which it is sought, -inf beside it.
 
     Examples
     --------
@@ -67,9 +68,9 @@ def traced_front(gap: Gap, points_mm: FloatArray) -> FloatArray:
     [0.0, -0.4, -inf]
     """
     at = np.array(points_mm, dtype=np.float64)
-    at[:, 1] = ABOVE_MM
-    outside_mm, todo = at[:, 1].copy(), np.arange(len(at))
-    for _ in range(_MOST_STEPS):
+    at[:, 1] = above_mm
+    outside_mm, todo = at[:, 1].copy(), np.flatnonzero(at[:, 1] > BELOW_MM)
+    for _ in range(_MOST_STEPS if todo.size else 0):
         distance = gap(at[todo])[0]
         outside_mm[todo] = np.where(distance >= 0.0, at[todo, 1], outside_mm[todo])
         todo, distance = todo[distance > _CLOSE_MM], distance[distance > _CLOSE_MM]
@@ -77,7 +78,9 @@ def traced_front(gap: Gap, points_mm: FloatArray) -> FloatArray:
         todo = todo[at[todo, 1] > BELOW_MM]
         if not todo.size:
             break
-    distance = gap(at)[0]
+    distance = np.full(len(at), np.inf)
+    known = at[:, 1] > BELOW_MM
+    distance[known] = gap(at[known])[0]
     at[distance > SYMMETRIC_MM, 1] = -np.inf  # along a wall, which a ray never meets
     inside = np.flatnonzero(distance < -_CLOSE_MM)
     low, high = at[inside, 1], outside_mm[inside]

@@ -6,23 +6,36 @@ distance is exact and not interpolated: docs/decisions/surfaces.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
 from numba import njit
 from scipy.ndimage import grey_closing, grey_dilation, grey_erosion, grey_opening
 
-from fingerpad.core.checks import FloatArray, IntArray, float_array, positive
+from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, positive
 from fingerpad.core.errors import InputError
 from fingerpad.geometry.closest_point import Triangles
 from fingerpad.geometry.indenters import Indenter
+from fingerpad.geometry.probing import traced_front
 
 SMALLEST_MM, LARGEST_MM = 0.1, 1000.0
 """Extents beyond which a surface is refused: its unit must be wrong. [mm]"""
 
 SKIRT_MM = 20.0
 """An open surface goes on downwards from its border as far as this. [mm]"""
+
+SMOOTH_BELOW_DEG = 30.0
+"""Angle of creases that are rounded where they are hollow, unless another is given. [degrees]"""
+
+LARGEST_SMOOTH_DEG = 90.0
+"""Largest such angle. [degrees]"""
+
+HOLLOW_MM = 0.1
+"""Distance from hollow creases over which they are rounded; less where triangles are small. [mm]"""
+
+FAR_MM = 2.0
+"""Beyond this distance above a surface its gap is this number: in a hollow all triangles are as far. [mm]"""
 
 REACH_MM = 6.0
 """Ridges, grooves and dots are looked for within this distance of the axis, along and across. [mm]"""
@@ -56,13 +69,16 @@ class Surface(Indenter):
     faces : int array (m, 3)
         Three corners each, counter-clockwise seen from outside. From the border of an open surface walls go
         down.
+    smooth_below_deg : float
+        Hollow creases at which the normals of two triangles differ by less are rounded over 0.1 mm to either
+        side at most; 0 keeps all. Edges of a larger angle, and all ridges, stay as they are. [degrees]
 
     Raises
     ------
     InputError
         If vertices are not finite, faces name no vertex, no triangle has an area, the surface is larger than
         1000 mm or smaller than 0.1 mm (a wrong unit), neighbouring triangles turn different sides out, more
-        than two share an edge, or it shows the skin its inner side.
+        than two share an edge, it shows the skin its inner side, or the angle is not from 0 to 90 degrees.
 
     Examples
     --------
@@ -76,6 +92,7 @@ class Surface(Indenter):
 
     vertices_mm: FloatArray
     faces: IntArray
+    smooth_below_deg: float = SMOOTH_BELOW_DEG
 
     def __post_init__(self) -> None:
         vertices = float_array("vertices_mm", self.vertices_mm, 2)
@@ -111,6 +128,11 @@ class Surface(Indenter):
         faces = faces[kept]
         _check_sides(faces, vertices)
         vertices = vertices - [0.0, corners[kept, :, 1].max(), 0.0]
+        if not 0.0 <= finite("smooth_below_deg", self.smooth_below_deg, "degrees") <= LARGEST_SMOOTH_DEG:
+            raise InputError(
+                f"smooth_below_deg must be from 0 to {LARGEST_SMOOTH_DEG:g} degrees: got "
+                f"{self.smooth_below_deg:g}."
+            )
         for name, value in (("vertices_mm", vertices), ("faces", faces)):
             value.setflags(write=False)
             object.__setattr__(self, name, value)
@@ -121,7 +143,7 @@ class Surface(Indenter):
 
     def __getstate__(self) -> dict[str, np.ndarray]:
         # The tree is large and is made anew where it is needed.
-        return {"vertices_mm": self.vertices_mm, "faces": self.faces}
+        return {part.name: getattr(self, part.name) for part in fields(self)}
 
     @property
     def half_width_mm(self) -> float:
@@ -166,6 +188,8 @@ class Surface(Indenter):
             grooves = grey_erosion(closed, around, mode="nearest") - part
             ridges[_is_steep(opened, thin * spacing)] = 0.0
             grooves[_is_steep(closed, thin * spacing)] = 0.0
+            # On a slope that ends at the border the disc lies lower by the slope over its width.
+            ridges -= 2 * radius * _slope_at_border(part, 3 * radius, 2 * radius)
             if max(ridges.max(), grooves.max()) > RELIEF_SHARE * width:
                 return width
         return WIDTHS_MM[-1]
@@ -183,7 +207,8 @@ class Surface(Indenter):
             np.stack([b, a + n_vertices, b + n_vertices], axis=1),
         ])  # fmt: skip
         below = self.vertices_mm - [0.0, SKIRT_MM, 0.0]
-        return Triangles.of(np.concatenate([self.vertices_mm, below]), np.concatenate([faces, walls]))
+        vertices, faces = np.concatenate([self.vertices_mm, below]), np.concatenate([faces, walls])
+        return Triangles.of(vertices, faces, self.smooth_below_deg, HOLLOW_MM, FAR_MM)
 
     @property
     def _face(self) -> tuple[FloatArray, float]:
@@ -200,6 +225,11 @@ class Surface(Indenter):
         height = np.full(tuple(counts), corners[..., 1].min())
         _raise_to_triangles(corners, low, spacing, height)
         return height, spacing
+
+    def front(self, points_mm: FloatArray) -> FloatArray:
+        """Height y of the face above the x and z of points (n, 3), -inf beside it. [mm]"""
+        height = self._triangles.heights(points_mm)
+        return traced_front(self.gap, points_mm, np.where(np.isfinite(height), height + HOLLOW_MM, -np.inf))
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
@@ -225,6 +255,17 @@ def _is_steep(height: FloatArray, spacing: float) -> np.ndarray:
     return np.hypot(*np.gradient(height, spacing)) > 1.0
 
 
+def _slope_at_border(height: FloatArray, pad: int, zone: int) -> FloatArray:
+    """Change of height per cell within a zone along the border inside of a pad, 0 elsewhere, (nx, nz)."""
+    slope = np.zeros_like(height)
+    for axis in (0, 1):
+        before = np.abs(np.diff(height, axis=axis, prepend=np.inf))
+        after = np.abs(np.diff(height, axis=axis, append=np.inf))
+        slope = np.hypot(slope, np.minimum(before, after))
+    slope[pad + zone : -pad - zone, pad + zone : -pad - zone] = 0.0
+    return slope
+
+
 @njit(cache=True, nogil=True)
 def _raise_to_triangles(
     corners: FloatArray, low: FloatArray, spacing: float, height: FloatArray
@@ -248,7 +289,9 @@ def _raise_to_triangles(
                     height[i, k] = max(height[i, k], y)
 
 
-def height_surface(heights_mm: FloatArray, pitch_mm: float) -> Surface:
+def height_surface(
+    heights_mm: FloatArray, pitch_mm: float, smooth_below_deg: float = SMOOTH_BELOW_DEG
+) -> Surface:
     """Surface through heights on a regular grid, centred on the indenter's axis.
 
     Parameters
@@ -257,6 +300,8 @@ def height_surface(heights_mm: FloatArray, pitch_mm: float) -> Surface:
         Heights towards the skin; rows run across the finger (z), columns along it (x). [mm]
     pitch_mm : float
         Distance between neighbouring heights. [mm]
+    smooth_below_deg : float
+        As of `Surface`. [degrees]
 
     Returns
     -------
@@ -287,4 +332,5 @@ def height_surface(heights_mm: FloatArray, pitch_mm: float) -> Surface:
     a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
     even = np.add.outer(np.arange(rows - 1), np.arange(columns - 1)) % 2 == 0
     one, other = np.where(even, [a, b, c], [a, b, d]), np.where(even, [a, c, d], [b, c, d])
-    return Surface(vertices, np.concatenate([each.reshape(3, -1).T for each in (one, other)]))
+    faces = np.concatenate([each.reshape(3, -1).T for each in (one, other)])
+    return Surface(vertices, faces, smooth_below_deg)

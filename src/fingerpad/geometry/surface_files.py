@@ -10,7 +10,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray, float_array, one_of, positive
 from fingerpad.core.errors import InputError
-from fingerpad.geometry.surface import LARGEST_MM, SMALLEST_MM, Surface, height_surface
+from fingerpad.geometry.surface import LARGEST_MM, SMALLEST_MM, SMOOTH_BELOW_DEG, Surface, height_surface
 
 UNITS_MM = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
 """Units of length of a file. [mm]"""
@@ -34,6 +34,7 @@ def read_surface(
     scale: float = 1.0,
     up: str = "+z",
     at_mm: tuple[float, float] = (0, 0),
+    smooth_below_deg: float = SMOOTH_BELOW_DEG,
 ) -> Surface:
     """Read a rigid body of triangles, watertight or open.
 
@@ -52,6 +53,8 @@ def read_surface(
         in the order x, y, z lies along the finger. `Touch.spin_deg` turns the body about this axis.
     at_mm : (float, float)
         Where the middle of the body's extent lies, along and across the finger, from the indenter's axis.
+    smooth_below_deg : float
+        Hollow creases between triangles of a smaller angle are rounded; see `Surface`. [degrees]
 
     Returns
     -------
@@ -107,7 +110,7 @@ def read_surface(
     placed = factor * vertices @ turned
     middle = 0.5 * (placed.min(axis=0) + placed.max(axis=0))
     try:
-        return Surface(placed - middle + [at[0], 0.0, at[1]], faces)
+        return Surface(placed - middle + [at[0], 0.0, at[1]], faces, smooth_below_deg)
     except InputError as error:
         raise InputError(f"{file.name}: {error}") from error
 
@@ -125,7 +128,9 @@ def _welded(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray
     return ahead[is_new], number[faces]
 
 
-def read_height_map(path: str | Path, pitch_mm: float, height_mm: float = 1.0) -> Surface:
+def read_height_map(
+    path: str | Path, pitch_mm: float, height_mm: float = 1.0, smooth_below_deg: float = SMOOTH_BELOW_DEG
+) -> Surface:
     """Read a map of heights towards the skin, centred on the indenter's axis.
 
     Rows run across the finger and columns along it.
@@ -138,6 +143,8 @@ def read_height_map(path: str | Path, pitch_mm: float, height_mm: float = 1.0) -
         Distance between neighbouring heights. [mm]
     height_mm : float
         Height of one unit of NPY, CSV and float TIFF; of white above black in the other images. [mm]
+    smooth_below_deg : float
+        Hollow creases between triangles of a smaller angle are rounded; see `Surface`. [degrees]
 
     Returns
     -------
@@ -177,7 +184,7 @@ def read_height_map(path: str | Path, pitch_mm: float, height_mm: float = 1.0) -
             f"column {wrong[0][1] + 1}."
         )
     try:
-        return height_surface(height_mm * heights, pitch_mm)
+        return height_surface(height_mm * heights, pitch_mm, smooth_below_deg)
     except InputError as error:
         raise InputError(f"{file.name}: {error}") from error
 
