@@ -49,7 +49,6 @@ def sent(tmp_path_factory):
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """Half a finger made by Gmsh."""
-    pytest.importorskip("gmsh", exc_type=ImportError)
     path = tmp_path_factory.mktemp("gmsh") / "finger.msh"
     gmsh_finger.write_gmsh_finger(path)
     return path
@@ -112,7 +111,6 @@ def test_a_finger_of_gmsh_is_a_finger(made, parts):
 
 def test_the_finger_of_gmsh_yields_as_ours_of_the_same_shape(tmp_path):
     """Two generators of meshes, one body: a tube of radius 8 mm with a round tip about a bone of 2.5 mm."""
-    pytest.importorskip("gmsh")
     path = tmp_path / "fine.msh"
     gmsh_finger.write_gmsh_finger(path, along=24, cap=8, around=24, through=(1, 1, 2, 4))
     stations = np.concatenate([np.linspace(0.0, 15.5, 32), 16.0 + 8.0 * np.sin(np.linspace(0.0, 1.4, 30))])
