@@ -20,6 +20,7 @@ BENCHMARKS = (
     "startup",
     "population",
     "mixed_population",
+    "surfaces",
     "receptors",
     "sphere",
     "fitting",

@@ -76,6 +76,9 @@ TARGETS = (
     Target(
         "mixed_s", "mixed_population", "4,000 mixed afferents, 1 s of touch, solved skin to spikes", 1.0, "s"
     ),
+    Target(
+        "million_triangles_s", "surfaces", "10^6 triangles, read and pressed, more than the sphere", 60.0, "s"
+    ),
     Target("afferents_s", "population", "100,000 afferents, 1 s, exact spikes", 1.0, "s"),
     Target("receptors_s", "receptors", "responses of 10,000 receptors to one touch, skin solved", 1.0, "s"),
     Target("gradient_sum_s", "population", "Gradient Sum, 7 spheres x 100 x 100 x 100", 0.1, "s"),
