@@ -436,7 +436,7 @@ def test_invalid_values_are_refused_in_one_sentence_with_their_position(parts, s
         ("question: [a\n", "mine.yaml cannot be read as YAML"),
         ("- 1\n- 2\n", "mine.yaml, the file must be a mapping of keys to values: got [1, 2]."),
         ("", "mine.yaml, the file must be a mapping of keys to values: got None."),
-        ("question: &a [*a]\n", "mine.yaml, question must be a text"),
+        ("question: &a [*a]\n", "mine.yaml, line 1, question must be a text"),
         ("[" * 600, "mine.yaml cannot be read as YAML"),
         ("{[1]: 2}", "mine.yaml cannot be read as YAML"),
     ],

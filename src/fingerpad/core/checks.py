@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import got
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -59,7 +60,7 @@ def whole(name: str, value: int, at_least: int) -> int:
 def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
     """Return `value` if it is one of `allowed`, else raise `InputError` that lists them."""
     if value not in allowed:
-        raise InputError(f"{name} must be one of {', '.join(allowed)}: got {value!r}.")
+        raise InputError(f"{name} must be one of {', '.join(allowed)}: {got(value, allowed)}")
     return value
 
 

@@ -30,12 +30,39 @@ def did_you_mean(wrong: str, known: Collection[str], owner: str = "") -> str:
     >>> did_you_mean("colour", ["curvature_per_m", "radius_mm"], "Sphere")
     'Sphere has curvature_per_m, radius_mm.'
     """
-    near = difflib.get_close_matches(wrong, known, n=1, cutoff=_CLOSE)
+    near = closest(wrong, known)
+    return f"did you mean {near}?" if near else f"{owner or 'it'} has {', '.join(known) or 'no keyword'}."
+
+
+def closest(wrong: Any, known: Collection[str]) -> str | None:
+    """Known word that a wrong one may be meant for; None if none is close.
+
+    Examples
+    --------
+    >>> closest("shpere", ["sphere", "bar"])
+    'sphere'
+    """
+    if not isinstance(wrong, str):
+        return None
+    names = [name for name in known if isinstance(name, str)]
+    near = difflib.get_close_matches(wrong, names, n=1, cutoff=_CLOSE)
     # A name without its unit, such as `edge`, is less similar than that.
-    near = near or [name for name in known if wrong and name.startswith(f"{wrong}_")]
-    if near:
-        return f"did you mean {near[0]}?"
-    return f"{owner or 'it'} has {', '.join(known) or 'no keyword'}."
+    near = near or [name for name in names if wrong and name.startswith(f"{wrong}_")]
+    return near[0] if near else None
+
+
+def got(value: Any, known: Collection[str], shown: str | None = None) -> str:
+    """End of an error about a value that is none of several names.
+
+    Examples
+    --------
+    >>> got("humn", ["human", "paper"])
+    "got 'humn' (did you mean human?)."
+    >>> got("wood", ["human", "paper"])
+    "got 'wood'."
+    """
+    near, said = closest(value, known), f"got {shown or repr(value)}"
+    return f"{said} (did you mean {near}?)." if near else f"{said}."
 
 
 def known_keywords(function: Callable[_Given, _Made]) -> Callable[_Given, _Made]:

@@ -11,6 +11,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.progress import Progress
 from fingerpad.experiments import schemas
 from fingerpad.experiments.descriptions.pressed import PressedTouch, press_described
+from fingerpad.experiments.descriptions.reading import at
 from fingerpad.experiments.descriptions.touch import (
     DescribedTouch,
     TouchDescription,
@@ -74,7 +75,7 @@ def check_described(described: DescribedTouch) -> None:
     """Raise `InputError` if the touch is impossible, or an output lacks a package or cannot express it."""
     described.touch, described.population  # noqa: B018
     for number, name in enumerate(described.description.outputs):
-        with described.placed("outputs", number):
+        with described.origin.located(), at("outputs", number):
             if name in REQUIRED:
                 REQUIRED[name]()
             if name == "nwb":

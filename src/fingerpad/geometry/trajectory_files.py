@@ -13,6 +13,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.core.units import MN_PER_N, MS_PER_S
+from fingerpad.geometry.sampled_motions import TOLERANCE, reduced
 from fingerpad.geometry.trajectory import SAME_VALUE, Trajectory, check_speed
 
 MM_PER_UM = 1e-3
@@ -94,6 +95,31 @@ def read_trajectory(
         )
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
+
+
+def recorded(file: Path, first_touch_mm: float = 0.0, tolerance: float = TOLERANCE) -> Trajectory:
+    """Read a motion from a CSV file (docs/motions.md), with as many samples as it needs.
+
+    Parameters
+    ----------
+    file : Path
+        The file; columns name what they hold and its unit.
+    first_touch_mm : float, optional
+        Reading of the depth at first touch. [mm]
+    tolerance : float, optional
+        Samples this close to a line, relative to the extent of the motion, are left out; 0 keeps all.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    InputError
+        As of `read_trajectory`.
+    """
+    motion = read_trajectory(file, first_touch_mm=first_touch_mm)
+    return reduced(motion, tolerance) if tolerance else motion
 
 
 def _columns(rows: Sequence[TableRow], path: str) -> dict[str, FloatArray]:

@@ -6,27 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter
-
 from fingerpad.core.checks import finite
 from fingerpad.core.errors import InputError
 from fingerpad.data import protocol
-from fingerpad.experiments.descriptions.signatures import made_by, one_of_kinds
+from fingerpad.experiments.descriptions.signatures import one_of_kinds
 from fingerpad.experiments.descriptions.values import Text
 from fingerpad.experiments.indenter_text import indenter_named
-from fingerpad.geometry.composed import ridges
-from fingerpad.geometry.dots import Dots, braille
-from fingerpad.geometry.embossed import Embossed, embossed_text
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh_files import MESH_FILES, read_finger
 from fingerpad.geometry.motion import ForceRampAndHold, Motion, RampAndHold
-from fingerpad.geometry.motions import chirp, repeated, sine, staircase, stroke
 from fingerpad.geometry.names import INDENTERS
-from fingerpad.geometry.sampled_motions import TOLERANCE, reduced
-from fingerpad.geometry.surface_files import read_height_map, read_surface
-from fingerpad.geometry.trajectory import Trajectory
-from fingerpad.geometry.trajectory_files import read_trajectory
 
 RAMP_AND_HOLD = "ramp_and_hold"
 MEASURED = "measured"
@@ -61,64 +51,42 @@ def ramp_and_hold(
     return RampAndHold(protocol.DEPTH.value if depth_mm is None else depth_mm, ramp_ms, hold_ms)
 
 
-def recorded(file: Path, first_touch_mm: float = 0.0, tolerance: float = TOLERANCE) -> Motion:
-    """Play a motion from a CSV file (docs/motions.md).
-
-    Parameters
-    ----------
-    file : Path
-        The file; columns name what they hold and its unit.
-    first_touch_mm : float, optional
-        Reading of the depth at first touch. [mm]
-    tolerance : float, optional
-        Samples this close to a line, relative to the extent of the motion, are left out; 0 keeps all.
-    """
-    motion = read_trajectory(file, first_touch_mm=first_touch_mm)
-    return reduced(motion, tolerance) if tolerance else motion
-
-
-FINGERS: dict[str, Callable[..., Finger]] = {
+FINGERS: dict[str, Callable[..., Finger] | str] = {
     MEASURED: Fingertip.of,
     "outline": Fingertip,
-    "mesh": read_finger,
+    "mesh": "fingerpad.geometry.mesh_files:read_finger",
 }
 """How a finger can be given, by kind."""
 
-OBJECTS: dict[str, Callable[..., Indenter]] = {
+OBJECTS: dict[str, Callable[..., Indenter] | str] = {
     **INDENTERS,
-    "dots": Dots,
-    "braille": braille,
-    "embossed": Embossed,
-    "embossed_text": embossed_text,
-    "ridges": ridges,
-    "surface": read_surface,
-    "height_map": read_height_map,
+    "dots": "fingerpad.geometry.dots:Dots",
+    "braille": "fingerpad.geometry.dots:braille",
+    "embossed": "fingerpad.geometry.embossed:Embossed",
+    "embossed_text": "fingerpad.geometry.embossed:embossed_text",
+    "ridges": "fingerpad.geometry.composed:ridges",
+    "surface": "fingerpad.geometry.surface_files:read_surface",
+    "height_map": "fingerpad.geometry.surface_files:read_height_map",
 }
-"""What can be pressed in, by kind."""
+"""What can be pressed in, by kind; by name where only a file with it needs the module."""
 
-MOTIONS: dict[str, Callable[..., Motion]] = {
+MOTIONS: dict[str, Callable[..., Motion] | str] = {
     RAMP_AND_HOLD: ramp_and_hold,
-    "sine": sine,
-    "chirp": chirp,
-    "repeated": repeated,
-    "staircase": staircase,
-    "stroke": stroke,
-    "recorded": recorded,
-    "trajectory": Trajectory,
+    **{
+        kind: f"fingerpad.geometry.motions:{kind}"
+        for kind in ("sine", "chirp", "repeated", "staircase", "stroke")
+    },
+    "recorded": "fingerpad.geometry.trajectory_files:recorded",
+    "trajectory": "fingerpad.geometry.trajectory:Trajectory",
 }
 """How it can move, by kind."""
 
 _WITHOUT: Mapping[str, Sequence[str]] = {"trajectory": ("phases", "cycles")}
 """Parameters that a file does not have."""
 
-FingerPart = one_of_kinds(
-    {kind: made_by(kind, makes) for kind, makes in FINGERS.items()}, default=MEASURED, text=Text
-)
-ObjectPart = one_of_kinds({kind: made_by(kind, makes) for kind, makes in OBJECTS.items()}, text=Text)
-MotionPart = one_of_kinds(
-    {kind: made_by(kind, makes, _WITHOUT.get(kind, ())) for kind, makes in MOTIONS.items()},
-    default=RAMP_AND_HOLD,
-)
+FingerPart = one_of_kinds(FINGERS, default=MEASURED, text=Text)
+ObjectPart = one_of_kinds(OBJECTS, text=Text)
+MotionPart = one_of_kinds(MOTIONS, default=RAMP_AND_HOLD, without=_WITHOUT)
 
 
 def finger_of(part: Any, beside: Path = Path()) -> Finger:
@@ -140,13 +108,3 @@ def object_of(part: Any, beside: Path = Path()) -> Indenter:
     """Make the object of a file: a part, or a text such as `punch:6.35`."""
     body: Indenter = indenter_named(part) if isinstance(part, str) else part.made(beside)
     return body
-
-
-def motion_of(content: Mapping[str, Any]) -> Any:
-    """Part of a motion from plain values."""
-    return TypeAdapter(MotionPart).validate_python(content)
-
-
-def finger_part(content: Mapping[str, Any]) -> Any:
-    """Part of a finger from plain values."""
-    return TypeAdapter(FingerPart).validate_python(content)

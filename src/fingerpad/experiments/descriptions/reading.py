@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import re
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import did_you_mean
+from fingerpad.core.keywords import did_you_mean, got
+from fingerpad.core.plain_yaml import line_at
+from fingerpad.experiments.descriptions.signatures import LateKind
 from fingerpad.experiments.descriptions.values import Part, kind_of
+
+Place = tuple[int | str, ...]
+"""Keys and indices that lead to a place in a file."""
 
 _Kind = TypeVar("_Kind", bound=Part)
 
@@ -26,7 +35,73 @@ _SHOWN = reprlib.Repr()
 _SHOWN.maxstring, _SHOWN.maxother, _SHOWN.maxlevel = 60, 60, 2
 
 
-def parsed(kind: type[_Kind], content: Any, source: str) -> _Kind:
+class PlacedError(InputError):
+    """An error at a known place of a file, which the sentence names.
+
+    Parameters
+    ----------
+    said : str
+        The sentence, which begins with the place as it is spelled.
+    place : sequence of int or str
+        Keys and indices that lead there.
+    """
+
+    def __init__(self, said: str, place: Sequence[int | str]):
+        super().__init__(said)
+        self.place = tuple(place)
+
+
+@dataclass(frozen=True)
+class Source:
+    r"""Where a description comes from: errors begin with its name and line.
+
+    Parameters
+    ----------
+    name : str
+        Of the file: files that it names are searched beside it.
+    text : str
+        Its content, for lines; empty where there is none.
+
+    Examples
+    --------
+    >>> with Source("touch.yaml", "object: sphere\nfriction: 9").located(), at("friction"):
+    ...     raise InputError("too rough.")
+    Traceback (most recent call last):
+    fingerpad.core.errors.InputError: touch.yaml, line 2, friction: too rough.
+    """
+
+    name: str
+    text: str = ""
+
+    @property
+    def beside(self) -> Path:
+        """Folder from which files are named."""
+        return Path(self.name).parent
+
+    @contextmanager
+    def located(self) -> Iterator[None]:
+        """Put the file, and the line where it is known, in front of an `InputError` from within."""
+        try:
+            yield
+        except InputError as error:
+            place = error.place if isinstance(error, PlacedError) else _unspelled(str(error))
+            line = line_at(self.text, place) if self.text else None
+            where = self.name if line is None else f"{self.name}, line {line}"
+            raise InputError(f"{where}, {error}") from error
+
+
+@contextmanager
+def at(*place: int | str) -> Iterator[None]:
+    """Put the place in front of an `InputError` from within that has none."""
+    try:
+        yield
+    except PlacedError:
+        raise
+    except InputError as error:
+        raise PlacedError(f"{spelled(place)}: {error}", place) from error
+
+
+def part_from(kind: type[_Kind], content: Any) -> _Kind:
     """Build a description from plain values.
 
     Parameters
@@ -35,18 +110,16 @@ def parsed(kind: type[_Kind], content: Any, source: str) -> _Kind:
         A part.
     content : mapping
         As YAML has it.
-    source : str
-        Where it comes from, for errors.
 
     Raises
     ------
-    InputError
-        For the first error, with its place.
+    PlacedError
+        For the first error.
     """
     try:
         return kind.model_validate(content)
     except ValidationError as error:
-        raise InputError(f"{source}, {error_sentence(error, kind)}") from error
+        raise PlacedError(error_sentence(error, kind), place_of(error)) from error
 
 
 def place_of(error: ValidationError) -> list[int | str]:
@@ -87,13 +160,21 @@ def error_sentence(error: ValidationError, kind: type[Part]) -> str:
         known = _keys_at(first["loc"][:-1], kind)
         return f"{where} is unknown: {did_you_mean(str(path[-1]), known, spelled(path[:-1]))}"
     expected = _EXPECTED.get(first["type"], first["msg"])
-    return f"{where} {expected}: got {_SHOWN.repr(first.get('input'))}."
+    value, allowed = first.get("input"), first.get("ctx", {}).get("allowed", ())
+    return f"{where} {expected}: {got(value, allowed, _SHOWN.repr(value))}"
 
 
 def spelled(path: Sequence[int | str]) -> str:
     """Spell a place in a file, such as stimuli[2].width_mm, entries counted from 1."""
     text = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in path)
     return text.lstrip(".") or "the file"
+
+
+def _unspelled(said: str) -> Place:
+    """Place that a sentence begins with: stimuli[2].width_mm."""
+    begin = re.match(r"[\w.\[\]]*", said)
+    parts = re.findall(r"\[(\d+)\]|(\w+)", begin[0] if begin else "")
+    return tuple(int(number) - 1 if number else key for number, key in parts)
 
 
 def _keys_at(path: Sequence[int | str], kind: type[Part]) -> list[str]:
@@ -121,4 +202,6 @@ def parts_in(annotation: Any) -> list[type[BaseModel]]:
     """Parts that an annotation names."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
+    if isinstance(annotation, LateKind):
+        return [annotation.part]
     return [found for inner in get_args(annotation) for found in parts_in(inner)]

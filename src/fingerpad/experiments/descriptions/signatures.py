@@ -9,10 +9,15 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from pkgutil import resolve_name
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
 
-from pydantic import Discriminator, Field, Tag, create_model
+from pydantic import Discriminator, Field, GetJsonSchemaHandler, Tag, create_model
+from pydantic_core import CoreSchema, core_schema
 
 from fingerpad.core.keywords import other_names
 from fingerpad.experiments.descriptions.values import (
@@ -150,17 +155,58 @@ def _first_sentence(makes: Callable[..., Any]) -> str:
     return (makes.__doc__ or "").strip().partition("\n")[0]
 
 
-def one_of_kinds(parts: Mapping[str, type[Made]], default: str | None = None, text: Any = None) -> Any:
+@dataclass(frozen=True)
+class LateKind:
+    """Part of one kind, made when it is first needed: a file of spheres does not load braille.
+
+    Parameters
+    ----------
+    kind : str
+        Value of the key `kind`.
+    makes : callable or str
+        As of `made_by`, or its name as module and name.
+    without : sequence of str
+        As of `made_by`.
+    """
+
+    kind: str
+    makes: Callable[..., Any] | str
+    without: Sequence[str] = ()
+
+    @cached_property
+    def part(self) -> type[Made]:
+        """The part."""
+        makes = resolve_name(self.makes) if isinstance(self.makes, str) else self.makes
+        return made_by(self.kind, makes, self.without)
+
+    def __get_pydantic_core_schema__(self, *_: Any) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(
+            lambda value: self.part.model_validate(value),
+            serialization=core_schema.plain_serializer_function_ser_schema(lambda made: made.model_dump()),
+        )
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return handler(self.part.__pydantic_core_schema__)
+
+
+def one_of_kinds(
+    makers: Mapping[str, Callable[..., Any] | str],
+    default: str | None = None,
+    text: Any = None,
+    without: Mapping[str, Sequence[str]] = MappingProxyType({}),
+) -> Any:
     """Type of a value that is one of several parts, by its key `kind`.
 
     Parameters
     ----------
-    parts : mapping of str to type
-        By kind.
+    makers : mapping of str to callable or str
+        What makes a part, by kind, as of `LateKind`.
     default : str, optional
         Kind of a mapping that names none.
     text : type, optional
         Type of a text in the place of the mapping.
+    without : mapping of str to sequence of str, optional
+        Parameters that a file does not have, by kind.
     """
 
     def tag(value: Any) -> str:
@@ -168,16 +214,19 @@ def one_of_kinds(parts: Mapping[str, type[Made]], default: str | None = None, te
             return form_of(str(getattr(value, "kind", default)))
         if isinstance(value, Mapping):
             kind = value.get("kind", default)
-            return form_of(kind) if isinstance(kind, str) and kind in parts else UNKNOWN
+            return form_of(kind) if isinstance(kind, str) and kind in makers else UNKNOWN
         return NAMED if isinstance(value, str) and text is not None else UNKNOWN
 
     # Named after its kinds: two models of one name would get longer names in a schema.
     unknown = create_model(
-        f"{UNKNOWN_MODEL}{'_'.join(parts)}",
+        f"{UNKNOWN_MODEL}{'_'.join(makers)}",
         __base__=Part,
-        kind=(Annotated[str, choice_of(tuple(parts))], ...),
+        kind=(Annotated[str, choice_of(tuple(makers))], ...),
     )
-    tagged = [Annotated[part, Tag(form_of(kind))] for kind, part in parts.items()]
+    tagged: list[Any] = [
+        Annotated[Any, LateKind(kind, makes, without.get(kind, ())), Tag(form_of(kind))]
+        for kind, makes in makers.items()
+    ]
     if text is not None:
         tagged.append(Annotated[text, Tag(NAMED)])
     tagged.append(Annotated[unknown, Tag(UNKNOWN)])

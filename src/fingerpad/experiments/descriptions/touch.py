@@ -6,34 +6,22 @@ docs/touch.md explains every key.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, Strict, ValidationError
+from pydantic import BeforeValidator, Field, Strict
 
-from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
-from fingerpad.core.plain_yaml import line_at, read_yaml
-from fingerpad.data.tissues import DEFAULT_TISSUES
-from fingerpad.experiments.conditions import straight_tilt_deg
+from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.experiments.descriptions.parts import DEFAULT, AfferentChoice, PopulationSettings
 from fingerpad.experiments.descriptions.population import afferent_of, population_of
-from fingerpad.experiments.descriptions.pressing import (
-    FingerPart,
-    MotionPart,
-    ObjectPart,
-    finger_of,
-    finger_part,
-    motion_of,
-    object_of,
-)
-from fingerpad.experiments.descriptions.reading import error_sentence, place_of, spelled
+from fingerpad.experiments.descriptions.pressing import finger_of
+from fingerpad.experiments.descriptions.reading import Source, at, part_from
+from fingerpad.experiments.descriptions.stimulus import FingerDescription, StimulusDescription
 from fingerpad.experiments.descriptions.values import (
-    FiniteNumber,
     NotNegative,
     Numbers,
     Pair,
@@ -43,12 +31,10 @@ from fingerpad.experiments.descriptions.values import (
     choice_of,
 )
 from fingerpad.geometry.fingertip import Finger
-from fingerpad.geometry.grading import RESOLUTIONS
-from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.rate_windows import rate_windows_ms
 from fingerpad.neuron.spikes import window_bounds
-from fingerpad.skin.indentation import Touch, touch_of
+from fingerpad.skin.indentation import Touch
 
 OUTPUTS = (
     "figures",
@@ -64,26 +50,6 @@ OUTPUTS = (
     "febio",
 )
 """What can be written of a touch."""
-
-
-class PlaceSettings(Part):
-    """Where and in which direction the object is pressed.
-
-    Parameters
-    ----------
-    x_mm, z_mm : float
-        Where the object's axis meets the skin, from the middle of the pad: along the finger, distal positive,
-        and across. [mm]
-    tilt_deg : float
-        0 is perpendicular to the long axis of the finger; without it, perpendicular to the skin. [degrees]
-    spin_deg : float
-        Turn about the direction of pressing. [degrees]
-    """
-
-    x_mm: FiniteNumber = 0.0
-    z_mm: FiniteNumber = 0.0
-    tilt_deg: FiniteNumber | None = None
-    spin_deg: FiniteNumber = 0.0
 
 
 class RateWindowSettings(Part):
@@ -119,28 +85,17 @@ class AfferentsSettings(PopulationSettings):
     windows_ms: RateWindowSettings = RateWindowSettings()
 
 
-class TouchDescription(Part):
+class TouchDescription(StimulusDescription, FingerDescription):
     """All that a file of one touch holds.
 
     Parameters
     ----------
     title : str
         What it is, in words: the title of the page.
-    resolution : {"quick", "standard", "paper"}
-        How fine mesh and steps are.
-    finger : mapping or str
-        Whose: a preset such as "child", the sizes of `fingerpad.Fingertip.of`, `kind: outline` with those of
-        `fingerpad.Fingertip`, or `kind: mesh` with the parameters of `fingerpad.read_finger`.
-    tissues : str
-        A set of tissues by name, as of `fingerpad.indent`.
-    object : mapping or str
-        What is pressed in: `kind` and its sizes, or a text such as "sphere:radius_mm=3.5".
-    motion : mapping
-        How: `kind` and its numbers; a ramp and hold by default.
-    place : PlaceSettings
-        Where, and in which direction.
-    friction : float
-        Coulomb's coefficient between skin and object.
+    resolution, finger, tissues
+        As of `FingerDescription`.
+    object, motion, place, friction
+        As of `StimulusDescription`.
     times_ms : list of float
         Times at which the result is wanted beside those that the motion has. [ms]
     afferents : AfferentsSettings
@@ -156,13 +111,6 @@ class TouchDescription(Part):
     """
 
     title: Text = "One touch"
-    resolution: Annotated[str, choice_of(RESOLUTIONS)] = "quick"
-    finger: FingerPart = Field(default_factory=lambda: finger_part({}))
-    tissues: Annotated[str, choice_of(TISSUES)] = DEFAULT_TISSUES
-    object: ObjectPart
-    motion: MotionPart = Field(default_factory=lambda: motion_of({}))
-    place: PlaceSettings = PlaceSettings()
-    friction: NotNegative = 0.0
     times_ms: Numbers = ()
     afferents: AfferentsSettings = AfferentsSettings()
     outputs: Annotated[
@@ -192,18 +140,9 @@ class DescribedTouch:
     text: str = ""
 
     @property
-    def beside(self) -> Path:
-        """Folder from which the description names files."""
-        return Path(self.source).parent
-
-    @contextmanager
-    def placed(self, *place: str | int) -> Iterator[None]:
-        """Put file, line and key in front of an `InputError` from within."""
-        try:
-            yield
-        except InputError as error:
-            key = f"{spelled(place)}: " if place else ""
-            raise InputError(f"{_located(self.source, self.text, place)}, {key}{error}") from error
+    def origin(self) -> Source:
+        """Where it comes from, for errors."""
+        return Source(self.source, self.text)
 
     @cached_property
     def finger(self) -> Finger:
@@ -214,8 +153,8 @@ class DescribedTouch:
         InputError
             If it is impossible, with its place in the file.
         """
-        with self.placed("finger"):
-            return finger_of(self.description.finger, self.beside)
+        with self.origin.located(), at("finger"):
+            return finger_of(self.description.finger, self.origin.beside)
 
     @cached_property
     def touch(self) -> Touch:
@@ -226,26 +165,10 @@ class DescribedTouch:
         InputError
             If a part is impossible, with its place in the file.
         """
-        asked, finger = self.description, self.finger
-        with self.placed("object"):
-            indenter = object_of(asked.object, self.beside)
-        with self.placed("motion"):
-            motion = asked.motion.made(self.beside)
-        tilt_deg = asked.place.tilt_deg
-        x, z = finger.contact_mm
-        with self.placed():
-            return touch_of(
-                finger,
-                indenter,
-                motion,
-                asked.tissues,
-                asked.resolution,
-                (x + asked.place.x_mm, z + asked.place.z_mm),
-                tilt_deg=straight_tilt_deg(finger, indenter) if tilt_deg is None else tilt_deg,
-                friction=asked.friction,
-                spin_deg=asked.place.spin_deg,
-                times_ms=asked.times_ms,
-            )
+        asked = self.description
+        with self.origin.located():
+            made = asked.stimulus(self.origin.beside)
+            return made.touch(self.finger, asked.tissues, asked.resolution, times_ms=asked.times_ms)
 
     @cached_property
     def population(self) -> Population:
@@ -257,10 +180,10 @@ class DescribedTouch:
             If they cannot be, or a window of rates has no phase, with its place in the file.
         """
         asked = self.description.afferents
-        with self.placed():
-            afferent = afferent_of(asked.afferent, self.description.tissues, self.beside)
+        with self.origin.located():
+            afferent = afferent_of(asked.afferent, self.description.tissues, self.origin.beside)
             laid = population_of(asked, afferent, "afferents", self.finger)
-        with self.placed("afferents", "windows_ms"):
+        with self.origin.located(), at("afferents", "windows_ms"):
             phases = self.touch.stimulus.phases
             for window in rate_windows_ms(phases, asked.windows_ms.dynamic, asked.windows_ms.static):
                 window_bounds(window)
@@ -269,14 +192,9 @@ class DescribedTouch:
     def input_hashes(self) -> dict[str, str]:
         """SHA-256 of the description and of the files that it names."""
         asked = self.description
-        named = [
-            self.beside / value
-            for part in (asked.object, asked.motion)
-            for key, value in getattr(part, "given", {}).items()
-            if key in getattr(part, "files", ())
-        ]
+        named = asked.files(self.origin.beside)
         if isinstance(asked.afferents.afferent, str) and asked.afferents.afferent != DEFAULT:
-            named.append(self.beside / asked.afferents.afferent)
+            named.append(self.origin.beside / asked.afferents.afferent)
         contents = {self.source: self.text.encode()} | {str(path): path.read_bytes() for path in named}
         return {name: hashlib.sha256(content).hexdigest() for name, content in contents.items()}
 
@@ -315,14 +233,5 @@ def described_touch(
     content: Mapping[str, Any] | Any, source: str = "touch", text: str = ""
 ) -> DescribedTouch:
     """Build the description of a touch from plain values; arguments as of `DescribedTouch`."""
-    try:
-        return DescribedTouch(TouchDescription.model_validate(content), source, text)
-    except ValidationError as error:
-        located = _located(source, text, place_of(error))
-        raise InputError(f"{located}, {error_sentence(error, TouchDescription)}") from error
-
-
-def _located(source: str, text: str, place: Sequence[str | int]) -> str:
-    """File and line, where it is known, of a place."""
-    line = line_at(text, place) if text else None
-    return source if line is None else f"{source}, line {line}"
+    with Source(source, text).located():
+        return DescribedTouch(part_from(TouchDescription, content), source, text)

@@ -62,12 +62,15 @@ def with_message(words: str, allowed: Collection[Any] | None = None) -> WrapVali
     """
 
     def checked(value: Any, handler: Callable[[Any], Any]) -> Any:
+        refusal = PydanticCustomError(
+            "expected", "must be {words}", {"words": words, "allowed": allowed or ()}
+        )
         try:
             found = handler(value)
         except ValidationError as error:
-            raise PydanticCustomError("expected", "must be {words}", {"words": words}) from error
+            raise refusal from error
         if allowed is not None and found not in allowed:
-            raise PydanticCustomError("expected", "must be {words}", {"words": words})
+            raise refusal
         return found
 
     return WrapValidator(checked)

@@ -11,7 +11,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.experiments.descriptions.parts import DEFAULT
-from fingerpad.experiments.descriptions.reading import parsed
+from fingerpad.experiments.descriptions.reading import Source, part_from
 from fingerpad.experiments.discrimination.task import DiscriminationTask
 from fingerpad.experiments.manifest import sha256
 
@@ -113,10 +113,10 @@ def read_task(source: str | Path, **skin: Any) -> DiscriminationTask:
     replaced = {key: value for key, value in skin.items() if value is not None}
     if replaced and isinstance(content, dict) and isinstance(content.get("skin", {}), dict):
         content["skin"] = content.get("skin", {}) | replaced
-    return parse_task(content, name)
+    return parse_task(content, name, text)
 
 
-def parse_task(content: Any, source: str = "task") -> DiscriminationTask:
+def parse_task(content: Any, source: str = "task", text: str = "") -> DiscriminationTask:
     """Build a task from plain values.
 
     Parameters
@@ -125,6 +125,8 @@ def parse_task(content: Any, source: str = "task") -> DiscriminationTask:
         As YAML has it.
     source : str, optional
         Where it comes from, for errors.
+    text : str, optional
+        Content of the file, for the lines of errors.
 
     Returns
     -------
@@ -144,4 +146,5 @@ def parse_task(content: Any, source: str = "task") -> DiscriminationTask:
     Traceback (most recent call last):
     fingerpad.core.errors.InputError: task, noise must be a number not below 0, or fitted: got -0.1.
     """
-    return parsed(DiscriminationTask, content, source)
+    with Source(source, text).located():
+        return part_from(DiscriminationTask, content)

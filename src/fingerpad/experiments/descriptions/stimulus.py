@@ -1,0 +1,209 @@
+"""What files say of one press: the finger, and the stimulus with its object, motion, place and friction."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from fingerpad.core.checks import finite
+from fingerpad.core.errors import InputError
+from fingerpad.data.tissues import DEFAULT_TISSUES
+from fingerpad.experiments.conditions import straight_tilt_deg
+from fingerpad.experiments.descriptions.pressing import FingerPart, MotionPart, ObjectPart, object_of
+from fingerpad.experiments.descriptions.reading import Place, PlacedError, at, spelled
+from fingerpad.experiments.descriptions.values import FiniteNumber, NotNegative, Part, choice_of
+from fingerpad.geometry.fingertip import Finger
+from fingerpad.geometry.grading import RESOLUTIONS, Grading
+from fingerpad.geometry.indenters import Indenter
+from fingerpad.geometry.motion import Motion, RampAndHold
+from fingerpad.mechanics.materials import Tissues
+from fingerpad.mechanics.tissues import TISSUES
+from fingerpad.skin.indentation import Touch, touch_of
+
+_ABOUT: tuple[tuple[str, Place], ...] = (
+    ("at_mm", ("place",)),
+    ("A", ("place",)),  # a position must lie on the finger
+    ("tilt_deg", ("place", "tilt_deg")),
+    ("spin_deg", ("place", "spin_deg")),
+    ("times_ms", ("times_ms",)),
+    ("friction", ("friction",)),
+    ("grading", ("object",)),
+)
+"""Which key of a file the solver's arguments are; any other error is one of the motion."""
+
+
+class PlaceSettings(Part):
+    """Where and in which direction the object is pressed.
+
+    Parameters
+    ----------
+    x_mm, z_mm : float
+        Where the object's axis meets the skin, from the middle of the pad: along the finger, distal positive,
+        and across. [mm]
+    tilt_deg : float
+        0 is perpendicular to the long axis of the finger; without it, perpendicular to the skin. [degrees]
+    spin_deg : float
+        Turn about the direction of pressing. [degrees]
+    """
+
+    x_mm: FiniteNumber = 0.0
+    z_mm: FiniteNumber = 0.0
+    tilt_deg: FiniteNumber | None = None
+    spin_deg: FiniteNumber = 0.0
+
+
+class FingerDescription(Part):
+    """The finger that is pressed.
+
+    Parameters
+    ----------
+    resolution : {"quick", "standard", "paper"}
+        How fine mesh and steps are.
+    finger : mapping or str
+        Whose: a preset such as "child", the sizes of `fingerpad.Fingertip.of`, `kind: outline` with those of
+        `fingerpad.Fingertip`, or `kind: mesh` with the parameters of `fingerpad.read_finger`.
+    tissues : str
+        A set of tissues by name, as of `fingerpad.indent`.
+    """
+
+    resolution: Annotated[str, choice_of(RESOLUTIONS)] = "quick"
+    finger: FingerPart = Field(default={}, validate_default=True)
+    tissues: Annotated[str, choice_of(TISSUES)] = DEFAULT_TISSUES
+
+
+class StimulusDescription(Part):
+    """What is pressed in, and how.
+
+    Parameters
+    ----------
+    object : mapping or str
+        What is pressed in: `kind` and its sizes, or a text such as "sphere:radius_mm=3.5".
+    motion : mapping
+        How: `kind` and its numbers; a ramp and hold by default.
+    place : PlaceSettings
+        Where, and in which direction.
+    friction : float
+        Coulomb's coefficient between skin and object.
+    """
+
+    object: ObjectPart
+    motion: MotionPart = Field(default={}, validate_default=True)
+    place: PlaceSettings = PlaceSettings()
+    friction: NotNegative = 0.0
+
+    def stimulus(self, beside: Path = Path()) -> TactileStimulus:
+        """Make what is described; files are named from the folder `beside`."""
+        with at("object"):
+            indenter = object_of(self.object, beside)
+        with at("motion"):
+            motion = self.motion.made(beside)
+        return TactileStimulus(indenter, motion, **dict(self.place), friction=self.friction)
+
+    def files(self, beside: Path = Path()) -> list[Path]:
+        """Files that object and motion name."""
+        return [
+            beside / value
+            for part in (self.object, self.motion)
+            for key, value in getattr(part, "given", {}).items()
+            if key in getattr(part, "files", ())
+        ]
+
+
+@dataclass(frozen=True)
+class TactileStimulus:
+    """An object, its motion, and its place on the finger.
+
+    Parameters
+    ----------
+    indenter : Indenter
+        The rigid body.
+    motion : Motion
+        How it is pressed.
+    x_mm, z_mm : float
+        Where its axis meets the skin, from the receptor or the middle of the pad: along the finger, distal
+        positive, and across. [mm]
+    tilt_deg : float, optional
+        As in `fingerpad.Touch`; by default it presses perpendicular to the skin at the receptor. [degrees]
+    spin_deg : float
+        As in `fingerpad.Touch`: the orientation of a bar, an edge, a gap or a grating. [degrees]
+    friction : float
+        Coulomb's coefficient.
+    """
+
+    indenter: Indenter
+    motion: Motion = field(default_factory=RampAndHold)
+    x_mm: float = 0.0
+    z_mm: float = 0.0
+    tilt_deg: float | None = None
+    spin_deg: float = 0.0
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        finite("x_mm", self.x_mm, "mm")
+        finite("z_mm", self.z_mm, "mm")
+        finite("spin_deg", self.spin_deg, "degrees")
+        if self.tilt_deg is not None:
+            finite("tilt_deg", self.tilt_deg, "degrees")
+
+    def touch(
+        self,
+        finger: Finger,
+        tissues: str | Tissues,
+        resolution: str,
+        grading: Grading | None = None,
+        times_ms: Sequence[float] = (),
+    ) -> Touch:
+        """Describe the touch for the solver.
+
+        Parameters
+        ----------
+        finger : Finger
+            The finger.
+        tissues : str or Tissues
+            What it consists of.
+        resolution : {"quick", "standard", "paper"}
+            How fine mesh and steps are.
+        grading : Grading, optional
+            Mesh; default: fine wherever the object goes.
+        times_ms : sequence of float, optional
+            Times at which the result is wanted. [ms]
+
+        Raises
+        ------
+        PlacedError
+            If they do not fit each other, with the part of a file that is about it.
+        """
+        tilt_deg = straight_tilt_deg(finger, self.indenter) if self.tilt_deg is None else self.tilt_deg
+        with _about():
+            return touch_of(
+                finger,
+                self.indenter,
+                self.motion,
+                tissues,
+                resolution,
+                (finger.contact_mm[0] + self.x_mm, finger.contact_mm[1] + self.z_mm),
+                grading,
+                tilt_deg,
+                friction=self.friction,
+                spin_deg=self.spin_deg,
+                times_ms=times_ms,
+            )
+
+
+@contextmanager
+def _about() -> Iterator[None]:
+    """Name the key of a file that an error of a whole touch is about."""
+    try:
+        yield
+    except InputError as error:
+        begin = re.match(r"(?:[xz] of )?(\w+)", str(error))
+        place = dict(_ABOUT).get(begin[1] if begin else "", ("motion",))
+        said = str(error).removeprefix(f"{place[-1]} ")
+        between = " " if said != str(error) else ": "
+        raise PlacedError(f"{spelled(place)}{between}{said}", place) from error
