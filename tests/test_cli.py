@@ -17,7 +17,7 @@ from fingerpad.core.errors import ConvergenceError, FingerpadError, StoreError
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments import gerling2014
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.discrimination.task import SkinSettings
+from fingerpad.experiments.descriptions.stimulus import FingerDescription
 from fingerpad.export import formats
 from fingerpad.geometry.fingertip import FINGERS, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS
@@ -69,7 +69,7 @@ def test_one_set_of_tissues_is_the_default_everywhere():
     assert set(pressed) == {"reproduce", "fit", "validate", "export"}
     functions = [inspect.signature(function).parameters["materials"] for function in (fp.indent, touch_of)]
     found = {*pressed.values(), *(each.default for each in functions), Conditions().materials}
-    assert found | {SkinSettings().materials, choices.DEFAULT_TISSUES} == {DEFAULT_TISSUES}
+    assert found | {FingerDescription().tissues, choices.DEFAULT_TISSUES} == {DEFAULT_TISSUES}
     assert Conditions().afferent == fp.Afferent() == fp.Population.grid().afferent
 
 

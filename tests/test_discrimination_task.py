@@ -38,9 +38,9 @@ from fingerpad.report import discrimination_task_figures as figures
 ROOT = Path(__file__).parents[1]
 QUESTION = {
     "question": "Which bumps?",
-    "skin": {"materials": "trial3"},  # whose afferent follows energy density
-    "common": {"indenter": "sphere"},
-    "stimuli": {"vary": "curvature_per_m", "values": [200, 220, 240, 280, 320]},
+    "tissues": "trial3",  # whose afferent follows energy density
+    "object": {"kind": "sphere"},
+    "stimuli": {"vary": "object.curvature_per_m", "values": [200, 220, 240, 280, 320]},
     "standard": 200,
     "population": {"rows": 4, "columns": 4},
     "code": ["gradient_sum", "euclidean"],
@@ -239,7 +239,10 @@ def test_a_missing_curve_has_its_reason():
 
 
 def test_stimuli_without_levels_have_hit_rates_and_no_curve():
-    listed = [{"name": "blunt", "curvature_per_m": 200}, {"name": "sharp", "curvature_per_m": 300}]
+    listed = [
+        {"name": "blunt", "object": {"curvature_per_m": 200}},
+        {"name": "sharp", "object": {"curvature_per_m": 300}},
+    ]
     question = asked(stimuli=listed, standard="blunt", measure="static")
     found = analyse(question, bumps(question))
     assert found.level is None
@@ -251,7 +254,7 @@ def test_stimuli_without_levels_have_hit_rates_and_no_curve():
 
 def test_two_stimuli_give_a_forced_choice_and_no_missing_threshold():
     """Proportion correct is the area under the ROC of the code's statistic; trials give the interval."""
-    two = {"vary": "curvature_per_m", "values": [200, 220]}
+    two = {"vary": "object.curvature_per_m", "values": [200, 220]}
     question = asked(stimuli=two, measure="static", code=["gradient_sum", "ideal"])
     found = analyse(question, bumps(question))
     for decoding in found.decodings:
@@ -422,7 +425,7 @@ def written(folder):
 
 
 # JSON is YAML.
-QUICK = {"skin": QUESTION["skin"] | {"resolution": "quick"}}
+QUICK = {"resolution": "quick"}
 MINE = json.dumps(QUESTION | QUICK | {"code": "gradient_sum", "measure": "static"})
 
 
@@ -500,11 +503,11 @@ def test_an_example_task_runs_by_name_or_as_a_file_of_ones_own(call, tmp_path, a
         ([], "discriminate needs a task, a YAML file or one of"),
         (["none.yaml"], "none.yaml must be a file that can be read"),
         (["bumps"], "bumps must be a YAML file or one of the example tasks"),
-        (["bad.yaml"], "bad.yaml, standard must be one of the stimuli"),
+        (["bad.yaml"], "bad.yaml, line 1, standard must be one of the stimuli"),
         (["broken.yaml"], "broken.yaml cannot be read as YAML"),
         (["empty.yaml"], "empty.yaml, the file must be a mapping"),
         (["mine.yaml", "--jobs", "0"], "jobs must be a whole number of at least 1"),
-        (["mine.yaml", "--resolution", "high"], "skin.resolution must be one of quick"),
+        (["mine.yaml", "--resolution", "high"], "resolution must be one of quick"),
         (["--example", "bumps"], "--example must be one of"),
         (["mine.yaml", "--out", "mine.yaml"], "--out must be a writable folder"),
     ],

@@ -99,8 +99,9 @@ def test_stimuli_of_a_fit_share_their_windows():
 def test_each_stimulus_of_a_task_has_its_own_windows():
     given_task = {
         "question": "Which ramp?",
-        "common": {"indenter": "sphere", "hold_ms": 950},
-        "stimuli": {"vary": "ramp_ms", "values": [50, 1500]},
+        "object": "sphere",
+        "motion": {"hold_ms": 950},
+        "stimuli": {"vary": "motion.ramp_ms", "values": [50, 1500]},
         "standard": 50,
         "noise": 0.1,
     }

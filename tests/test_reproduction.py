@@ -475,9 +475,11 @@ def test_another_seed_changes_what_the_observer_draws_and_nothing_else(first, ot
 
 PAPERS_QUESTION = """
 question: Which spheres can be discriminated from one of 287 /m?
-skin: {resolution: quick, materials: human}
-common: {indenter: sphere, depth_mm: 1.0, ramp_ms: 50, hold_ms: 950}
-stimuli: {vary: curvature_per_m, values: [287, 296, 305, 316, 328, 340, 365]}
+resolution: quick
+tissues: human
+object: {kind: sphere}
+motion: {depth_mm: 1.0, ramp_ms: 50, hold_ms: 950}
+stimuli: {vary: object.curvature_per_m, values: [287, 296, 305, 316, 328, 340, 365]}
 standard: 287
 afferent: results.json
 measure: [static, dynamic, latency]

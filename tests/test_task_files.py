@@ -2,7 +2,7 @@
 
 import json
 import re
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,16 +15,16 @@ from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.descriptions.reading import parts_in
 from fingerpad.experiments.discrimination.analysis import PreparedTask
-from fingerpad.experiments.discrimination.task import DiscriminationTask, StimulusSettings
+from fingerpad.experiments.discrimination.task import DiscriminationTask
 from fingerpad.experiments.discrimination.task_files import example_tasks, input_hashes, parse_task, read_task
 from fingerpad.experiments.discrimination.task_stimuli import task_population, task_stimuli, task_touches
 from fingerpad.experiments.fit.session import FitFile
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import discrimination_touches
+from fingerpad.geometry.dots import braille
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Bar, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
-from fingerpad.geometry.names import INDENTERS
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.skin.nail_edge import NailEdge
@@ -33,18 +33,25 @@ from fingerpad.skin.unrolled_skin import UnrolledSkin
 ROOT = Path(__file__).parents[1]
 SPHERES = {
     "question": "Which spheres?",
-    "common": {"indenter": "sphere"},
-    "stimuli": {"vary": "curvature_per_m", "values": [287, 296, 365]},
+    "object": {"kind": "sphere"},
+    "stimuli": {"vary": "object.curvature_per_m", "values": [287, 296, 365]},
     "standard": 287,
     "noise": 0.1,
 }
 BARS = {
     "question": "Which bars?",
-    "common": {"indenter": "bar", "fillet_mm": 0.2, "force_mn": 150.0},
+    "object": {"kind": "bar", "fillet_mm": 0.2},
+    "motion": {"force_mn": 150.0},
     "stimuli": [
-        {"name": "narrow", "width_mm": 2.0},
-        {"name": "wide", "width_mm": 4.0, "offset_mm": [0.5, 0.0]},
-        {"name": "deep", "width_mm": 2.0, "depth_mm": 0.8, "tilt_deg": 0.0, "friction": 0.3},
+        {"name": "narrow", "object": {"width_mm": 2.0}},
+        {"name": "wide", "object": {"width_mm": 4.0}, "place": {"x_mm": 0.5}},
+        {
+            "name": "deep",
+            "object": {"width_mm": 2.0},
+            "motion": {"depth_mm": 0.8},
+            "place": {"tilt_deg": 0.0},
+            "friction": 0.3,
+        },
     ],
     "standard": "wide",
     "noise": 0.1,
@@ -76,25 +83,49 @@ def test_what_varies_makes_one_stimulus_per_value_and_the_standard_comes_first()
 def test_listed_stimuli_have_parameters_of_their_own():
     wide, narrow, deep = task_stimuli(parse_task(BARS))
     assert (wide.name, wide.level, wide.indenter) == ("wide", None, Bar(4.0, 0.2))
-    assert (wide.motion, wide.offset_mm) == (ForceRampAndHold(150.0), (0.5, 0.0))
-    assert (narrow.indenter, narrow.offset_mm, narrow.tilt_deg) == (Bar(2.0, 0.2), (0.0, 0.0), None)
+    assert (wide.motion, wide.x_mm) == (ForceRampAndHold(150.0), 0.5)
+    assert (narrow.indenter, narrow.x_mm, narrow.tilt_deg) == (Bar(2.0, 0.2), 0.0, None)
     # Its own depth takes the place of the force that the others share.
     assert (deep.motion, deep.tilt_deg, deep.friction) == (RampAndHold(0.8), 0.0, 0.3)
 
 
 def test_a_force_or_a_duration_may_vary_as_well_as_a_size():
-    forces = changed(SPHERES, stimuli={"vary": "force_mn", "values": [50, 80]}, standard=50)
+    forces = changed(SPHERES, stimuli={"vary": "motion.force_mn", "values": [50, 80]}, standard=50)
     assert [stimulus.motion for stimulus in task_stimuli(parse_task(forces))] == [
         ForceRampAndHold(50.0),
         ForceRampAndHold(80.0),
     ]
-    ramps = changed(SPHERES, stimuli={"vary": "ramp_ms", "values": [50, 25]}, standard=50)
+    ramps = changed(SPHERES, stimuli={"vary": "motion.ramp_ms", "values": [50, 25]}, standard=50)
     assert [stimulus.motion.ramp_ms for stimulus in task_stimuli(parse_task(ramps))] == [50.0, 25.0]
 
 
-def test_every_size_of_every_indenter_can_be_given():
-    sizes = {size.name for indenter in INDENTERS.values() for size in fields(indenter)}
-    assert sizes <= set(StimulusSettings.model_fields)
+def test_any_object_and_any_motion_may_be_discriminated(tmp_path):
+    (tmp_path / "press.csv").write_text(
+        "time_ms,depth_mm,x_mm\n0,0,0\n50,0.6,0\n500,0.6,1\n", encoding="utf-8"
+    )
+    letters = changed(
+        SPHERES,
+        resolution="quick",
+        object={"kind": "braille"},
+        motion={"kind": "recorded", "file": "press.csv"},
+        friction=0.2,
+        stimuli={"vary": "object.text", "values": ["a", "b"]},
+        standard="a",
+    )
+    found = task_touches(parse_task(letters), tmp_path)
+    assert {name: touch.indenter for name, touch in found.items()} == {
+        name: braille(name) for name in ("a", "b")
+    }
+    assert {touch.friction for touch in found.values()} == {0.2}
+    assert [pose.x_mm for pose in found["a"].stimulus.poses][-1] == 1.0
+    assert len({touch.grading for touch in found.values()}) == 1
+    bump, stroke = (
+        {"kind": "sphere", "radius_mm": 3},
+        {"kind": "stroke", "depth_mm": 0.4, "speed_mm_per_s": 20, "x_mm": 1},
+    )
+    mixed = [{"name": "pressed", "object": bump}, {"name": "slid", "object": "plate", "motion": stroke}]
+    pressed = task_touches(parse_task(changed(SPHERES, resolution="quick", stimuli=mixed, standard="slid")))
+    assert [touch.stimulus.stays for touch in pressed.values()] == [False, True]
 
 
 def test_the_papers_spheres_are_the_very_touches_of_a_reproduction():
@@ -108,7 +139,7 @@ def test_the_papers_spheres_are_the_very_touches_of_a_reproduction():
 
 
 def test_all_stimuli_meet_one_mesh_that_is_fine_below_each_of_them():
-    pressed = task_touches(parse_task(changed(BARS, skin={"resolution": "quick"})))
+    pressed = task_touches(parse_task(changed(BARS, resolution="quick")))
     gradings = {touch.grading for touch in pressed.values()}
     assert len(gradings) == 1
     grading = gradings.pop()
@@ -122,9 +153,7 @@ def test_all_stimuli_meet_one_mesh_that_is_fine_below_each_of_them():
 
 
 def test_beside_the_midline_both_halves_are_pressed():
-    beside = changed(
-        SPHERES, common={"indenter": "sphere", "offset_mm": [0.0, 1.0]}, skin={"resolution": "quick"}
-    )
+    beside = changed(SPHERES, place={"z_mm": 1.0}, resolution="quick")
     assert all(
         touch.grading.full and touch.at_mm[1] == 1.0 for touch in task_touches(parse_task(beside)).values()
     )
@@ -202,8 +231,8 @@ def test_the_resolution_can_be_replaced_and_nothing_else_changes(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text(example_tasks()["sphere_curvature"], encoding="utf-8")
     quick, own = read_task(path, resolution="quick"), read_task(path)
-    assert (quick.skin.resolution, own.skin.resolution) == ("quick", "standard")
-    assert quick.model_copy(update={"skin": own.skin}) == own
+    assert (quick.resolution, own.resolution) == ("quick", "standard")
+    assert quick.model_copy(update={"resolution": own.resolution}) == own
 
 
 @pytest.mark.parametrize("name", example_tasks())
@@ -277,71 +306,113 @@ noise: fitted
 nois: 0.1
     nois is unknown: did you mean noise?
 colour: red
-    colour is unknown: the file has question, axis,
+    colour is unknown: the file has resolution, finger, tissues, object,
 stimuli: null
     stimuli must be given
 stimuli: []
     stimuli must be two or more
-stimuli: {vary: curvature_per_m, values: [287]}
+stimuli: {vary: object.curvature_per_m, values: [287]}
     stimuli must be two or more
-stimuli: {vary: curvature_per_m, values: [287, 287]}
+stimuli: {vary: object.curvature_per_m, values: [287, 287]}
     '287' is repeated
-stimuli: {vary: curvature_per_m, values: [287, x]}
-    stimuli.values[2] must be a finite
-stimuli: {vary: curvature_per_m, values: [287, 0]}
-    stimuli.values[2]: curvature_per_m must be a number greater than 0: got 0
-stimuli: {vary: curvature_per_m, values: 287}
+stimuli: {vary: object.curvature_per_m, values: [287, x]}
+    stimuli.values[2], object.curvature_per_m must be a finite number: got 'x'.
+stimuli: {vary: object.curvature_per_m, values: [287, 0]}
+    stimuli.values[2], object: curvature_per_m must be greater than 0
+stimuli: {vary: object.curvature_per_m, values: 287}
     stimuli.values must be a list: got 287.
 stimuli: {vary: colour, values: [1, 2]}
-    stimuli.vary must be one of curvature_per_m,
-stimuli: {vary: width_mm, values: [1, 2]}
-    stimuli.values[1].width_mm must not be given: a sphere has curvature_per_m, radius_mm, diameter_mm.
-{stimuli: {vary: depth_mm, values: [1, 50]}, standard: 1}
-    stimulus '50' cannot be used: depth_mm must stay below
-stimuli: {vary: curvature_per_m}
+    stimuli.vary must be friction, or a key of object, motion or place such as object.radius_mm: got 'colour'.
+stimuli: {vary: curvature_per_m, values: [1, 2]}
+    stimuli.vary must be friction, or a key of object, motion or place such as object.curvature_per_m: got
+stimuli: {vary: friction.x, values: [1, 2]}
+    stimuli.vary must be friction
+stimuli: {vary: object, values: [1, 2]}
+    stimuli.vary must be friction
+stimuli: {vary: object.width_mm, values: [1, 2]}
+    stimuli.values[1], object.width_mm is unknown: object has kind, curvature_per_m
+{stimuli: {vary: motion.depth_mm, values: [1, 50]}, standard: 1}
+    stimuli.values[2], motion: depth_mm must stay below
+stimuli: {vary: object.curvature_per_m}
     stimuli.values must be given
 stimuli: spheres
     stimuli must be a mapping of keys to values: got 'spheres'.
-stimuli: [{curvature_per_m: 300}]
+stimuli: [{object: {curvature_per_m: 300}}]
     stimuli[1].name must be given
 stimuli: [{name: a}, {name: a}]
     'a' is repeated
 {stimuli: [{name: a, level: 1}, {name: b}], standard: a}
     level must be given for all stimuli or for none: 'b' has none.
-stimuli: [{name: a, widht_mm: 3}, {name: b}]
-    stimuli[1].widht_mm is unknown: did you mean width_mm?
+{stimuli: [{name: a, object: {widht_mm: 3}}, {name: b}], object: bar}
+    stimuli[1].object.widht_mm is unknown: did you mean width_mm?
+stimuli: [{name: a, objct: {width_mm: 3}}, {name: b}]
+    stimuli[1].objct is unknown: did you mean object?
+stimuli: [{name: a, width_mm: 3}, {name: b}]
+    stimuli[1].width_mm is unknown: stimuli[1] has object, motion, place,
+stimuli: [{name: a, friction: -1}, {name: b}]
+    stimuli[1].friction must be a number not below 0: got -1
 standard: 300
     standard must be one of the stimuli, 287, 296, 365: got 300.0.
 standard: flat
     standard must be one of the stimuli, 287, 296, 365: got 'flat'.
 standard: [287]
     standard must be a number or a name: got [287].
-common: {}
-    stimuli.values[1].indenter must be given, there or in common, one of sphere,
-common: {indenter: needle}
-    common.indenter must be one of sphere, cylinder
-common: {indenter: sphere, curvature_per_m: 3}
-    common.curvature_per_m must not be given where stimuli.vary
-{common: {indenter: sphere, name: x}, stimuli: [{name: a}, {name: b}]}
-    common.name must not be given
-common: {indenter: sphere, depth_mm: 1, force_mn: 1}
-    common: depth_mm and force_mn exclude each other
-common: {indenter: sphere, depth_mm: 0}
-    common.depth_mm must be a number greater than 0: got 0.
-common: {indenter: sphere, offset_mm: 1}
-    common.offset_mm must be a pair of numbers: got 1.
-common: {indenter: sphere, offset_mm: [90, 0]}
-    stimulus '287' cannot be used
-common: {indenter: sphere, tilt_deg: 80}
-    tilt_deg must lie within 45 degrees
-skin: {materials: wood}
-    skin.materials must be one of human
-skin: {finger: baby}
-    skin.finger must be one of adult, small, large, child, macaque, aged: got 'baby'.
-skin: {resolution: high}
-    skin.resolution must be one of quick, standard, paper: got 'high'.
-skin: 3
-    skin must be a mapping of keys to values: got 3.
+object: {}
+    object.kind must be given: it is missing.
+object: null
+    object.kind must be given: it is missing.
+object: {kind: needle}
+    object.kind must be one of sphere, cylinder
+object: {kind: shpere}
+    got 'shpere' (did you mean sphere?).
+object: {kind: sphere, curvature_per_m: 3}
+    object.curvature_per_m must not be given where stimuli.vary it
+object: 3
+    object
+motion: {depth_mm: 1, force_mn: 1}
+    motion: depth_mm and force_mn exclude each other
+motion: {depth_mm: 0}
+    motion: depth_mm must be greater than 0
+motion: {depth: 1}
+    motion.depth is unknown: did you mean depth_mm?
+motion: {kind: sien}
+    got 'sien' (did you mean sine?).
+motion: {kind: recorded, file: none.csv}
+    motion: none.csv must be a file that can be read
+motion: sliding
+    motion must be a mapping of keys to values: got 'sliding'.
+motion: {kind: stroke, depth_mm: 0.5, speed_mm_per_s: 20, x_mm: 40}
+    motion: The indenter must not leave the finger
+place: {x_mm: 90}
+    place: A position must lie on the finger
+place: {x_mm: far}
+    place.x_mm must be a finite number: got 'far'.
+place: {offset_mm: [1, 0]}
+    place.offset_mm is unknown
+place: {tilt_deg: 80}
+    place.tilt_deg must lie within 45 degrees
+place: 3
+    place must be a mapping of keys to values: got 3.
+friction: -0.1
+    friction must be a number not below 0: got -0.1.
+friction: rough
+    friction must be a finite number: got 'rough'.
+finger: {length_mm: 3}
+    finger:
+finger: giant
+    finger:
+tissues: wood
+    tissues must be one of human
+tissues: humn
+    got 'humn' (did you mean human?).
+resolution: high
+    resolution must be one of quick, standard, paper: got 'high'.
+reach_mm: 0
+    reach_mm must be a number greater than 0: got 0.
+common: {indenter: sphere}
+    common is unknown
+skin: {materials: human}
+    skin is unknown
 population: {density_per_cm2: 0}
     population.density_per_cm2 must be a number greater than 0: got 0.
 population: {density_per_cm2: .nan}
@@ -477,9 +548,7 @@ def test_a_file_without_fitted_parameters_is_refused(tmp_path, content):
 
 def test_null_is_as_good_as_nothing():
     empty = {"layout": "nail rows", "jitter": None, "rows": None}
-    with_null = changed(
-        SPHERES, population=empty, common={"indenter": "sphere", "force_mn": None, "depth_mm": 1.0}
-    )
+    with_null = changed(SPHERES, population=empty, motion={"force_mn": None, "depth_mm": 1.0})
     assert len(asked(with_null).population) == len(NailEdge().rows(1, 100.0))
 
 
@@ -498,6 +567,8 @@ def test_the_guide_names_every_key():
     def keys(part):
         for name, field in part.model_fields.items():
             yield name
+            if name == "finger":  # whose words the guide to fingers has
+                continue
             for inner in parts_in(field.annotation):
                 yield from keys(inner)
 
@@ -506,7 +577,7 @@ def test_the_guide_names_every_key():
 
 
 def test_a_task_on_a_child_presses_and_samples_the_child_s_pad():
-    task = DiscriminationTask.model_validate(SPHERES | {"skin": {"finger": "child", "resolution": "quick"}})
+    task = DiscriminationTask.model_validate(SPHERES | {"finger": "child", "resolution": "quick"})
     child = Fingertip.of("child")
     touches = task_touches(task)
     assert {touch.finger for touch in touches.values()} == {child}

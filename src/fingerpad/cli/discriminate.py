@@ -43,7 +43,13 @@ def discriminate_command(
     from fingerpad.core.checks import one_of
     from fingerpad.experiments import schemas
     from fingerpad.experiments.discrimination.run import DiscriminationRun, discriminate
-    from fingerpad.experiments.discrimination.task_files import example_tasks, input_hashes, read_task, title
+    from fingerpad.experiments.discrimination.task_files import (
+        example_tasks,
+        input_hashes,
+        read_task,
+        task_text,
+        title,
+    )
     from fingerpad.report.discrimination_task import task_summary, write_task_page
 
     known = example_tasks()
@@ -57,7 +63,7 @@ def discriminate_command(
     if task is None:
         raise InputError(f"discriminate needs a task, a YAML file or one of {', '.join(known)}: see --help.")
     asked = read_task(task, resolution=resolution)
-    run = DiscriminationRun(asked, out, processes(jobs), task)
+    run = DiscriminationRun(asked, out, processes(jobs), task, task_text(task))
     make_writable(out)
     with interruptible():
         results = discriminate(

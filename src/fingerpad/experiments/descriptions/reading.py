@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import reprlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -101,6 +101,16 @@ def at(*place: int | str) -> Iterator[None]:
         raise PlacedError(f"{spelled(place)}: {error}", place) from error
 
 
+@contextmanager
+def moved(move: Callable[[Place], tuple[Place, str]]) -> Iterator[None]:
+    """Give a `PlacedError` from within another place, and the words for it."""
+    try:
+        yield
+    except PlacedError as error:
+        place, words = move(error.place)
+        raise PlacedError(words + str(error).removeprefix(spelled(error.place)), place) from error
+
+
 def part_from(kind: type[_Kind], content: Any) -> _Kind:
     """Build a description from plain values.
 
@@ -120,6 +130,33 @@ def part_from(kind: type[_Kind], content: Any) -> _Kind:
         return kind.model_validate(content)
     except ValidationError as error:
         raise PlacedError(error_sentence(error, kind), place_of(error)) from error
+
+
+def merged(common: Any, own: Any, default_kind: str | None = None) -> Any:
+    """Replace keys of a block by those of another one, or all of it where their kinds differ.
+
+    Parameters
+    ----------
+    common, own : mapping, str or None
+        Blocks as YAML has them; a text such as `sphere` is a block of that kind.
+    default_kind : str, optional
+        Kind of a block that names none.
+
+    Examples
+    --------
+    >>> merged("bar", {"width_mm": 3})
+    {'kind': 'bar', 'width_mm': 3}
+    >>> merged({"kind": "bar", "width_mm": 3}, {"kind": "sphere"})
+    {'kind': 'sphere'}
+    """
+    if own is None:
+        return common
+    if isinstance(common, str) and ":" not in common:
+        common = {"kind": common}
+    if not isinstance(common, Mapping) or not isinstance(own, Mapping):
+        return own
+    kind = common.get("kind", default_kind)
+    return {**common, **own} if own.get("kind", kind) == kind else own
 
 
 def place_of(error: ValidationError) -> list[int | str]:

@@ -180,7 +180,7 @@ class TactileStimulus:
             If they do not fit each other, with the part of a file that is about it.
         """
         tilt_deg = straight_tilt_deg(finger, self.indenter) if self.tilt_deg is None else self.tilt_deg
-        with _about():
+        with about():
             return touch_of(
                 finger,
                 self.indenter,
@@ -197,7 +197,7 @@ class TactileStimulus:
 
 
 @contextmanager
-def _about() -> Iterator[None]:
+def about() -> Iterator[None]:
     """Name the key of a file that an error of a whole touch is about."""
     try:
         yield

@@ -117,6 +117,8 @@ Truth = Annotated[bool, with_message("true or false")]
 Numbers = Annotated[tuple[FiniteNumber, ...], Strict(False), with_message("a list of finite numbers")]
 Pairs = Annotated[tuple[Pair, ...], Strict(False), with_message("a list of pairs of numbers")]
 Outlines = Annotated[tuple[Pairs, ...], Strict(False), with_message("a list of lists of pairs of numbers")]
+Block = Annotated[dict[str, Any], with_message("a mapping of keys to values")]
+"""Keys and values that are checked once it is known what they belong to."""
 LevelOrName = Annotated[float | str, Field(union_mode="left_to_right"), with_message("a number or a name")]
 
 

@@ -27,7 +27,6 @@ from fingerpad.experiments.discrimination.decoding import (
 from fingerpad.experiments.discrimination.task import (
     FITTED,
     IDEAL,
-    UNITS,
     DiscriminationTask,
     ObservedPoint,
     VariedStimuli,
@@ -47,6 +46,17 @@ from fingerpad.psychophysics.discrimination import Experiment
 from fingerpad.psychophysics.encoding import neighbours_of, taking_part
 from fingerpad.psychophysics.ideal_observer import Presentation
 from fingerpad.psychophysics.response_models import multiplied_responses
+
+_UNITS = {
+    "_per_m": "1/m",
+    "_mm_per_s": "mm/s",
+    "_mm": "mm",
+    "_ms": "ms",
+    "_mn": "mN",
+    "_hz": "Hz",
+    "_deg": "degrees",
+}
+"""Unit of a key that varies, by its end."""
 
 SESSION = 2
 """Session of the random numbers of efficiencies; that of the hit rates is another."""
@@ -370,9 +380,11 @@ class PreparedTask:
         """Say what the levels are."""
         if self.task.axis or not isinstance(self.task.stimuli, VariedStimuli):
             return self.task.axis or "level"
-        name, unit = self.task.stimuli.vary, UNITS[self.task.stimuli.vary]
-        words = name.split("_per_")[0] if "_per_" in name else name.rsplit("_", 1)[0] if unit else name
-        return f"{words} [{unit}]" if unit else words
+        name = self.task.stimuli.vary.rpartition(".")[2]
+        for suffix, unit in _UNITS.items():
+            if name.endswith(suffix):
+                return f"{name.removesuffix(suffix).replace('_', ' ')} [{unit}]"
+        return name.replace("_", " ")
 
     def responses(self, skins: Mapping[str, Skin]) -> list[ResponseMap]:
         """Responses of the population to every stimulus."""

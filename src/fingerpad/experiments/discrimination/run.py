@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Literal
 
 from fingerpad.core.checks import whole
-from fingerpad.core.errors import InputError
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
+from fingerpad.experiments.descriptions.reading import Source
 from fingerpad.experiments.discrimination.analysis import PreparedTask, TaskResult, analyse
 from fingerpad.experiments.discrimination.task import DiscriminationTask
 from fingerpad.experiments.discrimination.task_stimuli import (
-    conditions_of,
+    task_conditions,
     task_population,
     task_stimuli,
     task_touches,
@@ -66,6 +66,8 @@ class DiscriminationRun:
         Processes to use; the numbers do not depend on it.
     source : str
         File of the task: files that it names are searched beside it, and errors begin with it.
+    text : str
+        Its content, for the lines of errors.
 
     Raises
     ------
@@ -77,25 +79,24 @@ class DiscriminationRun:
     folder: Path
     jobs: int = 1
     source: str = "task"
+    text: str = ""
 
     def __post_init__(self) -> None:
         whole("jobs", self.jobs, at_least=1)
-        try:
+        with Source(self.source, self.text).located():
             # Built here, so that an error comes before anything is solved.
             self.prepared, self.touches  # noqa: B018
-        except InputError as error:
-            raise InputError(f"{self.source}, {error}") from error
 
     @cached_property
     def prepared(self) -> PreparedTask:
         """The task with its stimuli and its population."""
         beside = Path(self.source).parent
-        return PreparedTask(self.task, task_stimuli(self.task), task_population(self.task, beside))
+        return PreparedTask(self.task, task_stimuli(self.task, beside), task_population(self.task, beside))
 
     @cached_property
     def touches(self) -> dict[str, Touch]:
         """One touch per stimulus, the standard first."""
-        return task_touches(self.task)
+        return task_touches(self.task, Path(self.source).parent)
 
 
 def discriminate(
@@ -141,5 +142,5 @@ def discriminate(
         discrimination=found,
         task=task,
         afferent=asdict(as_sai(run.prepared.population.afferent)),
-        manifest=runner.manifest(conditions_of(task), meshes, command=command, inputs=inputs),
+        manifest=runner.manifest(task_conditions(task), meshes, command=command, inputs=inputs),
     )

@@ -10,11 +10,12 @@ from typing import Annotated
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 
 from fingerpad.data import psychophysics
-from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments.descriptions.parts import DEFAULT, AfferentChoice, PopulationSettings
+from fingerpad.experiments.descriptions.stimulus import FingerDescription
 from fingerpad.experiments.descriptions.values import (
     LISTED,
     VARIED,
+    Block,
     Count,
     FiniteNumber,
     LevelOrName,
@@ -30,11 +31,7 @@ from fingerpad.experiments.descriptions.values import (
     choice_of,
     with_message,
 )
-from fingerpad.geometry.fingertip import FINGERS
 from fingerpad.geometry.grading import RESOLUTIONS
-from fingerpad.geometry.motion import MOTION_UNITS
-from fingerpad.geometry.names import INDENTERS, SIZE_UNITS
-from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.psychophysics.discrimination import CRITERION_MOVES
 from fingerpad.psychophysics.functions import SIGMOIDS
 
@@ -45,106 +42,56 @@ FREE = "free"
 FITTED = "fitted"
 """Value of `noise` where it is fitted to observed hit rates."""
 
-UNITS = SIZE_UNITS | MOTION_UNITS | {"spin_deg": "degrees", "tilt_deg": "degrees", "friction": ""}
-"""What can be varied from stimulus to stimulus, and in which unit."""
-
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
 
 
-class SkinSettings(Part):
-    """The finger that is pressed.
+class StimulusBlocks(Part):
+    """What a stimulus, or all of them, say of themselves: blocks of a `StimulusDescription`, or parts.
 
     Parameters
     ----------
-    finger : str
-        Whose, by the name of a preset of `fingerpad.Fingertip.of`.
-    materials : str
-        A set of tissues by name, as of `fingerpad.indent`.
-    resolution : {"quick", "standard", "paper"}
-        How fine mesh and steps are.
-    reach_mm : float
-        How far to either side of the middle, along the finger and across, the mesh is fine at most; without
-        it, as far as the indenters need. [mm]
-    """
-
-    finger: Annotated[str, choice_of(FINGERS)] = "adult"
-    materials: Annotated[str, choice_of(TISSUES)] = DEFAULT_TISSUES
-    resolution: Annotated[str, choice_of(RESOLUTIONS)] = "standard"
-    reach_mm: Positive | None = None
-
-
-class StimulusSettings(Part):
-    """One stimulus, or what all have in common. What is absent is the paper's.
-
-    Parameters
-    ----------
-    name : str
-        Of a listed stimulus.
-    level : float
-        Where a listed stimulus stands on the axis of the psychometric curve.
-    indenter : str
-        Body that is pressed in.
-    curvature_per_m, radius_mm, diameter_mm, width_mm, gap_mm, ridge_mm, groove_mm, period_mm, duty : float
-    fillet_mm, edge_radius_mm, lip_mm, lip_radius_mm : float
-        Sizes, those that the indenter has. [1/m, mm, 1]
-    spin_deg : float
-        Turn about the direction of pressing: the orientation of a bar, an edge, a gap or a grating. [degrees]
-    tilt_deg : float
-        As of `fingerpad.Touch`; without it the indenter presses perpendicular to the skin. [degrees]
-    offset_mm : (float, float)
-        Where its axis meets the skin, from the middle of the pad: along the finger, distal positive, and
-        across. [mm]
-    depth_mm, force_mn : float
-        How far or how hard it is pressed; one of them. [mm, mN]
-    ramp_ms, hold_ms : float
-        Durations. [ms]
+    object, motion, place : mapping or str
+        As in the file of a touch. A stimulus has the keys of its own block, then those that all have.
     friction : float
         Coulomb's coefficient.
     """
 
-    name: Text | None = None
+    object: Block | Text | None = None
+    motion: Block | None = None
+    place: Block | None = None
+    friction: FiniteNumber | None = None
+
+
+class ListedStimulus(StimulusBlocks):
+    """One stimulus by name.
+
+    Parameters
+    ----------
+    name : str
+        How it is called.
+    level : float
+        Where it stands on the axis of the psychometric curve.
+    object, motion, place, friction
+        What differs from the blocks that all have.
+    """
+
+    name: Text
     level: FiniteNumber | None = None
-    indenter: Annotated[str, choice_of(INDENTERS)] | None = None
-    curvature_per_m: Positive | None = None
-    radius_mm: Positive | None = None
-    diameter_mm: Positive | None = None
-    width_mm: Positive | None = None
-    gap_mm: NotNegative | None = None
-    ridge_mm: Positive | None = None
-    groove_mm: Positive | None = None
-    period_mm: Positive | None = None
-    duty: Positive | None = None
-    fillet_mm: NotNegative | None = None
-    edge_radius_mm: NotNegative | None = None
-    lip_mm: NotNegative | None = None
-    lip_radius_mm: NotNegative | None = None
-    spin_deg: FiniteNumber | None = None
-    tilt_deg: FiniteNumber | None = None
-    offset_mm: Pair | None = None
-    depth_mm: Positive | None = None
-    force_mn: Positive | None = None
-    ramp_ms: Positive | None = None
-    hold_ms: Positive | None = None
-    friction: NotNegative | None = None
-
-
-VARIABLE = tuple(name for name in StimulusSettings.model_fields if name in UNITS)
-"""What may differ from stimulus to stimulus by a number."""
 
 
 class VariedStimuli(Part):
-    """Stimuli that differ in one number.
+    """Stimuli that differ in one key.
 
     Parameters
     ----------
     vary : str
-        Which of `VARIABLE`.
-    values : list of float
-        One per stimulus. [unit of what varies]
+        Block and key, such as "object.radius_mm", "motion.force_mn" or "place.spin_deg"; or "friction".
+    values : list of float or str
+        One per stimulus.
     """
 
-    vary: Annotated[str, choice_of(VARIABLE)]
-    values: Annotated[tuple[FiniteNumber, ...], Strict(False)]
+    vary: Text
+    values: Annotated[tuple[LevelOrName, ...], Strict(False)]
 
 
 class WindowSettings(Part):
@@ -253,7 +200,7 @@ class ObservedSettings(Part):
     source: Text = "people"
 
 
-class DiscriminationTask(Part):
+class DiscriminationTask(StimulusBlocks, FingerDescription):
     """All that a file of a task holds.
 
     Parameters
@@ -261,12 +208,15 @@ class DiscriminationTask(Part):
     question : str
         In words: the title of the page.
     axis : str
-        What the levels are, for the axes of figures; by default the parameter that varies.
-    skin : SkinSettings
-        The finger.
-    common : StimulusSettings
-        What all stimuli share, unless they say otherwise.
-    stimuli : VariedStimuli or list of StimulusSettings
+        What the levels are, for the axes of figures; by default the key that varies.
+    resolution, finger, tissues
+        As of `FingerDescription`; `resolution` is "standard" by default.
+    reach_mm : float
+        How far to either side of the middle, along the finger and across, the mesh is fine at most; without
+        it, as far as the objects need. [mm]
+    object, motion, place, friction
+        What all stimuli have, unless they say otherwise.
+    stimuli : VariedStimuli or list of ListedStimulus
         Which are discriminated.
     standard : float or str
         Level or name of the stimulus that all others are compared with.
@@ -294,10 +244,10 @@ class DiscriminationTask(Part):
 
     question: Text
     axis: Text | None = None
-    skin: SkinSettings = SkinSettings()
-    common: StimulusSettings = StimulusSettings()
+    resolution: Annotated[str, choice_of(RESOLUTIONS)] = "standard"
+    reach_mm: Positive | None = None
     stimuli: Annotated[
-        Annotated[tuple[StimulusSettings, ...], Strict(False), Tag(LISTED)]
+        Annotated[tuple[ListedStimulus, ...], Strict(False), Tag(LISTED)]
         | Annotated[VariedStimuli, Tag(VARIED)],
         Discriminator(lambda value: LISTED if isinstance(value, list | tuple) else VARIED),
     ]

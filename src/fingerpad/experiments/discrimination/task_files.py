@@ -9,10 +9,12 @@ from typing import Any
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
+from fingerpad.core.keywords import closest
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.experiments.descriptions.parts import DEFAULT
 from fingerpad.experiments.descriptions.reading import Source, part_from
 from fingerpad.experiments.discrimination.task import DiscriminationTask
+from fingerpad.experiments.discrimination.task_stimuli import task_stimuli
 from fingerpad.experiments.manifest import sha256
 
 SUFFIX = ".yaml"
@@ -65,24 +67,23 @@ def input_hashes(source: str | Path, task: DiscriminationTask) -> dict[str, str]
     dict of str to str
         By name of the file.
     """
-    path = Path(source)
-    content = path.read_bytes() if path.is_file() else example_tasks()[str(source)].encode()
-    hashes = {str(source): hashlib.sha256(content).hexdigest()}
+    hashes = {str(source): hashlib.sha256(task_text(source).encode()).hexdigest()}
+    beside = Path(source).parent
+    named = [path for stimulus in task_stimuli(task, beside) for path in stimulus.files]
     if isinstance(task.afferent, str) and task.afferent != DEFAULT:
-        named = path.parent / task.afferent
-        hashes[str(named)] = sha256(named)
-    return hashes
+        named.append(beside / task.afferent)
+    return hashes | {str(path): sha256(path) for path in named}
 
 
-def read_task(source: str | Path, **skin: Any) -> DiscriminationTask:
+def read_task(source: str | Path, **replacing: Any) -> DiscriminationTask:
     """Read a task from a file, or one that comes with the package.
 
     Parameters
     ----------
     source : str or Path
         A YAML file, or a name of `example_tasks`.
-    **skin
-        Settings of the skin that replace those of the file, such as `resolution`; None leaves them.
+    **replacing
+        Values that replace those of the file, such as `resolution`; None leaves them.
 
     Returns
     -------
@@ -96,24 +97,29 @@ def read_task(source: str | Path, **skin: Any) -> DiscriminationTask:
 
     Examples
     --------
-    >>> read_task("sphere_curvature", resolution="quick").skin.resolution
+    >>> read_task("sphere_curvature", resolution="quick").resolution
     'quick'
     """
-    name, path = str(source), Path(source)
-    known = example_tasks()
+    text = task_text(source)
+    content = read_yaml(text, str(source))
+    replaced = {key: value for key, value in replacing.items() if value is not None}
+    if replaced and isinstance(content, dict):
+        content |= replaced
+    return parse_task(content, str(source), text)
+
+
+def task_text(source: str | Path) -> str:
+    """Text of a task, from a file or from the package; arguments as of `read_task`."""
+    name, path, known = str(source), Path(source), example_tasks()
     if name in known and not path.is_file():
-        text = known[name]
-    elif path.suffix or path.exists():
-        text = read_text(path)
-    else:
-        raise InputError(
-            f"{name} must be a YAML file or one of the example tasks, {', '.join(known)}: it is neither."
-        )
-    content = read_yaml(text, name)
-    replaced = {key: value for key, value in skin.items() if value is not None}
-    if replaced and isinstance(content, dict) and isinstance(content.get("skin", {}), dict):
-        content["skin"] = content.get("skin", {}) | replaced
-    return parse_task(content, name, text)
+        return known[name]
+    if path.suffix or path.exists():
+        return read_text(path)
+    near = closest(name, known)
+    raise InputError(
+        f"{name} must be a YAML file or one of the example tasks, {', '.join(known)}: it is neither"
+        + (f", did you mean {near}?" if near else ".")
+    )
 
 
 def parse_task(content: Any, source: str = "task", text: str = "") -> DiscriminationTask:
@@ -139,7 +145,7 @@ def parse_task(content: Any, source: str = "task", text: str = "") -> Discrimina
 
     Examples
     --------
-    >>> spheres = {"vary": "curvature_per_m", "values": [287, 340]}
+    >>> spheres = {"vary": "object.curvature_per_m", "values": [287, 340]}
     >>> parse_task({"question": "Which?", "stimuli": spheres, "standard": 287, "noise": 0.1}).code
     ('gradient_sum',)
     >>> parse_task({"question": "Which?", "stimuli": spheres, "standard": 287, "noise": -0.1})

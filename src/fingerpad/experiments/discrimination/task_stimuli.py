@@ -2,49 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import closest
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.population import afferent_of, population_of
-from fingerpad.experiments.descriptions.reading import error_sentence
-from fingerpad.experiments.discrimination.task import DiscriminationTask, StimulusSettings, VariedStimuli
+from fingerpad.experiments.descriptions.pressing import RAMP_AND_HOLD, finger_of
+from fingerpad.experiments.descriptions.reading import (
+    Place,
+    PlacedError,
+    at,
+    merged,
+    moved,
+    part_from,
+    spelled,
+)
+from fingerpad.experiments.descriptions.stimulus import (
+    PlaceSettings,
+    StimulusDescription,
+    TactileStimulus,
+    about,
+)
+from fingerpad.experiments.discrimination.task import DiscriminationTask, StimulusBlocks, VariedStimuli
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading, covering
-from fingerpad.geometry.indenter_grading import grading_about
-from fingerpad.geometry.indenters import Indenter, Sphere
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Stimulus
-from fingerpad.geometry.names import INDENTERS, sizes_of
+from fingerpad.geometry.indenter_grading import grading_along
+from fingerpad.geometry.indenters import Sphere
+from fingerpad.geometry.motion import MOTION_UNITS
+from fingerpad.geometry.names import SIZE_UNITS
 from fingerpad.neuron.population import Population
-from fingerpad.skin.indentation import Touch, touch_of
+from fingerpad.skin.indentation import Touch
 
 _NEAR_MM = max(protocol.SPHERE_POSITIONS.value)
 """The mesh of the paper's spheres serves places as far as this from the middle. [mm]"""
 
-_MOTION = {"ramp_ms", "hold_ms"}
 _EXCLUSIVE = {"depth_mm": "force_mn", "force_mn": "depth_mm"}
-_HANDLING = (
-    "name",
-    "level",
-    "indenter",
-    "offset_mm",
-    "tilt_deg",
-    "spin_deg",
-    "friction",
-    "depth_mm",
-    "force_mn",
-    *_MOTION,
-)
 
 
-@dataclass(frozen=True)
-class TaskStimulus:
+@dataclass(frozen=True, kw_only=True)
+class TaskStimulus(TactileStimulus):
     """One stimulus of a task.
 
     Parameters
@@ -53,37 +54,27 @@ class TaskStimulus:
         How it is called.
     level : float or None
         Where it stands on the axis of the psychometric curve.
-    indenter : Indenter
-        What is pressed in.
-    motion : RampAndHold or ForceRampAndHold
-        How far or how hard, and how fast.
-    offset_mm : (float, float)
-        From the middle of the pad, along the finger and across. [mm]
-    tilt_deg : float or None
-        As of `Touch`; None for perpendicular to the skin. [degrees]
-    spin_deg : float
-        As of `Touch`. [degrees]
-    friction : float
-        Coulomb's coefficient.
+    files : tuple of Path
+        Those that its object and motion name.
+    in_file : callable
+        From a place in its description to that in the file of the task, and the words for it.
     """
 
     name: str
     level: float | None
-    indenter: Indenter
-    motion: Stimulus
-    offset_mm: tuple[float, ...]
-    tilt_deg: float | None
-    spin_deg: float
-    friction: float
+    files: tuple[Path, ...] = field(default=(), compare=False)
+    in_file: Callable[[Place], tuple[Place, str]] = field(compare=False, repr=False)
 
 
-def task_stimuli(task: DiscriminationTask) -> tuple[TaskStimulus, ...]:
+def task_stimuli(task: DiscriminationTask, beside: Path = Path()) -> tuple[TaskStimulus, ...]:
     """List the stimuli of a task, the standard first.
 
     Parameters
     ----------
     task : DiscriminationTask
         From `read_task`.
+    beside : Path, optional
+        Folder from which files are named.
 
     Returns
     -------
@@ -94,7 +85,7 @@ def task_stimuli(task: DiscriminationTask) -> tuple[TaskStimulus, ...]:
     ------
     InputError
         If there are fewer than two, two have one name or level, the standard is not among them, or one
-        cannot be: no indenter, a size that it does not have, depth and force at once.
+        cannot be: no object, a size that it does not have, depth and force at once.
 
     Examples
     --------
@@ -103,7 +94,7 @@ def task_stimuli(task: DiscriminationTask) -> tuple[TaskStimulus, ...]:
     >>> [stimulus.name for stimulus in spheres[:3]], spheres[1].indenter
     (['287', '296', '305'], Sphere(curvature_per_m=296.0))
     """
-    found = _varied(task) if isinstance(task.stimuli, VariedStimuli) else _listed(task)
+    found = [_presented(task, *each, beside) for each in _blocks(task)]
     if len(found) < 2:
         raise InputError(f"stimuli must be two or more to be discriminated: got {len(found)}.")
     for number, stimulus in enumerate(found):
@@ -128,100 +119,101 @@ def stimulus_index(stimuli: Sequence[TaskStimulus], place: float | str, key: str
     raise InputError(f"{key} must be one of the stimuli, {names}: got {place!r}.")
 
 
-def _varied(task: DiscriminationTask) -> list[TaskStimulus]:
-    assert isinstance(task.stimuli, VariedStimuli)
-    vary, found = task.stimuli.vary, []
-    if vary in task.common.given:
-        raise InputError(f"common.{vary} must not be given where stimuli.vary it: leave it out there.")
-    for number, value in enumerate(task.stimuli.values, start=1):
-        place = f"stimuli.values[{number}]"
-        try:
-            own = StimulusSettings.model_validate({vary: value})
-        except ValidationError as error:
-            raise InputError(f"{place}: {error_sentence(error, StimulusSettings)}") from error
-        found.append(_presented(place, task.common, own, f"{value:g}", value))
-    return found
-
-
-def _listed(task: DiscriminationTask) -> list[TaskStimulus]:
-    assert not isinstance(task.stimuli, VariedStimuli)
-    for key in ("name", "level"):
-        if key in task.common.given:
-            raise InputError(f"common.{key} must not be given: each stimulus has its own.")
-    found = []
-    for number, own in enumerate(task.stimuli, start=1):
-        place = f"stimuli[{number}]"
-        if own.name is None:
-            raise InputError(f"{place}.name must be given: it is missing.")
-        found.append(_presented(place, task.common, own, own.name, own.level))
-    return found
+def _blocks(task: DiscriminationTask) -> list[tuple[Place, str, float | None, dict[str, Any]]]:
+    """Place in the file, name, level and own blocks of each stimulus."""
+    if not isinstance(task.stimuli, VariedStimuli):
+        return [
+            (("stimuli", row), own.name, own.level, own.chosen(*StimulusBlocks.model_fields))
+            for row, own in enumerate(task.stimuli)
+        ]
+    block, dot, key = task.stimuli.vary.partition(".")
+    if block not in StimulusBlocks.model_fields or bool(dot) == (block == "friction"):
+        known = [f"object.{size}" for size in SIZE_UNITS] + [f"motion.{number}" for number in MOTION_UNITS]
+        near = closest(task.stimuli.vary, [*known, *(f"place.{name}" for name in PlaceSettings.model_fields)])
+        raise PlacedError(
+            "stimuli.vary must be friction, or a key of object, motion or place such as "
+            f"{near or 'object.radius_mm'}: got {task.stimuli.vary!r}.",
+            ("stimuli", "vary"),
+        )
+    common = getattr(task, block)
+    if common is not None and (not dot or (isinstance(common, Mapping) and key in common)):
+        raise PlacedError(
+            f"{task.stimuli.vary} must not be given where stimuli.vary it: leave it out.", (block, key)
+        )
+    return [
+        (
+            ("stimuli", "values", row),
+            value if isinstance(value, str) else f"{value:g}",
+            None if isinstance(value, str) else value,
+            {block: {key: value} if dot else value},
+        )
+        for row, value in enumerate(task.stimuli.values)
+    ]
 
 
 def _presented(
-    place: str, common: StimulusSettings, own: StimulusSettings, name: str, level: float | None
+    task: DiscriminationTask,
+    listed: Place,
+    name: str,
+    level: float | None,
+    own: Mapping[str, Any],
+    beside: Path,
 ) -> TaskStimulus:
-    """Build one stimulus from the common values and its own."""
-    given = _merged(place, common, own)
-    kind = given.get("indenter")
-    if kind is None:
-        raise InputError(
-            f"{place}.indenter must be given, there or in common, one of {', '.join(INDENTERS)}: it is "
-            "missing."
+    """Build one stimulus from the blocks that all have and its own."""
+
+    def in_file(path: Place) -> tuple[Place, str]:
+        block = own.get(str(path[0])) if path else own
+        if block is None or (len(path) > 1 and isinstance(block, Mapping) and path[1] not in block):
+            return path, spelled(path)  # of what all have
+        if listed[1] == "values":
+            return listed, f"{spelled(listed)}, {spelled(path)}"
+        return (*listed, *path), spelled((*listed, *path))
+
+    hidden = {_EXCLUSIVE.get(key) for key in own.get("motion", ())}
+    motion = {key: value for key, value in (task.motion or {}).items() if key not in hidden}
+    given = {
+        "object": merged(task.object, own.get("object")),
+        "motion": merged(motion, own.get("motion"), RAMP_AND_HOLD),
+        "place": merged(task.place, own.get("place")),
+        "friction": merged(task.friction, own.get("friction")),
+    }
+    with moved(in_file):
+        described = part_from(
+            StimulusDescription, {key: block for key, block in given.items() if block is not None}
         )
-    sizes = sizes_of(kind)
-    for key in given:
-        if key not in (*sizes, *_HANDLING):
-            raise InputError(
-                f"{place}.{key} must not be given: a {kind} has {', '.join(sizes) or 'no size'}."
-            )
-    motion = ForceRampAndHold if "force_mn" in given else RampAndHold
-    try:
         return TaskStimulus(
+            **vars(described.stimulus(beside)),
             name=name,
             level=level,
-            indenter=INDENTERS[kind](**_chosen(given, sizes)),
-            motion=motion(**_chosen(given, _MOTION | _EXCLUSIVE.keys())),
-            offset_mm=given.get("offset_mm", (0.0, 0.0)),
-            tilt_deg=given.get("tilt_deg"),
-            spin_deg=given.get("spin_deg", 0.0),
-            friction=given.get("friction", 0.0),
+            files=tuple(described.files(beside)),
+            in_file=in_file,
         )
-    except InputError as error:
-        raise InputError(f"{place}: {error}") from error
-
-
-def _merged(place: str, common: StimulusSettings, own: StimulusSettings) -> dict[str, Any]:
-    """Replace common values by those of a stimulus; its own depth also replaces a common force."""
-    for where, settings in ((place, own.given), ("common", common.given)):
-        if settings.keys() >= _EXCLUSIVE.keys():
-            raise InputError(f"{where}: depth_mm and force_mn exclude each other: leave one out.")
-    hidden = {_EXCLUSIVE.get(key) for key in own.given}
-    return {key: value for key, value in common.given.items() if key not in hidden} | own.given
-
-
-def _chosen(given: Mapping[str, Any], keys: Collection[str]) -> dict[str, Any]:
-    return {key: value for key, value in given.items() if key in keys}
-
-
-def conditions_of(task: DiscriminationTask) -> Conditions:
-    """Finger, tissues and accuracy of a task."""
-    skin = task.skin
-    return Conditions(skin.resolution, task.experiment.seed, skin.materials, Fingertip.of(skin.finger))
 
 
 def task_population(task: DiscriminationTask, beside: Path = Path()) -> Population:
     """Lay out the afferents of a task; a file of results that it names is searched in `beside`."""
-    afferent = afferent_of(task.afferent, task.skin.materials, beside)
-    return population_of(task.population, afferent, finger=Fingertip.of(task.skin.finger))
+    afferent = afferent_of(task.afferent, task.tissues, beside)
+    return population_of(task.population, afferent, finger=task_conditions(task).finger)
 
 
-def task_touches(task: DiscriminationTask) -> dict[str, Touch]:
+def task_conditions(task: DiscriminationTask) -> Conditions:
+    """Finger, tissues, accuracy and seed of a task."""
+    with at("finger"):
+        finger = finger_of(task.finger)
+        if not isinstance(finger, Fingertip):
+            raise InputError("finger must be a preset, measures or an outline in a task: got a mesh.")
+        return Conditions(task.resolution, task.experiment.seed, task.tissues, finger)
+
+
+def task_touches(task: DiscriminationTask, beside: Path = Path()) -> dict[str, Touch]:
     """One touch per stimulus, all on one mesh; those of the paper's spheres are those of a reproduction.
 
     Parameters
     ----------
     task : DiscriminationTask
         From `read_task`.
+    beside : Path, optional
+        Folder from which files are named.
 
     Returns
     -------
@@ -231,29 +223,16 @@ def task_touches(task: DiscriminationTask) -> dict[str, Touch]:
     Raises
     ------
     InputError
-        As `task_stimuli`, or if one cannot be used, with its name.
+        As `task_stimuli`, or if one cannot be used, with its place.
     """
-    stimuli = task_stimuli(task)
-    conditions = conditions_of(task)
-    grading = _grading(stimuli, conditions, task.skin.reach_mm)
+    stimuli, conditions = task_stimuli(task, beside), task_conditions(task)
+    grading = _grading(stimuli, conditions, task.reach_mm)
     found = {}
     for stimulus in stimuli:
-        along, across = stimulus.offset_mm
-        try:
-            found[stimulus.name] = touch_of(
-                conditions.finger,
-                stimulus.indenter,
-                stimulus.motion,
-                conditions.materials,
-                conditions.resolution,
-                (conditions.receptor_x_mm + along, across),
-                grading,
-                conditions.tilt_deg(stimulus.indenter) if stimulus.tilt_deg is None else stimulus.tilt_deg,
-                friction=stimulus.friction,
-                spin_deg=stimulus.spin_deg,
+        with moved(stimulus.in_file):
+            found[stimulus.name] = stimulus.touch(
+                conditions.finger, conditions.materials, conditions.resolution, grading
             )
-        except InputError as error:
-            raise InputError(f"stimulus {stimulus.name!r} cannot be used: {error}") from error
     return found
 
 
@@ -270,15 +249,22 @@ def _grading(stimuli: Sequence[TaskStimulus], conditions: Conditions, reach_mm: 
             half_width_mm=min(reach_mm, grading.half_width_mm),
         )
     except InputError as error:
-        raise InputError(f"skin.reach_mm leaves no room for the finest elements: {error}") from error
+        said = f"reach_mm leaves no room for the finest elements: {error}"
+        raise PlacedError(said, ("reach_mm",)) from error
 
 
 def _zone(stimulus: TaskStimulus, conditions: Conditions) -> Grading:
-    """Mesh that is fine where one stimulus touches."""
-    along, across = stimulus.offset_mm
-    if isinstance(stimulus.indenter, Sphere) and abs(along) <= _NEAR_MM and across == 0.0:
+    """Mesh that is fine wherever one stimulus touches."""
+    stays = stimulus.motion.stays and stimulus.z_mm == 0.0
+    if isinstance(stimulus.indenter, Sphere) and stays and abs(stimulus.x_mm) <= _NEAR_MM:
         return conditions.sphere_grading()
-    x_mm, size = conditions.receptor_x_mm + along, conditions.finger.relative_size
-    return grading_about(
-        stimulus.indenter, conditions.resolution, x_mm, across, stimulus.spin_deg, finger_size=size
-    )
+    with moved(stimulus.in_file), about():
+        return grading_along(
+            stimulus.indenter,
+            conditions.resolution,
+            conditions.receptor_x_mm + stimulus.x_mm,
+            stimulus.z_mm,
+            stimulus.spin_deg,
+            stimulus.motion.poses,
+            conditions.finger.relative_size,
+        )
