@@ -1,7 +1,7 @@
-"""Numbers and pictures of docs/afferents.md.
+"""Numbers and pictures of docs/afferents.md, docs/afferents-evidence.md and docs/decisions/sai-fields.md.
 
-`python -m studies.afferents_page` presses a probe, a ball and a stroke, and writes them anew (five minutes);
-with names of parts ("mixed") only those.
+`python -m studies.afferents_page` presses a probe, balls and a stroke, and writes them anew (ten minutes);
+with names of parts ("mixed", "tuning", "fields", "adaptation", "densities", "reach") only those.
 """
 
 from __future__ import annotations
@@ -9,17 +9,35 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import product
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.interpolate import interp1d
 
 import fingerpad as fp
+from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InertiaWarning
+from fingerpad.core.files import write_atomically
+from fingerpad.core.patterns import poisson_disc
 from fingerpad.core.regions import Ellipse
-from fingerpad.report.mixed_responses import draw_mixed_responses
-from fingerpad.report.style import write_png
+from fingerpad.data import afferents as published
+from fingerpad.neuron.afferent import AnyAfferent
+from fingerpad.neuron.mixed_population import PUBLISHED_DENSITIES, types_of_afferents
+from fingerpad.neuron.tuning import tuning_curve
+from fingerpad.report.mixed_responses import STYLES, draw_mixed_responses
+from fingerpad.report.style import PALE, new_figure, write_png
+from fingerpad.skin.unrolled_skin import UnrolledSkin
+from studies.vibration_page import DOCS, table, with_table
 
-IMAGES = Path(__file__).parents[1] / "docs" / "images"
-DISC = Ellipse(5.0, 5.0, centre_mm=(17.37, 0.0))
-BALL = fp.Sphere(curvature_per_m=287)
+IMAGES, PAGE, DECISION = DOCS / "images", DOCS / "afferents-evidence.md", DOCS / "decisions" / "sai-fields.md"
+X_MM = 17.37
+DISC = Ellipse(5.0, 5.0, centre_mm=(X_MM, 0.0))
+BALL, PROBE = fp.Sphere(curvature_per_m=287), fp.FlatPunch(diameter_mm=1.0, fillet_mm=0.2)
 TOUCHES = {
     "press of 1 mm": fp.RampAndHold(depth_mm=1.0, hold_ms=350.0),
     "vibration of 40 Hz, amplitude 50 µm": fp.sine(
@@ -27,13 +45,30 @@ TOUCHES = {
     ),
     "stroke of 20 mm/s": fp.stroke(depth_mm=0.5, speed_mm_per_s=20.0, x_mm=3.0, strokes=1, hold_ms=100.0),
 }
+SITES = {"SAI": 0.0, "RA": 0.0, "PC": 0.0, "SAII": 1.0}
+"""Distance of the end organ from the middle of the probe at which a type is most sensitive. [mm]"""
+
+LIGHT = {"SAI": 0.7, "SAII": 0.0}
+"""Hold of the slowly adapting types: so light that they are silent. Others: that of the probe."""
+
+OBSERVED = {"SAI": published.SAI_TUNING, "RA": published.RA_TUNING, "PC": published.PC_TUNING}
+FREQUENCIES_HZ = np.array(published.TUNING_FREQUENCIES.value)
+SLOW_MM_PER_S = 4.0
+SPEEDS_MM_PER_S = (4.0, 20.0, 100.0)
+PROBING_MM_PER_S = 20.0
+"""Speed at which receptive fields are probed."""
+
+DEPTHS_UM = np.geomspace(2.0, 1000.0, 90)
+TIMES_THRESHOLD = (4.0, 5.0)
+BRANCHES = {"SAI": (6, 1.0), "RA": (14, 1.2)}
+"""End organs per afferent and the radius of the disc in which they are scattered. [mm]"""
 
 
-def indented(indenter: fp.Indenter, motion: object, materials: str = "human") -> fp.SkinResponse:
+def indented(indenter: fp.Indenter, motion: Any, materials: str = "human", **more: Any) -> fp.SkinResponse:
     """Press at quick resolution, without the warning of inertia, about which the page speaks."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InertiaWarning)
-        return fp.indent(fp.Fingertip(), indenter, motion, materials)  # type: ignore[arg-type]
+        return fp.indent(fp.Fingertip(), indenter, motion, materials, **more)
 
 
 def mixed() -> None:
@@ -46,7 +81,321 @@ def mixed() -> None:
     write_png(draw_mixed_responses, maps, IMAGES / "mixed_responses.png")
 
 
-PARTS = {"mixed": mixed}
+@cache
+def step_on_hold() -> fp.SkinResponse:
+    """Press the probe 0.5 mm deep, and after 550 ms 10 µm more and less within 1 ms each."""
+    motion = fp.Trajectory((0, 50, 600, 601, 602, 603), (0, 0.5, 0.5, 0.51, 0.5, 0.49))
+    return indented(PROBE, motion)
+
+
+@cache
+def slow_ramp() -> fp.SkinResponse:
+    """Press the probe 1 mm deep at 4 mm/s, and hold it."""
+    times_ms = np.round(np.geomspace(2.5, 250.0, 25), 3)
+    return indented(PROBE, fp.Trajectory((0, 250, 750), (0, 1.0, 1.0)), times_ms=times_ms.tolist())
+
+
+def linear_response(name: str, afferent: AnyAfferent) -> tuple[float, float]:
+    """Return the hold and the change per µm of what a type follows, at its most sensitive place."""
+    skin = step_on_hold()
+    values = skin.sample(afferent.static_quantity, [(X_MM, SITES[name])])[:, 0]
+    at = [int(np.argmin(np.abs(skin.times_ms - time_ms))) for time_ms in (600.0, 601.0, 603.0)]
+    return float(values[at[0]]), float((values[at[1]] - values[at[2]]) / 20.0)
+
+
+def tuning() -> None:
+    """Write the table and the figure of the tuning curves."""
+    curves, rows = {}, []
+    for name, afferent in types_of_afferents().items():
+        hold, per_um = linear_response(name, afferent)
+        curves[name] = tuning_curve(afferent, FREQUENCIES_HZ, per_um, LIGHT.get(name, hold))
+    for number, frequency_hz in enumerate(FREQUENCIES_HZ):
+        cells = [f"{frequency_hz:g}"]
+        for name, curve in curves.items():
+            cells.append(_micrometres(curve[number]))
+            if name in OBSERVED:
+                seen = observed_um(name)[number]
+                cells += ["–", "–"] if np.isnan(seen) else [f"{seen:g}", f"{curve[number] / seen:.2f}"]
+        rows.append(cells)
+    head = ["frequency [Hz]"]
+    for name in curves:
+        head += [f"{name} [µm]", *(("recalled", "ratio") if name in OBSERVED else ())]
+    _write_table(PAGE, "tuning", head, rows)
+    write_png(draw_tuning, curves, IMAGES / "afferent_tuning.png")
+
+
+def observed_um(name: str) -> FloatArray:
+    """Recalled thresholds at `FREQUENCIES_HZ`, NaN where there is none. [µm]"""
+    values = np.full(FREQUENCIES_HZ.size, np.nan)
+    known = np.array(OBSERVED[name].value)
+    start = FREQUENCIES_HZ.size - known.size if name == "PC" else 0
+    values[start : start + known.size] = known
+    return values
+
+
+def draw_tuning(curves: dict[str, FloatArray]) -> Figure:
+    """Draw thresholds over frequency, and the recalled ones with a band of a factor of two."""
+    figure = new_figure(7.0, 4.6)
+    axes = figure.subplots()
+    for (name, curve), (colour, marker) in zip(curves.items(), STYLES, strict=False):
+        axes.loglog(FREQUENCIES_HZ, curve, color=colour, label=f"{name}, model")
+        if name in OBSERVED:
+            seen = observed_um(name)
+            axes.fill_between(FREQUENCIES_HZ, 0.5 * seen, 2.0 * seen, color=colour, alpha=0.12, linewidth=0.0)
+            axes.plot(
+                FREQUENCIES_HZ, seen, marker, color=colour, markerfacecolor="white", markersize=5.5,
+                label=f"{name}, recalled",
+            )  # fmt: skip
+    axes.set(xlabel="frequency [Hz]", ylabel="amplitude for one impulse per cycle [µm]", ylim=(0.3, 3000.0))
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+DISTANCES_MM = np.arange(0.0, 8.01, 0.1)
+
+
+def indented_by(traces: fp.SedTraces, depth_um: float, speed_mm_per_s: float) -> fp.SedTraces:
+    """Traces under an indentation to a depth at a speed, and a hold, from those of the slow ramp.
+
+    Stress and strain at a depth hardly depend on the speed: relaxation takes seconds.
+    """
+    ramp_ms = depth_um / speed_mm_per_s
+    known_um = SLOW_MM_PER_S * np.minimum(traces.times_ms, 250.0)
+    rises = known_um < SLOW_MM_PER_S * 250.0
+    times_ms = np.append(np.linspace(0.0, ramp_ms, 17), ramp_ms + 200.0)
+    wanted_um = np.minimum(speed_mm_per_s * times_ms, depth_um)
+    rises[np.argmax(~rises)] = True
+    values = interp1d(known_um[rises], traces.sed_kpa[rises], axis=0)(wanted_um)
+    return replace(traces, times_ms=times_ms, sed_kpa=values, kinks_ms=np.array([ramp_ms]), phases=())
+
+
+def threshold_depths_um(afferent: AnyAfferent, traces: fp.SedTraces, speed_mm_per_s: float) -> FloatArray:
+    """Smallest depth of an indentation that elicits a spike at every site, inf if 1 mm does not. [µm]"""
+    depths = np.full(traces.n_sites, np.inf)
+    for depth_um in DEPTHS_UM[::-1]:
+        fires = np.diff(afferent.spikes(indented_by(traces, depth_um, speed_mm_per_s)).offsets) > 0
+        depths[fires] = depth_um
+    return depths
+
+
+def ramp_traces(afferent: AnyAfferent, sites: Any) -> fp.SedTraces:
+    """Traces of the slow ramp at sites."""
+    return slow_ramp().sed(sites, afferent.dynamic_quantity, afferent.static_quantity)
+
+
+def field_area_mm2(depths_um: FloatArray, times: float) -> float:
+    """Area of skin from which a depth of so many times the smallest one elicits a spike, from a profile."""
+    inside = DISTANCES_MM[: depths_um.size][depths_um <= times * depths_um.min()]
+    return float(np.pi * inside.max() ** 2) if inside.size else float("nan")
+
+
+def profile_sites() -> list[list[tuple[float, float]]]:
+    """Sites at `DISTANCES_MM` from the probe across the finger and towards its base."""
+    across = [(X_MM, float(z)) for z in DISTANCES_MM if z < 6.55]
+    return [across, [(X_MM - float(x), 0.0) for x in DISTANCES_MM]]
+
+
+def branched_area_mm2(name: str, times: float, seed: int) -> float:
+    """Area of the field of one afferent with several end organs, probed on a grid of 0.25 mm.
+
+    By the profile across the finger, the probe at a place acts on an end organ as by their distance.
+    """
+    afferent = types_of_afferents()[name]
+    count, reach_mm = BRANCHES[name]
+    ends = fp.EndOrgans.scattered(np.zeros((seed + 1, 2)), count, reach_mm, seed=17).positions_mm[seed]
+    grid = np.arange(-4.0, 4.01, 0.25)
+    places = np.array(list(product(grid, grid)))
+    away = np.linalg.norm(places[:, None] - ends, axis=2)
+    profile = ramp_traces(afferent, profile_sites()[0])
+    known = DISTANCES_MM[: profile.n_sites]
+    values = np.array([np.interp(away, known, row).max(axis=1) for row in profile.sed_kpa])
+    depths = threshold_depths_um(afferent, replace(profile, sed_kpa=values), PROBING_MM_PER_S)
+    return float((depths <= times * depths.min()).sum() * 0.25**2)
+
+
+def fields() -> None:
+    """Write thresholds of indentation and areas of receptive fields, and their figure."""
+    depths: dict[str, list[FloatArray]] = {}
+    rows = []
+    for name, afferent in types_of_afferents().items():
+        profiles = [ramp_traces(afferent, sites) for sites in profile_sites()]
+        best = []
+        for speed in SPEEDS_MM_PER_S:
+            found = [threshold_depths_um(afferent, traces, speed) for traces in profiles]
+            best.append(min(each.min() for each in found))
+            if speed == PROBING_MM_PER_S:
+                depths[name] = found
+        observed = published.INDENTATION_THRESHOLDS.value[published.TYPES.index(name)]
+        rows.append([name, *(_micrometres(each) for each in best), f"{observed:g}"])
+    _write_table(
+        PAGE,
+        "indentation",
+        ["type", "4 mm/s [µm]", "20 mm/s [µm]", "100 mm/s [µm]", "median of units [µm]"],
+        rows,
+    )
+    rows = []
+    for name, along in depths.items():
+        low, high = (np.mean([field_area_mm2(each, times) for each in along]) for times in TIMES_THRESHOLD)
+        branched = "–"
+        if name in BRANCHES:
+            areas = [[branched_area_mm2(name, times, seed) for seed in range(8)] for times in TIMES_THRESHOLD]
+            branched = f"{np.median(areas[0]):.0f} to {np.median(areas[1]):.0f}"
+        observed = published.FIELD_AREAS.value[published.TYPES.index(name)]
+        rows.append([name, f"{low:.1f} to {high:.1f}", branched, f"{observed:g}"])
+    _write_table(
+        PAGE, "fields", ["type", "one end organ [mm²]", "several [mm²]", "median of units [mm²]"], rows
+    )
+    write_png(draw_fields, depths, IMAGES / "afferent_fields.png")
+
+
+def draw_fields(depths: dict[str, list[FloatArray]]) -> Figure:
+    """Draw the threshold over the distance of the probe, across and along the finger."""
+    figure = new_figure(8.4, 3.8)
+    for axes, which, title in zip(
+        figure.subplots(1, 2, sharey=True), (0, 1), ("across", "towards the base"), strict=True
+    ):
+        for (name, profiles), (colour, marker) in zip(depths.items(), STYLES, strict=False):
+            axes.semilogy(
+                DISTANCES_MM[: profiles[which].size], profiles[which], color=colour, marker=marker,
+                markevery=5, markersize=4.0, label=name,
+            )  # fmt: skip
+        axes.set(xlabel="distance of the probe [mm]", title=title, ylim=(10.0, 1100.0))
+    figure.axes[0].set_ylabel("threshold depth [µm]")
+    figure.axes[1].legend()
+    return figure
+
+
+def adaptation() -> None:
+    """Write spikes in the ramp and in parts of a hold of 5 s, and their figure."""
+    skin = indented(BALL, fp.RampAndHold(depth_mm=1.0, hold_ms=4950.0))
+    sites = [(X_MM + x, z) for x, z in product((-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5), (0.0, 0.5, 1.0, 1.5))]
+    found = {}
+    for name, afferent in types_of_afferents().items():
+        traces = skin.sed(sites, afferent.dynamic_quantity, afferent.static_quantity)
+        trains = afferent.spikes(traces)
+        found[name] = max((trains[n] for n in range(len(sites))), key=len)
+    parts = ((0.0, 60.0), (60.0, 1000.0), (1000.0, 2500.0), (2500.0, 5000.0))
+    rows = [
+        [
+            name,
+            *(
+                f"{1e3 * np.count_nonzero((train > low) & (train <= high)) / (high - low):.1f}"
+                for low, high in parts
+            ),
+        ]
+        for name, train in found.items()
+    ]
+    _write_table(PAGE, "adaptation", ["type", *(f"{low:g}-{high:g} ms" for low, high in parts)], rows)
+    write_png(draw_adaptation, found, IMAGES / "afferent_adaptation.png")
+
+
+def draw_adaptation(found: dict[str, FloatArray]) -> Figure:
+    """Draw instantaneous rates over time, ticks for the spikes."""
+    figure = new_figure(8.4, 3.6)
+    axes = figure.subplots()
+    for row, ((name, train), (colour, marker)) in enumerate(zip(found.items(), STYLES, strict=False)):
+        axes.loglog(train[1:], 1e3 / np.diff(train), marker, color=colour, markersize=3.5, label=name)
+        axes.plot(train, np.full(train.size, 1.25 + 0.35 * row), "|", color=colour, markersize=5.0)
+    axes.axvspan(1.0, 50.0, color=PALE, zorder=-1)
+    axes.set(
+        xlabel="time [ms], grey: ramp",
+        ylabel="1 / interval [spikes/s]",
+        ylim=(1.0, 1500.0),
+        xlim=(1.0, 5500.0),
+    )
+    axes.legend(loc="upper right")
+    return figure
+
+
+def densities() -> None:
+    """Write the densities and the numbers on the pad, and draw them."""
+    pad = UnrolledSkin(fp.Fingertip())
+    population = fp.MixedPopulation.at_densities(pad.pad(), place=pad.points, seed=1)
+    area = pad.pad().area_mm2
+    rows = [
+        [
+            name,
+            f"{density:g}",
+            f"{len(population.parts[name])}",
+            f"{100.0 * len(population.parts[name]) / area:.1f}",
+        ]
+        for name, density in PUBLISHED_DENSITIES.items()
+    ]
+    rows.append(
+        [
+            "all",
+            f"{published.DENSITY_TOTAL.value:g}",
+            f"{len(population)}",
+            f"{100.0 * len(population) / area:.1f}",
+        ]
+    )
+    _write_table(
+        PAGE,
+        "densities",
+        ["type", "published [1/cm²]", f"afferents on {area:.0f} mm² of pad", "[1/cm²]"],
+        rows,
+    )
+
+
+REACH_FORCE_MN = 500.0
+REACH_OF = {
+    "human": ("human", fp.Afferent()),
+    "human, fp.SAI()": ("human", fp.SAI()),
+    "paper": ("paper", fp.Afferent.for_tissues("paper")),
+    "trial3": ("trial3", fp.Afferent.for_tissues("trial3")),
+    "trial3, raised": ("trial3", fp.Afferent.for_tissues("trial3").with_static_threshold(0.2)),
+}
+
+
+def reach() -> None:
+    """Write how far from a ball at 0.5 N SAI afferents fire in the hold."""
+    finger = fp.Fingertip()
+    pad = UnrolledSkin(finger)
+    layout = poisson_disc(pad.pad(), density_per_cm2=70.0, seed=1)
+    rows = []
+    for name, (materials, afferent) in REACH_OF.items():
+        skin = indented(BALL, fp.ForceRampAndHold(force_mn=REACH_FORCE_MN), materials)
+        population = fp.Population.of_layout(layout, pad.points, afferent)
+        response = population.respond(skin)
+        away = np.linalg.norm(population.positions_mm - finger.skin_point(X_MM, 0.0), axis=1)
+        fires = response.static_rate_hz > 0.0
+        quantity = skin.sample(afferent.static_quantity, population.positions_mm)[-1]
+        threshold = afferent.static_threshold
+        rows.append([
+            name, afferent.static_quantity, f"{threshold:.2g}", f"{threshold / quantity.max():.1%}",
+            f"{fires.sum()} of {fires.size}", f"{away[fires].max():.1f}",
+            f"{np.median(response.static_rate_hz[fires]):.0f}",
+        ])  # fmt: skip
+    head = [
+        "tissues",
+        "follows",
+        "threshold [kPa]",
+        "over the largest under the ball",
+        "fire in the hold",
+        "farthest [mm]",
+        "median rate [spikes/s]",
+    ]
+    _write_table(DECISION, "reach", head, rows)
+
+
+def _micrometres(value: float) -> str:
+    return "none" if not np.isfinite(value) else f"{value:.0f}" if value >= 20.0 else f"{value:.1f}"
+
+
+def _write_table(page: Path, name: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    content = table(head, rows)
+    print(content)
+    write_atomically(page, with_table(page.read_text(encoding="utf-8"), name, content).encode())
+
+
+PARTS = {
+    "mixed": mixed,
+    "tuning": tuning,
+    "fields": fields,
+    "adaptation": adaptation,
+    "densities": densities,
+    "reach": reach,
+}
 
 
 def main(names: Sequence[str]) -> None:

@@ -19,8 +19,13 @@ from fingerpad.neuron.tuning import impulses_per_cycle, tuning_curve, vibration
 PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA = 0.0200, 10.4
 """Compressive stress below a 1 mm punch on a hold of 0.5 mm (docs/afferents.md, table of the probe)."""
 
+PC_PER_UM, PC_HOLD_MM = 3.43e-4, 0.151
+"""Mean displacement of the skin within 3 mm there."""
+
+LIGHT_KPA = 0.7
+"""Stress under a touch so light that an SAI afferent is silent in it."""
+
 FREQUENCIES_HZ = np.array(published.TUNING_FREQUENCIES.value)
-SKIN_QUANTITIES = {"SAI": "compressive_stress", "RA": "compressive_stress", "PC": "skin_displacement"}
 
 
 def traces(quantity: str, times_ms: object, values: object, kinks_ms: object = ()) -> fp.SedTraces:
@@ -50,7 +55,8 @@ class Pressed:
         return traces(dynamic_quantity, [0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 1.0], peak), [50.0])
 
 
-FINGER = Pressed({"compressive_stress": 15.0, "skin_displacement": 1.0, "skin_stretch": 0.1, "stored": 2.0})
+ENDS = np.array([[[0.0, 0.0], [1.0, 0.0]]])
+FINGER = Pressed({"compressive_stress": 15.0, "deep_displacement": 1.0, "skin_stretch": 0.1, "stored": 2.0})
 SQUARE = Rectangle(10.0, 10.0, centre_mm=(17.0, 0.0))
 
 
@@ -87,14 +93,15 @@ def test_the_band_pass_does_not_depend_on_the_number_of_sites() -> None:
 @pytest.mark.parametrize(
     ("afferent", "first_hz", "observed_um", "per_um", "hold"),
     [
+        (fp.SAI(), 0, published.SAI_TUNING, PUNCH_KPA_PER_UM, LIGHT_KPA),
         (fp.RA(), 0, published.RA_TUNING, PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA),
-        (fp.PC(), 3, published.PC_TUNING, 1e-3, 0.46),
+        (fp.PC(), 3, published.PC_TUNING, PC_PER_UM, PC_HOLD_MM),
     ],
 )
 def test_tuning_curves_lie_within_a_factor_of_two_of_the_published_ones(
     afferent: fp.RA, first_hz: int, observed_um: object, per_um: float, hold: float
 ) -> None:
-    found = tuning_curve(afferent, FREQUENCIES_HZ[first_hz:], per_um, hold)
+    found = tuning_curve(afferent, FREQUENCIES_HZ[first_hz:][: len(observed_um.value)], per_um, hold)
     ratio = found / np.array(observed_um.value)
     assert ratio.min() > 0.5
     assert ratio.max() < 2.0
@@ -103,11 +110,11 @@ def test_tuning_curves_lie_within_a_factor_of_two_of_the_published_ones(
 def test_the_best_frequencies_are_those_of_the_recordings() -> None:
     low, high, pacinian = published.BEST_FREQUENCIES.value
     ra = tuning_curve(fp.RA(), FREQUENCIES_HZ, PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA)
-    pc = tuning_curve(fp.PC(), FREQUENCIES_HZ, 1e-3, 0.46)
+    pc = tuning_curve(fp.PC(), FREQUENCIES_HZ[3:], PC_PER_UM, PC_HOLD_MM)
     assert low <= FREQUENCIES_HZ[np.argmin(ra)] <= high
-    assert FREQUENCIES_HZ[np.argmin(pc)] > pacinian
-    assert pc[FREQUENCIES_HZ == 200.0] < 0.1 * ra[FREQUENCIES_HZ == 200.0]
-    assert pc[FREQUENCIES_HZ == 10.0] > 2.0 * ra[FREQUENCIES_HZ == 10.0]
+    assert FREQUENCIES_HZ[3:][np.argmin(pc)] > pacinian
+    assert pc[FREQUENCIES_HZ[3:] == 200.0] < 0.1 * ra[FREQUENCIES_HZ == 200.0]
+    assert pc[FREQUENCIES_HZ[3:] == 10.0] > 2.0 * ra[FREQUENCIES_HZ == 10.0]
 
 
 def test_thresholds_of_a_curve_separate_silence_from_entrainment() -> None:
@@ -174,6 +181,45 @@ def test_one_end_organ_is_the_afferent_itself_and_two_are_their_weighted_sum() -
     assert_allclose(halved.spikes.times_ms, half.spikes.times_ms, rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    "afferent", [fp.SAI(), fp.RA(), fp.PC(), fp.SAII()], ids=lambda each: type(each).__name__
+)
+def test_sites_that_move_too_little_are_silent_and_leave_the_others_as_they_are(
+    afferent: fp.RA | fp.SAI,
+) -> None:
+    scale = {"SAI": 6.0, "RA": 2.0, "PC": 0.2, "SAII": 0.1}[type(afferent).__name__]
+    heights = scale * np.geomspace(1e-4, 1.0, 40)
+    quantity = afferent.static_quantity
+    sed = traces(quantity, [0.0, 20.0, 300.0], np.outer([0.0, 1.0, 1.0], heights), [20.0])
+    together = afferent.spikes(sed)
+    counts = np.diff(together.offsets)
+    assert counts[0] == 0 < counts[-1]
+    assert (np.diff(counts) >= 0).all()
+    for site in range(25, 40):
+        assert_array_equal(afferent.spikes(sed.part(slice(site, site + 1)))[0], together[site])
+
+
+@pytest.mark.parametrize(("rise", "fall"), [(1, 1), (2, 2), (3, 1)])
+def test_no_input_gives_more_than_the_largest_share_of_its_range(rise: int, fall: int) -> None:
+    band = BandPass(100.0, rise, fall)
+    # The worst input follows the sign of the impulse response, backwards in time.
+    times_ms = np.arange(0.0, 120.0, 0.05)
+    step = traces("stored", [0.0, 50.0, 50.05, 120.0], [0.0, 0.0, 1.0, 1.0])
+    at_ms, passed = band.of(step)
+    impulse = np.diff(np.interp(times_ms, at_ms, passed[:, 0]))
+    worst = (impulse[::-1] > 0.0).astype(float)
+    found = np.convolve(worst, impulse)[: 2 * worst.size].max()
+    assert found == pytest.approx(band.largest_share, rel=0.02)
+
+
+def test_the_strongest_end_organ_leads_if_asked_for():
+    sed = traces("stored", [0.0, 50.0], [[0.0, 0.0], [2.0, 3.0]])
+    largest = fp.EndOrgans(ENDS, [0.8, 0.2], combine="largest").combined(sed)
+    assert largest.sed_kpa.tolist() == [[0.0], [2.0]]
+    equal = fp.EndOrgans(ENDS, combine="largest").combined(sed)
+    assert equal.sed_kpa.tolist() == [[0.0], [3.0]]
+
+
 def test_scattered_end_organs_lie_within_reach_and_depend_on_seed_and_number_only() -> None:
     places = np.zeros((400, 2))
     ends = fp.EndOrgans.scattered(places, count=6, reach_mm=1.5, seed=3)
@@ -213,7 +259,6 @@ def test_a_spread_makes_afferents_of_a_type_unequal() -> None:
     assert not np.array_equal(factors, sensitivities(140, 0.4, seed=4))
 
 
-ENDS = np.array([[[0.0, 0.0], [1.0, 0.0]]])
 ENERGY = press("stored", 1.0)
 SPARSE = fp.MixedPopulation.at_densities
 
@@ -239,6 +284,7 @@ BAD: list[tuple[Callable[[], object], str]] = [
     (lambda: fp.EndOrgans(ENDS, [1.5, -0.5]), "must not be negative: the smallest is -0.5"),
     (lambda: fp.EndOrgans(ENDS, [1.0]), "one number per end organ, 2"),
     (lambda: fp.EndOrgans([[0.0, 0.0]]), "positions_mm must"),
+    (lambda: fp.EndOrgans(ENDS, combine="mean"), "combine must be one of sum, largest: got 'mean'"),
     (lambda: fp.EndOrgans(np.zeros((1, 0, 2))), "afferents by end organs"),
     (lambda: fp.EndOrgans.scattered([[0.0, 0.0]], 0, 1.0, 1), "count must be a whole number of at least 1"),
     (

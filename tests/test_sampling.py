@@ -126,7 +126,7 @@ def test_another_quantity_may_take_the_place_of_energy_in_the_static_term_or_in_
 
 @pytest.mark.parametrize("quantity", ["heat", "", "work"])
 def test_unknown_quantity_is_refused(quantity):
-    known = "stored, von_mises, skin_displacement, skin_stretch"
+    known = "stored, von_mises, skin_displacement, deep_displacement, skin_stretch"
     with pytest.raises(InputError, match=f"quantity must be one of {known}: got"):
         response(layered_block()).sample(quantity, SITES)
 

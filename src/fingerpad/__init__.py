@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from fingerpad.mechanics.press import PressSettings
     from fingerpad.mechanics.tissues import named_tissues
     from fingerpad.neuron.afferent import Afferent
-    from fingerpad.neuron.afferent_types import PC, RA, SAII, OwnAfferent
+    from fingerpad.neuron.afferent_types import PC, RA, SAI, SAII, OwnAfferent
     from fingerpad.neuron.end_organs import EndOrgans
     from fingerpad.neuron.mixed_population import MixedPopulation, MixedResponse
     from fingerpad.neuron.population import Population
@@ -74,6 +74,7 @@ if TYPE_CHECKING:
 __all__ = [
     "PC",
     "RA",
+    "SAI",
     "SAII",
     "Afferent",
     "Bar",
@@ -164,7 +165,7 @@ _HOMES = {
     "export.dataset": ("read_touch", "touch_dataset", "write_touch"),
     "export.view": ("save_view",),
     "neuron.afferent": ("Afferent",),
-    "neuron.afferent_types": ("PC", "RA", "SAII", "OwnAfferent"),
+    "neuron.afferent_types": ("PC", "RA", "SAI", "SAII", "OwnAfferent"),
     "neuron.end_organs": ("EndOrgans",),
     "neuron.mixed_population": ("MixedPopulation", "MixedResponse"),
     "geometry.edged_indenters": ("Edge", "Gap", "Grating"),

@@ -175,6 +175,17 @@ class SedTraces:
         dynamic = None if self.dynamic_kpa is None else self.dynamic_kpa[:, sites]
         return replace(self, sed_kpa=self.sed_kpa[:, sites], dynamic_kpa=dynamic)
 
+    def selected(self, sites: np.ndarray) -> SedTraces:
+        """Traces of the sites where a mask (n_sites,) is true.
+
+        Examples
+        --------
+        >>> SedTraces([0.0, 50.0], [[0.0, 0.0], [2.0, 3.0]]).selected(np.array([False, True])).n_sites
+        1
+        """
+        dynamic = None if self.dynamic_kpa is None else self.dynamic_kpa[:, sites]
+        return replace(self, sed_kpa=self.sed_kpa[:, sites], dynamic_kpa=dynamic)
+
     def scaled(self, factors: ArrayLike) -> SedTraces:
         """Traces with each site's values multiplied by a factor of its own, (n_sites,), not negative.
 
@@ -340,6 +351,19 @@ class SpikeTrains:
         counts = [np.diff(part.offsets) for part in parts]
         offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]) if parts else np.zeros(1)
         return cls(np.concatenate([part.times_ms for part in parts]) if parts else np.empty(0), offsets)
+
+    def spread(self, sites: np.ndarray) -> SpikeTrains:
+        """Trains of all sites, if these are those where a mask is true and the others are silent.
+
+        Examples
+        --------
+        >>> two = SpikeTrains.from_lists([[1.0], [2.0, 3.0]])
+        >>> [train.tolist() for train in two.spread(np.array([True, False, True]))]
+        [[1.0], [], [2.0, 3.0]]
+        """
+        counts = np.zeros(sites.size, dtype=np.int64)
+        counts[sites] = np.diff(self.offsets)
+        return SpikeTrains(self.times_ms, np.concatenate([[0], np.cumsum(counts)]))
 
     def __len__(self) -> int:
         return self.offsets.size - 1

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array
+from fingerpad.core.checks import FloatArray, float_array, not_negative
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import STORED_ENERGY, SedTraces, SpikeTrains
 from fingerpad.core.threads import in_blocks
@@ -244,6 +244,43 @@ class Afferent:
         return LeakyIntegrateAndFire(
             self.time_constant_ms, self.capacitance_mf, self.threshold_mv, self.refractory_ms
         )
+
+    @property
+    def static_threshold(self) -> float:
+        """Constant quantity above which the afferent fires, (C v / tau - beta) / k_s. [kPa]
+
+        Examples
+        --------
+        >>> round(Afferent().static_threshold, 2), round(Afferent.for_tissues("trial3").static_threshold, 3)
+        (2.91, 0.038)
+        """
+        rheobase_ma = self.capacitance_mf * self.threshold_mv / self.time_constant_ms
+        return (rheobase_ma - self.intercept_ma) / self.static_gain
+
+    def with_static_threshold(self, quantity: float) -> Afferent:
+        """Return the same afferent with another intercept, so that it fires above a constant quantity.
+
+        Parameters
+        ----------
+        quantity : float
+            The threshold. [kPa]
+
+        Returns
+        -------
+        Afferent
+
+        Raises
+        ------
+        InputError
+            If it is negative.
+
+        Examples
+        --------
+        >>> round(Afferent().with_static_threshold(5.0).static_threshold, 9)
+        5.0
+        """
+        raised = not_negative("quantity", quantity) - self.static_threshold
+        return replace(self, intercept_ma=self.intercept_ma - self.static_gain * raised)
 
     def spikes(self, sed: SedTraces | Drive) -> SpikeTrains:
         """Simulate the spikes of this afferent at every site.

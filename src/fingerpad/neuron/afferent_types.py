@@ -18,13 +18,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from fingerpad.core.checks import instance, not_negative, positive
+from fingerpad.core.checks import FloatArray, instance, not_negative, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import STORED_ENERGY, CurrentTraces, SedTraces, SpikeTrains
 from fingerpad.data import afferents
 from fingerpad.neuron.afferent import Afferent, check_quantities
-from fingerpad.neuron.band_pass import BandPass
+from fingerpad.neuron.band_pass import BandPass, resampled, smoothed_rate
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
+from fingerpad.neuron.transduction import Drive
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,11 @@ class RapidlyAdapting:
             If the traces are those of another quantity.
         """
         check_quantities(self, sed)
-        return self.membrane.spikes(self.current(sed))
+        # Most of the skin moves too little for a spike; a current below 1 never reaches the threshold.
+        may_fire = self.band_pass.largest_share * np.ptp(sed.sed_kpa, axis=0) > self.threshold
+        if not may_fire.any():
+            return SpikeTrains.from_lists([[]] * sed.n_sites)
+        return self.membrane.spikes(self.current(sed.selected(may_fire))).spread(may_fire)
 
 
 @dataclass(frozen=True)
@@ -157,8 +162,8 @@ class PC(RapidlyAdapting):
     """A Pacinian afferent (PC, FA-II).
 
     It responds to vibration of the skin above 64 Hz, most at 200 to 400 Hz, and is silent in a hold. It
-    follows how far the skin above has moved: its corpuscle lies deep, and skin moves over a wide area. The
-    defaults, their sources and status are in `fingerpad.data.afferents`.
+    follows how far the skin within 3 mm has moved, because its corpuscle lies deep. The defaults, their
+    sources and status are in `fingerpad.data.afferents`.
 
     Parameters
     ----------
@@ -167,13 +172,13 @@ class PC(RapidlyAdapting):
 
     Examples
     --------
-    The skin vibrates by 5 µm about 0.5 mm, at 250 Hz and at 10 Hz:
+    The tissue vibrates by 5 µm about 0.5 mm, at 250 Hz and at 10 Hz:
 
     >>> times_ms = np.arange(0.0, 400.0, 0.2)
     >>> def moved(frequency_hz):
     ...     course = 0.5 + 0.005 * np.sin(2e-3 * np.pi * frequency_hz * times_ms)
-    ...     return SedTraces(times_ms, course[:, None], dynamic_quantity="skin_displacement",
-    ...                      static_quantity="skin_displacement")
+    ...     return SedTraces(times_ms, course[:, None], dynamic_quantity="deep_displacement",
+    ...                      static_quantity="deep_displacement")
     >>> PC().spikes(moved(250.0))[0].size > 80, PC().spikes(moved(10.0))[0].size
     (True, 0)
     """
@@ -189,18 +194,88 @@ class PC(RapidlyAdapting):
 
 
 @dataclass(frozen=True)
-class SAII(Afferent):
+class SAI(Afferent):
+    """A slowly adapting type I (SAI) afferent that is also right under vibration.
+
+    It is `Afferent`, except that the dynamic term follows the quantity as a first-order low pass leaves it,
+
+        I = beta + k_d |S'| + k_s Q,    tau_s S' + S = Q.
+
+    The rate of change of a fast vibration would otherwise make it as sensitive at 400 Hz as at 20 Hz. Rates
+    in a hold are those of `Afferent`; those in the ramps to which it was fitted are 3 to 9 % lower.
+
+    Parameters
+    ----------
+    intercept_ma, dynamic_gain, static_gain, time_constant_ms, capacitance_mf, threshold_mv, refractory_ms
+        As in `Afferent`.
+    dynamic_quantity, static_quantity : str
+        As in `Afferent`.
+    smoothing_ms : float
+        Time constant of the low pass, tau_s. [ms]
+
+    Raises
+    ------
+    InputError
+        As `Afferent`, or if the smoothing is not positive.
+
+    Examples
+    --------
+    >>> from fingerpad.neuron.tuning import tuning_curve
+    >>> tuning_curve(SAI(), [10.0, 100.0], per_um=0.02).round(-1).tolist()
+    [70.0, 210.0]
+    >>> tuning_curve(Afferent(), [10.0, 100.0], per_um=0.02).round(-1).tolist()
+    [50.0, 30.0]
+    """
+
+    smoothing_ms: float = afferents.SAI_SMOOTHING.value
+
+    def __post_init__(self) -> None:
+        positive("smoothing_ms", self.smoothing_ms, "ms")
+        super().__post_init__()
+
+    def spikes(self, sed: SedTraces | Drive) -> SpikeTrains:
+        """Simulate the spikes of this afferent at every site, as `Afferent.spikes`."""
+        check_quantities(self, sed)
+        if isinstance(sed, Drive):
+            raise InputError("SAI smooths the traces of the skin: got a Drive; pass the SedTraces.")
+        may_fire = (
+            self._largest_current_ma(sed) > self.capacitance_mf * self.threshold_mv / self.time_constant_ms
+        )
+        if not may_fire.any():
+            return SpikeTrains.from_lists([[]] * sed.n_sites)
+        some = sed.selected(may_fire)
+        followed = (
+            some if some.dynamic_kpa is None else SedTraces(some.times_ms, some.dynamic_kpa, some.kinks_ms)
+        )
+        times_ms, rate = smoothed_rate(followed, self.smoothing_ms)
+        static = resampled(some, self.smoothing_ms).sed_kpa
+        driven = Drive(times_ms, static, np.abs(rate), sed.dynamic_quantity, sed.static_quantity, sed.phases)
+        return super().spikes(driven).spread(may_fire)
+
+    def _largest_current_ma(self, sed: SedTraces) -> FloatArray:
+        """Bound of the current at every site: a low pass changes at most by its input's range in tau_s."""
+        dynamic = sed.sed_kpa if sed.dynamic_kpa is None else sed.dynamic_kpa
+        fastest = np.ptp(dynamic, axis=0) / self.smoothing_ms
+        return (
+            self.intercept_ma
+            + abs(self.dynamic_gain) * fastest
+            + (self.static_gain * sed.sed_kpa).max(axis=0)
+        )
+
+
+@dataclass(frozen=True)
+class SAII(SAI):
     """A slowly adapting type II (SAII) afferent, which follows the stretch of the skin.
 
-    Its chain is that of `Afferent`, with the largest tensile strain within the skin in both terms. The
-    defaults, their sources and status are in `fingerpad.data.afferents`.
+    Its chain is that of `SAI`, with the largest tensile strain within the skin in both terms. The defaults,
+    their sources and status are in `fingerpad.data.afferents`.
 
     Parameters
     ----------
     intercept_ma, dynamic_gain, static_gain, time_constant_ms, capacitance_mf, threshold_mv, refractory_ms
         As in `Afferent`; the gains refer to strain.
-    dynamic_quantity, static_quantity : str
-        As in `Afferent`.
+    dynamic_quantity, static_quantity, smoothing_ms
+        As in `SAI`.
 
     Examples
     --------

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numba import njit
@@ -71,6 +72,17 @@ class BandPass:
         """Time constant of every stage, tau. [ms]"""
         return MS_PER_S / (2.0 * math.pi * self.corner_hz)
 
+    @property
+    def largest_share(self) -> float:
+        """Bound of the output over the range of the input: half of the integral of |impulse response|. [1]
+
+        Examples
+        --------
+        >>> round(BandPass(corner_hz=100.0, rise=1, fall=1).largest_share, 3)  # 1/e
+        0.368
+        """
+        return _largest_share(self.rise, self.fall)
+
     def gain(self, frequency_hz: FloatArray) -> FloatArray:
         """Amplitude of the output over that of a sinusoidal input.
 
@@ -97,10 +109,7 @@ class BandPass:
         values : array (n_knots, n_sites)
             Output, with the unit of the input, linear between the knots.
         """
-        step_ms = self.time_constant_ms / _KNOTS_PER_TIME_CONSTANT
-        driven = (
-            traces if isinstance(traces, Drive) else drive(traces, pieces=2**20, shortest_piece_ms=step_ms)
-        )
+        driven = traces if isinstance(traces, Drive) else resampled(traces, self.time_constant_ms)
 
         def filtered(sites: slice) -> FloatArray:
             values = np.array(driven.sed_kpa[:, sites])
@@ -109,6 +118,57 @@ class BandPass:
             return values
 
         return driven.times_ms, np.hstack(in_blocks(filtered, driven.n_sites))
+
+
+@lru_cache
+def _largest_share(rise: int, fall: int) -> float:
+    """Half of the variation of the step response, by its values at short steps."""
+    times = np.append(0.0, np.linspace(0.0, 10.0 * (rise + fall), 4001))
+    response = np.ones((times.size, 1))
+    response[0] = 0.0
+    for stage in range(rise + fall):
+        _stage(times, response, 1.0, stage < rise)
+    return 0.5 * float(np.abs(np.diff(response[:, 0])).sum())
+
+
+def resampled(traces: SedTraces, time_constant_ms: float) -> Drive:
+    """Resample traces so finely that a first-order stage with this time constant follows them. [ms]"""
+    step_ms = time_constant_ms / _KNOTS_PER_TIME_CONSTANT
+    return drive(traces, pieces=_MOST_PIECES, shortest_piece_ms=step_ms)
+
+
+def smoothed_rate(traces: SedTraces, time_constant_ms: float) -> tuple[FloatArray, FloatArray]:
+    """Rate of change of a quantity behind a first-order low pass: what this holds back, over its constant.
+
+    Parameters
+    ----------
+    traces : SedTraces
+        The quantity is that of the static term.
+    time_constant_ms : float
+        [ms]
+
+    Returns
+    -------
+    times_ms : array (n_knots,)
+        Knots, those of `resampled`. [ms]
+    rates : array (n_knots, n_sites)
+        Signed. [unit of the quantity per ms]
+
+    Examples
+    --------
+    >>> ramp = SedTraces([0.0, 100.0], [[0.0], [2.0]])
+    >>> times_ms, rates = smoothed_rate(ramp, 10.0)
+    >>> [round(float(rates[np.searchsorted(times_ms, at), 0]), 4) for at in (0.0, 10.0, 100.0)]
+    [0.0, 0.0126, 0.02]
+    """
+    driven = resampled(traces, time_constant_ms)
+
+    def held_back(sites: slice) -> FloatArray:
+        values = np.array(driven.sed_kpa[:, sites])
+        _stage(driven.times_ms, values, time_constant_ms, True)
+        return values
+
+    return driven.times_ms, np.hstack(in_blocks(held_back, driven.n_sites)) / time_constant_ms
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

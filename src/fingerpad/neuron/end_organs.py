@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, positive, whole
+from fingerpad.core.checks import FloatArray, float_array, one_of, positive, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Place
 from fingerpad.core.random_streams import Purpose, uniforms
@@ -20,8 +20,8 @@ _SUM_TOLERANCE = 1e-6
 class EndOrgans:
     """Positions and weights of the end organs of every afferent.
 
-    What the afferent follows is the weighted sum of what its end organs follow. With equal weights its
-    response is that to the mean over its field.
+    What the afferent follows is the weighted sum of what its end organs follow, or what the strongest of them
+    follows, as if the branch that first elicits a spike resets the others.
 
     Parameters
     ----------
@@ -29,6 +29,8 @@ class EndOrgans:
         x and z of each end organ on the volar side, or x, y and z of the skin above it. [mm]
     weights : array (n_ends,) or (n_afferents, n_ends), optional
         Share of each end organ, not negative; those of an afferent sum to 1. Default: equal. [1]
+    combine : {"sum", "largest"}, optional
+        The weighted sum; or the largest of the quantities, each times its weight over the largest weight.
 
     Raises
     ------
@@ -44,10 +46,12 @@ class EndOrgans:
 
     positions_mm: FloatArray
     weights: FloatArray | None = None
+    combine: str = "sum"
 
     def __post_init__(self) -> None:
         positions = float_array("positions_mm", self.positions_mm, 3)
         n_afferents, n_ends, columns = positions.shape
+        one_of("combine", self.combine, ("sum", "largest"))
         if columns not in (2, 3) or positions.size == 0:
             raise InputError(
                 "positions_mm of EndOrgans must be afferents by end organs by x, z, or x, y, z: got shape "
@@ -76,7 +80,13 @@ class EndOrgans:
 
     @classmethod
     def scattered(
-        cls, places_mm: ArrayLike, count: int, reach_mm: float, seed: int, place: Place | None = None
+        cls,
+        places_mm: ArrayLike,
+        count: int,
+        reach_mm: float,
+        seed: int,
+        place: Place | None = None,
+        combine: str = "sum",
     ) -> EndOrgans:
         """Scatter end organs about the places of afferents, uniformly within a disc.
 
@@ -92,6 +102,8 @@ class EndOrgans:
             Seed of the random numbers; those of an afferent depend on its number only.
         place : callable, optional
             From the plane to points of the skin, as in `Population.of_layout`.
+        combine : {"sum", "largest"}, optional
+            As in `EndOrgans`.
 
         Returns
         -------
@@ -116,7 +128,7 @@ class EndOrgans:
         ends = centres[:, None] + offsets
         if place is not None:
             ends = place(ends.reshape(-1, 2)).reshape(len(centres), count, 3)
-        return cls(ends)
+        return cls(ends, combine=combine)
 
     @property
     def sites_mm(self) -> FloatArray:
@@ -127,10 +139,13 @@ class EndOrgans:
         """Traces of the afferents from those of `sites_mm`."""
         return replace(
             traces,
-            sed_kpa=self._sum(traces.sed_kpa),
-            dynamic_kpa=None if traces.dynamic_kpa is None else self._sum(traces.dynamic_kpa),
+            sed_kpa=self._together(traces.sed_kpa),
+            dynamic_kpa=None if traces.dynamic_kpa is None else self._together(traces.dynamic_kpa),
         )
 
-    def _sum(self, values: FloatArray) -> FloatArray:
+    def _together(self, values: FloatArray) -> FloatArray:
         shaped = values.reshape(len(values), *self.positions_mm.shape[:2])
-        return np.sum(shaped * np.asarray(self.weights), axis=2)
+        weights = np.asarray(self.weights)
+        if self.combine == "sum":
+            return np.sum(shaped * weights, axis=2)
+        return np.max(shaped * (weights / weights.max(axis=1, keepdims=True)), axis=2)

@@ -13,10 +13,10 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Place
 from fingerpad.core.patterns import poisson_disc
 from fingerpad.core.regions import Region
-from fingerpad.core.signals import ResponseMap, Skin, SpikeTrains
+from fingerpad.core.signals import ResponseMap, Skin, SpikeTrains, traces_below
 from fingerpad.data import afferents as published
-from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
-from fingerpad.neuron.afferent_types import PC, RA, SAII
+from fingerpad.neuron.afferent import AnyAfferent, checked_afferent
+from fingerpad.neuron.afferent_types import PC, RA, SAI, SAII
 from fingerpad.neuron.population import Population, sensitivities
 from fingerpad.neuron.rate_windows import Window
 
@@ -34,7 +34,7 @@ def types_of_afferents() -> dict[str, AnyAfferent]:
     >>> list(types_of_afferents())
     ['SAI', 'RA', 'PC', 'SAII']
     """
-    return dict(zip(published.TYPES, (Afferent(), RA(), PC(), SAII()), strict=True))
+    return dict(zip(published.TYPES, (SAI(), RA(), PC(), SAII()), strict=True))
 
 
 @dataclass(frozen=True)
@@ -196,9 +196,19 @@ class MixedPopulation:
             As `Population.respond`.
         """
         windows = dynamic_window_ms, static_window_ms
-        return MixedResponse(
-            MappingProxyType({name: part.respond(skin, *windows) for name, part in self.parts.items()})
-        )
+        maps: dict[str, ResponseMap] = {}
+        # Afferents that follow the same quantities are sampled at once.
+        kinds = {name: (part.quantities, part.sites_mm.shape[1]) for name, part in self.parts.items()}
+        for kind in dict.fromkeys(kinds.values()):
+            quantities, some = kind[0], {name: self.parts[name] for name in kinds if kinds[name] == kind}
+            traces = traces_below(
+                skin, np.concatenate([part.sites_mm for part in some.values()]), *quantities
+            )
+            start = 0
+            for name, part in some.items():
+                maps[name] = part.respond_to(traces.part(slice(start, start + len(part.sites_mm))), *windows)
+                start += len(part.sites_mm)
+        return MixedResponse(MappingProxyType({name: maps[name] for name in self.parts}))
 
 
 def _seed_of(seed: int, number: int) -> int:

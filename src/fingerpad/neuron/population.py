@@ -13,7 +13,7 @@ from fingerpad.core.checks import FloatArray, finite, float_array, not_negative,
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.signals import ResponseMap, Skin, traces_below
+from fingerpad.core.signals import ResponseMap, SedTraces, Skin, traces_below
 from fingerpad.data import fingertip, psychophysics
 from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
 from fingerpad.neuron.end_organs import EndOrgans
@@ -252,9 +252,46 @@ class Population:
             If the skin does not return one trace per receptor, or lacks what the afferent follows, or a
             window is not given and the touch has no ramp or no hold.
         """
-        quantities = (self.afferent.dynamic_quantity, self.afferent.static_quantity)
-        sites = self.positions_mm if self.ends is None else self.ends.sites_mm
-        sed = traces_below(skin, sites, *quantities)
+        sites = self.sites_mm
+        return self.respond_to(
+            traces_below(skin, sites, *self.quantities), dynamic_window_ms, static_window_ms
+        )
+
+    @property
+    def sites_mm(self) -> FloatArray:
+        """Where the skin is sampled, (n_sites, 2 or 3): the end organs, afferent by afferent. [mm]"""
+        return self.positions_mm if self.ends is None else self.ends.sites_mm
+
+    @property
+    def quantities(self) -> tuple[str, str]:
+        """Quantities of the dynamic and of the static term."""
+        return self.afferent.dynamic_quantity, self.afferent.static_quantity
+
+    def respond_to(
+        self,
+        sed: SedTraces,
+        dynamic_window_ms: Window | None = None,
+        static_window_ms: Window | None = None,
+    ) -> ResponseMap:
+        """Simulate each afferent under traces that are known already.
+
+        Parameters
+        ----------
+        sed : SedTraces
+            Traces of `quantities` at `sites_mm`.
+        dynamic_window_ms, static_window_ms : (float, float), optional
+            As in `respond`. [ms]
+
+        Returns
+        -------
+        ResponseMap
+
+        Raises
+        ------
+        InputError
+            If there is not one trace per site, or a window is missing.
+        """
+        sites = self.sites_mm
         if sed.n_sites != len(sites):
             raise InputError(
                 f"skin.sed must give one trace per receptor: got {sed.n_sites} for {len(sites)}."

@@ -27,11 +27,15 @@ from scipy.spatial import cKDTree
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.threads import in_blocks
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.skin.grid_cubic import coefficients, values_and_slopes_at, values_at
 
 _PADDING = 24
 """Rows and columns beyond the rim. The end of a spline acts 0.27 as strongly one element further on."""
+
+_TIMES_PER_BLOCK = 64
+"""Times that one thread interpolates at once: their padded sheet stays in the cache."""
 
 _MOST_STEPS = 60
 _LONGEST_STEP = 2.0  # elements
@@ -153,9 +157,14 @@ class ReceptorSheet:
         -------
         array (n_times, n_sites)
         """
-        known = np.asarray(values, dtype=np.float64).T.reshape(*self.mesh.living_epidermis.shape, -1)
-        # At the pole, where all columns meet, they agree on their mean.
-        return values_at(self._control(known, 1.0, known[-1].mean(axis=0)), uv, _PADDING).T
+
+        def at_times(times: slice) -> FloatArray:
+            some = np.asarray(values[times], dtype=np.float64).T
+            known = some.reshape(*self.mesh.living_epidermis.shape, -1)
+            # At the pole, where all columns meet, they agree on their mean.
+            return values_at(self._control(known, 1.0, known[-1].mean(axis=0)), uv, _PADDING).T
+
+        return np.vstack(in_blocks(at_times, len(values), _TIMES_PER_BLOCK))
 
     def _below(self, uv: FloatArray) -> FloatArray:
         """Where the normal of the skin at (u, v) meets the border, S - t n = B(u', v')."""

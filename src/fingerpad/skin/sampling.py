@@ -20,7 +20,7 @@ from fingerpad.geometry.motion import STILL, Pose
 from fingerpad.skin.fields import Place, sampled_fields, stored_fields
 from fingerpad.skin.receptor_sheet import ReceptorSheet
 from fingerpad.skin.section import Section, middle_section
-from fingerpad.skin.surface_motion import SURFACE_QUANTITIES
+from fingerpad.skin.surface_motion import SURFACE_QUANTITIES, SurfaceMotion
 
 if TYPE_CHECKING:
     from fingerpad.mechanics.press import Deformation
@@ -275,7 +275,8 @@ class SkinResponse:
             One of `skin.fields.sampled_fields`: "stored", "instantaneous" or "work" (energy densities by
             their three definitions), "von_mises", "compressive_stress" [all kPa] or "compressive_strain"
             (logarithmic); or of `skin.surface_motion.SURFACE_QUANTITIES`: "skin_displacement" (how far the
-            skin above has moved, in mm) or "skin_stretch" (largest tensile strain within the surface).
+            skin above has moved, in mm), "deep_displacement" (its mean within 3 mm) or
+            "skin_stretch" (largest tensile strain within the surface).
         sites : array (n_sites, 2) or (n_sites, 3)
             x and z of end organs on the volar side, or x, y and z of the skin above them on any side. [mm]
 
@@ -307,10 +308,14 @@ class SkinResponse:
         held = {name: field for name, field in sampled_fields().items() if field.name in self.fields}
         one_of("quantity", quantity, (*held, *SURFACE_QUANTITIES))
         if quantity in SURFACE_QUANTITIES:
-            return SURFACE_QUANTITIES[quantity](self.mesh, self.skin_displacement_mm)
+            return getattr(self._surface, quantity)
         field = held[quantity]
         values = self.fields[field.name]
         return values if field.place is Place.WATCHED else values[:, self.mesh.living_epidermis.ravel()]
+
+    @cached_property
+    def _surface(self) -> SurfaceMotion:
+        return SurfaceMotion(self.mesh, self.skin_displacement_mm)
 
     @cached_property
     def _receptors(self) -> Receptors:

@@ -1,21 +1,29 @@
 """Motion of the skin's surface as a quantity that receptors sample: displacement and stretch.
 
-Both follow from the stored displacement of the skin, face by face of its grid. The faces are those above the
+All follow from the stored displacement of the skin, face by face of its grid. The faces are those above the
 elements of the living epidermis, so that receptors read them like any other quantity.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.spatial import cKDTree
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.data.afferents import PC_REACH
 from fingerpad.geometry.mesh import Mesh
 
+SURFACE_QUANTITIES = ("skin_displacement", "deep_displacement", "skin_stretch")
+"""Quantities of the surface by the names under which receptors sample them."""
 
-def skin_displacement_mm(mesh: Mesh, displacement_mm: FloatArray) -> FloatArray:
-    """Distance by which each face of the skin has moved, the length of its mean displacement.
+
+@dataclass(frozen=True)
+class SurfaceMotion:
+    """How the faces of the skin move and deform: arrays (n_times, n_faces), never negative.
 
     Parameters
     ----------
@@ -23,53 +31,61 @@ def skin_displacement_mm(mesh: Mesh, displacement_mm: FloatArray) -> FloatArray:
         The undeformed body.
     displacement_mm : array (n_times, n_skin_nodes, 3)
         Displacement of `mesh.skin_nodes`. [mm]
-
-    Returns
-    -------
-    array (n_times, n_faces)
-        Never negative. [mm]
     """
-    return np.linalg.norm(_corners(mesh, displacement_mm).mean(axis=0), axis=-1)
 
+    mesh: Mesh
+    displacement_mm: FloatArray
 
-def skin_stretch(mesh: Mesh, displacement_mm: FloatArray) -> FloatArray:
-    """Largest tensile strain within the surface at the middle of each face.
+    @cached_property
+    def skin_displacement(self) -> FloatArray:
+        """How far each face has moved, the length of its mean displacement. [mm]"""
+        return np.linalg.norm(self._corners(self.displacement_mm).mean(axis=0), axis=-1)
 
-    With the edges A, B of the undeformed face and a, b of the deformed one, the metrics are
-    G = (A·A, A·B, B·B) and g = (a·a, a·b, b·b). The squares of the principal stretches are the eigenvalues of
-    G⁻¹ g, and the strain is ln of the largest stretch, or 0 where nothing is stretched.
+    @cached_property
+    def deep_displacement(self) -> FloatArray:
+        """Mean of `skin_displacement` over the skin within `PC_REACH`. [mm]
 
-    Parameters
-    ----------
-    mesh, displacement_mm
-        As in `skin_displacement_mm`.
+        A corpuscle deep in the tissue moves with the skin above it, about as far around as it lies deep.
+        """
+        return np.asarray(self.skin_displacement @ self._shares_within_reach())
 
-    Returns
-    -------
-    array (n_times, n_faces)
-        Logarithmic strain, never negative. [1]
-    """
-    before = _metric(_corners(mesh, mesh.nodes_mm[mesh.skin_nodes]))
-    after = _metric(_corners(mesh, mesh.nodes_mm[mesh.skin_nodes] + displacement_mm))
-    determinant = _determinant(before)
-    trace = (before[2] * after[0] - 2.0 * before[1] * after[1] + before[0] * after[2]) / determinant
-    product = _determinant(after) / determinant
-    largest = 0.5 * trace + np.sqrt(np.maximum(0.25 * trace**2 - product, 0.0))
-    return np.maximum(0.5 * np.log(largest), 0.0)
+    @cached_property
+    def skin_stretch(self) -> FloatArray:
+        """Largest tensile strain within the surface at the middle of each face, logarithmic. [1]
 
+        With the edges A, B of the undeformed face and a, b of the deformed one, the metrics are
+        G = (A·A, A·B, B·B) and g = (a·a, a·b, b·b). The squares of the principal stretches are the
+        eigenvalues of G⁻¹ g, and the strain is ln of the largest stretch, or 0 where nothing is stretched.
+        """
+        undeformed = self.mesh.nodes_mm[self.mesh.skin_nodes]
+        before = _metric(self._corners(undeformed))
+        after = _metric(self._corners(undeformed + self.displacement_mm))
+        determinant = _determinant(before)
+        trace = (before[2] * after[0] - 2.0 * before[1] * after[1] + before[0] * after[2]) / determinant
+        product = _determinant(after) / determinant
+        largest = 0.5 * trace + np.sqrt(np.maximum(0.25 * trace**2 - product, 0.0))
+        return np.maximum(0.5 * np.log(largest), 0.0)
 
-SURFACE_QUANTITIES: dict[str, Callable[[Mesh, FloatArray], FloatArray]] = {
-    "skin_displacement": skin_displacement_mm,
-    "skin_stretch": skin_stretch,
-}
-"""Quantities of the surface by the names under which receptors sample them."""
+    def _corners(self, values: FloatArray) -> FloatArray:
+        """Values (..., n_skin_nodes, 3) at the four corners of every face, (4, ..., n_faces, 3)."""
+        rows = np.searchsorted(self.mesh.skin_nodes, self.mesh.skin_grid)
+        corners = rows[:-1, :-1], rows[1:, :-1], rows[1:, 1:], rows[:-1, 1:]
+        return np.stack([values[..., corner.ravel(), :] for corner in corners])
 
+    def _shares_within_reach(self) -> csr_matrix:
+        """Share of each face in the mean about each face, (n_faces, n_faces), a column per mean.
 
-def _corners(mesh: Mesh, values: FloatArray) -> FloatArray:
-    """Values (..., n_skin_nodes, 3) at the four corners of every face, (4, ..., n_faces, 3)."""
-    rows = np.searchsorted(mesh.skin_nodes, mesh.skin_grid)
-    corners = rows[:-1, :-1], rows[1:, :-1], rows[1:, 1:], rows[:-1, 1:]
-    return np.stack([values[..., corner.ravel(), :] for corner in corners])
+        Half of a finger is completed by its mirror image.
+        """
+        corners = self._corners(self.mesh.nodes_mm[self.mesh.skin_nodes])
+        middles, areas = corners.mean(axis=0), np.sqrt(_determinant(_metric(corners)))
+        weights = csr_matrix((len(middles), len(middles)))
+        for side in (1.0,) if self.mesh.full else (1.0, -1.0):
+            near = cKDTree(middles).query_ball_point(middles * [1.0, 1.0, side], PC_REACH.value)
+            rows = np.concatenate([np.array(each, dtype=np.int64) for each in near])
+            columns = np.repeat(np.arange(len(near)), [len(each) for each in near])
+            weights += csr_matrix((areas[rows], (rows, columns)), shape=weights.shape)
+        return csr_matrix(weights.multiply(1.0 / weights.sum(axis=0)))
 
 
 def _metric(corners: FloatArray) -> FloatArray:
