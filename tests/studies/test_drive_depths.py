@@ -88,7 +88,7 @@ def test_every_layer_is_read_and_no_other_leaks_in():
 
 
 def test_what_is_not_kept_there_is_not_made_up():
-    with pytest.raises(InputError, match="quantity must be one of stored, .*: got 'work'"):
+    with pytest.raises(InputError, match=r"quantity must be one of stored, .*: got 'work'"):
         drive_depths.read_in(SKINS[0], 1).sample("work", [[RECEPTOR_X_MM, 0.0]])
     for layer in (-1, 6):
         with pytest.raises(InputError, match=f"one of the 6 of this mesh, from 0: got {layer}"):
