@@ -27,6 +27,7 @@ from fingerpad.skin.free_receptors import FreeReceptors
 from fingerpad.skin.indentation import touch_of
 from fingerpad.skin.section import middle_section
 from fingerpad.skin.store import touch_key
+from fingerpad.skin.surface_motion import SURFACE_QUANTITIES
 from fingerpad.skin.unrolled_skin import UnrolledSkin
 from tests import gmsh_finger
 
@@ -80,6 +81,9 @@ def test_our_own_finger_comes_back_with_its_numbers(sent, name):
     # The same elements, interpolated otherwise: by a cubic spline on the grid there.
     sites = [[17.37, 0.0], [18.0, 0.5], [16.5, -0.5], [17.37, 1.0]]
     np.testing.assert_allclose(read.sed(sites).sed_kpa, skin.sed(sites).sed_kpa, rtol=0.03, atol=2e-3)
+    for quantity in SURFACE_QUANTITIES:
+        values = skin.sample(quantity, sites)
+        np.testing.assert_allclose(read.sample(quantity, sites), values, atol=0.06 * values.max())
     on_skin = Fingertip().skin_point(*np.transpose(sites))
     np.testing.assert_allclose(read.sed(on_skin).sed_kpa, skin.sed(on_skin).sed_kpa, rtol=0.03, atol=2e-3)
 

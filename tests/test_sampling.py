@@ -305,3 +305,15 @@ def test_displacement_of_the_surface_is_its_length():
     assert skin.sample("skin_displacement", SITES)[:, 0] == pytest.approx([0.0, 0.25, 0.5])
     traces = skin.sed(SITES, "skin_displacement", "skin_displacement")
     assert traces.dynamic_quantity == "skin_displacement"
+
+
+def test_deep_displacement_is_the_mean_of_the_skin_within_reach_in_half_and_in_whole_bodies():
+    def pressed(nodes):
+        return np.exp(-(nodes[:, [0]] ** 2) - nodes[:, [2]] ** 2) * [0.0, 0.5, 0.0]
+
+    half, whole = (response(layered_block(symmetric=each), displacement=pressed) for each in (True, False))
+    sites = np.array([[0.0, 0.0], [0.8, 0.3], [-1.0, 1.2]])
+    found = half.sample("deep_displacement", sites)[-1]
+    np.testing.assert_allclose(whole.sample("deep_displacement", sites)[-1], found, rtol=1e-6)
+    # Mean of the bell over a disc of 3 mm about its middle.
+    assert found[0] == pytest.approx(0.5 * (1.0 - np.exp(-9.0)) / 9.0, rel=0.05)

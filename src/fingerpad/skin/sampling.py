@@ -308,7 +308,7 @@ class SkinResponse:
         held = {name: field for name, field in sampled_fields().items() if field.name in self.fields}
         one_of("quantity", quantity, (*held, *SURFACE_QUANTITIES))
         if quantity in SURFACE_QUANTITIES:
-            return getattr(self._surface, quantity)
+            return self._surface.below(quantity)
         field = held[quantity]
         values = self.fields[field.name]
         return values if field.place is Place.WATCHED else values[:, self.mesh.living_epidermis.ravel()]

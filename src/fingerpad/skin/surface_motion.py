@@ -1,7 +1,7 @@
 """Motion of the skin's surface as a quantity that receptors sample: displacement and stretch.
 
-All follow from the stored displacement of the skin, face by face of its grid. The faces are those above the
-elements of the living epidermis, so that receptors read them like any other quantity.
+All follow from the stored displacement of the skin, face by face. Each element of the living epidermis has
+the values of the face above it, so that receptors read them like any other quantity.
 """
 
 from __future__ import annotations
@@ -66,11 +66,22 @@ class SurfaceMotion:
         largest = 0.5 * trace + np.sqrt(np.maximum(0.25 * trace**2 - product, 0.0))
         return np.maximum(0.5 * np.log(largest), 0.0)
 
+    def below(self, quantity: str) -> FloatArray:
+        """One of `SURFACE_QUANTITIES` above each of `mesh.living_epidermis`, (n_times, n_elements).
+
+        In a grid every such element has a face above it; in a mesh of one's own the nearest one is taken.
+        """
+        values: FloatArray = getattr(self, quantity)
+        if self.mesh.is_grid:
+            return values
+        elements = self.mesh.nodes_mm[self.mesh.elements[self.mesh.living_epidermis.ravel()]].mean(axis=1)
+        faces = self._corners(self.mesh.nodes_mm[self.mesh.skin_nodes]).mean(axis=0)
+        return values[:, cKDTree(faces).query(elements)[1]]
+
     def _corners(self, values: FloatArray) -> FloatArray:
         """Values (..., n_skin_nodes, 3) at the four corners of every face, (4, ..., n_faces, 3)."""
-        rows = np.searchsorted(self.mesh.skin_nodes, self.mesh.skin_grid)
-        corners = rows[:-1, :-1], rows[1:, :-1], rows[1:, 1:], rows[:-1, 1:]
-        return np.stack([values[..., corner.ravel(), :] for corner in corners])
+        rows = np.searchsorted(self.mesh.skin_nodes, self.mesh.skin_faces)
+        return np.stack([values[..., corner, :] for corner in rows.T])
 
     def _shares_within_reach(self) -> csr_matrix:
         """Share of each face in the mean about each face, (n_faces, n_faces), a column per mean.
