@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from threading import Event, Thread
 from time import monotonic
 from typing import Any
 
+from fingerpad.core.logger import LOGGER
 from fingerpad.core.numba_internals import is_compiled
 
 SUBJECT = "fingerpad compiles its kernels"
 NOTICE = f"{SUBJECT}, once: about half a minute."
-
-LOGGER = logging.getLogger("fingerpad")
-"""Logger of the messages: standard error, unless logging is configured otherwise."""
 
 INTERVAL_S = 5.0
 """Time between two messages. [s]"""
@@ -42,7 +39,7 @@ def announce_compilation(kernels: Sequence[Any]) -> Iterator[None]:
     ...     pass
     """
     global _announced
-    if _announced or is_compiled(kernels[0]):
+    if _announced or not kernels or is_compiled(kernels[0]):
         yield
         return
     _announced = True

@@ -1,11 +1,50 @@
 """Errors of the package: one sentence with the expected value, the actual value and the remedy."""
 
+import reprlib
 import sys
 from itertools import count
+from typing import Any
+
+LONGEST_MESSAGE = 2000
+"""Characters of an error's text; what is between its begin and its end is left out beyond that."""
 
 
 class FingerpadError(Exception):
     """Base class of every error that fingerpad raises deliberately."""
+
+    def __str__(self) -> str:
+        said = super().__str__()
+        if len(said) <= LONGEST_MESSAGE:
+            return said
+        return f"{said[: LONGEST_MESSAGE // 2]} ... {said[-LONGEST_MESSAGE // 4 :]}"
+
+
+class _Shown(reprlib.Repr):
+    """`repr` of bounded length and cost, also of numbers with more digits than Python writes."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel, self.maxstring, self.maxother, self.maxlong = 3, 80, 120, 60
+        self.maxlist = self.maxtuple = self.maxdict = self.maxset = self.maxfrozenset = self.maxarray = 6
+
+    def repr_int(self, x: int, level: int) -> str:
+        if x.bit_length() > 1000:
+            return f"a whole number of {x.bit_length()} bits"
+        return super().repr_int(x, level)
+
+
+def shown(value: Any) -> str:
+    """Text of a value in an error: its `repr` on one line, shortened where it is long.
+
+    Examples
+    --------
+    >>> shown("half"), shown([0.0] * 1000), shown(10**5000)
+    ("'half'", '[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ...]', 'a whole number of 16610 bits')
+    """
+    return " ".join(_SHOWN.repr(value).split())
+
+
+_SHOWN = _Shown()
 
 
 class InputError(FingerpadError, ValueError):

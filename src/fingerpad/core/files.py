@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import secrets
+import stat
 from pathlib import Path
 
-from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.errors import InputError, StoreError, shown
 
 
 def write_atomically(path: Path, content: bytes) -> None:
@@ -57,10 +58,49 @@ def write_atomically(path: Path, content: bytes) -> None:
         ) from error
 
 
+LARGEST_TEXT_MB = 200
+"""Largest file of text that is read, such as a mesh or a table. [MB]"""
+
+
+def path_of(name: str, value: object) -> Path:
+    """Return a path given as a text or as a path, else raise `InputError`.
+
+    Examples
+    --------
+    >>> path_of("path", "touch.yaml").suffix
+    '.yaml'
+    """
+    if isinstance(value, str | os.PathLike) and isinstance(path := os.fspath(value), str):
+        return Path(path)
+    raise InputError(f"{name} must be a path, as a text or a Path: got {shown(value)}.")
+
+
+def check_file(path: Path, largest_mb: float) -> Path:
+    """Return the path of a regular file of limited size, else raise `InputError`.
+
+    A device or a pipe has no end, or none that ever comes.
+    """
+    path = Path(path)
+    try:
+        about = path.stat()
+    except OSError as error:
+        raise InputError(f"{path} must be a file that can be read: {error.strerror}.") from error
+    except ValueError as error:
+        raise InputError(f"The name of a file must not hold a null character: got {str(path)!r}.") from error
+    if not stat.S_ISREG(about.st_mode):
+        kind = "Is a directory" if stat.S_ISDIR(about.st_mode) else "it is a device or a pipe"
+        raise InputError(f"{path} must be a file that can be read: {kind}.")
+    if about.st_size > largest_mb * 1e6:
+        raise InputError(
+            f"{path} must have at most {largest_mb:g} MB: got {about.st_size / 1e6:.0f} MB; split it."
+        )
+    return path
+
+
 def read_text(path: Path) -> str:
     """Return the text of a file in UTF-8, else raise `InputError`."""
     try:
-        return Path(path).read_text(encoding="utf-8-sig")
+        return check_file(path, LARGEST_TEXT_MB).read_text(encoding="utf-8-sig")
     except OSError as error:
         raise InputError(f"{path} must be a file that can be read: {error.strerror}.") from error
     except UnicodeDecodeError as error:

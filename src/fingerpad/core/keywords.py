@@ -45,9 +45,9 @@ def closest(wrong: Any, known: Collection[str]) -> str | None:
     if not isinstance(wrong, str):
         return None
     names = [name for name in known if isinstance(name, str)]
-    near = difflib.get_close_matches(wrong, names, n=1, cutoff=_CLOSE)
-    # A name without its unit, such as `edge`, is less similar than that.
-    near = near or [name for name in names if wrong and name.startswith(f"{wrong}_")]
+    # A name without its unit, such as `depth`, means the first unit that is known, not the most similar one.
+    near = [name for name in names if wrong and name.startswith(f"{wrong}_")]
+    near = near or difflib.get_close_matches(wrong, names, n=1, cutoff=_CLOSE)
     return near[0] if near else None
 
 

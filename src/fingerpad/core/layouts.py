@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, float_array, positive
+from fingerpad.core.checks import FloatArray, float_array, one_of, positive, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import converted
 
 Place = Callable[[FloatArray], FloatArray]
 """From positions in the plane (n, 2) to points of the skin (n, 3), both in mm."""
@@ -24,7 +25,12 @@ PATTERNS = ("rectangular", "hexagonal", "uniform", "jittered", "poisson-disc")
 MM2_PER_CM2 = 100.0
 
 
+MOST_RECEPTORS = 1_000_000
+"""Upper limit, to detect a wrong unit: the whole finger has some thousands."""
+
+
 @dataclass(frozen=True)
+@converted
 class Layout:
     """Positions of receptors in a plane.
 
@@ -55,6 +61,9 @@ class Layout:
         if places.shape[1] != 2 or len(places) == 0:
             raise InputError(f"places_mm must have rows of two numbers: got shape {places.shape}.")
         positive("pitch_mm", self.pitch_mm, "mm")
+        one_of("pattern", self.pattern, PATTERNS)
+        if self.seed is not None:
+            whole("seed", self.seed, at_least=0)
         object.__setattr__(self, "places_mm", places)
 
     def __len__(self) -> int:

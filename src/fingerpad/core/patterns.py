@@ -7,24 +7,24 @@ positions, whatever other random numbers are used.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from fingerpad.core.checks import FloatArray, not_negative, positive
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.layouts import MM2_PER_CM2, Layout, Place, around_zero, mean_spacing_mm
+from fingerpad.core.layouts import MM2_PER_CM2, MOST_RECEPTORS, Layout, Place, around_zero, mean_spacing_mm
 from fingerpad.core.random_streams import Purpose, normals, uniforms
 from fingerpad.core.regions import Region
-
-MOST_RECEPTORS = 1_000_000
-"""Upper limit, to detect a wrong unit: the whole finger has some thousands."""
 
 SEPARATION = 0.75
 """Least distance in a Poisson-disc layout over 1/sqrt(density). Random placement saturates at 0.83."""
 
 LARGEST_SEPARATION = 0.8
+MOST_APART = 100_000
+"""Upper limit of a Poisson-disc layout, whose receptors are placed one after the other."""
+
 _MOST_ATTEMPTS = 1000
 
 
@@ -60,10 +60,9 @@ def rectangular(region: Region, density_per_cm2: float) -> Layout:
     _expected(region, density_per_cm2)
     pitch = mean_spacing_mm(density_per_cm2)
     middle, extent = _middle_and_extent(region)
-    columns = [
-        centre + pitch * around_zero(max(1, round(length / pitch)))
-        for centre, length in zip(middle, extent, strict=True)
-    ]
+    counts = [max(1, round(length / pitch)) for length in extent]
+    _check_lattice(counts)
+    columns = [centre + pitch * around_zero(count) for centre, count in zip(middle, counts, strict=True)]
     return _lattice(region, np.stack(np.meshgrid(*columns, indexing="ij"), axis=-1), pitch, "rectangular")
 
 
@@ -98,6 +97,7 @@ def hexagonal(region: Region, density_per_cm2: float) -> Layout:
     step = 0.5 * math.sqrt(3.0) * pitch
     middle, (length, width) = _middle_and_extent(region)
     rows, columns = (math.ceil(0.5 * extent / size) + 1 for extent, size in ((length, step), (width, pitch)))
+    _check_lattice([2 * rows + 1, 2 * columns + 1])
     row, column = np.meshgrid(np.arange(-rows, rows + 1), np.arange(-columns, columns + 1), indexing="ij")
     across = pitch * (column + 0.5 * (row % 2))
     return _lattice(region, np.stack([step * row, across], axis=-1) + middle, pitch, "hexagonal")
@@ -228,6 +228,11 @@ def poisson_disc(
             f"separation must not exceed {LARGEST_SEPARATION:g} of 1/sqrt(density), the limit of random "
             f"placement: got {separation:g}."
         )
+    if count > MOST_APART:
+        raise InputError(
+            f"A layout with a least distance may have {MOST_APART:,} receptors at most: got {count:,}; "
+            "divide the region or take uniform(...)."
+        )
     pitch = mean_spacing_mm(density_per_cm2)
     least = separation * pitch
     places, points = np.empty((0, 2)), np.empty((0, 2))
@@ -297,6 +302,15 @@ def _lattice(region: Region, points: FloatArray, pitch: float, pattern: str) -> 
             f"{region.area_mm2:.3g} mm²: raise the density or enlarge the region."
         )
     return Layout(inside, pitch, pattern)
+
+
+def _check_lattice(counts: Sequence[int]) -> None:
+    """Raise an error if the lattice about a thin or hollow region is far larger than the region."""
+    if math.prod(counts) > 10 * MOST_RECEPTORS:
+        raise InputError(
+            f"The bounds of the region hold a lattice of {math.prod(counts):.3g} places, more than "
+            f"{10 * MOST_RECEPTORS:,}: divide the region or lower the density."
+        )
 
 
 def _expected(region: Region, density_per_cm2: float) -> int:

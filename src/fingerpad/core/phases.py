@@ -7,12 +7,14 @@ from dataclasses import dataclass
 
 from fingerpad.core.checks import finite
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import converted
 
 RAMP, HOLD = "ramp", "hold"
 """Names of the phases in which the two rates of the paper are counted."""
 
 
 @dataclass(frozen=True)
+@converted
 class Phase:
     """A named part of a touch.
 
@@ -48,7 +50,7 @@ class Phase:
         return self.start_ms, self.end_ms
 
 
-def ramp_and_hold(ramp_end_ms: float, hold_end_ms: float) -> tuple[Phase, Phase]:
+def ramp_and_hold_phases(ramp_end_ms: float, hold_end_ms: float) -> tuple[Phase, Phase]:
     """Phases of a ramp from 0 and of the hold after it. [ms]"""
     return Phase(RAMP, 0.0, ramp_end_ms), Phase(HOLD, ramp_end_ms, hold_end_ms)
 
@@ -58,7 +60,7 @@ def phase_named(phases: Sequence[Phase], name: str, asks: str = "phase") -> Phas
 
     Examples
     --------
-    >>> phase_named(ramp_and_hold(50.0, 1000.0), "hold").window_ms
+    >>> phase_named(ramp_and_hold_phases(50.0, 1000.0), "hold").window_ms
     (50.0, 1000.0)
     """
     for phase in phases:

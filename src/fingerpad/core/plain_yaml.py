@@ -1,4 +1,9 @@
-"""Reading YAML: plain values, numbers in any form, and an error for a duplicate key."""
+"""Reading YAML: plain values only, within limits, and an error for a duplicate key.
+
+A value is a mapping, a list, a text, a decimal number, true, false or null. A date, a number with colons,
+underscores or another base is text, as is a word such as `on`. Tags, anchors and aliases are refused: ten
+lines of them can write a list of a billion entries.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +14,12 @@ from typing import Any
 import yaml
 
 from fingerpad.core.errors import InputError
+
+LARGEST_TEXT = 300_000
+"""Characters of a document, which are read in some seconds; longer tables belong in CSV."""
+
+DEEPEST = 20
+"""Mappings and lists inside each other."""
 
 
 def read_yaml(text: str, source: str) -> Any:
@@ -28,7 +39,8 @@ def read_yaml(text: str, source: str) -> Any:
     Raises
     ------
     InputError
-        If the text is not YAML, or a mapping has a duplicate key.
+        If the text is not YAML, is longer than `LARGEST_TEXT` or nested deeper than `DEEPEST`, holds a tag,
+        an anchor or an alias, or a mapping has a duplicate key.
 
     Examples
     --------
@@ -37,6 +49,11 @@ def read_yaml(text: str, source: str) -> Any:
     >>> read_yaml("{gain: 1e-6, name: edge, off: [1, 2.5]}", "an example")
     {'gain': 1e-06, 'name': 'edge', 'off': [1, 2.5]}
     """
+    if len(text) > LARGEST_TEXT:
+        raise InputError(
+            f"{source} must have at most {LARGEST_TEXT:,} characters of YAML: got {len(text):,}; write long "
+            "tables as CSV."
+        )
     try:
         return yaml.load(text, _Loader)  # a SafeLoader: plain values only
     except yaml.YAMLError as error:
@@ -45,8 +62,6 @@ def read_yaml(text: str, source: str) -> Any:
         raise InputError(f"{source} cannot be read as YAML ({said}): correct it there.") from error
     except InputError as error:
         raise InputError(f"{source}, {error}") from error
-    except RecursionError as error:
-        raise InputError(f"{source} cannot be read as YAML (nested too deep): correct it there.") from error
 
 
 def line_at(text: str, place: Sequence[int | str]) -> int | None:
@@ -64,7 +79,10 @@ def line_at(text: str, place: Sequence[int | str]) -> int | None:
     >>> line_at("object:\n  kind: sphere\n  radius_mm: 3", ["object", "radius_mm"])
     3
     """
-    node, line = yaml.compose(text, _Loader), None
+    try:
+        node, line = yaml.compose(text, _Loader), None
+    except (yaml.YAMLError, InputError):  # not what `read_yaml` read
+        return None
     for part in place:
         if isinstance(node, yaml.MappingNode):
             found = [(key, value) for key, value in node.value if key.value == str(part)]
@@ -80,28 +98,52 @@ def line_at(text: str, place: Sequence[int | str]) -> int | None:
 
 
 class _Loader(yaml.SafeLoader):
-    """Raises an error for a duplicate key, of which YAML would keep the second."""
+    """Raises an error for what YAML would read silently: a duplicate key, an alias, a tag."""
+
+    depth = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        event = self.peek_event()
+        said = ""
+        if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
+            said = "it has an anchor or an alias, & or *, in the place of a value"
+        elif event.tag is not None:
+            said = f"it has the tag {event.tag}, with !"
+        elif self.depth == DEEPEST:
+            said = f"it is nested deeper than {DEEPEST} levels"
+        if said:
+            raise yaml.composer.ComposerError(None, None, said, event.start_mark)
+        self.depth += 1
+        node = super().compose_node(parent, index)
+        self.depth -= 1
+        return node
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys = [key.value for key, _ in node.value]
-        for key in keys:
-            if keys.count(key) > 1:
-                raise InputError(f"line {node.start_mark.line + 1}: {key} is repeated, keep one.")
+        seen = set()
+        for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                problem = "a key must be a word, not a list or a mapping"
+                raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)
+            if key.value in seen:
+                raise InputError(f"line {key.start_mark.line + 1}: {key.value} is repeated, keep one.")
+            seen.add(key.value)
         return super().construct_mapping(node, deep)
 
+    def number(self, node: yaml.ScalarNode) -> int | float:
+        """Value of a number in decimal digits."""
+        text = self.construct_scalar(node)
+        return float(text) if set(text) & set(".eE") or len(text) > _MOST_DIGITS else int(text)
 
-# A copy of the table of resolvers, because SafeLoader is shared by all code in this process.
-_Loader.yaml_implicit_resolvers = {
-    first: [
-        (tag, form)
-        for tag, form in resolvers
-        # `on`, `off`, `yes` and `no` are words; only `true` and `false` are not.
-        if tag != "tag:yaml.org,2002:bool" or first in "tTfF"
-    ]
-    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
-}
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$"),
-    list("-+.0123456789"),
-)
+
+_MOST_DIGITS = 30
+"""Digits of a whole number, beyond which it is a float, which overflows to infinity and is refused."""
+
+# A table of its own, because that of SafeLoader is shared by all code in this process.
+_Loader.yaml_implicit_resolvers = {}
+_Loader.add_constructor("tag:yaml.org,2002:float", _Loader.number)
+for kind, form, first in (
+    ("bool", "true|True|TRUE|false|False|FALSE", "tTfF"),
+    ("null", "~|null|Null|NULL|", ("~", "n", "N", "")),
+    ("float", r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?", "-+.0123456789"),
+):
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{kind}", re.compile(f"^({form})$"), list(first))

@@ -28,6 +28,10 @@ Numbers = int | Sequence[int] | np.ndarray
 """Trials or receptors: their numbers, or their count, numbered from 0."""
 
 LARGEST_SEED = 2**63 - 1
+
+MOST_NUMBERS = 100_000_000
+"""Largest number of random numbers that are drawn at once: 0.8 GB."""
+
 """Seeds, trials and receptors fit into a signed 64-bit integer, as in NumPy."""
 
 
@@ -247,7 +251,7 @@ def draw_each(
     >>> bool((one[0] == every[1, 5]).all())
     True
     """
-    numbers = np.empty((trials.size, whole("count", count, 0)))
+    numbers = np.empty((trials.size, whole("count", count, 0, MOST_NUMBERS // max(trials.size, 1))))
     _fill(
         _number("seed", seed), trials, receptors, int(instance("purpose", purpose, Purpose)), normal, numbers
     )
@@ -294,7 +298,7 @@ def numbered(name: str, which: Numbers) -> IntArray:
     ([0, 1, 2], [4, 2])
     """
     if isinstance(which, int | np.integer):
-        return np.arange(whole(name, int(which), 1), dtype=np.int64)
+        return np.arange(whole(name, which, 1, MOST_NUMBERS), dtype=np.int64)
     if isinstance(which, np.ndarray) and np.issubdtype(which.dtype, np.integer) and which.min(initial=0) >= 0:
         return which.astype(np.int64)
     return np.array([_number(name, number) for number in which], dtype=np.int64)

@@ -13,8 +13,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, finite, float_array, positive
+from fingerpad.core.checks import FloatArray, float_array, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import converted
 
 Point = tuple[float, float]
 
@@ -41,6 +42,7 @@ class Region(Protocol):
 
 
 @dataclass(frozen=True)
+@converted
 class Rectangle:
     """Rectangle with sides parallel to the axes.
 
@@ -70,7 +72,6 @@ class Rectangle:
     def __post_init__(self) -> None:
         positive("length_mm", self.length_mm, "mm")
         positive("width_mm", self.width_mm, "mm")
-        object.__setattr__(self, "centre_mm", _point("centre_mm", self.centre_mm))
 
     @property
     def area_mm2(self) -> float:
@@ -89,6 +90,7 @@ class Rectangle:
 
 
 @dataclass(frozen=True)
+@converted
 class Ellipse:
     """Ellipse with axes parallel to the coordinate axes; a disc if both semi-axes are equal.
 
@@ -118,7 +120,6 @@ class Ellipse:
     def __post_init__(self) -> None:
         positive("semi_length_mm", self.semi_length_mm, "mm")
         positive("semi_width_mm", self.semi_width_mm, "mm")
-        object.__setattr__(self, "centre_mm", _point("centre_mm", self.centre_mm))
 
     @property
     def area_mm2(self) -> float:
@@ -137,6 +138,7 @@ class Ellipse:
 
 
 @dataclass(frozen=True)
+@converted
 class Polygon:
     """Region inside a closed line of straight edges that does not cross itself.
 
@@ -228,13 +230,6 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
 def _bounds(centre: Point, half_length: float, half_width: float) -> tuple[Point, Point]:
     x, z = centre
     return (x - half_length, z - half_width), (x + half_length, z + half_width)
-
-
-def _point(name: str, value: Point) -> Point:
-    pair = float_array(name, value, 1)
-    if pair.size != 2:
-        raise InputError(f"{name} must be two numbers in mm: got {value!r}.")
-    return finite(name, pair[0], "mm"), finite(name, pair[1], "mm")
 
 
 def _points(points_mm: ArrayLike) -> FloatArray:

@@ -30,7 +30,7 @@ from pydantic_core import ArgsKwargs, core_schema
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError, StoreError
-from fingerpad.core.files import write_atomically
+from fingerpad.core.files import LARGEST_TEXT_MB, check_file, write_atomically
 
 _Kind = TypeVar("_Kind")
 
@@ -280,8 +280,14 @@ def read_format(path: Path, versions: Mapping[str, int]) -> dict[str, Any]:
 def _json_of_format(path: Path, versions: Mapping[str, int]) -> tuple[bytes, dict[str, Any]]:
     """Content of a file and its JSON values: the classes of some fields accept texts only from JSON."""
     try:
-        content = Path(path).read_bytes()
+        content = check_file(path, LARGEST_TEXT_MB).read_bytes()
         values = json.loads(content)
+    except RecursionError as error:
+        raise StoreError(
+            f"{path} cannot be read as JSON (nested too deep): run the command again."
+        ) from error
+    except InputError as error:
+        raise StoreError(str(error)) from error
     except (OSError, ValueError) as error:
         raise StoreError(f"{path} cannot be read as JSON ({error}): run the command again.") from error
     found = (values.get("format"), values.get("format_version")) if isinstance(values, dict) else (None, None)

@@ -6,17 +6,23 @@ Skin -> `SedTraces` -> `CurrentTraces` -> `SpikeTrains` -> `ResponseMap` -> `Hit
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from inspect import signature
-from typing import Protocol
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, increasing, positive
+from fingerpad.core.checks import FloatArray, float_array, increasing, int_array, positive
+from fingerpad.core.displayed import Displayed
 from fingerpad.core.errors import InputError
-from fingerpad.core.phases import Phase, ramp_and_hold
+from fingerpad.core.phases import Phase, ramp_and_hold_phases
+from fingerpad.core.values import converted
+
+if TYPE_CHECKING:
+    import pandas
 
 STORED_ENERGY = "stored"
 """Name of the quantity that drives both terms of the current in the paper: strain energy density."""
@@ -57,7 +63,8 @@ def _traces(kind: str, name: str, times_ms: ArrayLike, values: ArrayLike) -> tup
 
 
 @dataclass(frozen=True)
-class SedTraces:
+@converted
+class SedTraces(Displayed):
     """Strain energy density at receptor sites and at given times.
 
     Parameters
@@ -103,14 +110,14 @@ class SedTraces:
     def __post_init__(self) -> None:
         times, sed = _traces("SedTraces", "sed_kpa", self.times_ms, self.sed_kpa)
         increasing("times_ms", times)
-        if (sed < 0.0).any():
+        if sed.min(initial=0.0) < 0.0:
             raise InputError(f"sed_kpa must not be negative: the smallest value is {sed.min():.3g} kPa.")
         kinks = increasing("kinks_ms", float_array("kinks_ms", self.kinks_ms, 1))
         if not np.isin(kinks, times).all():
             raise InputError(f"kinks_ms must be among times_ms: got {kinks[~np.isin(kinks, times)]}.")
         _freeze(self, times_ms=times, sed_kpa=sed, kinks_ms=kinks)
         if not self.phases and kinks.size == 1 and 0.0 < kinks[0] < times[-1]:
-            object.__setattr__(self, "phases", ramp_and_hold(float(kinks[0]), float(times[-1])))
+            object.__setattr__(self, "phases", ramp_and_hold_phases(float(kinks[0]), float(times[-1])))
         if (self.dynamic_kpa is None) != (self.dynamic_quantity == self.static_quantity):
             raise InputError(
                 "dynamic_kpa is needed if dynamic_quantity is not static_quantity, and only then: got "
@@ -119,7 +126,7 @@ class SedTraces:
             )
         if self.dynamic_kpa is not None:
             _, dynamic = _traces("SedTraces", "dynamic_kpa", times, self.dynamic_kpa)
-            if dynamic.shape != sed.shape or (dynamic < 0.0).any():
+            if dynamic.shape != sed.shape or dynamic.min(initial=0.0) < 0.0:
                 raise InputError(
                     "dynamic_kpa must match sed_kpa and must not be negative: got shape "
                     f"{dynamic.shape} for {sed.shape} and a smallest value of {dynamic.min():.3g}."
@@ -161,6 +168,12 @@ class SedTraces:
             dynamic_kpa=None if dynamic_quantity == static_quantity else nothing,
             dynamic_quantity=dynamic_quantity,
             static_quantity=static_quantity,
+        )
+
+    def __repr__(self) -> str:
+        return (
+            f"SedTraces({self.times_ms.size} times to {self.times_ms[-1]:g} ms, {self.n_sites} sites, "
+            f"{self.static_quantity} at most {self.sed_kpa.max(initial=0.0):.3g} kPa)"
         )
 
     @property
@@ -221,7 +234,7 @@ def traces_below(skin: Skin, sites: ArrayLike, dynamic_quantity: str, static_qua
     Raises
     ------
     InputError
-        If another quantity than strain energy density is needed, and the skin accepts no quantity.
+        If there is no `sed`, or another quantity than strain energy density is needed and it accepts none.
 
     Examples
     --------
@@ -234,6 +247,10 @@ def traces_below(skin: Skin, sites: ArrayLike, dynamic_quantity: str, static_qua
     Traceback (most recent call last):
     fingerpad.core.errors.InputError: skin.sed must accept dynamic_quantity and static_quantity, since ...
     """
+    if not callable(getattr(skin, "sed", None)):
+        raise InputError(
+            f"skin must have a method sed(sites), as a solved indentation has: got {skin!r:.60}."
+        )
     if (dynamic_quantity, static_quantity) == (STORED_ENERGY, STORED_ENERGY):
         return skin.sed(sites)
     try:
@@ -249,6 +266,7 @@ def traces_below(skin: Skin, sites: ArrayLike, dynamic_quantity: str, static_qua
 
 
 @dataclass(frozen=True)
+@converted
 class CurrentTraces:
     """Membrane current at receptor sites, piecewise linear between its times.
 
@@ -291,7 +309,8 @@ class CurrentTraces:
 
 
 @dataclass(frozen=True)
-class SpikeTrains:
+@converted
+class SpikeTrains(Displayed):
     """Spike times of several afferents, one after the other in one array.
 
     Parameters
@@ -313,9 +332,7 @@ class SpikeTrains:
 
     def __post_init__(self) -> None:
         times = float_array("times_ms", self.times_ms, 1)
-        offsets = np.array(self.offsets, dtype=np.int64)
-        if not np.array_equal(offsets, self.offsets):
-            raise InputError(f"offsets must be whole numbers: got {self.offsets}.")
+        offsets = int_array("offsets", self.offsets, 1)
         if offsets.ndim != 1 or offsets.size == 0 or offsets[0] != 0 or offsets[-1] != times.size:
             raise InputError(f"offsets must run from 0 to the number of spikes, {times.size}: got {offsets}.")
         if (np.diff(offsets) < 0).any():
@@ -328,6 +345,9 @@ class SpikeTrains:
             raise InputError(
                 f"times_ms must increase within each afferent: it does not at {times[1:][falls][:4]}."
             )
+
+    def __repr__(self) -> str:
+        return f"SpikeTrains({self.times_ms.size} spikes of {len(self)} afferents)"
 
     @classmethod
     def from_lists(cls, trains: Sequence[ArrayLike]) -> SpikeTrains:
@@ -368,6 +388,9 @@ class SpikeTrains:
     def __len__(self) -> int:
         return self.offsets.size - 1
 
+    def __iter__(self) -> Iterator[FloatArray]:
+        return (self[afferent] for afferent in range(len(self)))
+
     def __getitem__(self, afferent: int) -> FloatArray:
         if not 0 <= afferent < len(self):
             raise IndexError(f"afferent must be within 0 ... {len(self) - 1}: got {afferent}.")
@@ -375,7 +398,8 @@ class SpikeTrains:
 
 
 @dataclass(frozen=True)
-class ResponseMap:
+@converted
+class ResponseMap(Displayed):
     """Response of a population of afferents to one touch.
 
     Parameters
@@ -404,6 +428,25 @@ class ResponseMap:
     first_spike_latency_ms: FloatArray
     duration_ms: float | None = None
     phases: tuple[Phase, ...] = ()
+
+    def __repr__(self) -> str:
+        firing = np.count_nonzero(np.diff(self.spikes.offsets))
+        return (
+            f"ResponseMap({firing} of {len(self.spikes)} afferents fire {self.spikes.times_ms.size} spikes, "
+            f"at most {self.dynamic_rate_hz.max(initial=0.0):.3g} spikes/s in the ramp and "
+            f"{self.static_rate_hz.max(initial=0.0):.3g} in the hold)"
+        )
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table with a row per afferent: its place, rates, latency and number of spikes.
+
+        Raises
+        ------
+        InputError
+            Without the extra `fingerpad[netcdf]`, which brings pandas.
+        """
+        made: pandas.DataFrame = resolve_name("fingerpad.export.dataset:response_table")(self)
+        return made
 
     def __post_init__(self) -> None:
         if self.duration_ms is not None:
@@ -437,6 +480,7 @@ class ResponseMap:
 
 
 @dataclass(frozen=True)
+@converted
 class HitRates:
     """Hit rate of each comparison with the standard.
 

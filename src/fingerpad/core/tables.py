@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fingerpad.core.checks import finite
+from fingerpad.core.checks import finite, number_in
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
 from fingerpad.core.keywords import did_you_mean
@@ -57,7 +58,8 @@ class TableRow:
         """Entry of `column` as a number that passes `check`, else raise `InputError`."""
         self.text(column)
         with self.placed():
-            return check(column, self.entries[column], unit)
+            entry = self.entries[column]
+            return check(column, number_in(column, entry, unit) if isinstance(entry, str) else entry, unit)
 
     def refuse_others(self, known: Collection[str], kind: str) -> None:
         """Raise `InputError` if the row has an entry in a column that a `kind` does not have."""
@@ -76,7 +78,7 @@ class TableRow:
             raise InputError(f"{self.place}: {error}") from error
 
 
-def read_csv(path: Path, known: Sequence[str]) -> list[TableRow]:
+def read_csv(path: Path, known: Sequence[str], prefixes: tuple[str, ...] = ()) -> list[TableRow]:
     r"""Rows of a CSV file: comments begin with #, then a header, then one row per line.
 
     Parameters
@@ -85,6 +87,8 @@ def read_csv(path: Path, known: Sequence[str]) -> list[TableRow]:
         A file in UTF-8, its entries separated by commas.
     known : sequence of str
         Columns that it may have, in any order.
+    prefixes : tuple of str, optional
+        A column that begins with one of these is known as well.
 
     Returns
     -------
@@ -115,15 +119,16 @@ def read_csv(path: Path, known: Sequence[str]) -> list[TableRow]:
         raise InputError(f"{path} must hold a header and at least one row: it has {len(rows)} of them.")
     (header_line, header), *body = rows
     columns = [column.strip() for column in header]
+    repeated = {column for column, count in Counter(columns).items() if count > 1}
     for column in columns:
-        if column not in known:
+        if column not in known and not column.startswith(prefixes):
             separator = next((each for each in (";", "\t") if each in column), "")
             hint = f" Separate entries by commas, not by {separator!r}." if separator else ""
             raise InputError(
                 f"{path}, line {header_line}: column {column!r} is unknown: "
                 f"{did_you_mean(column, known, 'a table')}{hint}"
             )
-        if columns.count(column) > 1:
+        if column in repeated:
             raise InputError(f"{path}, line {header_line}: column {column} is repeated, keep one.")
     lines = []
     for number, row in body:
