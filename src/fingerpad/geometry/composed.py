@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, float_array, instance, not_negative, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import converted
 from fingerpad.geometry.indenters import Bar, Indenter, Plate
+from fingerpad.geometry.relief import PIXELS, REACH_MM, RELIEF_MM, WIDTHS_MM, narrowest_relief
+from fingerpad.geometry.rounded_edges import check_edge_radius, with_rounded_edges
+
+SAME_MM = 1e-6
+"""Heights that differ by less are equal. [mm]"""
 
 LEAST_SLOPE = 0.2
 """Least length of the gradient in a seam by which a gap is divided: parts that face each other have none."""
 
 
 @dataclass(frozen=True)
+@converted
 class Union(Indenter):
-    """Several bodies as one, each moved, with rounded seams between them.
+    """Several bodies as one, each moved, with rounded seams and edges.
 
     Parameters
     ----------
@@ -27,6 +35,8 @@ class Union(Indenter):
         How far each is moved: along the finger, towards the skin, across. [mm]
     seam_mm : float
         Width over which concave seams are filled; 0 for sharp ones. [mm]
+    edge_radius_mm : float
+        Radius to which edges of the parts are rounded, at most half of the narrowest part; 0 keeps them. [mm]
 
     Examples
     --------
@@ -39,6 +49,7 @@ class Union(Indenter):
     parts: tuple[Indenter, ...]
     at_mm: tuple[tuple[float, float, float], ...]
     seam_mm: float = 0.0
+    edge_radius_mm: float = 0.0
 
     def __post_init__(self) -> None:
         parts = tuple(instance("a part", part, Indenter) for part in self.parts)
@@ -51,6 +62,8 @@ class Union(Indenter):
         not_negative("seam_mm", self.seam_mm, "mm")
         object.__setattr__(self, "parts", parts)
         object.__setattr__(self, "at_mm", tuple(map(tuple, at.tolist())))
+        if not_negative("edge_radius_mm", self.edge_radius_mm, "mm"):
+            check_edge_radius(self.edge_radius_mm, replace(self, edge_radius_mm=0.0).narrowest_mm)
 
     @property
     def half_width_mm(self) -> float:
@@ -61,16 +74,52 @@ class Union(Indenter):
 
     @property
     def relief_mm(self) -> float:
-        """Width of the narrowest dot, ridge or groove of a part; infinite without one. [mm]"""
-        return min(min(part.relief_mm, part.narrowest_mm) for part in self.parts)
+        """Width of the narrowest dot, ridge or groove; infinite if all are wide or run across. [mm]"""
+        found = min(part.relief_mm for part in self.parts)
+        return found if self._swept else min(found, self._measured_mm)
 
     @property
     def narrowest_mm(self) -> float:
-        """The same. [mm]"""
-        return self.relief_mm
+        """Width of the narrowest dot, ridge or groove; infinite if all are wide. [mm]"""
+        return min(self._measured_mm, *(min(part.relief_mm, part.narrowest_mm) for part in self.parts))
+
+    @property
+    def edge_reach_mm(self) -> float:
+        """Half-width about x = 0 of the finer mesh for narrow ridges across; 0 without. [mm]"""
+        if not (self._swept and np.isfinite(self.narrowest_mm)):
+            return 0.0
+        reaches = (
+            part.half_width_mm + abs(x) for part, (x, _, _) in zip(self.parts, self.at_mm, strict=True)
+        )
+        return min(max((reach for reach in reaches if np.isfinite(reach)), default=REACH_MM), REACH_MM)
+
+    @cached_property
+    def _swept(self) -> bool:
+        """Whether its face is the same all along z."""
+        return bool(np.ptp(self._heights(np.linspace(-REACH_MM, REACH_MM, 7)), axis=1).max() < SAME_MM)
+
+    @cached_property
+    def _measured_mm(self) -> float:
+        """Width of the narrowest dot, ridge or groove of the face; infinite if all are wide. [mm]"""
+        z_mm = np.zeros(1) if self._swept else np.linspace(-REACH_MM, REACH_MM, PIXELS)
+        height = self._heights(z_mm) * np.ones(PIXELS)
+        found = narrowest_relief(height, 2 * REACH_MM / (PIXELS - 1), float(height.min()))
+        return found if found < WIDTHS_MM[-1] else np.inf
+
+    def _heights(self, z_mm: FloatArray) -> FloatArray:
+        """Heights of the face over a grid of x and these z, the lowest that matters beside it. [mm]"""
+        x, z = np.meshgrid(np.linspace(-REACH_MM, REACH_MM, PIXELS), z_mm, indexing="ij")
+        height = self.front(np.column_stack([x.ravel(), np.zeros(x.size), z.ravel()])).reshape(x.shape)
+        return np.maximum(height, height.max() - RELIEF_MM)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
+        if self.edge_radius_mm == 0.0:
+            return self._sharp(points_mm)
+        return with_rounded_edges(self._sharp, points_mm, self.edge_radius_mm)
+
+    def _sharp(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Gap and normal with the edges that the parts have. [mm]"""
         gap, normal = self.parts[0].gap(points_mm - np.array(self.at_mm[0]))
         for part, at in zip(self.parts[1:], self.at_mm[1:], strict=True):
             gap, normal = self._joined(gap, normal, *part.gap(points_mm - np.array(at)))

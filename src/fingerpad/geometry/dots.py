@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, float_array, positive
+from fingerpad.core.checks import FloatArray, float_array, instance, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import converted
 from fingerpad.geometry.indenters import Indenter
 
 BRAILLE_DOT_MM, BRAILLE_HEIGHT_MM, BRAILLE_PITCH_MM, BRAILLE_CELL_MM = 1.44, 0.48, 2.34, 6.2
@@ -23,6 +24,7 @@ _LETTERS = {cell[0]: cell[1:] for cell in _CELLS.split()}
 
 
 @dataclass(frozen=True)
+@converted
 class Dots(Indenter):
     """Raised dots on a flat plate: caps of balls with their tops in one plane.
 
@@ -114,6 +116,7 @@ def braille(text: str, along_finger: bool = True) -> Dots:
     >>> braille("l").at_mm
     ((2.34, 0.0), (0.0, 0.0), (-2.34, 0.0))
     """
+    instance("text", text, str)
     unknown = sorted(set(text) - set(_LETTERS) - {" "})
     if unknown or not text.strip():
         raise InputError(f"text must have letters a to z and spaces: got {text!r}.")

@@ -15,6 +15,7 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, not_negative, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import OtherName
+from fingerpad.core.values import converted
 from fingerpad.data import protocol
 from fingerpad.geometry.indenters import BESIDE_EDGE_MM, Bar, Indenter, fillet_within, round_front, rounded
 
@@ -32,6 +33,7 @@ def _along_x(signs: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
+@converted
 class Edge(Indenter):
     """Flat body over the proximal half of the finger that ends in one rounded edge at x = 0, long in z.
 
@@ -82,6 +84,7 @@ class Edge(Indenter):
 
 
 @dataclass(frozen=True)
+@converted
 class Gap(Indenter):
     """Flat bar across the finger with a gap along its middle: two ridges of one rigid body.
 
@@ -199,6 +202,7 @@ def _of_period(period_mm: float = 2 * protocol.RIDGE_WIDTH.value, duty: float = 
 
 
 @dataclass(frozen=True)
+@converted
 class Grating(Indenter):
     """Grating larger than the finger: flat ridges across it with grooves between them, one ridge at x = 0.
 

@@ -12,7 +12,9 @@ from numba import njit
 
 from fingerpad.core.checks import FloatArray, float_array, one_of, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import converted
 from fingerpad.geometry.indenters import Indenter, rounded
+from fingerpad.geometry.outline_union import joined_outlines
 
 OPPOSITE = -0.985
 """Two pieces of outline bound a stroke or a gap if their normals are opposite to within 10 degrees, as they
@@ -26,6 +28,7 @@ DRAWN_EM = 1000.0
 
 
 @dataclass(frozen=True)
+@converted
 class Embossed(Indenter):
     """Shapes raised from a flat plate, with walls at right angles to it and rounded edges.
 
@@ -113,8 +116,7 @@ class Embossed(Indenter):
     @cached_property
     def _pieces(self) -> FloatArray:
         """Straight pieces of all outlines: begin and end, x and z, (n, 2, 2). [mm]"""
-        outlines = [np.array(line) for line in self.outlines_mm]
-        return np.concatenate([np.stack([line, np.roll(line, -1, axis=0)], axis=1) for line in outlines])
+        return _pieces(self.outlines_mm)
 
     @cached_property
     def _normals(self) -> FloatArray:
@@ -187,7 +189,7 @@ def embossed_text(
     Raises
     ------
     InputError
-        If there is no letter, the font does not have a character, or its outlines overlap (as of "Ç").
+        If there is no letter, or the font does not have a character.
 
     Examples
     --------
@@ -222,7 +224,16 @@ def embossed_text(
     placed = [scale * (outline - middle) for outline in outlines]
     # Seen from the skin, z runs to the right where x, to the tip, runs up.
     turned = [line * [1.0, -1.0] if along_finger else line[:, ::-1] for line in placed]
-    return Embossed(tuple(map(_corners, turned)), height_mm, edge_radius_mm)
+    corners = list(map(_corners, turned))
+    if _cross(_pieces(corners)):
+        corners = list(map(_corners, joined_outlines([np.array(line) for line in corners])))
+    return Embossed(tuple(corners), height_mm, edge_radius_mm)
+
+
+def _pieces(outlines: Sequence[Sequence[tuple[float, float]]]) -> FloatArray:
+    """Straight pieces of closed outlines: begin and end, (n, 2, 2)."""
+    lines = [np.array(line) for line in outlines]
+    return np.concatenate([np.stack([line, np.roll(line, -1, axis=0)], axis=1) for line in lines])
 
 
 def _corners(outline: FloatArray) -> tuple[tuple[float, float], ...]:

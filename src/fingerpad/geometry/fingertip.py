@@ -28,8 +28,10 @@ from fingerpad.core.checks import (
     one_of,
     positive,
 )
+from fingerpad.core.displayed import Displayed
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords, known_keywords
+from fingerpad.core.values import converted
 from fingerpad.data import fingers
 from fingerpad.data import fingertip as published
 
@@ -61,6 +63,7 @@ HALF_WIDTH_READINGS = _readings(published.HALF_WIDTH_X.value, published.HALF_WID
 
 
 @dataclass(frozen=True)
+@converted
 class Profile:
     """One dimension of the finger's sections, a smooth function of x that closes at the tip.
 
@@ -164,7 +167,8 @@ class Finger(metaclass=KnownKeywords):
 
 
 @dataclass(frozen=True)
-class Fingertip(Finger):
+@converted
+class Fingertip(Displayed, Finger):
     """Outline, layers, bone and nail of a fingertip.
 
     Parameters
@@ -229,6 +233,13 @@ class Fingertip(Finger):
                 f"got {self.spine_end_x_mm}, {self.bone_tip_x_mm} and {self.length_mm}."
             )
         self._check_that_the_bone_fits()
+
+    def __repr__(self) -> str:
+        volar, dorsal, half_width = (float(size) for size in self.section(self.contact_mm[0]))
+        return (
+            f"Fingertip({self.length_mm:.3g} mm long, {2.0 * half_width:.3g} mm wide and "
+            f"{volar + dorsal:.3g} mm high where it is pressed, skin {self.layer_depths_mm[-1]:.3g} mm thick)"
+        )
 
     def _check_that_the_bone_fits(self) -> None:
         x = np.linspace(0.0, self.spine_end_x_mm, 41)

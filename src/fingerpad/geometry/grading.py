@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 from fingerpad.core.checks import FloatArray, finite, one_of, positive, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import converted
 
 RESOLUTIONS = ("quick", "standard", "paper")
 
@@ -20,7 +21,15 @@ STEPS_TO_SUM = 4000
 """Intervals over which the number of elements is summed where their size varies."""
 
 
+FINGER_MM = 40.0
+"""Length of a finger, beyond which a fine zone has no elements. [mm]"""
+
+MOST_ELEMENTS = 2_000_000
+"""Elements of the fine zone beyond which no press ends; that of the paper's mesh has 143,000."""
+
+
 @dataclass(frozen=True)
+@converted
 class Grading:
     """Fine zone of the mesh of a finger and sizes of its elements.
 
@@ -94,6 +103,23 @@ class Grading:
                         f"{name} needs strips of from, to and size in mm, to above from and size above 0: "
                         f"got {(begin, end, size)!r}."
                     )
+        if self._elements_about > MOST_ELEMENTS:
+            raise InputError(
+                f"A grading may have about {MOST_ELEMENTS:,} elements in its fine zone: those of "
+                f"{self.size_x_mm:g} by {self.size_z_mm:g} mm, and strips, are {self._elements_about:.3g}; "
+                "take larger ones."
+            )
+
+    @property
+    def _elements_about(self) -> float:
+        """Number of elements of the fine zone and of the strips, roughly."""
+        along = min(2 * self.half_length_mm, FINGER_MM) / self.size_x_mm
+        if self.core_size_mm:
+            along += 2 * self.core_half_length_mm / self.core_size_mm
+        across = min((1 + self.full) * self.half_width_mm, FINGER_MM) / self.size_z_mm
+        along += sum((end - begin) / size for begin, end, size in self.finer_along)
+        across += sum((end - begin) / size for begin, end, size in self.finer_across)
+        return max(along, 1.0) * max(across, 1.0) * sum(self.counts)
 
     @property
     def finest_x_mm(self) -> float:

@@ -19,6 +19,7 @@ from fingerpad.core.checks import FloatArray, not_negative, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords, OtherName
 from fingerpad.core.units import curvature_per_m, radius_mm
+from fingerpad.core.values import converted
 from fingerpad.data import protocol
 from fingerpad.geometry.probing import mirrored, traced_front
 
@@ -205,6 +206,7 @@ def _of_diameter(radius_mm: float) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
+@converted
 class Cylinder(Indenter):
     """Cylinder that lies across the finger, its axis along z.
 
@@ -255,6 +257,7 @@ class Cylinder(Indenter):
 
 
 @dataclass(frozen=True)
+@converted
 class Line(Indenter):
     """Line load across the finger: a wire thinner than the elements of the skin, modelled as a blade.
 
@@ -303,6 +306,7 @@ class Line(Indenter):
 
 
 @dataclass(frozen=True)
+@converted
 class Sphere(Indenter):
     """Sphere given by its curvature, as in the psychophysics literature.
 
@@ -362,6 +366,7 @@ class Sphere(Indenter):
 
 
 @dataclass(frozen=True)
+@converted
 class Bar(Indenter):
     """Flat bar across the finger, long in z, its two edges rounded.
 
@@ -426,6 +431,7 @@ class Bar(Indenter):
 
 
 @dataclass(frozen=True)
+@converted
 class FlatPunch(Indenter):
     """Flat-ended round probe with a rounded rim.
 

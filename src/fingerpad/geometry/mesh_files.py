@@ -12,7 +12,8 @@ import numpy as np
 
 from fingerpad.core.checks import IntArray
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import read_text
+from fingerpad.core.files import path_of, read_text
+from fingerpad.core.keywords import known_keywords
 from fingerpad.geometry.free_mesh import FingerMesh
 from fingerpad.geometry.mesh import LAYERS
 from fingerpad.geometry.mesh_parts import MeshParts, finger_from, plain_name
@@ -34,6 +35,7 @@ _INP_BRICK_FACES = ([0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 
 """Nodes of the faces S1, S2, ... of Abaqus."""
 
 
+@known_keywords
 def read_finger(
     path: Path | str,
     unit: str = "mm",
@@ -89,7 +91,7 @@ def read_finger(
     Traceback (most recent call last):
     fingerpad.core.errors.InputError: finger.stl: a mesh must be a file .inp, .msh or .vtu.
     """
-    file = Path(path)
+    file = path_of("path", path)
     reader = _READERS.get(file.suffix.lower())
     if reader is None:
         raise InputError(f"{file.name}: a mesh must be a file .inp, .msh or .vtu.")
@@ -265,7 +267,7 @@ def _inp_elements(read: _Read, number: int, options: Mapping[str, str], rows: Se
     if not size:
         if re.match(r"(S[34]|STRI|R3D|M3D|SFM|CPS|CPE|T3D|B3|MASS|SPRING|DCOUP)", kind):
             return  # shells, rigid facets and the like are no tissue
-        read.wrong(f"elements must be C3D8 or C3D6 and their kin, got {kind}: {_REFUSED}", number)
+        read.wrong(f"elements must be C3D8, C3D6 or variants of them, got {kind}: {_REFUSED}", number)
     for line, words in rows:
         if len(words) != size + 1:
             read.wrong(
@@ -397,7 +399,7 @@ def _msh_41(read: _Read, blocks: Mapping[str, list[Row]], names: Mapping[tuple[i
         count = _whole(read, line, words[3])
         tags = [_whole(read, *_one(next(lines))) for _ in range(count)]
         read.node_numbers += tags
-        read.nodes += [_numbers(read, at, row[:3]) for at, row in (next(lines) for _ in range(count))]
+        read.nodes += [_numbers(read, at, row[:3]) for at, row in [next(lines) for _ in range(count)]]
     lines = iter(blocks["Elements"][1:])
     for line, words in lines:
         dimension, entity, kind, count = (_whole(read, line, word) for word in words)

@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from fingerpad.core.checks import FloatArray, IntArray, one_of, positive
+from fingerpad.core.checks import FloatArray, IntArray, instance, one_of, pair, positive
 from fingerpad.core.errors import InputError
 from fingerpad.data import fingertip as published
 from fingerpad.geometry.fingertip import SIZES_MM
@@ -106,7 +106,7 @@ class _Making:
         contact_mm: tuple[float, float] | None,
         receptor_depth_mm: float | None,
     ) -> FingerMesh:
-        for name in self.names:
+        for name in instance("names", self.names, Mapping):
             one_of("names", name, SETS)
         used, elements = np.unique(self.parts.elements, return_inverse=True)
         elements = elements.reshape(-1, 8)
@@ -140,8 +140,7 @@ class _Making:
             check_mesh(mesh)
         except InputError as error:
             self.wrong(str(error))
-        if contact_mm is None:
-            contact_mm = self.middle(mesh)
+        contact_mm = self.middle(mesh) if contact_mm is None else pair("contact_mm", contact_mm)
         depths = self.depths(mesh, contact_mm)
         border = _above_dermis(mesh)
         if receptor_depth_mm is None:

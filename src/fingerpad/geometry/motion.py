@@ -9,15 +9,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, not_negative, positive, whole
+from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.phases import Phase, ramp_and_hold
+from fingerpad.core.phases import Phase, ramp_and_hold_phases
+from fingerpad.core.values import converted
 from fingerpad.data import protocol
+
+LONGEST_MS = 1e13
+"""Longest ramp or hold; a quasi-static ramp of a validation takes 1e12 ms. [ms]"""
 
 MOTION_UNITS = {"depth_mm": "mm", "force_mn": "mN", "ramp_ms": "ms", "hold_ms": "ms"}
 """Units of the parameters of motions."""
 
 
 @dataclass(frozen=True)
+@converted
 class Pose:
     """How far an indenter has moved and turned since first touch, beside its advance.
 
@@ -41,6 +47,7 @@ class Pose:
 
 
 @dataclass(frozen=True)
+@converted
 class Cycles:
     """A part of a motion that repeats itself.
 
@@ -168,7 +175,9 @@ class _OneRamp(Motion):
     def __post_init__(self) -> None:
         for name, unit in MOTION_UNITS.items():
             if hasattr(self, name):
-                positive(name, getattr(self, name), unit)
+                size = positive(name, getattr(self, name), unit)
+                if unit == "ms" and size > LONGEST_MS:
+                    raise InputError(f"{name} must be at most {LONGEST_MS:g} ms: got {size:g}.")
 
     @property
     def end_ms(self) -> float:
@@ -183,7 +192,7 @@ class _OneRamp(Motion):
     @property
     def phases(self) -> tuple[Phase, ...]:
         """Ramp and hold."""
-        return ramp_and_hold(self.ramp_ms, self.end_ms)
+        return ramp_and_hold_phases(self.ramp_ms, self.end_ms)
 
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
         """Depth [mm] or force [mN] at `times_ms`, any shape: 0 at the start, the largest in the hold."""
@@ -207,6 +216,7 @@ class _OneRamp(Motion):
 
 
 @dataclass(frozen=True)
+@converted
 class RampAndHold(_OneRamp):
     """Indent at constant speed to a depth, then hold it.
 
@@ -242,6 +252,7 @@ class RampAndHold(_OneRamp):
 
 
 @dataclass(frozen=True)
+@converted
 class ForceRampAndHold(_OneRamp):
     """Press with a force that grows at a constant rate, then hold it: the skin creeps.
 

@@ -99,9 +99,10 @@ def chirp(
     >>> len(motion.times_ms), round(motion.end_ms, 1)
     (543, 1490.0)
     """
-    if len(frequencies_hz) != 2:
-        raise InputError(f"frequencies_hz must be a pair, first and last: got {len(frequencies_hz)}.")
-    first, last = (positive("frequencies_hz", each, "Hz") for each in frequencies_hz)
+    pair = float_array("frequencies_hz", frequencies_hz, 1)
+    if pair.size != 2:
+        raise InputError(f"frequencies_hz must be a pair, first and last: got {pair.size}.")
+    first, last = (positive("frequencies_hz", each, "Hz") for each in pair.tolist())
     seconds = positive("sweep_ms", sweep_ms, "ms") / MS_PER_S
     cycles = int((first + last) / 2.0 * seconds)
     if cycles < 1:

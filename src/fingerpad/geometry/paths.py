@@ -15,6 +15,9 @@ CLEARANCE_TO_BONE = 0.8
 STEP_MM = 0.25
 """Distance between places at which a way along the skin is looked at. [mm]"""
 
+FAR_MM = 1000.0
+"""Way beyond which the samples are looked at first. [mm]"""
+
 
 def check_path(finger: Finger, motion: Motion, at_mm: tuple[float, float]) -> None:
     """Check every place of a motion before anything is pressed.
@@ -48,6 +51,8 @@ def check_path(finger: Finger, motion: Motion, at_mm: tuple[float, float]) -> No
         times, places = samples_ms, np.broadcast_to(at_mm, (samples_ms.size, 2))
     else:
         ways = np.array([[pose.x_mm, pose.z_mm] for pose in motion.poses])
+        if np.abs(ways).max() > FAR_MM:  # beside any finger, and too far for the places between
+            _skin_y_mm(finger, motion, samples_ms, *(at_mm + ways).T)
         parts = np.maximum(np.ceil(np.linalg.norm(np.diff(ways, axis=0), axis=1) / STEP_MM), 1).astype(int)
         numbers = np.repeat(np.arange(parts.size), parts)
         share = (np.arange(numbers.size) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[numbers]

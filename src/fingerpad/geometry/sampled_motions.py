@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from fingerpad.core.checks import FloatArray, positive, whole
-from fingerpad.core.errors import InputError
+from fingerpad.core.checks import FloatArray, instance, positive, whole
+from fingerpad.core.errors import InputError, shown
 from fingerpad.core.phases import Phase
 from fingerpad.geometry.trajectory import POSE_COLUMNS, Trajectory, samples_of_line
 
@@ -79,6 +79,9 @@ def sampled(
     given = (("depth_mm", depth_mm), ("force_mn", force_mn), ("x_mm", x_mm), ("z_mm", z_mm),
              ("tilt_deg", tilt_deg), ("spin_deg", spin_deg))  # fmt: skip
     courses = {name: course for name, course in given if course is not None}
+    for name, course in courses.items():
+        if not callable(course):
+            raise InputError(f"{name} must be a function of the time [ms]: got {shown(course)}.")
     if not courses:
         raise InputError("A trajectory needs either depth_mm or force_mn: give one of them.")
 
@@ -154,6 +157,7 @@ def reduced(motion: Trajectory, tolerance: float = TOLERANCE) -> Trajectory:
     (0.0, 50.0, 1000.0)
     """
     positive("tolerance", tolerance)
+    instance("motion", motion, Trajectory)
     names = ["force_mn" if motion.by_force else "depth_mm"]
     names += [name for name in POSE_COLUMNS if getattr(motion, name) is not None]
     times, table = np.array(motion.times_ms), np.array([getattr(motion, name) for name in names]).T

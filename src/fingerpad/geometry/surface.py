@@ -11,13 +11,15 @@ from functools import cached_property
 
 import numpy as np
 from numba import njit
-from scipy.ndimage import grey_closing, grey_dilation, grey_erosion, grey_opening
 
-from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, positive
+from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, int_array, not_negative, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import converted
 from fingerpad.geometry.closest_point import Triangles
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.probing import traced_front
+from fingerpad.geometry.relief import PIXELS, REACH_MM, narrowest_relief
+from fingerpad.geometry.rounded_edges import check_edge_radius, with_rounded_edges
 
 SMALLEST_MM, LARGEST_MM = 0.1, 1000.0
 """Extents beyond which a surface is refused: its unit must be wrong. [mm]"""
@@ -37,27 +39,9 @@ HOLLOW_MM = 0.1
 FAR_MM = 2.0
 """Beyond this distance above a surface its gap is this number: in a hollow all triangles are as far. [mm]"""
 
-REACH_MM = 6.0
-"""Ridges, grooves and dots are looked for within this distance of the axis, along and across. [mm]"""
-
-PIXELS = 480
-"""Heights of the face along each side of that square, or of the body where it is smaller."""
-
-PIXELS_PER_FEATURE = 4
-"""Heights across the narrowest ridge, groove or dot that can be found; wider ones are sought with up to four
-times as many."""
-
-WIDTHS_MM = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.25, 1.5, 1.75, 2.0)
-"""Widths of ridges, grooves and dots that are looked for. [mm]"""
-
-RELIEF_MM = 2.0
-"""Depth below the highest point within which they are looked for. [mm]"""
-
-RELIEF_SHARE = 0.2
-"""A ridge or dot is as high, over its width, or more; a ball's cap of the same width is lower."""
-
 
 @dataclass(frozen=True, eq=False, repr=False)
+@converted
 class Surface(Indenter):
     """A rigid body bounded by triangles, watertight or open, in the frame of indenters.
 
@@ -72,13 +56,16 @@ class Surface(Indenter):
     smooth_below_deg : float
         Hollow creases at which the normals of two triangles differ by less are rounded over 0.1 mm to either
         side at most; 0 keeps all. Edges of a larger angle, and all ridges, stay as they are. [degrees]
+    edge_radius_mm : float
+        Radius to which ridges and corners are rounded, at most half of the narrowest part; 0 keeps them. [mm]
 
     Raises
     ------
     InputError
         If vertices are not finite, faces name no vertex, no triangle has an area, the surface is larger than
         1000 mm or smaller than 0.1 mm (a wrong unit), neighbouring triangles turn different sides out, more
-        than two share an edge, it shows the skin its inner side, or the angle is not from 0 to 90 degrees.
+        than two share an edge, it shows the skin its inner side, the angle is not from 0 to 90 degrees, or
+        the radius does not fit.
 
     Examples
     --------
@@ -93,10 +80,11 @@ class Surface(Indenter):
     vertices_mm: FloatArray
     faces: IntArray
     smooth_below_deg: float = SMOOTH_BELOW_DEG
+    edge_radius_mm: float = 0.0
 
     def __post_init__(self) -> None:
         vertices = float_array("vertices_mm", self.vertices_mm, 2)
-        faces = np.array(self.faces, dtype=np.int64)
+        faces = int_array("faces", self.faces, 2)
         if vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or not len(faces):
             raise InputError(
                 f"A surface needs vertices (n, 3) and at least one triangle (m, 3): got {vertices.shape} and "
@@ -136,6 +124,8 @@ class Surface(Indenter):
         for name, value in (("vertices_mm", vertices), ("faces", faces)):
             value.setflags(write=False)
             object.__setattr__(self, name, value)
+        if not_negative("edge_radius_mm", self.edge_radius_mm, "mm"):
+            check_edge_radius(self.edge_radius_mm, self.relief_mm)
 
     def __repr__(self) -> str:
         extents = " x ".join(f"{extent:.4g}" for extent in np.ptp(self.vertices_mm[self.faces], axis=(0, 1)))
@@ -165,34 +155,9 @@ class Surface(Indenter):
 
     @cached_property
     def relief_mm(self) -> float:
-        """Width of the narrowest ridge, groove or dot, 2 mm if all are wider. [mm]
-
-        It is the smallest width of a disc whose opening or closing of the face changes a height by more than
-        0.2 of that width, apart from the outermost heights along walls and from slopes above 45 degrees,
-        where triangles are ragged.
-        """
-        height, spacing = self._face
-        height = np.maximum(height, height.max() - RELIEF_MM)
-        for width in WIDTHS_MM:
-            thin = max(1, round(width / spacing) // PIXELS_PER_FEATURE**2)
-            radius = round(width / spacing / thin) // 2
-            if 2 * radius < PIXELS_PER_FEATURE:
-                continue
-            disc = np.hypot(*np.indices((2 * radius + 1,) * 2) - radius) <= radius + 0.5
-            # The opening of a square is rounder at its corners by 0.41 of the disc's radius.
-            around = 2 * int(np.ceil(0.5 * radius)) + 1
-            part = np.pad(height[::thin, ::thin], 3 * radius, constant_values=height.min())
-            opened = grey_opening(part, footprint=disc, mode="nearest")
-            closed = grey_closing(part, footprint=disc, mode="nearest")
-            ridges = part - grey_dilation(opened, around, mode="nearest")
-            grooves = grey_erosion(closed, around, mode="nearest") - part
-            ridges[_is_steep(opened, thin * spacing)] = 0.0
-            grooves[_is_steep(closed, thin * spacing)] = 0.0
-            # On a slope that ends at the border the disc lies lower by the slope over its width.
-            ridges -= 2 * radius * _slope_at_border(part, 3 * radius, 2 * radius)
-            if max(ridges.max(), grooves.max()) > RELIEF_SHARE * width:
-                return width
-        return WIDTHS_MM[-1]
+        """Width of the narrowest ridge, groove or dot of its face, 2 mm if all are wider. [mm]"""
+        # Beside a closed body is nothing; an open one is thought to go on at its lowest height.
+        return narrowest_relief(*self._face, beside_mm=float(self.vertices_mm[self.faces, 1].min()))
 
     @cached_property
     def _triangles(self) -> Triangles:
@@ -233,7 +198,9 @@ class Surface(Indenter):
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
-        return self._triangles.gap(points_mm)
+        if self.edge_radius_mm == 0.0:
+            return self._triangles.gap(points_mm)
+        return with_rounded_edges(self._triangles.gap, points_mm, self.edge_radius_mm)
 
 
 def _check_sides(faces: IntArray, vertices_mm: FloatArray) -> None:
@@ -248,22 +215,6 @@ def _check_sides(faces: IntArray, vertices_mm: FloatArray) -> None:
             f"{twice.size:,} edges do not, one at ({x:.4g}, {y:.4g}, {z:.4g}) mm; repair it, for example "
             "with trimesh.repair."
         )
-
-
-def _is_steep(height: FloatArray, spacing: float) -> np.ndarray:
-    """Whether the slope exceeds 45 degrees, (nx, nz)."""
-    return np.hypot(*np.gradient(height, spacing)) > 1.0
-
-
-def _slope_at_border(height: FloatArray, pad: int, zone: int) -> FloatArray:
-    """Change of height per cell within a zone along the border inside of a pad, 0 elsewhere, (nx, nz)."""
-    slope = np.zeros_like(height)
-    for axis in (0, 1):
-        before = np.abs(np.diff(height, axis=axis, prepend=np.inf))
-        after = np.abs(np.diff(height, axis=axis, append=np.inf))
-        slope = np.hypot(slope, np.minimum(before, after))
-    slope[pad + zone : -pad - zone, pad + zone : -pad - zone] = 0.0
-    return slope
 
 
 @njit(cache=True, nogil=True)
@@ -290,7 +241,10 @@ def _raise_to_triangles(
 
 
 def height_surface(
-    heights_mm: FloatArray, pitch_mm: float, smooth_below_deg: float = SMOOTH_BELOW_DEG
+    heights_mm: FloatArray,
+    pitch_mm: float,
+    smooth_below_deg: float = SMOOTH_BELOW_DEG,
+    edge_radius_mm: float = 0.0,
 ) -> Surface:
     """Surface through heights on a regular grid, centred on the indenter's axis.
 
@@ -300,8 +254,8 @@ def height_surface(
         Heights towards the skin; rows run across the finger (z), columns along it (x). [mm]
     pitch_mm : float
         Distance between neighbouring heights. [mm]
-    smooth_below_deg : float
-        As of `Surface`. [degrees]
+    smooth_below_deg, edge_radius_mm : float
+        As of `Surface`. [degrees], [mm]
 
     Returns
     -------
@@ -333,4 +287,4 @@ def height_surface(
     even = np.add.outer(np.arange(rows - 1), np.arange(columns - 1)) % 2 == 0
     one, other = np.where(even, [a, b, c], [a, b, d]), np.where(even, [a, c, d], [b, c, d])
     faces = np.concatenate([each.reshape(3, -1).T for each in (one, other)])
-    return Surface(vertices, faces, smooth_below_deg)
+    return Surface(vertices, faces, smooth_below_deg, edge_radius_mm)

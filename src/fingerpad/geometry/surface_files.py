@@ -10,6 +10,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray, float_array, one_of, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.files import path_of
 from fingerpad.geometry.surface import LARGEST_MM, SMALLEST_MM, SMOOTH_BELOW_DEG, Surface, height_surface
 
 UNITS_MM = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
@@ -35,6 +36,7 @@ def read_surface(
     up: str = "+z",
     at_mm: tuple[float, float] = (0, 0),
     smooth_below_deg: float = SMOOTH_BELOW_DEG,
+    edge_radius_mm: float = 0.0,
 ) -> Surface:
     """Read a rigid body of triangles, watertight or open.
 
@@ -65,7 +67,7 @@ def read_surface(
     InputError
         If the file cannot be read as triangles, has vertices that are not finite, or is of an unlikely size.
     """
-    file = Path(path)
+    file = path_of("path", path)
     factor = UNITS_MM[one_of("unit", unit, tuple(UNITS_MM))] * positive("scale", scale)
     number, sign = _AXES[one_of("up", up, tuple(_AXES))]
     at = float_array("at_mm", at_mm, 1)
@@ -110,7 +112,7 @@ def read_surface(
     placed = factor * vertices @ turned
     middle = 0.5 * (placed.min(axis=0) + placed.max(axis=0))
     try:
-        return Surface(placed - middle + [at[0], 0.0, at[1]], faces, smooth_below_deg)
+        return Surface(placed - middle + [at[0], 0.0, at[1]], faces, smooth_below_deg, edge_radius_mm)
     except InputError as error:
         raise InputError(f"{file.name}: {error}") from error
 
@@ -129,7 +131,11 @@ def _welded(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray
 
 
 def read_height_map(
-    path: str | Path, pitch_mm: float, height_mm: float = 1.0, smooth_below_deg: float = SMOOTH_BELOW_DEG
+    path: str | Path,
+    pitch_mm: float,
+    height_mm: float = 1.0,
+    smooth_below_deg: float = SMOOTH_BELOW_DEG,
+    edge_radius_mm: float = 0.0,
 ) -> Surface:
     """Read a map of heights towards the skin, centred on the indenter's axis.
 
@@ -156,7 +162,7 @@ def read_height_map(
     InputError
         If the file cannot be read, is no plane of finite numbers, or has more than 2,000,000 heights.
     """
-    file = Path(path)
+    file = path_of("path", path)
     positive("pitch_mm", pitch_mm, "mm")
     positive("height_mm", height_mm, "mm")
     _check_file(file, MAPS)
@@ -183,8 +189,13 @@ def read_height_map(
             f"{file.name} must hold finite heights: {len(wrong)} are not, first in row {wrong[0][0] + 1} and "
             f"column {wrong[0][1] + 1}."
         )
+    if np.abs(heights).max(initial=0.0) * height_mm > LARGEST_MM:
+        raise InputError(
+            f"{file.name} must have heights within {LARGEST_MM:g} mm: the largest is "
+            f"{np.abs(heights).max():.4g} times {height_mm:g} mm; check height_mm."
+        )
     try:
-        return height_surface(height_mm * heights, pitch_mm, smooth_below_deg)
+        return height_surface(height_mm * heights, pitch_mm, smooth_below_deg, edge_radius_mm)
     except InputError as error:
         raise InputError(f"{file.name}: {error}") from error
 

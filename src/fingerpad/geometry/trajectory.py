@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from fingerpad.core.checks import FloatArray, float_array, increasing
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import HOLD, RAMP, Phase
+from fingerpad.core.values import converted
 from fingerpad.data import protocol
 from fingerpad.geometry.motion import STILL, Cycles, Motion, Pose, hold_ends_ms
 
@@ -39,6 +40,7 @@ SAME_VALUE = 0.02
 
 
 @dataclass(frozen=True)
+@converted
 class Trajectory(Motion):
     """Move the indenter along any course of depth or of force, back as well as forth, aside and turning.
 
@@ -316,7 +318,8 @@ def check_speed(
 
     `place` says where the later of the two stands, from its number, and begins the message.
     """
-    speed = np.abs(np.diff(values_mm)) / np.diff(times_ms)
+    with np.errstate(over="ignore"):
+        speed = np.abs(np.diff(values_mm)) / np.diff(times_ms)
     fastest = int(speed.argmax())
     if speed[fastest] > protocol.FASTEST.value:  # 1 mm/ms is 1 m/s
         raise InputError(

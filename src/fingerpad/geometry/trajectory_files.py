@@ -10,6 +10,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, finite
 from fingerpad.core.errors import InputError
+from fingerpad.core.files import path_of
 from fingerpad.core.phases import Phase
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.core.units import MN_PER_N, MS_PER_S
@@ -75,7 +76,7 @@ def read_trajectory(
     >>> [round(time, 6) for time in motion.times_ms], motion.depth_mm
     ([0.0, 50.0, 500.0], (0.0, 0.8, 0.8))
     """
-    rows = read_csv(Path(path), tuple(COLUMNS))
+    rows = read_csv(path_of("path", path), tuple(COLUMNS))
     columns = _columns(rows, str(path))
     times_ms = columns.pop("times_ms")
     _check_times(times_ms, rows)
