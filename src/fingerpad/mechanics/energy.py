@@ -22,19 +22,23 @@ from __future__ import annotations
 
 import ast
 import operator
+import warnings
 from collections.abc import Callable, Mapping
 
 import numpy as np
 from numba import njit
 
 from fingerpad.core.checks import FloatArray, finite
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import InputError, shown
 
 VARIABLES = (
     "lambdabar1", "lambdabar2", "lambdabar3", "lambda1", "lambda2", "lambda3", "J", "I1", "I2",
 )  # fmt: skip
 FUNCTIONS = ("log", "exp", "sqrt")
 MOST_OPERATIONS = 200
+LONGEST_FORMULA = 4000
+"""Characters of a formula."""
+
 
 VARIABLE, ADD, SUBTRACT, MULTIPLY, DIVIDE, SCALE, SHIFT, POWER, LOG, EXP = range(10)
 OPERATION_SIZE = 4
@@ -89,9 +93,12 @@ class _Translator:
     """Walks over a parsed formula; a part is either a number or the index of an operation."""
 
     def __init__(self, formula: str, coefficients: Mapping[str, float]):
-        if not isinstance(formula, str):
-            raise InputError(f"An energy must be a formula, a string: got {formula!r}.")
-        self.formula = formula
+        if not isinstance(formula, str) or len(formula) > LONGEST_FORMULA:
+            raise InputError(
+                f"An energy must be a formula, a text of at most {LONGEST_FORMULA:,} characters: got "
+                f"{shown(formula)}."
+            )
+        self.formula, self.said = formula, shown(formula)
         self.coefficients = {name: finite(name, value) for name, value in coefficients.items()}
         for name in self.coefficients:
             if name in VARIABLES or name in FUNCTIONS:
@@ -103,22 +110,24 @@ class _Translator:
 
     def program(self) -> FloatArray:
         try:
-            tree = ast.parse(self.formula, mode="eval")
-        except SyntaxError as error:
-            raise InputError(f"The energy {self.formula!r} is not a formula: {error.msg}.") from error
+            with warnings.catch_warnings(action="ignore"):  # of text that is next to a formula, such as 1if
+                tree = ast.parse(self.formula, mode="eval")
+        except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+            said = getattr(error, "msg", None) or "it is nested too deep"
+            raise InputError(f"The energy {self.said} is not a formula: {said}.") from error
         try:
             result = self.part(tree.body)
         except (ArithmeticError, RecursionError) as error:
-            raise InputError(f"The energy {self.formula!r} cannot be evaluated: {error}.") from error
+            raise InputError(f"The energy {self.said} cannot be evaluated: {error}.") from error
         if self.unused:
             raise InputError(
-                f"The energy {self.formula!r} does not use the coefficient {min(self.unused)!r}: remove it."
+                f"The energy {self.said} does not use the coefficient {min(self.unused)!r}: remove it."
             )
         if isinstance(result, float):
-            raise InputError(f"The energy {self.formula!r} does not depend on the deformation.")
+            raise InputError(f"The energy {self.said} does not depend on the deformation.")
         if len(self.operations) > MOST_OPERATIONS:
             raise InputError(
-                f"The energy {self.formula!r} needs {len(self.operations)} operations, more than "
+                f"The energy {self.said} needs {len(self.operations)} operations, more than "
                 f"{MOST_OPERATIONS}: simplify it."
             )
         return np.array(list(self.operations), dtype=np.float64)
@@ -139,7 +148,7 @@ class _Translator:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
             return self.function(node.func.id, [self.part(argument) for argument in node.args])
         raise InputError(
-            f"The energy {self.formula!r} may hold numbers, names, + - * / ** and {', '.join(FUNCTIONS)}: "
+            f"The energy {self.said} may hold numbers, names, + - * / ** and {', '.join(FUNCTIONS)}: "
             f"got {ast.unparse(node)!r}."
         )
 
@@ -150,7 +159,7 @@ class _Translator:
             self.unused.discard(name)
             return self.coefficients[name]
         raise InputError(
-            f"The energy {self.formula!r} uses {name!r}, which is neither one of {', '.join(VARIABLES)} "
+            f"The energy {self.said} uses {name!r}, which is neither one of {', '.join(VARIABLES)} "
             "nor a coefficient: give its value."
         )
 
@@ -180,7 +189,7 @@ class _Translator:
     def power(self, base: float | int, exponent: float | int) -> float | int:
         if not isinstance(exponent, float):
             raise InputError(
-                f"An exponent in the energy {self.formula!r} must be a number: write exp(b * log(a))."
+                f"An exponent in the energy {self.said} must be a number: write exp(b * log(a))."
             )
         if isinstance(base, float):
             folded = base**exponent
@@ -190,7 +199,7 @@ class _Translator:
     def function(self, name: str, arguments: list[float | int]) -> float | int:
         if name not in FUNCTIONS or len(arguments) != 1:
             raise InputError(
-                f"The energy {self.formula!r} calls {name} with {len(arguments)} argument(s): "
+                f"The energy {self.said} calls {name} with {len(arguments)} argument(s): "
                 f"only {', '.join(FUNCTIONS)} of one argument can be used."
             )
         argument = arguments[0]

@@ -87,6 +87,22 @@ def fastest_hz(motion: Motion) -> float:
     return float(MS_PER_S * (fastest[counts] / (np.pi * way[counts])).max(initial=0.0))
 
 
+def inertial_share(
+    motion: Motion, materials: Sequence[Material], thickness_mm: ArrayLike
+) -> tuple[float, float, float]:
+    """Force that accelerates the tissue over its elastic force, (f / f_0)², with f and f_0. [1, Hz, Hz]
+
+    Parameters
+    ----------
+    motion : Motion
+        Motion of the indenter.
+    materials, thickness_mm
+        As in `resonance_hz`.
+    """
+    resonance, fastest = resonance_hz(materials, thickness_mm), fastest_hz(motion)
+    return (fastest / resonance) ** 2, fastest, resonance
+
+
 def warn_of_inertia(motion: Motion, materials: Sequence[Material], thickness_mm: ArrayLike) -> None:
     """Warn if a motion is so fast that the inertia of the tissue matters.
 
@@ -102,8 +118,7 @@ def warn_of_inertia(motion: Motion, materials: Sequence[Material], thickness_mm:
     InertiaWarning
         If the share of the force that accelerates the tissue is above `LARGEST_SHARE`.
     """
-    resonance, fastest = resonance_hz(materials, thickness_mm), fastest_hz(motion)
-    share = (fastest / resonance) ** 2
+    share, fastest, resonance = inertial_share(motion, materials, thickness_mm)
     if share > LARGEST_SHARE:
         warnings.warn(
             f"The fastest part of the motion is as fast as a vibration of {fastest:.3g} Hz, at which the "

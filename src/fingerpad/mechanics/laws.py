@@ -15,6 +15,7 @@ The polynomial has its own compiled kernel; every other law is differentiated fr
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -23,7 +24,8 @@ from typing import Protocol, Self
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, finite, not_negative, positive
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import InputError, shown
+from fingerpad.core.values import converted
 from fingerpad.mechanics.energy import CARRIED, SECOND, differentiate, translate
 
 
@@ -51,6 +53,7 @@ class Law(Protocol):
 
 
 @dataclass(frozen=True)
+@converted
 class Energy:
     """A law of your own: its energy as a formula in the principal stretches or invariants.
 
@@ -61,7 +64,7 @@ class Energy:
     ----------
     formula : str
         Energy per reference volume [kPa] from `lambda1` ... `lambda3`, `lambdabar1` ... `lambdabar3`, `I1`,
-        `I2`, `J` (see `mechanics.energy`), numbers, coefficients, + - * / **, log, exp and sqrt.
+        `I2`, `J` (see `mechanics.energy`), numbers, coefficients, ``+ - * / **``, log, exp and sqrt.
     coefficients : tuple of (str, float)
         Names and values.
 
@@ -82,25 +85,33 @@ class Energy:
     coefficients: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
+        for name, count in Counter(name for name, _ in self.coefficients).items():
+            if count > 1:
+                raise InputError(f"coefficients must name each once: {name} is given {count} times.")
         for logs in _PROBES:
             if not np.isfinite(self.derivatives(logs)).all():
                 stretches = ", ".join(f"{value:.3g}" for value in np.exp(logs[:3] + logs[3] / 3))
-                raise InputError(f"The energy {self.formula!r} is not finite at the stretches {stretches}.")
+                raise InputError(f"The energy {self._said} is not finite at the stretches {stretches}.")
             values = [self.derivatives([*np.roll(logs[:3], turn), logs[3]])[0] for turn in range(3)]
             values.append(self.derivatives([*logs[[1, 0, 2]], logs[3]])[0])
             if np.ptp(values) > 1e-9 * max(1e-300, np.abs(values).max()):
                 raise InputError(
-                    f"The energy {self.formula!r} must not prefer a direction: it changes when the principal "
+                    f"The energy {self._said} must not prefer a direction: it changes when the principal "
                     "stretches are exchanged."
                 )
-        positive(f"the initial shear modulus of {self.formula!r}", self.shear_modulus_kpa, "kPa")
-        positive(f"the initial bulk modulus of {self.formula!r}", self.bulk_modulus_kpa, "kPa")
+        positive(f"the initial shear modulus of {self._said}", self.shear_modulus_kpa, "kPa")
+        positive(f"the initial bulk modulus of {self._said}", self.bulk_modulus_kpa, "kPa")
         pressure = self.derivatives(np.zeros(4))[4]
         if abs(pressure) > 1e-9 * self.bulk_modulus_kpa:
             raise InputError(
-                f"The energy {self.formula!r} must be free of stress at rest: its mean stress there is "
+                f"The energy {self._said} must be free of stress at rest: its mean stress there is "
                 f"{pressure:.3g} kPa."
             )
+
+    @property
+    def _said(self) -> str:
+        """The formula in an error."""
+        return shown(self.formula)
 
     @property
     def energy(self) -> Energy:
@@ -169,6 +180,7 @@ class _OfModuli:
 
 
 @dataclass(frozen=True)
+@converted
 class Polynomial(_OfModuli):
     """Polynomial N = 2 in the isochoric invariants; neo-Hooke and Mooney-Rivlin among them.
 
@@ -227,6 +239,7 @@ class Polynomial(_OfModuli):
 
 
 @dataclass(frozen=True)
+@converted
 class _Powers(_OfModuli):
     """Common part of laws that are a sum of up to three powers of stretches."""
 
@@ -265,6 +278,7 @@ class _Powers(_OfModuli):
 
 
 @dataclass(frozen=True)
+@converted
 class Ogden(_Powers):
     """Sum of up to three powers of the isochoric stretches.
 
@@ -307,6 +321,7 @@ class Ogden(_Powers):
 
 
 @dataclass(frozen=True)
+@converted
 class Hyperfoam(_Powers):
     """Storakers' compressible foam (1986), with one Poisson's ratio for all terms: the form of Wu's tissues.
 
@@ -353,6 +368,7 @@ class Hyperfoam(_Powers):
 
 
 @dataclass(frozen=True)
+@converted
 class Hencky(_OfModuli):
     """Quadratic in the logarithmic strain: Hooke's law between Kirchhoff stress and logarithmic strain.
 
@@ -393,16 +409,18 @@ class Hencky(_OfModuli):
         )
 
 
-def check_poisson(poisson: float) -> None:
-    """Raise `InputError` unless Poisson's ratio lies between 0 and 0.5."""
-    if not 0.0 < finite("poisson", poisson) < 0.5:
+def check_poisson(poisson: float) -> float:
+    """Return Poisson's ratio as float if it lies between 0 and 0.5, else raise `InputError`."""
+    ratio = finite("poisson", poisson)
+    if not 0.0 < ratio < 0.5:
         raise InputError(
             f"poisson must lie between 0 and 0.5, both excluded: got {poisson!r}; "
             "take 0.4999 for a tissue that hardly changes its volume."
         )
+    return ratio
 
 
 def bulk_modulus(shear_kpa: float, poisson: float) -> float:
     """Bulk modulus K = 2 G (1 + nu) / (3 (1 - 2 nu)). [kPa]"""
-    check_poisson(poisson)
+    poisson = check_poisson(poisson)
     return 2 * shear_kpa * (1 + poisson) / (3 * (1 - 2 * poisson))

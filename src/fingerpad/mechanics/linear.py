@@ -17,6 +17,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.geometry.mesh import Mesh
+from fingerpad.mechanics.aggregation import SmoothedAggregation
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.columns import MOST_LANES
 from fingerpad.mechanics.factors import NotPositiveDefiniteError, SuperLuFactor
@@ -173,11 +174,12 @@ def choose_preconditioner(
             f"Poisson's ratio {poisson:.4g} is within {DIRECT_POISSON}."
         )
         return KeptFactor(sparsity, free), reason
-    if not mesh.is_grid:
-        raise InputError(
-            f"A mesh that is no grid must have at most {DIRECT_NODES} nodes: got {n_nodes}; use a coarser "
-            "mesh."
+    if not mesh.is_grid and poisson <= MULTIGRID_POISSON + 1e-9:
+        reason = (
+            f"algebraic multigrid by smoothed aggregation (PyAMG): {n_nodes} nodes without rows and columns "
+            f"are more than {DIRECT_NODES}, and Poisson's ratio {poisson:.4g} is within {MULTIGRID_POISSON}."
         )
+        return SmoothedAggregation(sparsity, free, mesh.nodes_mm), reason
     raise InputError(
         f"Poisson's ratio must not exceed {MULTIGRID_POISSON} for a mesh of more than {DIRECT_NODES} nodes: "
         f"got {poisson:.6g} and {n_nodes} nodes; use a smaller ratio or a coarser mesh."

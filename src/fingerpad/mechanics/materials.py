@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, float_array, instance, not_negative, one_of, positive
-from fingerpad.core.errors import InputError, MaterialWarning
+from fingerpad.core.checks import FloatArray, finite, float_array, instance, not_negative, one_of, positive
+from fingerpad.core.errors import InputError, MaterialWarning, shown
+from fingerpad.core.values import converted
 from fingerpad.mechanics.laws import (
     Energy,
     Hencky,
@@ -39,6 +40,7 @@ def has_formulas(law: FloatArray) -> bool | None:
 
 
 @dataclass(frozen=True)
+@converted
 class Prony:
     """Relaxation of the deviatoric stress: g(t) = 1 - sum g_i (1 - exp(-t / tau_i)).
 
@@ -82,6 +84,7 @@ class Prony:
 
 
 @dataclass(frozen=True)
+@converted
 class Material:
     """A tissue: a strain energy and how its stress relaxes.
 
@@ -120,7 +123,9 @@ class Material:
 
     def __post_init__(self) -> None:
         if not isinstance(self.law, Polynomial | Ogden | Hyperfoam | Hencky | Energy):
-            raise InputError(f"law must be Polynomial, Ogden, Hyperfoam, Hencky or Energy: got {self.law!r}.")
+            raise InputError(
+                f"law must be Polynomial, Ogden, Hyperfoam, Hencky or Energy: got {shown(self.law)}."
+            )
         instance("prony", self.prony, Prony)
         one_of("moduli", self.moduli, ("long_term", "instantaneous"))
         unstable = instability(self.law)
@@ -132,9 +137,9 @@ class Material:
         cls, shear_kpa: float, poisson: float, prony: Prony = Prony(), moduli: str = "long_term"
     ) -> Material:
         """Neo-Hooke from shear modulus and Poisson's ratio. [kPa]"""
-        positive("shear_kpa", shear_kpa, "kPa")
-        bulk = bulk_modulus(shear_kpa, poisson)
-        return cls(Polynomial(c10=shear_kpa / 2, bulk_linear=bulk / 2), prony, moduli)
+        shear = positive("shear_kpa", shear_kpa, "kPa")
+        bulk = bulk_modulus(shear, poisson)
+        return cls(Polynomial(c10=shear / 2, bulk_linear=bulk / 2), prony, moduli)
 
     @classmethod
     def linear_elastic(
@@ -146,9 +151,7 @@ class Material:
         law: str = "neo_hooke",
     ) -> Material:
         """Hooke's law at small strain; at large strain "neo_hooke" or "hencky" with the same moduli. [kPa]"""
-        positive("young_kpa", young_kpa, "kPa")
-        check_poisson(poisson)
-        shear = young_kpa / (2 * (1 + poisson))
+        shear = positive("young_kpa", young_kpa, "kPa") / (2 * (1 + check_poisson(poisson)))
         if one_of("law", law, ("neo_hooke", "hencky")) == "neo_hooke":
             return cls.neo_hooke(shear, poisson, prony, moduli)
         return cls(Hencky(shear, bulk_modulus(shear, poisson)), prony, moduli)
@@ -166,7 +169,8 @@ class Material:
         moduli: str = "long_term",
     ) -> Material:
         """Polynomial N = 2 (Mooney-Rivlin if c20 = c11 = c02 = 0) of a given Poisson's ratio. [kPa]"""
-        bulk = bulk_modulus(positive("2 (c10 + c01)", 2 * (c10 + c01), "kPa"), poisson)
+        half = finite("c10", c10, "kPa") + finite("c01", c01, "kPa")
+        bulk = bulk_modulus(positive("2 (c10 + c01)", 2 * half, "kPa"), poisson)
         return cls(Polynomial(c10, c01, c20, c11, c02, bulk_linear=bulk / 2), prony, moduli)
 
     @classmethod
@@ -179,7 +183,8 @@ class Material:
         moduli: str = "long_term",
     ) -> Material:
         """Ogden N <= 3 whose bulk modulus follows from the initial shear modulus. [kPa]"""
-        bulk = bulk_modulus(positive("the sum of moduli_kpa", sum(moduli_kpa), "kPa"), poisson)
+        total = float(float_array("moduli_kpa", moduli_kpa, 1).sum())
+        bulk = bulk_modulus(positive("the sum of moduli_kpa", total, "kPa"), poisson)
         return cls(Ogden(tuple(moduli_kpa), tuple(exponents), bulk), prony, moduli)
 
     @classmethod
@@ -237,6 +242,7 @@ class Material:
 
 
 @dataclass(frozen=True)
+@converted
 class Tissues:
     """The four layers of the fingertip from the outside in.
 

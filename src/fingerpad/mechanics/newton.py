@@ -21,6 +21,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, positive, whole
 from fingerpad.core.errors import ConvergenceError
+from fingerpad.core.values import converted
 from fingerpad.geometry.mesh_quality import element_place, squeezed_most
 from fingerpad.mechanics.configuration import Balance, Body, Configuration, Lagging, Load, evaluate
 from fingerpad.mechanics.contact import ContactState
@@ -73,6 +74,7 @@ FIRST_DEPTH_MM, MOST_ADVANCE = 0.01, 4.0
 
 
 @dataclass(frozen=True)
+@converted
 class NewtonSettings:
     """When an equilibrium counts as found.
 

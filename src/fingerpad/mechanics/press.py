@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from fingerpad.core.checks import FloatArray, float_array, increasing, positive, whole
 from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.values import converted
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.mesh_checks import check_mesh
@@ -88,6 +89,7 @@ LIFT_MM = 100.0
 
 
 @dataclass(frozen=True)
+@converted
 class PressSettings:
     """Steps in time and tolerances of a press.
 
