@@ -1,9 +1,10 @@
 """Hash of what the mechanical sources do: their syntax trees without what cannot change a number.
 
-Left out are comments, docstrings, formatting, annotations of functions, the text of error messages, names of
-files and of classes, and imports from the package itself. A class is represented by a tag, which is a hash of
-its own syntax tree; an imported name is represented by the name under which it was defined. Everything else
-counts: constants, names of functions and fields, defaults, order of statements.
+Left out are comments, docstrings, formatting, annotations of functions, the text of error messages, what a
+value shows of itself, names of files and of classes, and imports from the package itself. A class is
+represented by a tag, which is a hash of its own syntax tree; an imported name is represented by the name
+under which it was defined. Everything else counts: constants, names of functions and fields, defaults, order
+of statements.
 """
 
 from __future__ import annotations
@@ -34,6 +35,8 @@ MECHANICAL_SOURCES = (
 
 _IDENTIFIER = re.compile(r"<(\w+)>")
 _NO_MEANING = ("ctx", "kind", "type_comment", "returns")
+_SHOWING = ("__repr__", "_repr_html_", "plot")
+"""Methods by which a value shows itself."""
 
 
 @dataclass(frozen=True)
@@ -170,8 +173,8 @@ class _Reader:
         return text
 
     def _counts(self, node: Any) -> bool:
-        """Whether a statement does anything; `pass`, docstrings and imports from the package do not."""
-        if isinstance(node, ast.Pass):
+        """Whether a statement alters a number; `pass`, docstrings, imports from the package do not."""
+        if isinstance(node, ast.Pass) or (isinstance(node, ast.FunctionDef) and node.name in _SHOWING):
             return False
         if isinstance(node, ast.Expr):
             return not isinstance(node.value, ast.Constant)

@@ -8,13 +8,15 @@ from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from fingerpad.core.checks import FloatArray, finite, instance, one_of
+from fingerpad.core.checks import FloatArray, finite, instance, one_of, pair
 from fingerpad.core.compilation import announce_compilation
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.threads import compiled_threads
+from fingerpad.core.values import converted
 from fingerpad.data import fingertip as published
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Finger, Fingertip
@@ -32,7 +34,7 @@ from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.press import Deformation, PressSettings, press
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.skin.fields import stored_fields
-from fingerpad.skin.sampling import SkinResponse
+from fingerpad.skin.sampling import SkinResponse, places_below, receptors_of
 
 CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
 STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
@@ -43,8 +45,12 @@ LONGEST_STEP = 2.5
 
 LARGEST_TILT_DEG = 45.0
 
+FEWEST_ACROSS_BODY = 3
+"""Least number of elements across a body that is narrow along and across the finger."""
+
 
 @dataclass(frozen=True)
+@converted
 class Touch(metaclass=KnownKeywords):
     """Everything that determines one indentation; its value is the key of the stored result.
 
@@ -149,14 +155,27 @@ class Touch(metaclass=KnownKeywords):
         to_bone_mm = float(self.finger.depth_available_mm(*self.at_mm))
         return np.diff([0.0, *depths, max(to_bone_mm, depths[-1])])
 
+    def check_sites(self, sites_mm: ArrayLike) -> None:
+        """Raise `InputError` if the skin could not be sampled at a site, as `SkinResponse.sed` would.
+
+        Examples
+        --------
+        >>> from fingerpad.geometry.indenters import Sphere
+        >>> touch_of(Fingertip(), Sphere(), resolution="quick").check_sites([[99.0, 0.0]])
+        Traceback (most recent call last):
+        fingerpad.core.errors.InputError: sites must lie on the volar skin of the mesh: (x, z) = (99, 0) ...
+        """
+        places_below(receptors_of(self.mesh), sites_mm)
+
     def _check_sizes(self) -> None:
         """Check that elements are small enough: a body, ridge or groove between two nodes has no effect."""
         size_mm, narrowest_mm = max(sizes_across(self.grading, self.spin_deg)), self.indenter.narrowest_mm
-        width_mm = 2 * self.indenter.half_width_mm
-        if size_mm > width_mm:
+        fewest = FEWEST_ACROSS_BODY if self.indenter.symmetry_deg is None else 1
+        largest_mm = 2 * self.indenter.half_width_mm / fewest
+        if size_mm > largest_mm:
             raise InputError(
-                f"grading must have elements of at most {width_mm:g} mm, the width of the "
-                f"{type(self.indenter).__name__}, which would go between the nodes: got {size_mm:g} mm; "
+                f"grading must have elements of at most {largest_mm:g} mm, because the "
+                f"{type(self.indenter).__name__} would go between the nodes: got {size_mm:g} mm; "
                 "give a finer grading or a wider body."
             )
         if size_mm > narrowest_mm / FEWEST_ACROSS_GROOVE:
@@ -394,10 +413,4 @@ def settings_of(resolution: str) -> PressSettings:
 
 def _position(at_mm: Sequence[float] | None, finger: Finger) -> tuple[float, float]:
     """Check a place of contact; without one it is the finger's."""
-    if at_mm is None:
-        return finger.contact_mm
-    try:
-        x, z = at_mm
-    except (TypeError, ValueError) as error:
-        raise InputError(f"at_mm must be a pair, x and z in mm: got {at_mm!r}.") from error
-    return finite("x of at_mm", x, "mm"), finite("z of at_mm", z, "mm")
+    return finger.contact_mm if at_mm is None else pair("at_mm", at_mm)

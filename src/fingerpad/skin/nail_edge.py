@@ -23,6 +23,7 @@ from fingerpad.core.checks import FloatArray, float_array, instance, positive, w
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Layout, mean_spacing_mm
 from fingerpad.core.regions import Polygon
+from fingerpad.core.values import converted
 from fingerpad.geometry.fingertip import Fingertip
 
 REACH_MM = 4.0
@@ -34,6 +35,7 @@ _ROUND_OFF_MM = 1e-6
 
 
 @dataclass(frozen=True)
+@converted
 class NailEdge:
     """The plane of the skin around a finger's nail.
 

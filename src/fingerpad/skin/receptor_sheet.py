@@ -25,9 +25,9 @@ from functools import cached_property, partial
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
-from fingerpad.core.threads import in_blocks
+from fingerpad.core.threads import current_threads, in_blocks
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.skin.grid_cubic import coefficients, values_and_slopes_at, values_at
 
@@ -36,6 +36,9 @@ _PADDING = 24
 
 _TIMES_PER_BLOCK = 64
 """Times that one thread interpolates at once: their padded sheet stays in the cache."""
+
+_SITES_PER_BLOCK = 4096
+"""Sites that one thread locates at once."""
 
 _MOST_STEPS = 60
 _LONGEST_STEP = 2.0  # elements
@@ -97,7 +100,7 @@ class ReceptorSheet:
             If a site is not on the skin.
         """
         target = self._in_mesh(sites_mm)
-        start = self._middles[cKDTree(self._skin(self._middles)[0]).query(target)[1]]
+        start = self._middles[_nearest(self._skin(self._middles)[0], target)]
         uv, missed = self._solve(lambda uv, which: _tangential(self._skin(uv), target[which]), start)
         point, *slopes = self._skin(uv)
         away = np.linalg.norm(point - target, axis=1)
@@ -132,7 +135,7 @@ class ReceptorSheet:
         """
         target = self._in_mesh(organs_mm)
         volar = self._middles[self._volar.ravel()]
-        start = volar[cKDTree(self._centre(volar)[0][:, [0, 2]]).query(target)[1]]
+        start = volar[_nearest(self._centre(volar)[0][:, [0, 2]], target)]
         uv, missed = self._solve(lambda uv, which: _projected(self._centre(uv), target[which]), start)
         missed |= self._turn(uv) * self._volar_sign <= 0.0
         missed |= self._past_the_rim(target)
@@ -175,6 +178,14 @@ class ReceptorSheet:
 
     def _solve(self, equations: Equations, start: FloatArray) -> tuple[FloatArray, np.ndarray]:
         """(u, v) of every site by Newton's method, and whether it did not converge, bool (n,)."""
+
+        def block(sites: slice) -> tuple[FloatArray, np.ndarray]:
+            return self._newton(lambda uv, which: equations(uv, sites.start + which), start[sites])
+
+        uv, missed = zip(*in_blocks(block, max(len(start), 1), _SITES_PER_BLOCK), strict=True)
+        return np.concatenate(uv), np.concatenate(missed)
+
+    def _newton(self, equations: Equations, start: FloatArray) -> tuple[FloatArray, np.ndarray]:
         uv = start.copy()
         open_sites = np.arange(len(uv))
         for _ in range(_MOST_STEPS):
@@ -350,27 +361,31 @@ class ReceptorSheet:
         first, last = (True, True) if self._closed else self._mirrors
         around = known
         if not first:
-            around = np.concatenate([_straight_on(around[:, 1::-1])[:, ::-1], around], axis=1)
+            around = np.concatenate([_straight_on(around, 1, 0, axis=1)[:, ::-1], around], axis=1)
         if not last:
-            around = np.concatenate([around, _straight_on(around[:, -2:])], axis=1)
+            around = np.concatenate([around, _straight_on(around, -2, -1, axis=1)], axis=1)
         n_around = around.shape[1]
         steps = np.arange(-_PADDING if first else 0, n_around + (_PADDING if last else 0))
         turns, steps = np.divmod(steps, n_around)
         odd = (turns % 2 == 1) & (not self._closed)
-        around = np.where(odd[:, None], mirror, 1.0) * around[:, np.where(odd, n_around - 1 - steps, steps)]
-        rows = np.moveaxis(around, 0, 1)
-        start = _straight_on(rows[:, 1::-1])[:, ::-1]
+        rows = around[:, np.where(odd, n_around - 1 - steps, steps)]
+        rows[:, odd] *= mirror
         if self._ends_in_pole:
-            back = np.maximum(len(known) - 1 - np.arange(_PADDING), 0)
-            end = 2.0 * pole - rows[:, back]
+            end = 2.0 * pole - rows[np.maximum(len(known) - 1 - np.arange(_PADDING), 0)]
         else:
-            end = _straight_on(rows[:, -2:])
-        return coefficients(np.moveaxis(np.concatenate([start, rows, end], axis=1), 0, 1))
+            end = _straight_on(rows, -2, -1, axis=0)
+        return coefficients(np.concatenate([_straight_on(rows, 1, 0, axis=0)[::-1], rows, end]))
 
 
 def _surface(control: FloatArray) -> Surface:
     """Surface with these coefficients of its spline."""
     return partial(values_and_slopes_at, control, padding=_PADDING)
+
+
+def _nearest(points: FloatArray, targets: FloatArray) -> IntArray:
+    """Find the number of the nearest point to each target."""
+    found: IntArray = cKDTree(points).query(targets, workers=current_threads())[1]
+    return found
 
 
 def _bulge(nodes: FloatArray, axis: int) -> FloatArray:
@@ -379,9 +394,10 @@ def _bulge(nodes: FloatArray, axis: int) -> FloatArray:
     return np.moveaxis((second + third - first - fourth) / 16.0, 0, axis)
 
 
-def _straight_on(ends: FloatArray) -> FloatArray:
-    """Continue rows along a line through their last two: (n, 2, k) -> (n, _PADDING, k)."""
-    return ends[:, 1:] + np.arange(1.0, _PADDING + 1)[:, None] * (ends[:, 1:] - ends[:, :1])
+def _straight_on(values: FloatArray, inner: int, outer: int, axis: int) -> FloatArray:
+    """Continue rows or columns of (n_along, n_around, k) along a line through two of them, by `_PADDING`."""
+    before, end = (np.take(values, [which], axis) for which in (inner, outer))
+    return end + np.arange(1.0, _PADDING + 1).reshape((-1, 1, 1)[: 3 - axis]) * (end - before)
 
 
 def _tangential(surface: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -2,33 +2,47 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, one_of
+from fingerpad.core.checks import FloatArray, float_array, increasing, instance, one_of
+from fingerpad.core.displayed import Displayed
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase
-from fingerpad.core.signals import STORED_ENERGY, SedTraces
+from fingerpad.core.signals import STORED_ENERGY, ResponseMap, SedTraces
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.motion import STILL, Pose
+from fingerpad.skin.caveats import Caveat, caveats_of
 from fingerpad.skin.fields import Place, sampled_fields, stored_fields
 from fingerpad.skin.receptor_sheet import ReceptorSheet
 from fingerpad.skin.section import Section, middle_section
 from fingerpad.skin.surface_motion import SURFACE_QUANTITIES, SurfaceMotion
 
 if TYPE_CHECKING:
+    import xarray
+
     from fingerpad.mechanics.press import Deformation
     from fingerpad.skin.indentation import Touch
 
 
+_PLACES_KEPT = 4
+"""Sets of sites whose end organs are remembered."""
+
+
 class Receptors(Protocol):
     """Places of end organs in a mesh, and values there."""
+
+    @property
+    def mesh(self) -> Mesh:
+        """The undeformed body."""
+        ...
 
     def below(self, sites_mm: FloatArray) -> Any:
         """Find end organs below points of the skin, (n_sites, 3)."""
@@ -58,13 +72,24 @@ class SurfaceProfile:
     distance_mm: FloatArray
     deflection_mm: FloatArray
 
+    def __post_init__(self) -> None:
+        distance = increasing("distance_mm", float_array("distance_mm", self.distance_mm, 1))
+        deflection = float_array("deflection_mm", self.deflection_mm, 1)
+        if not distance.size or distance.shape != deflection.shape:
+            raise InputError(
+                "SurfaceProfile needs one deflection per distance: got "
+                f"{deflection.size} for {distance.size} distances."
+            )
+        object.__setattr__(self, "distance_mm", distance)
+        object.__setattr__(self, "deflection_mm", deflection)
+
     def at(self, distance_mm: ArrayLike) -> FloatArray:
         """Deflection at other distances, linear between nodes. [mm]"""
         return np.interp(np.asarray(distance_mm, dtype=float), self.distance_mm, self.deflection_mm)
 
 
-@dataclass(frozen=True)
-class SkinResponse:
+@dataclass(frozen=True, repr=False)
+class SkinResponse(Displayed):
     """Response of the skin to one indentation; the end of the mechanical half of the chain.
 
     Parameters
@@ -123,6 +148,7 @@ class SkinResponse:
     touch: Touch | None = None
 
     def __post_init__(self) -> None:
+        instance("fields", self.fields, Mapping)
         declared = {field.name: field for field in stored_fields()}
         for name, values in self.fields.items():
             shape = declared[one_of("field", name, tuple(declared))].shape(self.mesh, self.times_ms.size)
@@ -130,6 +156,29 @@ class SkinResponse:
                 raise InputError(f"Field {name} must have the shape {shape}: got {values.shape}.")
             if not np.isfinite(values).all():
                 raise InputError(f"Field {name} must be finite everywhere: some values are not.")
+
+    @cached_property
+    def caveats(self) -> tuple[Caveat, ...]:
+        """Where this result lies outside of what was verified; empty if nowhere."""
+        return caveats_of(self)
+
+    def __repr__(self) -> str:
+        body = "" if self.touch is None else f"{self.touch.indenter!r}, "
+        return (
+            f"SkinResponse({body}{self.times_ms.size} times to {self.times_ms[-1]:g} ms, at most "
+            f"{self.depth_mm.max():.3g} mm and {self.force_mn.max():.3g} mN)"
+        )
+
+    def to_xarray(self, response: ResponseMap | None = None) -> xarray.Dataset:
+        """Return this result, and the response of a population to it, as one labelled data set.
+
+        Raises
+        ------
+        InputError
+            Without the extra `fingerpad[netcdf]`.
+        """
+        made: xarray.Dataset = resolve_name("fingerpad.export.dataset:touch_dataset")(self, response)
+        return made
 
     def with_fields(self, **fields: FloatArray) -> SkinResponse:
         """Return the same response with other values of some fields."""
@@ -139,6 +188,11 @@ class SkinResponse:
     def times_ms(self) -> FloatArray:
         """Times from 0, the unloaded state, (n_times,). [ms]"""
         return self.fields["times_ms"]
+
+    @property
+    def pad_mm(self) -> tuple[float, float] | None:
+        """X and z of the middle of the pad of the finger, None if `touch` is not known. [mm]"""
+        return None if self.touch is None else self.touch.finger.contact_mm
 
     @property
     def force_mn(self) -> FloatArray:
@@ -296,12 +350,15 @@ class SkinResponse:
     def _read(self, quantities: Iterable[str], sites: ArrayLike) -> list[FloatArray]:
         """Several quantities at the same sites, (n_times, n_sites) each."""
         known = [self._of_sheet(quantity) for quantity in quantities]
-        points = float_array("sites", sites, 2)
-        if points.shape[1] not in (2, 3):
-            raise InputError(f"sites needs columns x and z, or x, y and z, in mm: got shape {points.shape}.")
-        places = self._receptors.under(points) if points.shape[1] == 2 else self._receptors.below(points)
-        # A spline may dip below zero beside a steep front; none of the quantities can.
-        return [np.maximum(self._receptors.read(places, values), 0.0) for values in known]
+        places = places_below(self._receptors, sites)
+        return [self._not_negative(self._receptors.read(places, values)) for values in known]
+
+    @staticmethod
+    def _not_negative(read: FloatArray) -> FloatArray:
+        """Freeze values of a spline, which may dip below zero beside a steep front; no quantity can."""
+        np.maximum(read, 0.0, out=read)
+        read.setflags(write=False)
+        return read
 
     def _of_sheet(self, quantity: str) -> FloatArray:
         """One quantity in the elements `mesh.living_epidermis` or above them, (n_times, n_sheet)."""
@@ -319,8 +376,55 @@ class SkinResponse:
 
     @cached_property
     def _receptors(self) -> Receptors:
-        if self.mesh.is_grid:
-            return ReceptorSheet(self.mesh)
-        # Loaded for those who have a mesh of their own.
-        free: Receptors = resolve_name("fingerpad.skin.free_receptors:FreeReceptors")(self.mesh)
-        return free
+        return receptors_of(self.mesh)
+
+
+def receptors_of(mesh: Mesh) -> Receptors:
+    """Return what finds end organs in a mesh and reads fields there."""
+    if mesh.is_grid:
+        return ReceptorSheet(mesh)
+    # Loaded for those who have a mesh of their own.
+    free: Receptors = resolve_name("fingerpad.skin.free_receptors:FreeReceptors")(mesh)
+    return free
+
+
+def places_below(receptors: Receptors, sites: ArrayLike) -> Any:
+    """Find end organs by their x and z on the volar side, or below x, y and z of the skin.
+
+    Raises
+    ------
+    InputError
+        If `sites` is not an array of pairs or triples, or one is not on the skin.
+    """
+    points = float_array("sites", sites, 2)
+    if points.shape[1] not in (2, 3):
+        raise InputError(f"sites needs columns x and z, or x, y and z, in mm: got shape {points.shape}.")
+    return _places_of(_Sites(receptors, points))
+
+
+class _Sites:
+    """Sites on a mesh, equal to those of another response if both have the same numbers.
+
+    Presses of one object at several depths or stiffnesses have equal meshes.
+    """
+
+    def __init__(self, receptors: Receptors, points: FloatArray):
+        self.receptors, self.points, mesh = receptors, points, receptors.mesh
+        parts = (mesh.nodes_mm, mesh.elements, mesh.living_epidermis, mesh.symmetry_nodes, points)
+        content = hashlib.blake2b(repr((mesh.full, [part.shape for part in parts])).encode())
+        for part in parts:
+            content.update(np.ascontiguousarray(part).tobytes())
+        self._digest = content.digest()
+
+    def __hash__(self) -> int:
+        return hash(self._digest)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Sites) and self._digest == other._digest
+
+
+@lru_cache(maxsize=_PLACES_KEPT)
+def _places_of(sites: _Sites) -> Any:
+    """Find the end organs, which takes longer than to read their values."""
+    receptors, points = sites.receptors, sites.points
+    return receptors.under(points) if points.shape[1] == 2 else receptors.below(points)

@@ -3,7 +3,8 @@
 The key of an indentation is a hash of its whole value (finger, indenter, motion, tissues, mesh, tolerances)
 and of the behaviour of the mechanical sources (`skin.behaviour`). There is one file per indentation, written
 atomically: a run that is killed at any moment continues from the last finished indentation and ends with the
-same bits.
+same bits. Each file holds its key and a checksum of its content. A file that was damaged, edited, renamed or
+written by something else is set aside and computed again. Files hold arrays only, no code.
 """
 
 from __future__ import annotations
@@ -11,33 +12,30 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
-import sys
-import threading
+import logging
+import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from dataclasses import Field, fields, is_dataclass
-from functools import partial
-from multiprocessing import get_context
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import Field, dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fingerpad.core.checks import whole
-from fingerpad.core.compilation import LOGGER, announce_compilation
+from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import ConvergenceError, InputError, StoreError
-from fingerpad.core.files import write_atomically
-from fingerpad.core.threads import available_threads
+from fingerpad.core.files import check_file, path_of, write_atomically
+from fingerpad.core.logger import LOGGER
 from fingerpad.mechanics.kernels import KERNELS
 from fingerpad.skin.behaviour import code_hash
 from fingerpad.skin.code_tags import array_digest, class_tag
 from fingerpad.skin.fields import Place, stored_fields
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
+
+PRESSES = logging.getLogger(__name__)
+"""Tells of each press that is stored."""
 
 _SOLUTION = {
     "force_imbalance": float,
@@ -48,11 +46,14 @@ _SOLUTION = {
 }
 """Content of the stored array "solution", in this order."""
 
+SUFFIX, ASIDE = ".npz", ".damaged"
+"""Ends of the names of stored files, and of those that were set aside."""
+
+KEY, CHECKSUM = "key", "checksum"
+"""Names of the arrays by which a stored file knows itself."""
+
 OnFailed = Callable[[Touch, ConvergenceError | InputError], None]
 """Told of an indentation that cannot be solved, and why."""
-
-_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-_LOOK_FOR_PARENT_S = 0.1
 
 
 def touch_key(touch: Touch) -> str:
@@ -67,6 +68,18 @@ def touch_key(touch: Touch) -> str:
     """
     text = json.dumps([code_hash(), _plain(touch)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def value_digest(value: Any) -> str:
+    """Sixteen hexadecimal digits, the same for equal values: a finger, tissues, a body.
+
+    Examples
+    --------
+    >>> import fingerpad as fp
+    >>> value_digest(fp.Sphere(287)) == value_digest(fp.Sphere(287.0)) != value_digest(fp.Sphere(288))
+    True
+    """
+    return hashlib.sha256(json.dumps(_plain(value), sort_keys=True).encode()).hexdigest()[:16]
 
 
 def _plain(value: Any, is_float: bool = False) -> Any:
@@ -109,20 +122,23 @@ class Store:
     """
 
     def __init__(self, folder: Path):
-        self.folder = Path(folder)
+        self.folder = path_of("folder", folder)
 
     def path(self, touch: Touch) -> Path:
         """File of an indentation, whether it exists or not."""
-        return self.folder / f"{touch_key(touch)}.npz"
+        return self.folder / f"{touch_key(touch)}{SUFFIX}"
 
     def holds(self, touch: Touch) -> bool:
         """Whether an indentation is stored."""
         return self.path(touch).exists()
 
     def missing(self, touches: Iterable[Touch]) -> dict[Path, Touch]:
-        """Indentations that are not stored, each once, by the file that each belongs into."""
+        """Indentations that are not stored, each once, by the file that each belongs into.
+
+        A file that is not what it was when it was written is set aside, with a warning in the log.
+        """
         wanted = {self.path(touch): touch for touch in touches}
-        return {path: touch for path, touch in wanted.items() if not path.exists()}
+        return {path: touch for path, touch in wanted.items() if not _is_whole(path)}
 
     def save(self, touch: Touch, response: SkinResponse) -> None:
         """Write an indentation, as a whole or not at all.
@@ -132,7 +148,8 @@ class Store:
         StoreError
             If the folder cannot be written.
         """
-        write_atomically(self.path(touch), _packed(response))
+        path = self.path(touch)
+        write_atomically(path, _packed(response, path.stem))
 
     def load(self, touch: Touch) -> SkinResponse:
         """Read an indentation.
@@ -140,52 +157,185 @@ class Store:
         Raises
         ------
         StoreError
-            If its file is missing or damaged, or its fields have not the shapes of this touch.
+            If its file is missing, or is not what it was when it was written.
         """
         path = self.path(touch)
         try:
-            # Opened here, since np.load leaves the file open where the archive is damaged.
-            with open(path, "rb") as opened, np.load(opened, allow_pickle=False) as file:
-                fields = {field.name: file[field.name].astype(np.float64) for field in stored_fields()}
-                numbers, linear_solver = file["solution"].tolist(), str(file["linear_solver"])
+            content = _unpacked(path)
+            numbers, linear_solver = content.pop("solution").tolist(), str(content.pop("linear_solver"))
+            fields = {field.name: content[field.name].astype(np.float64) for field in stored_fields()}
             solution = {
                 name: kind(number) for (name, kind), number in zip(_SOLUTION.items(), numbers, strict=True)
             }
             return touch.response(fields, linear_solver=linear_solver, **solution)
         except Exception as error:  # a file of unknown content may fail in any way
-            said = " ".join(str(error).split()).rstrip(".")
             raise StoreError(
-                f"The stored result {path} cannot be read ({said}): delete it and run again."
+                f"The stored result {path} cannot be read ({_said(error)}): run again, which sets it aside."
             ) from error
 
+    def files(self) -> list[StoredFile]:
+        """Describe the files of the store, the oldest first.
 
-def _packed(response: SkinResponse) -> bytes:
+        Raises
+        ------
+        StoreError
+            If the folder cannot be read.
+        """
+        try:
+            found = [(path, path.stat()) for path in sorted(self.folder.glob(f"*{SUFFIX}"))]
+        except OSError as error:
+            raise StoreError(f"{self.folder} cannot be read: {error.strerror or error}.") from error
+        files = [StoredFile(path, state.st_size, state.st_mtime) for path, state in found]
+        return sorted(files, key=lambda file: file.written_s)
+
+
+@dataclass(frozen=True)
+class StoredFile:
+    """A file of a store.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its name is the key of the indentation.
+    size : int
+        In bytes.
+    written_s : float
+        When it was written, in seconds since 1970.
+    """
+
+    path: Path
+    size: int
+    written_s: float
+
+    @property
+    def fault(self) -> str | None:
+        """What is wrong with the file; None if it is what it was when it was written."""
+        return _fault(self.path)
+
+
+def pruned(files: Sequence[StoredFile], before_s: float | None, most_bytes: int | None) -> list[StoredFile]:
+    """Choose files to delete: those written before a time, then the oldest until the rest is small enough.
+
+    Parameters
+    ----------
+    files : sequence of StoredFile
+        Of `Store.files`, the oldest first.
+    before_s : float, optional
+        In seconds since 1970.
+    most_bytes : int, optional
+        Largest size of all files that are left.
+
+    Examples
+    --------
+    >>> files = [StoredFile(Path(f"{day}.npz"), 100, float(day)) for day in (1, 2, 3, 4)]
+    >>> [file.path.stem for file in pruned(files, before_s=2.0, most_bytes=200)]
+    ['1', '2']
+    """
+    old = [file for file in files if before_s is not None and file.written_s < before_s]
+    left = [file for file in files if file not in old]
+    total = sum(file.size for file in left)
+    for file in left:
+        if most_bytes is None or total <= most_bytes:
+            break
+        old.append(file)
+        total -= file.size
+    return old
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a file is there and what it was when it was written; otherwise it is set aside."""
+    if not path.exists():
+        return False
+    fault = _fault(path)
+    if fault is None:
+        return True
+    aside = path.with_name(f"{path.name}{ASIDE}")
+    try:
+        path.replace(aside)
+    except FileNotFoundError:  # another process has set it aside
+        return False
+    except OSError as error:
+        raise StoreError(
+            f"The stored result {path} is damaged and cannot be set aside ({error.strerror or error}): "
+            "delete it and run again."
+        ) from error
+    LOGGER.warning(
+        "%s is no stored result (%s): it is kept as %s and computed again.", path, fault, aside.name
+    )
+    return False
+
+
+def _fault(path: Path) -> str | None:
+    try:
+        _unpacked(path)
+    except Exception as error:  # a file of unknown content may fail in any way
+        return _said(error)
+    return None
+
+
+def _said(error: Exception) -> str:
+    """Tell what an error says, on one line."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    said = " ".join(str(error).split()).rstrip(".")
+    return "it is no archive of arrays" if "pickle" in said or not said else said
+
+
+def _unpacked(path: Path) -> dict[str, np.ndarray]:
+    """Content of a stored file; any error if it is not what it was when it was written."""
+    # Opened here, since np.load leaves the file open where the archive is damaged.
+    with open(check_file(path, math.inf), "rb") as opened, np.load(opened, allow_pickle=False) as file:
+        content = {name: file[name] for name in file.files}
+    checksum, key = str(content.pop(CHECKSUM, "")), str(content.pop(KEY, ""))
+    if not checksum:
+        raise ValueError("it has no checksum")
+    if key != path.stem:
+        raise ValueError("it is the result of another touch")
+    if checksum != _checksum(key, content):
+        raise ValueError("its content has another checksum")
+    return content
+
+
+def _checksum(key: str, content: Mapping[str, np.ndarray]) -> str:
+    digest = hashlib.sha256(key.encode())
+    for name in sorted(content):
+        values = np.asarray(content[name])
+        digest.update(repr((name, values.dtype.str, values.shape)).encode())
+        digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()
+
+
+def _packed(response: SkinResponse, key: str) -> bytes:
     """Content of a stored file."""
-    content: dict[str, Any] = {
+    content: dict[str, np.ndarray] = {
         field.name: response.fields[field.name].astype(
             np.float64 if field.place is Place.PRESS else np.float32
         )
         for field in stored_fields()
     }
-    solution = np.array([getattr(response, name) for name in _SOLUTION], dtype=np.float64)
+    content["solution"] = np.array([getattr(response, name) for name in _SOLUTION], dtype=np.float64)
+    content["linear_solver"] = np.array(response.linear_solver)
+    named = {KEY: np.array(key), CHECKSUM: np.array(_checksum(key, content))}
     buffer = io.BytesIO()
-    np.savez(buffer, **content, solution=solution, linear_solver=np.array(response.linear_solver))
+    np.savez(buffer, **content, **named)  # type: ignore[arg-type]
     return buffer.getvalue()
 
 
-def _compute(touch: Touch, path: Path, threads: int | None = None) -> float:
-    """Solve one indentation and store it at `path`; return the seconds it took.
+def _compute(item: tuple[Path, Touch], threads: int | None = None) -> float:
+    """Solve one indentation and store it at the path; return the seconds it took.
 
-    The path is an argument because a worker would hash the sources as they are at that time.
+    The path is given because a worker would hash the sources as they are at that time.
     """
+    path, touch = item
     started = time.perf_counter()
-    write_atomically(path, _packed(touch.solve(threads)))
+    if not path.exists():  # another worker may have stored it since
+        write_atomically(path, _packed(touch.solve(threads), path.stem))
     return time.perf_counter() - started
 
 
 def solve_missing(
     missing: Mapping[Path, Touch],
-    jobs: int,
+    jobs: int | Engine,
     on_finished: Callable[[float], None] | None = None,
     on_failed: OnFailed | None = None,
 ) -> None:
@@ -195,8 +345,8 @@ def solve_missing(
     ----------
     missing : mapping of Path to Touch
         From `Store.missing`.
-    jobs : int
-        Number of processes; the results do not depend on it.
+    jobs : int or Engine
+        Number of processes, or what else shall do the work; the results do not depend on it.
     on_finished : callable, optional
         Called with the seconds that each indentation took.
     on_failed : callable, optional
@@ -207,85 +357,17 @@ def solve_missing(
     ConvergenceError, InputError
         Without `on_failed`, if one cannot be solved; those finished before remain in the store.
     """
-    whole("jobs", jobs, at_least=1)
-    in_processes = jobs > 1 and len(missing) > 1
-    for seconds in _in_processes(missing, jobs, on_failed) if in_processes else _in_turn(missing, on_failed):
-        if on_finished and seconds is not None:
-            on_finished(seconds)
-
-
-def _seconds(compute: Callable[[], float], touch: Touch, on_failed: OnFailed | None) -> float | None:
-    """Seconds that an indentation took; None if it failed, which `on_failed` then knows."""
-    try:
-        return compute()
-    except (ConvergenceError, InputError) as error:
-        if on_failed is None:
-            raise
-        on_failed(touch, error)
-        return None
-
-
-def _in_turn(touches: Mapping[Path, Touch], on_failed: OnFailed | None) -> Iterator[float | None]:
-    for path, touch in touches.items():
-        yield _seconds(partial(_compute, touch, path), touch, on_failed)
-
-
-def _in_processes(
-    touches: Mapping[Path, Touch], jobs: int, on_failed: OnFailed | None
-) -> Iterator[float | None]:
-    processes = min(jobs, len(touches))
-    threads = max(1, available_threads() // processes)
-    with (
-        announce_compilation(KERNELS),
-        _environment(_ONE_THREAD),
-        ProcessPoolExecutor(processes, get_context("spawn"), _begin, (os.getpid(),)) as pool,
-    ):
-        pressed: dict[Future[float], Touch] = {
-            pool.submit(_compute, touch, path, threads): touch for path, touch in touches.items()
-        }
-        waiting = set(pressed)
-        try:
-            while waiting:
-                done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                for future in done:
-                    yield _seconds(future.result, pressed[future], on_failed)
-        except BrokenProcessPool as error:
-            raise StoreError(
-                "A worker process was ended from outside (out of memory?): run again, perhaps with fewer "
-                "jobs; finished indentations are kept."
-            ) from error
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
-
-
-@contextmanager
-def _environment(variables: dict[str, str]) -> Iterator[None]:
-    """Set environment variables of new processes: one thread each for the libraries."""
-    before = {name: os.environ.get(name) for name in variables}
-    os.environ.update(variables)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
+    # Another process may have another working folder.
+    items = [(path.absolute(), touch) for path, touch in missing.items()]
+    with closing(engine_of(jobs, KERNELS).map(_compute, items)) as outcomes:
+        for number, outcome in outcomes:
+            try:
+                seconds = outcome()
+            except (ConvergenceError, InputError) as error:
+                if on_failed is None:
+                    raise
+                on_failed(items[number][1], error)
             else:
-                os.environ[name] = value
-
-
-def _begin(parent: int) -> None:
-    """Set up a worker, which logs nothing: its parent logs the compilation."""
-    LOGGER.disabled = True
-    _end_with_parent(parent)
-
-
-def _end_with_parent(parent: int) -> None:
-    """End a worker when its parent was killed, which it would not notice otherwise."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(_LOOK_FOR_PARENT_S)
-        os._exit(1)
-
-    if sys.platform != "win32":
-        threading.Thread(target=watch, daemon=True).start()
+                PRESSES.info("stored %s after %.1f s", items[number][0].name, seconds)
+                if on_finished:
+                    on_finished(seconds)

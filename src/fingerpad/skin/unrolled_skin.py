@@ -26,6 +26,7 @@ from scipy.interpolate import CubicSpline
 from fingerpad.core.checks import FloatArray, finite, float_array, increasing, instance
 from fingerpad.core.errors import InputError
 from fingerpad.core.regions import Polygon
+from fingerpad.core.values import converted
 from fingerpad.data import fingertip as published
 from fingerpad.geometry.fingertip import Fingertip
 
@@ -96,6 +97,7 @@ class _Quarter:
 
 
 @dataclass(frozen=True)
+@converted
 class UnrolledSkin:
     """The plane of a finger's skin.
 
