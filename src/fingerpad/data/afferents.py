@@ -79,12 +79,25 @@ INDENTATION_THRESHOLDS = Published(
     "Johansson & Vallbo 1979, J Physiol 297:405, abstract",
     "read",
 )
+_VELOCITIES = Source(
+    "Knibestöl 1973, J Physiol 232:427, abstract; 39 RA and 10 PC units of the human hand", "read"
+)
+RA_VELOCITIES = _VELOCITIES("RA: smallest and largest velocity threshold of a unit", (0.4, 39.3), "mm/s")
+PC_VELOCITIES = _VELOCITIES("PC: smallest and largest velocity threshold of a unit", (0.5, 19.6), "mm/s")
+SAI_DECLINE = Published(
+    "SAI: mean decline of the rate in the first 12 s of a hold of 0.65 and 1.3 mm",
+    (0.38, 0.36),
+    "1",
+    "Journal of Neuroscience 3(12), 2652, 1983, abstract; 21 monkey afferents",
+    "read",
+)
 FIELD_AREAS = Published(
     "median area of receptive fields at four to five times the threshold: SAI, RA, PC, SAII",
     (11.0, 12.6, 101.0, 59.0),
     "mm2",
     "Johansson & Vallbo 1980, Brain Res 184:353 (a review by Delhaye, Long & Bensmaia 2018 has 10 for SAI "
-    "and 50 for SAII)",
+    "and 50 for SAII; Table 1 of J Neurophysiol 101:1033, 2009, has less than 6, 5 to 30 and less than 25 "
+    "for SAI, RA and SAII, read)",
     "recalled",
 )
 

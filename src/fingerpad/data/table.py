@@ -6,7 +6,7 @@ import csv
 from dataclasses import dataclass
 from importlib.resources import files
 
-from fingerpad.core.checks import FloatArray, float_array, one_of
+from fingerpad.core.checks import FloatArray, float_array, number_in, one_of
 from fingerpad.core.errors import InputError
 from fingerpad.data.published import STATUSES
 
@@ -81,7 +81,7 @@ def parsed_table(name: str, text: str) -> Table:
         if len(row) != len(header):
             raise InputError(f"{name} needs {len(header)} entries per row: got {row}.")
     columns = {
-        column: float_array(f"{column} of {name}", list(values), 1)
+        column: float_array(column, [number_in(f"{column} of {name}", value) for value in values], 1)
         for column, values in zip(header, zip(*rows, strict=True), strict=True)
     }
     return Table(columns, story["content"], story["source"], story["status"])

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, finite, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import converted
 from fingerpad.data import neuron
 from fingerpad.inference.fitting.posterior import Chains, LogDensity, sample
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
@@ -78,6 +79,7 @@ def from_coordinates(points: ArrayLike) -> FloatArray:
 
 
 @dataclass(frozen=True)
+@converted
 class AfferentPrior:
     """Weakly informative prior of an afferent's parameters.
 

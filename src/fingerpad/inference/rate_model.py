@@ -23,7 +23,7 @@ from fingerpad.data import neuron
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.exact_spikes import exact_trains
-from fingerpad.neuron.rate_windows import Windows, common_rate_windows_ms
+from fingerpad.neuron.rate_windows import Windows, check_windows, common_rate_windows_ms
 from fingerpad.neuron.spikes import window_rates_hz
 from fingerpad.neuron.transduction import Drive, drive
 
@@ -152,6 +152,8 @@ class AfferentModel:
 
     def __post_init__(self) -> None:
         not_negative("refractory_ms", self.refractory_ms, "ms")
+        if self.windows_ms is not None:
+            object.__setattr__(self, "windows_ms", check_windows(self.windows_ms, np.inf))
         end = max(bound for window in self.used_windows_ms for bound in window)
         for group, columns in zip(self.drives, self.stimuli, strict=True):
             if group.times_ms[-1] < end:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, float_array, instance
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SpikeTrains
+from fingerpad.core.values import converted
 from fingerpad.neuron.rate_windows import Windows
 from fingerpad.neuron.spikes import firing_rate_hz
 
@@ -18,6 +20,7 @@ PHASES = ("dynamic", "static")
 
 
 @dataclass(frozen=True)
+@converted
 class RateRecordings:
     """Firing rates of one afferent, one row per stimulus.
 
@@ -49,9 +52,11 @@ class RateRecordings:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stimuli", tuple(self.stimuli))
-        twice = sorted({name for name in self.stimuli if self.stimuli.count(name) > 1})
+        twice = sorted(name for name, count in Counter(self.stimuli).items() if count > 1)
         if twice:
             raise InputError(f"stimuli must be named once each: {twice[0]!r} is repeated; take its mean.")
+        if not self.stimuli:
+            raise InputError("RateRecordings needs at least one stimulus: got none.")
         if not self.phases:
             raise InputError("RateRecordings needs dynamic_rate_hz, static_rate_hz or both: got neither.")
         for phase in self.phases:
@@ -87,6 +92,7 @@ class RateRecordings:
 
 
 @dataclass(frozen=True)
+@converted
 class SpikeRecordings:
     """Spike trains of one afferent, one per presentation of a stimulus.
 

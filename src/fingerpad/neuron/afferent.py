@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array, not_negative
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import InputError, shown
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import STORED_ENERGY, SedTraces, SpikeTrains
 from fingerpad.core.threads import in_blocks
+from fingerpad.core.values import converted
 from fingerpad.data import neuron
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.rate_windows import Window, rate_windows_ms
 from fingerpad.neuron.spikes import firing_rate_hz
-from fingerpad.neuron.transduction import Drive, Transduction
+from fingerpad.neuron.transduction import Drive, Transduction, drive
 
 PARAMETER_NAMES = (
     "intercept_ma",
@@ -29,6 +33,12 @@ PARAMETER_NAMES = (
 
 PARAMETER_UNITS = ("mA", "mA ms/kPa", "mA/kPa", "ms", "mF", "mV")
 """Units of the six fitted numbers."""
+
+_SITES_PER_BLOCK = 256
+"""Sites that a thread takes through the whole chain at once: their traces stay in the cache."""
+
+_SURELY_SILENT = 1.0 - 1e-9
+"""Share of the rheobase below which round-off cannot elicit a spike."""
 
 
 class Follows(Protocol):
@@ -58,7 +68,7 @@ def checked_afferent(afferent: AnyAfferent) -> AnyAfferent:
     if isinstance(afferent, type) or not all(hasattr(afferent, name) for name in _NEEDED):
         raise InputError(
             "afferent must be one such as Afferent(), RA(), PC(), SAII() or OwnAfferent(...): "
-            f"got {afferent!r}."
+            f"got {shown(afferent)}."
         )
     return afferent
 
@@ -66,7 +76,7 @@ def checked_afferent(afferent: AnyAfferent) -> AnyAfferent:
 def check_quantities(afferent: Follows, traces: Follows) -> None:
     """Raise `InputError` if traces hold other quantities than an afferent follows."""
     for name in ("dynamic_quantity", "static_quantity"):
-        needed, got = getattr(afferent, name), getattr(traces, name)
+        needed, got = getattr(afferent, name), getattr(traces, name, type(traces).__name__)
         if needed != got:
             raise InputError(
                 f"The {name.partition('_')[0]} term of this afferent needs {needed!r}: got traces of "
@@ -79,7 +89,8 @@ _NEEDED = ("dynamic_quantity", "static_quantity", "spikes")
 
 
 @dataclass(frozen=True)
-class Afferent:
+@converted
+class Afferent(metaclass=KnownKeywords):
     """A slowly adapting type I (SAI) afferent.
 
     The defaults are the fit with the default tissues, `human`, to the recordings under the shifted bar and to
@@ -254,8 +265,12 @@ class Afferent:
         >>> round(Afferent().static_threshold, 2), round(Afferent.for_tissues("trial3").static_threshold, 3)
         (2.91, 0.038)
         """
-        rheobase_ma = self.capacitance_mf * self.threshold_mv / self.time_constant_ms
-        return (rheobase_ma - self.intercept_ma) / self.static_gain
+        return (self.rheobase_ma - self.intercept_ma) / self.static_gain
+
+    @property
+    def rheobase_ma(self) -> float:
+        """Constant current that just reaches the threshold, C v / tau; less never elicits a spike. [mA]"""
+        return self.capacitance_mf * self.threshold_mv / self.time_constant_ms
 
     def with_static_threshold(self, quantity: float) -> Afferent:
         """Return the same afferent with another intercept, so that it fires above a constant quantity.
@@ -302,11 +317,22 @@ class Afferent:
             If the quantities of the two terms are not those of `sed`.
         """
         check_quantities(self, sed)
+        if isinstance(sed, Drive):
+            return SpikeTrains.joined(in_blocks(lambda sites: self._fired(sed.part(sites)), sed.n_sites))
+        # Most of the skin moves too little for a spike.
+        may_fire = self._largest_current_ma(sed) > _SURELY_SILENT * self.rheobase_ma
+        return spikes_where(may_fire, sed, lambda some: self._fired(self._driven(some)))
 
-        def trains(sites: slice) -> SpikeTrains:
-            return self.membrane.spikes(self.transduction.current(sed.part(sites)))
+    def _fired(self, driven: Drive) -> SpikeTrains:
+        return self.membrane.spikes(self.transduction.current(driven))
 
-        return SpikeTrains.joined(in_blocks(trains, sed.n_sites))
+    def _driven(self, sed: SedTraces) -> Drive:
+        """Resample what the two terms follow, and the rate of change of the dynamic one."""
+        return drive(sed)
+
+    def _largest_current_ma(self, sed: SedTraces) -> FloatArray:
+        """Bound of the current at every site, (n_sites,)."""
+        return self.transduction.largest_current_ma(sed)
 
     def rates(
         self,
@@ -334,13 +360,46 @@ class Afferent:
         InputError
             As `spikes`, or if a window is not given and `sed` has no ramp or no hold.
         """
-        dynamic, static = rate_windows_ms(sed.phases, dynamic_window_ms, static_window_ms)
+        dynamic, static = rate_windows_ms(sed.phases, dynamic_window_ms, static_window_ms, sed.times_ms[-1])
         spikes = self.spikes(sed)
         return firing_rate_hz(spikes, dynamic), firing_rate_hz(spikes, static)
+
+
+def spikes_where(
+    may_fire: np.ndarray, sed: SedTraces, spikes: Callable[[SedTraces], SpikeTrains]
+) -> SpikeTrains:
+    """Spikes of the sites that may fire, block by block on all threads; the others are silent.
+
+    Parameters
+    ----------
+    may_fire : bool array (n_sites,)
+        Sites that are simulated.
+    sed : SedTraces
+        Traces of all sites.
+    spikes : callable
+        From traces of some sites to their spikes.
+
+    Returns
+    -------
+    SpikeTrains
+        One train per site.
+
+    Examples
+    --------
+    >>> sed = SedTraces([0.0, 50.0], [[0.0, 0.0], [1.0, 2.0]])
+    >>> found = spikes_where(np.array([False, True]), sed, lambda some: SpikeTrains.from_lists([[9.0]]))
+    >>> [train.tolist() for train in found]
+    [[], [9.0]]
+    """
+    if not may_fire.any():
+        return SpikeTrains.from_lists([[]] * sed.n_sites)
+    some = sed.selected(may_fire)
+    trains = in_blocks(lambda sites: spikes(some.part(sites)), some.n_sites, _SITES_PER_BLOCK)
+    return SpikeTrains.joined(trains).spread(may_fire)
 
 
 def as_sai(afferent: AnyAfferent) -> Afferent:
     """Return an afferent if it has the chain of SAI, or raise `InputError`."""
     if not isinstance(afferent, Afferent):
-        raise InputError(f"afferent must have the chain of Afferent() here: got {afferent!r}.")
+        raise InputError(f"afferent must have the chain of Afferent() here: got {shown(afferent)}.")
     return afferent

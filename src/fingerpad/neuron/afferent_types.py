@@ -19,17 +19,20 @@ from typing import ClassVar
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, instance, not_negative, positive
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import InputError, shown
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import STORED_ENERGY, CurrentTraces, SedTraces, SpikeTrains
+from fingerpad.core.values import converted
 from fingerpad.data import afferents
-from fingerpad.neuron.afferent import Afferent, check_quantities
+from fingerpad.neuron.afferent import Afferent, check_quantities, spikes_where
 from fingerpad.neuron.band_pass import BandPass, resampled, smoothed_rate
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.transduction import Drive
 
 
 @dataclass(frozen=True)
-class RapidlyAdapting:
+@converted
+class RapidlyAdapting(metaclass=KnownKeywords):
     """Afferent that follows the band-passed and rectified course of one quantity: the chain of RA and PC.
 
     Parameters
@@ -119,12 +122,11 @@ class RapidlyAdapting:
         check_quantities(self, sed)
         # Most of the skin moves too little for a spike; a current below 1 never reaches the threshold.
         may_fire = self.band_pass.largest_share * np.ptp(sed.sed_kpa, axis=0) > self.threshold
-        if not may_fire.any():
-            return SpikeTrains.from_lists([[]] * sed.n_sites)
-        return self.membrane.spikes(self.current(sed.selected(may_fire))).spread(may_fire)
+        return spikes_where(may_fire, sed, lambda some: self.membrane.spikes(self.current(some)))
 
 
 @dataclass(frozen=True)
+@converted
 class RA(RapidlyAdapting):
     """A rapidly adapting afferent (RA, FA-I), which ends in Meissner corpuscles.
 
@@ -158,6 +160,7 @@ class RA(RapidlyAdapting):
 
 
 @dataclass(frozen=True)
+@converted
 class PC(RapidlyAdapting):
     """A Pacinian afferent (PC, FA-II).
 
@@ -194,10 +197,11 @@ class PC(RapidlyAdapting):
 
 
 @dataclass(frozen=True)
+@converted
 class SAI(Afferent):
     """A slowly adapting type I (SAI) afferent that is also right under vibration.
 
-    It is `Afferent`, except that the dynamic term follows the quantity as a first-order low pass leaves it,
+    It is `Afferent`, except that the dynamic term follows the quantity as a first-order low pass leaves it::
 
         I = beta + k_d |S'| + k_s Q,    tau_s S' + S = Q.
 
@@ -235,22 +239,17 @@ class SAI(Afferent):
 
     def spikes(self, sed: SedTraces | Drive) -> SpikeTrains:
         """Simulate the spikes of this afferent at every site, as `Afferent.spikes`."""
-        check_quantities(self, sed)
         if isinstance(sed, Drive):
+            check_quantities(self, sed)
             raise InputError("SAI smooths the traces of the skin: got a Drive; pass the SedTraces.")
-        may_fire = (
-            self._largest_current_ma(sed) > self.capacitance_mf * self.threshold_mv / self.time_constant_ms
-        )
-        if not may_fire.any():
-            return SpikeTrains.from_lists([[]] * sed.n_sites)
-        some = sed.selected(may_fire)
-        followed = (
-            some if some.dynamic_kpa is None else SedTraces(some.times_ms, some.dynamic_kpa, some.kinks_ms)
-        )
+        return super().spikes(sed)
+
+    def _driven(self, sed: SedTraces) -> Drive:
+        """Both terms between common knots: the quantity, and its rate of change behind the low pass."""
+        followed = sed if sed.dynamic_kpa is None else SedTraces(sed.times_ms, sed.dynamic_kpa, sed.kinks_ms)
         times_ms, rate = smoothed_rate(followed, self.smoothing_ms)
-        static = resampled(some, self.smoothing_ms).sed_kpa
-        driven = Drive(times_ms, static, np.abs(rate), sed.dynamic_quantity, sed.static_quantity, sed.phases)
-        return super().spikes(driven).spread(may_fire)
+        static = resampled(sed, self.smoothing_ms).sed_kpa
+        return Drive(times_ms, static, np.abs(rate), sed.dynamic_quantity, sed.static_quantity, sed.phases)
 
     def _largest_current_ma(self, sed: SedTraces) -> FloatArray:
         """Bound of the current at every site: a low pass changes at most by its input's range in tau_s."""
@@ -264,6 +263,7 @@ class SAI(Afferent):
 
 
 @dataclass(frozen=True)
+@converted
 class SAII(SAI):
     """A slowly adapting type II (SAII) afferent, which follows the stretch of the skin.
 
@@ -299,7 +299,8 @@ class SAII(SAI):
 
 
 @dataclass(frozen=True)
-class OwnAfferent:
+@converted
+class OwnAfferent(metaclass=KnownKeywords):
     """An afferent of one's own: a function of the traces of the skin that returns current or spikes.
 
     Parameters
@@ -346,7 +347,7 @@ class OwnAfferent:
 
     def __post_init__(self) -> None:
         if not callable(self.respond):
-            raise InputError(f"respond must be a function of SedTraces: got {self.respond!r}.")
+            raise InputError(f"respond must be a function of SedTraces: got {shown(self.respond)}.")
         if self.membrane is not None:
             instance("membrane", self.membrane, LeakyIntegrateAndFire)
 

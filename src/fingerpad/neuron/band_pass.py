@@ -22,6 +22,7 @@ from fingerpad.core.checks import FloatArray, positive, whole
 from fingerpad.core.signals import SedTraces
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.units import MS_PER_S
+from fingerpad.core.values import converted
 from fingerpad.neuron.transduction import Drive, drive
 
 _KNOTS_PER_TIME_CONSTANT = 4.0
@@ -32,6 +33,7 @@ _MOST_PIECES = 2**20
 
 
 @dataclass(frozen=True)
+@converted
 class BandPass:
     """A filter that transmits a band of frequencies.
 

@@ -12,11 +12,13 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Place
 from fingerpad.core.random_streams import Purpose, uniforms
 from fingerpad.core.signals import SedTraces
+from fingerpad.core.values import converted
 
 _SUM_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
+@converted
 class EndOrgans:
     """Positions and weights of the end organs of every afferent.
 
@@ -57,8 +59,8 @@ class EndOrgans:
                 "positions_mm of EndOrgans must be afferents by end organs by x, z, or x, y, z: got shape "
                 f"{positions.shape}."
             )
-        shares = np.full(n_ends, 1.0 / n_ends) if self.weights is None else np.asarray(self.weights)
-        weights = float_array("weights", np.atleast_2d(shares), 2)
+        shares = np.full(n_ends, 1.0 / n_ends) if self.weights is None else self.weights
+        weights = float_array("weights", np.atleast_2d(float_array("weights", shares, None)), 2)
         if weights.shape not in ((1, n_ends), (n_afferents, n_ends)):
             raise InputError(
                 f"weights needs one number per end organ, {n_ends}, or a row of them per afferent, "

@@ -27,6 +27,7 @@ from fingerpad.core.philox import four_uniforms
 from fingerpad.core.random_streams import Presentations, Purpose, checked_sites
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
 from fingerpad.core.threads import in_blocks
+from fingerpad.core.values import converted
 from fingerpad.neuron.exact_spikes import potential_at
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 
@@ -54,6 +55,7 @@ _MOST_REFINEMENTS = 100
 
 
 @dataclass(frozen=True)
+@converted
 class EscapeRate:
     """A leaky integrate-and-fire neuron with a soft threshold.
 

@@ -127,9 +127,39 @@ def exact_trains(
     within an interval are found in rounds of one spike per neuron, stage by stage in short loops.
     """
     n_neurons = currents.shape[1]
-    resistance = tau / capacitance
     potentials = np.zeros(n_neurons)
     ready = np.full(n_neurons, times[0])
+    return continued_trains(times, currents, tau, capacitance, threshold, refractory, potentials, ready)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def continued_trains(
+    times: FloatArray,
+    currents: FloatArray,
+    tau: float,
+    capacitance: float,
+    threshold: float,
+    refractory: float,
+    potentials: FloatArray,
+    ready: FloatArray,
+) -> tuple[FloatArray, np.ndarray]:
+    """Compute spike times as `exact_trains`, from a state that is carried on.
+
+    Parameters
+    ----------
+    times, currents, tau, capacitance, threshold, refractory
+        As of `exact_trains`.
+    potentials, ready : array (n_neurons,)
+        Potentials at the first knot [mV] and ends of the refractory periods [ms]; overwritten with those at
+        the last knot.
+
+    Returns
+    -------
+    array (n_spikes,), array (n_neurons + 1,)
+        As of `exact_trains`.
+    """
+    n_neurons = currents.shape[1]
+    resistance = tau / capacitance
     busy = np.empty(n_neurons, dtype=np.int64)
     searches = np.empty((6, n_neurons))
     crossings = np.empty(n_neurons)

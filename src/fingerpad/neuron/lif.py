@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from fingerpad.core.checks import positive
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
 from fingerpad.core.threads import in_blocks
+from fingerpad.core.values import converted
 from fingerpad.neuron.exact_spikes import exact_trains
 
 
 @dataclass(frozen=True)
+@converted
 class LeakyIntegrateAndFire:
     """A leaky integrate-and-fire membrane with a refractory period.
 

@@ -8,12 +8,13 @@ from types import MappingProxyType
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, positive, whole
+from fingerpad.core.checks import FloatArray, instance, positive, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Place
 from fingerpad.core.patterns import poisson_disc
 from fingerpad.core.regions import Region
 from fingerpad.core.signals import ResponseMap, Skin, SpikeTrains, traces_below
+from fingerpad.core.values import converted
 from fingerpad.data import afferents as published
 from fingerpad.neuron.afferent import AnyAfferent, checked_afferent
 from fingerpad.neuron.afferent_types import PC, RA, SAI, SAII
@@ -81,6 +82,7 @@ class MixedResponse:
 
 
 @dataclass(frozen=True)
+@converted
 class MixedPopulation:
     """Populations of several types in the same skin.
 
@@ -106,6 +108,10 @@ class MixedPopulation:
     parts: Mapping[str, Population]
 
     def __post_init__(self) -> None:
+        if not isinstance(self.parts, Mapping):
+            raise InputError(
+                f"parts must be a mapping from types to Population: got {type(self.parts).__name__}."
+            )
         if not self.parts:
             raise InputError("MixedPopulation needs at least one Population: got none.")
         for name, part in self.parts.items():
@@ -151,7 +157,8 @@ class MixedPopulation:
         Raises
         ------
         InputError
-            If a type is unknown and has no afferent, a density is not positive, or none is given.
+            If a type is unknown and has no afferent, a density is not positive, none is given, or the region
+            is none.
 
         Examples
         --------
@@ -160,6 +167,12 @@ class MixedPopulation:
         >>> len(MixedPopulation.at_densities(square, {"RA": 140.0, "PC": 20.0}))
         160
         """
+        for argument, given in (("densities_per_cm2", densities_per_cm2), ("afferents", afferents or {})):
+            instance(f"{argument}, with a type as each key,", given, Mapping)
+        if not hasattr(region, "area_mm2"):
+            raise InputError(
+                f"region must be one of fingerpad.core.regions or UnrolledSkin(finger).pad(): got {region!r}."
+            )
         known = types_of_afferents() | dict(afferents or {})
         whole("seed", seed, 0)
         parts = {}
@@ -198,9 +211,10 @@ class MixedPopulation:
         windows = dynamic_window_ms, static_window_ms
         maps: dict[str, ResponseMap] = {}
         # Afferents that follow the same quantities are sampled at once.
-        kinds = {name: (part.quantities, part.sites_mm.shape[1]) for name, part in self.parts.items()}
+        parts = {name: part.on(skin) for name, part in self.parts.items()}
+        kinds = {name: (part.quantities, part.sites_mm.shape[1]) for name, part in parts.items()}
         for kind in dict.fromkeys(kinds.values()):
-            quantities, some = kind[0], {name: self.parts[name] for name in kinds if kinds[name] == kind}
+            quantities, some = kind[0], {name: parts[name] for name in kinds if kinds[name] == kind}
             traces = traces_below(
                 skin, np.concatenate([part.sites_mm for part in some.values()]), *quantities
             )

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, positive, whole
-from fingerpad.core.errors import InputError
-from fingerpad.core.layouts import Layout, Place, around_zero
+from fingerpad.core.checks import FloatArray, float_array, not_negative, pair, positive, whole
+from fingerpad.core.errors import InputError, shown
+from fingerpad.core.layouts import MOST_RECEPTORS, Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import ResponseMap, SedTraces, Skin, traces_below
+from fingerpad.core.values import converted
 from fingerpad.data import fingertip, psychophysics
 from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
 from fingerpad.neuron.end_organs import EndOrgans
@@ -21,6 +22,7 @@ from fingerpad.neuron.rate_windows import Window, rate_windows_ms
 from fingerpad.neuron.spikes import firing_rate_hz, first_spike_latency_ms
 
 MM_PER_CM = 10.0
+LARGEST_SPREAD = 9.0
 CENTRE_MM = (fingertip.CONTACT_POINT.value[0], 0.0)
 """Centre of the default layout: the contact point of the paper's finger, on the midline. [mm]"""
 
@@ -67,11 +69,14 @@ def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
     True
     """
     sigma = not_negative("spread", spread)
-    drawn = normals(seed, 1, whole("count", count, 1), Purpose.SENSITIVITY, 1)[0, :, 0]
+    if sigma > LARGEST_SPREAD:
+        raise InputError(f"spread must be at most {LARGEST_SPREAD:g}, a factor of 10^4: got {sigma:g}.")
+    drawn = normals(seed, 1, whole("count", count, 1, MOST_RECEPTORS), Purpose.SENSITIVITY, 1)[0, :, 0]
     return np.exp(sigma * drawn - 0.5 * sigma**2)
 
 
 @dataclass(frozen=True)
+@converted
 class Population:
     """Afferents of one type at different positions of the skin, with their sensitivities and end organs.
 
@@ -90,6 +95,9 @@ class Population:
         Positions in the plane of the layout, by which neighbours are found; default: x and z. [mm]
     ends : EndOrgans, optional
         Several end organs of each afferent; by default it has one, at its position.
+    centre_mm : (float, float), optional
+        Middle of the pad about which the positions lie, if they follow the finger that is touched: `on` moves
+        them to the middle of its pad. By default they stay. [mm]
 
     Raises
     ------
@@ -104,6 +112,7 @@ class Population:
     sensitivity: FloatArray | None = None
     places_mm: FloatArray | None = None
     ends: EndOrgans | None = None
+    centre_mm: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         positions = float_array("positions_mm", self.positions_mm, 2)
@@ -196,11 +205,12 @@ class Population:
         rows, columns : int, optional
             Receptors along x and along z.
         centre_mm : (float, float), optional
-            x and z of the centre of the lattice; by default the middle of the finger's pad. [mm]
+            x and z of the centre of the lattice; by default the middle of the pad of the finger. [mm]
         afferent : Afferent, optional
             Default: `Afferent()`.
         finger : Fingertip, optional
-            The finger in whose pad they lie; default: the paper's.
+            The finger in whose pad they lie. Without finger and centre, the lattice lies in the middle of the
+            pad of the paper's finger, and `respond` moves it to that of the finger that is touched.
 
         Returns
         -------
@@ -210,7 +220,8 @@ class Population:
         Raises
         ------
         InputError
-            If the density is not positive or there is not at least one row and one column.
+            If the density is not positive, there is not at least one row and one column, or centre or finger
+            is none.
 
         Examples
         --------
@@ -219,12 +230,49 @@ class Population:
         (1.0, [[17.0, -0.5], [17.0, 0.5]])
         """
         pitch_mm = MM_PER_CM / math.sqrt(positive("density_per_cm2", density_per_cm2, "1/cm2"))
+        follows = centre_mm is None and finger is None
+        if finger is not None and not hasattr(finger, "contact_mm"):
+            raise InputError(
+                f"finger must be one such as Fingertip() or Fingertip.of('child'): got {shown(finger)}."
+            )
         centre = centre_mm or (CENTRE_MM if finger is None else finger.contact_mm)
-        centre_x, centre_z = (finite("centre_mm", value, "mm") for value in centre)
-        x = centre_x + pitch_mm * around_zero(whole("rows", rows, 1))
-        z = centre_z + pitch_mm * around_zero(whole("columns", columns, 1))
+        centre_x, centre_z = pair("centre_mm", centre)
+        counts = whole("rows", rows, 1), whole("columns", columns, 1)
+        if math.prod(counts) > MOST_RECEPTORS:
+            raise InputError(
+                f"rows times columns must be at most {MOST_RECEPTORS:,} receptors: got {rows} by {columns}."
+            )
+        x, z = centre_x + pitch_mm * around_zero(counts[0]), centre_z + pitch_mm * around_zero(counts[1])
         positions = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
-        return cls(positions, pitch_mm, afferent or Afferent())
+        return cls(positions, pitch_mm, afferent or Afferent(), centre_mm=CENTRE_MM if follows else None)
+
+    def on(self, skin: Skin) -> Population:
+        """Return this population as it lies on the finger of a skin.
+
+        Parameters
+        ----------
+        skin : Skin
+            Its `pad_mm` is the middle of the pad, as of a `SkinResponse`; a skin without one moves nothing.
+
+        Returns
+        -------
+        Population
+            Moved, if it has a `centre_mm` and no end organs of its own, to the middle of the pad.
+
+        Examples
+        --------
+        >>> class Child:
+        ...     pad_mm = 13.0, 0.0
+        >>> Population.grid(rows=1, columns=1).on(Child()).positions_mm.tolist()
+        [[13.0, 0.0]]
+        >>> Population.grid(rows=1, columns=1, centre_mm=(17.0, 0.0)).on(Child()).positions_mm.tolist()
+        [[17.0, 0.0]]
+        """
+        pad_mm = getattr(skin, "pad_mm", None)
+        if pad_mm is None or self.centre_mm in (None, pad_mm) or self.ends is not None:
+            return self
+        places = pad_mm + (self.positions_mm - self.centre_mm)
+        return replace(self, positions_mm=places, places_mm=places, centre_mm=pad_mm)
 
     def respond(
         self,
@@ -252,10 +300,9 @@ class Population:
             If the skin does not return one trace per receptor, or lacks what the afferent follows, or a
             window is not given and the touch has no ramp or no hold.
         """
-        sites = self.sites_mm
-        return self.respond_to(
-            traces_below(skin, sites, *self.quantities), dynamic_window_ms, static_window_ms
-        )
+        there = self.on(skin)
+        traces = traces_below(skin, there.sites_mm, *self.quantities)
+        return there.respond_to(traces, dynamic_window_ms, static_window_ms)
 
     @property
     def sites_mm(self) -> FloatArray:
@@ -298,7 +345,7 @@ class Population:
             )
         if self.ends is not None:
             sed = self.ends.combined(sed)
-        dynamic, static = rate_windows_ms(sed.phases, dynamic_window_ms, static_window_ms)
+        dynamic, static = rate_windows_ms(sed.phases, dynamic_window_ms, static_window_ms, sed.times_ms[-1])
         # What an afferent follows and its gains enter as a product: scaling the one scales the others.
         spikes = self.afferent.spikes(sed if self.sensitivity is None else sed.scaled(self.sensitivity))
         return ResponseMap(

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from fingerpad.core.checks import float_array
 from fingerpad.core.errors import InputError
-from fingerpad.core.phases import HOLD, Phase, phase_named, ramp_and_hold
+from fingerpad.core.phases import HOLD, Phase, phase_named, ramp_and_hold_phases
 from fingerpad.data import protocol
 
 Window = tuple[float, ...]
@@ -17,11 +20,15 @@ Windows = tuple[Window, Window]
 PAPER_WINDOWS_MS: Windows = (protocol.DYNAMIC_WINDOW.value, protocol.STATIC_WINDOW.value)
 """The paper's windows, which belong to its own ramp and hold. [ms]"""
 
-_PAPER_PHASES = ramp_and_hold(protocol.RAMP.value, protocol.RAMP.value + protocol.HOLD.value)
+_NAMES = "dynamic_window_ms", "static_window_ms"
+_PAPER_PHASES = ramp_and_hold_phases(protocol.RAMP.value, protocol.RAMP.value + protocol.HOLD.value)
 
 
 def rate_windows_ms(
-    phases: Sequence[Phase], dynamic_ms: Window | None = None, static_ms: Window | None = None
+    phases: Sequence[Phase],
+    dynamic_ms: Window | None = None,
+    static_ms: Window | None = None,
+    end_ms: float | None = None,
 ) -> Windows:
     """Return the windows of the dynamic and of the static rate of a touch.
 
@@ -35,6 +42,8 @@ def rate_windows_ms(
         Of the touch; those called "ramp" and "hold" are used, the first of each.
     dynamic_ms, static_ms : (float, float), optional
         Windows that are returned as they are. [ms]
+    end_ms : float, optional
+        End of what was recorded, if windows are checked. [ms]
 
     Returns
     -------
@@ -44,24 +53,47 @@ def rate_windows_ms(
     Raises
     ------
     InputError
-        If a window is not given and there is no phase of that name.
+        If a window is not given and there is no phase of that name; with `end_ms`, if one is not two times in
+        order from 0 to this end.
 
     Examples
     --------
-    >>> rate_windows_ms(ramp_and_hold(50.0, 1000.0))
+    >>> rate_windows_ms(ramp_and_hold_phases(50.0, 1000.0))
     ((30.0, 50.0), (600.0, 950.0))
-    >>> rate_windows_ms(ramp_and_hold(200.0, 1150.0))
+    >>> rate_windows_ms(ramp_and_hold_phases(200.0, 1150.0))
     ((120.0, 200.0), (750.0, 1100.0))
-    >>> rate_windows_ms(ramp_and_hold(50.0, 525.0))
+    >>> rate_windows_ms(ramp_and_hold_phases(50.0, 525.0))
     ((30.0, 50.0), (325.0, 500.0))
     """
     dynamic, static = (
-        given or _within(phase_named(phases, paper.name, f"{asks}_window_ms"), paper, window)
+        given if given is not None else _within(phase_named(phases, paper.name, asks), paper, window)
         for given, paper, window, asks in zip(
-            (dynamic_ms, static_ms), _PAPER_PHASES, PAPER_WINDOWS_MS, ("dynamic", "static"), strict=True
+            (dynamic_ms, static_ms), _PAPER_PHASES, PAPER_WINDOWS_MS, _NAMES, strict=True
         )
     )
+    if end_ms is not None:
+        return check_windows((dynamic, static), float(end_ms))
     return dynamic, static
+
+
+def check_windows(windows_ms: Windows, end_ms: float) -> Windows:
+    """Return two windows if both lie in what was recorded, else raise `InputError`.
+
+    Examples
+    --------
+    >>> check_windows(((30.0, 50.0), (600.0, 9500.0)), end_ms=1000.0)
+    Traceback (most recent call last):
+    fingerpad.core.errors.InputError: static_window_ms must be a start from 0 on and a later end, at most ...
+    """
+    checked = []
+    for name, window in zip(_NAMES, windows_ms, strict=True):
+        bounds = float_array(name, window, 1)
+        if bounds.size != 2 or not 0.0 <= bounds[0] < bounds[1] <= end_ms:
+            until = f", at most {end_ms:g} ms, where the touch ends" if np.isfinite(end_ms) else ""
+            came = ", ".join(f"{bound:g}" for bound in bounds[:4])
+            raise InputError(f"{name} must be a start from 0 on and a later end{until}: got {came}.")
+        checked.append((float(bounds[0]), float(bounds[1])))
+    return checked[0], checked[1]
 
 
 def common_rate_windows_ms(
@@ -76,7 +108,7 @@ def common_rate_windows_ms(
 
     Examples
     --------
-    >>> common_rate_windows_ms([ramp_and_hold(50.0, 1000.0), ramp_and_hold(100.0, 1000.0)])
+    >>> common_rate_windows_ms([ramp_and_hold_phases(50.0, 1000.0), ramp_and_hold_phases(100.0, 1000.0)])
     Traceback (most recent call last):
     fingerpad.core.errors.InputError: Windows of the rates must be given where the phases differ: ...
     """

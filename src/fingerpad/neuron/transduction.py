@@ -25,6 +25,7 @@ from fingerpad.core.checks import FloatArray, finite, float_array, positive, who
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase
 from fingerpad.core.signals import STORED_ENERGY, CurrentTraces, SedTraces
+from fingerpad.core.values import converted
 
 PIECES_PER_INTERVAL = 32
 """Largest number of linear pieces that replace the cubic between two given times."""
@@ -34,6 +35,7 @@ SHORTEST_PIECE_MS = 0.25
 
 
 @dataclass(frozen=True)
+@converted
 class Drive:
     """Strain energy density and its rate of change, both piecewise linear between the same knots.
 
@@ -82,6 +84,7 @@ class Drive:
 
 
 @dataclass(frozen=True)
+@converted
 class Transduction:
     """Gains that transform strain energy density (SED) to membrane current.
 
@@ -131,6 +134,51 @@ class Transduction:
             self.intercept_ma + self.dynamic_gain * driven.rate_kpa_per_ms + self.static_gain * driven.sed_kpa
         )
         return CurrentTraces(driven.times_ms, current_ma)
+
+    def largest_current_ma(self, sed: SedTraces) -> FloatArray:
+        """Bound of the current at every site, without a resampled trace.
+
+        Between two times a monotone cubic is at most as large as at one of them, and at most three times as
+        steep as the line between them.
+
+        Parameters
+        ----------
+        sed : SedTraces
+            As of `current`.
+
+        Returns
+        -------
+        array (n_sites,)
+            [mA]
+
+        Notes
+        -----
+        Fritsch & Carlson 1980.
+
+        Examples
+        --------
+        >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+        >>> Transduction(0.0, dynamic_gain=1e-4, static_gain=1e-6).largest_current_ma(sed).round(9).tolist()
+        [1.4e-05]
+        """
+        dynamic = sed.sed_kpa if sed.dynamic_kpa is None else sed.dynamic_kpa
+        above = _largest_sum(
+            np.diff(sed.times_ms), dynamic, sed.sed_kpa, 3.0 * max(self.dynamic_gain, 0.0), self.static_gain
+        )
+        return self.intercept_ma + above
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _largest_sum(lengths, dynamic, static, of_slope, of_value):  # type: ignore[no-untyped-def]
+    """Largest sum in any interval of the slope and the larger end value, each times a factor, (n_sites,)."""
+    found = np.full(static.shape[1], -np.inf)
+    for piece in range(lengths.size):
+        steep = of_slope / lengths[piece]
+        for site in range(found.size):
+            slope = abs(dynamic[piece + 1, site] - dynamic[piece, site])
+            value = max(of_value * static[piece, site], of_value * static[piece + 1, site])
+            found[site] = max(found[site], steep * slope + value)
+    return found
 
 
 def drive(
@@ -201,10 +249,10 @@ def drive(
             static_quantity=sed.static_quantity,
             phases=sed.phases,
         )
-    parts = _between_kinks(sed)
-    knots = [_knots(part.x, pieces, shortest_piece_ms) for part in parts]
+    spans = _between_kinks(sed)
+    knots = [_knots(sed.times_ms[first : last + 1], pieces, shortest_piece_ms) for first, last in spans]
     if difference_step_ms is not None:
-        driven = _difference(parts, knots, positive("difference_step_ms", difference_step_ms, "ms"))
+        driven = _difference(sed, spans, knots, positive("difference_step_ms", difference_step_ms, "ms"))
         return replace(
             driven,
             dynamic_quantity=sed.dynamic_quantity,
@@ -214,50 +262,83 @@ def drive(
     times = np.concatenate([sed.times_ms[:1], *knots])
     values, rates = np.empty((2, times.size, sed.n_sites))
     values[0], rates[0] = sed.sed_kpa[0], 0.0
-    first = 1
-    for part, part_knots in zip(parts, knots, strict=True):
-        rows = slice(first, first + part_knots.size)
-        _evaluate(part.c, part.x, part_knots, values[rows], rates[rows])
-        first = rows.stop
+    start = 1
+    for (first, last), some in zip(spans, knots, strict=True):
+        given, rows = slice(first, last + 1), slice(start, start + some.size)
+        _interpolate(sed.times_ms[given], sed.sed_kpa[given], some, values[rows], rates[rows])
+        start = rows.stop
+    for array in (times, values, rates):
+        array.setflags(write=False)
     return Drive(times, values, rates, sed.dynamic_quantity, sed.static_quantity, sed.phases)
 
 
-@njit(cache=True, nogil=True)
-def _evaluate(coefficients, breaks, times, values, rates):  # type: ignore[no-untyped-def]
-    """Evaluate a piecewise cubic and the absolute value of its derivative at increasing times.
+@njit(cache=True, error_model="numpy", nogil=True)
+def _interpolate(given, known, times, values, rates):  # type: ignore[no-untyped-def]
+    """Evaluate the monotone cubic through known values, and the absolute value of its derivative.
 
-    The results are bit-equal to SciPy's; both are computed in one pass over all sites.
+    It is the interpolant of Fritsch and Butland (1984), as in SciPy's `PchipInterpolator`: the slope at a
+    time is a weighted harmonic mean of the slopes of the two intervals beside it, or 0 if they differ in
+    sign. Sites are computed side by side, interval by interval.
 
     Parameters
     ----------
-    coefficients : array (4, n_breaks - 1, n_sites)
-        Coefficients of the third to the zeroth power of the time since the previous break.
-    breaks, times : array (n_breaks,), (n_times,)
-        Ends of the pieces, and times of the values, within the breaks. [ms]
+    given, known : array (n_given,), (n_given, n_sites)
+        Times, two at least, and the values there. [ms]
+    times : array (n_times,)
+        Increasing, from the first to the last of the given times. [ms]
     values, rates : array (n_times, n_sites)
         Overwritten.
     """
-    piece = 0
-    for row in range(times.size):
-        while piece < breaks.size - 2 and breaks[piece + 1] <= times[row]:
-            piece += 1
-        s = times[row] - breaks[piece]
-        for site in range(coefficients.shape[2]):
-            c3, c2 = coefficients[0, piece, site], coefficients[1, piece, site]
-            c1, c0 = coefficients[2, piece, site], coefficients[3, piece, site]
-            values[row, site] = c0 + c1 * s + c2 * (s * s) + c3 * (s * s * s)
-            rates[row, site] = abs(c1 + c2 * s * 2.0 + c3 * (s * s) * 3.0)
+    n_given, n_sites = known.shape
+    begin, end, ahead = np.empty(n_sites), np.empty(n_sites), np.empty(n_sites)
+    row = 0
+    for piece in range(n_given - 1):
+        length = given[piece + 1] - given[piece]
+        after = given[min(piece + 2, n_given - 1)] - given[piece + 1]
+        before = given[piece] - given[max(piece - 1, 0)]
+        for site in range(n_sites):
+            slope = (known[piece + 1, site] - known[piece, site]) / length
+            # The slope at the start of an interval is that at the end of the one before.
+            begin[site] = end[site]
+            if piece == 0:
+                begin[site] = slope
+                if n_given > 2:
+                    follows = (known[2, site] - known[1, site]) / after
+                    begin[site] = _end_slope(length, after, slope, follows)
+            if piece < n_given - 2:
+                follows = (known[piece + 2, site] - known[piece + 1, site]) / after
+                w1, w2 = 2.0 * after + length, after + 2.0 * length
+                same = slope * follows > 0.0
+                end[site] = (w1 + w2) / (w1 / slope + w2 / follows) if same else 0.0
+            else:
+                end[site] = slope if n_given == 2 else _end_slope(length, before, slope, ahead[site])
+            ahead[site] = slope
+        while row < times.size and (times[row] < given[piece + 1] or piece == n_given - 2):
+            s = times[row] - given[piece]
+            for site in range(n_sites):
+                c0, c1 = known[piece, site], begin[site]
+                c3 = (begin[site] + end[site] - 2.0 * ahead[site]) / length
+                c2 = (ahead[site] - begin[site]) / length - c3
+                c3 = c3 / length
+                values[row, site] = c0 + c1 * s + c2 * (s * s) + c3 * (s * s * s)
+                rates[row, site] = abs(c1 + c2 * s * 2.0 + c3 * (s * s) * 3.0)
+            row += 1
 
 
-def _between_kinks(sed: SedTraces) -> list[PPoly]:
-    """Return one monotone interpolant of SED for each part between kinks."""
+@njit(cache=True, error_model="numpy", nogil=True)
+def _end_slope(length: float, other: float, slope: float, beside: float) -> float:
+    """Slope at an end, from those of its interval and of the one beside: three points, and no overshoot."""
+    found = ((2.0 * length + other) * slope - length * beside) / (length + other)
+    if not found * slope > 0.0:
+        return 0.0
+    return 3.0 * slope if slope * beside <= 0.0 and abs(found) > 3.0 * abs(slope) else found
+
+
+def _between_kinks(sed: SedTraces) -> list[tuple[int, int]]:
+    """First and last index of the times of each part between kinks."""
     borders = np.searchsorted(sed.times_ms, sed.kinks_ms)
     inner = borders[(borders > 0) & (borders < sed.times_ms.size - 1)]
-    ends = [0, *inner.tolist(), sed.times_ms.size - 1]
-    return [
-        PchipInterpolator(sed.times_ms[first : last + 1], sed.sed_kpa[first : last + 1], axis=0)
-        for first, last in pairwise(ends)
-    ]
+    return list(pairwise([0, *inner.tolist(), sed.times_ms.size - 1]))
 
 
 def _knots(times_ms: FloatArray, pieces: int, shortest_piece_ms: float) -> FloatArray:
@@ -269,9 +350,14 @@ def _knots(times_ms: FloatArray, pieces: int, shortest_piece_ms: float) -> Float
     return np.append(knots, times_ms[-1])
 
 
-def _difference(parts: list[PPoly], knots: list[FloatArray], step_ms: float) -> Drive:
+def _difference(
+    traces: SedTraces, spans: list[tuple[int, int]], knots: list[FloatArray], step_ms: float
+) -> Drive:
     """Compute the backward difference of Eq. 2 as printed: U' = |U(t) - U(t - h)| / h."""
-    given = np.concatenate([parts[0].x[:1], *(part.x[1:] for part in parts)])
+    given = traces.times_ms
+    parts = [
+        PchipInterpolator(given[first : last + 1], traces.sed_kpa[first : last + 1]) for first, last in spans
+    ]
     sed = PPoly(np.concatenate([part.c for part in parts], axis=1), given)
     onset, end = given[0], given[-1]
     # From one step after a kink on, the difference lies within one part: a knot there limits the jump.

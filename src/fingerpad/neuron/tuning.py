@@ -14,7 +14,7 @@ from fingerpad.core.checks import FloatArray, float_array, not_negative, positiv
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.core.units import MS_PER_S
-from fingerpad.neuron.afferent import AnyAfferent
+from fingerpad.neuron.afferent import AnyAfferent, checked_afferent
 
 SAMPLES_PER_CYCLE = 40
 CYCLES, COUNTED_CYCLES = 30, 20
@@ -113,6 +113,7 @@ def tuning_curve(
     >>> tuning_curve(RA(), [5.0, 40.0, 200.0], per_um=0.02, hold=10.0).round().tolist()
     [50.0, 12.0, 56.0]
     """
+    checked_afferent(afferent)
     if afferent.dynamic_quantity != afferent.static_quantity:
         raise InputError(
             "tuning_curve needs an afferent that follows one quantity: got "

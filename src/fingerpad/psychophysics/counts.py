@@ -18,12 +18,18 @@ from scipy.stats import binomtest
 
 from fingerpad.core.checks import FloatArray, float_array
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import converted
 
 SMALLEST_OVERDISPERSION = 1e-5
 """Below it the beta-binomial formula loses precision and the binomial one is used."""
 
 
+LARGEST_LEVEL = 1e9
+"""Largest level of a stimulus; the fit loses its digits with far larger numbers."""
+
+
 @dataclass(frozen=True)
+@converted
 class JudgementCounts:
     """Numbers of judgements at each level that were correct, or "yes".
 
@@ -58,6 +64,10 @@ class JudgementCounts:
             raise InputError(
                 "levels, n_correct and n_trials must have one entry per level: "
                 f"got {levels.size}, {correct.size} and {trials.size}."
+            )
+        if np.abs(levels).max() > LARGEST_LEVEL:
+            raise InputError(
+                f"levels must lie within {LARGEST_LEVEL:g}: got {levels.tolist()}; change the unit."
             )
         if (np.diff(levels) <= 0.0).any():
             raise InputError(f"levels must increase strictly, each level once: got {levels.tolist()}.")

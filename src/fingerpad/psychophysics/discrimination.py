@@ -15,6 +15,8 @@ sessions of one seed share no random number.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,9 +26,11 @@ from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, not
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Purpose, normals, uniforms
 from fingerpad.core.signals import HitRates
+from fingerpad.core.values import converted
 from fingerpad.data import protocol, psychophysics
 from fingerpad.psychophysics.encoding import NORMS, check_neighbours, distance
-from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, noisy_responses, session_trials
+from fingerpad.psychophysics.noise import checked_noise
+from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, session_trials
 from fingerpad.psychophysics.signal_detection import (
     decision_point,
     hit_probability,
@@ -42,11 +46,18 @@ CRITERION_MOVES = ("point", "fraction", "likelihood")
 """Quantity multiplied by a varied criterion: the decision point, the fraction beta, or a likelihood ratio of
 1 between comparison and standard, which then is the criterion in the place of the fraction."""
 
+_NOISES_AT_ONCE = 32
+"""Noises whose sums are held in memory together."""
+
+MOST_REPETITIONS = 1_000_000
+"""Largest number of repetitions of each kind."""
+
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
 _REPETITIONS_VARIED = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
 
 
 @dataclass(frozen=True)
+@converted
 class Experiment:
     """Numbers of repetitions, and decision criterion.
 
@@ -95,7 +106,12 @@ class Experiment:
 
     def __post_init__(self) -> None:
         for name in ("presentations", "distributions", "pairs", "hit_rates", "presentations_varied"):
-            whole(name, getattr(self, name), 2)
+            whole(name, getattr(self, name), 2, MOST_REPETITIONS)
+        if math.prod(self.sums_per_sphere) > MOST_REPETITIONS:
+            raise InputError(
+                f"distributions times presentations must be at most {MOST_REPETITIONS:,}: got "
+                f"{self.distributions} by {self.presentations}."
+            )
         finite("criterion", self.criterion)
         not_negative("criterion_sigma", self.criterion_sigma)
         one_of("criterion_moves", self.criterion_moves, CRITERION_MOVES)
@@ -156,14 +172,67 @@ def discriminate_gradient_sum(
     >>> discriminate_gradient_sum(responses, [[0, 1]], 0.02, seed=1).hit_rate.round(1).tolist()
     [0.5, 0.9]
     """
-    plan = experiment or Experiment()
+    observer = noise_sigma, experiment or Experiment()
+    return compare_gradient_sum_observers(responses, neighbours, [observer], seed, silent_value, session)[0]
+
+
+def compare_gradient_sum_observers(
+    responses: ArrayLike,
+    neighbours: np.ndarray,
+    observers: Sequence[tuple[float, Experiment]],
+    seed: int,
+    silent_value: float | None = None,
+    session: int = 0,
+) -> list[HitRates]:
+    """Discriminate spheres by their Gradient Sum under several noises and criteria.
+
+    All observers meet the same random numbers, which are drawn once: each has the hit rates that
+    `discriminate_gradient_sum` gives it.
+
+    Parameters
+    ----------
+    responses, neighbours, seed, silent_value, session
+        As in `discriminate_gradient_sum`.
+    observers : sequence of (float, Experiment)
+        Standard deviation sigma_1 of the noise, and repetitions and criterion, of each.
+
+    Returns
+    -------
+    list of HitRates
+        One per observer.
+
+    Raises
+    ------
+    InputError
+        As of `discriminate_gradient_sum`.
+
+    Examples
+    --------
+    >>> responses = [[50.0, 60.0], [50.0, 64.0]]
+    >>> noises = [(sigma, Experiment()) for sigma in (0.01, 0.05)]
+    >>> found = compare_gradient_sum_observers(responses, [[0, 1]], noises, seed=1)
+    >>> [round(float(hits.hit_rate[0]), 1) for hits in found]
+    [1.0, 0.7]
+    """
     values = checked_responses(responses, silent_value)
     pairs = check_neighbours(neighbours, values.shape[1])
-    sigma = not_negative("noise_sigma", noise_sigma)
-    distributions, presentations = plan.sums_per_sphere
-    trials = session_trials(session, len(values), distributions)
-    sums = noisy_gradient_sums(values, pairs, sigma, whole("seed", seed, 0), trials, presentations)  # (a)-(f)
-    return hit_rates_of_sums(sums, seed, plan, session)
+    whole("seed", seed, 0)
+    alike: dict[tuple[int, int], dict[float, list[int]]] = {}
+    for number, (noise_sigma, plan) in enumerate(observers):
+        sigma = checked_noise(noise_sigma)
+        alike.setdefault(plan.sums_per_sphere, {}).setdefault(sigma, []).append(number)
+    found: dict[int, HitRates] = {}
+    for (distributions, presentations), by_sigma in alike.items():
+        trials = session_trials(session, len(values), distributions)
+        sigmas = list(by_sigma)
+        for first in range(0, len(sigmas), _NOISES_AT_ONCE):
+            some = np.array(sigmas[first : first + _NOISES_AT_ONCE])
+            measures = np.broadcast_to(values, (some.size, *values.shape))
+            sums = noisy_gradient_sums(measures, pairs, some, seed, trials, presentations)  # (a)-(f)
+            for sigma, of_sigma in zip(some.tolist(), sums, strict=True):
+                for number in by_sigma[sigma]:
+                    found[number] = hit_rates_of_sums(of_sigma, seed, observers[number][1], session)
+    return [found[number] for number in range(len(observers))]
 
 
 def hit_rates_of_sums(
@@ -251,21 +320,75 @@ def discriminate_euclidean(
     >>> discriminate_euclidean(responses, 0.02, seed=1).hit_rate.round(1).tolist()
     [0.6, 1.0]
     """
-    plan = experiment or Experiment()
-    if plan.criterion_sigma > 0.0:
-        raise InputError(
-            "criterion_sigma must be 0 for Euclidean Distance: its decision point does not vary."
-        )
+    observer = noise_sigma, experiment or Experiment()
+    return compare_euclidean_observers(responses, [observer], seed, silent_value, norm, session)[0]
+
+
+def compare_euclidean_observers(
+    responses: ArrayLike,
+    observers: Sequence[tuple[float, Experiment]],
+    seed: int,
+    silent_value: float | None = None,
+    norm: str = "city-block",
+    session: int = 0,
+) -> list[HitRates]:
+    """Discriminate spheres by their Euclidean Distance under several noises and criteria.
+
+    All observers meet the same random numbers, which are drawn once: each has the hit rates that
+    `discriminate_euclidean` gives it.
+
+    Parameters
+    ----------
+    responses, seed, silent_value, norm, session
+        As in `discriminate_euclidean`.
+    observers : sequence of (float, Experiment)
+        Standard deviation sigma_1 of the noise, and repetitions and criterion, of each.
+
+    Returns
+    -------
+    list of HitRates
+        One per observer.
+
+    Raises
+    ------
+    InputError
+        As of `discriminate_euclidean`.
+
+    Examples
+    --------
+    >>> noises = [(sigma, Experiment()) for sigma in (0.02, 0.2)]
+    >>> found = compare_euclidean_observers([[50.0, 60.0], [55.0, 66.0]], noises, seed=1)
+    >>> [round(float(hits.hit_rate[0]), 1) for hits in found]
+    [1.0, 0.5]
+    """
     one_of("norm", norm, NORMS)
     values = checked_responses(responses, silent_value)
-    sigma = not_negative("noise_sigma", noise_sigma)
-    trials = session_trials(session, plan.hit_rates, len(values))
-    sums = np.array([_distances(values, sigma, seed, repetition, plan, norm) for repetition in trials])
-    # (a)-(g*): (hit_rates, n_spheres, pairs)
-    means = sums.mean(axis=2)
-    points = decision_point(means[:, :1], means[:, 1:], plan.criterion)
-    beyond = side(means) * (sums[:, 1:] - points[:, :, np.newaxis]).transpose(0, 2, 1)
-    return _mean_and_spread(np.heaviside(beyond, 0.5).mean(axis=1), seed, session)  # (h*)
+    alike: dict[tuple[int, int, int], dict[float, list[int]]] = {}
+    for number, (noise_sigma, plan) in enumerate(observers):
+        if plan.criterion_sigma > 0.0:
+            raise InputError(
+                "criterion_sigma must be 0 for Euclidean Distance: its decision point does not vary."
+            )
+        sigma, sizes = (
+            checked_noise(noise_sigma),
+            (plan.hit_rates, plan.presentations, plan.pairs),
+        )
+        alike.setdefault(sizes, {}).setdefault(sigma, []).append(number)
+    found: dict[int, HitRates] = {}
+    for (repetitions, n_sets, n_pairs), by_sigma in alike.items():
+        trials = session_trials(session, repetitions, len(values))
+        sigmas = list(by_sigma)
+        for first in range(0, len(sigmas), _NOISES_AT_ONCE):
+            some = np.array(sigmas[first : first + _NOISES_AT_ONCE])
+            distances = np.stack(
+                [_noisy_distances(values, some, seed, trial, n_sets, n_pairs, norm) for trial in trials],
+                axis=1,
+            )
+            for sigma, of_sigma in zip(some.tolist(), distances, strict=True):
+                for number in by_sigma[sigma]:
+                    hit_rates = _rates_of_distances(of_sigma, observers[number][1])
+                    found[number] = _mean_and_spread(hit_rates, seed, session)
+    return [found[number] for number in range(len(observers))]
 
 
 def checked_responses(responses: ArrayLike, silent_value: float | None = None) -> FloatArray:
@@ -350,17 +473,31 @@ def _varied_criterion(
     return hit_probability(point, comparison, spreads[0, 1:], side(means[:1]))
 
 
-def _distances(
-    values: FloatArray, sigma: float, seed: int, trials: IntArray, plan: Experiment, norm: str
+def _noisy_distances(
+    values: FloatArray, sigmas: FloatArray, seed: int, trials: IntArray, n_sets: int, n_pairs: int, norm: str
 ) -> FloatArray:
-    """Return distances (n_spheres, pairs) of random sets from random sets of the standard (a)-(g*)."""
-    sets = noisy_responses(values, sigma, seed, trials, plan.presentations)
-    n_spheres, n_sets, _ = sets.shape
-    of_standard, of_sphere = _picks(seed, trials, (plan.pairs, 2), n_sets).transpose(2, 0, 1)
+    """Return distances (n_sigmas, n_spheres, pairs) of random sets from sets of the standard (a)-(g*)."""
+    draws = normals(seed, trials, values.shape[1], Purpose.RESPONSE, n_sets).transpose(0, 2, 1)
+    of_standard, of_sphere = _picks(seed, trials, (n_pairs, 2), n_sets).transpose(2, 0, 1)
     # The distance of a set from itself is 0 and has no noise: the standard is compared with its other sets.
-    other = _picks(seed, trials[:1], (plan.pairs, 2), n_sets - 1)[0, :, 1]
+    other = _picks(seed, trials[:1], (n_pairs, 2), n_sets - 1)[0, :, 1]
     of_sphere[0] = other + (other >= of_standard[0])
-    return distance(sets[0, of_standard], sets[np.arange(n_spheres)[:, np.newaxis], of_sphere], norm)
+    first = draws[0, of_standard]
+    second = draws[np.arange(len(values))[:, np.newaxis], of_sphere]
+    return np.array(
+        [
+            distance(values[0] * (1.0 + sigma * first), values[:, np.newaxis] * (1.0 + sigma * second), norm)
+            for sigma in sigmas
+        ]
+    )
+
+
+def _rates_of_distances(distances: FloatArray, plan: Experiment) -> FloatArray:
+    """Return hit rates (hit_rates, n_comparisons) of distances (hit_rates, n_spheres, pairs) (h*)."""
+    means = distances.mean(axis=2)
+    points = decision_point(means[:, :1], means[:, 1:], plan.criterion)
+    beyond = side(means) * (distances[:, 1:] - points[:, :, np.newaxis]).transpose(0, 2, 1)
+    return np.heaviside(beyond, 0.5).mean(axis=1)
 
 
 def _picks(seed: int, trials: IntArray, shape: tuple[int, int], choices: int) -> IntArray:

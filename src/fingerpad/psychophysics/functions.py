@@ -22,6 +22,7 @@ from scipy.special import expit, logit, ndtr, ndtri
 
 from fingerpad.core.checks import FloatArray, finite, float_array, one_of, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import converted
 
 LOWER, HALF, UPPER = 0.05, 0.5, 0.95
 """Shares of F at the start of its width, at its threshold and at the end of its width."""
@@ -138,6 +139,7 @@ def level_at(
 
 
 @dataclass(frozen=True)
+@converted
 class PsychometricFunction:
     """One psychometric function.
 

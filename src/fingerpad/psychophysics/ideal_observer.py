@@ -23,8 +23,9 @@ from numpy.typing import ArrayLike
 from scipy.special import ndtri
 from scipy.stats import rankdata
 
-from fingerpad.core.checks import FloatArray, float_array, not_negative, positive, whole
+from fingerpad.core.checks import FloatArray, float_array, not_negative, whole
 from fingerpad.core.errors import InputError
+from fingerpad.psychophysics.noise import checked_noise
 from fingerpad.psychophysics.noisy_responses import session_trials
 from fingerpad.psychophysics.response_models import ResponseModel
 
@@ -255,7 +256,10 @@ def gaussian_information(
     0.25
     """
     values, rises = float_array("responses", responses, 1), float_array("slopes", slopes, 1)
-    sigma, floor = positive("noise_sigma", noise_sigma), not_negative("smallest_spread", smallest_spread)
+    sigma, floor = (
+        checked_noise(noise_sigma, above_zero=True),
+        not_negative("smallest_spread", smallest_spread),
+    )
     zeros = np.count_nonzero(values == 0.0) if floor == 0.0 else 0
     if values.size != rises.size or zeros:
         raise InputError(

@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 from scipy.special import ndtr
 
-from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, positive
+from fingerpad.core.checks import FloatArray, finite, float_array, positive
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.data import psychophysics
 from fingerpad.psychophysics.discrimination import checked_responses
 from fingerpad.psychophysics.encoding import check_neighbours
+from fingerpad.psychophysics.noise import checked_noise
 from fingerpad.psychophysics.noisy_responses import shared_noise_gradient_sums
 from fingerpad.psychophysics.signal_detection import decision_point, hit_probability, moments, side
 
@@ -90,7 +91,7 @@ def expected_hit_rates(
             f"got shape {draws.shape}."
         )
     pairs = check_neighbours(neighbours, values.shape[1])
-    sums = shared_noise_gradient_sums(values, pairs, not_negative("noise_sigma", noise_sigma), draws)
+    sums = shared_noise_gradient_sums(values, pairs, checked_noise(noise_sigma), draws)
     means, spreads = moments(sums)
     point = decision_point(means[0], means[1:], finite("criterion", criterion))
     return hit_probability(point, means[1:], spreads[1:], side(means[np.newaxis]))
@@ -136,7 +137,7 @@ def expected_euclidean_hit_rates(
     [0.6, 1.0]
     """
     values = checked_responses(responses, silent_value)
-    sigma = positive("noise_sigma", noise_sigma)
+    sigma = checked_noise(noise_sigma, above_zero=True)
     d = np.abs(values - values[0])
     s = np.maximum(sigma * np.hypot(values, values[0]), np.finfo(float).tiny)  # both silent: no difference
     x = d / s

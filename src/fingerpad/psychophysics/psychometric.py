@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, finite, one_of
+from fingerpad.core.displayed import Displayed
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.psychophysics.counts import SMALLEST_OVERDISPERSION, JudgementCounts, log_probability
 from fingerpad.psychophysics.functions import SIGMOIDS, PsychometricFunction, checked_levels
@@ -30,8 +31,8 @@ NARROWEST, WIDEST = 0.5, 5.0
 """Bounds of the width: times the smallest distance between levels, and times their span."""
 
 
-@dataclass(frozen=True)
-class PsychometricFit:
+@dataclass(frozen=True, repr=False)
+class PsychometricFit(Displayed):
     """A psychometric function fitted to counts.
 
     Parameters
@@ -53,6 +54,12 @@ class PsychometricFit:
     overdispersion: float
     log_likelihood: float
     model: Model
+
+    def __repr__(self) -> str:
+        return (
+            f"PsychometricFit({self.function.sigmoid}, threshold {self.threshold():.3g}, "
+            f"{int(self.counts.n_trials.sum())} judgements of {self.counts.levels.size} levels)"
+        )
 
     @property
     def free(self) -> tuple[str, ...]:

@@ -15,9 +15,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, IntArray, float_array, not_negative, positive
+from fingerpad.core.checks import FloatArray, IntArray, float_array, not_negative
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Purpose, normals
+from fingerpad.core.values import converted
+from fingerpad.psychophysics.noise import checked_noise
 
 
 class ResponseModel(Protocol):
@@ -38,6 +40,7 @@ class ResponseModel(Protocol):
 
 
 @dataclass(frozen=True)
+@converted
 class GaussianResponses:
     """Normally distributed responses.
 
@@ -70,6 +73,8 @@ class GaussianResponses:
                 f"covariance must have one row and column per receptor: got {covariance.shape} for "
                 f"{mean.size}."
             )
+        if np.abs(covariance - covariance.T).max(initial=0.0) > 1e-9 * np.abs(covariance).max(initial=0.0):
+            raise InputError("covariance must be symmetric: the two halves differ.")
         object.__setattr__(self, "mean", mean)
         object.__setattr__(self, "covariance", covariance)
         self.factor  # noqa: B018
@@ -133,7 +138,7 @@ def multiplied_responses(
     [[1.0, 0.0], [0.0, 4.0]]
     """
     values = float_array("responses", responses, 1)
-    sigma = positive("noise_sigma", noise_sigma)
+    sigma = checked_noise(noise_sigma, above_zero=True)
     floor = not_negative("smallest_spread", smallest_spread)
     if floor == 0.0 and (values == 0.0).any():
         raise InputError(

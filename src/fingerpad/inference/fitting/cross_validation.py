@@ -82,8 +82,8 @@ def interleaved_folds(n_observations: int, n_folds: int = int(protocol.FOLDS.val
     >>> interleaved_folds(8, 3).tolist()
     [0, 1, 2, 0, 1, 2, 0, 1]
     """
-    whole("n_folds", n_folds, at_least=2)
-    whole("n_observations", n_observations, at_least=n_folds)
+    if whole("n_folds", n_folds, at_least=2) > whole("n_observations", n_observations, at_least=2):
+        raise InputError(f"n_folds must be at most the number of stimuli, {n_observations}: got {n_folds}.")
     return np.arange(n_observations, dtype=np.int64) % n_folds
 
 
