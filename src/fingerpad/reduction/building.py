@@ -1,0 +1,222 @@
+"""Make a reduced touch: press all poses, fit, and measure the error on touches that were not used.
+
+The error is measured on random touches of the range: each presses at one pose, perhaps moves to another,
+holds, and goes to another depth. Of every touch the largest error over time counts, relative to what
+`ReducedModel.error_scale` says at that time. The bound is the conformal quantile (Vovk, Gammerman & Shafer,
+Algorithmic Learning in a Random World, 2005): with n touches, the ceil(0.95 (n + 1))-th smallest of their
+errors.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray, instance, whole
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import STORED_ENERGY
+from fingerpad.data.neuron import HUMAN_QUANTITY
+from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.reduction.model import ReducedModel, fitted_model
+from fingerpad.reduction.streaming import ReducedTouch
+from fingerpad.reduction.training import ReducedTraining
+from fingerpad.skin.indentation import Touch
+from fingerpad.skin.sampling import SkinResponse
+
+COVERAGE = 0.95
+"""Part of new touches whose error is to stay within the bound."""
+
+FEWEST_CALIBRATED = 19
+"""Least number of touches from which a bound with this coverage exists."""
+
+CHECKED_SITES = 9
+"""Sites along and across at which errors are measured."""
+
+STREAM_MS = 5.0
+"""Longest step of the stream while errors are measured. [ms]"""
+
+Solve = Callable[[Sequence[Touch], str], list[SkinResponse]]
+"""Solves touches of a named stage, in their order."""
+
+
+def reduce_touch(
+    training: ReducedTraining,
+    solve: Solve | None = None,
+    quantities: Sequence[str] = (HUMAN_QUANTITY, STORED_ENERGY),
+    calibration: int = 20,
+    seed: int = 1,
+) -> ReducedModel:
+    """Make a reduced touch from full presses.
+
+    Parameters
+    ----------
+    training : ReducedTraining
+        The touch and the range.
+    solve : callable, optional
+        Solves touches, for example in many processes or from a store; by default one after the other.
+    quantities : sequence of str, optional
+        Quantities of `SkinResponse.sample` to keep; the first one must stand for the pressure on the skin.
+    calibration : int, optional
+        Number of random touches from which the error is measured: 0 for none, else 19 or more.
+    seed : int, optional
+        Of these touches.
+
+    Returns
+    -------
+    ReducedModel
+
+    Raises
+    ------
+    InputError
+        If a pose cannot be pressed so deep, or there are too few touches for the error.
+    ConvergenceError
+        If a press cannot be solved.
+
+    Examples
+    --------
+    The range of this example is one place, and its error is not measured:
+
+    >>> import fingerpad as fp
+    >>> touch = fp.touch_of(fp.Fingertip(), fp.Sphere(curvature_per_m=287))
+    >>> model = fp.reduce_touch(fp.ReducedTraining(touch, fp.ReducedRange(depth_mm=0.5)), calibration=0)
+    >>> stream = fp.ReducedTouch(model, [(17.37, 0.0)])
+    >>> sample = stream.step(50.0, depth_mm=0.5)
+    >>> print(f"{sample.force_mn:.0f} mN")
+    22 mN
+    """
+    instance("training", training, ReducedTraining)
+    whole("seed", seed, at_least=0)
+    if not quantities:
+        raise InputError("quantities must name at least one quantity: got none.")
+    if whole("calibration", calibration, at_least=0) and calibration < FEWEST_CALIBRATED:
+        raise InputError(
+            f"calibration must be 0 or at least {FEWEST_CALIBRATED} touches, fewer have no bound for "
+            f"{COVERAGE:.0%} of touches: got {calibration}."
+        )
+    solve = solve or _in_turn
+    poses = list(training.poses())
+    pressed = solve([touch for pose in poses for touch in pose.touches], "training")
+    each = len(poses[0].touches)
+    responses = [pressed[n * each : (n + 1) * each] for n in range(len(poses))]
+    base = training.touch_with(poses[0].values[3:])
+    model = fitted_model(
+        training.range.axes, training.range.depth_mm, base.at_mm, poses, responses, tuple(quantities)
+    )
+    if not calibration:
+        return model
+    random = np.random.default_rng(seed)
+    held_out = [draw_touch(training, model, random) for _ in range(calibration)]
+    solved = solve([touch for _, touch in held_out], "calibration")
+    errors = [largest_errors(model, skin, shape) for (shape, _), skin in zip(held_out, solved, strict=True)]
+    rank = math.ceil(COVERAGE * (calibration + 1)) - 1
+    return replace(model, error=np.sort(errors, axis=0)[min(rank, calibration - 1)])
+
+
+def _in_turn(touches: Sequence[Touch], stage: str) -> list[SkinResponse]:
+    return [touch.solve() for touch in touches]
+
+
+def draw_touch(
+    training: ReducedTraining, model: ReducedModel, random: np.random.Generator
+) -> tuple[tuple[float, ...], Touch]:
+    """Draw a touch of the range: press, perhaps move aside, hold, go to another depth, hold.
+
+    Returns
+    -------
+    (tuple of float, Touch)
+        Value of the indenter's parameter, if one varies, and the touch.
+    """
+    axes = training.range.axes
+    start, end = ({axis.name: random.uniform(axis.low, axis.high) for axis in axes} for _ in range(2))
+    shape = tuple(start[axis.name] for axis in axes[3:])
+    ways = ("x_mm", "z_mm", "tilt_deg")
+    if random.uniform() < 0.5:
+        end = start
+    first_mm, second_mm = random.uniform(0.3, 1.0, 2) * training.range.depth_mm
+    ramp_ms, move_ms, back_ms = random.uniform(30.0, 300.0, 3)
+    hold_ms = random.uniform(100.0, 1000.0)
+    meets = [
+        float(model.pose_weights([*(pose[way] for way in ways), *shape]) @ model.first_touch_mm)
+        for pose in (start, end)
+    ]
+    above_mm = min(0.0, float(model.first_touch_mm.min())) - 0.5
+    times_ms = np.cumsum([0.0, 50.0, 50.0, ramp_ms, move_ms, hold_ms, back_ms, 300.0])
+    depths = [
+        above_mm, above_mm, meets[0], meets[0] + first_mm, meets[1] + first_mm, meets[1] + first_mm,
+        meets[1] + second_mm, meets[1] + second_mm,
+    ]  # fmt: skip
+    x_mm, z_mm, tilt_deg = (
+        (0.0, *[start[way]] * 3, *[end[way]] * 4) if start[way] != 0.0 or end[way] != 0.0 else None
+        for way in ways
+    )
+    motion = Trajectory(
+        tuple(times_ms.tolist()), depth_mm=tuple(depths), x_mm=x_mm, z_mm=z_mm, tilt_deg=tilt_deg
+    )
+    return shape, training.touch_with(shape, motion)
+
+
+def largest_errors(model: ReducedModel, skin: SkinResponse, shape: Iterable[float] = ()) -> FloatArray:
+    """Largest errors over a touch, of the quantities and of the force, over `ReducedModel.error_scale`."""
+    return _compared(model, skin, shape)[2]
+
+
+def streamed(
+    model: ReducedModel, skin: SkinResponse, shape: Iterable[float] = ()
+) -> tuple[FloatArray, FloatArray, bool]:
+    """Compare a reduced touch with a full one.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The reduced touch.
+    skin : SkinResponse
+        The full one.
+    shape : iterable of float
+        Value of the indenter's parameter, if one varies.
+
+    Returns
+    -------
+    (array (n_quantities + 1,), array (n_quantities + 1,), bool)
+        Largest errors and largest values of the quantities [kPa] and of the force [mN], and whether all
+        errors stay within what the reduced touch says of them.
+    """
+    wrong, peaks, relative = _compared(model, skin, shape)
+    return wrong, peaks, bool((relative <= model.error).all())
+
+
+def _compared(
+    model: ReducedModel, skin: SkinResponse, shape: Iterable[float]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Largest errors, largest values, and largest errors over the scale of errors."""
+    motion = skin.touch.stimulus  # type: ignore[union-attr]
+    sites = _sites(model)
+    known = np.stack([skin.sample(quantity, sites) for quantity in model.quantities], axis=1)
+    stream = ReducedTouch(model, sites, *shape)
+    so_far, largest, relative = np.zeros((3, len(model.quantities) + 1))
+    for number in range(1, skin.times_ms.size):
+        begin, end = skin.times_ms[number - 1 : number + 1]
+        parts = max(1, math.ceil((end - begin) / STREAM_MS))
+        for time in (begin + (end - begin) * np.arange(1, parts + 1) / parts).tolist():
+            pose, depth_mm = motion.pose_at(time), float(motion.prescribed_at(time))
+            sample = stream.step(time, depth_mm, None, pose.x_mm, pose.z_mm, pose.tilt_deg)
+        values = np.array([*sample.fields.values()])
+        wrong = np.append(
+            np.abs(values - known[number]).max(axis=1), abs(sample.force_mn - skin.force_mn[number])
+        )
+        so_far = np.maximum(so_far, np.append(values.max(axis=1), sample.force_mn))
+        largest, relative = (
+            np.maximum(largest, wrong),
+            np.maximum(relative, wrong / model.error_scale(so_far)),
+        )
+    return largest, np.append(known.max(axis=(0, 2)), skin.force_mn.max()), relative
+
+
+def _sites(model: ReducedModel) -> FloatArray:
+    """Places about all contacts of the range, (n, 2). [mm]"""
+    low, high = model.middle_mm.min(axis=0), model.middle_mm.max(axis=0)
+    spread = 0.5 * model.reach_mm
+    x, z = (np.linspace(a, b, CHECKED_SITES) for a, b in zip(low - spread, high + spread, strict=True))
+    return np.column_stack([grid.ravel() for grid in np.meshgrid(x, z, indexing="ij")])

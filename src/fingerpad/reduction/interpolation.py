@@ -1,0 +1,117 @@
+"""Interpolation of smooth functions from their values at Chebyshev's points.
+
+Along one axis a function f of s in [0, 1] is replaced by the polynomial through its values at the points
+s_j = (1 - cos(pi j / n)) / 2 (Trefethen, Approximation Theory and Approximation Practice, 2013):
+
+    f(s) = sum_j L_j(s) f(s_j),    L_j(s) = prod_{i != j} (s - s_i) / (s_j - s_i).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fingerpad.core.checks import FloatArray, finite, whole
+from fingerpad.core.errors import InputError
+from fingerpad.core.values import converted
+
+
+def chebyshev_points(count: int) -> FloatArray:
+    """Chebyshev's points of [0, 1] with both ends, (count,); the middle for one point.
+
+    Examples
+    --------
+    >>> chebyshev_points(3).round(9).tolist(), chebyshev_points(1).tolist()
+    ([0.0, 0.5, 1.0], [0.5])
+    """
+    if count == 1:
+        return np.array([0.5])
+    return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.arange(count) / (count - 1)))
+
+
+def lagrange(points: FloatArray, values: ArrayLike) -> FloatArray:
+    """Lagrange's polynomials of `points` (n,) at `values` (...,), (..., n).
+
+    Examples
+    --------
+    >>> lagrange(np.array([0.0, 1.0]), [0.25]).tolist()
+    [[0.75, 0.25]]
+    """
+    at = np.asarray(values, dtype=float)[..., None, None]
+    others = ~np.eye(points.size, dtype=bool)
+    apart = np.where(others, points[:, None] - points, 1.0)
+    return np.asarray(np.where(others, (at - points) / apart, 1.0).prod(axis=-1))
+
+
+@dataclass(frozen=True)
+@converted
+class Axis:
+    """One quantity that varies over the range of a reduced touch.
+
+    Parameters
+    ----------
+    name : str
+        "x_mm", "z_mm", "tilt_deg", or a parameter of the indenter.
+    low, high : float
+        Its range; equal if it does not vary.
+    count : int
+        Number of Chebyshev's points, 1 if it does not vary.
+
+    Raises
+    ------
+    InputError
+        If the range is empty, or the count does not suit it.
+
+    Examples
+    --------
+    >>> Axis("x_mm", 1.0, 5.0, 3).values.round(9).tolist()
+    [1.0, 3.0, 5.0]
+    """
+
+    name: str
+    low: float
+    high: float
+    count: int
+
+    def __post_init__(self) -> None:
+        finite(f"low of {self.name}", self.low)
+        if finite(f"high of {self.name}", self.high) < self.low:
+            raise InputError(f"{self.name} must range from low to high: got {self.low:g} to {self.high:g}.")
+        whole(f"count of {self.name}", self.count, at_least=1)
+        if (self.count == 1) != (self.low == self.high):
+            raise InputError(
+                f"{self.name} needs two points or more if it varies, and one if it does not: got "
+                f"{self.count} for {self.low:g} to {self.high:g}."
+            )
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """Chebyshev's points as shares of the range."""
+        return chebyshev_points(self.count)
+
+    @property
+    def values(self) -> FloatArray:
+        """Values at Chebyshev's points."""
+        return self.low + (self.high - self.low) * self.points
+
+    def weights(self, value: float) -> FloatArray:
+        """Weights of the points at a value, (count,).
+
+        Raises
+        ------
+        InputError
+            If the value lies outside of the range.
+        """
+        # Sums of positions differ in the last digits.
+        slack = 1e-9 * max(1.0, abs(self.low), abs(self.high))
+        if not self.low - slack <= value <= self.high + slack:
+            raise InputError(
+                f"{self.name} must lie within {self.low:g} to {self.high:g}, the range of this reduced "
+                f"touch: got {value:g}; solve the touch in full, or reduce it over a wider range."
+            )
+        if self.count == 1:
+            return np.ones(1)
+        return lagrange(self.points, (value - self.low) / (self.high - self.low))

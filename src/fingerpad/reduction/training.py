@@ -1,0 +1,298 @@
+"""The full presses that a reduced touch is made from: which poses, and what is read from each.
+
+At every pose the indenter is pressed from first touch to a few depths by a fast ramp, and held. Ramps give
+the response at once to many depths; holds show what each branch of the tissues relaxes.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+from scipy.optimize import brentq
+
+from fingerpad.core.checks import finite, instance, one_of, positive
+from fingerpad.core.errors import InputError
+from fingerpad.core.values import converted
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import RESOLUTIONS
+from fingerpad.geometry.indenter_grading import grading_along
+from fingerpad.geometry.motion import STILL, Pose
+from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.mechanics.press import PressSettings
+from fingerpad.reduction.interpolation import Axis
+from fingerpad.skin.indentation import LARGEST_TILT_DEG, Touch, settings_of
+
+DEPTH_SHARES = (0.1, 0.25, 0.45, 0.7, 1.0)
+"""Depths of the presses at one pose, over the largest."""
+
+RAMP_MS, RAMP_SAMPLES = 20.0, 10
+"""Duration and samples of the ramp of each press. [ms]"""
+
+HOLD_MS = (80.0, 280.0, 980.0, 2000.0)
+"""Times of the samples in the hold, from its start. [ms]"""
+
+LONGEST_WAY_MM = 6.0
+"""How far above or below the first touch of the touch any pose meets the skin. [mm]"""
+
+MOVE_MS = 50.0
+"""Time to move aside, and time to approach, both without contact. [ms]"""
+
+CLEARANCE_MM = 0.5
+"""How far above the skin the indenter moves aside. [mm]"""
+
+SPACING = {"x_mm": 1.5, "z_mm": 1.0, "tilt_deg": 10.0}
+"""Largest mean distance of the poses along each axis."""
+
+MOST_FIXED_POINTS = 30
+"""Steps of the search for the skin on the line of pressing; each gains a digit or more."""
+
+FEWEST_POINTS = 3
+"""Least number of points along an axis that varies."""
+
+
+@dataclass(frozen=True)
+@converted
+class ReducedRange:
+    """Poses that a reduced touch serves.
+
+    Parameters
+    ----------
+    depth_mm : float
+        Largest depth below first touch at any pose. [mm]
+    x_mm, z_mm : (float, float), optional
+        Ways of the indenter along and across the finger, from the place of the touch. [mm]
+    tilt_deg : (float, float), optional
+        Tilt, added to that of the touch. [degrees]
+    parameter : str, optional
+        A parameter of the indenter that varies, such as "curvature_per_m" of a `Sphere`.
+    values : (float, float), optional
+        Its range.
+
+    Raises
+    ------
+    InputError
+        If the depth is not positive, a range is empty or does not hold 0, or one of `parameter` and `values`
+        is missing.
+
+    Examples
+    --------
+    >>> [axis.name for axis in ReducedRange(1.5, x_mm=(-3.0, 3.0)).axes if axis.count > 1]
+    ['x_mm']
+    """
+
+    depth_mm: float
+    x_mm: tuple[float, float] = (0.0, 0.0)
+    z_mm: tuple[float, float] = (0.0, 0.0)
+    tilt_deg: tuple[float, float] = (0.0, 0.0)
+    parameter: str | None = None
+    values: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        positive("depth_mm", self.depth_mm, "mm")
+        for name in SPACING:
+            low, high = _pair(name, getattr(self, name))
+            if not low <= 0.0 <= high:
+                raise InputError(f"{name} must range over 0, the pose of the touch: got {low:g} to {high:g}.")
+            object.__setattr__(self, name, (low, high))
+        if (self.parameter is None) != (self.values is None):
+            raise InputError("A range needs both a parameter of the indenter and its values, or neither.")
+        if self.values is not None:
+            object.__setattr__(self, "values", _pair("values", self.values))
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """Axes of the range: x, z, tilt and, if there is one, the parameter of the indenter."""
+        axes = [
+            Axis(
+                name, low, high, 1 if low == high else max(FEWEST_POINTS, math.ceil((high - low) / each) + 1)
+            )
+            for name, each in SPACING.items()
+            for low, high in [getattr(self, name)]
+        ]
+        if self.parameter is not None and self.values is not None:
+            low, high = self.values
+            axes.append(Axis(self.parameter, low, high, 1 if low == high else FEWEST_POINTS + 1))
+        return tuple(axes)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the indenter moves aside."""
+        return self.x_mm != (0.0, 0.0) or self.z_mm != (0.0, 0.0)
+
+
+def _pair(name: str, values: tuple[float, float]) -> tuple[float, float]:
+    try:
+        low, high = values
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be a pair, lowest and highest: got {values!r}.") from None
+    if finite(f"lowest {name}", low) > finite(f"highest {name}", high):
+        raise InputError(f"{name} must range from low to high: got {low:g} to {high:g}.")
+    return float(low), float(high)
+
+
+@dataclass(frozen=True)
+class TrainingPose:
+    """One pose, and the presses there.
+
+    Parameters
+    ----------
+    values : tuple of float
+        Its place on each axis of the range.
+    first_touch_mm : float
+        Depth at which the indenter meets the undeformed skin, along the pressing of the touch and from its
+        first touch. [mm]
+    meets_mm : float
+        The same from the first touch at this place, before the indenter tilts. [mm]
+    touches : tuple of Touch
+        One per depth.
+    """
+
+    values: tuple[float, ...]
+    first_touch_mm: float
+    meets_mm: float
+    touches: tuple[Touch, ...]
+
+
+@dataclass(frozen=True)
+@converted
+class ReducedTraining:
+    """All presses behind a reduced touch.
+
+    Parameters
+    ----------
+    touch : Touch
+        What is reduced: its finger, indenter, tissues, place, direction and friction; its motion and its mesh
+        do not count.
+    range : ReducedRange
+        The poses.
+    resolution : {"quick", "standard", "paper"}
+        How fine the mesh is.
+
+    Raises
+    ------
+    InputError
+        If they do not fit each other.
+    """
+
+    touch: Touch
+    range: ReducedRange
+    resolution: str = "quick"
+
+    def __post_init__(self) -> None:
+        touch = instance("touch", self.touch, Touch)
+        instance("range", self.range, ReducedRange)
+        one_of("resolution", self.resolution, RESOLUTIONS)
+        if not isinstance(touch.finger, Fingertip):
+            raise InputError(
+                f"finger must be a Fingertip to be reduced: got a {type(touch.finger).__name__}."
+            )
+        if touch.friction > 0.0 and self.range.moves:
+            raise InputError(
+                "friction must be 0 for a range of x_mm or z_mm, because what slides with friction depends "
+                f"on its way, which a reduced touch does not know: got {touch.friction:g}."
+            )
+        steepest = max(abs(touch.tilt_deg + tilt) for tilt in self.range.tilt_deg)
+        if steepest > LARGEST_TILT_DEG:
+            raise InputError(
+                f"tilt_deg must keep the indenter within {LARGEST_TILT_DEG:g} degrees: got {steepest:g}."
+            )
+        parameter = self.range.parameter
+        if parameter is not None and parameter not in vars(touch.indenter):
+            known = ", ".join(vars(touch.indenter))
+            raise InputError(
+                f"parameter must be one of {known}, those of {type(touch.indenter).__name__}: "
+                f"got {parameter!r}."
+            )
+
+    def poses(self) -> Iterator[TrainingPose]:
+        """List all poses, the last axis the first to change.
+
+        Raises
+        ------
+        InputError
+            If a pose cannot be pressed so deep: the sentence names the place.
+        """
+        bases: dict[tuple[float, ...], Touch] = {}
+        for values in itertools.product(*(axis.values.tolist() for axis in self.range.axes)):
+            base = bases.setdefault(values[3:], self.touch_with(values[3:]))
+            moved, lies_mm = _moved(base, *values[:2])
+            pose = Pose(tilt_deg=values[2])
+            meets_mm = first_touch_mm(moved, pose)
+            touches = tuple(
+                replace(moved, stimulus=_pressed(pose, meets_mm, share * self.range.depth_mm))
+                for share in DEPTH_SHARES
+            )
+            yield TrainingPose(values, lies_mm + meets_mm, meets_mm, touches)
+
+    def touch_with(self, shape: Sequence[float] = (), stimulus: Trajectory | None = None) -> Touch:
+        """Touch on the mesh that serves all poses.
+
+        Parameters
+        ----------
+        shape : sequence of float
+            Value of the indenter's parameter, if one varies.
+        stimulus : Trajectory, optional
+            Its motion, solved with the steps of the resolution; default: the first press of the training.
+        """
+        base, range_ = self.touch, self.range
+        body = base.indenter
+        if range_.parameter is not None:
+            body = replace(cast(Any, body), **{range_.parameter: shape[0]})
+        corners = itertools.product(*(getattr(range_, name) for name in SPACING))
+        poses = [Pose(), *(Pose(*corner) for corner in corners)]
+        grading = grading_along(
+            body, self.resolution, *base.at_mm, base.spin_deg, poses, base.finger.relative_size
+        )
+        steps = settings_of(self.resolution)
+        if stimulus is None:
+            stimulus = _pressed(Pose(), 0.0, DEPTH_SHARES[0] * range_.depth_mm)
+            steps = PressSettings(1, 1, steps.newton)
+        return replace(base, indenter=body, grading=grading, stimulus=stimulus, settings=steps)
+
+
+def _moved(base: Touch, x_mm: float, z_mm: float) -> tuple[Touch, float]:
+    """Touch whose indenter stands aside, and by how much deeper it meets the skin there. [mm]
+
+    It presses along the same line as one that has moved there, so its axis goes through another point of the
+    skin if it is tilted.
+    """
+    if x_mm == 0.0 and z_mm == 0.0:
+        return base, 0.0
+    axis, start_mm = base.placement.axis, base.placement.origin_mm + np.array([x_mm, 0.0, z_mm])
+    x, z, way_mm = start_mm[0], start_mm[2], 0.0
+    for _ in range(MOST_FIXED_POINTS):
+        x, z = start_mm[[0, 2]] + way_mm * axis[[0, 2]]
+        way_mm = float((base.finger.skin_point(x, z)[1] - start_mm[1]) / axis[1])
+    moved = replace(base, at_mm=(float(x), float(z)))
+    return moved, float((moved.placement.origin_mm - start_mm) @ axis)
+
+
+def _pressed(pose: Pose, meets_mm: float, depth_mm: float) -> Trajectory:
+    """Motion that tilts above the skin, then presses from first touch and holds."""
+    ramp_ms = np.linspace(0.0, RAMP_MS, RAMP_SAMPLES + 1)
+    hold_ms = RAMP_MS + np.array(HOLD_MS)
+    times_ms = np.concatenate([[0.0, MOVE_MS], 2 * MOVE_MS + ramp_ms, 2 * MOVE_MS + hold_ms])
+    pressed_mm = meets_mm + depth_mm * np.minimum(np.append(ramp_ms, hold_ms) / RAMP_MS, 1.0)
+    above_mm = min(meets_mm, 0.0) - CLEARANCE_MM
+    depths_mm = np.concatenate([[above_mm, above_mm], pressed_mm])
+    tilts_deg = np.where(times_ms > 0.0, pose.tilt_deg, 0.0)
+    return Trajectory(
+        tuple(times_ms.tolist()),
+        depth_mm=tuple(depths_mm.tolist()),
+        tilt_deg=None if pose == STILL else tuple(tilts_deg.tolist()),
+    )
+
+
+def first_touch_mm(touch: Touch, pose: Pose) -> float:
+    """Depth at which the indenter in a pose meets the undeformed skin, along its pressing. [mm]"""
+    placement, skin_mm = touch.placement.moved(pose), touch.mesh.nodes_mm[touch.mesh.skin_nodes]
+
+    def gap_mm(depth_mm: float) -> float:
+        return float(touch.body.gap(placement.to_local(skin_mm, depth_mm))[0].min())
+
+    return float(brentq(gap_mm, -LONGEST_WAY_MM, LONGEST_WAY_MM, xtol=1e-9))
