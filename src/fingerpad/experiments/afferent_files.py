@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.errors import InputError, StoreError, shown
 from fingerpad.core.files import read_text
 from fingerpad.experiments import schemas
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
@@ -32,9 +32,16 @@ def fitted_afferent(path: Path) -> Afferent:
         values = schemas.read(path, "fingerpad fit", "fingerpad reproduction")
     except (InputError, StoreError) as error:
         raise InputError(f"afferent: {error}") from error
-    fitted = values["fit" if "fit" in values else "single_unit"]
-    named = values if "fit" in values else fitted
-    return Afferent.from_parameters(
-        [fitted["parameters"][name] for name in PARAMETER_NAMES],
-        **{name: named[name] for name in ("dynamic_quantity", "static_quantity")},
-    )
+    try:
+        fitted = values["fit" if "fit" in values else "single_unit"]
+        named = values if "fit" in values else fitted
+        parameters = [fitted["parameters"][name] for name in PARAMETER_NAMES]
+        quantities = {name: named[name] for name in ("dynamic_quantity", "static_quantity")}
+    except (LookupError, TypeError) as error:
+        raise InputError(
+            f"afferent: {path} must hold the parameters of a fit: {shown(error.args[0])} is missing there."
+        ) from error
+    try:
+        return Afferent.from_parameters(parameters, **quantities)
+    except InputError as error:
+        raise InputError(f"afferent: {path}: {error}") from error

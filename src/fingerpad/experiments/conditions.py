@@ -6,7 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fingerpad.core.checks import one_of, whole
+from fingerpad.core.checks import instance, one_of, whole
+from fingerpad.core.random_streams import LARGEST_SEED
+from fingerpad.core.values import converted
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
@@ -44,6 +46,7 @@ def straight_tilt_deg(finger: Finger, indenter: Indenter) -> float:
 
 
 @dataclass(frozen=True)
+@converted
 class Conditions:
     """Finger, tissues and accuracy of a reproduction.
 
@@ -55,20 +58,22 @@ class Conditions:
         Seed of the observer's noise.
     materials : str or Tissues
         Tissues of all but the paper's three trials: a name, see `mechanics.tissues`, or your own.
-    finger : Fingertip
+    finger : Fingertip or FingerMesh
         The finger.
     """
 
     resolution: str = "standard"
     seed: int = 0
     materials: str | Tissues = DEFAULT_TISSUES
-    finger: Fingertip = field(default_factory=Fingertip)
+    finger: Finger = field(default_factory=Fingertip)
 
     def __post_init__(self) -> None:
         one_of("resolution", self.resolution, RESOLUTIONS)
-        whole("seed", self.seed, at_least=0)
+        whole("seed", self.seed, 0, LARGEST_SEED)
         if isinstance(self.materials, str):
             one_of("materials", self.materials, tuple(TISSUES))
+        else:
+            instance("materials", self.materials, Tissues)
 
     @property
     def afferent(self) -> Afferent:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from functools import lru_cache
 
-from fingerpad.core.checks import finite, one_of
+from fingerpad.core.checks import number_in, one_of
 from fingerpad.core.errors import InputError
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.names import INDENTERS, SIZE_UNITS
@@ -54,6 +54,4 @@ def indenter_named(text: str) -> Indenter:
         if size in written:
             raise InputError(f"indenter must have {size} once: got {text!r}.")
         written[size] = value
-    return body(
-        **{size: finite(size, value, SIZE_UNITS.get(size, "")) for size, value in written.items()}  # type: ignore[arg-type]
-    )
+    return body(**{size: number_in(size, value, SIZE_UNITS.get(size, "")) for size, value in written.items()})

@@ -8,7 +8,7 @@ import resource
 import sys
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -60,6 +60,8 @@ class StageSummary:
         Largest relative imbalance of the forces and of the energies of an indentation.
     linear_solvers : tuple of str
         Which solvers served the Newton steps.
+    caveats : tuple of str
+        Where indentations lie outside of what was verified, each sentence once.
     """
 
     name: str
@@ -69,6 +71,7 @@ class StageSummary:
     largest_force_imbalance: float | None = None
     largest_energy_imbalance: float | None = None
     linear_solvers: tuple[str, ...] = ()
+    caveats: tuple[str, ...] = ()
 
 
 @result_class
@@ -120,8 +123,23 @@ class Manifest:
     command: str | None = None
     inputs: dict[str, str]
 
+    @property
+    def caveats(self) -> tuple[str, ...]:
+        """Where the results lie outside of what was verified, each sentence once."""
+        return tuple(dict.fromkeys(text for stage in self.stages for text in stage.caveats))
 
-def software() -> dict[str, Any]:
+
+class Software(TypedDict):
+    """Program and system that compute something, by the names of the fields of a `Manifest`."""
+
+    version: str
+    code_hash: str
+    python: str
+    platform: str
+    packages: dict[str, str]
+
+
+def software() -> Software:
     """Fields of a `Manifest` that name the program and the system."""
     return {
         "version": __version__,

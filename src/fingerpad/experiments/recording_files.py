@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,18 +12,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fingerpad.core.checks import FloatArray, not_negative, positive
+from fingerpad.core.checks import FloatArray, not_negative, number_in, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.files import check_file
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.core.units import MS_PER_S
-from fingerpad.experiments.stimuli import Stimuli, TactileStimulus
+from fingerpad.experiments.descriptions.stimuli import NamedStimulus
+from fingerpad.experiments.stimuli import Stimuli
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
 
 RATES = tuple(f"{phase}_rate_hz" for phase in PHASES)
 SPIKES = "spike_times_ms"
 DURATION = "duration_ms"
 FOLD = "fold"
+LARGEST_NWB_MB = 20_000
 SUFFIXES_OF_NWB = (".nwb", ".h5", ".hdf5")
 
 
@@ -34,7 +38,7 @@ class Recorded:
     ----------
     recordings : RateRecordings or SpikeRecordings
         What the afferent answered.
-    stimuli : mapping of str to TactileStimulus
+    stimuli : mapping of str to NamedStimulus
         What touched it, in the order of their first presentations.
     memberships : int array (n_stimuli,) or None
         Fold of each stimulus, from 0, if the file says so.
@@ -45,7 +49,7 @@ class Recorded:
     """
 
     recordings: RateRecordings | SpikeRecordings
-    stimuli: Mapping[str, TactileStimulus]
+    stimuli: Mapping[str, NamedStimulus]
     memberships: NDArray[np.int64] | None
     presentations: Mapping[str, int]
     spikes_after_hold: int = 0
@@ -96,10 +100,10 @@ def read_recordings(path: Path, stimuli: Stimuli, unit: int | None = None) -> Re
         raise InputError(f"unit belongs to NWB files ({', '.join(SUFFIXES_OF_NWB)}): {path} is none.")
     _check_columns(path, stimuli.column, lines[0])
     presented = [_presented(line, stimuli) for line in lines]
-    names = [name for name, _ in presented]
-    found = dict(presented)
+    names = [stimulus.name for stimulus in presented]
+    found = {stimulus.name: stimulus for stimulus in presented}
     memberships = _memberships(path, lines, names) if FOLD in lines[0].entries else None
-    presentations = {name: names.count(name) for name in found}
+    presentations = dict(Counter(names))
     if SPIKES not in lines[0].entries:
         rates = _mean_rates(lines, names, str(path))
         return Recorded(rates, found, memberships, presentations)
@@ -120,29 +124,30 @@ def _check_columns(path: Path, column: str, first: TableRow) -> None:
         raise InputError(f"{path} has {DURATION}, which belongs to {SPIKES}: leave it out.")
 
 
-def _presented(line: TableRow, stimuli: Stimuli) -> tuple[str, TactileStimulus]:
+def _presented(line: TableRow, stimuli: Stimuli) -> NamedStimulus:
     entry = line.text(stimuli.column)
     with line.placed():
         return stimuli.named(entry)
 
 
 def _mean_rates(lines: Sequence[TableRow], names: Sequence[str], source: str) -> RateRecordings:
-    unique = tuple(dict.fromkeys(names))
+    presented: dict[str, list[int]] = {}
+    for number, name in enumerate(names):
+        presented.setdefault(name, []).append(number)
     means: dict[str, FloatArray | None] = dict.fromkeys(RATES)
     for column in RATES:
         if column in lines[0].entries:
             rates = np.array([line.number(column, "spikes/s", not_negative) for line in lines])
-            owner = np.array(names)
-            means[column] = np.array([rates[owner == name].mean() for name in unique])
-    return RateRecordings(unique, **means, source=source)
+            means[column] = np.array([rates[numbers].mean() for numbers in presented.values()])
+    return RateRecordings(tuple(presented), **means, source=source)
 
 
 def _spikes(
-    lines: Sequence[TableRow], presented: Sequence[tuple[str, TactileStimulus]], source: str
+    lines: Sequence[TableRow], presented: Sequence[NamedStimulus], source: str
 ) -> tuple[SpikeRecordings, int]:
     """Trains until the motion or the recording ends, and the number of spikes after the motion."""
     trains, durations, after = [], [], 0
-    for line, (_, stimulus) in zip(lines, presented, strict=True):
+    for line, stimulus in zip(lines, presented, strict=True):
         end = stimulus.motion.end_ms
         recorded = line.number(DURATION, "ms", positive) if line.has(DURATION) else np.inf
         times = _spike_times(line)
@@ -154,7 +159,10 @@ def _spikes(
         durations.append(min(end, recorded))
         after += int((times > end).sum())
     recordings = SpikeRecordings(
-        tuple(name for name, _ in presented), SpikeTrains.from_lists(trains), np.array(durations), source
+        tuple(stimulus.name for stimulus in presented),
+        SpikeTrains.from_lists(trains),
+        np.array(durations),
+        source,
     )
     return recordings, after
 
@@ -164,7 +172,7 @@ def _spike_times(line: TableRow) -> FloatArray:
     entry = line.entries[SPIKES]
     with line.placed():
         if isinstance(entry, str):
-            entry = [not_negative(SPIKES, time, "ms") for time in entry.split()]  # type: ignore[arg-type]
+            entry = [not_negative(SPIKES, number_in(SPIKES, time, "ms"), "ms") for time in entry.split()]
         times = np.asarray(entry, dtype=np.float64)
         backwards = np.flatnonzero(np.diff(times) <= 0.0)
         if backwards.size:
@@ -186,21 +194,21 @@ def _memberships(path: Path, lines: Sequence[TableRow], names: Sequence[str]) ->
                 f"{line.place}: {FOLD} must be the same for all presentations of {name}, which would be "
                 f"fitted and judged at once: got {fold:g}, and {before} in {where.place}."
             )
-    folds = np.array([fold for fold, _ in first.values()], dtype=np.int64)
-    n_folds = int(folds.max())
-    missing = sorted(set(range(1, n_folds + 1)) - set(folds.tolist()))
-    if missing or n_folds < 2:
+    folds = [fold for fold, _ in first.values()]
+    used = set(folds)
+    # The first fold without a stimulus is at most the number of stimuli + 1, however large a fold is.
+    missing = next(fold for fold in range(1, len(used) + 2) if fold not in used)
+    if missing <= max(2, *used):
         raise InputError(
             f"{path}: {FOLD} must number at least two folds from 1 without a gap: "
-            f"no row is in fold {missing[0] if missing else 2}."
+            f"no row is in fold {missing}."
         )
-    return folds - 1
+    return np.array(folds, dtype=np.int64) - 1
 
 
 def _nwb_lines(path: Path, column: str, unit: int | None) -> list[TableRow]:
     """Trials of an NWB file as lines of a table, with the spikes of one unit."""
-    if not path.is_file():
-        raise InputError(f"{path} must be a file that can be read: there is none.")
+    check_file(path, LARGEST_NWB_MB)
     try:
         from pynwb import NWBHDF5IO
     except ImportError as error:

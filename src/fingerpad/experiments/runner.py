@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -10,14 +11,18 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TypeVar
 
-from fingerpad.core.checks import whole
+from fingerpad.core.engine import Engine, engine_of
+from fingerpad.core.files import path_of
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.manifest import Manifest, StageSummary, mesh_summary, peak_memory_mb, software
 from fingerpad.geometry.mesh import Mesh
+from fingerpad.mechanics.kernels import KERNELS
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
 from fingerpad.skin.store import OnFailed, Store, solve_missing
+
+LOGGER = logging.getLogger(__name__)
 
 STORE_FOLDER = "indentations"
 """Folder of finished indentations within the folder of a run."""
@@ -32,8 +37,8 @@ class Runner:
     ----------
     folder : Path
         Folder of the run; finished indentations are stored below it.
-    jobs : int
-        Processes to use; the numbers do not depend on it.
+    jobs : int or Engine
+        Processes, or the engine that solves the indentations; the numbers do not depend on it.
     progress : Progress, optional
         Shown each finished part.
 
@@ -50,9 +55,10 @@ class Runner:
     (['fit'], 'quick')
     """
 
-    def __init__(self, folder: Path, jobs: int = 1, progress: Progress | None = None):
-        self.folder = Path(folder)
-        self.jobs = whole("jobs", jobs, at_least=1)
+    def __init__(self, folder: Path, jobs: int | Engine = 1, progress: Progress | None = None):
+        self.folder = path_of("folder", folder)
+        self._engine = engine_of(jobs, KERNELS)
+        self.jobs = jobs if isinstance(jobs, int) else 1
         self.progress = progress or NoProgress()
         self.store = Store(self.folder / STORE_FOLDER)
         self._stages: list[StageSummary] = []
@@ -64,7 +70,9 @@ class Runner:
         started = time.perf_counter()
         with self.progress.stage(name, total) as advance:
             yield advance
-        self._stages.append(StageSummary(name=name, wall_s=round(time.perf_counter() - started, 2)))
+        wall_s = round(time.perf_counter() - started, 2)
+        LOGGER.info("%s took %.2f s", name, wall_s)
+        self._stages.append(StageSummary(name=name, wall_s=wall_s))
 
     def solve(
         self,
@@ -97,7 +105,7 @@ class Runner:
         """
         missing = self.store.missing(touches)
         with self.stage(stage, len(missing)) as advance:
-            solve_missing(missing, self.jobs, lambda seconds: advance(), on_failed)
+            solve_missing(missing, self._engine, lambda seconds: advance(), on_failed)
         return missing.keys()
 
     def load(self, name: str, touches: Mapping[Key, Touch]) -> dict[Key, SkinResponse]:
@@ -121,15 +129,19 @@ class Runner:
         """
         with self.stage(name, 0):
             responses = {key: self.store.load(touch) for key, touch in touches.items()}
-        skins = responses.values()
+        self.note(responses.values())
+        return responses
+
+    def note(self, skins: Collection[SkinResponse]) -> None:
+        """Say in the manifest how good the indentations of the last stage are."""
         self._stages[-1] = replace(
             self._stages[-1],
-            indentations=len(touches),
+            indentations=len(skins),
             largest_force_imbalance=max((skin.force_imbalance for skin in skins), default=None),
             largest_energy_imbalance=max((skin.energy_imbalance for skin in skins), default=None),
             linear_solvers=tuple(sorted({skin.linear_solver for skin in skins})),
+            caveats=tuple(dict.fromkeys(caveat.text for skin in skins for caveat in skin.caveats)),
         )
-        return responses
 
     def responses(
         self, groups: Mapping[str, Mapping[Any, Touch]], on_failed: OnFailed | None = None

@@ -2,71 +2,80 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
-from fingerpad.core.checks import finite
+import numpy as np
+
+from fingerpad.core.checks import number_in
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
-from fingerpad.core.keywords import did_you_mean
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.tables import TableRow, read_csv
-from fingerpad.experiments.indenter_text import indenter_named
-from fingerpad.geometry.indenters import Bar, Indenter
-from fingerpad.geometry.motion import MOTION_UNITS, ForceRampAndHold, RampAndHold, Stimulus
-from fingerpad.geometry.names import INDENTERS, SIZE_UNITS, sizes_of
+from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.descriptions.pressing import named_files
+from fingerpad.experiments.descriptions.reading import (
+    Origin,
+    Place,
+    PlacedError,
+    at,
+    merged,
+    part_from,
+    place_text,
+)
+from fingerpad.experiments.descriptions.stimuli import (
+    NamedStimulus,
+    StimulusSet,
+    named_stimuli,
+    pressed_with,
+    touches_of,
+)
+from fingerpad.experiments.descriptions.stimulus import PlaceSettings
+from fingerpad.geometry.indenters import Bar
+from fingerpad.geometry.motion import MOTION_UNITS, Motion, RampAndHold
+from fingerpad.geometry.names import SIZE_UNITS
+from fingerpad.skin.indentation import Touch
 
-PLACE = {"x_mm": "mm", "z_mm": "mm", "tilt_deg": "degrees", "spin_deg": "degrees"}
-COLUMNS = ("stimulus", "indenter", *SIZE_UNITS, *MOTION_UNITS, *PLACE)
-"""Columns of a file of stimuli; only the first two are needed."""
+COLUMNS = (
+    "name",
+    "object",
+    *(f"object.{size}" for size in SIZE_UNITS),
+    *(f"motion.{number}" for number in MOTION_UNITS),
+    *(f"place.{name}" for name in PlaceSettings.model_fields),
+    "friction",
+)
+"""Usual columns of a table of stimuli; any other key of a block is one as well, such as `motion.file`."""
 
-
-@dataclass(frozen=True)
-class TactileStimulus:
-    """An indenter, its motion and its place relative to the receptive field.
-
-    Parameters
-    ----------
-    indenter : Indenter
-        The rigid body.
-    motion : RampAndHold or ForceRampAndHold
-        How it is pressed.
-    x_mm, z_mm : float
-        Where its axis meets the skin, from the centre of the receptive field: along the finger on the
-        tangent of the skin, distal positive, and across. [mm]
-    tilt_deg : float, optional
-        As in `fingerpad.Touch`; by default it presses perpendicular to the skin at the receptor. [degrees]
-    spin_deg : float
-        As in `fingerpad.Touch`: the orientation of a bar, an edge, a gap or a grating. [degrees]
-    """
-
-    indenter: Indenter
-    motion: Stimulus = field(default_factory=RampAndHold)
-    x_mm: float = 0.0
-    z_mm: float = 0.0
-    tilt_deg: float | None = None
-    spin_deg: float = 0.0
-
-    def __post_init__(self) -> None:
-        finite("x_mm", self.x_mm, "mm")
-        finite("z_mm", self.z_mm, "mm")
-        finite("spin_deg", self.spin_deg, "degrees")
-        if self.tilt_deg is not None:
-            finite("tilt_deg", self.tilt_deg, "degrees")
+BLOCKS = ("object.", "motion.", "place.")
+"""How other columns begin."""
 
 
 class Stimuli(Protocol):
-    """Tells which stimulus the entry of a table of recordings means."""
+    """Tells which stimulus the entry of a table of recordings means, and how it is pressed."""
 
     @property
     def column(self) -> str:
         """Column of the recordings that names the stimulus."""
         ...
 
-    def named(self, entry: str) -> tuple[str, TactileStimulus]:
-        """Name of the stimulus, the same for equal ones, and the stimulus; `InputError` if there is none."""
+    @property
+    def conditions(self) -> Conditions:
+        """Finger, tissues and accuracy."""
+        ...
+
+    @property
+    def finger_files(self) -> tuple[Path, ...]:
+        """Files that the finger is read from."""
+        ...
+
+    def named(self, entry: str) -> NamedStimulus:
+        """Stimulus of an entry, the same for equal ones; `InputError` if there is none."""
+        ...
+
+    def touches(self, stimuli: Sequence[NamedStimulus], conditions: Conditions) -> dict[str, Touch]:
+        """One touch per stimulus, by name; `InputError` with its name or its place if one cannot be."""
         ...
 
 
@@ -78,26 +87,45 @@ class ShiftedBar:
     ----------
     bar : Bar
         Width and fillets.
-    motion : RampAndHold or ForceRampAndHold
+    motion : Motion
         The same at all shifts.
+    column : str
+        Column of the recordings with the shifts.
+    conditions : Conditions
+        Finger, tissues and accuracy.
+    finger_files : tuple of Path
+        Those that the finger is read from.
 
     Examples
     --------
-    A positive shift lies on the proximal side (docs/decisions/bar-shift.md).
+    A positive shift lies on the proximal side, along the skin (docs/decisions/bar-shift.md).
 
-    >>> name, stimulus = ShiftedBar().named("1.50")
-    >>> name, stimulus.x_mm
-    ('1.5', -1.5)
+    >>> stimulus = ShiftedBar().named("1.50")
+    >>> stimulus.name, round(stimulus.x_mm, 2)
+    ('1.5', -1.49)
     """
 
     bar: Bar = field(default_factory=Bar)
-    motion: Stimulus = field(default_factory=RampAndHold)
+    motion: Motion = field(default_factory=RampAndHold)
     column: str = "shift_mm"
+    conditions: Conditions = field(default_factory=Conditions)
+    finger_files: tuple[Path, ...] = ()
 
-    def named(self, entry: str) -> tuple[str, TactileStimulus]:
-        """Shift as text and the bar at that shift."""
-        shift_mm = finite(self.column, entry, "mm") + 0.0  # type: ignore[arg-type]
-        return f"{shift_mm:g}", TactileStimulus(self.bar, self.motion, x_mm=-shift_mm)
+    def named(self, entry: str) -> NamedStimulus:
+        """Return the bar at a shift."""
+        shift_mm = number_in(self.column, entry, "mm") + 0.0
+        name = repr(shift_mm).removesuffix(".0")
+
+        def in_file(place: Place) -> tuple[Place, str]:
+            return place, f"Stimulus {name} cannot be used: {place_text(place)}"
+
+        along = along_skin(self.conditions)
+        return NamedStimulus(self.bar, self.motion, -shift_mm * along, name=name, in_file=in_file)
+
+    def touches(self, stimuli: Sequence[NamedStimulus], conditions: Conditions) -> dict[str, Touch]:
+        """One touch per stimulus, for the paper's bar those of the reproduction."""
+        grading = conditions.bar_grading() if conditions.finger.own_mesh is None else None
+        return {stimulus.name: pressed_with(stimulus, conditions, grading) for stimulus in stimuli}
 
 
 @dataclass(frozen=True)
@@ -106,33 +134,63 @@ class ListedStimuli:
 
     Parameters
     ----------
-    stimuli : mapping of str to TactileStimulus
+    stimuli : mapping of str to NamedStimulus
         By name.
     source : str
         Where they are listed, for errors.
+    column : str
+        Column of the recordings with the names.
+    conditions : Conditions
+        Finger, tissues and accuracy.
+    reach_mm : float, optional
+        As of `StimulusSet`. [mm]
+    finger_files : tuple of Path
+        Those that the finger is read from.
     """
 
-    stimuli: Mapping[str, TactileStimulus]
+    stimuli: Mapping[str, NamedStimulus]
     source: str = "stimuli"
     column: str = "stimulus"
+    conditions: Conditions = field(default_factory=Conditions)
+    reach_mm: float | None = None
+    finger_files: tuple[Path, ...] = ()
 
-    def named(self, entry: str) -> tuple[str, TactileStimulus]:
-        """Return the name and the stimulus."""
+    def named(self, entry: str) -> NamedStimulus:
+        """Return the stimulus of that name."""
         if entry not in self.stimuli:
             raise InputError(
                 f"{self.column} must be one of {self.source}, {', '.join(self.stimuli)}: got {entry!r}."
             )
-        return entry, self.stimuli[entry]
+        return self.stimuli[entry]
+
+    def touches(self, stimuli: Sequence[NamedStimulus], conditions: Conditions) -> dict[str, Touch]:
+        """One touch per stimulus; objects of one kind share a mesh, which is fine at the receptor as well."""
+        found: dict[str, Touch] = {}
+        for kind in dict.fromkeys(type(stimulus.indenter) for stimulus in stimuli):
+            same = [stimulus for stimulus in stimuli if type(stimulus.indenter) is kind]
+            # A wire needs elements so small that they cannot reach to the receptor as well.
+            wire = any(stimulus.indenter.grips for stimulus in same)
+            receptor = None if wire else conditions.sphere_grading()
+            found |= touches_of(same, conditions, self.reach_mm, receptor)
+        return {stimulus.name: found[stimulus.name] for stimulus in stimuli}
 
 
-def read_stimuli(path: Path) -> ListedStimuli:
+def along_skin(conditions: Conditions) -> float:
+    """Distance along the finger's axis over that along the skin at the receptor."""
+    return float(np.cos(np.deg2rad(conditions.skin_tilt_deg)))
+
+
+def read_stimuli(path: Path, **replacing: str | None) -> ListedStimuli:
     r"""Read a list of stimuli, CSV or YAML.
 
     Parameters
     ----------
     path : Path
-        A CSV file with columns among `COLUMNS`, or a YAML file (.yaml, .yml) that lists mappings with the
-        same names. A size, motion or place that is not given is the paper's.
+        A YAML file with the keys of `StimulusSet`, those of a touch with a list of `stimuli`; or a CSV file
+        with one row per stimulus, whose columns are `name` and the same keys, such as `object`,
+        `object.width_mm`, `motion.depth_mm`, `place.x_mm`.
+    **replacing
+        Values that replace those of the file: `resolution`, `tissues` or `finger`; None leaves them.
 
     Returns
     -------
@@ -141,71 +199,62 @@ def read_stimuli(path: Path) -> ListedStimuli:
     Raises
     ------
     InputError
-        If the file cannot be read, an indenter is unknown, a name is repeated, or a value cannot be; with
-        the line and the column.
+        If the file cannot be read, a key is unknown, a name is repeated, or a value cannot be; with the line
+        and the key.
 
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     path = Path(folder) / "stimuli.csv"
-    ...     _ = path.write_text("stimulus,indenter,diameter_mm\nprobe,punch,1.0\n", encoding="utf-8")
+    ...     _ = path.write_text("name,object,object.diameter_mm\nprobe,punch,1.0\n", encoding="utf-8")
     ...     read_stimuli(path).stimuli["probe"].indenter
     FlatPunch(diameter_mm=1.0, fillet_mm=0.3)
     """
-    lines = _yaml_lines(path) if path.suffix in (".yaml", ".yml") else read_csv(path, COLUMNS)
-    stimuli: dict[str, TactileStimulus] = {}
-    for line in lines:
-        name = line.text("stimulus")
-        if name in stimuli:
-            raise InputError(f"{line.place}: stimulus {name!r} is repeated, give each its own name.")
-        stimuli[name] = _stimulus(line)
-    return ListedStimuli(stimuli, str(path))
+    given = {key: value for key, value in replacing.items() if value is not None}
+    if path.suffix in (".yaml", ".yml"):
+        text = read_text(path)
+        origin, content = Origin(str(path), text), read_yaml(text, str(path))
+    else:
+        rows = read_csv(path, COLUMNS, BLOCKS)
+        origin = Origin(str(path), rows=tuple(row.line for row in rows))
+        content = {"stimuli": [_blocks(row) for row in rows]}
+    with origin.located():
+        described = part_from(StimulusSet, content | given if isinstance(content, dict) else content)
+        conditions = described.conditions(beside=origin.beside)
+        stimuli = named_stimuli(described, origin.beside)
+        if not stimuli:
+            raise PlacedError("stimuli must have at least one entry: got none.", ("stimuli",))
+    return ListedStimuli(
+        {stimulus.name: replace(stimulus, in_file=_located(stimulus, origin)) for stimulus in stimuli},
+        str(path),
+        conditions=conditions,
+        reach_mm=described.reach_mm,
+        finger_files=tuple(named_files(described.finger, origin.beside)),
+    )
 
 
-def _stimulus(line: TableRow) -> TactileStimulus:
-    """Build the stimulus that a line describes."""
-    kind, *inline = (part.strip() for part in line.text("indenter").split(":"))
-    with line.placed():
-        indenter = indenter_named(line.text("indenter"))
-    sizes = {size: SIZE_UNITS[size] for size in sizes_of(kind)}
-    line.refuse_others(("stimulus", "indenter", *sizes, *MOTION_UNITS, *PLACE), kind)
-    given = _given(line, sizes)
-    if inline and given:
-        raise InputError(
-            f"{line.place}: sizes must stand in indenter or in columns, not in both: leave "
-            f"{next(iter(given))} empty."
-        )
-    if line.has("depth_mm") and line.has("force_mn"):
-        raise InputError(f"{line.place}: depth_mm and force_mn exclude each other: leave one empty.")
-    motion = ForceRampAndHold if line.has("force_mn") else RampAndHold
-    with line.placed():
-        return TactileStimulus(
-            INDENTERS[kind](**given) if given else indenter,
-            motion(**_given(line, MOTION_UNITS)),
-            **_given(line, PLACE),
-        )
+def _blocks(row: TableRow) -> dict[str, object]:
+    """Keys of a stimulus that a row of a table gives, as YAML has them."""
+    found: dict[str, object] = {}
+    blocks: dict[str, dict[str, object]] = {}
+    for column, entry in row.entries.items():
+        if row.has(column):
+            block, dot, key = column.partition(".")
+            (blocks.setdefault(block, {}) if dot else found)[key or column] = (
+                entry.strip() if column == "name" else read_yaml(entry, f"{row.place}, {column}")
+            )
+    for block, keys in blocks.items():
+        with row.placed(), at(block):
+            found[block] = merged(found.get(block), keys)
+    return found
 
 
-def _given(line: TableRow, columns: Mapping[str, str]) -> dict[str, Any]:
-    """Numbers of those columns that are not empty."""
-    return {column: line.number(column, unit) for column, unit in columns.items() if line.has(column)}
+def _located(stimulus: NamedStimulus, origin: Origin) -> Callable[[Place], tuple[Place, str]]:
+    """Place and words of a key of a stimulus, with file and line."""
 
+    def in_file(path: Place) -> tuple[Place, str]:
+        place, words = stimulus.in_file(path)
+        return place, origin.sentence(words, place)
 
-def _yaml_lines(path: Path) -> list[TableRow]:
-    """Entries of a YAML list as lines of a table."""
-    content = read_yaml(read_text(path), str(path))
-    if not isinstance(content, list) or not content:
-        raise InputError(f"{path} must be a list of stimuli, each a mapping: got {type(content).__name__}.")
-    lines = []
-    for number, entry in enumerate(content, start=1):
-        place = f"{path}, entry {number}"
-        if not isinstance(entry, Mapping):
-            raise InputError(f"{place}: must be a mapping such as {{stimulus: edge, indenter: bar}}.")
-        for key in entry:
-            if key not in COLUMNS:
-                raise InputError(
-                    f"{place}: {key!r} is unknown: {did_you_mean(str(key), COLUMNS, 'a stimulus')}"
-                )
-        lines.append(TableRow(place, entry))
-    return lines
+    return in_file

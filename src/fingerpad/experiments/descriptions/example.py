@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import write_atomically
+from fingerpad.core.files import path_of, write_atomically
 from fingerpad.experiments import schemas
 
 EXAMPLE = f"""\
@@ -18,7 +18,7 @@ EXAMPLE = f"""\
 title: A ball on the finger pad
 
 resolution: quick          # quick for a first look, standard for results
-tissues: human             # a set of tissues; all others: fingerpad touch --help
+tissues: human             # a set of tissues; all others: docs/tissues.md
 finger: adult              # small, large, child, macaque, aged; or measures:
 # finger: {{length_mm: 24, width_mm: 18, height_mm: 15, stratum_corneum_mm: 0.5}}
 
@@ -61,7 +61,7 @@ def write_example(path: Path) -> Path:
     StoreError
         If the folder cannot be written.
     """
-    path = Path(path)
+    path = path_of("path", path)
     if path.exists():
         raise InputError(f"{path} exists and is not overwritten: choose another name.")
     schema = json.dumps(schemas.touch_schema(), indent=1)

@@ -6,6 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from pkgutil import resolve_name
 
+import numpy as np
+
+from fingerpad.core.checks import IntArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import PATTERNS
 from fingerpad.experiments.afferent_files import fitted_afferent
@@ -19,6 +22,7 @@ from fingerpad.experiments.descriptions.parts import (
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population, sensitivities
+from fingerpad.psychophysics.encoding import neighbours_of
 
 _OF_LAYOUT = {
     "rows": (GRID, NAIL_ROWS),
@@ -98,6 +102,12 @@ def population_of(
     if settings.sensitivity_spread == 0.0:
         return laid
     return replace(laid, sensitivity=sensitivities(len(laid), settings.sensitivity_spread, settings.seed))
+
+
+def population_neighbours(settings: PopulationSettings, population: Population) -> IntArray:
+    """Return who is whose neighbour in a population that was laid out by `settings`, (n_pairs, 2)."""
+    pattern = "rectangular" if settings.layout in (GRID, NAIL_ROWS) else settings.layout
+    return neighbours_of(np.asarray(population.places_mm), population.pitch_mm, pattern)
 
 
 def _grid(settings: PopulationSettings, afferent: Afferent, place: str, finger: Finger) -> Population:

@@ -161,6 +161,7 @@ def press_described(
             skin = touch.solve(whole=True)
             runner.store.save(touch, skin)
             advance()
+        runner.note([skin])
     else:
         skin = runner.responses({"press": {"touch": touch}})["press"]["touch"]
     with runner.stage("afferents", 1) as advance:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fingerpad.core.checks import finite
+from fingerpad.core.checks import number_in
 from fingerpad.core.errors import InputError
 from fingerpad.data import protocol
 from fingerpad.experiments.descriptions.signatures import one_of_kinds
@@ -101,10 +101,17 @@ def finger_of(part: Any, beside: Path = Path()) -> Finger:
     for _, equals, _ in sizes:
         if not equals:
             raise InputError(f"finger must be written like:name=mm, as adult:width_mm=18: got {part!r}.")
-    return Fingertip.of(like, **{name: finite(name, value, "mm") for name, _, value in sizes})  # type: ignore[arg-type]
+    return Fingertip.of(like, **{name: number_in(name, value, "mm") for name, _, value in sizes})
 
 
 def object_of(part: Any, beside: Path = Path()) -> Indenter:
     """Make the object of a file: a part, or a text such as `punch:6.35`."""
     body: Indenter = indenter_named(part) if isinstance(part, str) else part.made(beside)
     return body
+
+
+def named_files(part: Any, beside: Path = Path()) -> list[Path]:
+    """Files that a finger, an object or a motion of a description names, from the folder `beside`."""
+    if isinstance(part, str):
+        return [beside / part] if Path(part).suffix.lower() in MESH_FILES else []
+    return [beside / value for key, value in part.given.items() if key in getattr(part, "files", ())]

@@ -52,7 +52,7 @@ class PlacedError(InputError):
 
 
 @dataclass(frozen=True)
-class Source:
+class Origin:
     r"""Where a description comes from: errors begin with its name and line.
 
     Parameters
@@ -60,11 +60,13 @@ class Source:
     name : str
         Of the file: files that it names are searched beside it.
     text : str
-        Its content, for lines; empty where there is none.
+        Its content in YAML, for lines; empty where there is none.
+    rows : tuple of int
+        Lines of the entries of `stimuli` in a table.
 
     Examples
     --------
-    >>> with Source("touch.yaml", "object: sphere\nfriction: 9").located(), at("friction"):
+    >>> with Origin("touch.yaml", "object: sphere\nfriction: 9").located(), at("friction"):
     ...     raise InputError("too rough.")
     Traceback (most recent call last):
     fingerpad.core.errors.InputError: touch.yaml, line 2, friction: too rough.
@@ -72,6 +74,7 @@ class Source:
 
     name: str
     text: str = ""
+    rows: tuple[int, ...] = ()
 
     @property
     def beside(self) -> Path:
@@ -85,9 +88,16 @@ class Source:
             yield
         except InputError as error:
             place = error.place if isinstance(error, PlacedError) else _unspelled(str(error))
-            line = line_at(self.text, place) if self.text else None
-            where = self.name if line is None else f"{self.name}, line {line}"
-            raise InputError(f"{where}, {error}") from error
+            raise InputError(self.sentence(str(error), place)) from error
+
+    def sentence(self, said: str, place: Place) -> str:
+        """Begin a sentence about a place with the file and the line."""
+        row = place[1] if self.rows and len(place) > 1 and place[0] == "stimuli" else None
+        if isinstance(row, int):
+            said = said.removeprefix(place_text(place[:2])).lstrip(". ")
+            return f"{self.name}, line {self.rows[row]}, {said}"
+        line = line_at(self.text, place) if self.text else None
+        return f"{self.name}, {said}" if line is None else f"{self.name}, line {line}, {said}"
 
 
 @contextmanager
@@ -98,7 +108,7 @@ def at(*place: int | str) -> Iterator[None]:
     except PlacedError:
         raise
     except InputError as error:
-        raise PlacedError(f"{spelled(place)}: {error}", place) from error
+        raise PlacedError(f"{place_text(place)}: {error}", place) from error
 
 
 @contextmanager
@@ -108,7 +118,7 @@ def moved(move: Callable[[Place], tuple[Place, str]]) -> Iterator[None]:
         yield
     except PlacedError as error:
         place, words = move(error.place)
-        raise PlacedError(words + str(error).removeprefix(spelled(error.place)), place) from error
+        raise PlacedError(words + str(error).removeprefix(place_text(error.place)), place) from error
 
 
 def part_from(kind: type[_Kind], content: Any) -> _Kind:
@@ -142,6 +152,11 @@ def merged(common: Any, own: Any, default_kind: str | None = None) -> Any:
     default_kind : str, optional
         Kind of a block that names none.
 
+    Raises
+    ------
+    InputError
+        If a text with sizes gets keys.
+
     Examples
     --------
     >>> merged("bar", {"width_mm": 3})
@@ -151,7 +166,11 @@ def merged(common: Any, own: Any, default_kind: str | None = None) -> Any:
     """
     if own is None:
         return common
-    if isinstance(common, str) and ":" not in common:
+    if isinstance(common, str) and isinstance(own, Mapping) and "kind" not in own:
+        if ":" in common:
+            raise InputError(
+                f"sizes must stand in the text or in keys, not in both: got {common!r} and keys."
+            )
         common = {"kind": common}
     if not isinstance(common, Mapping) or not isinstance(own, Mapping):
         return own
@@ -165,11 +184,13 @@ def place_of(error: ValidationError) -> list[int | str]:
 
 
 def first_of(error: ValidationError) -> Any:
-    """First error that matters: the kind, then an unknown key, which may be meant for a missing one."""
+    """First error that matters: the kind, an unknown key, a wrong value, a missing key."""
     found = error.errors(include_url=False)
 
     def order(each: Any) -> int:
-        return 0 if each["loc"][-1:] == ("kind",) else 1 if each["type"] in _KEYS else 2
+        if each["loc"][-1:] == ("kind",):
+            return 0
+        return 1 if each["type"] in _KEYS else 3 if each["type"] == "missing" else 2
 
     return min(found, key=order)
 
@@ -190,18 +211,18 @@ def error_sentence(error: ValidationError, kind: type[Part]) -> str:
         One sentence.
     """
     first, path = first_of(error), place_of(error)
-    where = spelled(path)
+    where = place_text(path)
     if first["type"] == "missing":
         return f"{where} must be given: it is missing."
     if first["type"] == "extra_forbidden":
         known = _keys_at(first["loc"][:-1], kind)
-        return f"{where} is unknown: {did_you_mean(str(path[-1]), known, spelled(path[:-1]))}"
+        return f"{where} is unknown: {did_you_mean(str(path[-1]), known, place_text(path[:-1]))}"
     expected = _EXPECTED.get(first["type"], first["msg"])
     value, allowed = first.get("input"), first.get("ctx", {}).get("allowed", ())
     return f"{where} {expected}: {got(value, allowed, _SHOWN.repr(value))}"
 
 
-def spelled(path: Sequence[int | str]) -> str:
+def place_text(path: Sequence[int | str]) -> str:
     """Spell a place in a file, such as stimuli[2].width_mm, entries counted from 1."""
     text = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in path)
     return text.lstrip(".") or "the file"

@@ -11,12 +11,19 @@ from typing import Annotated
 
 from pydantic import Field
 
-from fingerpad.core.checks import finite
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import converted
 from fingerpad.data.tissues import DEFAULT_TISSUES
-from fingerpad.experiments.conditions import straight_tilt_deg
-from fingerpad.experiments.descriptions.pressing import FingerPart, MotionPart, ObjectPart, object_of
-from fingerpad.experiments.descriptions.reading import Place, PlacedError, at, spelled
+from fingerpad.experiments.conditions import Conditions, straight_tilt_deg
+from fingerpad.experiments.descriptions.pressing import (
+    FingerPart,
+    MotionPart,
+    ObjectPart,
+    finger_of,
+    named_files,
+    object_of,
+)
+from fingerpad.experiments.descriptions.reading import Place, PlacedError, at, place_text
 from fingerpad.experiments.descriptions.values import FiniteNumber, NotNegative, Part, choice_of
 from fingerpad.geometry.fingertip import Finger
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
@@ -36,6 +43,10 @@ _ABOUT: tuple[tuple[str, Place], ...] = (
     ("grading", ("object",)),
 )
 """Which key of a file the solver's arguments are; any other error is one of the motion."""
+
+
+MadeObjects = list[tuple[object, Indenter]]
+"""Parts of files with the objects that were made of them."""
 
 
 class PlaceSettings(Part):
@@ -76,6 +87,12 @@ class FingerDescription(Part):
     finger: FingerPart = Field(default={}, validate_default=True)
     tissues: Annotated[str, choice_of(TISSUES)] = DEFAULT_TISSUES
 
+    def conditions(self, seed: int = 0, beside: Path = Path()) -> Conditions:
+        """Finger, tissues and accuracy, with a seed; the file of a mesh is named from the folder `beside`."""
+        with at("finger"):
+            finger = finger_of(self.finger, beside)
+        return Conditions(self.resolution, seed, self.tissues, finger)
+
 
 class StimulusDescription(Part):
     """What is pressed in, and how.
@@ -97,27 +114,35 @@ class StimulusDescription(Part):
     place: PlaceSettings = PlaceSettings()
     friction: NotNegative = 0.0
 
-    def stimulus(self, beside: Path = Path()) -> TactileStimulus:
-        """Make what is described; files are named from the folder `beside`."""
-        with at("object"):
-            indenter = object_of(self.object, beside)
+    def stimulus(self, beside: Path = Path(), made: MadeObjects | None = None) -> TactileStimulus:
+        """Make what is described.
+
+        Parameters
+        ----------
+        beside : Path, optional
+            Folder from which files are named.
+        made : list of (part, Indenter), optional
+            Objects that were made before; one of the same part is used again, a new one is appended.
+        """
+        known = [] if made is None else made
+        indenter = next((body for part, body in known if part == self.object), None)
+        if indenter is None:
+            with at("object"):
+                indenter = object_of(self.object, beside)
+            known.append((self.object, indenter))
         with at("motion"):
             motion = self.motion.made(beside)
         return TactileStimulus(indenter, motion, **dict(self.place), friction=self.friction)
 
     def files(self, beside: Path = Path()) -> list[Path]:
         """Files that object and motion name."""
-        return [
-            beside / value
-            for part in (self.object, self.motion)
-            for key, value in getattr(part, "given", {}).items()
-            if key in getattr(part, "files", ())
-        ]
+        return [*named_files(self.object, beside), *named_files(self.motion, beside)]
 
 
 @dataclass(frozen=True)
+@converted
 class TactileStimulus:
-    """An object, its motion, and its place on the finger.
+    """An indenter, its motion, its place from the middle of the pad, and friction.
 
     Parameters
     ----------
@@ -126,10 +151,10 @@ class TactileStimulus:
     motion : Motion
         How it is pressed.
     x_mm, z_mm : float
-        Where its axis meets the skin, from the receptor or the middle of the pad: along the finger, distal
-        positive, and across. [mm]
+        Where its axis meets the skin, from the middle of the pad: along the finger, distal positive, and
+        across. [mm]
     tilt_deg : float, optional
-        As in `fingerpad.Touch`; by default it presses perpendicular to the skin at the receptor. [degrees]
+        As in `fingerpad.Touch`; by default it presses perpendicular to the skin in the middle. [degrees]
     spin_deg : float
         As in `fingerpad.Touch`: the orientation of a bar, an edge, a gap or a grating. [degrees]
     friction : float
@@ -143,13 +168,6 @@ class TactileStimulus:
     tilt_deg: float | None = None
     spin_deg: float = 0.0
     friction: float = 0.0
-
-    def __post_init__(self) -> None:
-        finite("x_mm", self.x_mm, "mm")
-        finite("z_mm", self.z_mm, "mm")
-        finite("spin_deg", self.spin_deg, "degrees")
-        if self.tilt_deg is not None:
-            finite("tilt_deg", self.tilt_deg, "degrees")
 
     def touch(
         self,
@@ -206,4 +224,4 @@ def about() -> Iterator[None]:
         place = dict(_ABOUT).get(begin[1] if begin else "", ("motion",))
         said = str(error).removeprefix(f"{place[-1]} ")
         between = " " if said != str(error) else ": "
-        raise PlacedError(f"{spelled(place)}{between}{said}", place) from error
+        raise PlacedError(f"{place_text(place)}{between}{said}", place) from error

@@ -14,23 +14,25 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, Strict
 
-from fingerpad.core.files import read_text
+from fingerpad.core.files import path_of, read_text
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.experiments.descriptions.parts import DEFAULT, AfferentChoice, PopulationSettings
 from fingerpad.experiments.descriptions.population import afferent_of, population_of
-from fingerpad.experiments.descriptions.pressing import finger_of
-from fingerpad.experiments.descriptions.reading import Source, at, part_from
+from fingerpad.experiments.descriptions.pressing import finger_of, named_files
+from fingerpad.experiments.descriptions.reading import Origin, at, part_from
 from fingerpad.experiments.descriptions.stimulus import FingerDescription, StimulusDescription
 from fingerpad.experiments.descriptions.values import (
     NotNegative,
     Numbers,
     Pair,
     Part,
+    Positive,
     Text,
     as_list,
     choice_of,
 )
 from fingerpad.geometry.fingertip import Finger
+from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.rate_windows import rate_windows_ms
 from fingerpad.neuron.spikes import window_bounds
@@ -96,6 +98,8 @@ class TouchDescription(StimulusDescription, FingerDescription):
         As of `FingerDescription`.
     object, motion, place, friction
         As of `StimulusDescription`.
+    stiffness : float
+        Factor of the moduli of all tissues.
     times_ms : list of float
         Times at which the result is wanted beside those that the motion has. [ms]
     afferents : AfferentsSettings
@@ -111,6 +115,7 @@ class TouchDescription(StimulusDescription, FingerDescription):
     """
 
     title: Text = "One touch"
+    stiffness: Positive = 1.0
     times_ms: Numbers = ()
     afferents: AfferentsSettings = AfferentsSettings()
     outputs: Annotated[
@@ -140,9 +145,9 @@ class DescribedTouch:
     text: str = ""
 
     @property
-    def origin(self) -> Source:
+    def origin(self) -> Origin:
         """Where it comes from, for errors."""
-        return Source(self.source, self.text)
+        return Origin(self.source, self.text)
 
     @cached_property
     def finger(self) -> Finger:
@@ -168,7 +173,9 @@ class DescribedTouch:
         asked = self.description
         with self.origin.located():
             made = asked.stimulus(self.origin.beside)
-            return made.touch(self.finger, asked.tissues, asked.resolution, times_ms=asked.times_ms)
+            named = asked.tissues
+            tissues = named if asked.stiffness == 1.0 else named_tissues(named).scaled(asked.stiffness)
+            return made.touch(self.finger, tissues, asked.resolution, times_ms=asked.times_ms)
 
     @cached_property
     def population(self) -> Population:
@@ -189,12 +196,19 @@ class DescribedTouch:
                 window_bounds(window)
         return laid
 
+    def pressed_as(self, other: DescribedTouch) -> DescribedTouch:
+        """Take over the finger and the touch of a description that differs in its afferents alone."""
+        same = DescribedTouch(self.description, self.source, self.text)
+        same.__dict__.update(finger=other.finger, touch=other.touch)  # what cached_property would compute
+        return same
+
     def input_hashes(self) -> dict[str, str]:
         """SHA-256 of the description and of the files that it names."""
         asked = self.description
-        named = asked.files(self.origin.beside)
+        beside = self.origin.beside
+        named = [*named_files(asked.finger, beside), *asked.files(beside)]
         if isinstance(asked.afferents.afferent, str) and asked.afferents.afferent != DEFAULT:
-            named.append(self.origin.beside / asked.afferents.afferent)
+            named.append(beside / asked.afferents.afferent)
         contents = {self.source: self.text.encode()} | {str(path): path.read_bytes() for path in named}
         return {name: hashlib.sha256(content).hexdigest() for name, content in contents.items()}
 
@@ -225,7 +239,7 @@ def read_touch_description(source: str | Path) -> DescribedTouch:
     ...     read_touch_description(path).touch.stimulus
     RampAndHold(depth_mm=0.5, ramp_ms=50.0, hold_ms=950.0)
     """
-    text = read_text(Path(source))
+    text = read_text(path_of("source", source))
     return described_touch(read_yaml(text, str(source)), str(source), text)
 
 
@@ -233,5 +247,5 @@ def described_touch(
     content: Mapping[str, Any] | Any, source: str = "touch", text: str = ""
 ) -> DescribedTouch:
     """Build the description of a touch from plain values; arguments as of `DescribedTouch`."""
-    with Source(source, text).located():
+    with Origin(source, text).located():
         return DescribedTouch(part_from(TouchDescription, content), source, text)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
@@ -98,14 +99,27 @@ class _Choice(WrapValidator):
         return handler(core) | {"enum": list(self.names)}
 
 
+def _at_most(most: int) -> AfterValidator:
+    """Refuse a number above `most`, at which memory or a type of numbers ends."""
+
+    def checked(value: int) -> int:
+        if value > most:
+            raise PydanticCustomError(
+                "expected", "must be {words}", {"words": f"at most {most:,}", "allowed": ()}
+            )
+        return value
+
+    return AfterValidator(checked)
+
+
 Text = Annotated[str, Field(min_length=1), with_message("a text")]
 FiniteNumber = Annotated[float, Field(allow_inf_nan=False), with_message("a finite number")]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), with_message("a number greater than 0")]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), with_message("a number not below 0")]
 Share = Annotated[float, Field(ge=0, le=1), with_message("a number within 0 ... 1")]
-Seed = Annotated[int, Field(ge=0), with_message("a whole number of at least 0")]
-Count = Annotated[int, Field(ge=1), with_message("a whole number of at least 1")]
-Several = Annotated[int, Field(ge=2), with_message("a whole number of at least 2")]
+Seed = Annotated[int, Field(ge=0), with_message("a whole number of at least 0"), _at_most(2**63 - 1)]
+Count = Annotated[int, Field(ge=1), with_message("a whole number of at least 1"), _at_most(1_000_000)]
+Several = Annotated[int, Field(ge=2), with_message("a whole number of at least 2"), _at_most(1_000_000)]
 Pair = Annotated[
     tuple[FiniteNumber, ...],
     Strict(False),

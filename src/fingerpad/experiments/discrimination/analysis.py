@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,7 +14,8 @@ from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.results import Matrix, Vector, result_class
 from fingerpad.core.signals import ResponseMap, Skin
-from fingerpad.experiments.descriptions.parts import GRID, NAIL_ROWS
+from fingerpad.experiments.descriptions.population import population_neighbours
+from fingerpad.experiments.descriptions.stimuli import NamedStimulus, VariedStimuli
 from fingerpad.experiments.discrimination.decoding import (
     SideCurve,
     TaskStatistic,
@@ -29,9 +31,8 @@ from fingerpad.experiments.discrimination.task import (
     IDEAL,
     DiscriminationTask,
     ObservedPoint,
-    VariedStimuli,
 )
-from fingerpad.experiments.discrimination.task_stimuli import TaskStimulus, stimulus_index
+from fingerpad.experiments.discrimination.task_stimuli import stimulus_index
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.rate_windows import Windows, rate_windows_ms
 from fingerpad.psychophysics.code_efficiency import (
@@ -43,7 +44,7 @@ from fingerpad.psychophysics.code_efficiency import (
 )
 from fingerpad.psychophysics.counts import binomial_interval
 from fingerpad.psychophysics.discrimination import Experiment
-from fingerpad.psychophysics.encoding import neighbours_of, taking_part
+from fingerpad.psychophysics.encoding import taking_part
 from fingerpad.psychophysics.ideal_observer import Presentation
 from fingerpad.psychophysics.response_models import multiplied_responses
 
@@ -297,7 +298,7 @@ class PreparedTask:
     ----------
     task : DiscriminationTask
         As it was read.
-    stimuli : tuple of TaskStimulus
+    stimuli : tuple of NamedStimulus
         From `task_stimuli`, the standard first.
     population : Population
         From `task_population`.
@@ -310,11 +311,15 @@ class PreparedTask:
     """
 
     task: DiscriminationTask
-    stimuli: tuple[TaskStimulus, ...]
+    stimuli: tuple[NamedStimulus, ...]
     population: Population
 
     def __post_init__(self) -> None:
         task = self.task
+        for key, names in (("code", task.code), ("measure", task.measure)):
+            for name, count in Counter(names).items():
+                if count > 1:
+                    raise InputError(f"{key} must name each once: {name} is given {count} times.")
         self._check_windows()
         for number, point in enumerate(task.observed.points if task.observed else (), start=1):
             if isinstance(point.at, str) or self.stimuli[0].level is None:
@@ -347,7 +352,7 @@ class PreparedTask:
                         f"ends at {stimulus.motion.end_ms:g} ms."
                     )
 
-    def _windows_ms(self, stimulus: TaskStimulus) -> Windows:
+    def _windows_ms(self, stimulus: NamedStimulus) -> Windows:
         asked = self.task.windows_ms
         return rate_windows_ms(stimulus.motion.phases, asked.dynamic, asked.static)
 
@@ -365,15 +370,12 @@ class PreparedTask:
     @cached_property
     def neighbours(self) -> IntArray:
         """Who is whose neighbour, (n_pairs, 2)."""
-        layout = self.task.population.layout
-        pattern = "rectangular" if layout in (GRID, NAIL_ROWS) else layout
-        return neighbours_of(np.asarray(self.population.places_mm), self.population.pitch_mm, pattern)
+        return population_neighbours(self.task.population, self.population)
 
     @property
     def plan(self) -> Experiment:
         """Repetitions and criterion."""
-        settings = dict(self.task.experiment)
-        return Experiment(**{name: settings[name] for name in settings if name not in ("seed", "trials")})
+        return self.task.experiment.plan
 
     @property
     def axis(self) -> str:
@@ -444,7 +446,7 @@ def analyse(prepared: PreparedTask, skins: Mapping[str, Skin]) -> TaskResult:
     )
 
 
-def _named(stimuli: Sequence[TaskStimulus], rows: Sequence[int] | IntArray) -> str:
+def _named(stimuli: Sequence[NamedStimulus], rows: Sequence[int] | IntArray) -> str:
     """Name stimuli within a sentence."""
     if len(rows) == len(stimuli):
         return "any stimulus"
@@ -568,7 +570,7 @@ def _observed(prepared: PreparedTask) -> TaskObservations | None:
     )
 
 
-def _observation(stimuli: Sequence[TaskStimulus], point: ObservedPoint) -> TaskObservation:
+def _observation(stimuli: Sequence[NamedStimulus], point: ObservedPoint) -> TaskObservation:
     at, interval = point.at, None
     if point.trials:
         low, high = binomial_interval(point.hit_rate, point.trials)

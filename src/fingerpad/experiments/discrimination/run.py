@@ -8,17 +8,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
-from fingerpad.core.checks import whole
+from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
-from fingerpad.experiments.descriptions.reading import Source
+from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.descriptions.reading import Origin, at
+from fingerpad.experiments.descriptions.stimuli import touches_of
 from fingerpad.experiments.discrimination.analysis import PreparedTask, TaskResult, analyse
 from fingerpad.experiments.discrimination.task import DiscriminationTask
 from fingerpad.experiments.discrimination.task_stimuli import (
     task_conditions,
     task_population,
     task_stimuli,
-    task_touches,
 )
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
@@ -62,8 +63,8 @@ class DiscriminationRun:
         From `task_files.read_task`.
     folder : Path
         Where finished indentations are stored.
-    jobs : int
-        Processes to use; the numbers do not depend on it.
+    jobs : int or Engine
+        Processes, or the engine that solves the indentations; the numbers do not depend on it.
     source : str
         File of the task: files that it names are searched beside it, and errors begin with it.
     text : str
@@ -77,13 +78,13 @@ class DiscriminationRun:
 
     task: DiscriminationTask
     folder: Path
-    jobs: int = 1
+    jobs: int | Engine = 1
     source: str = "task"
     text: str = ""
 
     def __post_init__(self) -> None:
-        whole("jobs", self.jobs, at_least=1)
-        with Source(self.source, self.text).located():
+        engine_of(self.jobs)
+        with Origin(self.source, self.text).located():
             # Built here, so that an error comes before anything is solved.
             self.prepared, self.touches  # noqa: B018
 
@@ -91,12 +92,18 @@ class DiscriminationRun:
     def prepared(self) -> PreparedTask:
         """The task with its stimuli and its population."""
         beside = Path(self.source).parent
-        return PreparedTask(self.task, task_stimuli(self.task, beside), task_population(self.task, beside))
+        population = task_population(self.task, beside, self.conditions.finger)
+        return PreparedTask(self.task, task_stimuli(self.task, beside), population)
+
+    @cached_property
+    def conditions(self) -> Conditions:
+        """Finger, tissues, accuracy and seed."""
+        return task_conditions(self.task, Path(self.source).parent)
 
     @cached_property
     def touches(self) -> dict[str, Touch]:
         """One touch per stimulus, the standard first."""
-        return task_touches(self.task, Path(self.source).parent)
+        return touches_of(self.prepared.stimuli, self.conditions, self.task.reach_mm)
 
 
 def discriminate(
@@ -133,6 +140,10 @@ def discriminate(
         If a stored indentation is damaged or the folder cannot be written.
     """
     task, runner = run.task, Runner(run.folder, run.jobs, progress)
+    with Origin(run.source, run.text).located(), at("population"):
+        # The mesh is needed to tell, so this is left to the run; still it comes before anything is solved.
+        next(iter(run.touches.values())).check_sites(run.prepared.population.sites_mm)
+        run.prepared.neighbours  # noqa: B018
     skins = runner.responses({"stimuli": run.touches})["stimuli"]
     with runner.stage("discrimination", 1) as advance:
         found = analyse(run.prepared, skins)
@@ -142,5 +153,5 @@ def discriminate(
         discrimination=found,
         task=task,
         afferent=asdict(as_sai(run.prepared.population.afferent)),
-        manifest=runner.manifest(task_conditions(task), meshes, command=command, inputs=inputs),
+        manifest=runner.manifest(run.conditions, meshes, command=command, inputs=inputs),
     )

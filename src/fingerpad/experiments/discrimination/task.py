@@ -7,17 +7,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
+from pydantic import BeforeValidator, Field, Strict
 
 from fingerpad.data import psychophysics
 from fingerpad.experiments.descriptions.parts import DEFAULT, AfferentChoice, PopulationSettings
-from fingerpad.experiments.descriptions.stimulus import FingerDescription
+from fingerpad.experiments.descriptions.stimuli import StimulusSet
 from fingerpad.experiments.descriptions.values import (
-    LISTED,
-    VARIED,
-    Block,
     Count,
-    FiniteNumber,
     LevelOrName,
     NotNegative,
     Pair,
@@ -31,9 +27,9 @@ from fingerpad.experiments.descriptions.values import (
     choice_of,
     with_message,
 )
-from fingerpad.geometry.grading import RESOLUTIONS
-from fingerpad.psychophysics.discrimination import CRITERION_MOVES
+from fingerpad.psychophysics.discrimination import CRITERION_MOVES, Experiment
 from fingerpad.psychophysics.functions import SIGMOIDS
+from fingerpad.psychophysics.noise import LARGEST_NOISE
 
 IDEAL = "ideal"
 CODES = ("gradient_sum", "euclidean", IDEAL)
@@ -43,55 +39,6 @@ FITTED = "fitted"
 """Value of `noise` where it is fitted to observed hit rates."""
 
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
-
-
-class StimulusBlocks(Part):
-    """What a stimulus, or all of them, say of themselves: blocks of a `StimulusDescription`, or parts.
-
-    Parameters
-    ----------
-    object, motion, place : mapping or str
-        As in the file of a touch. A stimulus has the keys of its own block, then those that all have.
-    friction : float
-        Coulomb's coefficient.
-    """
-
-    object: Block | Text | None = None
-    motion: Block | None = None
-    place: Block | None = None
-    friction: FiniteNumber | None = None
-
-
-class ListedStimulus(StimulusBlocks):
-    """One stimulus by name.
-
-    Parameters
-    ----------
-    name : str
-        How it is called.
-    level : float
-        Where it stands on the axis of the psychometric curve.
-    object, motion, place, friction
-        What differs from the blocks that all have.
-    """
-
-    name: Text
-    level: FiniteNumber | None = None
-
-
-class VariedStimuli(Part):
-    """Stimuli that differ in one key.
-
-    Parameters
-    ----------
-    vary : str
-        Block and key, such as "object.radius_mm", "motion.force_mn" or "place.spin_deg"; or "friction".
-    values : list of float or str
-        One per stimulus.
-    """
-
-    vary: Text
-    values: Annotated[tuple[LevelOrName, ...], Strict(False)]
 
 
 class WindowSettings(Part):
@@ -144,6 +91,12 @@ class ExperimentSettings(Part):
     hit_rates: Several = _REPETITIONS
     presentations_varied: Several = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
     trials: Count = _REPETITIONS
+
+    @property
+    def plan(self) -> Experiment:
+        """Repetitions and criterion."""
+        own = dict(self)
+        return Experiment(**{name: own[name] for name in own if name not in ("seed", "trials")})
 
 
 class CurveSettings(Part):
@@ -200,7 +153,7 @@ class ObservedSettings(Part):
     source: Text = "people"
 
 
-class DiscriminationTask(StimulusBlocks, FingerDescription):
+class DiscriminationTask(StimulusSet):
     """All that a file of a task holds.
 
     Parameters
@@ -209,15 +162,8 @@ class DiscriminationTask(StimulusBlocks, FingerDescription):
         In words: the title of the page.
     axis : str
         What the levels are, for the axes of figures; by default the key that varies.
-    resolution, finger, tissues
-        As of `FingerDescription`; `resolution` is "standard" by default.
-    reach_mm : float
-        How far to either side of the middle, along the finger and across, the mesh is fine at most; without
-        it, as far as the objects need. [mm]
-    object, motion, place, friction
-        What all stimuli have, unless they say otherwise.
-    stimuli : VariedStimuli or list of ListedStimulus
-        Which are discriminated.
+    resolution, finger, tissues, reach_mm, object, motion, place, friction, stimuli
+        As of `StimulusSet`.
     standard : float or str
         Level or name of the stimulus that all others are compared with.
     population : PopulationSettings
@@ -244,13 +190,6 @@ class DiscriminationTask(StimulusBlocks, FingerDescription):
 
     question: Text
     axis: Text | None = None
-    resolution: Annotated[str, choice_of(RESOLUTIONS)] = "standard"
-    reach_mm: Positive | None = None
-    stimuli: Annotated[
-        Annotated[tuple[ListedStimulus, ...], Strict(False), Tag(LISTED)]
-        | Annotated[VariedStimuli, Tag(VARIED)],
-        Discriminator(lambda value: LISTED if isinstance(value, list | tuple) else VARIED),
-    ]
     standard: LevelOrName
     population: PopulationSettings = PopulationSettings()
     afferent: AfferentChoice = DEFAULT
@@ -268,7 +207,8 @@ class DiscriminationTask(StimulusBlocks, FingerDescription):
     ] = ("static",)
     windows_ms: WindowSettings = WindowSettings()
     noise: Annotated[
-        NotNegative | Annotated[str, choice_of((FITTED,))], with_message(f"a number not below 0, or {FITTED}")
+        Annotated[NotNegative, Field(le=LARGEST_NOISE)] | Annotated[str, choice_of((FITTED,))],
+        with_message(f"a number from 0 to {LARGEST_NOISE:g}, or {FITTED}"),
     ]
     experiment: ExperimentSettings = ExperimentSettings()
     curve: CurveSettings = CurveSettings()

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import read_text
+from fingerpad.core.files import path_of, read_text
 from fingerpad.core.keywords import closest
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.experiments.descriptions.parts import DEFAULT
-from fingerpad.experiments.descriptions.reading import Source, part_from
+from fingerpad.experiments.descriptions.pressing import named_files
+from fingerpad.experiments.descriptions.reading import Origin, part_from
+from fingerpad.experiments.descriptions.stimuli import NamedStimulus
 from fingerpad.experiments.discrimination.task import DiscriminationTask
-from fingerpad.experiments.discrimination.task_stimuli import task_stimuli
 from fingerpad.experiments.manifest import sha256
 
 SUFFIX = ".yaml"
@@ -52,7 +54,9 @@ def title(text: str) -> str:
     return parse_task(read_yaml(text, "task")).question
 
 
-def input_hashes(source: str | Path, task: DiscriminationTask) -> dict[str, str]:
+def input_hashes(
+    source: str | Path, task: DiscriminationTask, stimuli: Sequence[NamedStimulus]
+) -> dict[str, str]:
     """SHA-256 of the files on which a task rests.
 
     Parameters
@@ -61,6 +65,8 @@ def input_hashes(source: str | Path, task: DiscriminationTask) -> dict[str, str]
         As of `read_task`.
     task : DiscriminationTask
         What was read there; it may name a file of fitted parameters.
+    stimuli : sequence of NamedStimulus
+        Its stimuli; objects and motions may name files.
 
     Returns
     -------
@@ -68,8 +74,8 @@ def input_hashes(source: str | Path, task: DiscriminationTask) -> dict[str, str]
         By name of the file.
     """
     hashes = {str(source): hashlib.sha256(task_text(source).encode()).hexdigest()}
-    beside = Path(source).parent
-    named = [path for stimulus in task_stimuli(task, beside) for path in stimulus.files]
+    beside = path_of("source", source).parent
+    named = [*named_files(task.finger, beside), *(path for stimulus in stimuli for path in stimulus.files)]
     if isinstance(task.afferent, str) and task.afferent != DEFAULT:
         named.append(beside / task.afferent)
     return hashes | {str(path): sha256(path) for path in named}
@@ -110,7 +116,7 @@ def read_task(source: str | Path, **replacing: Any) -> DiscriminationTask:
 
 def task_text(source: str | Path) -> str:
     """Text of a task, from a file or from the package; arguments as of `read_task`."""
-    name, path, known = str(source), Path(source), example_tasks()
+    name, path, known = str(source), path_of("source", source), example_tasks()
     if name in known and not path.is_file():
         return known[name]
     if path.suffix or path.exists():
@@ -150,7 +156,7 @@ def parse_task(content: Any, source: str = "task", text: str = "") -> Discrimina
     ('gradient_sum',)
     >>> parse_task({"question": "Which?", "stimuli": spheres, "standard": 287, "noise": -0.1})
     Traceback (most recent call last):
-    fingerpad.core.errors.InputError: task, noise must be a number not below 0, or fitted: got -0.1.
+    fingerpad.core.errors.InputError: task, noise must be a number from 0 to 1000, or fitted: got -0.1.
     """
-    with Source(source, text).located():
+    with Origin(source, text).located():
         return part_from(DiscriminationTask, content)

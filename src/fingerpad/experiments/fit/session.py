@@ -10,12 +10,14 @@ from typing import Literal
 
 import numpy as np
 
-from fingerpad.core.checks import IntArray, one_of, whole
+from fingerpad.core.checks import IntArray, one_of
+from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
 from fingerpad.data.observations import bar_firing_rates
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.descriptions.stimuli import NamedStimulus
 from fingerpad.experiments.fit.fit import check_enough, fit_recordings, folds_in_turn
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
 from fingerpad.experiments.fit.offset import check_offset
@@ -23,16 +25,13 @@ from fingerpad.experiments.fit.results import FitResult
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.recording_files import Recorded
 from fingerpad.experiments.runner import Runner
-from fingerpad.experiments.stimuli import TactileStimulus
-from fingerpad.geometry.grading import Grading, covering
-from fingerpad.geometry.indenter_grading import grading_about
-from fingerpad.geometry.indenters import Bar, FlatPunch, Line, Sphere
+from fingerpad.experiments.stimuli import Stimuli, along_skin
 from fingerpad.inference.afferent_methods import OFFSETS_MM
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.rate_windows import Window, Windows, common_rate_windows_ms
 from fingerpad.skin.fields import sampled_fields
-from fingerpad.skin.indentation import Touch, touch_of
+from fingerpad.skin.indentation import Touch
 
 EXAMPLE = "bar.csv"
 """Name of the file of `example_recordings`."""
@@ -73,8 +72,8 @@ class FitRequest:
     ----------
     recorded : Recorded
         From `fingerpad.experiments.recording_files.read_recordings`.
-    conditions : Conditions
-        Finger, tissues, accuracy and seed.
+    stimuli : Stimuli
+        With which it was read: they say how they are pressed.
     folder : Path
         Where finished indentations are stored.
     method : str
@@ -84,8 +83,10 @@ class FitRequest:
     windows_ms : ((float, float) or None, (float, float) or None)
         Windows of the dynamic and of the static rate; one that is None follows the phases of the stimuli, and
         is the paper's for the paper's motion. [ms]
-    jobs : int
-        Processes to use; the numbers do not depend on it.
+    jobs : int or Engine
+        Processes, or the engine that solves the indentations; the numbers do not depend on it.
+    seed : int
+        Of methods that draw.
     dynamic_quantity, static_quantity : str
         What each term follows: strain energy density, "stored", as in the paper, or another quantity of
         `SkinResponse.sample` as an extension. Default: that of the tissues.
@@ -106,12 +107,13 @@ class FitRequest:
     """
 
     recorded: Recorded
-    conditions: Conditions
+    stimuli: Stimuli
     folder: Path
     method: str = "least_squares"
     n_folds: int | None = None
     windows_ms: tuple[Window | None, Window | None] = (None, None)
-    jobs: int = 1
+    jobs: int | Engine = 1
+    seed: int = 0
     dynamic_quantity: str | None = None
     static_quantity: str | None = None
     with_posterior: bool = False
@@ -123,7 +125,7 @@ class FitRequest:
         one_of("method", self.method, METHODS)
         for name, quantity in zip(("dynamic_quantity", "static_quantity"), self.quantities, strict=True):
             one_of(name, quantity, tuple(sampled_fields()))
-        whole("jobs", self.jobs, at_least=1)
+        engine_of(self.jobs)
         for start, end in self.used_windows_ms:
             if not 0.0 <= start < end:
                 raise InputError(
@@ -168,70 +170,18 @@ class FitRequest:
     @cached_property
     def touches(self) -> dict[str, Touch]:
         """One touch per stimulus."""
-        return stimulus_touches(self.recorded.stimuli, self.conditions)
+        return self.stimuli.touches(list(self.recorded.stimuli.values()), self.conditions)
+
+    @cached_property
+    def conditions(self) -> Conditions:
+        """Finger, tissues, accuracy and seed."""
+        return replace(self.stimuli.conditions, seed=self.seed)
 
     @property
     def quantities(self) -> tuple[str, str]:
         """Quantities of the dynamic and of the static term."""
         default = self.conditions.quantity
         return self.dynamic_quantity or default, self.static_quantity or default
-
-
-def stimulus_touches(stimuli: Mapping[str, TactileStimulus], conditions: Conditions) -> dict[str, Touch]:
-    """One touch per stimulus; those of the paper's bar are the touches of the reproduction.
-
-    Parameters
-    ----------
-    stimuli : mapping of str to TactileStimulus
-        By name.
-    conditions : Conditions
-        Finger, tissues and accuracy.
-
-    Returns
-    -------
-    dict of str to Touch
-
-    Raises
-    ------
-    InputError
-        If one cannot be used, with its name.
-    """
-    along = float(np.cos(np.deg2rad(conditions.skin_tilt_deg)))
-
-    def touch(stimulus: TactileStimulus) -> Touch:
-        wire = isinstance(stimulus.indenter, Line)
-        return touch_of(
-            conditions.finger,
-            stimulus.indenter,
-            stimulus.motion,
-            conditions.materials,
-            conditions.resolution,
-            (RECEPTOR_X_MM + stimulus.x_mm * along, stimulus.z_mm),
-            None if wire else _grading(stimulus, conditions),
-            conditions.tilt_deg(stimulus.indenter) if stimulus.tilt_deg is None else stimulus.tilt_deg,
-            spin_deg=stimulus.spin_deg,
-        )
-
-    found = {}
-    for name, stimulus in stimuli.items():
-        try:
-            found[name] = touch(stimulus)
-        except InputError as error:
-            raise InputError(f"Stimulus {name} cannot be used: {error}") from error
-    return found
-
-
-def _grading(stimulus: TactileStimulus, conditions: Conditions) -> Grading:
-    """Mesh that is fine about the receptor, the same for all stimuli of a kind, and about edges within it."""
-    indenter, spin_deg = stimulus.indenter, stimulus.spin_deg
-    is_round = isinstance(indenter, Sphere | FlatPunch)
-    grading = conditions.sphere_grading() if is_round else conditions.bar_grading()
-    # The bar of the paper keeps the mesh of the reproduction, whose touches are then those of a fit.
-    as_reproduced = isinstance(indenter, Bar) and spin_deg == 0.0
-    if not (is_round or as_reproduced) and (indenter.edge_reach_mm > 0.0 or spin_deg != 0.0):
-        about = grading_about(indenter, conditions.resolution, RECEPTOR_X_MM, stimulus.z_mm, spin_deg)
-        grading = covering([grading, about])
-    return replace(grading, full=True) if stimulus.z_mm != 0.0 else grading
 
 
 def run_fit(
@@ -267,13 +217,14 @@ def run_fit(
     recorded, runner = request.recorded, Runner(request.folder, request.jobs, progress)
     skins = runner.responses({"stimuli": request.touches})["stimuli"]
     offsets_mm = OFFSETS_MM if request.with_offset else (0.0,)
-    sites = [[RECEPTOR_X_MM + offset, 0.0] for offset in offsets_mm]
+    x_mm, z_mm = request.conditions.finger.contact_mm
+    sites = [[x_mm + offset, z_mm] for offset in offsets_mm]
     sampled = [skin.sed(sites, *request.quantities) for skin in skins.values()]
     beside = {
         offset: [traces.part(slice(place, place + 1)) for traces in sampled]
         for place, offset in enumerate(offsets_mm)
     }
-    shifts_mm = _shifts_mm(list(recorded.stimuli.values()))
+    shifts_mm = _shifts_mm(list(recorded.stimuli.values()), along_skin(request.conditions))
     with runner.stage("fit", 1) as advance:
         found = fit_recordings(
             beside[0.0],
@@ -309,11 +260,11 @@ def run_fit(
     )
 
 
-def _shifts_mm(stimuli: Sequence[TactileStimulus]) -> list[float] | None:
-    """Shifts, proximal positive, of stimuli that differ in nothing else; None for others."""
-    if len({replace(stimulus, x_mm=0.0) for stimulus in stimuli}) > 1:
+def _shifts_mm(stimuli: Sequence[NamedStimulus], along: float) -> list[float] | None:
+    """Shifts along the skin, proximal positive, of stimuli that differ in nothing else; None for others."""
+    if len({replace(stimulus, x_mm=0.0, name="", level=None) for stimulus in stimuli}) > 1:
         return None
-    return [0.0 - stimulus.x_mm for stimulus in stimuli]
+    return [0.0 - float(f"{stimulus.x_mm / along:.9g}") for stimulus in stimuli]
 
 
 def example_recordings() -> dict[str, bytes]:

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from fingerpad.core.checks import whole
+from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
 from fingerpad.core.signals import STORED_ENERGY
@@ -59,8 +59,8 @@ class Reproduction:
         Finger, tissues, accuracy and seed.
     folder : Path
         Where finished indentations are stored.
-    jobs : int
-        Processes to use; the numbers do not depend on it.
+    jobs : int or Engine
+        Processes, or the engine that solves the indentations; the numbers do not depend on it.
     extended : bool, optional
         Whether to go beyond the paper: uncertainty of the fit, and curvature thresholds at other standards.
         By default not at "quick" resolution, where this takes half as long again.
@@ -68,11 +68,11 @@ class Reproduction:
 
     conditions: Conditions
     folder: Path
-    jobs: int = 1
+    jobs: int | Engine = 1
     extended: bool | None = None
 
     def __post_init__(self) -> None:
-        whole("jobs", self.jobs, at_least=1)
+        engine_of(self.jobs)
 
     @property
     def goes_beyond(self) -> bool:

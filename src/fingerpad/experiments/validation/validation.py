@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from fingerpad.core.checks import whole
+from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import Number, result_class
 from fingerpad.data import fingertip
@@ -158,8 +158,8 @@ class ValidationRequest:
         Finger, tissues, afferent, loading.
     folder : Path
         Where finished indentations are stored.
-    jobs : int
-        Processes to use; the numbers do not depend on it.
+    jobs : int or Engine
+        Processes, or the engine that solves the indentations; the numbers do not depend on it.
 
     Raises
     ------
@@ -170,10 +170,10 @@ class ValidationRequest:
     observations: Observations
     model: FingertipModel
     folder: Path
-    jobs: int = 1
+    jobs: int | Engine = 1
 
     def __post_init__(self) -> None:
-        whole("jobs", self.jobs, at_least=1)
+        engine_of(self.jobs)
         if isinstance(self.model.conditions.materials, str):
             named_tissues(self.model.conditions.materials)
 

@@ -1,0 +1,140 @@
+"""A touch to be reduced, in one file: the words of a touch without a motion, and a range of poses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from fingerpad.core.errors import InputError
+from fingerpad.core.files import path_of, read_text
+from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.experiments.descriptions.pressing import finger_of
+from fingerpad.experiments.descriptions.reading import Origin, at, part_from
+from fingerpad.experiments.descriptions.stimulus import FingerDescription, StimulusDescription
+from fingerpad.experiments.descriptions.values import Pair, Part, Positive, Seed, Text
+from fingerpad.experiments.runner import Runner
+from fingerpad.reduction.building import reduce_touch
+from fingerpad.reduction.model import ReducedModel
+from fingerpad.reduction.training import ReducedRange, ReducedTraining
+from fingerpad.skin.indentation import Touch
+from fingerpad.skin.sampling import SkinResponse
+
+NO_WAY = (0.0, 0.0)
+
+
+class RangeSettings(Part):
+    """Poses that the reduced touch serves.
+
+    Parameters
+    ----------
+    depth_mm : float
+        Largest depth below first touch at any pose. [mm]
+    x_mm, z_mm : (float, float)
+        Ways of the object along and across the finger, from its place. [mm]
+    tilt_deg : (float, float)
+        Tilt, added to that of the place. [degrees]
+    parameter : str
+        A parameter of the object that varies, such as `curvature_per_m` of a sphere.
+    values : (float, float)
+        Its range.
+    """
+
+    depth_mm: Positive
+    x_mm: Pair = NO_WAY
+    z_mm: Pair = NO_WAY
+    tilt_deg: Pair = NO_WAY
+    parameter: Text | None = None
+    values: Pair | None = None
+
+
+class ReductionDescription(StimulusDescription, FingerDescription):
+    """All that a file of `fingerpad reduce` holds.
+
+    Parameters
+    ----------
+    resolution, finger, tissues
+        As of `FingerDescription`.
+    object, place, friction
+        As of `StimulusDescription`; there is no motion.
+    range : RangeSettings
+        The poses.
+    calibration : int
+        Number of random touches from which the error is measured: 0 for none, else 19 or more.
+    seed : int
+        Of these touches.
+    """
+
+    range: RangeSettings
+    calibration: Annotated[int, Field(ge=0)] = 20
+    seed: Seed = 1
+
+
+@dataclass(frozen=True)
+class DescribedReduction:
+    """A description of a reduced touch, ready to be pressed.
+
+    Parameters
+    ----------
+    description : ReductionDescription
+        The description.
+    training : ReducedTraining
+        Its presses.
+    """
+
+    description: ReductionDescription
+    training: ReducedTraining
+
+
+def read_reduction(source: str | Path) -> DescribedReduction:
+    """Read the description of a reduced touch from a YAML file.
+
+    Raises
+    ------
+    InputError
+        If it is no YAML, or a key is unknown, missing or has an unfit value; with line and key.
+    """
+    text = read_text(path_of("source", source))
+    return described_reduction(read_yaml(text, str(source)), str(source), text)
+
+
+def described_reduction(
+    content: Mapping[str, Any] | Any, source: str = "range", text: str = ""
+) -> DescribedReduction:
+    """Build the description of a reduced touch from plain values; arguments as of `DescribedTouch`."""
+    origin = Origin(source, text)
+    with origin.located():
+        asked = part_from(ReductionDescription, content)
+        with at("motion"):
+            if "motion" in asked.model_fields_set:
+                raise InputError("motion must be left out: a reduced touch serves any motion in its range.")
+        with at("finger"):
+            finger = finger_of(asked.finger, origin.beside)
+        touch = asked.stimulus(origin.beside).touch(finger, asked.tissues, asked.resolution)
+        with at("range"):
+            training = ReducedTraining(touch, ReducedRange(**dict(asked.range)), asked.resolution)
+            # All poses are described, and so checked, before anything is pressed.
+            list(training.poses())
+    return DescribedReduction(asked, training)
+
+
+def run_reduction(described: DescribedReduction, runner: Runner) -> ReducedModel:
+    """Press what the store of a runner lacks, and make the reduced touch.
+
+    Raises
+    ------
+    ConvergenceError
+        If a press cannot be solved; those finished stay stored.
+    StoreError
+        If the folder of the runner cannot be written.
+    """
+
+    def solve(touches: Sequence[Touch], stage: str) -> list[SkinResponse]:
+        found = runner.responses({stage: dict(enumerate(touches))})[stage]
+        return [found[number] for number in range(len(touches))]
+
+    asked = described.description
+    return reduce_touch(described.training, solve, calibration=asked.calibration, seed=asked.seed)

@@ -1,0 +1,1 @@
+"""Sweeps: one touch, of which some fields vary, over thousands of settings."""

@@ -1,0 +1,617 @@
+"""What a file of a sweep says: a touch, and which of its fields vary.
+
+docs/sweeps.md explains every key.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import islice
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field, Strict
+
+from fingerpad.core.errors import InputError
+from fingerpad.core.files import path_of, read_text
+from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.experiments.descriptions.reading import Origin, at, part_from
+from fingerpad.experiments.descriptions.touch import DescribedTouch, described_touch
+from fingerpad.experiments.descriptions.values import (
+    Block,
+    Count,
+    FiniteNumber,
+    LevelOrName,
+    NotNegative,
+    Pair,
+    Part,
+    Positive,
+    Seed,
+    Text,
+    as_list,
+    choice_of,
+)
+from fingerpad.experiments.discrimination.task import CODES, IDEAL, MEASURES, ExperimentSettings
+from fingerpad.psychophysics.noise import LARGEST_NOISE
+from fingerpad.skin.fields import stored_fields
+
+AFFERENTS = "afferents"
+"""Block of a touch whose fields do not change the skin."""
+
+OBSERVER = "observer"
+"""Block of a sweep whose fields change hit rates alone."""
+
+NOT_SWEPT = ("title", "outputs")
+LINEAR, LOGARITHMIC = "linear", "logarithmic"
+SOBOL, LATIN_HYPERCUBE = "sobol", "latin_hypercube"
+ZIP, SAMPLE = "zip", "sample"
+"""Dimensions of fields that vary together."""
+
+MOST_CHECKED = 1000
+"""Most points of an axis whose values are checked before anything is pressed."""
+
+_COMPARED = "a constraint must be a comparison such as a.b < 2 * c.d"
+_ARITHMETIC = "a constraint must have fields, numbers, + - * / and comparisons"
+_COMPARISONS = {
+    ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater, ast.GtE: np.greater_equal,
+    ast.Eq: np.equal, ast.NotEq: np.not_equal,
+}  # fmt: skip
+_OPERATIONS: dict[type, Any] = {
+    ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.true_divide,
+}  # fmt: skip
+_OPERATORS = (*_COMPARISONS, *_OPERATIONS, ast.And, ast.Or, ast.USub)
+
+
+class EvenValues(Part):
+    """Evenly spaced values of a field.
+
+    Parameters
+    ----------
+    start, stop : float
+        First and last value. [unit of the field]
+    count : int
+        How many.
+    spacing : {"linear", "logarithmic"}
+        Whether differences or ratios are equal.
+    """
+
+    start: FiniteNumber
+    stop: FiniteNumber
+    count: Count
+    spacing: Annotated[str, choice_of((LINEAR, LOGARITHMIC))] = LINEAR
+
+    @property
+    def values(self) -> list[float]:
+        """The values."""
+        if self.spacing == LINEAR:
+            return np.linspace(self.start, self.stop, self.count).tolist()
+        if min(self.start, self.stop) <= 0.0:
+            raise InputError(
+                f"start and stop must be above 0 with logarithmic spacing: got {self.start:g} and "
+                f"{self.stop:g}."
+            )
+        return np.geomspace(self.start, self.stop, self.count).tolist()
+
+
+class SampleSettings(Part):
+    """Points that fill a box of several fields.
+
+    Parameters
+    ----------
+    method : {"sobol", "latin_hypercube"}
+        How: a scrambled Sobol sequence, or a Latin hypercube.
+    count : int
+        Number of points; powers of two suit Sobol.
+    seed : int
+        Of the random numbers.
+    fields : mapping of str to (float, float)
+        Lower and upper bound by field. [unit of the field]
+    """
+
+    method: Annotated[str, choice_of((SOBOL, LATIN_HYPERCUBE))] = SOBOL
+    count: Count
+    seed: Seed = 0
+    fields: dict[str, Pair]
+
+    @property
+    def values(self) -> dict[str, list[float]]:
+        """Values of each field."""
+        if not self.fields:
+            raise InputError("fields must name a field or more: it is empty.")
+        from scipy.stats import qmc
+
+        kind = qmc.Sobol if self.method == SOBOL else qmc.LatinHypercube
+        # All powers of two from the next one on begin with the same points, without a warning.
+        size = 1 << (self.count - 1).bit_length() if self.method == SOBOL else self.count
+        points = kind(len(self.fields), rng=np.random.default_rng(self.seed)).random(size)[: self.count]
+        low, high = np.array(list(self.fields.values())).T
+        if (low >= high).any():
+            raise InputError("fields must have a lower bound and then a higher one: one has not.")
+        scaled = low + (high - low) * points
+        return dict(zip(self.fields, scaled.T.tolist(), strict=True))
+
+
+class ObserverSettings(Part):
+    """An observer who discriminates the stimuli along one dimension of a sweep from one of them.
+
+    Parameters
+    ----------
+    along : str
+        Field of the touch that varies from stimulus to stimulus, such as "object.curvature_per_m".
+    standard : float or str
+        Its value under the standard, that all others are discriminated from.
+    code : {"gradient_sum", "euclidean"}
+        How the population is decoded.
+    measure : {"static", "dynamic", "latency"}
+        What is measured of each afferent.
+    latest_ms : float, optional
+        Latest first spike that counts, as `windows_ms.latency` of a task. [ms]
+    noise : float
+        Standard deviation of the multiplicative noise.
+    experiment : ExperimentSettings
+        Repetitions, criterion and seed.
+    """
+
+    along: Text
+    standard: LevelOrName
+    code: Annotated[str, choice_of(tuple(code for code in CODES if code != IDEAL))] = CODES[0]
+    measure: Annotated[str, choice_of(MEASURES)] = MEASURES[0]
+    latest_ms: Positive | None = None
+    noise: Annotated[NotNegative, Field(le=LARGEST_NOISE)]
+    experiment: ExperimentSettings = ExperimentSettings()
+
+
+class SweepDescription(Part):
+    """All that a file of a sweep holds.
+
+    Parameters
+    ----------
+    title : str
+        What it is, in words.
+    touch : mapping
+        The touch, with the keys of `TouchDescription`; what varies need not be given.
+    grid : mapping of str to list or EvenValues
+        Values by field, such as "motion.depth_mm": each field is a dimension, and settings are all
+        combinations.
+    zip : mapping of str to list
+        Fields that vary together, one value of each per setting: one dimension.
+    sample : SampleSettings
+        Fields that vary together over a box: one dimension.
+    where : list of str
+        Constraints such as "motion.depth_mm < 0.5 * object.radius_mm": other settings are left out.
+    fields : list of str
+        Fields of the skin that the result holds beside force, depth and contact, by the names of
+        `fingerpad.skin.fields.FIELDS`.
+    observer : mapping
+        An observer of the responses, with the keys of `ObserverSettings`; what varies need not be given.
+    """
+
+    title: Text = "A sweep"
+    touch: Block
+    observer: Block | None = None
+    grid: Block = Field(default={})
+    zip: Block = Field(default={})
+    sample: SampleSettings | None = None
+    where: Annotated[tuple[Text, ...], Strict(False), BeforeValidator(as_list)] = ()
+    fields: Annotated[
+        tuple[Annotated[str, choice_of([field.name for field in stored_fields()])], ...],
+        Strict(False),
+        BeforeValidator(as_list),
+    ] = ()
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One dimension of a sweep.
+
+    Parameters
+    ----------
+    name : str
+        Of the dimension: that of its field with underscores, "zip" or "sample".
+    values : mapping of str to list
+        Values by field, all of one length.
+    """
+
+    name: str
+    values: Mapping[str, list[Any]]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.values.values())))
+
+    @property
+    def presses(self) -> bool:
+        """Whether it changes the skin."""
+        return any(field.partition(".")[0] not in (AFFERENTS, OBSERVER) for field in self.values)
+
+    @property
+    def observes(self) -> bool:
+        """Whether it changes the observer, and nothing else.
+
+        Raises
+        ------
+        InputError
+            If fields of the observer and others vary together.
+        """
+        kinds = {field.partition(".")[0] == OBSERVER for field in self.values}
+        if len(kinds) > 1:
+            raise InputError(
+                f"{', '.join(self.values)} must not vary together: leave fields of the observer to grid."
+            )
+        return kinds.pop()
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A description of a sweep with where it comes from.
+
+    A setting is a number from 0 to `size` - 1, in the order of a C array of `shape`; so is a press within
+    `press_shape`.
+
+    Parameters
+    ----------
+    description : SweepDescription
+        The description.
+    source : str
+        File of the description: files that it names are searched beside it, and errors begin with it.
+    text : str
+        Content of that file, for the lines of errors.
+
+    Examples
+    --------
+    >>> sweep = sweep_of({"touch": {"object": "sphere"}, "grid": {"motion.depth_mm": [0.5, 1.0]}})
+    >>> sweep.axes[0].name, sweep.shape, sweep.content(1)["motion"]
+    ('motion_depth_mm', (2,), {'depth_mm': 1.0})
+    """
+
+    description: SweepDescription
+    source: str = "sweep"
+    text: str = ""
+
+    @property
+    def origin(self) -> Origin:
+        """Where it comes from, for errors."""
+        return Origin(self.source, self.text)
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """The dimensions of the settings: those that change the skin first."""
+        return tuple(axis for axis in self._all_axes if not axis.observes)
+
+    @property
+    def observer_axes(self) -> tuple[Axis, ...]:
+        """The dimensions that change the observer alone."""
+        return tuple(axis for axis in self._all_axes if axis.observes)
+
+    @cached_property
+    def _all_axes(self) -> tuple[Axis, ...]:
+        """All dimensions; InputError if a field has no values, or is given twice."""
+        asked = self.description
+        found = []
+        for field, values in asked.grid.items():
+            with self.origin.located(), at("grid", field):
+                found.append(Axis(_dimension(field), {field: _listed(values)}))
+        if asked.zip:
+            with self.origin.located(), at("zip"):
+                together = {field: _listed(values) for field, values in asked.zip.items()}
+                lengths = {field: len(values) for field, values in together.items()}
+                if len(set(lengths.values())) > 1:
+                    raise InputError(f"all fields must have as many values: got {lengths}.")
+                found.append(Axis(ZIP, together))
+        if asked.sample is not None:
+            with self.origin.located(), at("sample"):
+                found.append(Axis(SAMPLE, asked.sample.values))
+        fields = [field for axis in found for field in axis.values]
+        with self.origin.located():
+            if not found:
+                raise InputError("grid, zip or sample must name a field that varies: none does.")
+            for field, count in Counter(fields).items():
+                if count > 1:
+                    raise InputError(f"{field} must vary in one way: it is given twice.")
+                if field.partition(".")[0] in NOT_SWEPT or field == f"{OBSERVER}.along":
+                    raise InputError(f"{field} cannot vary: leave it out.")
+            if all(axis.observes for axis in found):
+                raise InputError("grid, zip or sample must name a field of the touch that varies: none does.")
+        return tuple(sorted(found, key=lambda axis: not axis.presses))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of points of each axis."""
+        return tuple(map(len, self.axes))
+
+    @property
+    def press_shape(self) -> tuple[int, ...]:
+        """Number of points of each axis that changes the skin."""
+        return tuple(len(axis) for axis in self.axes if axis.presses)
+
+    @property
+    def size(self) -> int:
+        """Number of settings, those that are left out included."""
+        return int(np.prod(self.shape))
+
+    @property
+    def presses(self) -> int:
+        """Number of presses, those that are left out included."""
+        return int(np.prod(self.press_shape))
+
+    @property
+    def observer_shape(self) -> tuple[int, ...]:
+        """Number of points of each axis that changes the observer."""
+        return tuple(map(len, self.observer_axes))
+
+    @cached_property
+    def observers(self) -> tuple[ObserverSettings, ...]:
+        """Observers in the order of a C array of `observer_shape`; none without a block `observer`.
+
+        Raises
+        ------
+        InputError
+            If a value is unfit, `along` is no field that changes the skin, or `standard` none of its values.
+        """
+        content = self.description.observer
+        if content is None:
+            if self.observer_axes:
+                with self.origin.located():
+                    raise InputError("observer must be given where its fields vary: it is missing.")
+            return ()
+        return tuple(self._observer(dict(content), place) for place in np.ndindex(self.observer_shape))
+
+    def _observer(self, content: dict[str, Any], place: tuple[int, ...]) -> ObserverSettings:
+        with self.origin.located(), at(OBSERVER):
+            for axis, number in zip(self.observer_axes, place, strict=True):
+                for field, values in axis.values.items():
+                    content = _with(content, field.split(".")[1:], values[number])
+            asked = part_from(ObserverSettings, content)
+            self.stimuli_axis(asked)
+        return asked
+
+    def stimuli_axis(self, observer: ObserverSettings) -> tuple[int, int]:
+        """Return which axis the stimuli of an observer lie along, and where the standard lies on it."""
+        for number, axis in enumerate(self.axes):
+            if axis.presses and observer.along in axis.values:
+                values = axis.values[observer.along]
+                if values.count(observer.standard) != 1:
+                    raise InputError(
+                        f"standard must be one of the values of {observer.along}, once: got "
+                        f"{observer.standard!r}."
+                    )
+                if len(values) < 2:
+                    raise InputError(f"{observer.along} must have two values or more to be discriminated.")
+                return number, values.index(observer.standard)
+        fields = [field for axis in self.axes if axis.presses for field in axis.values]
+        raise InputError(
+            f"along must be a field that varies and changes the skin, {', '.join(fields)}: got "
+            f"{observer.along!r}."
+        )
+
+    def settings_of(self, press: int) -> range:
+        """Return the settings that have a press in common."""
+        each = self.size // self.presses
+        return range(press * each, (press + 1) * each)
+
+    def values(self, setting: int) -> dict[str, Any]:
+        """Values of the fields that vary, in a setting."""
+        place = np.unravel_index(setting, self.shape)
+        return {
+            field: values[int(number)]
+            for axis, number in zip(self.axes, place, strict=True)
+            for field, values in axis.values.items()
+        }
+
+    def content(self, setting: int) -> dict[str, Any]:
+        """Touch of a setting, as plain values."""
+        content = dict(self.description.touch)
+        with self.origin.located(), at("touch"):
+            for field, value in self.values(setting).items():
+                content = _with(content, field.split("."), value)
+        return content
+
+    def described(self, setting: int) -> DescribedTouch:
+        """Touch of a setting.
+
+        Raises
+        ------
+        InputError
+            If a field is unknown, or a value is unfit.
+        """
+        return described_touch(self.content(setting), f"{self.source}, touch")
+
+    def check(self) -> None:
+        """Check all keys and values, and press nothing.
+
+        Raises
+        ------
+        InputError
+            If one is unknown or unfit, or no setting meets the constraints.
+        """
+        strides = [int(np.prod(self.shape[number + 1 :])) for number in range(len(self.axes))]
+        for axis, stride in zip(self.axes, strides, strict=True):
+            for number in range(min(len(axis), MOST_CHECKED)):
+                self.described(number * stride)
+        self.observers  # noqa: B018 - builds and checks all
+        if not any(self.allowed(setting) for setting in range(self.size)):
+            with self.origin.located():
+                raise InputError("where leaves no setting: give other constraints.")
+
+    def allowed(self, setting: int) -> bool:
+        """Whether a setting meets the constraints."""
+        if not self._constraints:
+            return True
+        content = self.content(setting)
+        with self.origin.located(), at("where"):
+            return all(met(content) for met in self._constraints)
+
+    @cached_property
+    def _constraints(self) -> tuple[Constraint, ...]:
+        found = []
+        for number, text in enumerate(self.description.where):
+            with self.origin.located(), at("where", number):
+                found.append(Constraint(text))
+        return tuple(found)
+
+    @property
+    def hashed(self) -> str:
+        """All that determines the results, as text."""
+        files = self.described(0).input_hashes()
+        content = self.description.model_dump(mode="json", exclude={"title"})
+        return json.dumps([content, sorted(files.values())], sort_keys=True)
+
+
+class Constraint:
+    """A comparison of fields of a touch, written as in `a.b < 2 * c.d`.
+
+    Parameters
+    ----------
+    text : str
+        Names of fields, numbers, + - * /, comparisons, `and`, `or` and parentheses.
+
+    Raises
+    ------
+    InputError
+        If it is anything else.
+
+    Examples
+    --------
+    >>> shallow = Constraint("motion.depth_mm < 0.5 * object.radius_mm")
+    >>> shallow({"motion": {"depth_mm": 1.0}, "object": {"radius_mm": 4.0}})
+    True
+    """
+
+    def __init__(self, text: str):
+        self.text = text
+        try:
+            self._tree = ast.parse(text.strip(), mode="eval").body
+        except SyntaxError as error:
+            raise InputError(
+                f"a constraint must be a comparison such as a.b < 2 * c.d: got {text!r}."
+            ) from error
+        if not isinstance(self._tree, ast.Compare | ast.BoolOp):
+            raise InputError(f"{_COMPARED}: got {text!r}.")
+        for _ in self._fields(self._tree):
+            pass
+
+    def __call__(self, content: Mapping[str, Any]) -> bool:
+        """Whether a touch meets it."""
+        return bool(self._value(self._tree, content))
+
+    def _fields(self, node: ast.AST) -> Iterator[str]:
+        """Names of its fields; anything that is not arithmetic is refused."""
+        known = (ast.Compare, ast.BoolOp, ast.BinOp, ast.UnaryOp, ast.Constant, ast.Name, ast.Attribute)
+        if not isinstance(node, known):
+            raise InputError(
+                f"a constraint must have fields, numbers, + - * / and comparisons: got {self.text!r}."
+            )
+        operators = [getattr(node, "op", None), *getattr(node, "ops", ())]
+        if not all(isinstance(each, _OPERATORS) for each in operators if each is not None):
+            raise InputError(f"{_ARITHMETIC}: got {self.text!r}.")
+        if isinstance(node, ast.Name | ast.Attribute):
+            yield _name(node)
+            return
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.expr):
+                yield from self._fields(child)
+
+    def _value(self, node: ast.AST, content: Mapping[str, Any]) -> Any:
+        def value(part: ast.AST) -> Any:
+            return self._value(part, content)
+
+        match node:
+            case ast.Constant():
+                return node.value
+            case ast.Name() | ast.Attribute():
+                return _at(content, _name(node), self.text)
+            case ast.BoolOp():
+                joined = all if isinstance(node.op, ast.And) else any
+                return joined(value(part) for part in node.values)
+            case ast.UnaryOp():
+                return -value(node.operand)
+            case ast.BinOp():
+                return _OPERATIONS[type(node.op)](value(node.left), value(node.right))
+            case ast.Compare():
+                sides = [value(part) for part in (node.left, *node.comparators)]
+                return all(
+                    _COMPARISONS[type(each)](left, right)
+                    for each, left, right in zip(node.ops, sides, islice(sides, 1, None), strict=False)
+                )
+        raise InputError(
+            f"a constraint must have fields, numbers, + - * / and comparisons: got {self.text!r}."
+        )
+
+
+def read_sweep(source: str | Path) -> Sweep:
+    """Read the description of a sweep from a YAML file.
+
+    Parameters
+    ----------
+    source : str or Path
+        The file; docs/sweeps.md explains its keys.
+
+    Returns
+    -------
+    Sweep
+
+    Raises
+    ------
+    InputError
+        If it is no YAML, or a key is unknown, missing or has an unfit value; with line and key.
+    """
+    text = read_text(path_of("source", source))
+    return sweep_of(read_yaml(text, str(source)), str(source), text)
+
+
+def sweep_of(content: Mapping[str, Any] | Any, source: str = "sweep", text: str = "") -> Sweep:
+    """Build the description of a sweep from plain values; arguments as of `Sweep`."""
+    with Origin(source, text).located():
+        return Sweep(part_from(SweepDescription, content), source, text)
+
+
+def _listed(values: Any) -> list[Any]:
+    """Values of a field that varies."""
+    found = part_from(EvenValues, values).values if isinstance(values, Mapping) else values
+    if not isinstance(found, list | tuple) or not found:
+        raise InputError(
+            f"a field that varies must have a list of values, or start, stop and count: got {values!r}."
+        )
+    return list(found)
+
+
+def _dimension(field: str) -> str:
+    return field.replace(".", "_")
+
+
+def _with(content: Mapping[str, Any], keys: list[str], value: Any) -> dict[str, Any]:
+    """Return the content with another value at a place; a text such as `sphere` is a block of that kind."""
+    first, *rest = keys
+    if not rest:
+        return {**content, first: value}
+    inner = content.get(first, {})
+    if isinstance(inner, str) and ":" not in inner:
+        inner = {"kind": inner}
+    if not isinstance(inner, Mapping):
+        raise InputError(
+            f"{first} must be a mapping of keys to values, so that {rest[0]} can vary: got {inner!r}."
+        )
+    return {**content, first: _with(inner, rest, value)}
+
+
+def _name(node: ast.AST) -> str:
+    parts: list[str] = []
+    while isinstance(node, ast.Attribute):
+        parts.append(node.attr)
+        node = node.value
+    if not isinstance(node, ast.Name):
+        raise InputError("a constraint must name fields as in motion.depth_mm.")
+    return ".".join([node.id, *reversed(parts)])
+
+
+def _at(content: Any, name: str, text: str) -> Any:
+    for key in name.split("."):
+        if not isinstance(content, Mapping) or key not in content:
+            raise InputError(f"{name} of {text!r} must be given in touch or vary: it is not.")
+        content = content[key]
+    return content

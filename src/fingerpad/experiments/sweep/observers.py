@@ -1,0 +1,105 @@
+"""Hit rates of the observers of a sweep, from the responses that its settings gave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray, IntArray
+from fingerpad.core.signals import HitRates
+from fingerpad.experiments.descriptions.population import population_neighbours
+from fingerpad.experiments.discrimination.decoding import SESSION, silent_stimuli
+from fingerpad.experiments.sweep.description import ObserverSettings, Sweep
+from fingerpad.psychophysics.discrimination import compare_euclidean_observers, compare_gradient_sum_observers
+from fingerpad.psychophysics.encoding import taking_part
+
+MEASURED = {
+    "static": "static_rate_hz",
+    "dynamic": "dynamic_rate_hz",
+    "latency": "first_spike_latency_ms",
+}
+"""Where a data set has each measure."""
+
+
+def observe(
+    sweep: Sweep, responses: Mapping[str, FloatArray], done: np.ndarray, on_finished: Callable[[], None]
+) -> FloatArray:
+    """Compute the hit rates of all observers of a sweep.
+
+    Parameters
+    ----------
+    sweep : Sweep
+        With observers.
+    responses : mapping of str to array (*shape, n_receptors)
+        By the names of `MEASURED`, with NaN behind the receptors of a setting that has fewer.
+    done : bool array (*shape)
+        Settings that have responses.
+    on_finished : callable
+        Called after each group of settings that differ in the stimulus alone.
+
+    Returns
+    -------
+    array (*shape, *observer_shape)
+        Share of trials in which the stimulus is told from the standard. NaN for the standard itself, and
+        where a stimulus of the group is not done or leaves the population silent. [0-1]
+    """
+    observers = sweep.observers
+    along, _ = sweep.stimuli_axis(observers[0])
+    found = np.full((*sweep.shape, len(observers)), np.nan)
+    by_stimulus = np.moveaxis(found, along, -2)
+    known: dict[str, tuple[IntArray, int]] = {}
+    for place in np.ndindex(by_stimulus.shape[:-2]):
+        index = (*place[:along], slice(None), *place[along:])
+        if done[index].all():
+            pairs, count = _neighbours(sweep, index, along, known)
+            tables = {name: values[index][:, :count] for name, values in responses.items()}
+            by_stimulus[place] = _group(sweep, tables, pairs, observers)
+        on_finished()
+    return found.reshape(*sweep.shape, *sweep.observer_shape)
+
+
+def _neighbours(
+    sweep: Sweep, index: Sequence[int | slice], along: int, known: dict[str, tuple[IntArray, int]]
+) -> tuple[IntArray, int]:
+    """Pairs of neighbours and number of receptors of a group; found once for equal afferents."""
+    place = [0 if number == along else int(where) for number, where in enumerate(index)]  # type: ignore[arg-type]
+    described = sweep.described(int(np.ravel_multi_index(place, sweep.shape)))
+    asked = described.description
+    key = f"{asked.finger!r} {asked.afferents!r}"
+    if key not in known:
+        known[key] = population_neighbours(asked.afferents, described.population), len(described.population)
+    return known[key]
+
+
+def _group(
+    sweep: Sweep, tables: Mapping[str, FloatArray], pairs: IntArray, observers: Sequence[ObserverSettings]
+) -> FloatArray:
+    """Hit rates of all observers of one group, (n_stimuli, n_observers)."""
+    n_stimuli = len(next(iter(tables.values())))
+    found = np.full((n_stimuli, len(observers)), np.nan)
+    alike: dict[tuple[str, str, float | None, int, int], list[int]] = {}
+    for number, one in enumerate(observers):
+        standard = sweep.stimuli_axis(one)[1]
+        key = (one.code, one.measure, one.latest_ms, standard, one.experiment.seed)
+        alike.setdefault(key, []).append(number)
+    for (code, measure, latest_ms, standard, seed), numbers in alike.items():
+        table = tables[MEASURED[measure]]
+        if measure == "latency" and latest_ms is not None:
+            table = np.fmin(table, latest_ms)
+        if silent_stimuli(table, measure, latest_ms).size:
+            continue
+        order = np.concatenate([[standard], np.delete(np.arange(n_stimuli), standard)])
+        hits = _hit_rates(code, *taking_part(table[order], pairs), seed, [observers[n] for n in numbers])
+        for number, each in zip(numbers, hits, strict=True):
+            found[order[1:], number] = each.hit_rate
+    return found
+
+
+def _hit_rates(
+    code: str, table: FloatArray, pairs: np.ndarray, seed: int, observers: Sequence[ObserverSettings]
+) -> list[HitRates]:
+    plans = [(one.noise, one.experiment.plan) for one in observers]
+    if code == "euclidean":
+        return compare_euclidean_observers(table, plans, seed, session=SESSION)
+    return compare_gradient_sum_observers(table, pairs, plans, seed, session=SESSION)

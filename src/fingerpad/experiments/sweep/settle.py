@@ -1,0 +1,172 @@
+"""One press of a sweep with all its settings: what a worker does, and what it hands back."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.core.signals import ResponseMap
+from fingerpad.experiments.descriptions.pressed import respond
+from fingerpad.experiments.descriptions.touch import DescribedTouch
+from fingerpad.experiments.sweep.description import Sweep, sweep_of
+from fingerpad.geometry.mesh import Mesh
+from fingerpad.skin.fields import FIELDS, Place
+from fingerpad.skin.sampling import SkinResponse
+from fingerpad.skin.store import Store
+
+TRACES = ("times_ms", "force_mn", "depth_mm", "contact_area_mm2")
+"""Fields of the skin that every sweep keeps."""
+
+PLACES_MM: dict[Place, tuple[str, Callable[[Mesh], np.ndarray]]] = {
+    Place.NODE: ("node_mm", lambda mesh: mesh.nodes_mm),
+    Place.SKIN_NODE: ("skin_node_mm", lambda mesh: mesh.nodes_mm[mesh.skin_nodes]),
+    Place.ELEMENT: ("element_mm", lambda mesh: mesh.nodes_mm[mesh.elements].mean(axis=1)),
+    Place.WATCHED: (
+        "sheet_mm",
+        lambda mesh: mesh.nodes_mm[mesh.elements[mesh.living_epidermis.ravel()]].mean(axis=1),
+    ),
+}
+"""Where the values of fields are, undeformed: name of the positions, and the positions. [mm]"""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One press with the settings that are wanted of it.
+
+    Parameters
+    ----------
+    text, source : str
+        Description of the sweep in JSON, and its file.
+    press : int
+        Number of the press.
+    settings : tuple of int
+        Numbers of the settings, all of this press.
+    store : Path
+        Folder of stored indentations.
+    """
+
+    text: str
+    source: str
+    press: int
+    settings: tuple[int, ...]
+    store: Path
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What became of a case.
+
+    Parameters
+    ----------
+    press : int
+        Number of the press.
+    pressed : bool
+        Whether it was pressed, and not loaded.
+    seconds : float
+        Time of the press. [s]
+    skin : mapping of str to array
+        Traces and fields of the skin by name; empty if it failed.
+    responses : mapping of int to ResponseMap
+        By number of the setting.
+    failures : mapping of int to str
+        Reason why there is no response, by number of the setting.
+    """
+
+    press: int
+    pressed: bool
+    seconds: float
+    skin: Mapping[str, np.ndarray] = field(default_factory=dict)
+    responses: Mapping[int, ResponseMap] = field(default_factory=dict)
+    failures: Mapping[int, str] = field(default_factory=dict)
+
+
+def settle(case: Case, threads: int | None = None) -> Settled:
+    """Press, or load what is stored, and let the afferents of every setting respond.
+
+    Parameters
+    ----------
+    case : Case
+        The press.
+    threads : int, optional
+        Number of threads, all by default; the result does not depend on it.
+
+    Returns
+    -------
+    Settled
+        With reasons in the place of what cannot be pressed or cannot respond.
+
+    Raises
+    ------
+    StoreError
+        If the store cannot be written.
+    """
+    sweep = _sweep(case.text, case.source)
+    began = time.perf_counter()
+    first = case.settings[0]
+    try:
+        described = sweep.described(first)
+        skin, pressed = skin_of(described, Store(case.store), threads)
+    except (InputError, ConvergenceError) as error:
+        return Settled(
+            case.press, False, time.perf_counter() - began, failures=dict.fromkeys(case.settings, str(error))
+        )
+    seconds = time.perf_counter() - began
+    responses, failures = {}, {}
+    for setting in case.settings:
+        try:
+            responses[setting] = respond(sweep.described(setting).pressed_as(described), skin)
+        except InputError as error:
+            failures[setting] = str(error)
+    names = dict.fromkeys((*TRACES, *sweep.description.fields))
+    kept = {name: skin.fields[name] for name in names}
+    kept |= {PLACES_MM[place][0]: PLACES_MM[place][1](skin.mesh) for place in _places(names)}
+    return Settled(case.press, pressed, seconds, kept, responses, failures)
+
+
+def skin_of(described: DescribedTouch, store: Store, threads: int | None) -> tuple[SkinResponse, bool]:
+    """Response of the skin to a touch, and whether it was pressed for it."""
+    if not store.missing([described.touch]):
+        return store.load(described.touch), False
+    skin = described.touch.solve(threads)
+    store.save(described.touch, skin)
+    # What was stored is in single precision: a sweep that goes on has the same bits as one that did not stop.
+    return store.load(described.touch), True
+
+
+def _places(names: Iterable[str]) -> list[Place]:
+    """Places at which fields have values, each once."""
+    return [place for place in dict.fromkeys(FIELDS[name].place for name in names) if place in PLACES_MM]
+
+
+@lru_cache(maxsize=2)
+def _sweep(text: str, source: str) -> Sweep:
+    """Read a sweep once per process."""
+    return sweep_of(read_yaml(text, source), source)
+
+
+def unsettled(sweep: Sweep, done: np.ndarray, store: Path) -> Sequence[Case]:
+    """Cases of a sweep of which some settings are not done and meet the constraints.
+
+    Parameters
+    ----------
+    sweep : Sweep
+        The sweep.
+    done : bool array (size,)
+        Settings that need nothing.
+    store : Path
+        Folder of stored indentations.
+    """
+    text = sweep.description.model_dump_json()
+    cases = []
+    for press in range(sweep.presses):
+        wanted = tuple(setting for setting in sweep.settings_of(press) if not done[setting])
+        if wanted:
+            cases.append(Case(text, sweep.source, press, wanted, store.absolute()))
+    return cases
