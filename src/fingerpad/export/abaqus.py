@@ -20,9 +20,9 @@ def abaqus_deck(job: Job) -> str:
     """Text of an Abaqus/Standard input file.
 
     Bricks are C3D8H and wedges C3D6H, with constant pressure as in the elements of fingerpad. Layers of foam,
-    in which shape and volume are coupled, have C3D8 and C3D6. The indenter is an exact rigid surface that is
-    moved by its reference node. Steps are *VISCO with the increments of the indentation, or *STATIC when
-    nothing relaxes.
+    in which shape and volume are coupled, have C3D8 and C3D6. The indenter is an exact rigid surface, or
+    rigid facets where it has no outline, moved by its reference node. Steps are *VISCO with the increments of
+    the indentation, or *STATIC when nothing relaxes.
 
     Parameters
     ----------
@@ -95,10 +95,22 @@ def _skin(job: Job) -> list[str]:
 
 
 def _rigid_surface(job: Job, reference: int) -> list[str]:
-    """Cards of the indenter: its outline in local axes, attached to a reference node at its tip."""
+    """Cards of the indenter: its outline in local axes, or its facets, attached to a node at its tip."""
     origin, outline = job.placement.origin_mm, job.outline
     x, y, z = job.placement.rotation.T
     lines = cards.nodes(origin[None], reference, REFERENCE)
+    if outline is None:
+        facets = job.rigid
+        outer = facets.nodes_mm[: len(facets.nodes_mm) // 2]
+        numbers = len(job.mesh.elements) + 1 + np.arange(len(facets.quads))
+        return [
+            *lines,
+            *cards.nodes(outer, reference + 1, "FACETS"),
+            *cards.elements("R3D4", INDENTER, numbers, facets.quads + reference + 1),
+            f"*SURFACE, TYPE=ELEMENT, NAME={INDENTER}",
+            f"{INDENTER}, SPOS",
+            f"*RIGID BODY, ELSET={INDENTER}, REF NODE={reference}",
+        ]
     if outline.revolved:
         lines += [f"*SURFACE, TYPE=REVOLUTION, NAME={INDENTER}", *data([*origin, *(origin + y)])]
     else:

@@ -63,7 +63,7 @@ def calculix_deck(job: Job, elastic_moduli: str | None = None, element: str = "C
     Traceback (most recent call last):
     ...
     fingerpad.core.errors.InputError: CalculiX cannot relax the hyperelastic layer stratum_corneum: give \
-elastic_moduli ("long_term" or "instantaneous"), or export for Abaqus or FEBio.
+elastic_moduli ("long_term" or "instantaneous"; in a command --elastic-moduli), or export for Abaqus or FEBio.
     >>> deck = calculix_deck(job, elastic_moduli="long_term")
     >>> [line for line in deck.splitlines() if line.startswith("*STATIC")]
     ['*STATIC']
@@ -113,7 +113,7 @@ def _law(material: Material, name: str, elastic_moduli: str | None) -> list[str]
     if elastic_moduli is None:
         raise InputError(
             f"CalculiX cannot relax the hyperelastic layer {name}: give elastic_moduli "
-            '("long_term" or "instantaneous"), or export for Abaqus or FEBio.'
+            '("long_term" or "instantaneous"; in a command --elastic-moduli), or export for Abaqus or FEBio.'
         )
     one_of("elastic_moduli", elastic_moduli, MODULI)
     share = material.prony.long_term_share

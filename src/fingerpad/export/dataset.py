@@ -30,13 +30,14 @@ import numpy as np
 from fingerpad import __version__
 from fingerpad.core.checks import instance, one_of
 from fingerpad.core.errors import InputError, StoreError
-from fingerpad.core.files import write_atomically
+from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.signals import ResponseMap, SpikeTrains
 from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.skin.fields import FIELDS, Field, Place, Times, stored_fields
 from fingerpad.skin.sampling import SkinResponse
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
     from fingerpad.geometry.indenters import Indenter
@@ -70,7 +71,7 @@ _OBJECT_REACH_MM, _OBJECT_STEPS = (14.0, 10.0), 240
 
 
 @dataclass(frozen=True)
-class Part:
+class Variable:
     """One variable that is no field of the press.
 
     Parameters
@@ -95,32 +96,34 @@ class Part:
 
 
 MESH_PARTS = {
-    "node_mm": Part("mm", ("node", "axis"), "undeformed nodes"),
-    "element_nodes": Part("", ("element", "corner"), "nodes of each brick, bone side first", "node"),
-    "layer": Part("", ("element",), "layer of the skin"),
-    "skin_node": Part("", ("skin_node",), "nodes of the skin", "node"),
-    "facet_nodes": Part("", ("facet", "facet_corner"), "nodes of the faces of the skin", "node"),
-    "facet_element": Part("", ("facet",), "outermost element below each face", "element"),
-    "sheet": Part("", ("sheet",), "elements of the living epidermis above the dermis", "element"),
-    "bone": Part("", ("bone_node",), "nodes on the bone", "node"),
-    "nail": Part("", ("nail_node",), "nodes under the nail", "node"),
+    "node_mm": Variable("mm", ("node", "axis"), "undeformed nodes"),
+    "element_nodes": Variable("", ("element", "corner"), "nodes of each brick, bone side first", "node"),
+    "layer": Variable("", ("element",), "layer of the skin"),
+    "skin_node": Variable("", ("skin_node",), "nodes of the skin", "node"),
+    "facet_nodes": Variable("", ("facet", "facet_corner"), "nodes of the faces of the skin", "node"),
+    "facet_element": Variable("", ("facet",), "outermost element below each face", "element"),
+    "sheet": Variable("", ("sheet",), "elements of the living epidermis above the dermis", "element"),
+    "bone": Variable("", ("bone_node",), "nodes on the bone", "node"),
+    "nail": Variable("", ("nail_node",), "nodes under the nail", "node"),
 }
 OBJECT_PARTS = {
-    "object_x": Part("mm", ("object_x",), "x in the frame of the indenter"),
-    "object_z": Part("mm", ("object_z",), "z in the frame of the indenter"),
-    "object_front_mm": Part(
+    "object_x": Variable("mm", ("object_x",), "x in the frame of the indenter"),
+    "object_z": Variable("mm", ("object_z",), "z in the frame of the indenter"),
+    "object_front_mm": Variable(
         "mm", ("object_x", "object_z"), "height y of its face towards the skin", holes=True
     ),
-    "object_tip_mm": Part("mm", ("time", "axis"), "tip of the indenter"),
-    "object_axes": Part("1", ("time", "axis", "object_axis"), "axes x, y and z of the indenter as columns"),
+    "object_tip_mm": Variable("mm", ("time", "axis"), "tip of the indenter"),
+    "object_axes": Variable(
+        "1", ("time", "axis", "object_axis"), "axes x, y and z of the indenter as columns"
+    ),
 }
 RESPONSE_PARTS = {
-    "receptor_mm": Part("mm", ("receptor", "coordinate"), "place of each end organ"),
-    "dynamic_rate_hz": Part("s-1", ("receptor",), "firing rate in the ramp"),
-    "static_rate_hz": Part("s-1", ("receptor",), "firing rate in the hold"),
-    "first_spike_latency_ms": Part("ms", ("receptor",), "time of the first spike", holes=True),
-    "spike_count": Part("1", ("receptor",), "number of spikes of each receptor"),
-    "spike_time_ms": Part("ms", ("spike",), "spike times, receptor by receptor"),
+    "receptor_mm": Variable("mm", ("receptor", "coordinate"), "place of each end organ"),
+    "dynamic_rate_hz": Variable("s-1", ("receptor",), "firing rate in the ramp"),
+    "static_rate_hz": Variable("s-1", ("receptor",), "firing rate in the hold"),
+    "first_spike_latency_ms": Variable("ms", ("receptor",), "time of the first spike", holes=True),
+    "spike_count": Variable("1", ("receptor",), "number of spikes of each receptor"),
+    "spike_time_ms": Variable("ms", ("spike",), "spike times, receptor by receptor"),
 }
 PARTS = {**MESH_PARTS, **OBJECT_PARTS, **RESPONSE_PARTS}
 """Variables beside the fields of the press, by name."""
@@ -167,7 +170,7 @@ def touch_dataset(
     >>> f"{touch.depth_mm[-1].item():g} {touch.depth_mm.units}"
     '0.3 mm'
     """
-    xarray = _library("xarray")
+    xarray = library("xarray")
     instance("skin", skin, SkinResponse)
     for name in quantities:
         one_of("quantity", name, tuple(FIELDS))
@@ -237,10 +240,10 @@ def write_touch(
     'touch.nc'
     0.3
     """
-    path = Path(path)
+    path = path_of("path", path)
     if path.suffix not in SUFFIXES:
         raise InputError(f"A touch is written as {' or '.join(SUFFIXES)}: got {path.name}.")
-    _library("h5netcdf" if path.suffix == ".nc" else "zarr")
+    library("h5netcdf" if path.suffix == ".nc" else "zarr")
     data = touch_dataset(skin, response, quantities=quantities, seed=seed)
     if path.suffix == ".zarr":
         _write_zarr(path, data)
@@ -273,10 +276,10 @@ def read_touch(path: str | Path) -> xarray.Dataset:
         is missing or has another unit, other dimensions, numbers that are not finite, or numbers of nodes and
         elements that do not exist.
     """
-    found = touch_file(Path(path))
-    xarray = _library("xarray")
+    found = touch_file(path_of("path", path))
+    xarray = library("xarray")
     engine = "zarr" if found.is_dir() else "h5netcdf"
-    _library(engine)
+    library(engine)
     options = {"consolidated": False} if engine == "zarr" else {}
     try:
         with xarray.open_dataset(found, engine=engine, decode_times=False, **options) as opened:
@@ -284,7 +287,7 @@ def read_touch(path: str | Path) -> xarray.Dataset:
     except Exception as error:  # a file of unknown content may fail in any way
         raise InputError(
             f"{found} must be a touch that fingerpad wrote, as {' or '.join(SUFFIXES)}: it cannot be read "
-            f"({_first_line(error)})."
+            f"({first_line(error)})."
         ) from error
     check_touch(str(found), data)
     return data
@@ -344,7 +347,7 @@ def _fields(
 
 
 def _field_attributes(field: Field) -> Attributes:
-    return {"long_name": field.long_name, "units": _UDUNITS.get(field.unit, field.unit)}
+    return {"long_name": field.long_name, "units": unit_of(field)}
 
 
 def _mesh_values(mesh: Mesh) -> dict[str, np.ndarray]:
@@ -522,7 +525,7 @@ def _check_variable(where: str, name: Hashable, values: xarray.Variable, data: x
     field = FIELDS.get("times_ms" if name == "time" else str(name))
     part = PARTS.get(str(name))
     if field is not None:
-        unit, holes = _UDUNITS.get(field.unit, field.unit), False
+        unit, holes = unit_of(field), False
         ends = (*_PLACES[field.place], *_COMPONENTS[field.components])
         allowed = {ends, ("time", *ends)}
         if field.place is Place.WATCHED:
@@ -546,7 +549,18 @@ def _check_variable(where: str, name: Hashable, values: xarray.Variable, data: x
             raise InputError(f"{where} must hold whole numbers from 0 to {count - 1}: some are not.")
 
 
-def _first_line(error: Exception) -> str:
+def unit_of(field: Field) -> str:
+    """Return the unit of a field as UDUNITS reads it."""
+    return _UDUNITS.get(field.unit, field.unit)
+
+
+def field_dimensions(field: Field) -> tuple[str, ...]:
+    """Dimensions of a field as it is stored."""
+    time = ("time",) if field.stored is Times.ALL else ()
+    return (*time, *_PLACES[field.place], *_COMPONENTS[field.components])
+
+
+def first_line(error: Exception) -> str:
     """First line of what a library says."""
     return (str(error).strip().splitlines() or [type(error).__name__])[0].strip().rstrip(".")[:200]
 
@@ -554,10 +568,36 @@ def _first_line(error: Exception) -> str:
 def require_netcdf() -> None:
     """Raise `InputError` if a library that writes data sets is not installed."""
     for name in ("xarray", "h5netcdf", "zarr"):
-        _library(name)
+        library(name)
 
 
-def _library(name: str) -> Any:
+def response_table(response: ResponseMap) -> pandas.DataFrame:
+    """Return the response of a population as a table; see `ResponseMap.to_pandas`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from fingerpad.core.signals import SpikeTrains
+    >>> spikes, rates = SpikeTrains.from_lists([[12.0, 40.0], []]), np.array([30.0, 0.0])
+    >>> places, latency = [[17.0, 0.0], [18.0, 0.0]], np.array([12.0, np.nan])
+    >>> table = response_table(ResponseMap(places, 1.0, spikes, rates, rates, latency))
+    >>> table.columns.tolist(), table.spikes.tolist()
+    (['x_mm', 'z_mm', 'dynamic_rate_hz', 'static_rate_hz', 'first_spike_latency_ms', 'spikes'], [2, 0])
+    """
+    axes = ("x_mm", "z_mm") if response.positions_mm.shape[1] == 2 else ("x_mm", "y_mm", "z_mm")
+    columns = dict(zip(axes, response.positions_mm.T, strict=True))
+    columns |= {
+        name: getattr(response, name)
+        for name in ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms")
+    }
+    table: pandas.DataFrame = library("pandas").DataFrame(
+        columns | {"spikes": np.diff(response.spikes.offsets)}
+    )
+    return table.rename_axis("afferent")
+
+
+def library(name: str) -> Any:
+    """Import a library of the extra `netcdf`, or raise an `InputError` that says how to install it."""
     try:
         return import_module(name)
     except ImportError as error:

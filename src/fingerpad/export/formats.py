@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fingerpad.core.checks import one_of
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import write_atomically
+from fingerpad.core.files import path_of, write_atomically
 from fingerpad.export.abaqus import abaqus_deck
 from fingerpad.export.calculix import calculix_deck
 from fingerpad.export.dataset import require_netcdf, write_touch
@@ -75,7 +75,7 @@ def export_touch(
         if whole := format_name in REQUIRED:
             REQUIRED[format_name]()  # first, since solving takes its time
         name, write = RESULTS[format_name]
-        return write(Path(folder) / name, touch.solve(whole=whole))
+        return write(path_of("folder", folder) / name, touch.solve(whole=whole))
     return (write_deck(folder, job_of(touch), format_name, elastic_moduli),)
 
 
@@ -83,5 +83,5 @@ def write_deck(folder: Path, job: Job, format_name: str, elastic_moduli: str | N
     """Write the input file of a solver; arguments as of `export_touch`, with what `job_of` returns."""
     name, deck = DECKS[format_name]
     text = deck(job) if elastic_moduli is None else calculix_deck(job, elastic_moduli)
-    write_atomically(Path(folder) / name, text.encode())
-    return Path(folder) / name
+    write_atomically(path_of("folder", folder) / name, text.encode())
+    return path_of("folder", folder) / name

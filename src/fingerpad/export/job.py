@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from fingerpad import __version__
 from fingerpad.core.checks import FloatArray, IntArray, float_array, increasing, instance
 from fingerpad.core.errors import InputError
-from fingerpad.export.outline import Outline, RigidMesh, outline_of, rigid_mesh
+from fingerpad.export.outline import Outline, RigidMesh, face_mesh, outline_of, rigid_mesh
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.mechanics.contact import Placement, check_friction
@@ -166,8 +166,8 @@ class Job:
         return float(np.ptp(self.mesh.nodes_mm, axis=0).max() + 2 * self.depths_mm.max())
 
     @property
-    def outline(self) -> Outline:
-        """Section of the indenter."""
+    def outline(self) -> Outline | None:
+        """Section of the indenter, if it has one of lines and arcs."""
         return outline_of(self.indenter, self.reach_mm)
 
     def _local(self, points_mm: FloatArray) -> FloatArray:
@@ -182,8 +182,19 @@ class Job:
         reached = skin[self.indenter.gap(skin)[0] < BESIDE_FACETS_MM]
         lowest = min(-2.0 * deepest, float(reached[:, 1].min(initial=0.0))) - BESIDE_FACETS_MM
         beyond = deepest + BESIDE_INDENTER_MM
-        extent = float(skin[:, 2].min() - beyond), float(skin[:, 2].max() + beyond)
-        local = rigid_mesh(self.outline, lowest, extent)
+        outline = self.outline
+        if outline is None:
+            along, across = (
+                (
+                    float(reached[:, axis].min(initial=0.0)) - 1.0,
+                    float(reached[:, axis].max(initial=0.0)) + 1.0,
+                )
+                for axis in (0, 2)
+            )
+            local = face_mesh(self.indenter, lowest, along, across)
+        else:
+            extent = float(skin[:, 2].min() - beyond), float(skin[:, 2].max() + beyond)
+            local = rigid_mesh(outline, lowest, extent)
         nodes = self.placement.origin_mm + local.nodes_mm @ self.placement.rotation.T
         return RigidMesh(nodes, local.quads, local.triangles)
 
@@ -205,7 +216,8 @@ class Job:
             may = self.indenter.may_touch(local.reshape(-1, 3)).reshape(faces.shape).all(axis=1)
         else:
             across = np.abs(local[..., 0])
-            if self.outline.revolved:
+            outline = self.outline
+            if outline is not None and outline.revolved:
                 across = np.hypot(local[..., 0], local[..., 2])
             beyond = self.indenter.half_width_mm + self.depths_mm.max() + BESIDE_INDENTER_MM
             normal = np.cross(local[:, 2] - local[:, 0], local[:, 3] - local[:, 1])

@@ -28,6 +28,15 @@ LARGEST_TURN_RAD = np.deg2rad(3.0)
 FACETS_AROUND = 96
 FACETS_ACROSS = 8
 
+FACETS_ACROSS_RELIEF = 16
+"""Facets across the narrowest part of a body without an outline."""
+
+SMALLEST_FACET_MM, LARGEST_FACET_MM, MOST_FACETS = 0.025, 0.1, 250_000
+"""Bounds of their size, and of their number. [mm]"""
+
+SHELL_MM = 0.1
+"""Thickness of their solid elements. [mm]"""
+
 
 @dataclass(frozen=True)
 class Outline:
@@ -46,8 +55,8 @@ class Outline:
 
     Examples
     --------
-    >>> outline_of(Cylinder(diameter_mm=2.0), reach_mm=5.0).corners
-    ((-1.0, -1.0), (0.0, 0.0), (1.0, -1.0))
+    >>> Outline(True, ((0.0, 0.0), (2.0, -2.0)), ((0.0, -2.0),)).points(lowest_mm=-0.9).shape
+    (20, 2)
     """
 
     revolved: bool
@@ -79,24 +88,20 @@ def _arc(start: Point, end: Point, centre: Point) -> FloatArray:
     return middle + radius * np.column_stack([np.cos(angles), np.sin(angles)])
 
 
-def outline_of(indenter: Indenter, reach_mm: float) -> Outline:
+def outline_of(indenter: Indenter, reach_mm: float) -> Outline | None:
     """Outline of an indenter.
 
     Parameters
     ----------
     indenter : Indenter
-        One of the package's own classes; for another class only its gap is known.
+        Any body.
     reach_mm : float
         Half extent of a body without edges (plate), height of straight sides, and depth of grooves. [mm]
 
     Returns
     -------
-    Outline
-
-    Raises
-    ------
-    InputError
-        If the indenter has no outline of lines and arcs.
+    Outline or None
+        None if it has no outline of lines and arcs: `face_mesh` divides its face.
 
     Examples
     --------
@@ -136,10 +141,7 @@ def outline_of(indenter: Indenter, reach_mm: float) -> Outline:
         middles = indenter.period_mm * np.arange(-count, count + 1)
         lip = indenter.lip_mm
         return _ridges(tuple(_Ridge(u - half, u + half, lip, lip) for u in middles.tolist()), reach_mm)
-    raise InputError(
-        f"{type(indenter).__name__} cannot be exported, because only its gap is known: use Sphere, Cylinder, "
-        "Bar, FlatPunch, Plate, Line, Edge, Gap or Grating."
-    )
+    return None
 
 
 @dataclass(frozen=True)
@@ -245,6 +247,58 @@ def rigid_mesh(outline: Outline, lowest_mm: float, z_mm: tuple[float, float]) ->
         towards[:, 0] += middles[np.abs(outer[:, :1] - middles).argmin(axis=1)]
         towards[:, 2] = 0.0
     return RigidMesh(np.concatenate([outer, outer + SHELL_SHARE * towards]), quads, triangles)
+
+
+def face_mesh(
+    indenter: Indenter, lowest_mm: float, x_mm: tuple[float, float], z_mm: tuple[float, float]
+) -> RigidMesh:
+    """Divide the face of any body into facets over a grid; walls are as steep as one of its cells is wide.
+
+    Parameters
+    ----------
+    indenter : Indenter
+        The body.
+    lowest_mm : float
+        Lowest y of the facets, negative. [mm]
+    x_mm, z_mm : (float, float)
+        Extent of the facets. [mm]
+
+    Returns
+    -------
+    RigidMesh
+
+    Raises
+    ------
+    InputError
+        If there would be more than 250,000 facets.
+
+    Examples
+    --------
+    >>> dome = face_mesh(Sphere(curvature_per_m=500), -1.0, (-2.5, 2.5), (-2.5, 2.5))
+    >>> dome.quads.shape[1], round(float(dome.nodes_mm[:, 1].max()), 3)
+    (4, 0.0)
+    """
+    pitch = np.clip(indenter.relief_mm / FACETS_ACROSS_RELIEF, SMALLEST_FACET_MM, LARGEST_FACET_MM)
+    lines = []
+    for low, high in (x_mm, z_mm):
+        # The middle of the body is on a line: a symmetric body has symmetric facets.
+        lines.append(pitch * np.arange(np.floor(low / pitch), np.ceil(high / pitch) + 1))
+    x, z = np.meshgrid(*lines, indexing="ij")
+    if x.size > MOST_FACETS:
+        raise InputError(
+            f"{type(indenter).__name__} would need {x.size:,} facets, more than {MOST_FACETS:,}: press it "
+            "less deep, or export vtu, csv or npz."
+        )
+    height = indenter.front(np.column_stack([x.ravel(), np.zeros(x.size), z.ravel()])).reshape(x.shape)
+    height = np.maximum(height, lowest_mm)
+    ids = np.arange(x.size).reshape(x.shape)
+    corners = [ids[:-1, :-1], ids[:-1, 1:], ids[1:, 1:], ids[1:, :-1]]
+    quads = np.stack(corners, axis=-1).reshape(-1, 4)
+    quads = quads[(height.ravel()[quads] > lowest_mm).any(axis=1)]
+    used, numbers = np.unique(quads, return_inverse=True)
+    outer = np.column_stack([x.ravel(), height.ravel(), z.ravel()])[used]
+    nodes = np.concatenate([outer, outer - [0.0, SHELL_MM, 0.0]])
+    return RigidMesh(nodes, numbers.reshape(quads.shape), np.empty((0, 3), dtype=np.int64))
 
 
 def _swept(line: FloatArray, z: FloatArray) -> tuple[FloatArray, IntArray]:

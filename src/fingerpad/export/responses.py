@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from fingerpad.core.checks import instance
-from fingerpad.core.files import write_atomically
+from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.signals import ResponseMap
 from fingerpad.neuron.response_maps import recruitment_rank
 
@@ -70,8 +70,8 @@ def write_response_csv(path: Path, response: ResponseMap) -> Path:
     table = csv.writer(text, lineterminator="\n")
     table.writerow(("receptor", *PLACES[response.positions_mm.shape[1]], *ANSWERS))
     table.writerows(_rows(response))
-    write_atomically(Path(path), text.getvalue().encode())
-    return Path(path)
+    write_atomically(path_of("path", path), text.getvalue().encode())
+    return path_of("path", path)
 
 
 def _rows(response: ResponseMap) -> Iterator[list[object]]:

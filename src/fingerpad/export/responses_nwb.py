@@ -14,10 +14,13 @@ import numpy as np
 from fingerpad import __version__
 from fingerpad.core.checks import instance, not_negative, positive
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import write_atomically
+from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.signals import ResponseMap
 from fingerpad.core.units import MS_PER_S
 from fingerpad.export.responses import PLACES
+
+_RESOLUTION_S = 1e-9
+"""Spike times are roots of a closed form; those of two processors differ by less. [s]"""
 
 
 def write_responses_nwb(
@@ -69,6 +72,7 @@ def write_responses_nwb(
     'session.nwb'
     """
     not_negative("pause_ms", pause_ms, "ms")
+    instance("responses", responses, Mapping)
     began = started or datetime.now(UTC)
     if began.tzinfo is None:
         raise InputError(f"started must have a time zone, such as datetime.UTC: got {began.isoformat()}.")
@@ -78,7 +82,21 @@ def write_responses_nwb(
     with warnings.catch_warnings(), TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
         pynwb = require_pynwb()
-        session = pynwb.NWBFile(f"simulated by fingerpad {__version__}", Path(path).stem, began)
+        session = pynwb.NWBFile(
+            f"simulated by fingerpad {__version__}",
+            path_of("path", path).stem,
+            began,
+            experiment_description="Simulated touch of a fingertip: finite elements and afferents.",
+            keywords=["simulation", "touch", "tactile afferents"],
+            # A range of ages without bounds: the finger is a model.
+            subject=pynwb.file.Subject(
+                subject_id="model",
+                species="Homo sapiens",
+                sex="U",
+                age="P0D/",
+                description="Finite-element model of a fingertip.",
+            ),
+        )
         session.add_trial_column("stimulus", "name of the touch")
         for (name, answer), onset_ms, lasts_ms in zip(
             responses.items(), onsets_ms, durations_ms, strict=True
@@ -87,6 +105,9 @@ def write_responses_nwb(
             for phase in answer.phases:
                 start, end = ((onset_ms + time_ms) / MS_PER_S for time_ms in phase.window_ms)
                 session.add_epoch(start, end, tags=[phase.name, name])
+        session.units = pynwb.misc.Units(
+            name="units", description="One unit per receptor.", resolution=_RESOLUTION_S
+        )
         columns = PLACES[positions_mm.shape[1]]
         for column in columns:
             session.add_unit_column(column, f"{column[0]} of the receptor on the undeformed skin, in mm")
@@ -101,8 +122,8 @@ def write_responses_nwb(
         unfinished = Path(folder) / "session.nwb"
         with pynwb.NWBHDF5IO(str(unfinished), mode="w") as file:
             file.write(session)
-        write_atomically(Path(path), unfinished.read_bytes())
-    return Path(path)
+        write_atomically(path_of("path", path), unfinished.read_bytes())
+    return path_of("path", path)
 
 
 def _places(responses: Mapping[str, ResponseMap]) -> np.ndarray:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fingerpad.core.files import write_atomically
+from fingerpad.core.files import path_of, write_atomically
 from fingerpad.skin.fields import FIELDS, Place
 from fingerpad.skin.sampling import SkinResponse
 
@@ -61,8 +61,8 @@ def write_touch_csv(path: Path, skin: SkinResponse) -> tuple[Path, ...]:
     table = csv.writer(text, lineterminator="\n")
     table.writerow(columns)
     table.writerows(np.column_stack(list(columns.values())).tolist())
-    write_atomically(Path(path), text.getvalue().encode())
-    return (Path(path),)
+    write_atomically(path_of("path", path), text.getvalue().encode())
+    return (path_of("path", path),)
 
 
 def write_touch_npz(path: Path, skin: SkinResponse) -> tuple[Path, ...]:
@@ -92,5 +92,5 @@ def write_touch_npz(path: Path, skin: SkinResponse) -> tuple[Path, ...]:
     content: dict[str, Any] = {name: getattr(skin.mesh, name) for name in MESH_ARRAYS}
     content |= {**skin.fields, "kinks_ms": np.array(skin.kinks_ms), "units": np.array(json.dumps(units))}
     np.savez_compressed(buffer, **content)
-    write_atomically(Path(path), buffer.getvalue())
-    return (Path(path),)
+    write_atomically(path_of("path", path), buffer.getvalue())
+    return (path_of("path", path),)

@@ -32,7 +32,7 @@ from scipy.spatial import cKDTree
 
 from fingerpad.core.checks import FloatArray, finite, instance, one_of, whole
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import write_atomically
+from fingerpad.core.files import path_of, write_atomically
 from fingerpad.export.dataset import check_touch, read_touch, spike_trains
 from fingerpad.report.style import BLACK, BLUE, STYLE, new_figure, say_nothing_to_draw
 from fingerpad.report.touch import BONE, DECADES, SKIN
@@ -119,7 +119,7 @@ def save_view(
     >>> picture.name
     'touch.png'
     """
-    path = Path(path)
+    path = path_of("path", path)
     one_of("ending of the file", path.suffix.lower(), SUFFIXES)
     film = path.suffix.lower() != ".png"
     if film and time_ms is not None:

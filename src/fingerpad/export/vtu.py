@@ -7,14 +7,18 @@ VTK_HEXAHEDRON, collapsed ones VTK_WEDGE. The package `vtk`, of the extra `finge
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import write_atomically
+from fingerpad.core.files import path_of, read_text, write_atomically
 from fingerpad.export.job import wedge_nodes
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.press import Deformation
@@ -70,7 +74,7 @@ def write_vtu_series(path: Path, skin: SkinResponse) -> tuple[Path, ...]:
     ['touch.pvd', 'touch_0000.vtu', 'touch_0001.vtu', 'touch_0002.vtu']
     """
     require_vtk()
-    path = Path(path)
+    path = path_of("path", path)
     if skin.deformation is None:
         raise InputError(
             "VTU files show all nodes and elements over time, which this response does not hold: solve the "
@@ -89,6 +93,76 @@ def write_vtu_series(path: Path, skin: SkinResponse) -> tuple[Path, ...]:
         write_atomically(path.with_name(name), _xml(grid))
     write_atomically(path, _index(names, skin.times_ms))
     return path, *(path.with_name(name) for name in names)
+
+
+@dataclass(frozen=True)
+class VtuSeries:
+    """A deformation as VTU files hold it.
+
+    Parameters
+    ----------
+    times_ms : array (n_times,)
+        Times of the files. [ms]
+    points_mm : array (n_nodes, 3)
+        Undeformed nodes. [mm]
+    points, cells, press : mapping of str to array (n_times, ...)
+        Values at nodes, in elements, and of the whole press, by ParaView's names.
+    """
+
+    times_ms: FloatArray
+    points_mm: FloatArray
+    points: Mapping[str, np.ndarray]
+    cells: Mapping[str, np.ndarray]
+    press: Mapping[str, np.ndarray]
+
+
+def read_vtu_series(path: str | Path) -> VtuSeries:
+    """Read the files that `write_vtu_series` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+        The PVD file.
+
+    Returns
+    -------
+    VtuSeries
+
+    Raises
+    ------
+    InputError
+        If VTK is not installed, or a file is missing or no VTU.
+    """
+    require_vtk()
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+
+    path = path_of("path", path)
+    try:
+        listed = [dict(entry.attrib) for entry in ElementTree.fromstring(read_text(path)).iter("DataSet")]
+        files = [(float(entry["timestep"]), path.with_name(Path(entry["file"]).name)) for entry in listed]
+    except (ElementTree.ParseError, KeyError, ValueError) as error:
+        raise InputError(f"{path} must be an index of VTU files: it cannot be read ({error}).") from error
+    found: list[tuple[np.ndarray, list[dict[str, np.ndarray]]]] = []
+    for _, name in files:
+        reader = vtkXMLUnstructuredGridReader()
+        if not reader.CanReadFile(str(name)):
+            raise InputError(f"{name} must be a VTU file: it is missing or cannot be read.")
+        reader.SetFileName(str(name))
+        reader.Update()
+        grid = reader.GetOutput()
+        groups = [
+            {data.GetArrayName(n): vtk_to_numpy(data.GetArray(n)) for n in range(data.GetNumberOfArrays())}
+            for data in (grid.GetPointData(), grid.GetCellData(), grid.GetFieldData())
+        ]
+        found.append((vtk_to_numpy(grid.GetPoints().GetData()), groups))
+    if not found:
+        raise InputError(f"{path} must list a VTU file or more: it lists none.")
+    points, cells, press = (
+        {name: np.stack([groups[kind][name] for _, groups in found]) for name in found[0][1][kind]}
+        for kind in range(3)
+    )
+    return VtuSeries(np.array([time for time, _ in files]), found[0][0], points, cells, press)
 
 
 def require_vtk() -> None:
