@@ -152,11 +152,16 @@ def _draw(section: SphereDiscrimination, panels: list[Panel], columns: int) -> F
         if rates is None:
             say_nothing_to_draw(axes, "not computed")
             continue
-        axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)), label="chance")
-        _curves(axes, section.curvature_per_m[1:], rates)
-        _people(axes, section.goodwin)
+        draw_hit_rates(axes, section, rates)
     _label(figure, grid, len(panels))
     return figure
+
+
+def draw_hit_rates(axes: Axes, section: SphereDiscrimination, rates: ObserverHitRates) -> None:
+    """Draw the hit rates of one observer at both positions, those of people, and chance."""
+    axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)), label="chance")
+    _curves(axes, section.curvature_per_m[1:], rates)
+    _people(axes, section.goodwin)
 
 
 def _curves(axes: Axes, comparison: FloatArray, rates: ObserverHitRates) -> None:

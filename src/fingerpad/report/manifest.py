@@ -33,8 +33,9 @@ def manifest_chapter(manifest: Manifest) -> Chapter:
 
 
 def edition(manifest: Manifest) -> str:
-    """Return the version, resolution and seed of a run."""
-    return f"fingerpad {manifest.version}, {manifest.resolution} resolution, seed {manifest.seed}"
+    """Return the version, resolution and seed of a run, and its caveats: what was not verified."""
+    made = f"fingerpad {manifest.version}, {manifest.resolution} resolution, seed {manifest.seed}"
+    return made if not manifest.caveats else f"{made}. Not verified: {' '.join(manifest.caveats)}"
 
 
 def facts_table(title: str, facts: Mapping[str, object]) -> Table:

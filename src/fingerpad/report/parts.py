@@ -183,14 +183,17 @@ class Page:
         Summary; links and code as in `Paragraph`.
     chapters : sequence of Chapter
         In order.
+    opening : sequence of Drawing, optional
+        Small figures side by side before the summary, each with one sentence as its caption.
     """
 
     heading: str
     subtitle: str
     paragraphs: Sequence[str]
     chapters: Sequence[Chapter]
+    opening: Sequence[Drawing] = ()
 
     @property
     def drawings(self) -> list[Drawing]:
-        """Figures of all chapters."""
-        return [drawing for chapter in self.chapters for drawing in chapter.drawings]
+        """Figures of the opening and of all chapters."""
+        return [*self.opening, *(drawing for chapter in self.chapters for drawing in chapter.drawings)]

@@ -6,11 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from fingerpad.data import STATUSES, paper
+from fingerpad.data import STATUSES
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
-from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
-from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult
-from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.report.comparison import comparison_tables, verdict_sentence
 from fingerpad.report.curvature_thresholds import caption_thresholds, draw_thresholds, threshold_tables
@@ -23,7 +20,8 @@ from fingerpad.report.discrimination import (
     draw_noise,
     draw_observers,
 )
-from fingerpad.report.formatting import fixed, joined, number, plain, whole_percent
+from fingerpad.report.first_screen import first_screen
+from fingerpad.report.formatting import plain
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.mesh_picture import caption_mesh, draw_mesh
 from fingerpad.report.nail import caption_nail, draw_nail
@@ -85,6 +83,7 @@ def reproduction_page(result: ReproductionResult) -> Page:
             Chapter("Published numbers used", input_tables(result.inputs)),
             manifest_chapter(result.manifest),
         ],
+        first_screen(result),
     )
 
 
@@ -157,52 +156,14 @@ def _of_run(part: Part, manifest: Manifest) -> Part:
 
 
 def reproduction_summary(result: ReproductionResult) -> list[str]:
-    """Return the paragraphs that open the report: the result of each level, then what was met and missed."""
-    found = " ".join(
-        [_skin(result.skin_deflection), _afferent(result.single_unit), _percept(result.discrimination)]
-    )
-    paragraphs = [found, verdict_sentence(result.comparison)]
+    """Return the paragraphs below the pictures of the levels: what was met and missed."""
+    paragraphs = [verdict_sentence(result.comparison)]
     if result.single_unit_uncertainty is None:
         paragraphs.append(
             "Parts beyond the paper were not run: uncertainty of the fit and curvature thresholds "
             "(`fingerpad reproduce --extended`)."
         )
     return paragraphs
-
-
-def _skin(section: SkinDeflectionResult) -> str:
-    trials = (section.trial1, section.trial2, section.trial3)
-    fits = {f"Trial {number}": trial.cylinder.r2 for number, trial in enumerate(trials, start=1)}
-    best = max(fits, key=lambda name: fits[name])
-    listed = joined([f"{name} {fixed(fit, 2)}" for name, fit in fits.items()])
-    return (
-        f"Skin: of the material trials, {best} is closest to the observed deflection under the cylinder "
-        f"(R²: {listed}); in the paper Trial 3 is."
-    )
-
-
-def _afferent(section: SingleUnitResult) -> str:
-    return (
-        "Afferent: the fitted afferent reaches a fractional sum of squares (FSS) of "
-        f"{fixed(section.fss_out_of_sample, 2)} out of sample, on positions of the bar that were not used "
-        f"for fitting (the paper: {fixed(paper.FSS_OUT_OF_SAMPLE.value, 2)}), and "
-        f"{fixed(section.fss_in_sample, 2)} on all positions."
-    )
-
-
-def _percept(section: SphereDiscrimination) -> str:
-    people, comparison = section.goodwin, section.curvature_per_m[1:].tolist()
-    rates = section.gradient_sum["static"].hit_rate
-    discriminated = [
-        f"{number(curvature)} 1/m in {whole_percent(rates[comparison.index(curvature)])} of trials "
-        f"(observed: {whole_percent(observed)})"
-        for curvature, observed in zip(people.curvature_per_m.tolist(), people.hit_rate, strict=True)
-    ]
-    return (
-        f"Percept: with noise of {number(section.noise_sigma)}, the static Gradient Sum discriminates "
-        f"spheres of {joined(discriminated)} from the standard; the paper's noise is "
-        f"{number(section.noise_sigma_paper)}."
-    )
 
 
 def input_tables(inputs: Sequence[PublishedNumber]) -> list[Table]:

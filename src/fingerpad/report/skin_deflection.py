@@ -43,10 +43,7 @@ def draw_skin_deflection(section: SkinDeflectionResult) -> Figure:
     for row, indenter in enumerate((LINE, CYLINDER)):
         whole, near = panels[row]
         for axes in (whole, near):
-            for name, trial in _trials(section).items():
-                _draw_profile(axes, name, trial[indenter])
-            if indenter == CYLINDER:
-                _draw_observed(axes, section.observed)
+            draw_profiles(axes, section, indenter)
         whole.set_title(f"({'ab'[row]}) {indenter}, {protocol.DEPTH.value} mm deep")
         whole.margins(x=0.01)
         whole.set_ylabel("deflection towards the bone [mm]")
@@ -60,9 +57,17 @@ def draw_skin_deflection(section: SkinDeflectionResult) -> Figure:
     return figure
 
 
+def draw_profiles(axes: Axes, section: SkinDeflectionResult, indenter: str) -> None:
+    """Draw the deflection of each trial under an indenter, and what was observed under it."""
+    for name, trial in _trials(section).items():
+        _draw_profile(axes, name, trial[indenter])
+    if indenter == CYLINDER:
+        _draw_observed(axes, section.observed)
+
+
 def _draw_profile(axes: Axes, name: str, profile: IndenterDeflection) -> None:
     colour, style = TRIAL_STYLES[name]
-    fit = f", $R^2$ = {fixed(profile.r2, 2)}" if isinstance(profile, CylinderDeflection) else ""
+    fit = f", R² = {fixed(profile.r2, 2)}" if isinstance(profile, CylinderDeflection) else ""
     axes.plot(profile.distance_mm, profile.deflection_mm, color=colour, linestyle=style, label=name + fit)
 
 

@@ -13,9 +13,10 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.core.files import write_atomically
+from fingerpad.core.files import path_of, write_atomically
 
 RESOLUTION_DPI = 150
 
@@ -80,7 +81,11 @@ def png(draw: Callable[..., Figure], *parts: Any) -> bytes:
     """Return what `draw` makes of its arguments, as PNG; settings elsewhere stay as they are."""
     buffer = io.BytesIO()
     with matplotlib.rc_context(STYLE):
-        draw(*parts).savefig(buffer, format="png", metadata={"Software": None})
+        figure = draw(*parts)
+        for text in figure.findobj(Text):
+            # A dollar stands in a name that somebody gave. The ticks of scales are not written yet.
+            text.set_parse_math("$" not in text.get_text())
+        figure.savefig(buffer, format="png", metadata={"Software": None})
     return buffer.getvalue()
 
 
@@ -106,8 +111,8 @@ def write_png(draw: Callable[[Any], Figure], section: Any, path: Path) -> Path:
     StoreError
         If the file cannot be written.
     """
-    write_atomically(Path(path), png(draw, section))
-    return Path(path)
+    write_atomically(path_of("path", path), png(draw, section))
+    return path_of("path", path)
 
 
 def draw_rates(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,9 +13,10 @@ from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.files import path_of
 from fingerpad.core.signals import ResponseMap
 from fingerpad.core.units import cosine_and_sine
-from fingerpad.report.style import BLACK, BLUE, new_figure, say_nothing_to_draw, write_png
+from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure, say_nothing_to_draw, write_png
 
 if TYPE_CHECKING:
     from fingerpad.geometry.indenters import Indenter
@@ -76,7 +78,7 @@ def save_figure(
     >>> fp.save_figure(Path(mkdtemp()) / "touch.png", skin, response, sphere).name
     'touch.png'
     """
-    return write_png(lambda parts: draw(*parts), (skin, response, indenter), Path(path))
+    return write_png(lambda parts: draw(*parts), (skin, response, indenter), path_of("path", path))
 
 
 def draw(skin: SkinResponse, response: ResponseMap, indenter: Indenter | None = None) -> Figure:
@@ -87,6 +89,9 @@ def draw(skin: SkinResponse, response: ResponseMap, indenter: Indenter | None = 
     motion = figure.add_subplot(grid[0, 1])
     draw_motion(motion, skin)
     draw_spikes(figure.add_subplot(grid[1, 1], sharex=motion), skin, response)
+    if skin.caveats:
+        text = " ".join(caveat.text for caveat in skin.caveats)
+        figure.supxlabel(fill(f"Not verified: {text}", 130), fontsize=8.0, color=ORANGE)
     return figure
 
 
@@ -157,10 +162,11 @@ def _draw_indenter(axes: Axes, skin: SkinResponse, section: Section, indenter: I
     gap = surface @ towards - face(surface @ along)
     line = np.linspace(-BODY_MM, BODY_MM, 4001)
     height = face(line)
-    line, height = line[np.isfinite(height)], height[np.isfinite(height)]
-    top = foot + np.outer(line, along) + np.outer(height + gap.min(), towards)
-    outline = np.concatenate([top, top[[-1, 0]] - BODY_MM * towards])
-    axes.fill(*outline.T, facecolor="#c9d1d8", edgecolor=BLACK, linewidth=1.0)
+    solid = np.flatnonzero(np.isfinite(height))
+    for part in np.split(solid, np.flatnonzero(np.diff(solid) > 1) + 1):  # holes lie between
+        top = foot + np.outer(line[part], along) + np.outer(height[part] + gap.min(), towards)
+        outline = np.concatenate([top, top[[-1, 0]] - BODY_MM * towards])
+        axes.fill(*outline.T, facecolor="#c9d1d8", edgecolor=BLACK, linewidth=1.0)
 
 
 def draw_motion(axes: Axes, skin: SkinResponse) -> None:

@@ -1,0 +1,194 @@
+"""One drawing per question to a result: what `plot` of results draws, and their pictures in notebooks."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Callable, Mapping
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fingerpad.core.checks import one_of
+from fingerpad.core.displayed import Displayed
+from fingerpad.core.signals import ResponseMap, SedTraces, SpikeTrains
+from fingerpad.report.population import QUANTITIES
+from fingerpad.report.style import BLACK, BLUE, GREY, new_figure, png, say_nothing_to_draw
+from fingerpad.report.touch import BONE, draw_section
+
+if TYPE_CHECKING:
+    from fingerpad.geometry.fingertip import Fingertip
+    from fingerpad.psychophysics.psychometric import PsychometricFit
+    from fingerpad.skin.sampling import SkinResponse
+
+PALE_SKIN = "#f7ece1"
+
+CURVE_POINTS = 200
+
+
+def draw_force(axes: Axes, skin: SkinResponse) -> None:
+    """Draw the force on the object over time."""
+    axes.plot(skin.times_ms, skin.force_mn, color=BLACK)
+    axes.set(xlabel="time [ms]", ylabel="force [mN]")
+
+
+def draw_depth(axes: Axes, skin: SkinResponse) -> None:
+    """Draw the depth from first touch over time."""
+    axes.plot(skin.times_ms, skin.depth_mm, color=BLACK)
+    axes.set(xlabel="time [ms]", ylabel="depth [mm]")
+
+
+def draw_profile(axes: Axes, skin: SkinResponse) -> None:
+    """Draw the deflection of the skin along the midline at the end."""
+    profile = skin.surface_profile()
+    axes.plot(profile.distance_mm, profile.deflection_mm, color=BLACK)
+    axes.set(xlabel="distance from the object's axis [mm]", ylabel="deflection towards the bone [mm]")
+
+
+def draw_pad(axes: Axes, skin: SkinResponse, quantity: str = "stored", reach_mm: float = 6.0) -> None:
+    """Draw a quantity at the end organs below the pad, at the last time.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where.
+    skin : SkinResponse
+        What was pressed.
+    quantity : str
+        As of `SkinResponse.sample`.
+    reach_mm : float
+        How far from the object's axis. [mm]
+    """
+    low, high = -reach_mm, reach_mm
+    x = skin.axis_x_mm + skin.pose.x_mm + np.linspace(low, high, 61)
+    z = np.linspace(low, high, 61)
+    sites = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
+    values = skin.sample(quantity, sites)[-1].reshape(x.size, z.size)
+    drawn = axes.pcolormesh(z, x, values, cmap="viridis", shading="gouraud")
+    unit = "" if quantity == "compressive_strain" else " [kPa]"
+    axes.figure.colorbar(drawn, ax=axes, label=quantity.replace("_", " ") + unit)
+    axes.set(xlabel="across, z [mm]", ylabel="along, x [mm]", aspect="equal")
+    axes.grid(visible=False)
+
+
+def draw_raster(axes: Axes, spikes: SpikeTrains | ResponseMap) -> None:
+    """Draw the spikes of the afferents that fire, in their order."""
+    trains = spikes.spikes if isinstance(spikes, ResponseMap) else spikes
+    firing = [train for train in trains if train.size]
+    if not firing:
+        say_nothing_to_draw(axes, "no afferent fires a spike")
+        return
+    axes.eventplot(firing, lineoffsets=list(range(1, len(firing) + 1)), linelengths=0.8, colors=BLACK)
+    axes.set(xlabel="time [ms]", ylabel=f"{len(firing)} of {len(trains)} afferents fire", yticks=[])
+
+
+def draw_map(axes: Axes, response: ResponseMap, quantity: str = "static_rate_hz") -> None:
+    """Draw a quantity of every afferent at its place, seen onto the pad.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where.
+    response : ResponseMap
+        Of a population.
+    quantity : {"static_rate_hz", "dynamic_rate_hz", "first_spike_latency_ms"}
+        Which.
+    """
+    one_of("quantity", quantity, tuple(QUANTITIES))
+    phase, label, colours, _ = QUANTITIES[quantity]
+    place = response.positions_mm[:, [-1, 0]]
+    drawn = axes.scatter(
+        place[:, 0], place[:, 1], c=getattr(response, quantity), cmap=colours, s=60.0, edgecolors=GREY
+    )
+    axes.figure.colorbar(drawn, ax=axes, label=f"{phase}: {label}")
+    axes.set(xlabel="across, z [mm]", ylabel="along, x [mm]", aspect="equal")
+
+
+def draw_traces(axes: Axes, traces: SedTraces) -> None:
+    """Draw what the static term follows over time, a line per site."""
+    axes.plot(traces.times_ms, traces.sed_kpa, color=BLACK, linewidth=0.8)
+    axes.set(xlabel="time [ms]", ylabel=f"{traces.static_quantity.replace('_', ' ')} [kPa]")
+
+
+def draw_curve(axes: Axes, fit: PsychometricFit) -> None:
+    """Draw the observed proportions, the curve through them, and its threshold."""
+    levels = fit.counts.levels
+    room = 0.1 * float(np.ptp(levels))
+    at = np.linspace(levels.min() - room, levels.max() + room, CURVE_POINTS)
+    threshold = fit.threshold()
+    axes.plot(at, fit.predict(at), color=BLUE)
+    axes.plot(levels, fit.counts.proportion, "o", color=BLACK)
+    axes.axvline(threshold, color=GREY, linestyle=":")
+    axes.set(xlabel=f"level; threshold {threshold:.3g}", ylabel="proportion correct", ylim=(0.0, 1.05))
+
+
+def draw_finger(axes: Axes, finger: Fingertip) -> None:
+    """Draw the outline of a finger in its middle plane, with skin, bone and nail."""
+    # A square root of the way to the tip, where the outline is round.
+    x = finger.length_mm * (1.0 - np.linspace(1.0, 0.0, CURVE_POINTS) ** 2)
+    volar, dorsal, _ = finger.section(x)
+    outline = np.concatenate([x, x[::-1]]), np.concatenate([-volar, dorsal[::-1]])
+    axes.fill(*outline, facecolor=PALE_SKIN, edgecolor=BLACK, linewidth=1.0)
+    start, tip = finger.spine_end_x_mm, finger.bone_tip_x_mm
+    way = np.linspace(0.0, np.pi, CURVE_POINTS)
+    bone_x = np.concatenate([[0.0], start + (tip - start) * np.sin(way), [0.0]])
+    bone_y = finger.spine_y_mm + finger.bone_height_mm * np.concatenate([[1.0], np.cos(way), [-1.0]])
+    axes.fill(bone_x, bone_y, facecolor="white", edgecolor=BONE, linewidth=1.2)
+    nail = np.linspace(finger.nail_x_mm[0], finger.nail_x_mm[1], CURVE_POINTS)
+    axes.plot(nail, finger.section(nail)[1], color=BONE, linewidth=4.0)
+    for depth in finger.layer_depths_mm:
+        below = np.where(volar > 2.0 * depth, depth - volar, np.nan)  # layers turn upright at the tip
+        axes.plot(x, below, color=GREY, linewidth=0.5)
+    axes.plot([finger.contact_mm[0]], [-float(finger.section(finger.contact_mm[0])[0])], "v", color=BLUE)
+    axes.set(xlabel="along, x [mm]", ylabel="towards the back, y [mm]", aspect="equal")
+    axes.grid(visible=False)
+
+
+DRAWINGS: Mapping[str, Mapping[str, Callable[..., None]]] = {
+    "SkinResponse": {
+        "force": draw_force,
+        "section": draw_section,
+        "profile": draw_profile,
+        "pad": draw_pad,
+        "depth": draw_depth,
+    },
+    "ResponseMap": {"raster": draw_raster, "map": draw_map},
+    "SpikeTrains": {"raster": draw_raster},
+    "SedTraces": {"traces": draw_traces},
+    "PsychometricFit": {"curve": draw_curve},
+    "Fingertip": {"outline": draw_finger},
+}
+"""Drawings by the name of a result's class, the default first."""
+
+IN_NOTEBOOKS = {"SkinResponse": "section"}
+"""Drawings in notebooks that are not the default."""
+
+
+def plot(result: Displayed, axes: Axes | None = None, what: str | None = None, **options: Any) -> Axes:
+    """Draw a result; see `Displayed.plot`."""
+    drawings = DRAWINGS[type(result).__name__]
+    name = one_of("what", what or next(iter(drawings)), tuple(drawings))
+    if axes is None:
+        # Only a figure of pyplot is shown by a notebook or a window.
+        from matplotlib import pyplot
+
+        axes = pyplot.subplots(layout="constrained")[1]
+    drawings[name](axes, result, **options)
+    return axes
+
+
+def html(result: Displayed) -> str:
+    """Return a picture and the line of `repr` in HTML; see `Displayed`."""
+
+    def draw() -> Figure:
+        figure = new_figure(4.5, 2.6)
+        plot(result, figure.add_subplot(), IN_NOTEBOOKS.get(type(result).__name__))
+        return figure
+
+    picture = b64encode(png(draw)).decode()
+    return (
+        f'<figure style="margin:0"><img width="450" alt="" src="data:image/png;base64,{picture}">'
+        f"<figcaption>{escape(repr(result))}</figcaption></figure>"
+    )
