@@ -1,0 +1,1 @@
+"""A laboratory in the browser: objects pressed by hand, answered by reduced touches."""

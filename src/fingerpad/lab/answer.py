@@ -1,0 +1,285 @@
+"""What a touch of the laboratory gives: fields over the skin, contact, force and spikes over time."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from functools import cache
+from typing import cast
+
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import STORED_ENERGY, ResponseMap, SedTraces
+from fingerpad.data import psychophysics
+from fingerpad.experiments.descriptions.reduction import DescribedReduction
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.lab.state import LabState
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.afferent_types import RA
+from fingerpad.neuron.population import Population
+from fingerpad.psychophysics.ideal_observer import present
+from fingerpad.psychophysics.response_models import multiplied_responses
+from fingerpad.reduction.model import ON_THE_PAD, ReducedModel
+from fingerpad.reduction.streaming import ReducedTouch
+from fingerpad.skin.sampling import SkinResponse
+
+ABOVE_MS = 10.0
+"""Time to move aside above the skin, and time to approach it. [ms]"""
+
+CLEARANCE_MM = 0.5
+"""How far above the skin the object moves aside. [mm]"""
+
+RAMP_PARTS, HOLD_PARTS = 20, 25
+"""Samples of the ramp, of the lift and of the hold."""
+
+MAP_MM, MAP_STEP_MM = (8.0, 7.0), 0.5
+"""Half-extent of the map about the middle of the pad, along and across, and distance of its points. [mm]"""
+
+ROWS, COLUMNS = 15, 13
+"""Afferents along and across, 1 mm apart."""
+
+TRIALS = 1000
+"""Presentations of each object to an observer."""
+
+SPREAD_SPIKES = 1.0
+"""Standard deviation of the number of spikes that does not depend on it; assumed."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A touch over time.
+
+    Parameters
+    ----------
+    times_ms : array (n_times,)
+        Times. [ms]
+    depth_mm, force_mn, force_error_mn, contact_area_mm2 : array (n_times,)
+        Depth below the first touch of the range, force, what it lies within for 95 % of touches (0 in full,
+        infinite if not measured), and undeformed skin in contact. [mm, mN, mN, mm²]
+    middle_mm : array (n_times, 2)
+        Middle of the contact, x and z. [mm]
+    x_mm, z_mm : array (nx,), array (nz,)
+        Points of the map. [mm]
+    sed_kpa : array (n_times, nx, nz)
+        Strain energy density at the depth of the end organs; NaN beside the pad. [kPa]
+    response : ResponseMap
+        Spikes and rates of the afferents.
+    """
+
+    times_ms: FloatArray
+    depth_mm: FloatArray
+    force_mn: FloatArray
+    force_error_mn: FloatArray
+    contact_area_mm2: FloatArray
+    middle_mm: FloatArray
+    x_mm: FloatArray
+    z_mm: FloatArray
+    sed_kpa: FloatArray
+    response: ResponseMap
+
+
+def shape_of(described: DescribedReduction, size: float) -> tuple[float, ...]:
+    """Value of the parameter of the object that varies, if one does; 0 is that of the description."""
+    name = described.training.range.parameter
+    if name is None:
+        return ()
+    return (size or float(getattr(described.training.touch.indenter, name)),)
+
+
+def motion_of(
+    described: DescribedReduction, model: ReducedModel, state: LabState
+) -> tuple[Trajectory, tuple[float, ...]]:
+    """Press, hold and perhaps slide, lift; and the shape of the object.
+
+    Raises
+    ------
+    InputError
+        If a pose lies out of the range.
+    """
+    if state.depth_mm > model.depth_mm:
+        raise InputError(
+            f"depth_mm must be at most {model.depth_mm:g}, the depth of this reduced touch: got "
+            f"{state.depth_mm:g}."
+        )
+    shape = shape_of(described, state.size)
+    ways = (state.x_mm, state.x_mm + state.slide_mm)
+    meets = [
+        float(model.pose_weights((x, state.z_mm, state.tilt_deg, *shape)) @ model.first_touch_mm)
+        for x in ways
+    ]
+    above = min(0.0, *meets, float(model.first_touch_mm.min())) - CLEARANCE_MM
+    times = np.cumsum([0.0, ABOVE_MS, ABOVE_MS, state.ramp_ms, state.hold_ms, state.ramp_ms])
+    depth = [above, above, meets[0], meets[0] + state.depth_mm, meets[1] + state.depth_mm, meets[1]]
+    return Trajectory(
+        tuple(times.tolist()),
+        depth_mm=tuple(depth),
+        x_mm=(0.0, *[ways[0]] * 3, ways[1], ways[1]),
+        z_mm=(0.0, *[state.z_mm] * 5),
+        tilt_deg=(0.0, *[state.tilt_deg] * 5),
+    ), shape
+
+
+def sample_times_ms(motion: Trajectory) -> FloatArray:
+    """Return the times of a motion at which the reduced touch is evaluated."""
+    parts = (1, 1, RAMP_PARTS, HOLD_PARTS, RAMP_PARTS)
+    ends = zip(motion.times_ms[:-1], motion.times_ms[1:], parts, strict=True)
+    return np.concatenate([[0.0], *(a + (b - a) * np.arange(1, n + 1) / n for a, b, n in ends)])
+
+
+def population_of(described: DescribedReduction, state: LabState) -> Population:
+    """Afferents of one type in the pad, 1 mm apart."""
+    afferent = RA() if state.afferent == "RA" else Afferent.for_tissues(described.description.tissues)
+    finger = finger_of(described)
+    grid = Population.grid(
+        psychophysics.RECEPTOR_DENSITY.value, ROWS, COLUMNS, afferent=afferent, finger=finger
+    )
+    x, z = grid.positions_mm.T
+    positions = grid.positions_mm[_on_pad(finger, x, z)]
+    return Population(positions, grid.pitch_mm, afferent)
+
+
+def _on_pad(finger: Fingertip, x_mm: FloatArray, z_mm: FloatArray) -> FloatArray:
+    """Whether places lie where fields are known."""
+    inside = np.asarray((x_mm > 1.0) & (x_mm < finger.length_mm - 1.0))
+    widest = ON_THE_PAD * finger.section(np.where(inside, x_mm, 0.5 * finger.length_mm))[2]
+    return np.asarray(inside & (np.abs(z_mm) < widest))
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """Limit the threads of NumPy: matrices are small, and on busy cores threads wait for each other."""
+    return _controller().limit(limits=1)
+
+
+@cache
+def _controller() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
+def finger_of(described: DescribedReduction) -> Fingertip:
+    """Return the finger that is pressed; only a `Fingertip` can be reduced."""
+    return cast(Fingertip, described.training.touch.finger)
+
+
+def map_axes(described: DescribedReduction) -> tuple[FloatArray, FloatArray]:
+    """Points of the map along and across. [mm]"""
+    middle = described.training.touch.finger.contact_mm
+    along, across = (
+        centre + np.arange(-reach, reach + 0.5 * MAP_STEP_MM, MAP_STEP_MM)
+        for centre, reach in zip(middle, MAP_MM, strict=True)
+    )
+    return along, across
+
+
+def reduced_answer(described: DescribedReduction, model: ReducedModel, state: LabState) -> Answer:
+    """Answer by the reduced touch.
+
+    Raises
+    ------
+    InputError
+        If a pose lies out of the range.
+    """
+    motion, shape = motion_of(described, model, state)
+    population = population_of(described, state)
+    stream = ReducedTouch(model, _sites(described, population), *shape)
+    samples = []
+    with one_thread():
+        for time in sample_times_ms(motion).tolist():
+            pose, depth = motion.pose_at(time), float(motion.prescribed_at(time))
+            samples.append(stream.step(time, depth, None, pose.x_mm, pose.z_mm, pose.tilt_deg))
+    fields = {name: np.stack([sample.fields[name] for sample in samples]) for name in samples[0].fields}
+    return _answer(
+        described, model, state, population, fields,
+        *(np.array([getattr(sample, name) for sample in samples]) for name in
+          ("time_ms", "depth_mm", "force_mn", "force_error_mn", "contact_area_mm2")),
+    )  # fmt: skip
+
+
+def in_full(
+    described: DescribedReduction, model: ReducedModel, state: LabState, skin: SkinResponse
+) -> Answer:
+    """Answer by a full solution of the same motion."""
+    population = population_of(described, state)
+    sites = _sites(described, population)
+    fields = {name: skin.sample(name, sites) for name in model.quantities}
+    none = np.zeros(skin.times_ms.size)
+    totals = skin.times_ms, skin.depth_mm, skin.force_mn, none, skin.contact_area_mm2
+    return _answer(described, model, state, population, fields, *totals)
+
+
+def _sites(described: DescribedReduction, population: Population) -> FloatArray:
+    """Points of the map that lie on the pad, then the afferents."""
+    x, z = (grid.ravel() for grid in np.meshgrid(*map_axes(described), indexing="ij"))
+    inside = _on_pad(finger_of(described), x, z)
+    return np.vstack([np.column_stack([x, z])[inside], population.positions_mm])
+
+
+def _answer(
+    described: DescribedReduction,
+    model: ReducedModel,
+    state: LabState,
+    population: Population,
+    fields: dict[str, FloatArray],
+    times: FloatArray,
+    depth: FloatArray,
+    force: FloatArray,
+    error: FloatArray,
+    area: FloatArray,
+) -> Answer:
+    (motion, shape), (x, z) = motion_of(described, model, state), map_axes(described)
+    on_skin = _on_pad(finger_of(described), *np.meshgrid(x, z, indexing="ij"))
+    sed = np.full((times.size, x.size, z.size), np.nan)
+    n_map = np.count_nonzero(on_skin)
+    sed[:, on_skin] = fields[STORED_ENERGY][:, :n_map]
+    dynamic, static = (fields[name][:, n_map:] for name in population.quantities)
+    same = population.quantities[0] == population.quantities[1]
+    traces = SedTraces(
+        times, static, np.intersect1d(motion.times_ms[1:-1], times),
+        None if same else dynamic, *population.quantities,
+    )  # fmt: skip
+    start, held, ends = motion.times_ms[2:5]
+    ways = [motion.pose_at(time) for time in times.tolist()]
+    weights = [model.pose_weights((pose.x_mm, pose.z_mm, pose.tilt_deg, *shape)) for pose in ways]
+    return Answer(
+        times, depth, force, error, area, np.array(weights) @ model.middle_mm, x, z, sed,
+        population.respond_to(traces, (start, held), (held, ends)),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What observers say about two touches, in trials of two alternatives.
+
+    Parameters
+    ----------
+    ideal, summed : float
+        Proportion correct of the observer that knows every afferent, and of the one that knows the sum of all
+        spikes. [0-1]
+    """
+
+    ideal: float
+    summed: float
+
+
+def compared(one: Answer, other: Answer, seed: int = 1) -> Comparison:
+    """Compare two touches by the spikes that each afferent fires.
+
+    Numbers of spikes have the multiplicative noise of the paper and a further spread of one spike.
+    """
+    counts = [np.diff(each.response.spikes.offsets).astype(float) for each in (one, other)]
+    if (counts[0] == counts[1]).all():
+        return Comparison(0.5, 0.5)
+    # Whoever is silent for both tells nothing.
+    firing = counts[0] + counts[1] > 0.0
+    first, second = (
+        multiplied_responses(each[firing], psychophysics.NOISE_SIGMA.value, SPREAD_SPIKES) for each in counts
+    )
+    with one_thread():
+        shown = present(first, second, seed, TRIALS)
+        return Comparison(
+            shown.ideal().proportion_correct,
+            shown.of(lambda responses: responses.sum(axis=1)).proportion_correct,
+        )

@@ -1,0 +1,297 @@
+"""The objects of the laboratory, their reduced touches, and the answers to its states."""
+
+from __future__ import annotations
+
+import hashlib
+import multiprocessing
+import queue
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fingerpad.core.engine import Engine
+from fingerpad.core.errors import InputError
+from fingerpad.core.files import path_of, read_text
+from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.core.progress import Progress
+from fingerpad.experiments.descriptions.reduction import (
+    DescribedReduction,
+    described_reduction,
+    run_reduction,
+)
+from fingerpad.experiments.runner import Runner
+from fingerpad.geometry.fingertip import FINGERS
+from fingerpad.lab.answer import Answer, in_full, motion_of, reduced_answer
+from fingerpad.lab.state import LabState
+from fingerpad.mechanics.tissues import TISSUES
+from fingerpad.reduction.files import read_reduced, write_reduced
+from fingerpad.reduction.model import ReducedModel
+from fingerpad.skin.behaviour import code_hash
+
+KEPT_ANSWERS = 16
+"""Answers that are kept, so that a comparison and a second user do not compute again."""
+
+
+@dataclass(frozen=True)
+class Making:
+    """A computation that is under way.
+
+    Parameters
+    ----------
+    what : str
+        In words.
+    done, total : int
+        Finished presses, and all of them; 0 before that is known.
+    """
+
+    what: str
+    done: int = 0
+    total: int = 0
+
+
+class Laboratory:
+    """Objects to press, and what was made of them so far.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where presses and reduced touches are kept from one run to the next.
+    ranges : sequence of Path, optional
+        Files of `fingerpad reduce`, each an object by the name of its file; default: those of the package.
+    jobs : int or Engine, optional
+        Processes that press.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be used, or two have one name.
+    """
+
+    def __init__(self, folder: str | Path, ranges: Sequence[Path] = (), jobs: int | Engine = 1):
+        self.folder, self._engine = path_of("folder", folder), jobs
+        self._contents = {path.stem: read_yaml(read_text(path), str(path)) for path in ranges or shipped()}
+        self._files = {path.stem: path for path in ranges or shipped()}
+        if len(self._files) < len(ranges):
+            raise InputError("The files of ranges must have different names, by which objects are chosen.")
+        self._described: dict[tuple[str, str, str], DescribedReduction] = {}
+        self._models: dict[Path, ReducedModel] = {}
+        self._answers: OrderedDict[tuple[LabState, bool], Answer] = OrderedDict()
+        self._making: dict[object, tuple[Future[Any], _Told]] = {}
+        self._lock = threading.RLock()
+        # What somebody waits for, one after the other, and errors, which nobody waits for.
+        self._worker, self._later = _Worker(), _Worker()
+        for name in self._contents:
+            self.described(LabState(name))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the objects."""
+        return tuple(self._contents)
+
+    def source(self, state: LabState) -> Path:
+        """File of the range of a state."""
+        return self._files[state.object]
+
+    def close(self) -> None:
+        """End all computations; what they have stored stays."""
+        for process in multiprocessing.active_children():
+            process.kill()
+
+    def described(self, state: LabState) -> DescribedReduction:
+        """Describe the range of a state.
+
+        Raises
+        ------
+        InputError
+            If the object, the finger or the tissues are unknown, or do not fit each other.
+        """
+        for name, known in (
+            ("object", self._contents),
+            ("finger", ("", *FINGERS)),
+            ("tissues", ("", *TISSUES)),
+        ):
+            if getattr(state, name) not in known:
+                words = ", ".join(each for each in known if each)
+                raise InputError(f"{name} must be one of {words}: got {getattr(state, name)[:40]!r}.")
+        key = state.object, state.finger, state.tissues
+        with self._lock:
+            if key not in self._described:
+                content = self._contents[state.object]
+                chosen = {
+                    name: getattr(state, name) for name in ("finger", "tissues") if getattr(state, name)
+                }
+                asked = {**content, **chosen} if isinstance(content, dict) else content
+                self._described[key] = described_reduction(asked, str(self._files[state.object]))
+            return self._described[key]
+
+    def path(self, state: LabState) -> Path:
+        """File of the reduced touch of a state, by what it depends on."""
+        text = self.described(state).description.model_dump_json() + code_hash()
+        return self.folder / f"{state.object}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
+
+    def model(self, state: LabState) -> ReducedModel | None:
+        """Return the reduced touch of a state, if it was made already.
+
+        Raises
+        ------
+        InputError
+            If its file is damaged.
+        """
+        path = self.path(state)
+        with self._lock:
+            if path not in self._models and path.exists():
+                self._models[path] = read_reduced(path, self.described(state).training.touch)
+            return self._models.get(path)
+
+    def make(self, state: LabState, with_error: bool = False, told: Progress | None = None) -> ReducedModel:
+        """Make the reduced touch of a state, without its error or with it.
+
+        Raises
+        ------
+        FingerpadError
+            If a press failed.
+        """
+        described, path = self.described(state), self.path(state)
+        if not with_error:
+            asked = described.description.model_copy(update={"calibration": 0})
+            described = replace(described, description=asked)
+        model = run_reduction(described, Runner(self.folder, self._engine, told))
+        write_reduced(model, path)
+        with self._lock:
+            self._models[path] = model
+            self._answers.clear()
+        return model
+
+    def measured(self, state: LabState) -> bool:
+        """Whether the error of the reduced touch of a state is known, or not wanted by its file."""
+        model = self.model(state)
+        wanted = self.described(state).description.calibration > 0
+        return not wanted or (model is not None and bool(np.isfinite(model.error).all()))
+
+    def answer(self, state: LabState, exact: bool = False, told: Progress | None = None) -> Answer:
+        """Answer a state, and make its reduced touch before that if there is none.
+
+        Parameters
+        ----------
+        state : LabState
+            What is pressed, and how.
+        exact : bool, optional
+            Whether the full solver presses.
+
+        Returns
+        -------
+        Answer
+
+        Raises
+        ------
+        FingerpadError
+            If the state is out of the range, or a press failed.
+        """
+        described, key = self.described(state), (_alone(state), exact)
+        if (kept := self._kept(key)) is not None:
+            return kept
+        model = self.model(state) or self.make(state, told=told)
+        motion, shape = motion_of(described, model, state)
+        if exact:
+            touch = described.training.touch_with(shape, motion)
+            runner = Runner(self.folder, self._engine, told)
+            skin = runner.responses({"exact": {0: touch}})["exact"][0]
+            answer = in_full(described, model, state, skin)
+        else:
+            answer = reduced_answer(described, model, state)
+        with self._lock:
+            # Meanwhile the reduced touch may have got its error.
+            if self._models.get(self.path(state)) is model:
+                self._answers[key] = answer
+            if len(self._answers) > KEPT_ANSWERS:
+                self._answers.popitem(last=False)
+        return answer
+
+    def poll(self, state: LabState, exact: bool = False) -> Answer | Making:
+        """Answer at once: what needs a press goes on in the background, and the answer is how far it is."""
+        ready = self.model(state) is not None
+        # Before an answer that is kept: it may be kept before the first poll that finds a model.
+        if ready and not self.measured(state) and (later := ("error", self.path(state))) not in self._making:
+            told = _Told("errors")
+            self._making[later] = self._later.submit(lambda: self.make(state, True)), told
+        if (kept := self._kept((_alone(state), exact))) is not None:
+            return kept
+        if ready and not exact:
+            return self.answer(state)
+        # A reduced touch serves many states: they wait for one computation.
+        key: object = (_alone(state), exact) if ready else self.path(state)
+        with self._lock:
+            if key not in self._making:
+                told = _Told(f"{'the full solution' if ready else 'a reduced touch'} of {state.object}")
+                self._making[key] = self._worker.submit(lambda: self.answer(state, exact, told)), told
+            future, told = self._making[key]
+            if not future.done():
+                return told.making
+            del self._making[key]
+        future.result()
+        return self.poll(state, exact)
+
+    def _kept(self, key: tuple[LabState, bool]) -> Answer | None:
+        with self._lock:
+            if key in self._answers:
+                self._answers.move_to_end(key)
+            return self._answers.get(key)
+
+
+def _alone(state: LabState) -> LabState:
+    """Without what does not change the answer."""
+    return replace(state, other="", other_size=0.0)
+
+
+def shipped() -> list[Path]:
+    """Files of the ranges of the package."""
+    folder = Path(str(resources.files("fingerpad.lab") / "ranges"))
+    return sorted(folder.glob("*.yaml"))
+
+
+class _Worker:
+    """Thread that does one thing after the other, and does not keep the process from its end."""
+
+    def __init__(self) -> None:
+        self._queue: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]]] = queue.SimpleQueue()
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def submit(self, work: Callable[[], Any]) -> Future[Any]:
+        """Do something later."""
+        future: Future[Any] = Future()
+        self._queue.put((future, work))
+        return future
+
+    def _run(self) -> None:
+        while True:
+            future, work = self._queue.get()
+            try:
+                future.set_result(work())
+            except Exception as error:  # raised where the result is asked for
+                future.set_exception(error)
+
+
+class _Told:
+    """Progress of a computation, for those who ask."""
+
+    def __init__(self, what: str):
+        self.making = Making(what)
+
+    @contextmanager
+    def stage(self, name: str, total: int) -> Iterator[Callable[[], None]]:
+        """Count the presses of one stage."""
+        if total:
+            self.making = replace(self.making, done=0, total=total)
+
+        def advance() -> None:
+            self.making = replace(self.making, done=self.making.done + 1)
+
+        yield advance

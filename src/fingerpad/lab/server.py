@@ -1,0 +1,154 @@
+"""The page on this computer, served by Panel: one message asks, one answers."""
+
+from __future__ import annotations
+
+import json
+import logging
+import signal
+import socket
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib import resources
+from typing import Any
+
+from fingerpad.core.errors import FingerpadError, InputError
+from fingerpad.geometry.fingertip import FINGERS
+from fingerpad.lab.laboratory import Laboratory, Making
+from fingerpad.lab.state import AFFERENTS, BOUNDS, LabState, state_of
+from fingerpad.lab.view import view_of
+from fingerpad.mechanics.tissues import TISSUES
+
+LOGGER = logging.getLogger(__name__)
+HOST = "127.0.0.1"
+
+CONTROLS = (
+    ("object", "object", "", 0),
+    ("size", "size", "", 1),
+    ("depth_mm", "depth", "mm", 0.05),
+    ("x_mm", "along the finger", "mm", 0.1),
+    ("z_mm", "across the finger", "mm", 0.1),
+    ("tilt_deg", "tilt", "degrees", 1),
+    ("slide_mm", "slide in the hold", "mm", 0.1),
+    ("ramp_ms", "press and lift", "ms", 10),
+    ("hold_ms", "hold", "ms", 10),
+    ("other", "compared with", "", 0),
+    ("other_size", "other size", "", 1),
+    ("afferent", "afferents", "", 0),
+    ("finger", "finger", "", 0),
+    ("tissues", "tissues", "", 0),
+)
+"""What can be set: name, label, unit and step."""
+
+
+def spec_of(laboratory: Laboratory) -> dict[str, Any]:
+    """Describe the controls to the page."""
+    objects: dict[str, dict[str, Any]] = {}
+    for name in laboratory.names:
+        training = laboratory.described(LabState(name)).training
+        range_ = training.range
+        way = range_.x_mm[1] - range_.x_mm[0]
+        objects[name] = {
+            "depth_mm": [BOUNDS["depth_mm"][0], range_.depth_mm],
+            "x_mm": range_.x_mm,
+            "z_mm": range_.z_mm,
+            "tilt_deg": range_.tilt_deg,
+            "slide_mm": [-way, way],
+            "parameter": range_.parameter,
+            "values": range_.values or [0, 0],
+            "size": getattr(training.touch.indenter, range_.parameter) if range_.parameter else 0,
+        }
+    first = laboratory.names[0]
+    depth = min(LabState.depth_mm, objects[first]["depth_mm"][1])
+    return {
+        "controls": CONTROLS,
+        "objects": objects,
+        "bounds": BOUNDS,
+        "choices": {
+            "object": laboratory.names,
+            "other": ["", *laboratory.names],
+            "afferent": AFFERENTS,
+            "finger": ["", *FINGERS],
+            "tissues": ["", *TISSUES],
+        },
+        "empty": {"other": "nothing", "finger": "as in the file", "tissues": "as in the file"},
+        "start": asdict(LabState(first, size=objects[first]["size"], depth_mm=depth)),
+        "exact": True,
+    }
+
+
+def reply_to(laboratory: Laboratory, message: Any) -> dict[str, Any]:
+    """Answer one message of the page; whatever it is, an error is one sentence."""
+    asked = message if isinstance(message, dict) else {}
+    reply: dict[str, Any] = {"id": asked.get("id")}
+    try:
+        if "state" not in asked:
+            raise InputError("A message to the laboratory must have the key state.")
+        made = view_of(laboratory, state_of(asked["state"]), bool(asked.get("exact")))
+        reply["making" if isinstance(made, Making) else "view"] = asdict(made)
+    except FingerpadError as error:
+        reply["error"] = str(error)
+    except Exception:
+        LOGGER.exception("The laboratory could not answer %.200r", message)
+        reply["error"] = "The laboratory could not answer this; the terminal says why."
+    return reply
+
+
+def serve(laboratory: Laboratory, port: int = 0, ready: Callable[[str], None] = print) -> None:
+    """Serve the page on the loopback interface until the process is interrupted.
+
+    Parameters
+    ----------
+    laboratory : Laboratory
+        What is shown.
+    port : int, optional
+        0 for any that is free.
+    ready : callable, optional
+        Called with the address of the page.
+
+    Raises
+    ------
+    InputError
+        If Panel is not installed, or the port is none or taken.
+    """
+    try:
+        from panel.custom import JSComponent
+        from panel.io.server import get_server
+        from param import String
+    except ImportError as error:
+        raise InputError("The laboratory needs Panel: pip install 'fingerpad[lab]'.") from error
+
+    class Page(JSComponent):
+        spec = String(json.dumps(spec_of(laboratory)))
+        _esm = (resources.files("fingerpad.lab") / "page.js").read_text("utf-8")
+
+        def _handle_msg(self, message: Any) -> None:
+            self._send_msg(json.dumps(reply_to(laboratory, message)))
+
+    interrupted, port = signal.getsignal(signal.SIGINT), _free_port(port)
+    server = get_server(
+        lambda: Page(sizing_mode="stretch_width"),
+        port=port,
+        address=HOST,
+        websocket_origin=[f"{HOST}:{port}", f"localhost:{port}"],
+        title="fingerpad laboratory",
+        check_unused_sessions_milliseconds=5000,
+        unused_session_lifetime_milliseconds=15000,
+    )
+    # Panel would end without a word after Ctrl-C.
+    signal.signal(signal.SIGINT, interrupted)
+    ready(f"http://{HOST}:{port}/")
+    try:
+        server.io_loop.start()
+    finally:
+        laboratory.close()
+
+
+def _free_port(port: int) -> int:
+    """Return a port if it is free, any free one for 0."""
+    with socket.socket() as tried:
+        tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            tried.bind((HOST, port))
+        except (OSError, OverflowError) as error:
+            raise InputError(f"--port must be a free port: got {port} ({error}).") from error
+        return int(tried.getsockname()[1])
