@@ -29,11 +29,22 @@ if TYPE_CHECKING:
         StoreError,
     )
     from fingerpad.core.phases import Phase
+    from fingerpad.core.progress import notebook_progress
     from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
+    from fingerpad.experiments.cluster import Cluster
     from fingerpad.experiments.descriptions.touch import TouchDescription, read_touch_description
     from fingerpad.export.dataset import read_touch, touch_dataset, write_touch
+    from fingerpad.export.sweep import run_sweep
+    from fingerpad.export.sweep_dataset import observe_sweep, open_sweep, setting_spikes, setting_touch
+    from fingerpad.export.sweep_tables import (
+        read_sweep_table,
+        setting_response,
+        write_sweep_spikes,
+        write_sweep_table,
+    )
     from fingerpad.export.touch_outputs import run_touch
     from fingerpad.export.view import save_view
+    from fingerpad.export.vtu import read_vtu_series
     from fingerpad.geometry.composed import Union, ridges
     from fingerpad.geometry.dots import Dots, braille
     from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
@@ -63,10 +74,16 @@ if TYPE_CHECKING:
     from fingerpad.mechanics.press import PressSettings
     from fingerpad.mechanics.tissues import named_tissues
     from fingerpad.neuron.afferent import Afferent
+    from fingerpad.neuron.afferent_stream import AfferentStream
     from fingerpad.neuron.afferent_types import PC, RA, SAI, SAII, OwnAfferent
     from fingerpad.neuron.end_organs import EndOrgans
     from fingerpad.neuron.mixed_population import MixedPopulation, MixedResponse
     from fingerpad.neuron.population import Population
+    from fingerpad.reduction.building import reduce_touch
+    from fingerpad.reduction.files import read_reduced, write_reduced
+    from fingerpad.reduction.model import ReducedModel
+    from fingerpad.reduction.streaming import ReducedSample, ReducedTouch
+    from fingerpad.reduction.training import ReducedRange, ReducedTraining
     from fingerpad.report.touch import save_figure
     from fingerpad.skin.indentation import Touch, indent, touch_of
     from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
@@ -77,7 +94,9 @@ __all__ = [
     "SAI",
     "SAII",
     "Afferent",
+    "AfferentStream",
     "Bar",
+    "Cluster",
     "ConvergenceError",
     "CurrentTraces",
     "Cycles",
@@ -115,6 +134,11 @@ __all__ = [
     "PressSettings",
     "Prony",
     "RampAndHold",
+    "ReducedModel",
+    "ReducedRange",
+    "ReducedSample",
+    "ReducedTouch",
+    "ReducedTraining",
     "ResponseMap",
     "SedTraces",
     "SkinResponse",
@@ -134,37 +158,67 @@ __all__ = [
     "height_surface",
     "indent",
     "named_tissues",
+    "notebook_progress",
+    "observe_sweep",
+    "open_sweep",
     "read_finger",
     "read_height_map",
+    "read_reduced",
     "read_surface",
+    "read_sweep_table",
     "read_touch",
     "read_touch_description",
     "read_trajectory",
+    "read_vtu_series",
+    "reduce_touch",
     "reduced",
     "repeated",
     "ridges",
+    "run_sweep",
     "run_touch",
     "sampled",
     "save_figure",
     "save_view",
+    "setting_response",
+    "setting_spikes",
+    "setting_touch",
     "sine",
     "staircase",
     "stroke",
     "touch_dataset",
     "touch_of",
+    "write_reduced",
+    "write_sweep_spikes",
+    "write_sweep_table",
     "write_touch",
 ]
 
 _HOMES = {
     "geometry.composed": ("Union", "ridges"),
     "experiments.descriptions.touch": ("TouchDescription", "read_touch_description"),
+    "experiments.cluster": ("Cluster",),
+    "export.sweep": ("run_sweep",),
+    "export.sweep_dataset": ("observe_sweep", "open_sweep", "setting_spikes", "setting_touch"),
+    "export.sweep_tables": (
+        "read_sweep_table",
+        "setting_response",
+        "write_sweep_spikes",
+        "write_sweep_table",
+    ),
     "export.touch_outputs": ("run_touch",),
+    "export.vtu": ("read_vtu_series",),
     "geometry.dots": ("Dots", "braille"),
     "geometry.surface": ("Surface", "height_surface"),
     "geometry.surface_files": ("read_height_map", "read_surface"),
     "export.dataset": ("read_touch", "touch_dataset", "write_touch"),
     "export.view": ("save_view",),
     "neuron.afferent": ("Afferent",),
+    "neuron.afferent_stream": ("AfferentStream",),
+    "reduction.building": ("reduce_touch",),
+    "reduction.files": ("read_reduced", "write_reduced"),
+    "reduction.model": ("ReducedModel",),
+    "reduction.streaming": ("ReducedSample", "ReducedTouch"),
+    "reduction.training": ("ReducedRange", "ReducedTraining"),
     "neuron.afferent_types": ("PC", "RA", "SAI", "SAII", "OwnAfferent"),
     "neuron.end_organs": ("EndOrgans",),
     "neuron.mixed_population": ("MixedPopulation", "MixedResponse"),
@@ -203,6 +257,7 @@ _HOMES = {
     "geometry.motion": ("Cycles", "ForceRampAndHold", "RampAndHold"),
     "geometry.motions": ("chirp", "repeated", "sine", "staircase", "stroke"),
     "core.phases": ("Phase",),
+    "core.progress": ("notebook_progress",),
     "geometry.sampled_motions": ("reduced", "sampled"),
     "geometry.trajectory": ("Trajectory",),
     "geometry.trajectory_files": ("read_trajectory",),

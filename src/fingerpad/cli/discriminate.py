@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from fingerpad.cli.choices import RESOLUTION_CHOICES
-from fingerpad.cli.options import Jobs
-from fingerpad.cli.running import Bars, interruptible, make_writable, processes
+from fingerpad.cli.options import Jobs, Scheduler
+from fingerpad.cli.running import engine, interruptible, make_writable, progress
 from fingerpad.core.errors import InputError
 
 
@@ -30,6 +30,7 @@ def discriminate_command(
         str | None, typer.Option(help=f"One of {', '.join(RESOLUTION_CHOICES)}. Default: that of the task.")
     ] = None,
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
     listed: Annotated[
         bool, typer.Option("--list", help="List the example tasks of the package, and exit.")
     ] = False,
@@ -38,8 +39,6 @@ def discriminate_command(
     ] = None,
 ) -> None:
     """Predict hit rates, psychometric curves and thresholds of a discrimination task."""
-    from rich.console import Console
-
     from fingerpad.core.checks import one_of
     from fingerpad.experiments import schemas
     from fingerpad.experiments.discrimination.run import DiscriminationRun, discriminate
@@ -63,14 +62,14 @@ def discriminate_command(
     if task is None:
         raise InputError(f"discriminate needs a task, a YAML file or one of {', '.join(known)}: see --help.")
     asked = read_task(task, resolution=resolution)
-    run = DiscriminationRun(asked, out, processes(jobs), task, task_text(task))
+    run = DiscriminationRun(asked, out, engine(jobs, scheduler), task, task_text(task))
     make_writable(out)
     with interruptible():
         results = discriminate(
             run,
-            Bars(Console(stderr=True)),
+            progress(),
             command=shlex.join(["fingerpad", *sys.argv[1:]]),
-            inputs=input_hashes(task, asked),
+            inputs=input_hashes(task, asked, run.prepared.stimuli),
         )
         page = write_task_page(results, out)
         schemas.write(out / "discriminate.json", results)

@@ -9,7 +9,7 @@ import typer
 
 from fingerpad.cli.choices import DEFAULT_TISSUES, FINGER_CHOICES, FORMAT_CHOICES, INDENTER_CHOICES
 from fingerpad.cli.options import Materials, Resolution, number_option
-from fingerpad.cli.running import INTERRUPTED, make_writable
+from fingerpad.cli.running import interruptible, make_writable
 from fingerpad.core.errors import InputError
 
 SPHERE, QUICK, ADULT = "sphere", "quick", "adult"
@@ -86,11 +86,6 @@ def export_command(
             "the touch",
         ).touch
     make_writable(folder, "FOLDER")
-    try:
+    with interruptible("Files that exist are complete; the others were not written."):
         files = export_touch(folder, touch, format_name, elastic_moduli)
-    except KeyboardInterrupt as error:
-        typer.echo(
-            "fingerpad: stopped. Files that exist are complete; the others were not written.", err=True
-        )
-        raise typer.Exit(INTERRUPTED) from error
     typer.echo(f"Open: {files[0]}")

@@ -9,17 +9,24 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fingerpad.cli.choices import DEFAULT_TISSUES, METHOD_CHOICES, QUANTITY_CHOICES
-from fingerpad.cli.options import Jobs, Materials, Resolution, Seed, integer_option, number_option
-from fingerpad.cli.running import Bars, interruptible, make_writable, processes
+from fingerpad.cli.choices import (
+    DEFAULT_TISSUES,
+    FINGER_CHOICES,
+    MATERIAL_CHOICES,
+    METHOD_CHOICES,
+    QUANTITY_CHOICES,
+    RESOLUTION_CHOICES,
+)
+from fingerpad.cli.options import Jobs, Scheduler, Seed, integer_option, number_option
+from fingerpad.cli.running import engine, interruptible, make_writable, progress
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
 
 if TYPE_CHECKING:
     from fingerpad.experiments.stimuli import Stimuli
 
-BAR = "bar"
-"""Value of `--stimulus` for the bar of the paper; any other value is a file."""
+STANDARD, BAR = "standard", "bar"
+"""Default of `--resolution`; value of `--stimulus` for the bar of the paper, any other is a file."""
 
 
 def fit_command(
@@ -88,19 +95,35 @@ def fit_command(
         Path,
         typer.Option(help="Folder for the report, the figures, the results and the stored indentations."),
     ] = Path("fit"),
-    resolution: Resolution = "standard",
-    materials: Materials = DEFAULT_TISSUES,
+    resolution: Annotated[
+        str | None,
+        typer.Option(help=f"One of {', '.join(RESOLUTION_CHOICES)}. Default: that of the stimuli, standard."),
+    ] = None,
+    materials: Annotated[
+        str | None,
+        typer.Option(
+            help=f"One of {', '.join(MATERIAL_CHOICES)}. Default: tissues of the stimuli, {DEFAULT_TISSUES}."
+        ),
+    ] = None,
+    finger: Annotated[
+        str | None,
+        typer.Option(
+            help=f"One of {', '.join(FINGER_CHOICES)}, with measures as in adult:width_mm=18. Default: "
+            "that of the stimuli, adult."
+        ),
+    ] = None,
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
     seed: Seed = 0,
     example: Annotated[
         Path | None, typer.Option(help="Write example recordings into this folder, and exit.")
     ] = None,
 ) -> None:
     """Fit an afferent to your own recordings: firing rates or spike times under known stimuli."""
-    from rich.console import Console
-
+    from fingerpad.core.checks import one_of
     from fingerpad.experiments import schemas
-    from fingerpad.experiments.conditions import Conditions
+    from fingerpad.experiments.descriptions.pressing import finger_of, named_files
+    from fingerpad.experiments.descriptions.reading import at
     from fingerpad.experiments.fit.session import EXAMPLE, FitRequest, example_recordings, run_fit
     from fingerpad.experiments.manifest import sha256
     from fingerpad.experiments.recording_files import read_recordings
@@ -117,15 +140,23 @@ def fit_command(
             "fit needs recordings and --stimulus, or --example FOLDER: see fingerpad fit --help."
         )
     sizes = {"width": width, "fillet": fillet, "depth": depth}
-    stimuli = _stimuli(stimulus, stimulus_column, sizes)
+    one_of("resolution", resolution or STANDARD, RESOLUTION_CHOICES)
+    one_of("materials", materials or DEFAULT_TISSUES, MATERIAL_CHOICES)
+    if finger is not None:
+        with at("--finger"):
+            finger_of(finger)
+        finger = next((str(path.absolute()) for path in named_files(finger)), finger)
+    pressed_into = {"resolution": resolution, "tissues": materials, "finger": finger}
+    stimuli = _stimuli(stimulus, stimulus_column, sizes, pressed_into)
     request = FitRequest(
         read_recordings(recordings, stimuli, unit),
-        Conditions(resolution=resolution, seed=seed, materials=materials),
+        stimuli,
         out,
         method,
         folds,
         (dynamic_window, static_window),
-        processes(jobs),
+        engine(jobs, scheduler),
+        seed,
         dynamic_quantity,
         static_quantity,
         with_posterior=posterior,
@@ -134,11 +165,12 @@ def fit_command(
         with_offset=offset,
     )
     make_writable(out)
-    inputs = [recordings, *([] if stimulus == BAR else [Path(stimulus)])]
+    named = [file for each in request.recorded.stimuli.values() for file in each.files]
+    inputs = [recordings, *([] if stimulus == BAR else [Path(stimulus)]), *stimuli.finger_files, *named]
     with interruptible():
         results = run_fit(
             request,
-            Bars(Console(stderr=True)),
+            progress(),
             command=shlex.join(["fingerpad", *sys.argv[1:]]),
             inputs={str(path): sha256(path) for path in inputs},
         )
@@ -150,10 +182,15 @@ def fit_command(
     typer.echo(f"Results: {out / 'fit.json'}")
 
 
-def _stimuli(stimulus: str, column: str | None, given: dict[str, float | None]) -> Stimuli:
+def _stimuli(
+    stimulus: str, column: str | None, given: dict[str, float | None], pressed_into: dict[str, str | None]
+) -> Stimuli:
     """Make the stimuli that `--stimulus` names, with the given sizes where it is the bar."""
     from dataclasses import replace
 
+    from fingerpad.experiments.descriptions.pressing import named_files
+    from fingerpad.experiments.descriptions.reading import part_from
+    from fingerpad.experiments.descriptions.stimulus import FingerDescription
     from fingerpad.experiments.stimuli import ShiftedBar, read_stimuli
     from fingerpad.geometry.indenters import Bar
     from fingerpad.geometry.motion import RampAndHold
@@ -165,8 +202,17 @@ def _stimuli(stimulus: str, column: str | None, given: dict[str, float | None]) 
                 f"--{next(iter(sizes))} is that of the bar, and {stimulus} lists stimuli with their own: "
                 "leave it out."
             )
-        listed = read_stimuli(Path(stimulus))
+        listed = read_stimuli(Path(stimulus), **pressed_into)
         return listed if column is None else replace(listed, column=column)
     motion = RampAndHold(depth_mm=sizes.pop("depth")) if "depth" in sizes else RampAndHold()
-    bar = ShiftedBar(Bar(**{f"{key}_mm": size for key, size in sizes.items()}), motion)
+    described = part_from(
+        FingerDescription,
+        {"resolution": STANDARD} | {key: value for key, value in pressed_into.items() if value},
+    )
+    bar = ShiftedBar(
+        Bar(**{f"{key}_mm": size for key, size in sizes.items()}),
+        motion,
+        conditions=described.conditions(),
+        finger_files=tuple(named_files(described.finger)),
+    )
     return bar if column is None else replace(bar, column=column)

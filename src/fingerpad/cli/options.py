@@ -9,10 +9,11 @@ import typer
 import typer.core
 
 from fingerpad.cli.choices import MATERIAL_CHOICES, RESOLUTION_CHOICES
+from fingerpad.cli.running import interruptible
 
 
 class Command(typer.core.TyperCommand):
-    """A command that does not take the name of one of its options for the value of another."""
+    """A command that does not take an option's name for the value of another, and ends well by a signal."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the words after the name of the command."""
@@ -21,12 +22,17 @@ class Command(typer.core.TyperCommand):
         with_argument = {name for option in options if not option.is_flag for name in option.opts}
         for before, word in pairwise(["An argument", *args]):
             # As a path an empty word would mean the current folder.
-            if not word and (before == "--out" or before not in with_argument):
+            if not word and (before in ("--out", "--example") or before not in with_argument):
                 ctx.fail(f"{before} must not be empty: write a name, or leave it out")
         for word, following in pairwise(args[: args.index("--")] if "--" in args else args):
             if word in with_argument and following in names:
                 ctx.fail(f"Option {word!r} requires an argument: got {following!r}; write its value first")
         return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; a signal that it does not take care of itself ends it with a sentence."""
+        with interruptible("Run the same command again."):
+            return super().invoke(ctx)
 
 
 def to_whole(text: str) -> int:
@@ -58,4 +64,11 @@ def integer_option(help_text: str) -> Any:
 Resolution = Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTION_CHOICES)}.")]
 Materials = Annotated[str, typer.Option(help=f"One of {', '.join(MATERIAL_CHOICES)}.")]
 Jobs = Annotated[int | None, integer_option("Number of processes. Default: one per core.")]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Press on the workers of this Dask scheduler, tcp://HOST:PORT, instead of processes here.",
+    ),
+]
 Seed = Annotated[int, integer_option("Seed of the random numbers.")]

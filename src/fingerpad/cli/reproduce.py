@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from fingerpad.cli.choices import DEFAULT_TISSUES
-from fingerpad.cli.options import Jobs, Materials, Resolution, Seed
-from fingerpad.cli.running import Bars, interruptible, make_writable, processes
+from fingerpad.cli.options import Jobs, Materials, Resolution, Scheduler, Seed
+from fingerpad.cli.running import engine, interruptible, make_writable, progress
+from fingerpad.core.progress import NoProgress
 
 EXPECTED_TIME = {"quick": "a minute and a half", "standard": "about 6 minutes", "paper": "some hours"}
 """Time on two cores if no indentation is stored yet."""
@@ -22,6 +23,7 @@ def reproduce_command(
         typer.Option(help="Folder for the report, the figures, the results and the stored indentations."),
     ] = Path("reproduction"),
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
     seed: Seed = 0,
     materials: Materials = DEFAULT_TISSUES,
     extended: Annotated[
@@ -34,8 +36,6 @@ def reproduce_command(
     ] = None,
 ) -> None:
     """Reproduce Gerling et al. (2014) and compare every result with the paper."""
-    from rich.console import Console
-
     from fingerpad.experiments.conditions import Conditions
     from fingerpad.experiments.gerling2014 import Reproduction, reproduce
     from fingerpad.experiments.gerling2014.claim_row import Verdict
@@ -43,19 +43,21 @@ def reproduce_command(
     from fingerpad.report.reproduction import write_report
 
     conditions = Conditions(resolution=resolution, seed=seed, materials=materials)
-    run = Reproduction(conditions, out, processes(jobs), extended)
+    run = Reproduction(conditions, out, engine(jobs, scheduler), extended)
     make_writable(out)
-    console = Console(stderr=True)
-    if console.is_terminal:
-        console.print(
-            f"Reproducing at {resolution} resolution with {run.jobs} process(es): "
+    shown = progress()
+    if not isinstance(shown, NoProgress):
+        by = f"{run.jobs} process(es)" if scheduler is None else f"the workers of {scheduler}"
+        typer.echo(
+            f"Reproducing at {resolution} resolution with {by}: "
             f"{EXPECTED_TIME[resolution]} on two cores. "
-            "You can stop at any time: the same command continues after the last finished indentation."
+            "You can stop at any time: the same command continues after the last finished indentation.",
+            err=True,
         )
     with interruptible():
-        results = reproduce(run, Bars(console))
-        write(out / "results.json", results)
+        results = reproduce(run, shown)
         report = write_report(results, out)
+        write(out / "results.json", results)
     missed = [row.quantity for row in results.comparison if row.verdict is Verdict.MISSED]
     typer.echo(f"Report: {report}")
     typer.echo(f"Results: {out / 'results.json'}")

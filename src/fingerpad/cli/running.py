@@ -2,34 +2,69 @@
 
 from __future__ import annotations
 
+import logging
 import os
+import signal
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
 from fingerpad.core.errors import InputError
+from fingerpad.core.logger import LOGGER
+from fingerpad.core.progress import Lines, NoProgress, Progress
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-INTERRUPTED = 130
-"""Exit status after Ctrl-C, by convention."""
+    from fingerpad.core.engine import Engine
+
+INTERRUPTED, TERMINATED = 130, 143
+"""Exit statuses after Ctrl-C and after SIGTERM, by convention."""
+
+CONTINUES = "The same command continues after the last finished indentation."
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM came."""
 
 
 @contextmanager
-def interruptible() -> Iterator[None]:
-    """After Ctrl-C, exit with a sentence on how to continue."""
+def signals_raise() -> Iterator[None]:
+    """Let the first Ctrl-C and the first SIGTERM raise, and let a second one end the process at once."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def raise_once(number: int, frame: object) -> None:
+        for each in before:
+            signal.signal(each, signal.SIG_DFL)
+        raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    for number in before:
+        signal.signal(number, raise_once)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def interruptible(ending: str = CONTINUES) -> Iterator[None]:
+    """After Ctrl-C or SIGTERM, exit with a sentence on how to go on."""
     try:
         yield
     except KeyboardInterrupt as error:
-        typer.echo(
-            "fingerpad: stopped. The same command continues after the last finished indentation.", err=True
-        )
-        raise typer.Exit(INTERRUPTED) from error
+        typer.echo(f"fingerpad: stopped. {ending}", err=True)
+        status = TERMINATED if isinstance(error, Terminated) else INTERRUPTED
+        raise typer.Exit(status) from error
 
 
 def cores() -> int:
@@ -42,6 +77,21 @@ def processes(jobs: int | None) -> int:
     return cores() if jobs is None else jobs
 
 
+def engine(jobs: int | None, scheduler: str | None) -> int | Engine:
+    """Return the workers of `--scheduler` once it answers, or the number of processes here."""
+    if scheduler is None:
+        return processes(jobs)
+    if jobs is not None:
+        raise InputError(
+            f"--jobs is the number of processes here, and --scheduler {scheduler} has workers: leave one out."
+        )
+    from fingerpad.experiments.cluster import Cluster
+
+    cluster = Cluster(scheduler)
+    cluster.check()
+    return cluster
+
+
 def make_writable(folder: Path, name: str = "--out") -> None:
     """Create `folder` if needed, and check that a file can be written into it."""
     try:
@@ -50,6 +100,16 @@ def make_writable(folder: Path, name: str = "--out") -> None:
             pass
     except OSError as error:
         raise InputError(f"{name} must be a writable folder: {folder} is not ({error.strerror}).") from error
+
+
+def progress() -> Progress:
+    """Bars on a terminal, else a line every ten seconds; nothing after `--quiet`. On standard error."""
+    from rich.console import Console
+
+    if not LOGGER.isEnabledFor(logging.WARNING):
+        return NoProgress()
+    console = Console(stderr=True)
+    return Bars(console) if console.is_terminal else Lines(partial(typer.echo, err=True), short=False)
 
 
 class Bars:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.running import Bars, interruptible, make_writable
+from fingerpad.cli.running import interruptible, make_writable, progress
 
 Description = Annotated[
     Path, typer.Argument(metavar="TOUCH", help="YAML file of a touch (format: docs/touch.md).")
@@ -28,13 +28,13 @@ def init_command(
 
 def check_command(touch: Description) -> None:
     """Check a touch without pressing: nodes, steps, and the time and memory that a press will take."""
-    from fingerpad.experiments.descriptions.estimate import estimate
+    from fingerpad.experiments.descriptions.estimate import estimate_press
     from fingerpad.experiments.descriptions.touch import read_touch_description
     from fingerpad.export.touch_outputs import check_described
 
     described = read_touch_description(touch)
     check_described(described)
-    for line in estimate(described).lines:
+    for line in estimate_press(described).lines:
         typer.echo(line)
 
 
@@ -45,8 +45,6 @@ def touch_command(
     ] = Path("touch"),
 ) -> None:
     """Press a touch that a file describes, and write figures, tables and files for other programs."""
-    from rich.console import Console
-
     from fingerpad.experiments.descriptions.touch import read_touch_description
     from fingerpad.export.touch_outputs import RESULT, check_described, run_touch
     from fingerpad.report.touch_page import PAGE, touch_summary
@@ -55,11 +53,11 @@ def touch_command(
     check_described(described)
     make_writable(out)
     with interruptible():
-        pressed = run_touch(
-            described, out, Bars(Console(stderr=True)), shlex.join(["fingerpad", *sys.argv[1:]])
-        )
+        pressed = run_touch(described, out, progress(), shlex.join(["fingerpad", *sys.argv[1:]]))
     for paragraph in touch_summary(pressed.result):
         typer.echo(paragraph)
+    for caveat in pressed.skin.caveats:
+        typer.echo(f"Not verified: {caveat.text}")
     if (out / PAGE).exists():
         typer.echo(f"Report: {out / PAGE}")
     typer.echo(f"Results: {out / RESULT}")

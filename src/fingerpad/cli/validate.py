@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from fingerpad.cli.choices import DEFAULT_TISSUES, KIND_CHOICES, LOADING_CHOICES
-from fingerpad.cli.options import Jobs, Materials, Resolution
-from fingerpad.cli.running import Bars, interruptible, make_writable, processes
+from fingerpad.cli.options import Jobs, Materials, Resolution, Scheduler
+from fingerpad.cli.running import engine, interruptible, make_writable, progress
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
 
@@ -46,14 +46,13 @@ def validate_command(
         tuple[float, float], typer.Option(help="Window of the rates: start and end. [ms]")
     ] = (600.0, 950.0),
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
     example: Annotated[
         str | None,
         typer.Option(help=f"Write an example file, one of {', '.join(KIND_CHOICES)}, into --out, and exit."),
     ] = None,
 ) -> None:
     """Score the model against your own observations of force, deflection or firing rates."""
-    from rich.console import Console
-
     from fingerpad.experiments import schemas
     from fingerpad.experiments.afferent_files import fitted_afferent
     from fingerpad.experiments.conditions import Conditions
@@ -77,13 +76,13 @@ def validate_command(
         loading,
         static_window,
     )
-    request = ValidationRequest(read_observations(observations), model, out, processes(jobs))
+    request = ValidationRequest(read_observations(observations), model, out, engine(jobs, scheduler))
     make_writable(out)
     inputs = [observations, *([] if afferent is None else [afferent])]
     with interruptible():
         results = validate(
             request,
-            Bars(Console(stderr=True)),
+            progress(),
             command=shlex.join(["fingerpad", *sys.argv[1:]]),
             inputs={str(path): sha256(path) for path in inputs},
         )

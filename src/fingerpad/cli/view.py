@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from fingerpad.cli.options import integer_option, number_option
-from fingerpad.cli.running import INTERRUPTED
+from fingerpad.cli.running import interruptible
 from fingerpad.core.errors import InputError
 
 
@@ -34,9 +34,6 @@ def view_command(
     path = Path("view.png") if out is None else out
     if path.is_dir():
         raise InputError(f"--out must be a file: {path} is a folder.")
-    try:
+    with interruptible("Nothing was written."):
         (written,) = save_view(path, result, field=field, time_ms=time, frames=frames)
-    except KeyboardInterrupt as error:
-        typer.echo("fingerpad: stopped. Nothing was written.", err=True)
-        raise typer.Exit(INTERRUPTED) from error
     typer.echo(f"Open: {written}")

@@ -1,0 +1,47 @@
+"""`fingerpad lab`: a laboratory in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fingerpad.cli.options import Jobs, integer_option
+from fingerpad.cli.running import engine, interruptible, make_writable, progress
+
+
+def lab_command(
+    ranges: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="[RANGE]...",
+            help="YAML files of `fingerpad reduce`, each an object by the name of its file. "
+            "Default: a ball, a cylinder and a plate.",
+        ),
+    ] = None,
+    folder: Annotated[
+        Path, typer.Option(help="Where presses and reduced touches are kept for the next time.")
+    ] = Path("lab"),
+    port: Annotated[int, integer_option("Port of the page. Default: one that is free.")] = 0,
+    static: Annotated[
+        Path | None,
+        typer.Option(help="Write a page into this folder that needs no server, and serve nothing."),
+    ] = None,
+    jobs: Jobs = None,
+) -> None:
+    """Press objects into the finger in the browser, on this computer alone."""
+    from fingerpad.lab.laboratory import Laboratory
+    from fingerpad.lab.server import serve
+    from fingerpad.lab.static import write_static
+
+    make_writable(folder, "--folder")
+    if static is not None:
+        make_writable(static, "--static")
+    with interruptible("The next laboratory in the same folder presses nothing again."):
+        laboratory = Laboratory(folder, ranges or (), engine(jobs, None))
+        if static is not None:
+            written = write_static(laboratory, static, progress())
+            typer.echo(f"Open: {written} ({written.stat().st_size / 1e6:.1f} MB)")
+            return
+        serve(laboratory, port, lambda address: typer.echo(f"Open: {address}"))
