@@ -199,3 +199,20 @@ def test_what_a_term_follows_is_no_fitted_number():
     extended = Afferent.from_parameters(Afferent().parameters, **quantities)
     assert extended == Afferent(**quantities)
     assert_array_equal(extended.parameters, Afferent().parameters)
+
+
+def test_sites_that_are_not_simulated_would_be_silent():
+    afferent = Afferent.for_tissues("trial3")
+    ramp = np.linspace(0.0, 1.0, 9)
+    course = np.concatenate([ramp, np.full(8, 1.0)])[:, None]
+    times = np.concatenate([50.0 * ramp, 50.0 + np.geomspace(1.0, 950.0, 8)])
+    # Half of the peaks lie within 1 % of where the hold just reaches the threshold.
+    near = afferent.static_threshold * np.concatenate([1.0 + np.geomspace(1e-12, 1e-2, 40), [1.0]])
+    peaks = np.concatenate([near, 2.0 - near / near[-1], np.linspace(0.0, 0.2, 40)])
+    sed = SedTraces(times, course * np.maximum(peaks, 0.0), kinks_ms=[50.0])
+    slow = SedTraces(20.0 * times, sed.sed_kpa, kinks_ms=[1000.0])
+    for traces in (sed, slow):
+        found, all_simulated = afferent.spikes(traces), afferent.spikes(drive(traces))
+        assert_array_equal(found.times_ms, all_simulated.times_ms)
+        assert_array_equal(found.offsets, all_simulated.offsets)
+    assert 0 < np.count_nonzero(np.diff(found.offsets)) < peaks.size

@@ -294,6 +294,8 @@ BAD: list[tuple[Callable[[], object], str]] = [
     (lambda: fp.Population([[17.0, 0.0]], 1.0, fp.RA), "afferent must be one such as"),
     (lambda: fp.Population([[17.0, 0.0]], 1.0, None), "afferent must be one such as"),
     (lambda: fp.MixedPopulation({}), "at least one Population"),
+    (lambda: fp.MixedPopulation([fp.Population.grid()]), "parts must be a mapping .* got list"),
+    (lambda: tuning_curve(fp.RA, [40.0], 0.02), "afferent must be one such as"),
     (lambda: fp.MixedPopulation({"RA": fp.RA()}), r"parts\['RA'\] must be a Population"),
     (lambda: SPARSE(SQUARE, {"RA": 0.0}), r"densities_per_cm2\['RA'\].*greater than 0"),
     (lambda: SPARSE(SQUARE, {"RA": -1.0}), r"densities_per_cm2\['RA'\].*greater than 0"),
@@ -302,6 +304,17 @@ BAD: list[tuple[Callable[[], object], str]] = [
     (lambda: SPARSE(SQUARE, {"X": 50.0}, {"X": None}), "afferent must be one such as"),
     (lambda: SPARSE(SQUARE, seed=-1), "seed must be a whole number"),
     (lambda: SPARSE(SQUARE, {"RA": 9.0}).respond(FINGER)["SAI"], "must be one of RA: got 'SAI'"),
+    (lambda: SPARSE(SQUARE, 100.0), "densities_per_cm2, with a type as each key, must be of type Mapping"),
+    (lambda: SPARSE(SQUARE, afferents=[fp.RA()]), "afferents, with a type as each key, must be of type"),
+    (lambda: SPARSE("pad"), r"region must be one of fingerpad.core.regions or .* got 'pad'"),
+    (lambda: SPARSE(SQUARE).respond("skin"), r"skin must have a method sed\(sites\), .* got 'skin'"),
+    (lambda: fp.Population.grid().respond(None), r"skin must have a method sed\(sites\), .* got None"),
+    (lambda: fp.Population.grid(centre_mm=17.0), r"centre_mm must be a pair, x and z \[mm\]: got 17.0"),
+    (lambda: fp.Population.grid(centre_mm=(17.0, 0.0, 1.0)), "centre_mm must be a pair"),
+    (lambda: fp.Population.grid(finger="child"), r"finger must be one such as .* got 'child'"),
+    (lambda: fp.RA(treshold=0.1), "RA has no treshold: did you mean threshold"),
+    (lambda: fp.SAI(smoothing=5.0), "SAI has no smoothing: did you mean smoothing_ms"),
+    (lambda: fp.RA().spikes([1.0, 2.0]), "needs 'compressive_stress': got traces of 'list'"),
     (lambda: tuning_curve(fp.RA(), [0.0], 0.02), "frequency_hz must be greater than 0"),
     (lambda: tuning_curve(fp.Afferent(static_quantity="stored"), [1.0], 0.02), "follows one quantity"),
 ]  # fmt: skip
@@ -312,4 +325,4 @@ def test_bad_input_is_refused_in_one_sentence(make: Callable[[], object], said: 
     with pytest.raises(fp.InputError, match=said) as refused:
         make()
     assert "\n" not in str(refused.value)
-    assert str(refused.value).endswith(".")
+    assert str(refused.value).endswith((".", "?"))

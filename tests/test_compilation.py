@@ -136,10 +136,10 @@ def test_a_press_calls_every_kernel_that_is_counted():
 def test_workers_leave_it_to_their_parent(say):
     code = """
         import logging, os
-        from fingerpad.skin import store
+        from fingerpad.core import engine
         from fingerpad.core.compilation import announce_compilation
         from kernels import twice
-        store._begin(os.getppid())
+        engine._begin(os.getppid())
         with announce_compilation([twice]):
             pass
     """

@@ -53,6 +53,8 @@ QUESTION = {
 class Bump:
     """A skin that a sphere has pressed: the more it is curved, the higher and narrower its energy density."""
 
+    caveats = ()
+
     def __init__(self, curvature_per_m, peak_kpa=3.0):
         self.peak_kpa = peak_kpa * curvature_per_m / 200.0
         self.width_mm = 2.0 * np.sqrt(200.0 / curvature_per_m)

@@ -1,19 +1,29 @@
 """Files of stimuli and recordings: their meaning, and errors of invalid ones."""
 
+import csv
+import json
 import warnings
 from datetime import UTC, datetime
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from fingerpad.core.errors import InputError
+from fingerpad.experiments.descriptions.stimuli import NamedStimulus
 from fingerpad.experiments.recording_files import read_recordings
-from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar, TactileStimulus, read_stimuli
+from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar, along_skin, read_stimuli
+from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Bar, FlatPunch, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
+from tests.mutations import CHANGES, VALUES, changed, places
 
-TWO = ListedStimuli({"edge": TactileStimulus(Bar()), "flat": TactileStimulus(Bar(), x_mm=1.0)}, "two.csv")
+TWO = ListedStimuli(
+    {"edge": NamedStimulus(Bar(), name="edge"), "flat": NamedStimulus(Bar(), x_mm=1.0, name="flat")},
+    "two.csv",
+)
 
 
 @pytest.fixture
@@ -47,10 +57,13 @@ def test_rates_are_means_over_presentations_wherever_their_columns_stand(written
 
 def test_shifts_that_are_equal_are_one_stimulus_however_they_are_written(written):
     path = written("rates.csv", "shift_mm,dynamic_rate_hz\n-0,1\n0.0,3\n1e-1,5\n")
-    recorded = read_recordings(path, ShiftedBar(Bar(2.0), RampAndHold(0.5)))
+    bar = ShiftedBar(Bar(2.0), RampAndHold(0.5))
+    recorded = read_recordings(path, bar)
     assert recorded.recordings.stimuli == ("0", "0.1")
     assert recorded.recordings.dynamic_rate_hz.tolist() == [2.0, 5.0]
-    assert recorded.stimuli["0.1"] == TactileStimulus(Bar(2.0), RampAndHold(0.5), x_mm=-0.1)
+    assert recorded.stimuli["0.1"] == NamedStimulus(
+        Bar(2.0), RampAndHold(0.5), x_mm=-0.1 * along_skin(bar.conditions), name="0.1"
+    )
 
 
 def test_spikes_end_with_the_motion_or_with_their_recording(written):
@@ -130,54 +143,119 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
         read_recordings(tmp_path / "none.nwb", TWO)
 
 
-CSV = """stimulus,indenter,curvature_per_m,diameter_mm,depth_mm,force_mn,hold_ms,x_mm,z_mm,tilt_deg
-ball,sphere,340,,0.5,,,-0.5,1,0
-probe,punch,,1,,200,500,,,
-bar,bar,,,,,,,,
-"""
+CSV = """# mine
+name,object,object.curvature_per_m,object.diameter_mm,motion.depth_mm,motion.force_mn,motion.hold_ms,\
+place.x_mm,place.z_mm,place.tilt_deg,friction,motion.kind,motion.file
+ball,sphere,340,,0.5,,,-0.5,1,0,,,
+probe,punch,,1.0,,200,500,,,,0.2,,
+bar,bar,,,,,,,,,,,
+moved,bar,,,,,,,,,,recorded,course.csv
+""".replace("\\\n", "")
 YAML = """
-- {stimulus: ball, indenter: sphere, curvature_per_m: 340, depth_mm: 0.5, x_mm: -0.5, z_mm: 1, tilt_deg: 0}
-- {stimulus: probe, indenter: punch, diameter_mm: 1.0, force_mn: 200, hold_ms: 500}
-- stimulus: bar
-  indenter: bar
+object: bar
+stimuli:
+  - {name: ball, object: {kind: sphere, curvature_per_m: 340}, motion: {depth_mm: 0.5},
+     place: {x_mm: -0.5, z_mm: 1, tilt_deg: 0}}
+  - {name: probe, object: "punch:1.0", motion: {force_mn: 200, hold_ms: 500}, friction: 0.2}
+  - name: bar
+  - {name: moved, motion: {kind: recorded, file: course.csv}}
 """
 
 
 @pytest.mark.parametrize(("name", "content"), [("mine.csv", CSV), ("mine.yaml", YAML), ("mine.yml", YAML)])
 def test_stimuli_are_the_same_from_csv_and_yaml(written, name, content):
+    written("course.csv", "time_ms,depth_mm\n0,0\n50,0.4\n900,0.4\n")
     listed = read_stimuli(written(name, content))
-    assert listed.stimuli == {
-        "ball": TactileStimulus(Sphere(340.0), RampAndHold(depth_mm=0.5), -0.5, 1.0, 0.0),
-        "probe": TactileStimulus(FlatPunch(1.0), ForceRampAndHold(200.0, hold_ms=500.0)),
-        "bar": TactileStimulus(Bar()),
+    found = {
+        "ball": NamedStimulus(Sphere(340.0), RampAndHold(depth_mm=0.5), -0.5, 1.0, 0.0, name="ball"),
+        "probe": NamedStimulus(
+            FlatPunch(1.0), ForceRampAndHold(200.0, hold_ms=500.0), friction=0.2, name="probe"
+        ),
+        "bar": NamedStimulus(Bar(), name="bar"),
     }
-    assert list(listed.stimuli) == ["ball", "probe", "bar"]
+    moved = listed.stimuli["moved"]
+    assert {key: each for key, each in listed.stimuli.items() if key != "moved"} == found
+    assert (moved.motion.depth_mm, moved.files[0].name) == ((0.0, 0.4, 0.4), "course.csv")
+    assert list(listed.stimuli) == ["ball", "probe", "bar", "moved"]
+
+
+def test_stimuli_name_finger_tissues_and_resolution_and_options_replace_them(written):
+    path = written(
+        "mine.yaml",
+        "finger: child\ntissues: trial3\nresolution: quick\nreach_mm: 2.0\nmotion: {depth_mm: 0.5}\n"
+        "stimuli: {vary: object.text, values: [a, b]}\nobject: {kind: braille}\n",
+    )
+    listed = read_stimuli(path, tissues="paper", finger=None)
+    asked = listed.conditions
+    assert (asked.resolution, asked.materials, asked.finger) == ("quick", "paper", Fingertip.of("child"))
+    touches = listed.touches(list(listed.stimuli.values()), asked)
+    assert list(touches) == ["a", "b"]
+    assert len({touch.grading for touch in touches.values()}) == 1
+    assert touches["a"].grading.half_length_mm == 2.0
+    assert touches["a"].at_mm == asked.finger.contact_mm
 
 
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("a.csv", "stimulus,indenter\ntip,cone\n", "a.csv, line 2: indenter must be one of sphere, cylinder"),
-        ("a.csv", "stimulus,indenter\ntip,\n", "a.csv, line 2: indenter must be given"),
-        ("a.csv", "stimulus\ntip\n", "a.csv, line 2: indenter must be given"),
-        ("a.csv", "stimulus,indenter\ntip,bar\ntip,bar\n", "a.csv, line 3: stimulus 'tip' is repeated"),
-        ("a.csv", "stimulus,indenter,radius\ntip,bar,1\n", "a.csv, line 1: column 'radius' is unknown"),
-        ("a.csv", "stimulus,indenter,width_mm\ntip,sphere,1\n", "line 2: a sphere has no width_mm"),
-        ("a.csv", "stimulus,indenter,width_mm\ntip,bar,0\n", "line 2: width_mm must be greater than 0 [mm]"),
-        ("a.csv", "stimulus,indenter,width_mm,fillet_mm\ntip,bar,1,1\n", "line 2: fillet_mm must not exceed"),
-        ("a.csv", "stimulus,indenter\ntip,plate:3\n", "line 2: indenter must be written plate, sizes from"),
-        ("a.csv", "stimulus,indenter,width_mm\ntip,bar:2,1\n", "line 2: sizes must stand in indenter or in"),
-        ("a.csv", "stimulus,indenter,depth_mm\ntip,bar,deep\n", "line 2: depth_mm must be a finite number"),
-        ("a.csv", "stimulus,indenter,depth_mm,force_mn\ntip,bar,1,1\n", "exclude each other"),
-        ("a.yaml", "", "a.yaml must be a list of stimuli, each a mapping: got NoneType."),
-        ("a.yaml", "stimulus: tip\n", "a.yaml must be a list of stimuli, each a mapping: got dict."),
-        ("a.yaml", "- tip\n", "a.yaml, entry 1: must be a mapping"),
-        ("a.yaml", "- {stimulus: tip, indentor: bar}\n", "a.yaml, entry 1: 'indentor' is unknown"),
-        ("a.yaml", "- {stimulus: tip, indenter: bar, indenter: sphere}\n", "line 1: indenter is repeated"),
-        ("a.yaml", "- {stimulus: tip\n", "a.yaml cannot be read as YAML"),
-        ("a.yaml", "- {stimulus: tip, indenter: bar, depth_mm: yes}\n", "entry 1: depth_mm must be a finite"),
-        ("a.yaml", "- {stimulus: tip, indenter: bar, x_mm: .nan}\n", "entry 1: x_mm must be a finite"),
-        ("a.yaml", b"- {stimulus: \xff}\n", "a.yaml must be text in UTF-8: byte 14 is not"),
+        (
+            "a.csv",
+            "name,object\ntip,cone\n",
+            "a.csv, line 2, object: indenter must be one of sphere, cylinder",
+        ),
+        ("a.csv", "name,object\ntip,\n", "a.csv, line 2, object must be given"),
+        ("a.csv", "name\ntip\n", "a.csv, line 2, object must be given"),
+        ("a.csv", "name,object\n,bar\n", "a.csv, line 2, name must be given"),
+        ("a.csv", "name,object\ntip,bar\ntip,bar\n", "a.csv, line 3, stimuli must differ: 'tip' is repeated"),
+        (
+            "a.csv",
+            "name,object,radius_mm\ntip,bar,1\n",
+            "line 1: column 'radius_mm' is unknown: did you mean obj",
+        ),
+        ("a.csv", "name,object,object.width_mm\ntip,sphere,1\n", "line 2, object.width_mm is unknown"),
+        (
+            "a.csv",
+            "name,object,object.width_mm\ntip,bar,0\n",
+            "line 2, object: width_mm must be greater than 0",
+        ),
+        ("a.csv", "name,object,object.fillet_mm\ntip,bar,9\n", "line 2, object: fillet_mm must not exceed"),
+        ("a.csv", "name,object\ntip,plate:3\n", "line 2, object: indenter must be written plate, sizes from"),
+        ("a.csv", "name,object,object.width_mm\ntip,bar:2,1\n", "line 2: object: sizes must stand in"),
+        ("a.csv", "name,object,motion.depth_mm\ntip,bar,deep\n", "line 2, motion.depth_mm must be a finite"),
+        (
+            "a.csv",
+            "name,object,motion.depth_mm\ntip,bar,[\n",
+            "line 2, motion.depth_mm cannot be read as YAML",
+        ),
+        ("a.csv", "name,object,motion.depth_mm,motion.force_mn\ntip,bar,1,1\n", "exclude each other"),
+        (
+            "a.csv",
+            "name,object,motion.kind,motion.file\ntip,bar,recorded,no.csv\n",
+            "line 2, motion: no.csv must",
+        ),
+        ("a.yaml", "", "a.yaml, the file must be a mapping of keys to values: got None"),
+        ("a.yaml", "- {name: tip}\n", "a.yaml, the file must be a mapping of keys to values: got "),
+        ("a.yaml", "stimuli:\n- tip\n", "a.yaml, line 2, stimuli[1] must be a mapping"),
+        ("a.yaml", "stimuli: []\n", "a.yaml, line 1, stimuli must have at least one entry"),
+        (
+            "a.yaml",
+            "object: bar\nstimuli:\n- {nane: tip}\n",
+            "line 3, stimuli[1].nane is unknown: did you mean",
+        ),
+        ("a.yaml", "finger: own.inp\nstimuli: [{name: tip, object: bar}]\n", "line 1, finger"),
+        ("a.yaml", "stimuli: {name: tip, name: bar}\n", "line 1: name is repeated"),
+        ("a.yaml", "stimuli: {\n", "a.yaml cannot be read as YAML"),
+        (
+            "a.yaml",
+            "object: bar\nstimuli:\n- {name: tip, motion: {depth_mm: yes}}\n",
+            "line 3, stimuli[1].motion.depth_mm must be a finite",
+        ),
+        (
+            "a.yaml",
+            "object: bar\nstimuli:\n- {name: tip}\nplace: {x_mm: .nan}\n",
+            "line 4, place.x_mm must be a finite",
+        ),
+        ("a.yaml", b"stimuli: \xff\n", "a.yaml must be text in UTF-8: byte 10 is not"),
     ],
     ids=lambda value: str(value)[-40:],
 )
@@ -187,6 +265,76 @@ def test_stimuli_that_cannot_be_are_named_by_line_and_column(written, name, cont
         read_stimuli(path)
     assert said in str(refused.value)
     assert str(refused.value).count("\n") == 0
+
+
+LIST = {
+    "finger": {"like": "adult", "width_mm": 15.0},
+    "tissues": "human",
+    "resolution": "quick",
+    "reach_mm": 3.0,
+    "object": {"kind": "bar", "width_mm": 3.0},
+    "motion": {"depth_mm": 0.5},
+    "place": {"x_mm": 0.5},
+    "friction": 0.2,
+    "stimuli": [
+        {"name": "edge", "place": {"x_mm": 1.5, "spin_deg": 20.0}},
+        {"name": "ball", "object": {"kind": "sphere", "radius_mm": 3.0}, "friction": 0.0},
+        {"name": "slid", "motion": {"kind": "stroke", "depth_mm": 0.3, "speed_mm_per_s": 20.0, "x_mm": 1.0}},
+    ],
+}
+TABLE = [
+    ["name", "object", "object.width_mm", "motion.depth_mm", "motion.force_mn", "place.x_mm", "friction"],
+    ["edge", "bar", "3", "0.5", "", "1.5", ""],
+    ["ball", "sphere", "", "", "80", "", "0.3"],
+    ["letter", "{kind: braille, text: l}", "", "0.4", "", "", ""],
+]
+
+
+def possible(path):
+    """What is said of a file of stimuli, and of their touches."""
+    try:
+        listed = read_stimuli(path)
+        listed.touches(list(listed.stimuli.values()), listed.conditions)
+    except InputError as error:
+        return str(error)
+    return f"{path}, possible."
+
+
+@pytest.mark.filterwarnings("ignore::fingerpad.core.errors.InertiaWarning")
+@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@given(st.sampled_from([place for place in places(LIST) if place]), VALUES, CHANGES)
+def test_any_change_of_listed_stimuli_is_possible_or_refused_in_one_sentence(
+    tmp_path_factory, place, value, change
+):
+    path = tmp_path_factory.getbasetemp() / "list.yaml"
+    path.write_text(json.dumps(changed(LIST, place, value, change)), encoding="utf-8")
+    said = possible(path)
+    assert said.startswith(str(path)) or said.startswith("reach_mm")
+    assert "\n" not in said
+    assert said[-1] in ".?"
+
+
+@pytest.mark.filterwarnings("ignore::fingerpad.core.errors.InertiaWarning")
+@settings(max_examples=80, deadline=None, suppress_health_check=list(HealthCheck))
+@given(
+    st.integers(0, 3),
+    st.integers(0, 6),
+    st.one_of(
+        st.text(max_size=8), st.floats().map(str), st.sampled_from(["[", "{a: 1}", "bar:3", "~", "''"])
+    ),
+)
+def test_any_change_of_a_table_of_stimuli_is_possible_or_refused_in_one_sentence(
+    tmp_path_factory, row, column, entry
+):
+    path = tmp_path_factory.getbasetemp() / "list.csv"
+    rows = [list(line) for line in TABLE]
+    rows[row][column] = entry
+    with path.open("w", newline="", encoding="utf-8", errors="surrogatepass") as file:
+        csv.writer(file).writerows(rows)
+    said = possible(path)
+    assert said.startswith(str(path))
+    assert "\n" not in said
+    assert said[-1] in ".?"
 
 
 @pytest.fixture(scope="module")

@@ -17,11 +17,12 @@ from fingerpad.export.calculix import calculix_deck
 from fingerpad.export.febio import febio_deck
 from fingerpad.export.formats import export_touch
 from fingerpad.export.job import Job, job_of
-from fingerpad.export.outline import outline_of, rigid_mesh
+from fingerpad.export.outline import face_mesh, outline_of, rigid_mesh
 from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
+from fingerpad.geometry.embossed import Embossed
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
-from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh, finger_mesh
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.laws import Hencky, Hyperfoam, Polynomial
@@ -754,19 +755,42 @@ def test_febio_relaxes_as_we_do(moduli):
         assert modulus * shape == pytest.approx(share * ours)
 
 
+# --- bodies without an outline ---------------------------------------------
+
+FRAME = [[(-u, -u), (u, -u), (u, u), (-u, u)] for u in (1.8, 0.6)]
+
+
+def test_a_body_without_an_outline_is_divided_over_its_face():
+    """Corners of facets lie on the face, facets turn their outer side to the skin, a hole stays a hole."""
+    body = Embossed(FRAME, height_mm=0.5, edge_radius_mm=0.2)
+    found = face_mesh(body, -0.4, (-3.0, 3.0), (-2.0, 2.0))
+    outer = found.nodes_mm[: len(found.nodes_mm) // 2]
+    np.testing.assert_allclose(outer[:, 1], np.maximum(body.front(outer), -0.4), atol=1e-12)
+    first, second, third, _ = outer[found.quads].transpose(1, 0, 2)
+    normal = np.cross(second - first, third - first)
+    assert (normal[:, 1] > 0.0).all()
+    area = normal[outer[found.quads][:, :, 1].min(axis=1) > -1e-9, 1].sum()
+    flat = 2 * (1.8 - 0.2) * 2 * (1.8 - 0.2) - 2 * (0.6 + 0.2) * 2 * (0.6 + 0.2)
+    assert area == pytest.approx(flat, rel=0.08)
+    assert not (np.abs(outer[:, [0, 2]]).max(axis=1) < 0.45).any()
+    with pytest.raises(InputError, match="Embossed would need 1,002,001 facets, more than 250,000"):
+        face_mesh(body, -0.4, (-37.5, 37.5), (-37.5, 37.5))
+
+
+@pytest.mark.parametrize("write", [abaqus_deck, calculix_deck, febio_deck])
+def test_a_deck_has_the_facets_of_such_a_body(write):
+    job = block_job(Embossed(FRAME, height_mm=0.6, edge_radius_mm=0.4))
+    deck = write(job)
+    assert job.outline is None
+    assert len(job.rigid.quads) > 1000
+    if write is abaqus_deck:
+        assert "*ELEMENT, TYPE=R3D4, ELSET=INDENTER" in deck
+        assert f"*RIGID BODY, ELSET=INDENTER, REF NODE={len(job.mesh.nodes_mm) + 1}" in deck
+        assert "ANALYTICAL" not in deck
+    assert deck.count("\n") > 2 * len(job.rigid.quads)
+
+
 # --- what cannot be exported -----------------------------------------------
-
-
-class Wedge(Indenter):
-    """A body known only by its gap."""
-
-    half_width_mm = 1.0
-
-    def gap(self, points_mm):
-        return Plate().gap(points_mm)
-
-    def front(self, points_mm):
-        return Plate().front(points_mm)
 
 
 @pytest.mark.parametrize("write", [abaqus_deck, calculix_deck, febio_deck])
@@ -777,8 +801,6 @@ def test_nothing_else_is_written_instead(write):
         write(
             block_job(material=Material.from_energy("a / 2 * (I1 - 3) + k / 2 * (J - 1)**2", a=5.0, k=90.0))
         )
-    with pytest.raises(InputError, match="Wedge cannot be exported, because only its gap is known"):
-        write(block_job(Wedge()))
 
 
 def test_febio_refuses_what_it_would_change():

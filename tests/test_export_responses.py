@@ -81,7 +81,7 @@ def responses_to_two_touches() -> dict[str, ResponseMap]:
 
 
 def test_a_session_is_read_back_as_recordings_of_every_receptor(tmp_path):
-    (tmp_path / "two.csv").write_text("stimulus,indenter\nedge,bar\nflat,bar\n", encoding="utf-8")
+    (tmp_path / "two.csv").write_text("name,object\nedge,bar\nflat,bar\n", encoding="utf-8")
     responses = responses_to_two_touches()
     path = write_responses_nwb(tmp_path / "deeper" / "session.nwb", responses, pause_ms=250.0)
     assert [entry.name for entry in path.parent.iterdir()] == ["session.nwb"]

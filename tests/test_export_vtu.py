@@ -16,7 +16,7 @@ from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.export.dataset import read_touch
 from fingerpad.export.formats import FORMATS, export_touch
-from fingerpad.export.vtu import HEXAHEDRON, WEDGE, cells_of, write_vtu_series
+from fingerpad.export.vtu import HEXAHEDRON, WEDGE, cells_of, read_vtu_series, write_vtu_series
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Sphere
@@ -135,6 +135,32 @@ def test_fields_come_back_at_every_time(done, files):
         assert overall["dissipated_uj"] == done.energy.dissipated_uj[number].astype("f4")
         names = [grid.GetCellData().GetArray("stress_kpa").GetComponentName(k) for k in range(6)]
         assert names == ["XX", "YY", "ZZ", "XY", "YZ", "XZ"]
+
+
+def test_the_series_is_read_back(done, files):
+    series = read_vtu_series(files[0])
+    np.testing.assert_array_equal(series.times_ms, done.times_ms)
+    np.testing.assert_array_equal(series.points_mm, TOUCH.mesh.nodes_mm)
+    np.testing.assert_array_equal(series.points["displacement_mm"], done.displacement_mm.astype("f4"))
+    np.testing.assert_array_equal(series.cells["stress_kpa"], done.fields.stress_kpa.astype("f4"))
+    np.testing.assert_array_equal(series.press["force_mn"][:, 0], done.force_mn.astype("f4"))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("no xml", "touch.pvd must be an index of VTU files"),
+        ("<VTKFile/>", "touch.pvd must list a VTU file or more"),
+        (
+            '<VTKFile><DataSet timestep="0" file="a.vtu"/></VTKFile>',
+            "a.vtu must be a VTU file: it is missing",
+        ),
+    ],
+)
+def test_what_is_no_series_is_refused(tmp_path, text, said):
+    (tmp_path / "touch.pvd").write_text(text)
+    with pytest.raises(InputError, match=said):
+        read_vtu_series(tmp_path / "touch.pvd")
 
 
 def test_response_without_its_deformation_is_refused(skin, tmp_path):

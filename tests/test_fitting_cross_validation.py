@@ -141,7 +141,7 @@ def test_memberships_that_miss_an_observation_are_refused() -> None:
 def test_other_wrong_shapes_are_refused() -> None:
     with pytest.raises(InputError, match="increments must match starts"):
         ResponseSurface([[0.0], [1.0]], [0.1, 0.1, 0.1])
-    with pytest.raises(InputError, match="n_observations must be a whole number of at least 6"):
+    with pytest.raises(InputError, match="n_folds must be at most the number of stimuli"):
         interleaved_folds(5)
     with pytest.raises(InputError, match="n_folds must be a whole number of at least 2"):
         interleaved_folds(5, 1)

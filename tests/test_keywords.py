@@ -152,9 +152,10 @@ def test_files_of_stimuli_take_either_name(tmp_path, suffix):
     path = tmp_path / f"stimuli.{suffix}"
     path.write_text(
         {
-            "csv": "stimulus,indenter,radius_mm,period_mm,duty\nball,sphere,4,,\nrows,grating,,2,0.25\n",
-            "yaml": "- {stimulus: ball, indenter: sphere, radius_mm: 4}\n"
-            "- {stimulus: rows, indenter: grating, period_mm: 2, duty: 0.25}\n",
+            "csv": "name,object,object.radius_mm,object.period_mm,object.duty\n"
+            "ball,sphere,4,,\nrows,grating,,2,0.25\n",
+            "yaml": "stimuli:\n- {name: ball, object: {kind: sphere, radius_mm: 4}}\n"
+            "- {name: rows, object: {kind: grating, period_mm: 2, duty: 0.25}}\n",
         }[suffix],
         encoding="utf-8",
     )

@@ -1,5 +1,8 @@
 """The kept factor against SciPy's direct solver, and systems without a solution."""
 
+import sys
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
@@ -7,6 +10,7 @@ from scipy.sparse.linalg import spsolve
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.mechanics import linear
+from fingerpad.mechanics.aggregation import SmoothedAggregation
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.factors import SuperLuFactor
 from fingerpad.mechanics.linear import (
@@ -214,6 +218,42 @@ def test_column_too_deep_for_the_kernels_of_multigrid_gets_a_factor(monkeypatch)
     monkeypatch.setattr(linear, "MULTIGRID_NODES", 100)
     monkeypatch.setattr(linear, "MOST_LANES", BLOCK.grid.shape[2] - 1)
     assert isinstance(chosen(0.48)[0], KeptFactor)
+
+
+LARGE = block_mesh(
+    np.arange(13.0), np.arange(9.0), np.arange(9.0), layers=[0, 0, 1, 1, 2, 2, 3, 3], symmetric=True
+)
+
+
+def test_large_mesh_without_rows_is_solved_by_algebraic_multigrid(monkeypatch):
+    sparsity = Sparsity.of(LARGE.elements, len(LARGE.nodes_mm))
+    free = free_degrees_of_freedom(len(LARGE.nodes_mm), LARGE.fixed_nodes, LARGE.symmetry_nodes)
+    mesh = SimpleNamespace(nodes_mm=LARGE.nodes_mm, is_grid=False)
+    monkeypatch.setattr(linear, "DIRECT_NODES", 1000)
+    preconditioner, reason = choose_preconditioner(sparsity, free, mesh, 0.48)
+    assert isinstance(preconditioner, SmoothedAggregation)
+    assert reason == (
+        "algebraic multigrid by smoothed aggregation (PyAMG): 1053 nodes without rows and columns are more "
+        "than 1000, and Poisson's ratio 0.48 is within 0.499."
+    )
+    blocks = tangent(poisson=0.48, mesh=LARGE, sparsity=sparsity)
+    residual = np.random.default_rng(0).normal(size=free.size)
+    solver = LinearSolver(preconditioner)
+    solution = solver.solve(blocks, residual, relative_tolerance=1e-10)
+    back = sparsity.matrix(blocks).tocsr()[free][:, free] @ solution
+    np.testing.assert_allclose(back, residual, rtol=0, atol=1e-8)
+    assert solver.iterations < 50
+    # A stiffer tangent is solved with the hierarchy of the first.
+    halved = solver.solve(2.0 * blocks, residual, 1e-10)
+    np.testing.assert_allclose(halved, 0.5 * solution, rtol=0, atol=1e-8 * np.abs(solution).max())
+    assert solver.renewals == 1
+    again = LinearSolver(SmoothedAggregation(sparsity, free, LARGE.nodes_mm))
+    np.testing.assert_array_equal(again.solve(blocks, residual, 1e-10), solution)
+    with pytest.raises(InputError, match=r"must not exceed 0.499 for a mesh of more than 1000 nodes"):
+        choose_preconditioner(sparsity, free, mesh, 0.4995)
+    monkeypatch.setitem(sys.modules, "pyamg", None)
+    with pytest.raises(InputError, match=r"1,053 nodes needs PyAMG: pip install 'fingerpad\[meshes\]'"):
+        choose_preconditioner(sparsity, free, mesh, 0.48)
 
 
 def test_ratio_beyond_every_solver_is_refused_with_what_to_do():

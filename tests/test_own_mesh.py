@@ -8,6 +8,9 @@ import pytest
 import fingerpad as fp
 from fingerpad.core.errors import InputError
 from fingerpad.experiments.descriptions.touch import described_touch
+from fingerpad.experiments.discrimination.run import DiscriminationRun
+from fingerpad.experiments.discrimination.task_files import input_hashes, read_task, task_text
+from fingerpad.experiments.stimuli import read_stimuli
 from fingerpad.export.abaqus import abaqus_deck
 from fingerpad.export.formats import export_touch
 from fingerpad.export.job import job_of
@@ -33,7 +36,7 @@ from tests import gmsh_finger
 
 BALL, MOTION = Sphere(radius_mm=4.0), RampAndHold(depth_mm=0.6, hold_ms=50.0)
 STEPS = PressSettings(ramp_steps=2, hold_steps=1)
-COARSE = Grading(17.37, 2.0, 2.0, 0.6, 0.6, 3.0, stratum_corneum=2, dermis=2, subcutis=3)
+COARSE = Grading(17.37, 2.0, 2.0, 0.6, 0.6, 3.0, stratum_corneum=1, dermis=2, subcutis=2)
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +77,15 @@ def test_our_own_finger_comes_back_with_its_numbers(sent, name):
     assert own.layer_depths_mm == pytest.approx((0.371, 0.471, 1.624), abs=2e-3)
     assert mesh.receptor_depth_mm == pytest.approx(0.471, abs=1e-3)
     assert float(own.depth_available_mm(17.37, 0.0)) == pytest.approx(5.549, abs=1e-3)
+    if name != "finger.inp":  # the same nodes and elements have the same numbers
+        deck = read_finger(folder / "finger.inp").mesh
+        order, deck_order = (np.lexsort(np.round(each.nodes_mm, 6).T) for each in (mesh, deck))
+        np.testing.assert_allclose(mesh.nodes_mm[order], deck.nodes_mm[deck_order], rtol=0, atol=1e-6)
+        place = np.empty(len(order), dtype=int)
+        place[order] = deck_order
+        ours, theirs = place[mesh.elements], deck.elements
+        np.testing.assert_array_equal(ours[np.lexsort(ours.T)], theirs[np.lexsort(theirs.T)])
+        return
     read = touch_of(own, BALL, MOTION, at_mm=(17.37, 0.0), settings=STEPS).solve()
     np.testing.assert_allclose(read.force_mn, skin.force_mn, rtol=2e-6, atol=1e-9)
     np.testing.assert_allclose(read.contact_area_mm2, skin.contact_area_mm2, rtol=1e-5)
@@ -145,7 +157,9 @@ def test_older_files_units_and_axes_give_the_same_finger(made, parts, tmp_path):
     assert turned != old
 
 
-def test_a_whole_finger_of_gmsh_gives_the_force_of_the_half(parts):
+def test_a_whole_finger_of_gmsh_gives_the_force_of_the_half(tmp_path):
+    gmsh_finger.write_gmsh_finger(tmp_path / "coarse.msh", along=9, cap=4, around=8, through=(1, 1, 1, 2))
+    parts = _read_msh(tmp_path / "coarse.msh")
     half, whole = finger_from(parts), finger_from(mirrored(parts))
     assert whole.mesh.full
     place = (10.0, 0.0)
@@ -208,7 +222,7 @@ def test_closest_points_lie_on_the_surface():
     assert (weights >= 0.0).all()
     np.testing.assert_allclose(weights.sum(axis=1), 1.0)
     found = np.linalg.norm((weights[..., None] * corners[triangle]).sum(axis=1) - points, axis=1)
-    tried = generator.dirichlet([1.0, 1.0, 1.0], size=2000)
+    tried = generator.dirichlet([1.0, 1.0, 1.0], size=700)
     sampled = np.einsum("ka,tad->tkd", tried, corners).reshape(-1, 3)
     nearest = np.linalg.norm(points[:, None] - sampled, axis=2).min(axis=1)
     assert (found <= nearest + 1e-12).all()
@@ -338,6 +352,8 @@ def swapped_layers(parts):
         (lambda p: p, {"names": {"dermis": "corium"}}, "set corium of elements is missing"),
         (lambda p: p, {"receptor_depth_mm": 30.0}, "end organs 30 mm below the skin must lie in the mesh"),
         (lambda p: p, {"receptor_depth_mm": -1.0}, "receptor_depth_mm must be greater than 0"),
+        (lambda p: p, {"contact_mm": 10.0}, r"contact_mm must be a pair, x and z \[mm\]: got 10.0"),
+        (lambda p: p, {"names": ["skin"]}, r"names must be of type Mapping: got \['skin'\]"),
         (lambda p: p, {"contact_mm": (90.0, 0.0)}, "A position must lie on the finger"),
         (lambda p: moved(p, 5, np.nan), {}, "nodes must have finite coordinates"),
         (
@@ -444,3 +460,38 @@ def test_files_that_are_cut_short_or_garbled_are_refused_or_read(sent, made, tmp
                 read_finger(path)
             except InputError as error:
                 assert f"finger.{end}" in str(error)  # noqa: PT017
+
+
+BALLS = """\
+question: Can two balls be told apart?
+finger: finger.inp
+resolution: quick
+object: {kind: sphere}
+stimuli: {vary: object.radius_mm, values: [3.0, 4.0]}
+standard: 3.0
+noise: 0.05
+"""
+
+
+def test_a_task_presses_all_stimuli_into_the_mesh(sent, tmp_path):
+    folder, skin = sent
+    path = folder / "task.yaml"
+    path.write_text(BALLS)
+    run = DiscriminationRun(read_task(path), tmp_path, 1, str(path), task_text(path))
+    meshes = [touch.mesh for touch in run.touches.values()]
+    assert meshes[0] is meshes[1]
+    assert len(meshes[0].nodes_mm) == len(skin.mesh.nodes_mm)
+    assert str(folder / "finger.inp") in input_hashes(path, run.task, run.prepared.stimuli)
+    path.write_text(BALLS + "reach_mm: 3\n")
+    with pytest.raises(InputError, match="reach_mm must not be given: the finger has a mesh of its own"):
+        DiscriminationRun(read_task(path), tmp_path, 1, str(path), task_text(path))
+
+
+def test_stimuli_of_a_fit_are_pressed_into_the_mesh(sent):
+    folder, skin = sent
+    path = folder / "stimuli.yaml"
+    path.write_text("finger: finger.inp\nobject: sphere\nstimuli: [{name: probe}]\n")
+    read = read_stimuli(path)
+    assert read.finger_files == (folder / "finger.inp",)
+    (touch,) = read.touches([read.named("probe")], read.conditions).values()
+    assert len(touch.mesh.nodes_mm) == len(skin.mesh.nodes_mm)

@@ -107,6 +107,11 @@ def test_the_three_lists_of_public_names_agree():
     assert sorted(fingerpad.__all__) == sorted(name for names in typed.values() for name in names)
 
 
+def test_no_package_hides_a_public_name():
+    packages = {path.name for path in Path(fingerpad.__file__).parent.iterdir()}
+    assert not packages & set(fingerpad.__all__)
+
+
 def test_names_are_listed_before_they_are_loaded_and_others_are_not_there():
     assert set(fingerpad.__all__) < set(dir(fingerpad))
     with pytest.raises(AttributeError, match="module 'fingerpad' has no attribute 'Fingertap'"):

@@ -10,7 +10,9 @@ from fingerpad.core.patterns import jittered
 from fingerpad.core.regions import Ellipse
 from fingerpad.core.signals import SedTraces
 from fingerpad.neuron.afferent import Afferent
-from fingerpad.neuron.population import Population, sensitivities
+from fingerpad.neuron.end_organs import EndOrgans
+from fingerpad.neuron.mixed_population import MixedPopulation
+from fingerpad.neuron.population import CENTRE_MM, Population, sensitivities
 from sections import SED_DRIVEN, SENSITIVE
 
 
@@ -33,6 +35,21 @@ def test_the_papers_population_is_3_by_6_at_1_mm_and_symmetric_across_the_finger
     assert_allclose(np.unique(x), [16.37, 17.37, 18.37], rtol=1e-14)
     assert_array_equal(np.unique(z), [-2.5, -1.5, -0.5, 0.5, 1.5, 2.5])
     assert len({tuple(position) for position in population.positions_mm}) == 18
+
+
+def test_the_default_grid_follows_the_finger_that_is_touched_and_others_stay():
+    skin, child = Bump(13.0, 0.0), Population.grid(centre_mm=(13.0, 0.0), afferent=SENSITIVE)
+    skin.pad_mm = (13.0, 0.0)
+    response, expected = Population.grid(afferent=SENSITIVE).respond(skin), child.respond(skin)
+    assert_allclose(response.positions_mm, expected.positions_mm, rtol=1e-12)
+    assert_allclose(response.static_rate_hz, expected.static_rate_hz, rtol=1e-9)
+    assert response.static_rate_hz.max() > 0.0
+    mixed = MixedPopulation({"SAI": Population.grid(afferent=SENSITIVE)}).respond(skin)
+    assert_array_equal(mixed["SAI"].positions_mm, response.positions_mm)
+    stays = Population.grid(centre_mm=CENTRE_MM, afferent=SENSITIVE).respond(skin)
+    assert_array_equal(stays.positions_mm, Population.grid().positions_mm)
+    branched = replace(Population.grid(rows=1, columns=1), ends=EndOrgans([[[17.0, 0.0]]]))
+    assert branched.on(skin) is branched
 
 
 @pytest.mark.parametrize("density", [25.0, 70.0, 100.0, 400.0])

@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.ndimage import spline_filter1d
 
 from fingerpad.core.errors import InputError
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading, resolution_grading
 from fingerpad.geometry.mesh import block_mesh, finger_mesh
+from fingerpad.skin.grid_cubic import coefficients
 from fingerpad.skin.receptor_sheet import ReceptorSheet
 
 FINGER = Fingertip()
@@ -187,3 +189,11 @@ def test_columns_agree_at_the_pole(name):
 def test_the_tip_itself_is_skin():
     tip = np.array([[FINGER.length_mm, 0.0, 0.0]])
     assert SHEETS["full"].below(tip).shape == (1, 2)
+
+
+def test_the_coefficients_of_a_spline_are_those_of_scipy():
+    values = np.random.default_rng(5).normal(size=(31, 17, 3))
+    known = spline_filter1d(spline_filter1d(values, axis=0, mode="mirror"), axis=1, mode="mirror")
+    assert_allclose(coefficients(values), known, rtol=0, atol=1e-13)
+    turned = np.moveaxis(np.ascontiguousarray(np.moveaxis(values, 2, 0)), 0, 2)
+    assert_allclose(coefficients(turned), known, rtol=0, atol=1e-13)

@@ -1,7 +1,6 @@
 """Fit to recordings of a user: recovery of known parameters, then reports, errors and files."""
 
 import json
-import math
 import re
 import shlex
 import subprocess
@@ -24,6 +23,7 @@ from fingerpad.core.signals import SedTraces, SpikeTrains
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.descriptions.stimuli import NamedStimulus
 from fingerpad.experiments.fit import fit as study
 from fingerpad.experiments.fit import posterior as recording_posterior
 from fingerpad.experiments.fit import session
@@ -33,7 +33,7 @@ from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, Rate
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.manifest import sha256
 from fingerpad.experiments.recording_files import read_recordings
-from fingerpad.experiments.stimuli import ShiftedBar, TactileStimulus
+from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar
 from fingerpad.geometry.edged_indenters import Gap
 from fingerpad.geometry.indenters import Bar, Line, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
@@ -311,11 +311,10 @@ def test_a_stimulus_that_ends_before_a_window_is_refused():
 def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
     path = tmp_path / session.EXAMPLE
     path.write_bytes(session.example_recordings()[session.EXAMPLE])
-    recorded = read_recordings(path, ShiftedBar())
-    conditions = Conditions("quick")
-    assert list(session.stimulus_touches(recorded.stimuli, conditions).values()) == single_unit.bar_touches(
-        conditions
-    )
+    bar, conditions = ShiftedBar(), Conditions("quick")
+    recorded = read_recordings(path, bar)
+    touches = bar.touches(list(recorded.stimuli.values()), conditions)
+    assert list(touches.values()) == single_unit.bar_touches(conditions)
     observed = bar_firing_rates()
     np.testing.assert_array_equal(recorded.recordings.dynamic_rate_hz, observed.dynamic_rate_hz)
     np.testing.assert_array_equal(recorded.recordings.static_rate_hz, observed.static_rate_hz)
@@ -324,21 +323,18 @@ def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
 
 def test_stimuli_are_indented_at_their_position_with_their_motion():
     conditions = Conditions("quick")
-    pressed = session.stimulus_touches(
-        {
-            "beside": TactileStimulus(Sphere(340.0), RampAndHold(0.4), x_mm=1.0, z_mm=0.5, tilt_deg=3.0),
-            "wire": TactileStimulus(Line(), ForceRampAndHold(50.0)),
-            "gap": TactileStimulus(Gap(gap_mm=0.5), x_mm=0.2),
-            "turned": TactileStimulus(Bar(), spin_deg=30.0),
-        },
-        conditions,
-    )
+    stimuli = [
+        NamedStimulus(Sphere(340.0), RampAndHold(0.4), x_mm=1.0, z_mm=0.5, tilt_deg=3.0, name="beside"),
+        NamedStimulus(Line(), ForceRampAndHold(50.0), name="wire"),
+        NamedStimulus(Gap(gap_mm=0.5), x_mm=0.2, friction=0.3, name="gap"),
+        NamedStimulus(Bar(), spin_deg=30.0, name="turned"),
+    ]
+    pressed = ListedStimuli({}).touches(stimuli, conditions)
     beside, wire, gap, turned = pressed.values()
-    along = math.cos(math.radians(conditions.skin_tilt_deg))
-    assert beside.at_mm == (pytest.approx(RECEPTOR_X_MM + along, abs=1e-12), 0.5)
+    assert beside.at_mm == (RECEPTOR_X_MM + 1.0, 0.5)
     assert (beside.tilt_deg, beside.grading.full, beside.stimulus.depth_mm) == (3.0, True, 0.4)
     assert (wire.tilt_deg, wire.grading.full, wire.stimulus.force_mn) == (0.0, False, 50.0)
-    assert (gap.indenter.gap_mm, gap.grading.full, gap.spin_deg) == (0.5, False, 0.0)
+    assert (gap.indenter.gap_mm, gap.grading.full, gap.spin_deg, gap.friction) == (0.5, False, 0.0, 0.3)
     assert min(gap.grading.size_x_mm, gap.grading.core_size_mm or 1.0) <= 0.5 / 4
     assert (turned.spin_deg, turned.grading.full) == (30.0, True)
 
@@ -347,17 +343,17 @@ def test_stimuli_are_indented_at_their_position_with_their_motion():
     ("stimulus", "said"),
     [
         (
-            TactileStimulus(Bar(), RampAndHold(9.0)),
-            "Stimulus deep cannot be used: depth_mm must stay below",
+            ShiftedBar(motion=RampAndHold(9.0)).named("1"),
+            "^Stimulus 1 cannot be used: motion: depth_mm must stay",
         ),
-        (TactileStimulus(Bar(), x_mm=80.0), "Stimulus deep cannot be used: "),
-        (TactileStimulus(Line(), tilt_deg=5.0), "cannot be used: tilt_deg must be 0 for Line"),
+        (ShiftedBar().named("-80"), "^Stimulus -80 cannot be used: place: A position must lie on the finger"),
+        (NamedStimulus(Line(), tilt_deg=5.0, name="deep"), "^place.tilt_deg must be 0 for Line"),
     ],
     ids=["depth", "place", "tilt"],
 )
 def test_a_stimulus_that_cannot_be_pressed_is_named(stimulus, said):
     with pytest.raises(InputError, match=said):
-        session.stimulus_touches({"deep": stimulus}, Conditions("quick"))
+        ListedStimuli({}).touches([stimulus], Conditions("quick"))
 
 
 # The command
@@ -367,7 +363,7 @@ class Pressed:
     """Stands for the skin under a touch: two humps of energy density where the edges of the bar are."""
 
     force_imbalance = energy_imbalance = 0.0
-    linear_solver = "none"
+    linear_solver, caveats = "none", ()
 
     def __init__(self, touch):
         self.shift_mm, self.depth_mm = touch.at_mm[0] - RECEPTOR_X_MM, touch.stimulus.depth_mm
@@ -472,7 +468,7 @@ def test_what_is_asked_for_beside_the_fit_is_on_its_page(call, tmp_path, monkeyp
 
 def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_path):
     (tmp_path / "list.csv").write_text(
-        "stimulus,indenter,width_mm,depth_mm,x_mm,hold_ms\n"
+        "name,object,object.width_mm,motion.depth_mm,place.x_mm,motion.hold_ms\n"
         + "".join(f"bar {row},bar,3,{1.0 - 0.1 * row},1.5,{900 + row}\n" for row in range(5))
     )
     (tmp_path / "mine.csv").write_text(
@@ -507,11 +503,23 @@ def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_pa
         (["mine.csv", "--stimulus", "bar"], ROWS + "2,-1,3\n", "mine.csv, line 8: dynamic_rate_hz must not"),
         (["mine.csv", "--stimulus", "bar"], ROWS + "2,1,nan\n", "mine.csv, line 8: static_rate_hz must be a"),
         (["mine.csv", "--stimulus", "bar"], "shift_mm,static_rate_hz\n0,1\n1,2\n", "at least 4 rates"),
-        (["mine.csv", "--stimulus", "bar"], ROWS + "90,1,3\n", "Stimulus 90 cannot be used"),
-        (["mine.csv", "--stimulus", "bar", "--depth", "9"], ROWS, "Stimulus -2 cannot be used: depth_mm"),
+        (
+            ["mine.csv", "--stimulus", "bar"],
+            ROWS + "90,1,3\n",
+            "Stimulus 90 cannot be used: place: A position",
+        ),
+        (
+            ["mine.csv", "--stimulus", "bar", "--depth", "9"],
+            ROWS,
+            "Stimulus -2 cannot be used: motion: depth_mm",
+        ),
         (["mine.csv", "--stimulus", "bar", "--width", "0"], ROWS, "width_mm must be greater than 0"),
         (["mine.csv", "--stimulus", "bar", "--fillet", "2"], ROWS, "fillet_mm must not exceed half"),
-        (["mine.csv", "--stimulus", "bar", "--folds", "7"], ROWS, "n_observations must be a whole number of"),
+        (
+            ["mine.csv", "--stimulus", "bar", "--folds", "7"],
+            ROWS,
+            "n_folds must be at most the number of stimuli",
+        ),
         (
             ["mine.csv", "--stimulus", "bar", "--folds", "1"],
             ROWS,
@@ -539,6 +547,8 @@ def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_pa
             "shift_mm,static_rate_hz\n" + "".join(f"{row},9\n" for row in range(8)),
             "recordings must leave at least 5 rates",
         ),
+        (["mine.csv", "--stimulus", "bar", "--finger", "chid"], ROWS, "--finger: like must be one of adult"),
+        (["mine.csv", "--stimulus", "list.csv", "--finger", "a.inp"], ROWS, "--finger: a.inp must be a file"),
         (["mine.csv", "--stimulus", "bar", "--jobs", "0"], ROWS, "jobs must be a whole number of at least 1"),
         (["mine.csv", "--stimulus", "bar", "--materials", "wood"], ROWS, "materials must be one of"),
         (["mine.csv", "--stimulus", "bar", "--resolution", "high"], ROWS, "resolution must be one of quick"),
@@ -578,7 +588,7 @@ def test_bad_input_is_one_sentence_and_status_2_and_nothing_is_written(
     call, tmp_path, arguments, content, said
 ):
     (tmp_path / "mine.csv").write_bytes(content if isinstance(content, bytes) else content.encode())
-    (tmp_path / "list.csv").write_text("stimulus,indenter\nedge,bar\nwide,bar\n")
+    (tmp_path / "list.csv").write_text("name,object\nedge,bar\nwide,bar\n")
     status, out, errors = call(*arguments)
     assert (status, out) == (2, "")
     assert said in errors
@@ -659,17 +669,17 @@ def test_a_fit_from_nothing_recovers_a_known_afferent(call, monkeypatch, tmp_pat
         cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
     # The kernels may be compiled only now.
-    said = [line for line in shell.stderr.splitlines() if not line.startswith(SUBJECT)]
+    said = [line for line in shell.stderr.splitlines() if not line.startswith((SUBJECT, "indentations: "))]
     assert (shell.returncode, said) == (0, [])
     folder = tmp_path / "fit"
     assert json.loads((folder / "fit.json").read_text())["manifest"]["stages"][1]["computed"] == 3
 
     monkeypatch.undo()
     monkeypatch.chdir(tmp_path)
-    stimuli = {name: ShiftedBar().named(name)[1] for name in listed}
+    stimuli = [ShiftedBar().named(name) for name in listed]
     store, pressed = (
         runner.Store(folder / runner.STORE_FOLDER),
-        session.stimulus_touches(stimuli, Conditions("quick")),
+        ShiftedBar().touches(stimuli, Conditions("quick")),
     )
     followed = (known.dynamic_quantity, known.static_quantity)
     stress = [store.load(touch).sed([[RECEPTOR_X_MM, 0.0]], *followed) for touch in pressed.values()]

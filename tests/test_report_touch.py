@@ -106,6 +106,20 @@ def test_a_body_that_moved_is_drawn_where_it_is_at_the_end_if_that_is_on_the_mid
     assert drawn(Pose(x_mm=2.0)).get_xlim()[0] == pytest.approx(drawn(Pose()).get_xlim()[0] + 2.0)
 
 
+def test_a_hole_through_a_body_is_drawn_as_a_hole(skin):
+    """A ring of triangles: two parts in the section, 2 mm apart, and nothing between them."""
+    angle = np.arange(48) * 2 * np.pi / 48
+    flat = [[r * np.cos(a), 0.0, r * np.sin(a)] for r in (1.0, 2.0) for a in angle]
+    near = np.arange(48)
+    after, outer = (near + 1) % 48, near + 48
+    quads = np.stack([near, after, after + 48, outer], axis=1)
+    ring = fp.Surface(np.array(flat), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+    axes = new_figure(4.0, 3.0).subplots()
+    touch_figure._draw_indenter(axes, skin, skin.section(), ring)
+    left, right = (patch.get_xy()[:, 0] for patch in axes.patches)
+    assert right.min() - left.max() == pytest.approx(2.0, abs=0.15)
+
+
 def test_trains_stand_in_the_order_of_their_distance_and_silent_ones_are_counted(skin):
     trains = {2.0: [3.0, 9.0], 0.5: [1.0], 9.0: [], 4.0: [7.0]}
     response = SimpleNamespace(

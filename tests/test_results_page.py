@@ -71,7 +71,7 @@ def test_a_readme_without_its_marks_and_a_comparison_without_its_rows_are_refuse
 
 
 def test_files_that_are_missing_or_of_another_kind_are_refused(tmp_path):
-    with pytest.raises(StoreError, match=r"none\.json cannot be read"):
+    with pytest.raises(StoreError, match=r"none\.json must be a file that can be read"):
         read_excerpt(tmp_path / "none.json")
     (tmp_path / "other.json").write_text(json.dumps({"format": "fingerpad fit", "format_version": 1}))
     with pytest.raises(StoreError, match="must have the format fingerpad reproduction"):

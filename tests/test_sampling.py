@@ -1,6 +1,7 @@
 """Sampling of the skin: exact for linear fields, mirrored in z, refused beside the finger."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,7 +16,14 @@ from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
 from sections import DEPTHS_MM, LAYER_OF_INTERVAL, layered_block
 
 TIMES_MS = np.array([0.0, 50.0, 1000.0])
-QUICK = finger_mesh(Fingertip(), resolution_grading("quick", 17.37))
+
+
+@cache
+def mesh_of(resolution):
+    return finger_mesh(Fingertip(), resolution_grading(resolution, 17.37))
+
+
+QUICK = mesh_of("quick")
 MIDDLE_DEPTH_MM = 0.421
 """Depth of the middles of the living epidermis' elements, whose means are read."""
 
@@ -88,6 +96,22 @@ def test_smooth_field_is_read_within_the_error_of_its_mesh():
         read = response(layered_block(symmetric=symmetric), bump).sed(SITES).sed_kpa[-1]
         expected = bump(np.column_stack([SITES[:, 0], np.zeros(len(SITES)), SITES[:, 1]]))
         np.testing.assert_allclose(read, expected, rtol=0, atol=0.01)
+
+
+def test_sites_are_found_once_on_equal_meshes_and_anew_on_others(monkeypatch):
+    found = []
+    under = ReceptorSheet.under
+    monkeypatch.setattr(
+        ReceptorSheet, "under", lambda sheet, organs: found.append(sheet.mesh) or under(sheet, organs)
+    )
+    sites = SITES + np.array([0.125, 0.0])
+    mesh = layered_block()
+    same = replace(mesh, nodes_mm=mesh.nodes_mm.copy())
+    moved = replace(mesh, nodes_mm=mesh.nodes_mm + np.array([0.5, 0.0, 0.0]))
+    read = [response(each, bump).sed(sites).sed_kpa for each in (mesh, same, moved)]
+    assert [each is moved for each in found] == [False, True]
+    np.testing.assert_array_equal(read[0], read[1])
+    assert not np.allclose(read[0], read[2])
 
 
 def test_energy_never_falls_below_zero_beside_a_steep_front():
@@ -198,7 +222,7 @@ def by_triangles(mesh, values, organs):
 )
 def test_smooth_fields_are_read_better_than_by_triangles(resolution, field, quick, standard):
     """The errors of docs/decisions/sampling-between-elements.md."""
-    mesh = finger_mesh(Fingertip(), resolution_grading(resolution, 17.37))
+    mesh = mesh_of(resolution)
     sites = np.random.default_rng(1).uniform([14.0, -3.0], [20.5, 3.0], (1000, 2))
     sheet, truth = ReceptorSheet(mesh), FIELDS_IN_SPACE[field]
     x, _, z = mesh.nodes_mm[mesh.elements[mesh.living_epidermis.ravel()]].mean(axis=1).T

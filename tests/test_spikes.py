@@ -87,5 +87,5 @@ def test_a_train_that_runs_backwards_is_refused_but_trains_may_overlap():
 
 
 def test_offsets_with_a_fraction_are_refused_not_cut():
-    with pytest.raises(InputError, match="offsets must be whole numbers"):
+    with pytest.raises(InputError, match="offsets must hold whole numbers"):
         SpikeTrains([1.0, 2.0], [0, 0.5, 2])

@@ -13,6 +13,7 @@ import pytest
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
+from fingerpad.cli import main
 from fingerpad.core.errors import ConvergenceError, InputError, StoreError
 from fingerpad.export.dataset import touch_dataset
 from fingerpad.export.vtu import write_vtu_series
@@ -28,7 +29,7 @@ from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.skin.fields import FIELDS, Field, Place, Times
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
-from fingerpad.skin.store import Store, solve_missing, touch_key
+from fingerpad.skin.store import Store, _checksum, solve_missing, touch_key
 
 COARSE = Grading(
     17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=6.0, stratum_corneum=1, living_epidermis=1, dermis=1, subcutis=1
@@ -156,14 +157,14 @@ def test_key_changes_with_what_a_user_would_change(change):
 
 def test_indenters_of_equal_numbers_have_different_keys():
     bodies = [
-        Line(0.9),
-        Cylinder(0.9),
-        Bar(0.9),
-        FlatPunch(0.9),
-        Sphere(0.9),
+        Line(3.5),
+        Cylinder(3.5),
+        Bar(3.5),
+        FlatPunch(3.5),
+        Sphere(3.5),
         Plate(),
-        Bar(0.9, 0.1),
-        Edge(0.9),
+        Bar(3.5, 0.1),
+        Edge(3.5),
     ]
     assert len({touch_key(replace(TINY, indenter=body)) for body in bodies}) == len(bodies)
 
@@ -231,10 +232,8 @@ def test_arrays_that_are_not_known_are_left_aside_and_a_missing_one_is_named(tmp
         for name, axes in {**DOUBLE, **SINGLE}.items()
     }
     solution = np.array([0.1, 0.2, 0.3, 4.0, 5.0])
-    np.savez(
-        store.path(TINY), **content, direction=np.array([0.0, 1.0, 0.0]), solution=solution,
-        linear_solver=np.array("multigrid"),
-    )  # fmt: skip
+    known = {"solution": solution, "linear_solver": np.array("multigrid")}
+    write_signed(store.path(TINY), content | known | {"direction": np.array([0.0, 1.0, 0.0])})
     back = store.load(TINY)
     assert set(back.fields) == set(content)
     for name, values in content.items():
@@ -249,8 +248,8 @@ def test_arrays_that_are_not_known_are_left_aside_and_a_missing_one_is_named(tmp
         }
         np.testing.assert_array_equal(file["solution"], solution)
     del content["contact_area_mm2"]
-    np.savez(store.path(TINY), **content, solution=solution, linear_solver=np.array("multigrid"))
-    with pytest.raises(StoreError, match=r"contact_area_mm2 .*: delete it and run again\."):
+    write_signed(store.path(TINY), content | known)
+    with pytest.raises(StoreError, match=r"contact_area_mm2.*: run again, which sets it aside\."):
         store.load(TINY)
 
 
@@ -312,24 +311,39 @@ def test_only_the_touch_itself_is_held(stored):
     assert not Store(stored.folder / "elsewhere").holds(TINY)
 
 
+def content_of(path):
+    with np.load(path) as file:
+        return {name: file[name] for name in file.files if name not in ("key", "checksum")}
+
+
+def write_signed(path, content):
+    """Write arrays with the key and the checksum that they should have."""
+    checksum = _checksum(path.stem, content)
+    with open(path, "wb") as file:
+        np.savez(file, **content, key=np.array(path.stem), checksum=np.array(checksum))
+
+
 def without(name):
     def rewrite(path):
-        with np.load(path) as file:
-            content = {key: file[key] for key in file.files if key != name}
-        with open(path, "wb") as file:
-            np.savez(file, **content)
+        write_signed(path, {key: array for key, array in content_of(path).items() if key != name})
 
     return rewrite
 
 
 def with_array(name, array):
-    def rewrite(path):
-        with np.load(path) as file:
-            content = {key: file[key] for key in file.files} | {name: array}
-        with open(path, "wb") as file:
-            np.savez(file, **content)
+    return lambda path: write_signed(path, content_of(path) | {name: array})
 
-    return rewrite
+
+def edited(path):
+    """Change a number and leave the checksum as it was."""
+    with np.load(path) as file:
+        content = {name: file[name] for name in file.files}
+    with open(path, "wb") as file:
+        np.savez(file, **content | {"force_mn": 2.0 * content["force_mn"]})
+
+
+def unsigned(path):
+    np.savez(path, **content_of(path))
 
 
 def one_bit_in_the_middle(path):
@@ -349,6 +363,8 @@ def a_folder(path):
 
 
 DAMAGES = {
+    "edited": edited,
+    "of an older version": unsigned,
     "empty": lambda path: path.write_bytes(b""),
     "truncated by a byte": lambda path: path.write_bytes(path.read_bytes()[:-1]),
     "half": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
@@ -381,8 +397,68 @@ def test_a_damaged_file_is_named_in_one_sentence(stored, damage):
         stored.load(TINY)
     said = str(refusal.value)
     assert str(path) in said
-    assert said.endswith(": delete it and run again.")
+    assert said.endswith(": run again, which sets it aside.")
     assert "\n" not in said
+
+
+@pytest.mark.parametrize("damage", ["edited", "one bit", "half", "text", "folder", "of an older version"])
+def test_a_damaged_file_is_set_aside_and_computed_again(stored, caplog, damage):
+    path = stored.path(TINY)
+    known = stored.load(TINY)
+    DAMAGES[damage](path)
+    missing = stored.missing([TINY])
+    assert list(missing) == [path]
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert str(path) in line
+    assert "computed again" in line
+    assert path.with_name(f"{path.name}.damaged").exists()
+    solve_missing(missing, 1)
+    np.testing.assert_array_equal(stored.load(TINY).force_mn, known.force_mn)
+    assert stored.missing([TINY]) == {}
+
+
+def test_swapped_files_are_noticed(stored, skin):
+    stored.save(SIX[0], skin)
+    one, other = stored.path(TINY), stored.path(SIX[0])
+    content = one.read_bytes()
+    one.write_bytes(other.read_bytes())
+    other.write_bytes(content)
+    with pytest.raises(StoreError, match="it is the result of another touch"):
+        stored.load(TINY)
+    assert set(stored.missing([TINY, SIX[0]])) == {one, other}
+
+
+def test_the_command_lists_verifies_and_prunes(stored, skin, run_program, caplog):
+    stored.save(SIX[0], skin)
+    os.utime(stored.path(SIX[0]), (0.0, 0.0))
+
+    def call(*words):
+        return run_program(main, "fingerpad", "store", *words)
+
+    status, said, _ = call("list", stored.folder)
+    assert status == 0
+    assert said.splitlines()[0].startswith(stored.path(SIX[0]).stem)
+    assert said.splitlines()[-1].startswith("2 indentations, ")
+    assert call("verify", stored.folder)[:2] == (0, "2 indentations, 0 damaged\n")
+    edited(stored.path(TINY))
+    status, said, _ = call("verify", stored.folder)
+    assert status == 1
+    assert said == f"{stored.path(TINY)}: its content has another checksum\n2 indentations, 1 damaged\n"
+    assert call("prune", stored.folder, "--days", 30)[1].startswith("1 of 2 indentations")
+    assert len(stored.files()) == 2  # --yes was not given
+    assert call("prune", stored.folder, "--days", 30, "--yes")[0] == 0
+    assert [file.path for file in stored.files()] == [stored.path(TINY)]
+    assert call("prune", stored.folder, "--size", 0, "--yes")[0] == 0
+    assert stored.files() == []
+    for words, expected in (
+        (("prune", stored.folder), "prune needs --days, --size or both"),
+        (("list", stored.folder / "none"), "must be a folder of stored indentations"),
+        (("prune", stored.folder, "--days", -1), "must not be negative"),
+    ):
+        status, _, errors = call(*words)
+        assert status == 2
+        assert expected in errors
+        assert errors.count("\n") == 1
 
 
 def test_any_byte_changed_is_noticed_or_harmless(stored):

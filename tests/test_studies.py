@@ -137,7 +137,7 @@ def test_materials_of_the_conditions_reach_the_later_studies_but_not_the_trials(
         (lambda: Conditions("fine"), "resolution must be one of quick, standard, paper: got 'fine'"),
         (lambda: Conditions(materials="humann"), "materials must be one of human, paper, .*got 'humann'"),
         (lambda: Conditions(seed=-1), "seed must be a whole number of at least 0: got -1"),
-        (lambda: Conditions(seed=0.5), "seed must be a whole number of at least 0: got 0.5"),
+        (lambda: Conditions(seed=0.5), "seed must be a whole number: got 0.5"),
         (lambda: Reproduction(Conditions(), "here", jobs=0), "jobs must be a whole number of at least 1"),
         (lambda: Reproduction(Conditions(), "here", jobs=True), "jobs must be a whole number of at least 1"),
     ],

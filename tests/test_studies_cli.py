@@ -80,7 +80,7 @@ def test_every_study_has_a_command_and_a_line_of_help(call):
         (["drives", "--resolution", "fine"], "resolution must be one of quick, standard, paper", "'fine'"),
         (["paper-size", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
         (["mesh-refinement", "--resolution", "quick"], "No such option", "--resolution"),
-        (["results", "none.json"], "none.json cannot be read as JSON", "No such file"),
+        (["results", "none.json"], "none.json must be a file that can be read", "No such file"),
         (["meshes"], "No such command", "'meshes'"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

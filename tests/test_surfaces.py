@@ -9,6 +9,7 @@ from PIL import Image
 from fingerpad.core.errors import InputError
 from fingerpad.geometry.closest_point import Triangles
 from fingerpad.geometry.composed import Union, ridges
+from fingerpad.geometry.dots import Dots
 from fingerpad.geometry.edged_indenters import Grating
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading, resolution_grading
@@ -209,6 +210,60 @@ def test_a_body_from_triangles_presses_as_its_analytic_twin(body, size_mm, tmp_p
         np.testing.assert_allclose(twin.sed_kpa, exact.sed_kpa, rtol=0, atol=0.02 * exact.sed_kpa.max())
 
 
+@pytest.mark.parametrize("radius_mm", [0.1, 0.3, 0.6])
+@pytest.mark.parametrize("kind", ["surface", "map", "union"])
+def test_rounded_edges_are_those_of_the_analytic_bar(radius_mm, kind):
+    """Sharp bars of triangles, of heights and of parts, against the bar with fillets: gap to rounding errors.
+
+    Walls of a map lean by its pitch, so that one with a fine pitch near the edges is taken.
+    """
+    if kind == "surface":
+        body = Surface(CUBE * [1.5, 2.0, 10.0], SIDES, edge_radius_mm=radius_mm)
+    elif kind == "union":
+        halves = Bar(2.5, 0.0), Bar(2.5, 0.0)
+        body = Union(halves, [(-0.25, 0.0, 0.0), (0.25, 0.0, 0.0)], edge_radius_mm=radius_mm)
+    else:
+        heights = np.where(np.abs(np.arange(-2.0, 2.0005, 0.001)) < 1.5, 0.0, -4.0) * np.ones((2, 1))
+        wide = height_surface(heights, 0.001)
+        body = Surface(wide.vertices_mm * [1.0, 1.0, 2e4], wide.faces, edge_radius_mm=radius_mm)
+    points = np.random.default_rng(2).uniform([-2.2, -1.5, -6.0], [2.2, 0.8, 6.0], (3000, 3))
+    gap, normal = Bar(3.0, radius_mm).gap(points)
+    near = (gap > -radius_mm) & (gap < 0.7)
+    found = body.gap(points[near])
+    exact = 1e-3 if kind == "map" else 1e-11
+    np.testing.assert_allclose(found[0], gap[near], rtol=0, atol=exact)
+    if kind != "map":
+        np.testing.assert_allclose(found[1], normal[near], rtol=0, atol=1e-9)
+
+
+def test_corners_are_rounded_as_a_ball_and_hollows_stay():
+    cube = Surface(CUBE, SIDES, edge_radius_mm=0.4)
+    points = np.random.default_rng(3).uniform([-1.6, -2.6, -2.1], [1.6, 0.6, 2.1], (4000, 3))
+    core = points - np.clip(points, [-0.6, -1.6, -1.1], [0.6, -0.4, 1.1])
+    exact = np.linalg.norm(core, axis=1) - 0.4
+    outside = exact > -0.4 + 1e-9
+    np.testing.assert_allclose(cube.gap(points[outside])[0], exact[outside], rtol=0, atol=1e-11)
+    check_gap(cube.gap, "cube")
+    steps = ridges([-1.0, 1.0], [1.0, 1.0], fillet_mm=0.0, height_mm=0.5)
+    round_ones = replace(steps, edge_radius_mm=0.2)
+    foot, top = np.array([[-0.45, -0.47, 0.0]]), np.array([[-0.5, 0.0, 0.0]])
+    assert round_ones.gap(foot)[0] == steps.gap(foot)[0]
+    assert round_ones.gap(top)[0] == pytest.approx(0.2 * (np.sqrt(2.0) - 1.0), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda: Surface(CUBE * [0.3, 1.0, 1.0], SIDES, edge_radius_mm=0.5),
+        lambda: Union([Bar(0.5, 0.0), Plate()], [(0, 0, 0), (0, -1, 0)], edge_radius_mm=0.3),
+    ],
+    ids=["surface", "union"],
+)
+def test_edges_that_do_not_fit_are_refused(made):
+    with pytest.raises(InputError, match="edge_radius_mm must not exceed half of the narrowest part"):
+        made()
+
+
 def test_the_content_of_a_surface_is_its_key():
     same, other = CUBE.copy(), CUBE.copy()
     other[3, 0] = np.nextafter(other[3, 0], 9.0)
@@ -227,6 +282,19 @@ def test_fine_relief_asks_for_a_mesh_that_resolves_it():
         touch_of(Fingertip(), rippled, grading=replace(COARSE, full=True))
     assert height_surface(map_of(Sphere(curvature_per_m=287.0), 2.0), 0.1).relief_mm > 1.5
     assert cup(8.0).relief_mm == 2.0  # its borders are slopes, not ridges
+    assert [Surface(CUBE * [half, 1.0, 1.0], SIDES).relief_mm for half in (0.05, 0.3)] == [0.1, 0.6]
+
+
+def test_a_mesh_must_resolve_the_parts_of_a_union():
+    across = ridges([-1.6, 0.0, 1.0], [1.2, 0.6, 0.6], fillet_mm=0.1)
+    assert (across.narrowest_mm, across.relief_mm, across.edge_reach_mm) == (0.4, np.inf, 2.2)
+    graded = grading_about(across, "quick", 17.37)
+    assert graded.core_size_mm <= 0.1 < graded.size_z_mm
+    with pytest.raises(InputError, match="grading must have elements of at most"):
+        touch_of(Fingertip(), across, grading=COARSE)
+    cross = Union([Bar(0.6, 0.1), Dots([(0.0, 0.0)], 1.6, 0.4)], [(0, 0, 0), (0, 0, 0)])
+    assert cross.relief_mm == 0.6
+    assert Union([Sphere(100.0), Plate()], [(0, 0, 0), (0, -1, 0)]).narrowest_mm == np.inf
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.plain_yaml import read_yaml
@@ -15,6 +17,7 @@ from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.descriptions.reading import parts_in
 from fingerpad.experiments.discrimination.analysis import PreparedTask
+from fingerpad.experiments.discrimination.run import DiscriminationRun
 from fingerpad.experiments.discrimination.task import DiscriminationTask
 from fingerpad.experiments.discrimination.task_files import example_tasks, input_hashes, parse_task, read_task
 from fingerpad.experiments.discrimination.task_stimuli import task_population, task_stimuli, task_touches
@@ -29,6 +32,8 @@ from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.skin.nail_edge import NailEdge
 from fingerpad.skin.unrolled_skin import UnrolledSkin
+from tests.mutations import CHANGES, VALUES, places
+from tests.mutations import changed as mutated
 
 ROOT = Path(__file__).parents[1]
 SPHERES = {
@@ -248,9 +253,9 @@ def test_ready_made_questions_can_be_asked(name):
 
 def test_a_folder_named_like_an_example_task_is_not_taken_for_a_file(tmp_path, monkeypatch):
     (tmp_path / "sphere_curvature").mkdir()
-    before = input_hashes("sphere_curvature", read_task("sphere_curvature"))
+    before = input_hashes("sphere_curvature", read_task("sphere_curvature"), ())
     monkeypatch.chdir(tmp_path)
-    assert input_hashes("sphere_curvature", read_task("sphere_curvature")) == before
+    assert input_hashes("sphere_curvature", read_task("sphere_curvature"), ()) == before
 
 
 # YAML as people mean it
@@ -290,11 +295,13 @@ question: 3
 noise: null
     noise must be given
 noise: -0.1
-    noise must be a number not below 0, or fitted: got -0.1.
+    noise must be a number from 0 to 1000, or fitted: got -0.1.
+noise: 1e300
+    noise must be a number from 0 to 1000, or fitted: got 1e+300.
 noise: much
-    noise must be a number not below 0, or fitted: got 'much'.
+    noise must be a number from 0 to 1000, or fitted: got 'much'.
 noise: true
-    noise must be a number not below 0, or fitted: got True.
+    noise must be a number from 0 to 1000, or fitted: got True.
 {noise: 0, code: [gradient_sum, ideal]}
     noise must be greater than 0 where code has ideal: got 0.
 {noise: fitted, code: [ideal, euclidean], observed: {points: [{at: 296, hit_rate: 0.6}]}}
@@ -503,11 +510,11 @@ def test_invalid_values_are_refused_in_one_sentence_with_their_position(parts, s
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("question: a\nquestion: b\n", "mine.yaml, line 1: question is repeated, keep one."),
+        ("question: a\nquestion: b\n", "mine.yaml, line 2: question is repeated, keep one."),
         ("question: [a\n", "mine.yaml cannot be read as YAML"),
         ("- 1\n- 2\n", "mine.yaml, the file must be a mapping of keys to values: got [1, 2]."),
         ("", "mine.yaml, the file must be a mapping of keys to values: got None."),
-        ("question: &a [*a]\n", "mine.yaml, line 1, question must be a text"),
+        ("question: &a [*a]\n", "mine.yaml cannot be read as YAML (it has an anchor or an alias"),
         ("[" * 600, "mine.yaml cannot be read as YAML"),
         ("{[1]: 2}", "mine.yaml cannot be read as YAML"),
     ],
@@ -585,3 +592,52 @@ def test_a_task_on_a_child_presses_and_samples_the_child_s_pad():
     assert next(iter(touches.values())).grading.size_x_mm < 0.45
     middle = task_population(task).positions_mm.mean(axis=0)
     assert middle == pytest.approx(child.contact_mm, abs=1e-9)
+
+
+# Random changes
+
+
+LETTERS = {
+    "question": "Which letters can be discriminated?",
+    "resolution": "quick",
+    "finger": {"like": "child"},
+    "tissues": "human",
+    "motion": {"kind": "stroke", "depth_mm": 0.3, "speed_mm_per_s": 20.0, "x_mm": 2.0},
+    "place": {"x_mm": 0.5},
+    "friction": 0.3,
+    "stimuli": [
+        {"name": "a", "level": 1.0, "object": {"kind": "braille", "text": "a"}},
+        {"name": "edge", "level": 2.0, "object": "edge", "place": {"spin_deg": 10.0}},
+        {"name": "ball", "level": 3.0, "object": {"kind": "sphere", "radius_mm": 3.0}, "friction": 0.0},
+    ],
+    "standard": "a",
+    "population": {"layout": "hexagonal", "density_per_cm2": 70.0, "region": {"shape": "pad"}},
+    "code": ["euclidean"],
+    "measure": ["static", "dynamic"],
+    "windows_ms": {"dynamic": [0.0, 50.0]},
+    "noise": 0.1,
+    "experiment": {"seed": 3, "trials": 50},
+    "curve": {"sigmoid": "logistic", "lapse": 0.02},
+    "observed": {"source": "people", "points": [{"at": 2.0, "hit_rate": 0.8, "trials": 20}]},
+}
+
+
+@pytest.mark.filterwarnings("ignore::fingerpad.core.errors.InertiaWarning")
+@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    st.sampled_from([(task, place) for task in (SPHERES, LETTERS) for place in places(task) if place]),
+    VALUES,
+    CHANGES,
+)
+def test_any_change_of_a_task_is_possible_or_refused_in_one_sentence(where, value, change):
+    task, place = where
+    said = "mine.yaml, possible."
+    try:
+        DiscriminationRun(
+            parse_task(mutated(task, place, value, change), "mine.yaml"), Path(), 1, "mine.yaml"
+        )
+    except InputError as error:
+        said = str(error)
+    assert said.startswith("mine.yaml, ")
+    assert "\n" not in said
+    assert said[-1] in ".?"

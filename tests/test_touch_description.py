@@ -1,5 +1,6 @@
 """Descriptions of a touch: what they mean, what is refused, and what their commands write."""
 
+import hashlib
 import json
 import re
 from pathlib import Path
@@ -16,14 +17,25 @@ from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.results import from_json, to_json
 from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.descriptions.estimate import estimate
+from fingerpad.experiments.descriptions.estimate import (
+    BASE_MB,
+    OWN_EXPONENT,
+    OWN_NODE_MB,
+    OWN_NODES,
+    estimate_press,
+)
 from fingerpad.experiments.descriptions.example import EXAMPLE
 from fingerpad.experiments.descriptions.pressed import TouchFile, respond
 from fingerpad.experiments.descriptions.pressing import MOTIONS, OBJECTS
+from fingerpad.experiments.descriptions.reading import part_from
+from fingerpad.experiments.descriptions.stimuli import StimulusSet, named_stimuli
 from fingerpad.experiments.descriptions.touch import OUTPUTS, described_touch
+from fingerpad.export.formats import export_touch
 from fingerpad.export.touch_outputs import WRITERS, as_described, check_described, run_touch
+from fingerpad.geometry import surface_files
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.skin.indentation import touch_of
+from tests.mutations import CHANGES, VALUES, changed, places
 
 ROOT = Path(__file__).parents[1]
 FULL = {
@@ -131,6 +143,43 @@ def test_a_recorded_motion_is_named_from_the_folder_of_the_description(tmp_path)
     assert set(described.input_hashes()) == {str(path), str(tmp_path / "deep" / "press.csv")}
 
 
+def test_hashes_name_every_file_of_a_description(tmp_path):
+    for name in ("own.inp", "body.stl", "press.csv", "fit.json"):
+        (tmp_path / name).write_bytes(name.encode())
+    (tmp_path / "touch.yaml").write_text(
+        "finger: {kind: mesh, path: own.inp}\nobject: {kind: surface, path: body.stl, unit: mm}\n"
+        "motion: {kind: recorded, file: press.csv}\nafferents: {afferent: fit.json}\n"
+    )
+    found = fp.read_touch_description(tmp_path / "touch.yaml").input_hashes()
+    assert {Path(name).name for name in found} == {
+        "touch.yaml",
+        "own.inp",
+        "body.stl",
+        "press.csv",
+        "fit.json",
+    }
+    assert found[str(tmp_path / "own.inp")] == hashlib.sha256(b"own.inp").hexdigest()
+    (tmp_path / "touch.yaml").write_text("finger: own.inp\nobject: sphere\n")
+    again = fp.read_touch_description(tmp_path / "touch.yaml").input_hashes()
+    assert {Path(name).name for name in again} == {"touch.yaml", "own.inp"}
+
+
+def test_a_surface_of_several_stimuli_is_read_once(tmp_path, monkeypatch):
+    np.savetxt(tmp_path / "map.csv", np.zeros((4, 4)), delimiter=",")
+    read = []
+    original = surface_files.height_surface
+    monkeypatch.setattr(surface_files, "height_surface", lambda *sizes: read.append(1) or original(*sizes))
+    asked = part_from(
+        StimulusSet,
+        {
+            "object": {"kind": "height_map", "path": "map.csv", "pitch_mm": 0.5},
+            "stimuli": {"vary": "place.spin_deg", "values": [0.0, 10.0, 20.0]},
+        },
+    )
+    made = named_stimuli(asked, tmp_path)
+    assert len({id(stimulus.indenter) for stimulus in made}) == 1 == len(read)
+
+
 def test_afferents_are_those_of_a_task_with_the_same_words():
     described = described_touch(
         FULL | {"afferents": {"layout": "nail rows", "rows": 2, "afferent": {"static_gain": 1e-6}}}
@@ -202,7 +251,7 @@ WRONG = [
         "object:\n\tkind: sphere\n",
         "cannot be read as YAML (found character '\\t' that cannot start any token, line 2)",
     ),
-    ("object: sphere\nobject: plate\n", "line 1: object is repeated, keep one"),
+    ("object: sphere\nobject: plate\n", "line 2: object is repeated, keep one"),
     ("object: {kind: sphere, kind: plate}\n", "kind is repeated"),
     ("[" * 600, "cannot be read as YAML"),
     ("{[1]: 2}\n", "cannot be read as YAML"),
@@ -228,8 +277,8 @@ WRONG = [
     ),
     ("object: {kind: plate, width_mm: 3}\n", "object.width_mm is unknown: object has kind"),
     ("object: {kind: sphere, radius_mm: wide}\n", "object.radius_mm must be a finite number: got 'wide'"),
-    ("object: {kind: sphere, radius_mm: .nan}\n", "object.radius_mm must be a finite number: got nan"),
-    ("object: {kind: sphere, radius_mm: .inf}\n", "object.radius_mm must be a finite number: got inf"),
+    ("object: {kind: sphere, radius_mm: .nan}\n", "object.radius_mm must be a finite number: got '.nan'"),
+    ("object: {kind: sphere, radius_mm: .inf}\n", "object.radius_mm must be a finite number: got '.inf'"),
     ("object: {kind: sphere, radius_mm: true}\n", "object.radius_mm must be a finite number: got True"),
     ("object: {kind: sphere, radius_mm: 2020-01-01}\n", "object.radius_mm must be a finite number"),
     (
@@ -358,6 +407,12 @@ def test_a_malformed_description_is_refused_in_one_sentence_and_nothing_is_writt
         assert [path.name for path in Path().iterdir()] == ["touch.yaml"]
 
 
+def test_a_way_of_hundreds_of_kilometres_is_refused_at_once():
+    stroke = {"kind": "stroke", "depth_mm": 0.3, "speed_mm_per_s": 20.0, "x_mm": 999_999_999}
+    with pytest.raises(fp.InputError, match=r"The indenter must not leave the finger at .* sample 4"):
+        described_touch({"object": "sphere", "motion": stroke}).touch  # noqa: B018
+
+
 def test_files_that_are_no_text_are_refused(call):
     Path("touch.yaml").write_bytes(bytes(range(256)))
     status, _, error = call("check", "touch.yaml")
@@ -370,48 +425,16 @@ def test_files_that_are_no_text_are_refused(call):
     assert "cannot be read as YAML" in call("check", "zero.yaml")[2]
 
 
-VALUES = st.one_of(
-    st.none(), st.booleans(), st.integers(-(10**400), 10**400), st.integers(-5, 5), st.floats(),
-    st.text(max_size=5),
-    st.lists(st.floats(), max_size=3),
-    st.dictionaries(st.text(max_size=5), st.integers(), max_size=2),
-    st.sampled_from(["sphere", "sine", "grid", "kind", "csv"]),
-)  # fmt: skip
-
-
-def places(content, place=()):
-    """Every place in nested mappings and lists."""
-    yield place
-    items = (
-        content.items()
-        if isinstance(content, dict)
-        else enumerate(content)
-        if isinstance(content, list)
-        else ()
-    )
-    for key, value in items:
-        yield from places(value, (*place, key))
-
-
+@pytest.mark.filterwarnings("ignore::fingerpad.core.errors.InertiaWarning")
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     st.sampled_from([place for place in places(FULL) if place]),
     VALUES,
-    st.sampled_from(["set", "drop", "rename"]),
+    CHANGES,
 )
 def test_any_change_of_a_description_is_possible_or_refused_in_one_sentence(place, value, change):
-    content = json.loads(json.dumps(FULL))
-    holder = content
-    for part in place[:-1]:
-        holder = holder[part]
-    if change == "set" or not isinstance(holder, dict):
-        holder[place[-1]] = value
-    else:
-        kept = holder.pop(place[-1])
-        if change == "rename":
-            holder[str(value)[:20]] = kept
     try:
-        check_described(described_touch(content))
+        check_described(described_touch(changed(FULL, place, value, change)))
     except fp.InputError as error:
         said = str(error)
     else:
@@ -473,11 +496,22 @@ def test_a_touch_is_pressed_once_and_its_outputs_are_what_python_computes(call, 
     assert first.spikes.times_ms.tolist() != other.spikes.times_ms.tolist()
 
 
+def test_the_estimate_of_a_mesh_of_ones_own_counts_its_nodes_and_its_elimination(tmp_path):
+    coarse = fp.Grading(17.37, 2.0, 2.0, 0.8, 0.8, 3.0, stratum_corneum=1, dermis=2, subcutis=2)
+    touch = fp.touch_of(fp.Fingertip(), fp.Sphere(), fp.RampAndHold(0.5), grading=coarse)
+    path = export_touch(tmp_path, touch, "abaqus")[0]
+    own = estimate_press(described_touch({"object": "sphere", "finger": str(path)}))
+    ours = estimate_press(described_touch({"object": "sphere"}))
+    assert own.nodes == len(touch.mesh.nodes_mm) > OWN_NODES
+    assert own.time_s / own.nodes == pytest.approx(ours.time_s / ours.nodes * own.nodes / OWN_NODES)
+    assert own.memory_mb > BASE_MB + OWN_NODE_MB * own.nodes**OWN_EXPONENT
+
+
 def test_the_estimate_grows_with_mesh_steps_force_and_friction():
     ball = {"object": "sphere"}
-    base = estimate(described_touch(ball))
+    base = estimate_press(described_touch(ball))
     more = [
-        estimate(described_touch(ball | change))
+        estimate_press(described_touch(ball | change))
         for change in (
             {"resolution": "standard"},
             {"motion": {"force_mn": 100}},

@@ -218,7 +218,11 @@ def test_finger_is_released_from_a_millimetre():
     assert 0.0 < sed[-1] < 0.1 * sed.max()
 
 
-def test_punch_that_goes_between_two_nodes_is_refused_instead_of_pressing_with_no_force():
+def test_punch_that_goes_between_two_nodes_is_refused_instead_of_pressing_with_no_force(monkeypatch):
     tiny = FlatPunch(diameter_mm=0.1, fillet_mm=0.02)
+    with pytest.raises(InputError, match="would go between the nodes"):
+        touch_of(Fingertip(), tiny, RampAndHold(depth_mm=0.3))
+    # What its size does not tell is told by the force.
+    monkeypatch.setattr("fingerpad.skin.indentation.FEWEST_ACROSS_BODY", 1)
     with pytest.raises(InputError, match="FlatPunch goes between the nodes of the skin"):
         touch_of(Fingertip(), tiny, RampAndHold(depth_mm=0.3)).solve()

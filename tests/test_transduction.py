@@ -185,6 +185,23 @@ def test_the_fast_evaluation_is_that_of_the_interpolants_themselves():
     assert (fast.times_ms == 50.0).sum() == 2
 
 
+def test_traces_share_the_memory_of_checked_values_only():
+    given = np.array([[0.0, 0.0], [1.0, 2.0]])
+    sed = SedTraces([0.0, 50.0], given)
+    given[1] = 9.0
+    assert sed.sed_kpa[1].tolist() == [1.0, 2.0]
+    assert np.shares_memory(sed.part(slice(1, 2)).sed_kpa, sed.sed_kpa)
+    frozen = given[:, :1]
+    frozen.setflags(write=False)
+    held = SedTraces([0.0, 50.0], frozen)
+    given[1] = 7.0
+    assert held.sed_kpa[1, 0] == 9.0
+    with pytest.raises(InputError, match="finite numbers only: 2 are not, first in row and column 1, 1"):
+        SedTraces([0.0, 50.0], [[np.inf, 1.0], [-np.inf, 1.0]])
+    huge = np.full((2, 2), 1e308)
+    assert_array_equal(SedTraces([0.0, 50.0], huge).sed_kpa, huge)
+
+
 def test_a_part_of_traces_or_of_their_drive_is_that_of_its_sites():
     sed = SedTraces([0.0, 50.0, 90.0], [[0.0] * 3, [1.0, 2.0, 3.0], [1.0, 1.0, 2.0]], kinks_ms=[50.0])
     assert_array_equal(sed.part(slice(1, 3)).sed_kpa, sed.sed_kpa[:, 1:])
@@ -232,3 +249,23 @@ def test_a_part_of_traces_or_of_their_drive_keeps_what_the_dynamic_term_follows(
     assert_array_equal(part.rate_kpa_per_ms, whole.rate_kpa_per_ms)
     assert_array_equal(part.rate_kpa_per_ms, drive(both).rate_kpa_per_ms[:, :2])
     assert part.dynamic_quantity == whole.dynamic_quantity == "von_mises"
+
+
+@pytest.mark.parametrize("gains", [(1e-6, 2e-4, 7e-7), (-1e-6, 2e-4, -7e-7), (0.0, -1e-4, 3e-6)])
+def test_the_current_is_nowhere_above_its_bound(gains):
+    rng = np.random.default_rng(4)
+    times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 20.0, 20))])
+    energy, strain = rng.exponential(size=(2, 21, 500)) * rng.integers(0, 2, (2, 21, 500))
+    mixed = SedTraces(
+        times, energy, times[[7]], strain, dynamic_quantity="skin_stretch", static_quantity="stored"
+    )
+    chain = Transduction(*gains)
+    for sed in (mixed, SedTraces(times, energy)):
+        assert (chain.largest_current_ma(sed) >= chain.current(sed).current_ma.max(axis=0)).all()
+
+
+def test_the_bound_of_the_current_is_at_most_three_times_the_current():
+    chain = Transduction(0.0, 2e-4, 7e-7)
+    ratio = chain.largest_current_ma(ramp_and_hold()) / chain.current(ramp_and_hold()).current_ma.max(axis=0)
+    assert (ratio > 1.0).all()
+    assert (ratio < 3.0).all()

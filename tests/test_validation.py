@@ -154,7 +154,7 @@ UNFIT = [
     ("force_n,indenter,depth_mm,force_n\n1,plate,1,1\n", "mine.csv, line 1: column force_n is repeated"),
     (FORCE + "plate,1\n", "mine.csv, line 2: must have 3 entries, one per column: got 2."),
     (FORCE + "plate,deep,1\n", "mine.csv, line 2: depth_mm must be a finite number [mm]: got 'deep'."),
-    (FORCE + "plate,1,1\nplate,-1,1\n", "mine.csv, line 3: depth_mm must not be negative [mm]: got '-1'."),
+    (FORCE + "plate,1,1\nplate,-1,1\n", "mine.csv, line 3: depth_mm must not be negative [mm]: got -1.0."),
     (FORCE + "plate,nan,1\n", "mine.csv, line 2: depth_mm must be a finite number"),
     (FORCE + "plate,1,inf\n", "mine.csv, line 2: force_n must be a finite number"),
     (FORCE + "plate,1,\n", "mine.csv, line 2: force_n must be given"),

@@ -16,7 +16,7 @@ import fingerpad
 from .cases import ORDERED
 from .page import PAGE, expectation, number, page_text
 from .pictures import draw_all
-from .press_table import TABLE_PAGE, press_all
+from .press_table import RESOLUTIONS, TABLE_PAGE, press_all
 from .stored_runs import closing
 
 
@@ -41,7 +41,7 @@ def run_all(names: list[str]) -> int:
         stamp = f"Written on {day} by fingerpad {fingerpad.__version__}, {versions}."
         PAGE.write_text(page_text(ORDERED, draw_all(), stamp, closing()), encoding="utf-8")
         print(f"wrote {PAGE}", flush=True)
-        press_all(["quick", "standard"])
+        press_all(RESOLUTIONS)
         print(f"wrote {TABLE_PAGE}")
     return failed
 

@@ -16,6 +16,7 @@ from fingerpad.export import cards
 from fingerpad.export.calculix import calculix_deck
 from fingerpad.export.job import Job, job_of
 from fingerpad.geometry.edged_indenters import Edge, Gap
+from fingerpad.geometry.embossed import Embossed
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
@@ -123,6 +124,7 @@ def felupe_release() -> list[Row]:
 
 TILTED = np.array([[0.96, -0.28, 0.0], [0.28, 0.96, 0.0], [0.0, 0.0, 1.0]])
 QUARTER = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+FRAME = [[(-u, -u), (u, -u), (u, u), (-u, u)] for u in (1.8, 0.6)]
 PRESSES = {  # indenter, its axes, friction
     "sphere": (Sphere(curvature_per_m=1000.0 / 3.0), np.eye(3), 0.0),
     "cylinder, tilted by 16 degrees": (Cylinder(4.0), TILTED, 0.0),
@@ -133,6 +135,7 @@ PRESSES = {  # indenter, its axes, friction
     "line": (Line(0.9), np.eye(3), 0.0),
     "bar, turned by a quarter": (Bar(3.4, 0.6), QUARTER, 0.0),
     "edge": (Edge(0.6), np.eye(3), 0.0),
+    "raised square with a hole": (Embossed(FRAME, height_mm=0.6, edge_radius_mm=0.4), np.eye(3), 0.0),
 }
 
 

@@ -1,0 +1,379 @@
+"""Random odd inputs for every public value type, file reader and command: a result, or one sentence.
+
+`FUZZ` in the environment multiplies the number of examples; `make fuzz` takes an hour.
+"""
+
+import contextlib
+import io
+import json
+import os
+import struct
+import sys
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import fingerpad as fp
+from fingerpad.cli import main
+from fingerpad.core.errors import FingerpadError
+from fingerpad.core.layouts import Layout
+from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.core.regions import Ellipse, Polygon, Rectangle
+from fingerpad.core.signals import CurrentTraces
+from fingerpad.experiments.afferent_files import fitted_afferent
+from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.descriptions.example import EXAMPLE
+from fingerpad.experiments.descriptions.reduction import read_reduction
+from fingerpad.experiments.descriptions.stimulus import TactileStimulus
+from fingerpad.experiments.discrimination.task_files import example_tasks, read_task
+from fingerpad.experiments.recording_files import read_recordings
+from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.stimuli import ShiftedBar, read_stimuli
+from fingerpad.experiments.sweep.description import read_sweep
+from fingerpad.inference.recordings import RateRecordings
+from fingerpad.mechanics.newton import NewtonSettings
+from fingerpad.neuron.band_pass import BandPass
+from fingerpad.neuron.lif import LeakyIntegrateAndFire
+from fingerpad.neuron.transduction import Transduction
+from fingerpad.psychophysics.counts import JudgementCounts
+from fingerpad.psychophysics.discrimination import Experiment
+from fingerpad.psychophysics.functions import PsychometricFunction
+from fingerpad.psychophysics.response_models import GaussianResponses
+from fingerpad.skin.sampling import SurfaceProfile
+
+LONGEST = 2600
+"""Characters of an error."""
+
+MANY = int(os.environ.get("FUZZ", "1"))
+
+
+def examples(count: int) -> settings:
+    return settings(max_examples=count * MANY, deadline=None, suppress_health_check=list(HealthCheck))
+
+
+# -- value types ---------------------------------------------------------------------------------------------
+
+VALUES = {
+    fp.Sphere: {"curvature_per_m": 287.0},
+    fp.Cylinder: {"diameter_mm": 3.0},
+    fp.Line: {"diameter_mm": 0.3},
+    fp.Bar: {"width_mm": 3.0, "fillet_mm": 0.3},
+    fp.Edge: {"fillet_mm": 0.1},
+    fp.FlatPunch: {"diameter_mm": 3.0, "fillet_mm": 0.3},
+    fp.Gap: {"gap_mm": 1.0, "width_mm": 8.0, "fillet_mm": 0.1, "lip_mm": 0.1},
+    fp.Grating: {"ridge_mm": 1.0, "groove_mm": 1.0, "lip_mm": 0.1},
+    fp.Dots: {"at_mm": ((0.0, 0.0), (2.5, 0.0)), "diameter_mm": 1.4, "height_mm": 0.5},
+    fp.Embossed: {
+        "outlines_mm": (((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)),),
+        "height_mm": 0.5,
+        "edge_radius_mm": 0.1,
+    },
+    fp.Union: {"parts": (fp.Sphere(287), fp.Sphere(400)), "at_mm": ((0, 0, 0), (3, 0, 0)), "seam_mm": 0.0},
+    fp.Surface: {
+        "vertices_mm": [[-1.0, 0, -1], [1.0, 0, -1], [0.0, 0, 1]],
+        "faces": [[0, 2, 1]],
+        "smooth_below_deg": 10.0,
+    },
+    fp.RampAndHold: {"depth_mm": 1.0, "ramp_ms": 50.0, "hold_ms": 950.0},
+    fp.ForceRampAndHold: {"force_mn": 100.0, "ramp_ms": 50.0, "hold_ms": 950.0},
+    fp.Trajectory: {"times_ms": (0.0, 10.0, 20.0), "depth_mm": (0.0, 1.0, 1.0), "x_mm": (0.0, 0.0, 0.5)},
+    fp.Cycles: {"start_ms": 0.0, "period_ms": 10.0, "count": 3},
+    fp.Phase: {"name": "ramp", "start_ms": 0.0, "end_ms": 50.0},
+    fp.Fingertip: {"length_mm": 31.78, "dermis_mm": 1.1, "nail_x_mm": (16.5, 29.25), "spine_y_mm": -2.0},
+    fp.Grading: {
+        "centre_mm": 17.0,
+        "half_length_mm": 2.0,
+        "half_width_mm": 2.0,
+        "size_x_mm": 0.5,
+        "size_z_mm": 0.5,
+        "dermis": 3,
+        "full": True,
+        "finer_along": ((16.0, 18.0, 0.1),),
+    },
+    fp.Polynomial: {"c10": 5.0, "c01": 0.0, "bulk_linear": 100.0, "bulk_cubic": 0.0},
+    fp.Ogden: {"moduli_kpa": (5.0, 1.0), "exponents": (2.0, -2.0), "bulk_kpa": 100.0},
+    fp.Hyperfoam: {"moduli_kpa": (5.0,), "exponents": (2.0,), "poisson": 0.3},
+    fp.Hencky: {"shear_kpa": 5.0, "bulk_kpa": 100.0},
+    fp.Energy: {
+        "formula": "m / 2 * (I1 - 3) + k / 2 * (J - 1)**2",
+        "coefficients": (("m", 5.0), ("k", 100.0)),
+    },
+    fp.Prony: {"shares": (0.3, 0.1), "times_ms": (25.0, 300.0)},
+    fp.Material: {"law": fp.Hencky(5.0, 100.0), "prony": fp.Prony(), "moduli": "long_term"},
+    fp.Tissues: dict(
+        zip(
+            ("stratum_corneum", "living_epidermis", "dermis", "subcutis"),
+            [fp.Material(fp.Hencky(5.0, 100.0))] * 4,
+            strict=True,
+        )
+    ),
+    fp.PressSettings: {"ramp_steps": 5, "hold_steps": 5, "times_ms": (1.0, 2.0), "cycle_tolerance": 0.01},
+    NewtonSettings: {"residual_tolerance": 1e-5, "most_iterations": 40, "persistent": False},
+    fp.Afferent: {"intercept_ma": 0.0, "dynamic_gain": 6e-5, "static_gain": 5e-7, "time_constant_ms": 80.0},
+    fp.RA: {"threshold": 1.0, "corner_hz": 30.0, "rise": 1, "fall": 1, "refractory_ms": 1.0},
+    fp.PC: {"threshold": 1.0, "retraction": 0.5, "quantity": "stored"},
+    fp.SAI: {"smoothing_ms": 2.0, "static_gain": 5e-7},
+    Transduction: {"intercept_ma": 0.0, "dynamic_gain": 1.0, "static_gain": 1.0},
+    LeakyIntegrateAndFire: {
+        "time_constant_ms": 80.0,
+        "capacitance_mf": 1e-6,
+        "threshold_mv": 30.0,
+        "refractory_ms": 1.0,
+    },
+    BandPass: {"corner_hz": 30.0, "rise": 2, "fall": 2},
+    fp.Population: {"positions_mm": [[17.0, 0.0], [18.0, 0.0]], "pitch_mm": 1.0, "sensitivity": [1.0, 2.0]},
+    fp.EndOrgans: {"positions_mm": [[[17.0, 0.0], [18.0, 0.0]]], "weights": [0.5, 0.5], "combine": "sum"},
+    fp.SedTraces: {"times_ms": [0.0, 50.0, 100.0], "sed_kpa": [[0.0], [1.0], [1.0]], "kinks_ms": [50.0]},
+    CurrentTraces: {"times_ms": [0.0, 50.0], "current_ma": [[0.0, 1.0], [1.0, 1.0]]},
+    fp.SpikeTrains: {"times_ms": [1.0, 2.0, 1.5], "offsets": [0, 2, 3]},
+    fp.HitRates: {"hit_rate": [0.5, 0.7], "hit_rate_sd": [0.1, 0.1], "seed": 3, "session": 0},
+    Layout: {"places_mm": [[0.0, 0.0], [1.0, 0.0]], "pitch_mm": 1.0, "pattern": "uniform", "seed": 1},
+    Rectangle: {"length_mm": 3.0, "width_mm": 6.0, "centre_mm": (1.0, 2.0)},
+    Ellipse: {"semi_length_mm": 3.0, "semi_width_mm": 6.0, "centre_mm": (1.0, 2.0)},
+    Polygon: {"corners_mm": ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))},
+    Experiment: {"presentations": 10, "criterion": 0.5, "criterion_sigma": 0.0, "criterion_moves": "point"},
+    PsychometricFunction: {"threshold": 1.0, "width": 0.5, "guess": 0.5, "lapse": 0.0, "sigmoid": "weibull"},
+    JudgementCounts: {"levels": [1.0, 2.0], "n_correct": [5, 9], "n_trials": [10, 10]},
+    GaussianResponses: {"mean": [1.0, 2.0], "covariance": [[1.0, 0.1], [0.1, 1.0]]},
+    RateRecordings: {"stimuli": ("a", "b"), "dynamic_rate_hz": [1.0, 2.0], "static_rate_hz": [1.0, 2.0]},
+    SurfaceProfile: {"distance_mm": [0.0, 1.0], "deflection_mm": [0.1, 0.2]},
+    Conditions: {"resolution": "quick", "seed": 3, "materials": "human"},
+    TactileStimulus: {"indenter": fp.Sphere(287), "x_mm": 1.0, "tilt_deg": 3.0, "friction": 0.3},
+    fp.ReducedRange: {
+        "depth_mm": 1.0,
+        "x_mm": (-1.0, 1.0),
+        "parameter": "curvature_per_m",
+        "values": (200, 300),
+    },
+}
+
+numbers = st.one_of(
+    st.floats(),
+    st.integers(),
+    st.sampled_from([10**400, -(10**5000), 2**63, 2**64, 0, -0.0, 5e-324, 1e308, 1e-300, 1_000_000_000]),
+)
+oddities = st.one_of(
+    numbers,
+    st.text(max_size=5),
+    st.sampled_from(
+        [
+            None, True, np.True_, "1", b"1", "x" * 100_000, 1j, np.complex128(1j), Decimal("0.5"),
+            Decimal("NaN"),
+            Fraction(1, 3), np.float32(0.5), np.float16(0.5), np.int8(3), np.longdouble(0.5),
+            np.uint64(2**63),
+            np.datetime64("2001-01-01"), np.timedelta64(3, "ms"), np.ma.masked, np.array(0.5),
+            np.array("0.5"),
+            np.ma.array([1.0, 2.0], mask=[0, 1]), [], (), {}, set(), object(), float, range(3), iter(()),
+            np.array(["2001-01-01", "2001-01-02"], dtype="datetime64[D]"), np.empty((0, 2)), np.ones((2, 2,
+            2)),
+            fp.Sphere(1.0), fp.Tissues, [[1.0], [1.0, 2.0]], np.array([object()]), memoryview(b"12"),
+        ]
+    ),
+    st.lists(numbers, max_size=4),
+    st.lists(st.lists(numbers, min_size=2, max_size=2), max_size=4),
+)  # fmt: skip
+
+
+def changed(value: object, odd: object, place: int) -> object:
+    """Value with an odd one in its place, or somewhere within it."""
+    if isinstance(value, tuple | list) and value and place % 3:
+        items = list(value)
+        items[place % len(items)] = changed(items[place % len(items)], odd, place // 3)
+        return tuple(items) if isinstance(value, tuple) else items
+    return odd
+
+
+@examples(1100)
+@given(st.sampled_from(list(VALUES)), st.integers(0, 999), oddities, st.integers(0, 80))
+@pytest.mark.filterwarnings("ignore::fingerpad.core.errors.MaterialWarning")
+def test_a_value_type_takes_a_value_or_refuses_it_in_one_sentence(kind, which, odd, place):
+    fields = VALUES[kind]
+    name = list(fields)[which % len(fields)]
+    given_values = fields | {name: changed(fields[name], odd, place)}
+    try:
+        made = kind(**given_values)
+    except FingerpadError as error:
+        said = str(error)
+        assert "\n" not in said.rstrip("\n") or "x" in str(odd)
+        assert len(said) < LONGEST
+        return
+    held = getattr(made, name)
+    before = fields[name]
+    if isinstance(before, float):
+        assert held is None or (type(held) is float and np.isfinite(held))
+    if isinstance(before, tuple) and held is not None:
+        assert isinstance(held, tuple)
+        hash(held)
+    if isinstance(before, bool | int):
+        assert held is None or type(held) in (bool, int)
+    if isinstance(held, np.ndarray):
+        assert not isinstance(held, np.ma.MaskedArray)
+        assert held.dtype.kind in "if"
+        assert not held.flags.writeable
+    repr(made)
+
+
+def test_unchanged_values_are_taken():
+    for kind, fields in VALUES.items():
+        kind(**fields)
+
+
+# -- files ---------------------------------------------------------------------------------------------------
+
+STL = b"\0" * 80 + struct.pack("<I", 1) + struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 2, 0, 0)
+OBJ = b"v 0 0 0\nv 2 0 0\nv 0 2 0\nf 1 2 3\n"
+PLY = (
+    b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n2 0 0\n0 2 0\n3 0 1 2\n"
+)
+FIT = json.dumps(
+    {
+        "format": "fingerpad fit",
+        "format_version": 3,
+        "fit": {"parameters": {"intercept_ma": 0.0}},
+        "dynamic_quantity": "stored",
+        "static_quantity": "stored",
+    }
+).encode()
+MESH = (
+    b'$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n3 1 "dermis"\n$EndPhysicalNames\n'
+    b"$Nodes\n1 4 1 4\n3 1 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n"
+    b"$Elements\n1 1 1 1\n3 1 4 1\n1 1 2 3 4\n$EndElements\n"
+)
+INP = b"*NODE\n1, 0., 0., 0.\n2, 1., 0., 0.\n*ELEMENT, TYPE=C3D8, ELSET=dermis\n1, 1, 2, 1, 2, 1, 2, 1, 2\n"
+
+
+def _array(values: object) -> bytes:
+    stored = io.BytesIO()
+    np.save(stored, values)
+    return stored.getvalue()
+
+
+def _picture() -> bytes:
+    from PIL import Image
+
+    stored = io.BytesIO()
+    Image.fromarray(np.arange(16, dtype=np.uint8).reshape(4, 4)).save(stored, format="png")
+    return stored.getvalue()
+
+
+FILES = {
+    "task.yaml": (example_tasks()["sphere_curvature"].encode(), lambda path: read_task(str(path))),
+    "touch.yaml": (EXAMPLE.encode(), fp.read_touch_description),
+    "sweep.yaml": (b"touch:\n  object: {kind: sphere}\ngrid:\n  object.radius_mm: [2, 3]\n", read_sweep),
+    "reduction.yaml": (b"touch:\n  object: {kind: sphere}\nrange: {depth_mm: 1}\n", read_reduction),
+    "any.yaml": (b"a: [1, 2.5, {b: 'c'}]\n", lambda path: read_yaml(path.read_text(errors="ignore"), "any")),
+    "stimuli.csv": (b"name,object,object.diameter_mm\nprobe,punch,1.0\nwide,punch,4\n", read_stimuli),
+    "stimuli.yaml": (b"stimuli:\n- {name: a, object: {kind: sphere, radius_mm: 3}}\n", read_stimuli),
+    "rates.csv": (
+        b"shift_mm,static_rate_hz,dynamic_rate_hz,fold\n-1.5,60,20,1\n0,10,5,2\n",
+        lambda path: read_recordings(path, ShiftedBar()),
+    ),
+    "spikes.csv": (
+        b"shift_mm,spike_times_ms,duration_ms\n-1.5,1 2 30,900\n0,,800\n",
+        lambda path: read_recordings(path, ShiftedBar()),
+    ),
+    "motion.csv": (b"time_ms,depth_mm,x_mm\n0,0,0\n50,1,0\n60,1,0.2\n", fp.read_trajectory),
+    "fit.json": (FIT, fitted_afferent),
+    "body.stl": (STL, fp.read_surface),
+    "body.obj": (OBJ, fp.read_surface),
+    "body.ply": (PLY, fp.read_surface),
+    "map.npy": (_array(np.arange(12.0).reshape(3, 4)), lambda path: fp.read_height_map(path, 0.5)),
+    "map.csv": (b"0,1,2\n1,2,3\n2,3,4\n", lambda path: fp.read_height_map(path, 0.5)),
+    "map.png": (_picture(), lambda path: fp.read_height_map(path, 0.5)),
+    "finger.msh": (MESH, lambda path: fp.read_finger(path)),
+    "finger.inp": (INP, lambda path: fp.read_finger(path)),
+    "model.npz": (b"PK\3\4" + b"0" * 60, fp.read_reduced),
+}
+
+TOKENS = [
+    b"", b"\n", b"\0", b"\xff\xfe", b"nan", b"inf", b"-1", b"1e400", b"9" * 5000, b"1_0", b"1:30",
+    b"2001-13-45",
+    b"!!int x", b"&a [*a]", b"*a", b"<<: *a", b"{", b"[" * 50, b"- " * 50, b"'", b'"', b",", b";", b"\t",
+    b": ",
+    b"#", b"~", b"0x_", "１".encode(), "\u202e".encode(), b"$\\nope{ $", b"..", b"/", b"%s", b"a" * 3000,
+]  # fmt: skip
+
+
+@st.composite
+def damaged(draw: st.DrawFn, content: bytes) -> bytes:
+    """Content with some bytes replaced, inserted, repeated or cut away."""
+    for _ in range(draw(st.integers(1, 3))):
+        begin = draw(st.integers(0, len(content)))
+        end = begin + draw(st.sampled_from([0, 0, 1, 1, 2, 8, 10**6]))
+        put = draw(st.one_of(st.sampled_from(TOKENS), st.binary(max_size=4), st.just(content[begin:end] * 2)))
+        content = content[:begin] + put + content[end:]
+    return content
+
+
+@examples(900)
+@given(st.sampled_from(list(FILES)), st.data())
+@pytest.mark.filterwarnings("ignore::fingerpad.core.errors.InertiaWarning")
+def test_a_damaged_file_is_read_or_refused_in_one_sentence(tmp_path_factory, name, data):
+    whole, read = FILES[name]
+    path = tmp_path_factory.getbasetemp() / name
+    path.write_bytes(data.draw(damaged(whole)))
+    try:
+        read(path)
+    except FingerpadError as error:
+        said = str(error)
+        assert len(said) < LONGEST
+
+
+# -- the command line ----------------------------------------------------------------------------------------
+
+COMMANDS = [
+    "touch", "init", "check", "sweep", "reproduce", "fit", "discriminate", "validate", "export", "view",
+    "reduce", "store",
+]  # fmt: skip
+OPTIONS = [
+    "--out", "--resolution", "--materials", "--jobs", "--seed", "--stimulus", "--depth", "--width",
+    "--fillet",
+    "--folds", "--method", "--unit", "--static-window", "--finger", "--list", "--example", "--format",
+    "--touch",
+    "--extended", "--dry-run", "--help", "--version", "--scheduler", "--posterior", "list", "verify", "prune",
+]  # fmt: skip
+WORDS = [
+    "", "-1", "0", "1", "nan", "inf", "1e400", "9" * 400, "quick", "human", "bar", "x", "none.yaml",
+    "touch.yaml",
+    "task.yaml", "rates.csv", "/dev/zero", "/dev/null", ".", "..", "a\0b", "$\\nope{ $", "--", "-", "１",
+    "\ud800",
+    "sphere_curvature", "gap_detection", "paper", "adult:width_mm=18", "child", "30", "50", "a" * 3000,
+    "vtu", "csv",
+]  # fmt: skip
+
+
+@examples(300)
+@given(st.sampled_from(COMMANDS), st.lists(st.sampled_from(OPTIONS + 2 * WORDS), max_size=6))
+def test_a_command_line_ends_with_a_status_and_at_most_one_sentence(tmp_path_factory, command, words):
+    folder = tmp_path_factory.mktemp("cli", numbered=True)
+    for name in ("touch.yaml", "task.yaml", "rates.csv"):
+        (folder / name).write_bytes(FILES[name][0])
+    said, errors = io.StringIO(), io.StringIO()
+
+    def refuse(*args: object, **kwargs: object) -> None:
+        raise FingerpadError("This would press.")
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.chdir(folder)
+        patched.setattr(sys, "argv", ["fingerpad", command, *words])
+        patched.setattr(Runner, "solve", refuse)
+        with (
+            contextlib.redirect_stdout(said),
+            contextlib.redirect_stderr(errors),
+            pytest.raises(SystemExit) as ended,
+        ):
+            main()
+    status = ended.value.code or 0
+    assert status in (0, 2)
+    assert "Traceback" not in errors.getvalue()
+    said_last = errors.getvalue().splitlines()[-1:]
+    assert status == 0 or not said_last or said_last[0].startswith("fingerpad: ")
+    assert len(errors.getvalue()) < 4000
+    for path in Path(folder).rglob("*.json"):
+        assert path.stat().st_size

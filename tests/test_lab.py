@@ -1,0 +1,410 @@
+"""The laboratory: states, answers, the page's messages, the server, and the page in a browser."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import http.client
+import io
+import json
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import pytest
+from tornado.httpclient import HTTPRequest
+from tornado.websocket import websocket_connect
+
+import fingerpad as fp
+from fingerpad.experiments.descriptions.reduction import DescribedReduction
+from fingerpad.experiments.runner import Runner
+from fingerpad.lab.answer import Answer, compared
+from fingerpad.lab.laboratory import Laboratory, Making, shipped
+from fingerpad.lab.server import HOST, reply_to, serve, spec_of
+from fingerpad.lab.state import LabState, state_of
+from fingerpad.lab.static import write_static
+from fingerpad.lab.view import View, view_of
+from fingerpad.skin.store import Store
+
+RANGE = "object: {kind: sphere, curvature_per_m: %g}\nrange: {depth_mm: 0.5}\ncalibration: 0\n"
+PRESS = LabState("ball", depth_mm=0.4)
+
+
+@pytest.fixture(scope="module")
+def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Laboratory:
+    """Two objects: a ball, and one that presses a fifth harder everywhere."""
+    folder = tmp_path_factory.mktemp("lab")
+    for name, curvature in (("ball", 287.0), ("flat", 180.0)):
+        (folder / f"{name}.yaml").write_text(RANGE % curvature, encoding="utf-8")
+    made = Laboratory(folder / "kept", [folder / "ball.yaml", folder / "flat.yaml"])
+    made.answer(PRESS)
+    model = made.model(PRESS)
+    assert model is not None
+    harder = replace(model, totals=1.2 * model.totals, coefficients=1.2 * model.coefficients)
+    fp.write_reduced(harder, made.path(replace(PRESS, object="flat")))
+    return made
+
+
+def waited(laboratory: Laboratory, state: LabState, exact: bool = False) -> View:
+    """View of a state once its presses are done."""
+    end = time.monotonic() + 60.0
+    while isinstance(view := view_of(laboratory, state, exact), Making):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    return view
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (None, "must be a mapping: got NoneType"),
+        ({}, "object must be given"),
+        ({"object": "ball", "depht_mm": 1}, "did you mean depth_mm"),
+        ({"object": "ball", "depth_mm": "deep"}, "depth_mm must be a number within 0.05 to 5: got 'deep'"),
+        ({"object": "ball", "depth_mm": float("nan")}, "got 'nan'"),
+        ({"object": "ball", "x_mm": 1e9}, "x_mm must be a number within -20 to 20"),
+        ({"object": "ball", "x_mm": [1]}, "x_mm must be a number"),
+        ({"object": "ball", "hold_ms": True}, "hold_ms must be a number"),
+        ({"object": "ball", "afferent": "PC"}, "afferent must be SAI or RA: got 'PC'"),
+    ],
+)
+def test_a_wrong_state_is_one_sentence(asked: object, said: str) -> None:
+    with pytest.raises(fp.InputError, match=said.replace("(", r"\(")):
+        state_of(asked)
+
+
+def test_a_state_is_what_the_address_says() -> None:
+    assert state_of({name: str(value) for name, value in asdict(PRESS).items()}) == PRESS
+
+
+@pytest.mark.parametrize(
+    ("message", "said"),
+    [
+        ("nonsense", "must have the key state"),
+        ({"id": 3}, "must have the key state"),
+        ({"id": 3, "state": {"object": "cube"}}, "object must be one of ball, flat: got 'cube'"),
+        ({"id": 3, "state": {"object": "ball", "depth_mm": 2}}, "depth_mm must be at most 0.5"),
+        ({"id": 3, "state": {"object": "ball", "depth_mm": 0.4, "x_mm": 1}}, "x_mm must lie within 0 to 0"),
+        ({"id": 3, "state": {"object": "ball", "tissues": "wood"}}, "tissues must be one of human"),
+        ({"id": 3, "state": {"object": "ball", "finger": "thumb"}}, "finger must be one of adult"),
+    ],
+)
+def test_a_broken_message_is_one_sentence(laboratory: Laboratory, message: object, said: str) -> None:
+    reply = reply_to(laboratory, message)
+    assert said in reply["error"]
+    assert reply["id"] == (message["id"] if isinstance(message, dict) else None)
+    json.dumps(reply)
+
+
+def test_a_defect_is_told_and_does_not_stop(
+    laboratory: Laboratory, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(laboratory, "poll", lambda state: 1 / 0)
+    reply = reply_to(laboratory, {"id": 1, "state": {"object": "ball"}})
+    assert "the terminal says why" in reply["error"]
+    assert "ZeroDivisionError" in caplog.text
+
+
+def test_the_page_gets_all_that_it_draws(laboratory: Laboratory) -> None:
+    reply = json.loads(json.dumps(reply_to(laboratory, {"id": 7, "state": asdict(PRESS)})))
+    view, shown = reply["view"], reply["view"]["answer"]
+    n, points = len(shown["times_ms"]), len(view["x_mm"]) * len(view["z_mm"])
+    assert reply["id"] == 7
+    assert len(shown["force_mn"]) == len(shown["contact_mm"]) == n
+    assert len(shown["frames"]) == 4 * -(-n * points // 3)
+    assert len(shown["spikes"]) == len(view["positions_mm"]) == len(view["order"])
+    assert 0.0 == shown["force_mn"][0] < max(shown["force_mn"])
+    assert sum(map(len, shown["spikes"])) > 50
+    area = np.pi * shown["contact_mm"][n // 2][2] * shown["contact_mm"][n // 2][3]
+    assert area == pytest.approx(shown["area_mm2"][n // 2], rel=0.01)
+    assert spec_of(laboratory)["objects"]["ball"]["depth_mm"] == [0.05, 0.5]
+
+
+def test_a_deeper_press_is_stronger_and_another_afferent_is_silent_in_the_hold(
+    laboratory: Laboratory,
+) -> None:
+    light, deep = (laboratory.answer(replace(PRESS, depth_mm=depth)) for depth in (0.2, 0.5))
+    assert deep.force_mn.max() > 2.0 * light.force_mn.max()
+    rapid = laboratory.answer(replace(PRESS, afferent="RA")).response
+    assert rapid.dynamic_rate_hz.max() > 20.0
+    assert rapid.static_rate_hz.max() < 5.0 < deep.response.static_rate_hz.max()
+
+
+def test_the_full_solution_stands_beside_the_reduced_one(laboratory: Laboratory) -> None:
+    assert isinstance(view_of(laboratory, PRESS, exact=True), Making)
+    view = waited(laboratory, PRESS, exact=True)
+    assert view.exact is not None
+    assert "Largest differences from the full solution: force" in view.difference
+    forces = np.interp(view.exact.times_ms, view.answer.times_ms, view.answer.force_mn)
+    assert np.abs(forces - view.exact.force_mn).max() < 0.02 * max(view.exact.force_mn)
+
+
+def test_observers_tell_what_differs(laboratory: Laboratory) -> None:
+    ball, flat = (laboratory.answer(replace(PRESS, object=name)) for name in ("ball", "flat"))
+    assert (compared(ball, ball).ideal, compared(ball, ball).summed) == (0.5, 0.5)
+    found = compared(ball, flat)
+    assert 0.5 < found.summed <= found.ideal <= 1.0
+    assert f"ball from flat in {found.ideal:.0%}" in waited(laboratory, replace(PRESS, other="flat")).compared
+
+
+def test_the_python_lines_reproduce_the_view(laboratory: Laboratory) -> None:
+    view = waited(laboratory, PRESS)
+    printed, names = io.StringIO(), {}
+    with contextlib.redirect_stdout(printed):
+        exec(view.python, names)
+    np.testing.assert_allclose(names["force_mn"], view.answer.force_mn, atol=1e-3)
+    spikes = names["spikes"]
+    for site, train in enumerate(view.answer.spikes):
+        np.testing.assert_allclose(spikes[site], train, atol=0.01)
+    laboratory.answer(PRESS, exact=True)
+    assert Store(laboratory.folder / "indentations").holds(names["exact"])
+
+
+def test_what_was_made_is_not_pressed_again(laboratory: Laboratory, monkeypatch: pytest.MonkeyPatch) -> None:
+    again = Laboratory(laboratory.folder, [laboratory.source(LabState(name)) for name in laboratory.names])
+    monkeypatch.setattr("fingerpad.lab.laboratory.run_reduction", None)
+    kept, known = again.answer(PRESS), laboratory.answer(PRESS)
+    assert isinstance(kept, Answer)
+    assert (kept.force_mn == known.force_mn).all()
+    assert again.path(replace(PRESS, finger="child")) != again.path(PRESS)
+    assert again.model(replace(PRESS, tissues="paper")) is None
+
+
+@pytest.mark.parametrize("kept", [False, True], ids=["asked meanwhile", "answered before"])
+def test_errors_are_measured_while_the_answer_is_there(
+    laboratory: Laboratory, monkeypatch: pytest.MonkeyPatch, kept: bool
+) -> None:
+    asked = []
+
+    def run(described: DescribedReduction, runner: Runner) -> fp.ReducedModel:
+        asked.append(described.description.calibration)
+        return model if asked[-1] == 0 else replace(model, error=np.full(3, 0.02))
+
+    model = laboratory.model(PRESS)
+    assert model is not None
+    source = laboratory.source(PRESS).with_name("measured.yaml")
+    source.write_text((RANGE % 287.0).replace("calibration: 0", "calibration: 20"), encoding="utf-8")
+    monkeypatch.setattr("fingerpad.lab.laboratory.run_reduction", run)
+    measuring = Laboratory(laboratory.folder, [source])
+    state = replace(PRESS, object="measured")
+    measuring.path(state).unlink(missing_ok=True)
+    if kept:
+        measuring.answer(state)
+    first = waited(measuring, state)
+    end = time.monotonic() + 60.0
+    while not measuring.measured(state):
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    assert asked == [0, 20]
+    assert max(first.answer.error_mn) == 0.0 < max(waited(measuring, state).answer.error_mn)
+
+
+def test_the_shipped_ranges_are_whole(tmp_path: Path) -> None:
+    assert Laboratory(tmp_path).names == tuple(path.stem for path in shipped())
+    with pytest.raises(fp.InputError, match="different names"):
+        Laboratory(tmp_path, [shipped()[0], shipped()[0]])
+
+
+@pytest.fixture(scope="module")
+def served(laboratory: Laboratory) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """Start the command, and give the address of the page."""
+    files = [str(laboratory.source(LabState(name))) for name in laboratory.names]
+    command = [sys.executable, "-m", "fingerpad", "lab", *files, "--folder", str(laboratory.folder)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert line.startswith("Open: http://127.0.0.1:"), line
+        yield line.split()[1], process
+        process.send_signal(signal.SIGINT)
+        assert process.wait(10) == 130
+
+
+def test_the_server_listens_on_loopback_alone_and_survives_users(
+    served: tuple[str, subprocess.Popen[str]],
+) -> None:
+    address, process = served
+    connections = psutil.Process(process.pid).net_connections()
+    assert {each.laddr.ip for each in connections if each.status == "LISTEN"} == {"127.0.0.1"}
+
+    async def use() -> None:
+        first, second = await session(address), await session(address)
+        await first.write_message("no message of the protocol")
+        second.stream.close()  # as if the browser was killed
+        third = await session(address)
+        for each in (first, second, third):
+            each.close()
+            while await each.read_message() is not None:
+                pass
+
+    asyncio.run(use())
+    with urllib.request.urlopen(address) as page:
+        assert page.status == 200
+
+
+@pytest.mark.parametrize("taken", [True, False])
+def test_a_port_that_cannot_be_is_one_sentence(laboratory: Laboratory, taken: bool) -> None:
+    with socket.socket() as held:
+        held.bind((HOST, 0))
+        held.listen()
+        port = held.getsockname()[1] if taken else 70000
+        with pytest.raises(fp.InputError, match=f"--port must be a free port: got {port}"):
+            serve(laboratory, port)
+
+
+def test_a_page_of_another_origin_is_refused(served: tuple[str, subprocess.Popen[str]]) -> None:
+    connection = http.client.HTTPConnection(served[0][len("http://") : -1])
+    connection.request("GET", "/ws", headers={
+        "Origin": "http://elsewhere.org", "Connection": "Upgrade", "Upgrade": "websocket",
+        "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "x" * 22 + "==",
+    })  # fmt: skip
+    assert connection.getresponse().status == 403
+    connection.close()
+
+
+async def session(address: str) -> Any:
+    """Open a session as a browser does, and wait for the first word of the server."""
+    with urllib.request.urlopen(address) as page:
+        token = re.search(r'"token":"([^"]+)"', page.read().decode())[1]  # type: ignore[index]
+    wanted = HTTPRequest(address.replace("http", "ws") + "ws", headers={"Origin": address[:-1]})
+    opened = await websocket_connect(wanted, subprotocols=["bokeh", token])
+    assert "ACK" in str(await opened.read_message())
+    return opened
+
+
+def test_the_colours_keep_their_order_in_greys() -> None:
+    page = (resources.files("fingerpad.lab") / "page.js").read_text("utf-8")
+    stops = np.array(json.loads(re.search(r"STOPS = (\[.*\]);", page)[1]))  # type: ignore[index]
+    grey = stops @ [0.2126, 0.7152, 0.0722]
+    assert (np.diff(grey) < -10.0).all()
+
+
+def test_the_static_page_holds_its_answers(laboratory: Laboratory, tmp_path: Path) -> None:
+    written = write_static(laboratory, tmp_path)
+    assert written == tmp_path / "index.html"
+    assert written.stat().st_size < 5e6
+    assert str(laboratory.folder) not in written.read_text("utf-8")
+
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+needs_browser = pytest.mark.skipif(
+    BROWSER is None, reason="no Chromium is installed (apt-get install chromium)"
+)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        opened = play.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+class Watched:
+    """A page of the laboratory, and what went wrong in it."""
+
+    def __init__(self, browser: Any, address: str, width: int = 1280):
+        self.page = browser.new_page(viewport={"width": width, "height": 800})
+        self.wrong: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("console", lambda said: said.type == "error" and self.wrong.append(said.text))
+        self.page.on("pageerror", lambda error: self.wrong.append(str(error)))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.goto(address)
+        self.page.locator(".lab div[role=status] p").first.wait_for(timeout=60000)
+
+    @property
+    def words(self) -> str:
+        return str(self.page.locator(".lab div[role=status]").inner_text())
+
+    @property
+    def said(self) -> str:
+        return str(self.page.locator(".lab .said").inner_text())
+
+    def changes(self, action: Callable[[], object], of: Callable[[], str]) -> str:
+        """Do something, and wait until what is shown differs."""
+        before, end = of(), time.monotonic() + 20.0
+        action()
+        while of() == before:
+            assert time.monotonic() < end, f"still {before!r}"
+            self.page.wait_for_timeout(20)
+        return of()
+
+    def picture(self, number: int = 0) -> str:
+        return str(self.page.locator(".lab canvas").nth(number).evaluate("canvas => canvas.toDataURL()"))
+
+
+@needs_browser
+def test_the_page_works_with_keys_and_mouse(
+    browser: Any, served: tuple[str, subprocess.Popen[str]], tmp_path: Path
+) -> None:
+    address = served[0]
+    watched = Watched(browser, f"{address}#depth_mm=0.3")
+    page = watched.page
+    assert page.locator("input[name=depth_mm]").input_value() == "0.3"
+    skin = watched.picture()
+    page.locator("input[name=depth_mm]").focus()
+    watched.changes(lambda: page.keyboard.press("ArrowRight"), lambda: watched.words)
+    assert watched.picture() != skin
+    page.wait_for_url("**depth_mm=0.35**")
+    canvas = page.locator(".lab canvas").first
+    watched.changes(lambda: (canvas.focus(), page.keyboard.press("PageDown")), lambda: watched.words)
+    canvas.hover()
+    watched.changes(lambda: page.mouse.wheel(0, 100), lambda: watched.words)
+    page.wait_for_url("**depth_mm=0.35**")
+    watched.changes(lambda: page.locator("input[name=time]").press("ArrowLeft"), lambda: watched.words)
+    number = page.locator("input[name=depth_mm_number]")
+    said = watched.changes(lambda: (number.fill("3"), number.press("Enter")), lambda: watched.said)
+    assert "depth_mm must be at most 0.5" in said
+    watched.changes(lambda: (number.fill("0.4"), number.press("Enter")), lambda: watched.said)
+    watched.changes(lambda: page.locator("select[name=other]").select_option("flat"), lambda: watched.words)
+    assert "An ideal observer tells ball from flat" in watched.words
+    page.get_by_role("button", name="Solve exactly").click()
+    page.get_by_text("Largest differences from the full solution").wait_for(timeout=60000)
+    for name in ("touch.png", "touch.json", "touch.py"):
+        text = {"touch.png": "Save figure", "touch.json": "Save data", "touch.py": "Save Python"}[name]
+        with page.expect_download() as saved:
+            page.get_by_role("button", name=text).click()
+        saved.value.save_as(tmp_path / name)
+        assert saved.value.suggested_filename == name
+    assert (tmp_path / "touch.png").read_bytes().startswith(b"\x89PNG")
+    assert max(json.loads((tmp_path / "touch.json").read_text())["answer"]["force_mn"]) > 1.0
+    assert watched.wrong == []
+    assert all(url.startswith((address, "data:", "blob:")) for url in watched.asked)
+    page.close()
+
+
+@needs_browser
+def test_a_small_screen_scrolls_only_downwards(
+    browser: Any, served: tuple[str, subprocess.Popen[str]]
+) -> None:
+    watched = Watched(browser, served[0], width=360)
+    assert watched.page.evaluate("document.documentElement.scrollWidth") <= 360
+    watched.page.close()
+
+
+@needs_browser
+def test_the_static_page_works_from_a_file(browser: Any, laboratory: Laboratory, tmp_path: Path) -> None:
+    watched = Watched(browser, write_static(laboratory, tmp_path).as_uri())
+    page = watched.page
+    skin = watched.picture()
+    watched.changes(lambda: page.locator("input[name=depth_mm]").press("ArrowRight"), lambda: watched.words)
+    assert watched.picture() != skin
+    watched.changes(lambda: page.locator("select[name=other]").select_option("flat"), lambda: watched.words)
+    assert "An ideal observer tells ball from flat" in watched.words
+    assert watched.wrong == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in watched.asked)
+    page.close()

@@ -1,0 +1,62 @@
+"""What a command tells while it runs: lines where it is piped, nothing or more on request."""
+
+import logging
+
+import pytest
+
+from fingerpad.cli import main
+from fingerpad.cli.running import Bars, progress
+from fingerpad.core.logger import LOGGER
+from fingerpad.core.progress import Lines, NoProgress
+
+TOUCH = "object: sphere\nmotion: {depth_mm: 0.2, hold_ms: 60}\nafferents: {windows_ms: {static: [60, 100]}}\n"
+
+
+@pytest.fixture(autouse=True)
+def levels():
+    """Put the level of the logger, and the handlers of the root, back."""
+    handlers = logging.getLogger().handlers[:]
+    yield
+    LOGGER.setLevel(logging.NOTSET)
+    logging.getLogger().handlers[:] = handlers
+
+
+def test_lines_tell_the_way_and_the_end_of_a_long_stage_only():
+    told = []
+    with Lines(told.append, every_s=0.0).stage("presses", 3) as advance:
+        for _ in range(3):
+            advance()
+    assert [line.partition(",")[0] for line in told] == [
+        "presses: 1 of 3",
+        "presses: 2 of 3",
+        "presses: 3 of 3",
+    ]
+    with Lines(told.append, every_s=60.0, short=False).stage("short", 2) as advance:
+        advance()
+        advance()
+    assert len(told) == 3
+
+
+def test_progress_is_lines_where_it_is_piped_bars_on_a_terminal_and_nothing_when_quiet(monkeypatch):
+    assert isinstance(progress(), Lines)
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    assert isinstance(progress(), Bars)
+    LOGGER.setLevel(logging.ERROR)
+    assert isinstance(progress(), NoProgress)
+
+
+def test_quiet_says_nothing_but_results_and_verbose_tells_of_stages(run_program, tmp_path, caplog):
+    (tmp_path / "touch.yaml").write_text(TOUCH)
+    status, out, errors = run_program(main, "fingerpad", "--quiet", "touch", "touch.yaml", "--out", "quiet")
+    assert (status, errors, caplog.text) == (0, "", "")
+    assert out
+    status, _, _ = run_program(main, "fingerpad", "--verbose", "touch", "touch.yaml", "--out", "verbose")
+    told = [(record.name, record.getMessage()) for record in caplog.records]
+    assert status == 0
+    assert any(name == "fingerpad.experiments.runner" and " took " in text for name, text in told)
+    assert any(name == "fingerpad.skin.store" and text.startswith("stored ") for name, text in told)
+
+
+def test_quiet_and_verbose_exclude_each_other(run_program):
+    status, _, errors = run_program(main, "fingerpad", "--quiet", "--verbose", "store", "list")
+    assert (status, errors) == (2, "fingerpad: --quiet and --verbose exclude each other: leave one out.\n")

@@ -1,0 +1,262 @@
+"""A reduced touch: interpolation, relaxation, streaming, files, and agreement with the full solver."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import fingerpad as fp
+from fingerpad.cli import main
+from fingerpad.core.signals import SedTraces
+from fingerpad.reduction.building import largest_errors
+from fingerpad.reduction.interpolation import Axis, chebyshev_points, lagrange
+from fingerpad.reduction.relaxation import filtered
+from fingerpad.reduction.streaming import read_local
+from fingerpad.reduction.training import ReducedRange, ReducedTraining
+
+DEEPEST_MM = 1.0
+
+
+@pytest.fixture(scope="module")
+def training() -> ReducedTraining:
+    touch = fp.touch_of(fp.Fingertip(), fp.Sphere(curvature_per_m=287))
+    return ReducedTraining(touch, ReducedRange(DEEPEST_MM))
+
+
+@pytest.fixture(scope="module")
+def model(training: ReducedTraining) -> fp.ReducedModel:
+    return fp.reduce_touch(training, calibration=0)
+
+
+def pressed(training: ReducedTraining, times_ms: list[float], depth_mm: list[float]) -> fp.SkinResponse:
+    return training.touch_with((), fp.Trajectory(tuple(times_ms), depth_mm=tuple(depth_mm))).solve()
+
+
+def test_polynomials_up_to_the_number_of_points_are_exact() -> None:
+    points, at = chebyshev_points(5), np.linspace(0.0, 1.0, 11)
+    for power in range(5):
+        np.testing.assert_allclose(lagrange(points, at) @ points**power, at**power, atol=1e-13)
+    assert np.abs(lagrange(points, at) @ points**5 - at**5).max() > 1e-4
+
+
+def test_an_axis_refuses_what_is_out_of_its_range() -> None:
+    axis = Axis("x_mm", -1.0, 2.0, 4)
+    np.testing.assert_allclose(axis.weights(1.3) @ axis.values, 1.3)
+    with pytest.raises(fp.InputError, match=r"x_mm must lie within -1 to 2, .* got 2.5"):
+        axis.weights(2.5)
+
+
+def test_the_filter_solves_its_equation() -> None:
+    times = np.array([0.0, 10.0, 30.0, 80.0, 81.0])
+    values = np.array([[0.0], [2.0], [1.0], [1.0], [4.0]])
+
+    def slope(time: float, m: np.ndarray) -> np.ndarray:
+        return np.asarray((np.interp(time, times, values[:, 0]) - m) / 25.0)
+
+    known = solve_ivp(slope, (0.0, 81.0), [0.0], t_eval=times, max_step=0.5, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(filtered(times, values, 25.0)[:, 0], known.y[0], atol=1e-6)
+
+
+def test_local_fields_are_read_exactly_up_to_the_second_degree() -> None:
+    i, j = np.meshgrid(np.arange(9.0), np.arange(9.0), indexing="ij")
+    places = np.array([[2.3, 4.7], [5.0, 5.0], [3.5, 1.25]])
+    u, v = places.T
+    field = (0.3 * i**2 - 0.1 * i * j + j)[None, None]
+    np.testing.assert_allclose(read_local(field, places)[0, 0], 0.3 * u**2 - 0.1 * u * v + v, atol=1e-12)
+    assert (read_local(field, np.array([[-0.1, 3.0], [3.0, 8.2]])) == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("times_ms", "depth_mm"),
+    [
+        ([0.0, 60.0, 800.0], [0.0, 0.8, 0.8]),
+        ([0.0, 40.0, 300.0, 340.0, 600.0], [0.0, 0.95, 0.95, 0.4, 0.4]),
+    ],
+    ids=["press and hold", "partial release"],
+)
+def test_it_agrees_with_the_full_solver_on_touches_not_used(
+    training: ReducedTraining, model: fp.ReducedModel, times_ms: list[float], depth_mm: list[float]
+) -> None:
+    stress, sed, force = largest_errors(model, pressed(training, times_ms, depth_mm))
+    assert force < 0.01
+    assert stress < 0.06
+    assert sed < 0.06
+
+
+def test_without_relaxation_it_is_wrong(training: ReducedTraining, model: fp.ReducedModel) -> None:
+    elastic = replace(model, totals=model.totals * (np.arange(model.totals.shape[1]) < 14)[:, None])
+    skin = pressed(training, [0.0, 60.0, 800.0], [0.0, 0.8, 0.8])
+    assert largest_errors(elastic, skin)[2] > 0.02
+
+
+def test_a_force_finds_its_depth(model: fp.ReducedModel) -> None:
+    by_depth, by_force = (fp.ReducedTouch(model, [(17.37, 0.0)]) for _ in range(2))
+    wanted = by_depth.step(100.0, depth_mm=0.7)
+    found = by_force.step(100.0, force_mn=wanted.force_mn)
+    assert found.depth_mm == pytest.approx(0.7, rel=0.02)
+    later = by_force.step(1000.0, force_mn=wanted.force_mn)
+    assert later.depth_mm > found.depth_mm  # the skin creeps
+
+
+def test_a_touch_out_of_its_range_leaves_the_state_as_it_was(model: fp.ReducedModel) -> None:
+    stream = fp.ReducedTouch(model, [(17.37, 0.0)])
+    stream.step(50.0, depth_mm=0.5)
+    for wrong in ({"depth_mm": 1.5}, {"depth_mm": 0.5, "x_mm": 1.0}, {"force_mn": 1e4}, {}):
+        with pytest.raises(fp.InputError):
+            stream.step(60.0, **wrong)
+    with pytest.raises(fp.InputError, match="time_ms must not go back"):
+        stream.step(40.0, depth_mm=0.5)
+    again = fp.ReducedTouch(model, [(17.37, 0.0)])
+    again.step(50.0, depth_mm=0.5)
+    assert stream.step(70.0, depth_mm=0.6).fields == again.step(70.0, depth_mm=0.6).fields
+
+
+def test_a_file_has_the_same_bits_and_tells_damage(tmp_path: Path, model: fp.ReducedModel) -> None:
+    path = tmp_path / "sphere.npz"
+    fp.write_reduced(model, path)
+    assert path.stat().st_size < 5e6
+    read = fp.read_reduced(path)
+    assert (read.modes == model.modes).all()
+    assert read.axes == model.axes
+    content = bytearray(path.read_bytes())
+    for damaged in (
+        content[:-200],
+        content[: len(content) // 2],
+        bytearray(b"nothing of this kind"),
+        bytearray(),
+    ):
+        path.write_bytes(damaged)
+        with pytest.raises(fp.InputError, match=r"sphere\.npz"):
+            fp.read_reduced(path)
+    for place in range(100, len(content), len(content) // 7):
+        flipped = bytearray(content)
+        flipped[place] ^= 16
+        path.write_bytes(flipped)
+        with pytest.raises(fp.InputError, match=r"sphere\.npz"):
+            fp.read_reduced(path)
+    with pytest.raises(fp.InputError, match="must be a file that can be read"):
+        fp.read_reduced(tmp_path / "none.npz")
+
+
+def test_another_finger_is_refused(tmp_path: Path, model: fp.ReducedModel) -> None:
+    fp.write_reduced(model, tmp_path / "sphere.npz")
+    fp.read_reduced(tmp_path / "sphere.npz", fp.touch_of(fp.Fingertip(), fp.Sphere()))
+    with pytest.raises(fp.InputError, match="another finger"):
+        fp.read_reduced(tmp_path / "sphere.npz", fp.touch_of(fp.Fingertip.of("child"), fp.Sphere()))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda: ReducedRange(0.0), "depth_mm must be greater than 0"),
+        (lambda: ReducedRange(1.0, x_mm=(1.0, 2.0)), "x_mm must range over 0"),
+        (lambda: ReducedRange(1.0, z_mm=(2.0, -2.0)), "z_mm must range from low to high"),
+        (lambda: ReducedRange(1.0, x_mm=3.0), "x_mm must be two numbers"),  # type: ignore[arg-type]
+        (lambda: ReducedRange(1.0, parameter="curvature_per_m"), "or neither"),
+    ],
+)
+def test_an_impossible_range_is_one_sentence(wrong: object, said: str) -> None:
+    with pytest.raises(fp.InputError, match=said):
+        wrong()  # type: ignore[operator]
+
+
+def test_what_cannot_be_reduced_is_told_before_a_press(training: ReducedTraining) -> None:
+    sticky = replace(training.touch, friction=0.5)
+    with pytest.raises(fp.InputError, match="friction must be 0 for a range"):
+        ReducedTraining(sticky, ReducedRange(1.0, x_mm=(-1.0, 1.0)))
+    with pytest.raises(fp.InputError, match="parameter must be one of curvature_per_m"):
+        ReducedTraining(training.touch, ReducedRange(1.0, parameter="width", values=(1.0, 2.0)))
+    with pytest.raises(fp.InputError, match="calibration must be 0 or at least 19"):
+        fp.reduce_touch(training, calibration=5)
+    with pytest.raises(fp.InputError, match="bone"):
+        list(ReducedTraining(training.touch, ReducedRange(9.0)).poses())
+
+
+def test_a_pose_aside_is_met_as_by_an_indenter_that_moves_there() -> None:
+    touch = fp.touch_of(fp.Fingertip(), fp.Sphere(curvature_per_m=287), tilt_deg=5.0)
+    aside = ReducedTraining(touch, ReducedRange(1.0, x_mm=(0.0, 2.0)))
+    for pose in aside.poses():
+        x_mm = pose.values[0]
+        base = aside.touch_with()
+        start_mm = base.placement.origin_mm + np.array([x_mm, 0.0, 0.0])
+        off = pose.touches[0].placement.origin_mm - start_mm
+        along = off @ base.placement.axis
+        assert np.linalg.norm(off - along * base.placement.axis) < 1e-6
+        assert pose.first_touch_mm == pytest.approx(along, abs=1e-9)
+
+
+def test_streamed_spikes_are_those_of_one_go() -> None:
+    random = np.random.default_rng(3)
+    times = np.cumsum(np.append(0.0, random.uniform(0.5, 2.0, 400)))
+    sed = np.vstack([np.zeros(5), np.abs(np.cumsum(random.normal(0.0, 0.4, (400, 5)), axis=0))])
+    afferent = fp.Afferent()
+    quantity = afferent.static_quantity
+    traces = SedTraces(times, sed, times[1:-1], dynamic_quantity=quantity, static_quantity=quantity)
+    whole = afferent.spikes(traces)
+    stream = fp.AfferentStream(afferent, 5)
+    parts = [stream.step(float(time), row) for time, row in zip(times[1:], sed[1:], strict=True)]
+    for site in range(5):
+        streamed = np.concatenate([part[site] for part in parts])
+        assert streamed.size > 10
+        np.testing.assert_allclose(streamed, whole[site], rtol=0.0, atol=1e-9)
+
+
+def test_a_stream_refuses_wrong_samples() -> None:
+    stream = fp.AfferentStream(fp.Afferent(), 2)
+    with pytest.raises(fp.InputError, match="one value per site, 2: got 3"):
+        stream.step(1.0, [0.0, 0.0, 0.0])
+    with pytest.raises(fp.InputError, match="follows one quantity"):
+        stream.step(1.0, [0.0, 0.0], [0.0, 0.0])
+    stream.step(1.0, [0.0, 0.0])
+    with pytest.raises(fp.InputError, match="time_ms must go on"):
+        stream.step(1.0, [0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("object: sphere\n", "range must be given"),
+        ("object: sphere\nrange: {depth_mm: -1}\n", "range.depth_mm must be a number greater than 0"),
+        ("object: sphere\nrange: {depth_mm: 1, x_mm: 3}\n", "range.x_mm must be a pair of numbers"),
+        ("object: sphere\nrange: {depth_mm: 1, y_mm: [0, 1]}\n", "y_mm"),
+        ("object: sphere\nrange: {depth_mm: 9}\n", "bone"),
+        ("object: sphere\nrange: {depth_mm: 1}\nmotion: {depth_mm: 1}\n", "motion must be left out"),
+        ("object: sphere\nrange: {depth_mm: 1}\ncalibration: 3\n", "calibration must be 0 or at least 19"),
+        ("object: sphere\nrange: {depth_mm: 1, x_mm: [-1, 1]}\nfriction: 0.5\n", "friction must be 0"),
+        (
+            "object: sphere\nrange: {depth_mm: 1, parameter: size, values: [1, 2]}\n",
+            "parameter must be one of",
+        ),
+        ("object: sphere\nrange: {depth_mm: 1, x_mm: [-30, 30]}\n", "finger"),
+        ("object: sphere\nrange: [1]\n", "range must be a mapping"),
+        ("just text\n", "must be a mapping"),
+    ],
+)
+def test_a_wrong_file_is_one_sentence_before_a_press(
+    run_program: Callable[..., tuple[int, str, str]], tmp_path: Path, content: str, said: str
+) -> None:
+    (tmp_path / "range.yaml").write_text(content, encoding="utf-8")
+    status, _, errors = run_program(main, "fingerpad", "reduce", "range.yaml")
+    assert status == 2
+    assert said in errors
+    assert errors.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["range.yaml"]
+
+
+def test_the_command_writes_a_file_that_streams(
+    run_program: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    text = "object: {kind: sphere, radius_mm: 3.5}\nrange: {depth_mm: 0.3}\ncalibration: 0\n"
+    (tmp_path / "range.yaml").write_text(text, encoding="utf-8")
+    words = "fingerpad", "reduce", "range.yaml", "--out", "ball.npz", "--jobs", 1
+    status, printed, _ = run_program(main, *words)
+    assert status == 0
+    assert "1 poses, one place, up to 0.3 mm deep" in printed
+    first = (tmp_path / "ball.npz").read_bytes()
+    assert run_program(main, *words)[0] == 0  # nothing is pressed again
+    assert (tmp_path / "ball.npz").read_bytes() == first
+    stream = fp.ReducedTouch(fp.read_reduced(tmp_path / "ball.npz"), [(17.37, 0.0)])
+    assert stream.step(50.0, depth_mm=0.3).force_mn > 1.0

@@ -1,0 +1,84 @@
+"""Ctrl-C and SIGTERM end a command and its workers at once, with one sentence."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+LIMIT_S = 60.0
+AT_ONCE_S = 1.0
+
+
+def begin(folder: Path, jobs: int) -> subprocess.Popen[str]:
+    """Start a run with many presses in a process group of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "fingerpad", "reproduce", "--resolution", "quick", "--jobs", str(jobs)],
+        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+
+
+def descendants(program: subprocess.Popen[str]) -> list[psutil.Process]:
+    return psutil.Process(program.pid).children(recursive=True)
+
+
+@pytest.mark.parametrize(
+    ("sent", "status", "after_s", "jobs"),
+    [
+        (signal.SIGINT, 130, 2.0, 1),
+        (signal.SIGINT, 130, 6.0, 2),
+        (signal.SIGTERM, 143, 6.0, 2),
+    ],
+    ids=["while it starts", "Ctrl-C in presses", "SIGTERM in presses"],
+)
+def test_a_signal_ends_everything_at_once_with_a_sentence(
+    tmp_path: Path, sent: signal.Signals, status: int, after_s: float, jobs: int
+) -> None:
+    program = begin(tmp_path, jobs)
+    try:
+        time.sleep(after_s)
+        workers = descendants(program)
+        if sent == signal.SIGINT:
+            os.killpg(program.pid, sent)  # as a terminal does
+        else:
+            program.send_signal(sent)
+        began = time.monotonic()
+        _, said = program.communicate(timeout=LIMIT_S)
+        assert program.returncode == status
+        assert time.monotonic() - began < 5 * AT_ONCE_S  # other tests use the same cores
+        assert "Traceback" not in said
+        assert any(line.startswith("fingerpad: stopped.") for line in said.splitlines())
+        _, alive = psutil.wait_procs(workers, timeout=5 * AT_ONCE_S)
+        assert alive == []
+    finally:
+        program.kill()
+        program.communicate()
+
+
+def test_a_second_signal_ends_the_process_whatever_it_does(tmp_path: Path) -> None:
+    script = (
+        "import time\n"
+        "from fingerpad.cli.running import signals_raise\n"
+        "with signals_raise():\n"
+        "    try:\n"
+        "        print('ready', flush=True)\n"
+        "        time.sleep(60)\n"
+        "    finally:\n"
+        "        time.sleep(60)\n"
+    )
+    program = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    try:
+        assert program.stdout is not None
+        assert program.stdout.readline() == "ready\n"
+        program.send_signal(signal.SIGINT)
+        time.sleep(0.3)
+        assert program.poll() is None  # it tidies up
+        program.send_signal(signal.SIGINT)
+        assert program.wait(timeout=LIMIT_S) == -signal.SIGINT
+    finally:
+        program.kill()
+        program.communicate()

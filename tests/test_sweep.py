@@ -1,0 +1,571 @@
+"""Sweeps: what varies, what is pressed, what is written, and what happens when something goes wrong."""
+
+import json
+import os
+import sys
+import warnings
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray
+import zarr
+
+import fingerpad as fp
+from fingerpad.cli import main
+from fingerpad.core.errors import InputError, StoreError
+from fingerpad.experiments.descriptions.pressed import press_described
+from fingerpad.experiments.discrimination.decoding import code_hit_rates
+from fingerpad.experiments.sweep.description import Constraint, read_sweep, sweep_of
+from fingerpad.experiments.sweep.observers import observe
+from fingerpad.export.sweep_dataset import DONE, FAILED, LEFT_OUT, SweepFile, open_sweep
+from fingerpad.psychophysics.discrimination import Experiment
+
+TOUCH = {
+    "object": "cylinder",
+    "motion": {"ramp_ms": 50, "hold_ms": 60},
+    "afferents": {"rows": 1, "columns": 2},
+}
+STUDY = {
+    "touch": TOUCH,
+    "grid": {"motion.depth_mm": [0.3, 0.5, 9.0], "afferents.columns": [2, 3]},
+    "where": "motion.depth_mm < 0.4 or afferents.columns == 3",
+}
+"""Three presses, of which one is impossible, and one setting that is left out."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Folder with a finished study, and the indentations that all tests share."""
+    found = tmp_path_factory.mktemp("sweep")
+    fp.run_sweep(STUDY, found / "study.zarr")
+    return found
+
+
+@pytest.fixture
+def run(folder, tmp_path, monkeypatch):
+    """Run a sweep whose presses are all stored."""
+
+    def run(sweep, name="study.zarr", **options):
+        monkeypatch.setattr(fp.Touch, "solve", pytest.fail)
+        return fp.run_sweep(sweep, tmp_path / name, store=folder / "indentations", **options)
+
+    return run
+
+
+def files(folder):
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name != "zarr.json"
+    }
+
+
+# What varies
+
+
+def points(**sweep):
+    found = sweep_of({"touch": {"object": "sphere"}, **sweep})
+    return [found.values(setting) for setting in range(found.size)]
+
+
+def test_a_grid_has_all_combinations_and_fields_of_the_skin_come_first():
+    sweep = sweep_of(
+        {
+            "touch": {"object": "sphere"},
+            "grid": {
+                "afferents.seed": [1, 2],
+                "motion.depth_mm": {"start": 0.2, "stop": 0.6, "count": 3},
+                "object.curvature_per_m": {"start": 100, "stop": 400, "count": 3, "spacing": "logarithmic"},
+            },
+        }
+    )
+    assert [axis.name for axis in sweep.axes] == [
+        "motion_depth_mm", "object_curvature_per_m", "afferents_seed",
+    ]  # fmt: skip
+    assert (sweep.shape, sweep.press_shape, sweep.presses) == ((3, 3, 2), (3, 3), 9)
+    assert sweep.values(3) == pytest.approx(
+        {"motion.depth_mm": 0.2, "object.curvature_per_m": 200.0, "afferents.seed": 2}
+    )
+    assert list(sweep.settings_of(4)) == [8, 9]
+    assert sweep.content(0)["object"] == {"kind": "sphere", "curvature_per_m": pytest.approx(100.0)}
+
+
+def test_zipped_fields_vary_together():
+    assert points(zip={"place.x_mm": [0, 1], "motion.depth_mm": [0.2, 0.4]}) == [
+        {"place.x_mm": 0, "motion.depth_mm": 0.2},
+        {"place.x_mm": 1, "motion.depth_mm": 0.4},
+    ]
+
+
+@pytest.mark.parametrize("method", ["sobol", "latin_hypercube"])
+def test_a_sample_fills_its_box_and_depends_on_its_seed_alone(method):
+    box = {
+        "method": method,
+        "count": 13,
+        "seed": 5,
+        "fields": {"friction": [0, 1], "motion.depth_mm": [0.2, 0.6]},
+    }
+    found = points(sample=box)
+    assert len(found) == 13
+    assert points(sample=box) == found != points(sample=box | {"seed": 6})
+    friction = np.sort([point["friction"] for point in found])
+    depth = np.sort([point["motion.depth_mm"] for point in found])
+    assert 0.0 <= friction[0] < friction[-1] <= 1.0
+    assert 0.2 <= depth[0] < depth[-1] <= 0.6
+    if method == "latin_hypercube":
+        assert np.floor(13 * friction).tolist() == list(range(13))
+
+
+@pytest.mark.parametrize(
+    ("text", "met"),
+    [
+        ("a.b < 2 * c", True),
+        ("a.b > c", False),
+        ("0 < a.b <= 1.0", True),
+        ("not_there < 1", None),
+        ("a.b == 1 and (c > 3 or c == -2 + 4)", True),
+    ],
+)
+def test_a_constraint_compares_fields(text, met):
+    content = {"a": {"b": 1.0}, "c": 2}
+    if met is None:
+        with pytest.raises(InputError, match=r"not_there of 'not_there < 1' must be given in touch or vary"):
+            Constraint(text)(content)
+    else:
+        assert Constraint(text)(content) is met
+
+
+@pytest.mark.parametrize(
+    ("sweep", "said"),
+    [
+        ({"grid": {"object.raduis_mm": [1]}}, "object.raduis_mm is unknown: did you mean radius_mm?"),
+        ({"grid": {"friction": []}}, "must have a list of values, or start, stop and count: got []"),
+        ({}, "grid, zip or sample must name a field that varies: none does"),
+        ({"grid": {"friction": [0.1]}, "where": "friction >"}, "must be a comparison such as"),
+        ({"grid": {"friction": [0.1]}, "where": "__import__('os') > 1"}, "must have fields, numbers"),
+        ({"grid": {"friction": [0.1]}, "where": "friction ** 2 > 1"}, "must have fields, numbers"),
+        ({"grid": {"friction": [0.1]}, "where": "friction > 2"}, "where leaves no setting"),
+        ({"grid": {"friction": ["rough"]}}, "friction must be a number not below 0: got 'rough'"),
+        ({"grid": {"friction": [0.1]}, "zip": {"friction": [1]}}, "friction must vary in one way"),
+        ({"grid": {"outputs": ["csv"]}}, "outputs cannot vary"),
+        ({"zip": {"place.x_mm": [1, 2], "place.z_mm": [1]}}, "all fields must have as many values"),
+        ({"sample": {"count": 4, "fields": {"friction": [1, 0]}}}, "a lower bound and then a higher one"),
+        ({"sample": {"count": 4, "fields": {}}}, "fields must name a field or more"),
+        ({"grid": {"friction": {"start": 0, "stop": 1}}}, "count must be given: it is missing"),
+        ({"grid": {"friction": {"start": 0, "stop": 1, "count": 2, "spacing": "logarithmic"}}}, "above 0"),
+        ({"grid": {"seed": [1]}}, "seed is unknown"),
+        (
+            {"grid": {"friction.much": [1]}, "touch": {"object": "sphere", "friction": 0.1}},
+            "must be a mapping",
+        ),
+        ({"grids": {}}, "grids is unknown: did you mean grid?"),
+        ({"grid": {"friction": [0.1]}, "fields": ["warmth"]}, "must be one of times_ms"),
+    ],
+)
+def test_a_bad_sweep_is_refused_in_one_sentence(sweep, said, tmp_path):
+    with pytest.raises(InputError) as refusal:
+        fp.run_sweep({"touch": {"object": "sphere"}, **sweep}, tmp_path / "study.zarr")
+    assert said in str(refusal.value)
+    assert str(refusal.value).startswith("sweep, ")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_is_refused_with_its_line(tmp_path):
+    (tmp_path / "sweep.yaml").write_text("touch: {object: sphere}\ngrid:\n  motion.depth_mm: []\n")
+    with pytest.raises(InputError, match=r"sweep.yaml, line \d, grid.motion.depth_mm: a field that varies"):
+        read_sweep(tmp_path / "sweep.yaml").check()
+
+
+def test_a_large_sweep_needs_consent(tmp_path):
+    many = {"touch": TOUCH, "grid": {"motion.depth_mm": {"start": 0.1, "stop": 1, "count": 10_001}}}
+    with pytest.raises(InputError, match=r"at most 10000 settings, or --yes be given: it has 10001"):
+        fp.run_sweep(many, tmp_path / "study.zarr")
+
+
+# What is written
+
+
+def test_the_data_set_has_the_fields_that_vary_as_dimensions(folder):
+    data = open_sweep(folder / "study.zarr")
+    assert data.force_mn.dims == ("motion_depth_mm", "time")
+    assert data.static_rate_hz.dims == ("motion_depth_mm", "afferents_columns", "receptor")
+    assert data.motion_depth_mm.values.tolist() == [0.3, 0.5, 9.0]
+    assert (data.motion_depth_mm.units, data.force_mn.units, data.static_rate_hz.units) == ("mm", "mN", "s-1")
+    assert data.status.values.tolist() == [[DONE, DONE], [LEFT_OUT, DONE], [LEFT_OUT, FAILED]]
+    assert "because of the bone" in data.reason.values[2, 1]
+    assert data.reason.values[0].tolist() == ["", ""]
+    assert np.isnan(data.force_mn.values[2]).all()
+    assert {"version", "inputs_sha256", "seed", "code_hash", "packages"} <= set(data.attrs)
+
+
+def test_a_setting_has_the_numbers_of_its_touch(folder):
+    data = open_sweep(folder / "study.zarr")
+    where = {"motion_depth_mm": 0, "afferents_columns": 1}
+    touch = fp.setting_touch(data, **where)
+    assert touch["motion"] == {"ramp_ms": 50, "hold_ms": 60, "depth_mm": 0.3}
+    pressed = press_described(sweep_of(STUDY).described(1), folder)
+    one = data.isel(where)
+    assert one.force_mn.values.tolist() == pressed.skin.force_mn.tolist()
+    assert one.time_ms.values.tolist() == pressed.skin.times_ms.tolist()
+    assert one.static_rate_hz.values.tolist() == pressed.response.static_rate_hz.tolist()
+    trains = fp.setting_spikes(one)
+    assert [train.tolist() for train in trains] == [train.tolist() for train in pressed.response.spikes]
+    assert sum(map(len, trains)) > 0
+    with pytest.raises(InputError, match="one setting must be chosen"):
+        fp.setting_spikes(data)
+    with pytest.raises(InputError, match="an index must be given for each of motion_depth_mm"):
+        fp.setting_touch(data, motion_depth_mm=0)
+
+
+def test_rows_of_fewer_receptors_end_in_nan(folder):
+    data = open_sweep(folder / "study.zarr").isel(motion_depth_mm=0)
+    assert np.isnan(data.dynamic_rate_hz.values[0]).tolist() == [False, False, True]
+    assert not np.isnan(data.dynamic_rate_hz.values[1]).any()
+
+
+def test_any_reader_of_zarr_opens_it(folder):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        data = xarray.open_zarr(folder / "study.zarr", decode_timedelta=False)
+    assert float(data.force_mn.sel(motion_depth_mm=0.5).max()) > float(
+        data.force_mn.sel(motion_depth_mm=0.3).max()
+    )
+    assert json.loads((folder / "study.zarr" / "zarr.json").read_text())["zarr_format"] == 3
+
+
+def test_afferents_alone_press_nothing_and_fields_are_kept_on_request(run, tmp_path):
+    only = {
+        "touch": TOUCH | {"motion": TOUCH["motion"] | {"depth_mm": 0.3}},
+        "grid": {"afferents.density_per_cm2": [50, 80, 110]},
+        "fields": ["contact_pressure_kpa", "displacement_mm"],
+    }
+    done = run(only)
+    assert (done.done, done.pressed, done.loaded) == (3, 0, 1)
+    data = open_sweep(tmp_path / "study.zarr")
+    assert data.force_mn.dims == ("time",)
+    assert data.contact_pressure_kpa.dims == ("time", "skin_node")
+    assert data.displacement_mm.dims == ("node", "axis")
+    assert data.skin_node_mm.shape == (data.sizes["skin_node"], 3)
+    assert float(data.contact_pressure_kpa.max()) > 0.0
+
+
+def test_stiffer_tissues_take_more_force(folder):
+    soft, stiff = (
+        fp.run_sweep(
+            {"touch": TOUCH, "grid": {"motion.depth_mm": [0.3], "stiffness": [factor]}}, folder / name
+        )
+        for factor, name in ((1.0, "soft.zarr"), (2.0, "stiff.zarr"))
+    )
+    assert (soft.pressed, stiff.pressed) == (0, 1)
+    forces = [open_sweep(done.path).force_mn.max().item() for done in (soft, stiff)]
+    assert forces[1] == pytest.approx(2.0 * forces[0], rel=1e-3)
+
+
+# For other programs
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_a_table_of_rates_is_read_back_bit_by_bit(folder, tmp_path, ending):
+    data = open_sweep(folder / "study.zarr")
+    table = fp.read_sweep_table(fp.write_sweep_table(data, tmp_path / f"rates.{ending}"))
+    assert table.attrs["inputs_sha256"] == data.attrs["inputs_sha256"]
+    assert list(table.columns) == [
+        "motion_depth_mm", "afferents_columns", "receptor", "x_mm", "z_mm",
+        "dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms", "spike_count",
+    ]  # fmt: skip
+    assert len(table) == 2 + 3 + 3
+    some = table[(table.motion_depth_mm == 0.5) & (table.afferents_columns == 3)]
+    one = data.isel(motion_depth_mm=1, afferents_columns=1)
+    for name in ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms", "spike_count"):
+        np.testing.assert_array_equal(some[name], one[name])
+    np.testing.assert_array_equal(some[["x_mm", "z_mm"]], one.receptor_mm)
+
+
+def test_a_foreign_table_is_refused(folder, tmp_path):
+    data, path = open_sweep(folder / "study.zarr"), tmp_path / "rates.csv"
+    fp.write_sweep_table(data, path)
+    text = path.read_text()
+    for changed, said in [
+        (text.replace('"format_version": 1', '"format_version": 2'), "must have format_version 1: got 2"),
+        (text.replace("fingerpad sweep table", "other"), "must be a table of a sweep that fingerpad wrote"),
+        ("a,b\n1,2\n", "must be a table of a sweep: it cannot be read"),
+    ]:
+        path.write_text(changed)
+        with pytest.raises(InputError, match=said):
+            fp.read_sweep_table(path)
+    with pytest.raises(InputError, match=r"is written as \.csv or \.parquet: got rates.xls"):
+        fp.write_sweep_table(data, tmp_path / "rates.xls")
+    with pytest.raises(InputError, match="A setting must be done for a table of rates"):
+        fp.write_sweep_table(data.isel(motion_depth_mm=[2]), path)
+
+
+def test_spikes_of_a_sweep_are_a_session_of_nwb(folder, tmp_path):
+    pynwb = pytest.importorskip("pynwb")
+    data = open_sweep(folder / "study.zarr")
+    path = fp.write_sweep_spikes(data, tmp_path / "spikes.nwb", afferents_columns=1)
+    responses = [fp.setting_response(data, motion_depth_mm=n, afferents_columns=1) for n in range(2)]
+    with pynwb.NWBHDF5IO(str(path), "r") as file:
+        session = file.read()
+        names = session.trials["stimulus"][:].tolist()
+        # Without these two nwbinspector finds a critical defect and a violation of best practice.
+        assert (session.subject.species, session.units.resolution) == ("Homo sapiens", 1e-9)
+        onsets_ms = 1000.0 * session.trials["start_time"][:]
+        trains = [1000.0 * session.units["spike_times"][receptor] for receptor in range(3)]
+    assert names == [f"motion.depth_mm {depth}, afferents.columns 3" for depth in (0.3, 0.5)]
+    for receptor, train in enumerate(trains):
+        own = [
+            onset + response.spikes[receptor] for onset, response in zip(onsets_ms, responses, strict=True)
+        ]
+        np.testing.assert_allclose(train, np.concatenate(own), rtol=1e-12)
+    with pytest.raises(InputError, match="must come from the same receptors"):
+        fp.write_sweep_spikes(data, tmp_path / "all.nwb")
+    with pytest.raises(InputError, match="depth must be one of motion_depth_mm, afferents_columns"):
+        fp.write_sweep_spikes(data, tmp_path / "all.nwb", depth=1)
+    with pytest.raises(InputError, match=r"must be done: .*because of the bone"):
+        fp.setting_response(data, motion_depth_mm=2, afferents_columns=1)
+    with pytest.raises(InputError, match=r"must be within 0 \.\.\. 2: got 3"):
+        fp.setting_touch(data, motion_depth_mm=3, afferents_columns=1)
+
+
+def test_a_response_of_the_data_set_is_that_of_its_touch(folder):
+    pressed = press_described(sweep_of(STUDY).described(0), folder)
+    found = fp.setting_response(open_sweep(folder / "study.zarr"), motion_depth_mm=0, afferents_columns=0)
+    for name in ("positions_mm", "static_rate_hz", "first_spike_latency_ms"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(pressed.response, name))
+    assert (found.pitch_mm, found.phases) == (pressed.response.pitch_mm, pressed.response.phases)
+    assert found.duration_ms == pressed.response.duration_ms
+
+
+# What goes wrong
+
+
+def test_a_second_run_does_nothing_and_failures_are_tried_again_on_request(run):
+    first, again, retried = run(STUDY), run(STUDY), run(STUDY, retry_failed=True)
+    assert (first.done, first.failed, first.left_out, first.loaded) == (3, 1, 2, 2)
+    assert (again.done, again.failed, again.loaded) == (3, 1, 0)
+    assert (retried.done, retried.failed) == (3, 1)
+
+
+@pytest.mark.parametrize("failing", ["force_mn", "spike_time_ms", "status"])
+@pytest.mark.parametrize("failure", [KeyboardInterrupt(), OSError(28, "No space left on device")])
+def test_a_write_that_is_cut_short_goes_on_with_the_same_bits(
+    run, folder, tmp_path, monkeypatch, failing, failure
+):
+    write = SweepFile._write
+
+    def cut(file, name, *where):
+        if name == failing:
+            raise failure
+        write(file, name, *where)
+
+    with monkeypatch.context() as broken:
+        broken.setattr(SweepFile, "_write", cut)
+        with pytest.raises((KeyboardInterrupt, StoreError)) as ended:
+            run(STUDY)
+    if isinstance(failure, OSError):
+        assert "cannot be written (No space left on device): make space" in str(ended.value)
+    assert not (open_sweep(tmp_path / "study.zarr").status == DONE).any()
+    assert run(STUDY).done == 3
+    assert files(tmp_path / "study.zarr") == files(folder / "study.zarr")
+
+
+def test_another_sweep_or_program_is_refused(run, tmp_path, monkeypatch):
+    run(STUDY)
+    other = STUDY | {"where": "motion.depth_mm < 0.4"}
+    with pytest.raises(InputError, match=r"must be of the same sweep: it is of another one; choose"):
+        run(other)
+    with monkeypatch.context() as newer:
+        newer.setattr("fingerpad.export.sweep.software", lambda: sweep_dataset_software("0123"))
+        with pytest.raises(InputError, match=r"must be continued with the same program: version .* began it"):
+            run(STUDY)
+    group = zarr.open_group(tmp_path / "study.zarr", mode="r+")
+    group.attrs["format_version"] = 2
+    with pytest.raises(InputError, match="must have format_version 1: got 2"):
+        open_sweep(tmp_path / "study.zarr")
+    group.attrs["format"] = "other"
+    with pytest.raises(InputError, match="must be a sweep that fingerpad wrote"):
+        open_sweep(tmp_path / "study.zarr")
+
+
+def sweep_dataset_software(code_hash):
+    from fingerpad.experiments.manifest import software
+
+    return software() | {"code_hash": code_hash}
+
+
+@pytest.mark.parametrize("there", [None, "note.txt"])
+def test_what_is_no_sweep_is_refused(tmp_path, there):
+    path = tmp_path / "study.zarr"
+    if there:
+        path.mkdir()
+        (path / there).write_text("mine")
+    with pytest.raises(InputError, match="must be a sweep that fingerpad wrote: it cannot be read"):
+        open_sweep(path)
+    with pytest.raises(InputError, match=r"written as \.zarr"):
+        fp.run_sweep(STUDY, tmp_path / "study.nc")
+    if there:
+        with pytest.raises(InputError, match="must be a sweep that fingerpad wrote: it cannot be read"):
+            fp.run_sweep(STUDY, path)
+
+
+# Progress
+
+
+def test_a_notebook_shows_one_line_that_changes(run, monkeypatch):
+    shown = []
+    line = SimpleNamespace(update=lambda content, raw: shown.append(content["text/plain"]))
+    module = SimpleNamespace(display=lambda *_, **__: line)
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(display=module))
+    monkeypatch.setitem(sys.modules, "IPython.display", module)
+    run(STUDY, progress=fp.notebook_progress())
+    assert shown[-1] == "presses: 3 of 3, 0 s left"
+    monkeypatch.setitem(sys.modules, "IPython.display", None)
+    with pytest.raises(InputError, match="needs IPython, as in a notebook"):
+        fp.notebook_progress()
+
+
+# The command
+
+
+def test_the_command_estimates_runs_and_tells_how_many_failed(run_program, folder, tmp_path):
+    (tmp_path / "sweep.yaml").write_text(json.dumps(STUDY))
+    words = ("fingerpad", "sweep", "sweep.yaml", "--store", folder / "indentations", "--jobs", 1)
+    status, said, errors = run_program(main, *words, "--dry-run")
+    assert (status, errors) == (0, "")
+    assert said.startswith("4 settings, 3 presses.\nIf none is stored: about ")
+    assert os.listdir(tmp_path) == ["sweep.yaml"]
+    outputs = ("--table", "rates.csv", "--spikes", "spikes.txt")
+    status, said, errors = run_program(main, *words, "--out", "study.zarr", *outputs)
+    assert (status, os.listdir(tmp_path)) == (2, ["sweep.yaml"])
+    assert "Spikes of a sweep are written as .nwb: got spikes.txt" in errors
+    status, said, errors = run_program(main, *words, "--out", "study.zarr", *outputs[:2])
+    assert said.endswith("Table: rates.csv\n")
+    assert status == 11
+    assert said.startswith("3 of 4 settings done, 1 failed; 0 pressed and 2 loaded in ")
+    assert (
+        open_sweep(tmp_path / "study.zarr").attrs["command"].startswith("fingerpad sweep sweep.yaml --store")
+    )
+
+
+def test_a_scheduler_that_cannot_be_reached_is_refused(run_program, is_refused, tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("fingerpad.experiments.cluster._CONNECT_S", 0.3)
+    (tmp_path.parent / "study.yaml").write_text(json.dumps(STUDY))
+    outcome = run_program(main, "fingerpad", "sweep", "../study.yaml", "--scheduler", "tcp://127.0.0.1:1")
+    is_refused(outcome, "fingerpad", "--scheduler", "tcp://127.0.0.1:1")
+
+
+# Observers
+
+
+STIMULI = {
+    "touch": TOUCH,
+    "grid": {"motion.depth_mm": [0.3, 0.5, 0.7], "afferents.columns": [2, 3]},
+    "observer": {"along": "motion.depth_mm", "standard": 0.5, "noise": 0.1},
+}
+
+
+def asked(**observer):
+    """Sweep with other keys of its observer, those with a list varying."""
+    varied = {f"observer.{key}": value for key, value in observer.items() if isinstance(value, list)}
+    given = {key: value for key, value in observer.items() if not isinstance(value, list)}
+    return {**STIMULI, "observer": STIMULI["observer"] | given, "grid": STIMULI["grid"] | varied}
+
+
+@pytest.fixture(scope="module")
+def responses():
+    """Made-up responses of 2 and of 3 receptors under three stimuli."""
+    rates = np.random.default_rng(3).uniform(20.0, 60.0, (3, 2, 3))
+    rates[:, 0, 2] = np.nan
+    return {"static_rate_hz": rates, "dynamic_rate_hz": 1.5 * rates, "first_spike_latency_ms": rates}
+
+
+def observed(responses, done=None, **observer):
+    sweep = sweep_of(asked(**observer))
+    done = np.ones(sweep.shape, dtype=bool) if done is None else done
+    return observe(sweep, responses, done, lambda: None)
+
+
+@pytest.mark.parametrize("code", ["gradient_sum", "euclidean"])
+def test_hit_rates_are_those_of_each_observer_alone(responses, code):
+    rates = responses["dynamic_rate_hz"]
+    found = observed(
+        responses, code=code, measure="dynamic", noise=[0.05, 0.2], **{"experiment.criterion": [0.4, 0.6]}
+    )
+    assert found.shape == (3, 2, 2, 2)
+    for receptors, noise, criterion in np.ndindex(2, 2, 2):
+        count = 2 + receptors
+        table = rates[[1, 0, 2], receptors, :count]
+        expected = code_hit_rates(
+            code,
+            table,
+            np.array([[0, 1], [1, 2]][: count - 1]),
+            [0.05, 0.2][noise],
+            0,
+            Experiment(criterion=[0.4, 0.6][criterion]),
+        )
+        got = found[:, receptors, noise, criterion]
+        assert got[[0, 2]].tolist() == expected.hit_rate.tolist()
+        assert np.isnan(got[1])
+
+
+def test_the_standard_varies_too(responses):
+    found = observed(responses, standard=[0.3, 0.7])
+    assert np.isnan(found).sum(axis=0).tolist() == [[1, 1], [1, 1]]
+    assert np.isnan(found[0, :, 0]).all()
+    assert np.isnan(found[2, :, 1]).all()
+
+
+def test_a_group_with_a_silent_or_missing_stimulus_has_no_hit_rate(responses):
+    done = np.ones((3, 2), dtype=bool)
+    done[0, 1] = False
+    silent = {name: values.copy() for name, values in responses.items()}
+    silent["static_rate_hz"][2, 0, :2] = 0.0
+    assert np.isnan(observed(responses, done)[:, 1]).all()
+    assert not np.isnan(observed(responses, done)[[0, 2], 0]).any()
+    assert np.isnan(observed(silent)[:, 0]).all()
+
+
+def test_observers_of_a_run_are_in_the_data_set_and_others_are_asked_later(run, tmp_path):
+    sweep = {
+        "touch": {**TOUCH, "afferents": {"rows": 1, "columns": 3}},
+        "observer": {"along": "motion.depth_mm", "standard": 0.3, "measure": "dynamic"},
+        "grid": {"motion.depth_mm": [0.3, 0.5], "observer.noise": [0.1, 0.2]},
+    }
+    run(sweep)
+    data = open_sweep(tmp_path / "study.zarr")
+    assert data.hit_rate.dims == ("motion_depth_mm", "observer_noise")
+    assert data.observer_noise.values.tolist() == [0.1, 0.2]
+    assert 0.5 < data.hit_rate.values[1, 1] <= data.hit_rate.values[1, 0]
+    again = fp.observe_sweep(data, sweep["observer"], {"noise": [0.2, 0.3]})
+    assert again.sel(motion_depth_mm=0.5).values[0] == data.hit_rate.values[1, 1]
+    assert run(sweep).loaded == 0
+
+
+@pytest.mark.parametrize(
+    ("observer", "said"),
+    [
+        ({"along": "motion.hold_ms"}, "along must be a field that varies and changes the skin"),
+        ({"along": "afferents.columns"}, "along must be a field that varies and changes the skin"),
+        ({"standard": 0.4}, "standard must be one of the values of motion.depth_mm"),
+        ({"noise": -1.0}, "noise must be a number not below 0: got -1"),
+        ({"noise": [0.1, "much"]}, "noise must be a number not below 0: got 'much'"),
+        ({"code": "ideal"}, "code must be one of gradient_sum, euclidean"),
+        ({"nose": 0.1}, "nose is unknown: did you mean noise"),
+        ({"along": ["motion.depth_mm"]}, "observer.along cannot vary"),
+    ],
+)
+def test_a_bad_observer_is_refused_before_anything_is_pressed(observer, said, tmp_path):
+    with pytest.raises(InputError, match=said):
+        fp.run_sweep(asked(**observer), tmp_path / "study.zarr")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_observer_without_its_block_or_with_other_fields_is_refused(tmp_path):
+    without = {key: value for key, value in asked(noise=[0.1]).items() if key != "observer"}
+    with pytest.raises(InputError, match="observer must be given where its fields vary"):
+        fp.run_sweep(without, tmp_path / "study.zarr")
+    mixed = {**STIMULI, "zip": {"observer.noise": [0.1, 0.2], "stiffness": [1.0, 2.0]}}
+    with pytest.raises(InputError, match=r"observer.noise, stiffness must not vary together"):
+        fp.run_sweep(mixed, tmp_path / "study.zarr")
