@@ -70,12 +70,30 @@ TARGETS = (
     Target("reproduce_standard_gb", "reproduction", f"{_STANDARD}: memory", 3.0, "GB"),
     Target("reproduce_quick_s", "reproduction", f"{_QUICK}: time", 90.0, "s"),
     Target("import_s", "startup", "`import fingerpad`, kernels compiled", 0.5, "s"),
+    Target("sweep_overhead", "sweeps", "engine and data set of a sweep, over its presses", 0.05, "x"),
+    Target("sweep_receptors_s", "sweeps", "10^5 receptors, 100 stored touches", 30.0, "s"),
+    Target("sweep_observers", "sweeps", "settings of an observer per minute", 10_000, "", at_least=True),
+    Target("touches_memory_growth", "touches", "memory of a sweep, from a tenth to its end", 1.05, "x"),
     Target("growth_time_exponent", "growth", f"{_GROWTH} of time", 1.15, ""),
     # "Linear" is read as an exponent of at most 1.05; the memory of Python itself would reduce the exponent.
     Target("growth_memory_exponent", "growth", f"{_GROWTH} of memory", 1.05, ""),
     Target(
         "mixed_s", "mixed_population", "4,000 mixed afferents, 1 s of touch, solved skin to spikes", 1.0, "s"
     ),
+    Target("reduced_step_ms", "reduced", "reduced touch, a step of the skin, 99 %", 5.0, "ms"),
+    Target("reduced_step_ms", "reduced", "reduced touch, a step of the skin, 99 %, stretch", 1.0, "ms"),
+    Target("reduced_spikes_ms", "reduced", "955 afferents, a step of 1 ms, 99 %", 0.3, "ms"),
+    Target("reduced_touch_s", "reduced", "reduced touch, 1 s with 955 afferents", 0.5, "s"),
+    Target("reduced_built_s", "reduced", "making a reduced touch", 1800.0, "s"),
+    Target("reduced_size_mb", "reduced", "file of a reduced touch", 50.0, "MB"),
+    Target("reduced_sed_share", "reduced", "touches with SED within 2 % of the peak", 0.95, "", True),
+    Target("reduced_force_share", "reduced", "touches with force within 1 % of the peak", 0.95, "", True),
+    Target("reduced_coverage", "reduced", "touches within the error bar", 0.95, "", True),
+    Target("reduced_static_rate", "reduced", "reduced touch, static rates", 3.0, "spikes/s"),
+    Target("reduced_dynamic_rate", "reduced", "reduced touch, dynamic rates", 10.0, "spikes/s"),
+    Target("laboratory_ms", "laboratory", "laboratory, from slider to picture, 99 %", 1000.0, "ms"),
+    Target("laboratory_static_mb", "laboratory", "static page of the laboratory", 20.0, "MB"),
+    Target("laboratory_growth_mb", "laboratory", "laboratory, growth of its server in use", 20.0, "MB"),
     Target(
         "million_triangles_s", "surfaces", "10^6 triangles, read and pressed, more than the sphere", 60.0, "s"
     ),

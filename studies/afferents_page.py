@@ -30,7 +30,7 @@ from fingerpad.neuron.afferent import AnyAfferent
 from fingerpad.neuron.mixed_population import PUBLISHED_DENSITIES, types_of_afferents
 from fingerpad.neuron.tuning import tuning_curve
 from fingerpad.report.mixed_responses import STYLES, draw_mixed_responses
-from fingerpad.report.style import PALE, new_figure, write_png
+from fingerpad.report.style import BLACK, GREY, PALE, new_figure, write_png
 from fingerpad.skin.unrolled_skin import UnrolledSkin
 from studies.vibration_page import DOCS, table, with_table
 
@@ -58,7 +58,11 @@ SPEEDS_MM_PER_S = (4.0, 20.0, 100.0)
 PROBING_MM_PER_S = 20.0
 """Speed at which receptive fields are probed."""
 
-DEPTHS_UM = np.geomspace(2.0, 1000.0, 90)
+DEEPEST_MM = 1.6
+"""Depth of the slow ramp, five times the largest threshold."""
+
+DEPTHS_UM = np.geomspace(2.0, 1e3 * DEEPEST_MM, 96)
+SPEEDS_OF_THRESHOLDS = np.geomspace(0.1, 100.0, 61)
 TIMES_THRESHOLD = (4.0, 5.0)
 BRANCHES = {"SAI": (6, 1.0), "RA": (14, 1.2)}
 """End organs per afferent and the radius of the disc in which they are scattered. [mm]"""
@@ -90,9 +94,11 @@ def step_on_hold() -> fp.SkinResponse:
 
 @cache
 def slow_ramp() -> fp.SkinResponse:
-    """Press the probe 1 mm deep at 4 mm/s, and hold it."""
-    times_ms = np.round(np.geomspace(2.5, 250.0, 25), 3)
-    return indented(PROBE, fp.Trajectory((0, 250, 750), (0, 1.0, 1.0)), times_ms=times_ms.tolist())
+    """Press the probe at 4 mm/s, and hold it."""
+    end_ms = 1e3 * DEEPEST_MM / SLOW_MM_PER_S
+    times_ms = np.round(np.geomspace(2.5, end_ms, 28), 3)
+    motion = fp.Trajectory((0, end_ms, end_ms + 500.0), (0, DEEPEST_MM, DEEPEST_MM))
+    return indented(PROBE, motion, times_ms=times_ms.tolist())
 
 
 def linear_response(name: str, afferent: AnyAfferent) -> tuple[float, float]:
@@ -160,8 +166,8 @@ def indented_by(traces: fp.SedTraces, depth_um: float, speed_mm_per_s: float) ->
     Stress and strain at a depth hardly depend on the speed: relaxation takes seconds.
     """
     ramp_ms = depth_um / speed_mm_per_s
-    known_um = SLOW_MM_PER_S * np.minimum(traces.times_ms, 250.0)
-    rises = known_um < SLOW_MM_PER_S * 250.0
+    known_um = np.minimum(SLOW_MM_PER_S * traces.times_ms, 1e3 * DEEPEST_MM)
+    rises = known_um < 1e3 * DEEPEST_MM
     times_ms = np.append(np.linspace(0.0, ramp_ms, 17), ramp_ms + 200.0)
     wanted_um = np.minimum(speed_mm_per_s * times_ms, depth_um)
     rises[np.argmax(~rises)] = True
@@ -170,7 +176,7 @@ def indented_by(traces: fp.SedTraces, depth_um: float, speed_mm_per_s: float) ->
 
 
 def threshold_depths_um(afferent: AnyAfferent, traces: fp.SedTraces, speed_mm_per_s: float) -> FloatArray:
-    """Smallest depth of an indentation that elicits a spike at every site, inf if 1 mm does not. [µm]"""
+    """Smallest depth of an indentation that elicits a spike at every site, inf if none does. [µm]"""
     depths = np.full(traces.n_sites, np.inf)
     for depth_um in DEPTHS_UM[::-1]:
         fires = np.diff(afferent.spikes(indented_by(traces, depth_um, speed_mm_per_s)).offsets) > 0
@@ -234,47 +240,83 @@ def fields() -> None:
         rows,
     )
     rows = []
+    for name, units in (("RA", published.RA_VELOCITIES), ("PC", published.PC_VELOCITIES)):
+        slowest = velocity_threshold(types_of_afferents()[name], SITES[name])
+        rows.append([name, f"{slowest:.1f}", "{:g} to {:g}".format(*units.value)])
+    _write_table(PAGE, "velocity", ["type", "model [mm/s]", "units [mm/s]"], rows)
+    rows, areas_of = [], {}
     for name, along in depths.items():
         low, high = (np.mean([field_area_mm2(each, times) for each in along]) for times in TIMES_THRESHOLD)
-        branched = "–"
+        areas_of[name], branched = [(low, high)], "–"
         if name in BRANCHES:
             areas = [[branched_area_mm2(name, times, seed) for seed in range(8)] for times in TIMES_THRESHOLD]
+            areas_of[name].append((np.median(areas[0]), np.median(areas[1])))
             branched = f"{np.median(areas[0]):.0f} to {np.median(areas[1]):.0f}"
         observed = published.FIELD_AREAS.value[published.TYPES.index(name)]
         rows.append([name, f"{low:.1f} to {high:.1f}", branched, f"{observed:g}"])
     _write_table(
         PAGE, "fields", ["type", "one end organ [mm²]", "several [mm²]", "median of units [mm²]"], rows
     )
-    write_png(draw_fields, depths, IMAGES / "afferent_fields.png")
+    write_png(lambda found: draw_fields(*found), (depths, areas_of), IMAGES / "afferent_fields.png")
 
 
-def draw_fields(depths: dict[str, list[FloatArray]]) -> Figure:
-    """Draw the threshold over the distance of the probe, across and along the finger."""
-    figure = new_figure(8.4, 3.8)
-    for axes, which, title in zip(
-        figure.subplots(1, 2, sharey=True), (0, 1), ("across", "towards the base"), strict=True
-    ):
+def velocity_threshold(afferent: AnyAfferent, site_mm: float) -> float:
+    """Smallest speed of an indentation to 1 mm that elicits a spike. [mm/s]"""
+    traces = ramp_traces(afferent, [(X_MM, site_mm)])
+    fires = (
+        afferent.spikes(indented_by(traces, 1000.0, speed)).offsets[-1] > 0 for speed in SPEEDS_OF_THRESHOLDS
+    )
+    return float(next(speed for speed, spike in zip(SPEEDS_OF_THRESHOLDS, fires, strict=True) if spike))
+
+
+def draw_fields(depths: dict[str, list[FloatArray]], areas: dict[str, list[tuple[float, float]]]) -> Figure:
+    """Draw the threshold over the distance of the probe, and areas of fields beside the published medians."""
+    figure = new_figure(9.5, 3.8)
+    left, middle, right = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.1))
+    middle.sharey(left)
+    for row, (name, found) in enumerate(areas.items()):
+        colour, marker = STYLES[row]
+        for branched, (low, high) in enumerate(found):
+            right.plot(
+                (low, high), (row + 0.15 * branched,) * 2, color=colour, linestyle="-", marker=marker,
+                markersize=5.0, markerfacecolor="white" if branched else colour,
+            )  # fmt: skip
+        median = published.FIELD_AREAS.value[published.TYPES.index(name)]
+        right.plot((median / 2.0, 2.0 * median), (row - 0.15,) * 2, color=GREY, linewidth=6.0, alpha=0.35)
+        right.plot(median, row - 0.15, "x", color=BLACK, markersize=8.0)
+    right.set(
+        xlabel="area of the field [mm²]", title="4 and 5 times the threshold", xscale="log",
+        xlim=(2.0, 250.0), yticks=range(len(areas)), yticklabels=list(areas), ylim=(len(areas) - 0.5, -0.5),
+    )  # fmt: skip
+    for axes, which, title in ((left, 0, "across"), (middle, 1, "towards the base")):
         for (name, profiles), (colour, marker) in zip(depths.items(), STYLES, strict=False):
             axes.semilogy(
                 DISTANCES_MM[: profiles[which].size], profiles[which], color=colour, marker=marker,
                 markevery=5, markersize=4.0, label=name,
             )  # fmt: skip
-        axes.set(xlabel="distance of the probe [mm]", title=title, ylim=(10.0, 1100.0))
-    figure.axes[0].set_ylabel("threshold depth [µm]")
-    figure.axes[1].legend()
+        axes.set(xlabel="distance of the probe [mm]", title=title, ylim=(8.0, 1e3 * DEEPEST_MM))
+        medians = published.INDENTATION_THRESHOLDS.value
+        for median, (colour, marker) in zip(medians, STYLES, strict=False):
+            axes.plot(-0.4, median, marker, color=colour, markerfacecolor="white", clip_on=False)
+    left.set_ylabel("threshold depth [µm]")
+    left.legend(loc="center right", bbox_to_anchor=(1.0, 0.4))
     return figure
 
 
+FIRST_MS, LAST_MS = (50.0, 1050.0), (12000.0, 13000.0)
+"""Windows of the decline in 12 s of a hold."""
+
+
 def adaptation() -> None:
-    """Write spikes in the ramp and in parts of a hold of 5 s, and their figure."""
-    skin = indented(BALL, fp.RampAndHold(depth_mm=1.0, hold_ms=4950.0))
+    """Write spikes in the ramp and in parts of a hold of 13 s, and their figure."""
+    skin = indented(BALL, fp.RampAndHold(depth_mm=1.0, hold_ms=12950.0))
     sites = [(X_MM + x, z) for x, z in product((-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5), (0.0, 0.5, 1.0, 1.5))]
     found = {}
     for name, afferent in types_of_afferents().items():
         traces = skin.sed(sites, afferent.dynamic_quantity, afferent.static_quantity)
         trains = afferent.spikes(traces)
         found[name] = max((trains[n] for n in range(len(sites))), key=len)
-    parts = ((0.0, 60.0), (60.0, 1000.0), (1000.0, 2500.0), (2500.0, 5000.0))
+    parts = ((0.0, 60.0), (60.0, 1000.0), (1000.0, 2500.0), (2500.0, 5000.0), FIRST_MS, LAST_MS)
     rows = [
         [
             name,
@@ -301,8 +343,12 @@ def draw_adaptation(found: dict[str, FloatArray]) -> Figure:
         xlabel="time [ms], grey: ramp",
         ylabel="1 / interval [spikes/s]",
         ylim=(1.0, 1500.0),
-        xlim=(1.0, 5500.0),
+        xlim=(1.0, 14000.0),
     )
+    train = found["SAI"]
+    first = np.count_nonzero((train > FIRST_MS[0]) & (train <= FIRST_MS[1]))
+    declined = first * (1.0 - np.mean(published.SAI_DECLINE.value))
+    axes.plot(LAST_MS[0], declined, "x", color=BLACK, markersize=9.0, label="SAI, published decline")
     axes.legend(loc="upper right")
     return figure
 
@@ -335,6 +381,31 @@ def densities() -> None:
         ["type", "published [1/cm²]", f"afferents on {area:.0f} mm² of pad", "[1/cm²]"],
         rows,
     )
+    write_png(lambda found: draw_densities(found, area), population, IMAGES / "afferent_densities.png")
+
+
+def draw_densities(population: fp.MixedPopulation, area_mm2: float) -> Figure:
+    """Draw densities beside the published ones, and where the afferents lie in the unrolled pad."""
+    figure = new_figure(9.5, 3.6)
+    left, right = figure.subplots(1, 2)
+    for row, (name, part) in enumerate(population.parts.items()):
+        colour, marker = STYLES[row]
+        left.bar(row, 100.0 * len(part) / area_mm2, 0.6, color=colour, alpha=0.75)
+        left.plot(row, PUBLISHED_DENSITIES[name], "D", color=BLACK, markerfacecolor="white", markersize=7.0)
+        around, along = np.array(part.places_mm).T[::-1]
+        right.plot(around, along, marker, color=colour, markersize=3.0, label=f"{name}, {len(part)}")
+    left.set(
+        ylabel="afferents per cm²", title="bars: placed; marks: published",
+        xticks=range(len(population.parts)), xticklabels=list(population.parts),
+    )  # fmt: skip
+    right.set(
+        xlabel="around the finger [mm]",
+        ylabel="along the finger [mm]",
+        aspect="equal",
+        title="the pad, unrolled",
+    )
+    right.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
 
 
 REACH_FORCE_MN = 500.0

@@ -11,7 +11,7 @@ from studies.pages.markdown import markdown_table as table
 
 INTRODUCTION = """# Command line
 
-`fingerpad` has nine commands. The option `--help` of each shows the same text.
+`fingerpad` has thirteen commands. The option `--help` of each shows the same text.
 `make reproduce ARGS="--resolution quick"` runs `fingerpad reproduce` in the environment of the repository.
 `python -m studies results` writes this page.
 """
@@ -20,11 +20,15 @@ GUIDES = {
     "touch": "Format and outputs: [touch.md](touch.md).",
     "init": "What it holds: [touch.md](touch.md).",
     "check": "How good the estimate is: [touch.md](touch.md#before-a-press).",
+    "sweep": "Format and results: [sweeps.md](sweeps.md).",
     "fit": "Formats and results: [fit.md](fit.md).",
     "discriminate": "Format and results: [discriminate.md](discriminate.md).",
     "validate": "Format and scores: [validate.md](validate.md).",
     "export": "What is exported: [mechanics.md](mechanics.md#export).",
     "view": "Pictures and films: [view.md](view.md).",
+    "store": "What a store holds: [store.md](store.md).",
+    "reduce": "Format and use: [reduced.md](reduced.md).",
+    "lab": "Guide: [lab.md](lab.md).",
     "reproduce": "Results of a run: [results.md](results.md).",
 }
 """Pages that explain a command."""
@@ -34,10 +38,15 @@ def command_line_page() -> str:
     """Return the page."""
     group: Any = typer.main.get_command(app)
     parts = [INTRODUCTION.rstrip("\n")]
-    for name, command in group.commands.items():
+    commands = [
+        (f"{name} {inner}", each)
+        for name, command in group.commands.items()
+        for inner, each in getattr(command, "commands", {"": command}).items()
+    ]
+    for name, command in ((name.strip(), command) for name, command in commands):
         parts += [
             f"## fingerpad {name}",
-            " ".join([" ".join(command.help.split()), GUIDES[name]]),
+            " ".join([" ".join(command.help.split()), GUIDES[name.split()[0]]]),
             table(("option", "default", "meaning"), [_row(parameter) for parameter in command.params]),
         ]
     return "\n\n".join(parts) + "\n"

@@ -18,6 +18,7 @@ from fingerpad.data import psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, skin_deflection, sphere_discrimination
 from fingerpad.experiments.runner import Runner
+from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import LAYERS, Mesh, finger_mesh
 from fingerpad.neuron.population import Population
@@ -329,8 +330,7 @@ def run(runner: Runner) -> PaperSize:
 
 def preset() -> Preset:
     """Count and measure the preset."""
-    conditions = Conditions(REFERENCE, materials=TISSUES)
-    mesh = finger_mesh(conditions.finger, resolution_grading(REFERENCE, RECEPTOR_X_MM))
+    mesh = finger_mesh(Fingertip(), resolution_grading(REFERENCE, RECEPTOR_X_MM))
     border = int((mesh.layer[: mesh.shape[2]] < LAYERS.index("dermis")).sum())
     return Preset(
         nodes=len(mesh.nodes_mm),
@@ -359,7 +359,7 @@ def pad_edges(mesh: Mesh, centre_mm: float, below: int) -> Edges:
     """
     skin = mesh.nodes_mm[mesh.skin_grid]
     along, across = PAD_HALF_AXES_MM
-    volar = skin[..., 1] < Conditions().finger.spine_y_mm
+    volar = skin[..., 1] < Fingertip().spine_y_mm
     pad = (((skin[..., 0] - centre_mm) / along) ** 2 + (skin[..., 2] / across) ** 2 < 1.0) & volar
     points = mesh.nodes_mm[mesh.skin_grid + below]  # nodes are numbered from skin to bone first
     edges = np.concatenate(

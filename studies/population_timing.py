@@ -240,7 +240,7 @@ def run(runner: Runner, conditions: Conditions) -> PopulationTimingStudy:
     """
     fitted = fit_bars(runner, conditions, {"spheres": discrimination_touches(conditions)})
     with runner.stage("population over time", 1) as advance:
-        timing = population_timing(fitted.others["spheres"], fitted.afferent, conditions.finger)
+        timing = population_timing(fitted.others["spheres"], fitted.afferent)
         advance()
     return PopulationTimingStudy(timing=timing, manifest=runner.manifest(conditions))
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from fingerpad.cli.options import Jobs, Materials, Resolution, to_whole
-from fingerpad.cli.running import Bars, interruptible, make_writable, processes
+from fingerpad.cli.running import interruptible, make_writable, processes, progress
 from fingerpad.core.files import write_atomically
 from fingerpad.core.results import to_json
 from fingerpad.experiments.conditions import Conditions
@@ -105,9 +105,7 @@ def command_of(study: Study) -> Callable[..., None]:
 
 def execute(study: Study, conditions: Conditions, out: Path, jobs: int | None) -> None:
     """Run a study from the command line, with bars on a terminal, and print the paths of its files."""
-    from rich.console import Console
-
-    runner = Runner(out, processes(jobs), Bars(Console(stderr=True)))
+    runner = Runner(out, processes(jobs), progress())
     make_writable(out)
     with interruptible():
         page, numbers = run_study(study, runner, conditions)

@@ -76,7 +76,10 @@ def markdown(page: Page) -> str:
     Half of the finger.
     <BLANKLINE>
     """
-    blocks = [f"# {page.heading}", page.subtitle, *page.paragraphs]
+    blocks = [f"# {page.heading}", page.subtitle]
+    for drawing in page.opening:
+        blocks += _block(drawing, "")
+    blocks += page.paragraphs
     for chapter in page.chapters:
         blocks += markdown_blocks(chapter)
     return "\n\n".join(block for block in blocks if block) + "\n"

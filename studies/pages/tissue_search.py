@@ -131,16 +131,16 @@ def draw(results: TissueSearch) -> Figure:
     force.set(
         title="(a) deflection, force",
         xlabel="force of the plate at 2 mm [N]",
-        ylabel="$R^2$ under the cylinder",
+        ylabel="R² under the cylinder",
     )
     _shade(firing, wanted.noise_sigma, (wanted.fss, 1.0))
-    firing.set(title="(b) percept, firing", xlabel=r"fitted noise $\sigma_1$", ylabel="FSS out of sample")
+    firing.set(title="(b) percept, firing", xlabel="fitted noise σ₁", ylabel="FSS out of sample")
     rates.plot(*PAPER_DYNAMIC_HZ, "+", color=BLACK, markersize=12.0)
     rates.set(title="(c) dynamic rates", xlabel="under the flat face [spikes/s]", ylabel="largest [spikes/s]")
     _shade(codes, wanted.noise_sigma, (0.0, wanted.euclidean_rms))
     codes.set(
         title="(d) both codes at one noise",
-        xlabel=r"noise $\sigma_1$ fitted to the Gradient Sum",
+        xlabel="noise σ₁ fitted to the Gradient Sum",
         ylabel="rms error of the Euclidean Distance",
     )
     figure.draw_without_rendering()  # which gives the panels their final sizes
