@@ -1,0 +1,68 @@
+"""Settings of the site: all pages of the repository, the gallery, and the reference of `fingerpad`.
+
+The source folder is the root of the repository, so that pages keep their links to each other and to files.
+"""
+
+import sys
+from pathlib import Path
+
+import fingerpad
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+from reference import write_reference  # noqa: E402 - lies beside this file
+
+project = "fingerpad"
+author = "the authors of fingerpad"
+project_copyright = f"%Y, {author}"
+version = release = fingerpad.__version__
+root_doc = "docs/index"
+include_patterns = ["docs/**", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md"]
+exclude_patterns = [".venv", ".peers", "build", "**/__pycache__", "docs/gallery", "docs/site"]
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx_gallery.gen_gallery",
+]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 4
+# Decisions are listed on their own page. Shapes such as (n_sites,) are no references.
+suppress_warnings = ["config.cache", "toc.not_included", "ref.python"]
+
+default_role = "code"
+autodoc_typehints = "none"  # docstrings give units and shapes, which types do not
+autodoc_default_options = {"members": True, "member-order": "bysource"}
+autosummary_generate = False
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+
+sphinx_gallery_conf = {
+    "examples_dirs": "docs/gallery",
+    "gallery_dirs": "docs/examples",
+    "filename_pattern": r"\.py$",
+    "abort_on_example_error": True,
+    "within_subsection_order": "FileNameSortKey",
+    "download_all_examples": False,
+    "write_computation_times": False,
+    "remove_config_comments": True,
+    "capture_repr": (),
+    "min_reported_time": 3600,
+}
+
+html_theme = "furo"
+html_title = "fingerpad"
+html_extra_path = ["root"]  # the address of the site leads to its first page
+html_copy_source = False
+html_show_sourcelink = False
+
+
+def setup(app: object) -> None:
+    """Write the pages of the reference, which follow the list of public names."""
+    write_reference(HERE.parent / "reference")
