@@ -2,10 +2,17 @@
 # make test          check style, types, imports, behaviour and the wheel; stops at the first failure
 # make checks        only style, types and imports
 # make pages         only the examples and links of README and docs
+# make kernels       only the example of the README, which compiles all kernels
+# make site          build the site into build/site: all pages, the gallery, which is run, and the reference
 # make wheel         build the wheel, install it into an empty environment and run the README's ten lines there
+# make release       build wheel and sdist twice, compare and check them; publish nothing
 # make results       reproduce at standard resolution, and write the numbers and the picture of README and docs
 # make verification  run every verification case, slow ones too, and write docs/verification.md
 # make benchmarks    run benchmarks, some by ARGS="sphere growth", and write benchmarks/README.md (no part of the tests)
+# make fuzz          random odd inputs for an hour; SEED=... repeats a run, FUZZ=... sets its length
+# make lock          pin every package of the development, with hashes, in requirements-dev.txt
+# make audit         ask for known vulnerabilities of what is pinned there
+# make sbom          write what the package needs at run time, build/sbom.json (CycloneDX)
 # make clean         remove what these have made, the environment included
 #
 # All make their own environment in .venv; PYTHON names the interpreter it is made with.
@@ -24,16 +31,16 @@ install := $(bin)/python -m pip install --quiet --disable-pip-version-check --no
 export PYTHONNOUSERSITE := 1
 unexport PYTHONPATH
 
-.PHONY: reproduce test checks pages wheel results verification benchmarks clean
+.PHONY: reproduce test checks pages kernels site wheel release results verification benchmarks fuzz lock audit sbom clean
 .DEFAULT_GOAL := test
 
 reproduce: .venv/installed
 	$(bin)/fingerpad reproduce $(ARGS)
 
-# Each of the first three keeps about one core busy; the pages compile the kernels for the tests that follow.
+# Each of the first three keeps about one core busy. Kernels are compiled before two processes need them at once.
 test: .venv/installed-for-tests
-	$(MAKE) --jobs 2 wheel checks pages
-	$(bin)/pytest $(PYTEST_ARGS) --ignore $(PAGES)
+	$(MAKE) --jobs 2 wheel checks site release
+	$(bin)/pytest $(PYTEST_ARGS)
 
 checks: .venv/installed-for-tests
 	$(bin)/ruff check
@@ -44,8 +51,17 @@ checks: .venv/installed-for-tests
 pages: .venv/installed-for-tests
 	$(bin)/pytest $(PAGES)
 
+kernels: .venv/installed-for-tests
+	$(bin)/pytest --quiet $(PAGES) -k README.md
+
+site: kernels
+	$(bin)/python -m sphinx --quiet --fail-on-warning --keep-going -b html -c docs/site . build/site
+
 wheel: .venv/installed-for-tests
 	$(bin)/python -m tests.installed_wheel
+
+release: .venv/installed-for-tests
+	$(bin)/python -m tests.release
 
 results: .venv/installed
 	$(bin)/fingerpad reproduce --extended $(ARGS)
@@ -59,6 +75,30 @@ verification: .venv/installed-for-tests
 
 benchmarks: .venv/installed-for-tests
 	$(bin)/python -m benchmarks $(ARGS)
+
+SEED ?= $(shell date +%s)
+FUZZ ?= 100
+fuzz: .venv/installed-for-tests
+	@echo "seed $(SEED)"
+	FUZZ=$(FUZZ) $(bin)/pytest tests/test_fuzz.py --hypothesis-profile=search --hypothesis-seed=$(SEED)
+
+# These tools have their own environment, so that they are no part of what they look at.
+pins := .venv/tools/bin/uv pip compile --quiet --universal --generate-hashes --custom-compile-command "make lock" pyproject.toml
+lock: .venv/tools
+	$(pins) --extra test --output-file requirements-dev.txt
+
+audit: .venv/tools
+	.venv/tools/bin/pip-audit --require-hashes --disable-pip --requirement requirements-dev.txt
+
+sbom: .venv/tools
+	mkdir -p build
+	$(pins) --output-file build/requirements.txt
+	.venv/tools/bin/cyclonedx-py requirements --pyproject pyproject.toml --mc-type library --output-reproducible \
+		--output-file build/sbom.json build/requirements.txt
+
+.venv/tools: | $(bin)/python
+	$(bin)/python -m venv $@
+	$@/bin/pip install --quiet "uv>=0.9,<1" "pip-audit>=2.9,<3" "cyclonedx-bom>=7,<8"
 
 .venv/installed: pyproject.toml | $(bin)/python
 	$(install) .
@@ -75,5 +115,5 @@ $(bin)/python:
 	"$(PYTHON)" -m venv .venv
 
 clean:
-	rm -rf .venv build dist reproduction .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv build dist reproduction docs/examples docs/reference .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find src tests benchmarks studies -name __pycache__ -type d -prune -exec rm -rf {} +
