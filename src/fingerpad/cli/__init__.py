@@ -19,7 +19,7 @@ from fingerpad.cli.lab import lab_command
 from fingerpad.cli.options import Command
 from fingerpad.cli.reduce import reduce_command
 from fingerpad.cli.reproduce import reproduce_command
-from fingerpad.cli.running import INTERRUPTED, TERMINATED, Terminated, signals_raise
+from fingerpad.cli.running import INTERRUPTED, TERMINATED, Terminated, forget_interrupt, signals_raise
 from fingerpad.cli.store import store_app
 from fingerpad.cli.sweep import sweep_command
 from fingerpad.cli.touch import check_command, init_command, touch_command
@@ -114,6 +114,7 @@ def run(commands: typer.Typer, program: str) -> None:
             sys.stdout.flush()
         sys.exit(status)
     except (typer.Abort, KeyboardInterrupt) as stop:  # click makes the first of the second
+        forget_interrupt()
         terminated = isinstance(stop.__cause__ or stop, Terminated)
         print(f"{program}: stopped. Run the same command again.", file=sys.stderr)
         sys.exit(TERMINATED if terminated else INTERRUPTED)

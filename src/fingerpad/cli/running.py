@@ -56,12 +56,22 @@ def signals_raise() -> Iterator[None]:
             signal.signal(number, handler)
 
 
+def forget_interrupt() -> None:
+    """Let this process end with its own status after a `KeyboardInterrupt`.
+
+    CPython ends `python -m` by SIGINT instead if the exception passed through `exec` of a text, as while
+    dataclasses are made, until another text is executed (`run_eval_code_obj` of its source).
+    """
+    exec("")
+
+
 @contextmanager
 def interruptible(ending: str = CONTINUES) -> Iterator[None]:
     """After Ctrl-C or SIGTERM, exit with a sentence on how to go on."""
     try:
         yield
     except KeyboardInterrupt as error:
+        forget_interrupt()
         typer.echo(f"fingerpad: stopped. {ending}", err=True)
         status = TERMINATED if isinstance(error, Terminated) else INTERRUPTED
         raise typer.Exit(status) from error
