@@ -6,6 +6,7 @@ half a finger at z >= 0.
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -35,6 +36,9 @@ def write_gmsh_finger(
         pytest.skip(f"Gmsh cannot be loaded: {error}")
 
     gmsh.initialize(interruptible=False)
+    if hasattr(signal, "SIGPIPE"):
+        # Gmsh gives it back to the system: writing to a closed socket would end all further tests.
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         occ, mesh = gmsh.model.geo, gmsh.model.mesh
