@@ -184,7 +184,7 @@ def touch_dataset(
     if skin.touch is not None:
         values |= _object_values(skin.touch, skin)
     if response is not None:
-        values |= _response_values(instance("response", response, ResponseMap))
+        values |= response_values(instance("response", response, ResponseMap))
     for name, value in values.items():
         part = PARTS[name]
         attributes: Attributes = {"long_name": part.long_name}
@@ -394,7 +394,7 @@ def _face(body: Indenter, reach_mm: Sequence[float]) -> tuple[np.ndarray, np.nda
     return x, z, body.front(points).reshape(x.size, z.size)
 
 
-def _response_values(response: ResponseMap) -> dict[str, np.ndarray]:
+def response_values(response: ResponseMap) -> dict[str, np.ndarray]:
     """Values of `RESPONSE_PARTS`."""
     return {
         "receptor_mm": response.positions_mm,

@@ -26,11 +26,18 @@ import numpy as np
 
 from fingerpad.core.errors import InputError, StoreError, shown
 from fingerpad.core.files import path_of
-from fingerpad.core.signals import ResponseMap, SpikeTrains
+from fingerpad.core.signals import SpikeTrains
 from fingerpad.experiments.sweep.description import OBSERVER, Sweep, sweep_of
 from fingerpad.experiments.sweep.observers import MEASURED, observe
 from fingerpad.experiments.sweep.settle import PLACES_MM, Settled
-from fingerpad.export.dataset import RESPONSE_PARTS, field_dimensions, first_line, library, unit_of
+from fingerpad.export.dataset import (
+    RESPONSE_PARTS,
+    field_dimensions,
+    first_line,
+    library,
+    response_values,
+    unit_of,
+)
 from fingerpad.skin.fields import FIELDS, Place
 
 if TYPE_CHECKING:
@@ -302,18 +309,6 @@ class SweepFile:
     @staticmethod
     def _place(number: int, shape: tuple[int, ...]) -> tuple[int, ...]:
         return tuple(int(index) for index in np.unravel_index(number, shape)) if shape else ()
-
-
-def response_values(response: ResponseMap) -> dict[str, np.ndarray]:
-    """Values of `RESPONSE_PARTS`."""
-    return {
-        "receptor_mm": response.positions_mm,
-        "dynamic_rate_hz": response.dynamic_rate_hz,
-        "static_rate_hz": response.static_rate_hz,
-        "first_spike_latency_ms": response.first_spike_latency_ms,
-        "spike_count": np.diff(response.spikes.offsets).astype(np.int32),
-        "spike_time_ms": response.spikes.times_ms,
-    }
 
 
 def open_sweep(path: str | Path) -> xarray.Dataset:
