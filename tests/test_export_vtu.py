@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkVersion
 from vtkmodules.vtkFiltersGeneral import vtkCellValidator
 from vtkmodules.vtkFiltersVerdict import vtkCellSizeFilter
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
@@ -85,8 +86,9 @@ def test_cells_are_bricks_and_wedges_of_the_right_volume_and_turned_the_right_wa
     validator.SetInputData(grid)
     validator.Update()
     state = vtk_to_numpy(validator.GetOutput().GetCellData().GetArray("ValidityState"))
-    assert set(state[repeats].tolist()) == {0}
-    assert set(state.tolist()) <= {0, WARPED}
+    if (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()) >= (9, 7):
+        assert set(state[repeats].tolist()) == {0}  # before, the validator turned wedges the other way
+    assert set(state[~repeats].tolist()) <= {0, WARPED}
     sizes = vtkCellSizeFilter()
     sizes.SetInputData(grid)
     sizes.Update()

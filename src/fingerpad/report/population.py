@@ -56,6 +56,9 @@ def draw_population(section: PopulationMaps) -> Figure:
         _surface(surface, x, z, values, label, colours, scale)
         _on_the_finger(solid, finger, key, colours, scale)
         _map(plane, x, z, values, label, colours, scale, receptors)
+        for axes in (surface, solid):
+            # Until it is drawn, Matplotlib 3.11.0 lays a surface out as if it filled the figure.
+            axes.draw(figure.canvas.get_renderer())  # type: ignore[attr-defined]
     return figure
 
 
