@@ -86,9 +86,10 @@ def test_cells_are_bricks_and_wedges_of_the_right_volume_and_turned_the_right_wa
     validator.SetInputData(grid)
     validator.Update()
     state = vtk_to_numpy(validator.GetOutput().GetCellData().GetArray("ValidityState"))
-    if (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()) >= (9, 7):
-        assert set(state[repeats].tolist()) == {0}  # before, the validator turned wedges the other way
     assert set(state[~repeats].tolist()) <= {0, WARPED}
+    if (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()) < (9, 7):
+        pytest.skip("Before 9.7 VTK turned wedges the other way, and measured warped cells otherwise.")
+    assert set(state[repeats].tolist()) == {0}
     sizes = vtkCellSizeFilter()
     sizes.SetInputData(grid)
     sizes.Update()
