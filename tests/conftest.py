@@ -66,6 +66,7 @@ def is_refused(tmp_path) -> Callable[..., None]:
         assert (status, said) == (2, "")
         assert errors.startswith(f"{program}: ")
         assert errors.endswith(".\n")
+        assert not errors.endswith("..\n")  # no sentence within a sentence
         assert errors.count("\n") == 1
         assert named in errors
         assert came in errors.removeprefix(f"{program}: ")

@@ -86,7 +86,7 @@ def test_one_afferent_serves_all_readings_and_each_reading_is_fitted_as_well(dri
         for reading in (bar_readings.USED, bar_readings.LITERAL)
     }
     used, literal = bar_readings.compare(models, dict.fromkeys(models, driven))
-    assert used.fss_same_afferent == used.fss_in_sample
+    assert used.fss_same_afferent == pytest.approx(used.fss_in_sample, rel=1e-12)
     assert (literal.static_rate_hz <= used.static_rate_hz).all()
     assert literal.dynamic_rate_hz.max() < used.dynamic_rate_hz.max()
     assert literal.fss_same_afferent < literal.fss_in_sample

@@ -63,7 +63,8 @@ def read(printed: str, n_elements: int, sets: tuple[str, ...]) -> Found:
         named = re.match(r"internal energy density .*set (\S+) and time\s+(\S+)", head)
         if not named or named[1] not in [name.upper() for name in sets]:
             continue
-        values = np.array([row.split() for row in rows if row.strip()], dtype=float)
+        # CalculiX 2.23 names the increment in between.
+        values = np.array([row.split() for row in rows if re.match(r"\s*\d", row)], dtype=float)
         element = values[:, 0].astype(int) - 1
         counts = np.bincount(element, minlength=n_elements)
         sums = np.bincount(element, values[:, 2], minlength=n_elements)

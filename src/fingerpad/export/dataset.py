@@ -302,18 +302,19 @@ def touch_file(path: Path) -> Path:
         If there is none.
     """
     try:
-        if path.is_dir() and path.suffix != ".zarr":
-            held = [path / name for name in FILE_NAMES if (path / name).exists()]
-            if not held:
-                raise InputError(f"{path} must hold {' or '.join(FILE_NAMES)}: there is neither.")
-            return held[0]
-        if not path.exists():
-            raise InputError(f"{path} must be a touch that fingerpad wrote: there is no such file.")
-        if not (path.is_dir() or path.is_file()):
-            raise InputError(f"{path} must be a file or a folder: it is neither.")
+        path.stat()
+        held = [path / name for name in FILE_NAMES if (path / name).exists()]
+    except FileNotFoundError as error:
+        raise InputError(f"{path} must be a touch that fingerpad wrote: there is no such file.") from error
     except (OSError, ValueError) as error:  # no right to look, or no possible name
         said = getattr(error, "strerror", None) or error
         raise InputError(f"{str(path)[:200]!r} must be a file or folder that can be read: {said}.") from error
+    if path.is_dir() and path.suffix != ".zarr":
+        if not held:
+            raise InputError(f"{path} must hold {' or '.join(FILE_NAMES)}: there is neither.")
+        return held[0]
+    if not (path.is_dir() or path.is_file()):
+        raise InputError(f"{path} must be a file or a folder: it is neither.")
     return path
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dis
 import hashlib
+import inspect
 import pickle
 import sys
 from collections.abc import Iterator
@@ -21,6 +22,9 @@ import numpy as np
 
 from fingerpad.core.errors import InputError
 from fingerpad.skin.behaviour import PACKAGE, own_class_tag
+
+_HAS_DOCSTRING: int = getattr(inspect, "CO_HAS_DOCSTRING", 0)
+"""Flag of code with a docstring, from Python 3.14 on."""
 
 _GENERATED = frozenset(
     (
@@ -167,7 +171,7 @@ class _Tagger:
     def code_lines(self, code: CodeType, names: list[str]) -> Iterator[str]:
         """Instructions of some code, and into `names` those of globals that it may use."""
         names += code.co_names
-        yield repr((code.co_argcount, code.co_kwonlyargcount, code.co_flags))
+        yield repr((code.co_argcount, code.co_kwonlyargcount, code.co_flags & ~_HAS_DOCSTRING))
         for step in dis.get_instructions(code):
             yield step.opname
             if isinstance(step.argval, CodeType):
