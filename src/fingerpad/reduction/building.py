@@ -10,8 +10,9 @@ errors.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,6 +35,9 @@ FEWEST_CALIBRATED = 19
 
 CHECKED_SITES = 9
 """Sites along and across at which errors are measured."""
+
+EXPONENTS = tuple(0.05 * n for n in range(17))
+"""Exponents of `relaxation` that are tried."""
 
 STREAM_MS = 5.0
 """Longest step of the stream while errors are measured. [ms]"""
@@ -98,13 +102,15 @@ def reduce_touch(
         )
     solve = solve or _in_turn
     poses = list(training.poses())
-    pressed = solve([touch for pose in poses for touch in pose.touches], "training")
+    shape, again = training.pressed_again()
+    *pressed, repressed = solve([*(touch for pose in poses for touch in pose.touches), again], "training")
     each = len(poses[0].touches)
     responses = [pressed[n * each : (n + 1) * each] for n in range(len(poses))]
     base = training.touch_with(poses[0].values[3:])
     model = fitted_model(
         training.range.axes, training.range.depth_mm, base.at_mm, poses, responses, tuple(quantities)
     )
+    model = with_exponents(model, repressed, shape)
     if not calibration:
         return model
     random = np.random.default_rng(seed)
@@ -113,6 +119,26 @@ def reduce_touch(
     errors = [largest_errors(model, skin, shape) for (shape, _), skin in zip(held_out, solved, strict=True)]
     rank = math.ceil(COVERAGE * (calibration + 1)) - 1
     return replace(model, error=np.sort(errors, axis=0)[min(rank, calibration - 1)])
+
+
+def with_exponents(model: ReducedModel, skin: SkinResponse, shape: Iterable[float] = ()) -> ReducedModel:
+    """Choose the exponents with which a touch is met best, by least squares over its times.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        Exponents do not count.
+    skin : SkinResponse
+        A touch that has relaxed at one depth before it goes to others.
+    shape : iterable of float
+        Value of the indenter's parameter, if one varies.
+    """
+    sums = []
+    for exponent in EXPONENTS:
+        tried = replace(model, exponents=np.full(model.error.size, exponent))
+        wrong = np.array([row.wrong for row in _compared(tried, skin, shape)])
+        sums.append((wrong**2).sum(axis=0))
+    return replace(model, exponents=np.array(EXPONENTS)[np.argmin(sums, axis=0)])
 
 
 def _in_turn(touches: Sequence[Touch], stage: str) -> list[SkinResponse]:
@@ -160,7 +186,12 @@ def draw_touch(
 
 def largest_errors(model: ReducedModel, skin: SkinResponse, shape: Iterable[float] = ()) -> FloatArray:
     """Largest errors over a touch, of the quantities and of the force, over `ReducedModel.error_scale`."""
-    return _compared(model, skin, shape)[2]
+    so_far = np.zeros(model.error.size)
+    relative = so_far
+    for row in _compared(model, skin, shape):
+        so_far = np.maximum(so_far, row.reduced)
+        relative = np.maximum(relative, row.wrong / model.error_scale(so_far))
+    return relative
 
 
 def streamed(
@@ -183,35 +214,37 @@ def streamed(
         Largest errors and largest values of the quantities [kPa] and of the force [mN], and whether all
         errors stay within what the reduced touch says of them.
     """
-    wrong, peaks, relative = _compared(model, skin, shape)
-    return wrong, peaks, bool((relative <= model.error).all())
+    rows = list(_compared(model, skin, shape))
+    wrong, known = (np.max([getattr(row, name) for row in rows], axis=0) for name in ("wrong", "known"))
+    return wrong, known, bool((largest_errors(model, skin, shape) <= model.error).all())
 
 
-def _compared(
-    model: ReducedModel, skin: SkinResponse, shape: Iterable[float]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Largest errors, largest values, and largest errors over the scale of errors."""
+class _Row(NamedTuple):
+    """One time of a comparison: largest errors, and largest values of both, of quantities and of force."""
+
+    wrong: FloatArray
+    known: FloatArray
+    reduced: FloatArray
+
+
+def _compared(model: ReducedModel, skin: SkinResponse, shape: Iterable[float]) -> Iterator[_Row]:
+    """Stream the motion of a full touch, and compare at each of its times."""
     motion = skin.touch.stimulus  # type: ignore[union-attr]
     sites = _sites(model)
     known = np.stack([skin.sample(quantity, sites) for quantity in model.quantities], axis=1)
     stream = ReducedTouch(model, sites, *shape)
-    so_far, largest, relative = np.zeros((3, len(model.quantities) + 1))
     for number in range(1, skin.times_ms.size):
         begin, end = skin.times_ms[number - 1 : number + 1]
         parts = max(1, math.ceil((end - begin) / STREAM_MS))
         for time in (begin + (end - begin) * np.arange(1, parts + 1) / parts).tolist():
             pose, depth_mm = motion.pose_at(time), float(motion.prescribed_at(time))
             sample = stream.step(time, depth_mm, None, pose.x_mm, pose.z_mm, pose.tilt_deg)
-        values = np.array([*sample.fields.values()])
-        wrong = np.append(
-            np.abs(values - known[number]).max(axis=1), abs(sample.force_mn - skin.force_mn[number])
+        values, force_mn = np.array([*sample.fields.values()]), skin.force_mn[number]
+        yield _Row(
+            np.append(np.abs(values - known[number]).max(axis=1), abs(sample.force_mn - force_mn)),
+            np.append(known[number].max(axis=1), force_mn),
+            np.append(values.max(axis=1), sample.force_mn),
         )
-        so_far = np.maximum(so_far, np.append(values.max(axis=1), sample.force_mn))
-        largest, relative = (
-            np.maximum(largest, wrong),
-            np.maximum(relative, wrong / model.error_scale(so_far)),
-        )
-    return largest, np.append(known.max(axis=(0, 2)), skin.force_mn.max()), relative
 
 
 def _sites(model: ReducedModel) -> FloatArray:

@@ -18,7 +18,7 @@ from fingerpad.reduction.model import ReducedModel, origin_of
 from fingerpad.skin.indentation import Touch
 
 FORMAT = "fingerpad reduced touch"
-VERSION = 1
+VERSION = 2
 LARGEST_MB = 1000.0
 """Largest file that is read. [MB]"""
 
@@ -32,6 +32,7 @@ ARRAYS = (
     "reach_mm",
     "largest",
     "error",
+    "exponents",
 )
 """Fields of `ReducedModel` that are arrays."""
 

@@ -11,14 +11,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import cast
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.reduction.interpolation import Axis, chebyshev_points, lagrange
 from fingerpad.reduction.relaxation import filtered
+from fingerpad.reduction.retreat import LEVELS, levels_mm, slope_changes
 from fingerpad.reduction.training import TrainingPose
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
@@ -86,6 +89,8 @@ class ReducedModel:
     error : array (n_quantities + 1,)
         Errors that 95 % of new touches stay within, over `error_scale` (see `building`). Infinite before that
         is measured.
+    exponents : array (n_quantities + 1,)
+        Powers of the depth that scale what has relaxed (see `relaxation`), of the quantities and the force.
     origin : dict of str
         What was pressed: for people, and to refuse another finger.
     """
@@ -103,6 +108,7 @@ class ReducedModel:
     reach_mm: FloatArray
     largest: FloatArray
     error: FloatArray
+    exponents: FloatArray
     origin: Mapping[str, str]
 
     def error_scale(self, so_far: FloatArray) -> FloatArray:
@@ -116,11 +122,49 @@ class ReducedModel:
             weights = np.multiply.outer(weights, axis.weights(value)).ravel()
         return weights
 
-    def terms(self, depth_mm: float) -> FloatArray:
-        """Return the factors of the terms, (1 + n_branches, n_terms), at a depth below first touch."""
+    @cached_property
+    def squared(self) -> np.ndarray:
+        """Which quantities are squares of what relaxes linearly, (n_quantities,)."""
+        return squares(self.quantities)
+
+    @cached_property
+    def deepest_terms(self) -> FloatArray:
+        """Terms of the largest depth, (1 + n_branches, n_terms)."""
+        return self.terms(self.depth_mm, np.zeros(LEVELS))
+
+    @cached_property
+    def levels_mm(self) -> FloatArray:
+        """Levels of the springs of `retreat`, (n_levels,). [mm]"""
+        return levels_mm(self.depth_mm)
+
+    @cached_property
+    def _slope_changes(self) -> tuple[FloatArray, FloatArray]:
+        """Weights of the springs in the polynomials of the depth, at once and relaxed, (n_levels, degree)."""
+        at = np.append(self.levels_mm, self.depth_mm)
+        once, relaxed = (
+            slope_changes(self.levels_mm, self.depth_mm, depth_basis(at, self.depth_mm, degree))
+            for degree in (AT_ONCE, RELAXED)
+        )
+        return once, relaxed
+
+    def terms(self, depth_mm: float, behind_mm: FloatArray) -> FloatArray:
+        """Factors of the terms of the response at once and of each branch.
+
+        Parameters
+        ----------
+        depth_mm : float
+            Depth below first touch. [mm]
+        behind_mm : array (n_levels,)
+            How far the skin of each level stays behind. [mm]
+
+        Returns
+        -------
+        array (1 + n_branches, n_terms)
+        """
         depth = np.array(depth_mm)
-        once = depth_basis(depth, self.depth_mm, AT_ONCE)
-        relaxed = depth_basis(depth, self.depth_mm, RELAXED)
+        once_of, relaxed_of = self._slope_changes
+        once = depth_basis(depth, self.depth_mm, AT_ONCE) + behind_mm @ once_of
+        relaxed = depth_basis(depth, self.depth_mm, RELAXED) + behind_mm @ relaxed_of
         found = np.zeros((1 + self.times_ms.size, AT_ONCE + RELAXED * self.times_ms.size))
         found[0, :AT_ONCE] = once
         for branch in range(self.times_ms.size):
@@ -153,7 +197,7 @@ def fitted_model(
     Returns
     -------
     ReducedModel
-        Not calibrated.
+        Not calibrated, and with exponents of 0.
     """
     touch = poses[0].touches[0]
     finger = cast(Fingertip, touch.finger)
@@ -167,13 +211,17 @@ def fitted_model(
     middles = np.array([_middle_mm(each[-1]) for each in responses])
     totals, fields_of, peaks = [], [], []
     for n, each in enumerate(responses):
-        rows = np.vstack(terms[n * len(each) : (n + 1) * len(each)])
+        linear, quadratic = (
+            np.vstack(rows) for rows in zip(*terms[n * len(each) : (n + 1) * len(each)], strict=True)
+        )
         sites = _sites(finger, middles[n], reach)
         known = np.vstack(
             [np.hstack([skin.sample(quantity, sites) for quantity in quantities]) for skin in each]
         )
         whole = np.vstack([np.stack([skin.force_mn, skin.contact_area_mm2], axis=1) for skin in each])
-        found = np.linalg.lstsq(rows, np.hstack([whole, known]), rcond=1e-8)[0]
+        found = np.linalg.lstsq(linear, np.hstack([whole, known]), rcond=1e-8)[0]
+        of_squares = np.concatenate([[False, False], np.repeat(squares(quantities), len(sites))])
+        found[:, of_squares] = np.linalg.lstsq(quadratic, known[:, of_squares[2:]], rcond=1e-8)[0]
         peaks.append(known.reshape(len(known), len(quantities), -1).max(axis=(0, 2)))
         totals.append(found[:, :2])
         fields_of.append(found[:, 2:])
@@ -194,6 +242,7 @@ def fitted_model(
         reach_mm=reach,
         largest=np.append(largest, max(skin.force_mn.max() for each in responses for skin in each)),
         error=np.full(len(quantities) + 1, np.inf),
+        exponents=np.zeros(len(quantities) + 1),
         origin=origin_of(touch),
     )
 
@@ -207,15 +256,30 @@ def origin_of(touch: Touch) -> dict[str, str]:
     }
 
 
+def squares(quantities: Sequence[str]) -> np.ndarray:
+    """Tell which quantities are quadratic in the strain, (n_quantities,)."""
+    return np.array([quantity == STORED_ENERGY for quantity in quantities])
+
+
 def _terms(
     times_ms: FloatArray, depth_mm: FloatArray, deepest_mm: float, constants_ms: FloatArray
-) -> FloatArray:
-    """One row per time: the response at once, less what each branch has relaxed."""
+) -> tuple[FloatArray, FloatArray]:
+    """One row per time: the response at once, less what each branch has relaxed; and the same of squares.
+
+    The strain behind a square grows with the depth here.
+    """
     steps = np.arange(FINE_PARTS * (times_ms.size - 1) + 1) / FINE_PARTS
     fine = np.interp(steps, np.arange(times_ms.size), times_ms)
-    relaxed = depth_basis(np.interp(fine, times_ms, depth_mm), deepest_mm, RELAXED)
-    branches = [-filtered(fine, relaxed, constant)[::FINE_PARTS] for constant in constants_ms.tolist()]
-    return np.hstack([depth_basis(depth_mm, deepest_mm, AT_ONCE), *branches])
+    depth = np.maximum(np.interp(fine, times_ms, depth_mm), 0.0)[:, None]
+    basis = depth_basis(depth[:, 0], deepest_mm, RELAXED)
+    linear = [depth_basis(depth_mm, deepest_mm, AT_ONCE)]
+    quadratic = linear.copy()
+    for constant in constants_ms.tolist():
+        relaxed = filtered(fine, np.hstack([basis, depth]), constant)
+        share = np.divide(relaxed[:, -1:], depth, out=np.zeros_like(depth), where=depth > 0.0)
+        linear.append(-relaxed[::FINE_PARTS, :-1])
+        quadratic.append(-(share * (2.0 - share) * basis)[::FINE_PARTS])
+    return np.hstack(linear), np.hstack(quadratic)
 
 
 def _middle_mm(skin: SkinResponse) -> FloatArray:

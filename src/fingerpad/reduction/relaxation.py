@@ -6,9 +6,14 @@ is linear in the stress therefore is
 
     y(t) = Y(p(t)) - sum_i m_i(t),    tau_i dm_i/dt = D_i(p(t)) - m_i,
 
-with Y the response at once and D_i what branch i relaxes in a long hold of the pose. Tissue that relaxes also
-deforms a little differently; how much this matters is measured (docs/decisions/reduced-touch.md). As in the
-full solver, D_i is linear within a step, and then the steps are exact.
+with Y the response at once and D_i what branch i relaxes in a long hold of the pose. As in the full solver,
+D_i is linear within a step, and then the steps are exact. Two corrections matter
+(docs/decisions/reduced-touch.md):
+
+- The stored energy is quadratic. Each branch holds an energy E_i = r_i^2 of a strain r_i, so r_i is filtered,
+  and the branch has lost r_i^2 - (r_i - m_i)^2.
+- Stress that relaxed at one depth counts less when the indenter has gone deeper, and more when it has come
+  back: m_i filters s(d) D_i and counts as m_i / s(d), with s a power of the depth. At one depth s cancels.
 """
 
 from __future__ import annotations
@@ -32,6 +37,41 @@ def filter_step(step_ms: float, times_ms: FloatArray) -> tuple[FloatArray, Float
     gamma = np.exp(-step_ms / times_ms)
     average = times_ms / step_ms * (1.0 - gamma)
     return 1.0 - average, average - gamma, gamma
+
+
+SHALLOWEST = 0.4
+"""Share of the largest depth up to which what has relaxed counts alike."""
+
+
+def depth_scale(depth_mm: float, deepest_mm: float, exponents: FloatArray) -> FloatArray:
+    """Scale s of what relaxes at a depth, of the shape of the exponents; 1 at the largest depth.
+
+    Examples
+    --------
+    >>> print(depth_scale(0.25, 1.0, np.array([0.0, 0.5])))
+    [1.  0.5]
+    """
+    return np.asarray(max(depth_mm / deepest_mm, SHALLOWEST) ** exponents)
+
+
+def amplitudes(values: FloatArray, squared: FloatArray) -> FloatArray:
+    """Return what relaxes linearly: values, or roots of those that are squares, (..., n_quantities, n)."""
+    found = values.copy()
+    found[..., squared, :] = np.sqrt(np.maximum(values[..., squared, :], 0.0))
+    return found
+
+
+def lost(amplitude: FloatArray, relaxed: FloatArray, squared: FloatArray) -> FloatArray:
+    """Values that are lost when amplitudes have relaxed by `relaxed`, (..., n_quantities, n).
+
+    Examples
+    --------
+    >>> print(lost(np.array([[2.0], [2.0]]), np.array([[0.5], [0.5]]), np.array([False, True])).ravel())
+    [0.5  1.75]
+    """
+    found = relaxed.copy()
+    found[..., squared, :] *= 2.0 * amplitude[..., squared, :] - relaxed[..., squared, :]
+    return found
 
 
 def filtered(times_ms: FloatArray, values: FloatArray, constant_ms: float) -> FloatArray:

@@ -7,7 +7,9 @@ contact; its share of relaxation is read from a sheet of further places.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -16,10 +18,14 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, finite, float_array, instance, not_negative
 from fingerpad.core.errors import InputError
 from fingerpad.reduction.model import GRID_POINTS, ReducedModel
-from fingerpad.reduction.relaxation import filter_step
+from fingerpad.reduction.relaxation import amplitudes, depth_scale, filter_step, lost
+from fingerpad.reduction.retreat import Springs
 
 SHEET_MM = 0.8
 """Distance of the places that tell how far the skin below the contact has relaxed. [mm]"""
+
+FORGETS_MM = 2.0
+"""Way of sliding over which the skin below the contact is replaced. [mm]"""
 
 LEAST_SHARE = 0.05
 """Least relaxation that the pose leads to, over that of the skin, from which it counts for the force."""
@@ -87,18 +93,17 @@ class ReducedTouch:
             wanted = f"needs {shape[0].name} as parameter" if shape else "has no parameter of the indenter"
             raise InputError(f"This reduced touch {wanted}: got {parameter!r}.")
         self._model, self._shape = model, () if parameter is None else (finite("parameter", parameter),)
-        self._n_receptors = len(receptors)
-        self._sites = np.vstack([receptors, self._sheet()])
+        self._receptors, self._sheet = receptors, self._places_below()
         n_branches, n_quantities = model.times_ms.size, len(model.quantities)
-        self._relaxed = np.zeros((n_branches, n_quantities, len(self._sites)))
-        self._before = np.zeros_like(self._relaxed)
-        self._time_ms = 0.0
-        self._share = np.zeros(n_branches)
-        self._largest = np.zeros(n_quantities + 1)
+        self._at_receptors = _Filters.at_rest((n_branches, n_quantities, len(receptors)))
+        self._at_sheet = _Filters.at_rest((n_branches, len(self._sheet)))
+        self._springs = Springs.at_rest(n_branches)
+        self._time_ms, self._way_mm = 0.0, np.zeros(2)
+        self._share, self._largest = np.zeros(n_branches), np.zeros(n_quantities + 1)
         self._flat_modes = model.modes.reshape(len(model.modes), -1)
         self.step(0.0, depth_mm=min(0.0, float(model.first_touch_mm.min())))
 
-    def _sheet(self) -> FloatArray:
+    def _places_below(self) -> FloatArray:
         """Places below all contacts of the range, (n, 2)."""
         model = self._model
         low, high = model.middle_mm.min(axis=0) - model.reach_mm, model.middle_mm.max(axis=0) + model.reach_mm
@@ -146,37 +151,40 @@ class ReducedTouch:
         weights = model.pose_weights((*pose, *self._shape))
         first_mm = float(weights @ model.first_touch_mm)
         totals = np.tensordot(weights, model.totals, 1)
+        follows = _Followed(model, totals[:, 0], self._springs, step_ms, np.hypot(*(self._way_mm - pose[:2])))
         if force_mn is None:
             below_mm = finite("depth_mm", depth_mm, "mm") - first_mm  # type: ignore[arg-type]
         else:
-            below_mm = self._depth_of(not_negative("force_mn", force_mn, "mN"), totals)
+            wanted_mn = not_negative("force_mn", force_mn, "mN")
+            below_mm = self._depth_of(
+                wanted_mn, lambda at_mm: self._totals(at_mm, follows.terms(at_mm), totals)[0]
+            )
         if below_mm > model.depth_mm * (1 + 1e-9):
             raise InputError(
                 f"The indenter must stay within {model.depth_mm:g} mm below first touch, the range of this "
                 f"reduced touch: got {below_mm:.4g} mm; solve the touch in full, or reduce it over a "
                 "wider range."
             )
-        terms = model.terms(below_mm)
-        by_mode = terms @ np.tensordot(weights, model.coefficients, 1)
-        local = (by_mode @ self._flat_modes).reshape(
+        terms = follows.terms(below_mm)
+        fields = (terms @ np.tensordot(weights, model.coefficients, 1) @ self._flat_modes).reshape(
             len(terms), len(model.quantities), GRID_POINTS, GRID_POINTS
         )
-        middle = weights @ model.middle_mm
-        at_sites = read_local(
-            local, (self._sites - middle + model.reach_mm) / (2 * model.reach_mm) * (GRID_POINTS - 1)
-        )
-        a, b, gamma = (each[:, None, None] for each in filter_step(step_ms, model.times_ms))
-        self._relaxed = a * at_sites[1:] + b * self._before + gamma * self._relaxed
-        self._before, self._time_ms = at_sites[1:], time_ms
-        values = np.maximum(at_sites[0] - self._relaxed.sum(axis=0), 0.0)[:, : self._n_receptors]
+        corner, spacing = weights @ model.middle_mm - model.reach_mm, 2 * model.reach_mm / (GRID_POINTS - 1)
+        at_receptors = read_local(fields, (self._receptors - corner) / spacing)
         # The first quantity stands for the pressure on the skin.
-        sheet = slice(self._n_receptors, None)
-        pressing = at_sites[1:, 0, sheet].sum(axis=1)
-        relaxed = self._relaxed[:, 0, sheet].sum(axis=1)
+        at_sheet = read_local(fields[1:, :1], (self._sheet - corner) / spacing)[:, 0]
+        scale = depth_scale(below_mm, model.depth_mm, model.exponents)
+        factors, amplitude = filter_step(step_ms, model.times_ms), amplitudes(at_receptors[1:], model.squared)
+        self._at_receptors = self._at_receptors.after(factors, amplitude * scale[:-1, None])
+        self._at_sheet = self._at_sheet.after(factors, at_sheet * scale[-1])
+        self._springs, self._way_mm, self._time_ms = follows.springs(below_mm), np.array(pose[:2]), time_ms
+        loss = lost(amplitude, self._at_receptors.relaxed / scale[:-1, None], model.squared)
+        values = np.maximum(at_receptors[0] - loss.sum(axis=0), 0.0)
+        pressing, relaxed = at_sheet.sum(axis=1), self._at_sheet.relaxed.sum(axis=1)
         # A touch so light that its own relaxation is lost in that of an earlier one is not relaxed.
-        tells = pressing > LEAST_SHARE * relaxed
+        tells = pressing * scale[-1] > LEAST_SHARE * relaxed
         self._share = np.divide(relaxed, pressing, out=np.zeros_like(relaxed), where=tells & (pressing > 0.0))
-        force, area = self._totals(terms, totals)
+        force, area = self._totals(below_mm, terms, totals)
         self._largest = np.maximum(self._largest, [*values.max(axis=1, initial=0.0), force])
         errors = model.error * model.error_scale(self._largest)
         return ReducedSample(
@@ -189,27 +197,76 @@ class ReducedTouch:
             field_errors=dict(zip(model.quantities, errors.tolist(), strict=False)),
         )
 
-    def _totals(self, terms: FloatArray, totals: FloatArray) -> tuple[float, float]:
+    def _totals(self, below_mm: float, terms: FloatArray, totals: FloatArray) -> tuple[float, float]:
         """Force and area, relaxed by the share of the skin below the contact."""
+        model = self._model
         at_once, *relaxed = terms @ totals
-        force, area = at_once - self._share @ np.array(relaxed).reshape(-1, 2)
+        share = self._share / depth_scale(below_mm, model.depth_mm, model.exponents[-1])
+        force, area = at_once - share @ np.array(relaxed).reshape(-1, 2)
         return max(float(force), 0.0), max(float(area), 0.0)
 
-    def _depth_of(self, force_mn: float, totals: FloatArray) -> float:
+    def _depth_of(self, force_mn: float, force_at: Callable[[float], float]) -> float:
         """Depth below first touch at which the indenter presses with a force, relaxed as at the last step."""
-        model = self._model
         if force_mn <= 0.0:
             return 0.0
-        low, high = 0.0, model.depth_mm
-        if self._totals(model.terms(high), totals)[0] < force_mn:
+        low, high = 0.0, self._model.depth_mm
+        if force_at(high) < force_mn:
             return float("inf")
         for _ in range(MOST_SECANTS):
             middle = 0.5 * (low + high)
-            if self._totals(model.terms(middle), totals)[0] < force_mn:
+            if force_at(middle) < force_mn:
                 low = middle
             else:
                 high = middle
         return high
+
+
+@dataclass(frozen=True)
+class _Filters:
+    """State of the filters of `relaxation` at some places: what has relaxed, and what drove it last."""
+
+    relaxed: FloatArray
+    before: FloatArray
+
+    @classmethod
+    def at_rest(cls, shape: tuple[int, ...]) -> _Filters:
+        return cls(np.zeros(shape), np.zeros(shape))
+
+    def after(self, factors: tuple[FloatArray, FloatArray, FloatArray], now: FloatArray) -> _Filters:
+        """State after a step, by the factors of `filter_step`."""
+        a, b, gamma = (each.reshape(-1, *[1] * (now.ndim - 1)) for each in factors)
+        return _Filters(a * now + b * self.before + gamma * self.relaxed, now)
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """How the springs of `retreat` follow the indenter in one step, to any depth.
+
+    `force_terms` (n_terms,) are the coefficients of the force at the pose, and `moved_mm` is the way aside.
+    """
+
+    model: ReducedModel
+    force_terms: FloatArray
+    before: Springs
+    step_ms: float
+    moved_mm: float
+
+    @cached_property
+    def _shares(self) -> FloatArray:
+        """Part of the force that each branch relaxes in a long hold of the largest depth, (n_branches,)."""
+        at_once, *relaxed = self.model.deepest_terms @ self.force_terms
+        return np.array(relaxed) / at_once
+
+    def springs(self, below_mm: float) -> Springs:
+        """Springs at a depth below first touch."""
+        kept = float(np.exp(-self.moved_mm / FORGETS_MM))
+        way_mm = np.maximum(below_mm - self.model.levels_mm, 0.0)
+        return self.before.followed(self.step_ms, way_mm, self.model.times_ms, self._shares, kept)
+
+    def terms(self, below_mm: float) -> FloatArray:
+        """Factors of the terms there, (1 + n_branches, n_terms)."""
+        way_mm = np.maximum(below_mm - self.model.levels_mm, 0.0)
+        return self.model.terms(below_mm, self.springs(below_mm).way_mm - way_mm)
 
 
 @njit(cache=True, nogil=True)

@@ -1,7 +1,8 @@
 """The full presses that a reduced touch is made from: which poses, and what is read from each.
 
 At every pose the indenter is pressed from first touch to a few depths by a fast ramp, and held. Ramps give
-the response at once to many depths; holds show what each branch of the tissues relaxes.
+the response at once to many depths; holds show what each branch of the tissues relaxes. One more press goes
+deeper and back after a hold.
 """
 
 from __future__ import annotations
@@ -35,6 +36,10 @@ RAMP_MS, RAMP_SAMPLES = 20.0, 10
 
 HOLD_MS = (80.0, 280.0, 980.0, 2000.0)
 """Times of the samples in the hold, from its start. [ms]"""
+
+PRESSED_AGAIN_MS = (0.0, 20.0, 1020.0, 1040.0, 1540.0, 1590.0, 1890.0)
+PRESSED_AGAIN = (0.0, 0.45, 0.45, 1.0, 1.0, 0.6, 0.6)
+"""Motion that shows how what has relaxed counts at other depths: times [ms], depths over the largest."""
 
 LONGEST_WAY_MM = 6.0
 """How far above or below the first touch of the touch any pose meets the skin. [mm]"""
@@ -228,6 +233,18 @@ class ReducedTraining:
                 for share in DEPTH_SHARES
             )
             yield TrainingPose(values, lies_mm + meets_mm, meets_mm, touches)
+
+    def pressed_again(self) -> tuple[tuple[float, ...], Touch]:
+        """Touch in the middle of the range that goes deeper and back after it has relaxed.
+
+        Returns
+        -------
+        (tuple of float, Touch)
+            Value of the indenter's parameter, if one varies, and the touch.
+        """
+        shape = tuple(0.5 * (axis.low + axis.high) for axis in self.range.axes[3:])
+        depths_mm = tuple(share * self.range.depth_mm for share in PRESSED_AGAIN)
+        return shape, self.touch_with(shape, Trajectory(PRESSED_AGAIN_MS, depth_mm=depths_mm))
 
     def touch_with(self, shape: Sequence[float] = (), stimulus: Trajectory | None = None) -> Touch:
         """Touch on the mesh that serves all poses.
