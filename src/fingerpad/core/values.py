@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
 from dataclasses import fields
-from functools import cache
+from functools import cache, lru_cache
 from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
@@ -162,6 +162,7 @@ def _within(name: str, value: float) -> float:
     return value
 
 
+@lru_cache(maxsize=1024)
 def _unit(name: str) -> str:
     field = name.partition("[")[0]
     return next((unit for end, unit in _UNITS.items() if field.endswith(end)), "")

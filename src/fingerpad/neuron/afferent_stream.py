@@ -43,6 +43,7 @@ class AfferentStream:
 
     def __init__(self, afferent: Afferent, n_sites: int):
         self._afferent = instance("afferent", afferent, Afferent)
+        self._gains, self._constants = afferent.transduction, afferent.membrane.constants()
         count = whole("n_sites", n_sites, at_least=1)
         self._time_ms, self._potentials, self._ready = 0.0, np.zeros(count), np.zeros(count)
         self._static, self._dynamic = np.zeros(count), np.zeros(count)
@@ -77,13 +78,12 @@ class AfferentStream:
             raise InputError(f"This afferent follows {wanted}: got {1 if dynamic is None else 2}.")
         later = self._values("static", static)
         followed = later if dynamic is None else self._values("dynamic", dynamic)
-        gains, step_ms = self._afferent.transduction, time_ms - self._time_ms
+        gains, step_ms = self._gains, time_ms - self._time_ms
         driven = gains.intercept_ma + gains.dynamic_gain * np.abs(followed - self._dynamic) / step_ms
         current_ma = np.stack([driven + gains.static_gain * value for value in (self._static, later)])
         found = continued_trains(
-            np.array([self._time_ms, time_ms]), current_ma, *self._afferent.membrane.constants(),
-            self._potentials, self._ready,
-        )  # fmt: skip
+            np.array([self._time_ms, time_ms]), current_ma, *self._constants, self._potentials, self._ready
+        )
         self._time_ms, self._static, self._dynamic = float(time_ms), later, followed
         return SpikeTrains(*found)
 

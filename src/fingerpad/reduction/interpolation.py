@@ -9,9 +9,10 @@ s_j = (1 - cos(pi j / n)) / 2 (Trefethen, Approximation Theory and Approximation
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, finite, whole
@@ -19,6 +20,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.values import converted
 
 
+@cache
 def chebyshev_points(count: int) -> FloatArray:
     """Chebyshev's points of [0, 1] with both ends, (count,); the middle for one point.
 
@@ -27,9 +29,11 @@ def chebyshev_points(count: int) -> FloatArray:
     >>> chebyshev_points(3).round(9).tolist(), chebyshev_points(1).tolist()
     ([0.0, 0.5, 1.0], [0.5])
     """
-    if count == 1:
-        return np.array([0.5])
-    return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.arange(count) / (count - 1)))
+    points = np.array([0.5])
+    if count > 1:
+        points = 0.5 - 0.5 * np.cos(np.pi * np.arange(count) / (count - 1))
+    points.setflags(write=False)
+    return points
 
 
 def lagrange(points: FloatArray, values: ArrayLike) -> FloatArray:
@@ -40,10 +44,24 @@ def lagrange(points: FloatArray, values: ArrayLike) -> FloatArray:
     >>> lagrange(np.array([0.0, 1.0]), [0.25]).tolist()
     [[0.75, 0.25]]
     """
-    at = np.asarray(values, dtype=float)[..., None, None]
-    others = ~np.eye(points.size, dtype=bool)
-    apart = np.where(others, points[:, None] - points, 1.0)
-    return np.asarray(np.where(others, (at - points) / apart, 1.0).prod(axis=-1))
+    at = np.asarray(values, dtype=float)
+    return np.asarray(_lagrange(points, at.ravel()).reshape(*at.shape, points.size))
+
+
+@njit(cache=True, nogil=True)
+def _lagrange(points, at):  # type: ignore[no-untyped-def]
+    found = np.ones((at.size, points.size))
+    for k in range(at.size):
+        for j in range(points.size):
+            for i in range(points.size):
+                if i != j:
+                    found[k, j] *= (at[k] - points[i]) / (points[j] - points[i])
+    return found
+
+
+def weighted(weights: FloatArray, values: FloatArray) -> FloatArray:
+    """Sum of values (n, ...) by weights (n,)."""
+    return np.asarray((weights @ values.reshape(weights.size, -1)).reshape(values.shape[1:]))
 
 
 @dataclass(frozen=True)

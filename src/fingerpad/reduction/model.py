@@ -36,7 +36,7 @@ GRID_POINTS = 41
 BEYOND_CONTACT_MM = 3.0
 """How far the local fields extend beyond the contact. [mm]"""
 
-LOST = 1e-4
+LOST = 1e-3
 """Part of the fields that modes may leave out, relative to the largest singular value."""
 
 FINE_PARTS = 20

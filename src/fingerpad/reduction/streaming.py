@@ -14,9 +14,11 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
+from scipy.optimize import brentq
 
 from fingerpad.core.checks import FloatArray, finite, float_array, instance, not_negative
 from fingerpad.core.errors import InputError
+from fingerpad.reduction.interpolation import weighted
 from fingerpad.reduction.model import GRID_POINTS, ReducedModel
 from fingerpad.reduction.relaxation import amplitudes, depth_scale, filter_step, lost
 from fingerpad.reduction.retreat import Springs
@@ -30,8 +32,8 @@ FORGETS_MM = 2.0
 LEAST_SHARE = 0.05
 """Least relaxation that the pose leads to, over that of the skin, from which it counts for the force."""
 
-MOST_SECANTS = 40
-"""Steps of the search for the depth of a force."""
+CLOSEST_MM = 1e-9
+"""Tolerance of the depth of a force. [mm]"""
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,7 @@ class ReducedTouch:
         self._springs = Springs.at_rest(n_branches)
         self._time_ms, self._way_mm = 0.0, np.zeros(2)
         self._share, self._largest = np.zeros(n_branches), np.zeros(n_quantities + 1)
-        self._flat_modes = model.modes.reshape(len(model.modes), -1)
+        self._modes = model.modes.reshape(len(model.modes), -1)
         self.step(0.0, depth_mm=min(0.0, float(model.first_touch_mm.min())))
 
     def _places_below(self) -> FloatArray:
@@ -150,14 +152,15 @@ class ReducedTouch:
         pose = finite("x_mm", x_mm, "mm"), finite("z_mm", z_mm, "mm"), finite("tilt_deg", tilt_deg, "degrees")
         weights = model.pose_weights((*pose, *self._shape))
         first_mm = float(weights @ model.first_touch_mm)
-        totals = np.tensordot(weights, model.totals, 1)
+        totals, coefficients = weighted(weights, model.totals), weighted(weights, model.coefficients)
         follows = _Followed(model, totals[:, 0], self._springs, step_ms, np.hypot(*(self._way_mm - pose[:2])))
         if force_mn is None:
             below_mm = finite("depth_mm", depth_mm, "mm") - first_mm  # type: ignore[arg-type]
         else:
             wanted_mn = not_negative("force_mn", force_mn, "mN")
             below_mm = self._depth_of(
-                wanted_mn, lambda at_mm: self._totals(at_mm, follows.terms(at_mm), totals)[0]
+                wanted_mn,
+                lambda at_mm: self._totals(at_mm, follows.terms(at_mm, follows.springs(at_mm)), totals)[0],
             )
         if below_mm > model.depth_mm * (1 + 1e-9):
             raise InputError(
@@ -165,19 +168,21 @@ class ReducedTouch:
                 f"reduced touch: got {below_mm:.4g} mm; solve the touch in full, or reduce it over a "
                 "wider range."
             )
-        terms = follows.terms(below_mm)
-        fields = (terms @ np.tensordot(weights, model.coefficients, 1) @ self._flat_modes).reshape(
-            len(terms), len(model.quantities), GRID_POINTS, GRID_POINTS
-        )
+        springs = follows.springs(below_mm)
+        terms = follows.terms(below_mm, springs)
+        fields = self._fields(terms @ coefficients)
         corner, spacing = weights @ model.middle_mm - model.reach_mm, 2 * model.reach_mm / (GRID_POINTS - 1)
-        at_receptors = read_local(fields, (self._receptors - corner) / spacing)
+        n_quantities = len(model.quantities)
+        at_receptors = read_local(fields, (self._receptors - corner) / spacing).reshape(
+            len(terms), n_quantities, -1
+        )
         # The first quantity stands for the pressure on the skin.
-        at_sheet = read_local(fields[1:, :1], (self._sheet - corner) / spacing)[:, 0]
+        at_sheet = read_local(fields[..., n_quantities::n_quantities], (self._sheet - corner) / spacing)
         scale = depth_scale(below_mm, model.depth_mm, model.exponents)
         factors, amplitude = filter_step(step_ms, model.times_ms), amplitudes(at_receptors[1:], model.squared)
         self._at_receptors = self._at_receptors.after(factors, amplitude * scale[:-1, None])
         self._at_sheet = self._at_sheet.after(factors, at_sheet * scale[-1])
-        self._springs, self._way_mm, self._time_ms = follows.springs(below_mm), np.array(pose[:2]), time_ms
+        self._springs, self._way_mm, self._time_ms = springs, np.array(pose[:2]), time_ms
         loss = lost(amplitude, self._at_receptors.relaxed / scale[:-1, None], model.squared)
         values = np.maximum(at_receptors[0] - loss.sum(axis=0), 0.0)
         pressing, relaxed = at_sheet.sum(axis=1), self._at_sheet.relaxed.sum(axis=1)
@@ -197,6 +202,11 @@ class ReducedTouch:
             field_errors=dict(zip(model.quantities, errors.tolist(), strict=False)),
         )
 
+    def _fields(self, amounts: FloatArray) -> FloatArray:
+        """Fields of the modes, (n_grid, n_grid, n * n_quantities): those of a point lie side by side."""
+        found = (amounts @ self._modes).reshape(-1, GRID_POINTS, GRID_POINTS)
+        return np.ascontiguousarray(np.moveaxis(found, 0, -1))
+
     def _totals(self, below_mm: float, terms: FloatArray, totals: FloatArray) -> tuple[float, float]:
         """Force and area, relaxed by the share of the skin below the contact."""
         model = self._model
@@ -209,16 +219,10 @@ class ReducedTouch:
         """Depth below first touch at which the indenter presses with a force, relaxed as at the last step."""
         if force_mn <= 0.0:
             return 0.0
-        low, high = 0.0, self._model.depth_mm
-        if force_at(high) < force_mn:
+        deepest_mm = self._model.depth_mm
+        if force_at(deepest_mm) < force_mn:
             return float("inf")
-        for _ in range(MOST_SECANTS):
-            middle = 0.5 * (low + high)
-            if force_at(middle) < force_mn:
-                low = middle
-            else:
-                high = middle
-        return high
+        return float(brentq(lambda at_mm: force_at(at_mm) - force_mn, 0.0, deepest_mm, xtol=CLOSEST_MM))
 
 
 @dataclass(frozen=True)
@@ -263,10 +267,10 @@ class _Followed:
         way_mm = np.maximum(below_mm - self.model.levels_mm, 0.0)
         return self.before.followed(self.step_ms, way_mm, self.model.times_ms, self._shares, kept)
 
-    def terms(self, below_mm: float) -> FloatArray:
+    def terms(self, below_mm: float, springs: Springs) -> FloatArray:
         """Factors of the terms there, (1 + n_branches, n_terms)."""
         way_mm = np.maximum(below_mm - self.model.levels_mm, 0.0)
-        return self.model.terms(below_mm, self.springs(below_mm).way_mm - way_mm)
+        return self.model.terms(below_mm, springs.way_mm - way_mm)
 
 
 @njit(cache=True, nogil=True)
@@ -281,21 +285,25 @@ def _weights(share):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def read_local(fields, places):  # type: ignore[no-untyped-def]
-    """Read fields (n, m, n_grid, n_grid) at places (n_sites, 2) in steps of the grid; 0 outside of it."""
-    last = fields.shape[2] - 1
-    found = np.zeros((fields.shape[0], fields.shape[1], len(places)))
+    """Read fields (n_grid, n_grid, n) at places (n_sites, 2) in steps of the grid; 0 outside of it.
+
+    Returns
+    -------
+    array (n, n_sites)
+    """
+    last, n = fields.shape[0] - 1, fields.shape[2]
+    found = np.zeros((len(places), n))
     for site in range(len(places)):
         u, v = places[site, 0], places[site, 1]
         if not (0.0 <= u <= last and 0.0 <= v <= last):
             continue
         i, j = min(int(u), last - 1), min(int(v), last - 1)
         along, across = _weights(u - i), _weights(v - j)
+        here = found[site]
         for p in range(4):
             row = min(max(i + p - 1, 0), last)
             for q in range(4):
-                column = min(max(j + q - 1, 0), last)
-                weight = along[p] * across[q]
-                for n in range(fields.shape[0]):
-                    for m in range(fields.shape[1]):
-                        found[n, m, site] += weight * fields[n, m, row, column]
-    return found
+                weight, values = along[p] * across[q], fields[row, min(max(j + q - 1, 0), last)]
+                for each in range(n):
+                    here[each] += weight * values[each]
+    return np.ascontiguousarray(found.T)

@@ -31,8 +31,11 @@ from fingerpad.skin.indentation import LARGEST_TILT_DEG, Touch, settings_of
 DEPTH_SHARES = (0.1, 0.25, 0.45, 0.7, 1.0)
 """Depths of the presses at one pose, over the largest."""
 
-RAMP_MS, RAMP_SAMPLES = 20.0, 10
-"""Duration and samples of the ramp of each press. [ms]"""
+RAMP_MS = 20.0
+"""Duration of the ramp of each press. [ms]"""
+
+RAMP_SHARES = 1.0 - (1.0 - np.arange(1, 13) / 12) ** 1.5
+"""Samples of a ramp, as shares of it: denser where no other press at the pose adds to them."""
 
 HOLD_MS = (80.0, 280.0, 980.0, 2000.0)
 """Times of the samples in the hold, from its start. [ms]"""
@@ -291,7 +294,7 @@ def _moved(base: Touch, x_mm: float, z_mm: float) -> tuple[Touch, float]:
 
 def _pressed(pose: Pose, meets_mm: float, depth_mm: float) -> Trajectory:
     """Motion that tilts above the skin, then presses from first touch and holds."""
-    ramp_ms = np.linspace(0.0, RAMP_MS, RAMP_SAMPLES + 1)
+    ramp_ms = RAMP_MS * np.append(0.0, RAMP_SHARES)
     hold_ms = RAMP_MS + np.array(HOLD_MS)
     times_ms = np.concatenate([[0.0, MOVE_MS], 2 * MOVE_MS + ramp_ms, 2 * MOVE_MS + hold_ms])
     pressed_mm = meets_mm + depth_mm * np.minimum(np.append(ramp_ms, hold_ms) / RAMP_MS, 1.0)
