@@ -38,7 +38,7 @@ from fingerpad.lab.static import write_static
 from fingerpad.lab.view import View, view_of
 from fingerpad.skin.store import Store
 
-RANGE = "object: {kind: sphere, curvature_per_m: %g}\nrange: {depth_mm: 0.5}\ncalibration: 0\n"
+RANGE = "object: {kind: sphere, curvature_per_m: %g}\nrange: {depth_mm: 0.5, x_mm: [-1, 1]}\ncalibration: 0\n"
 PRESS = LabState("ball", depth_mm=0.4)
 
 
@@ -96,7 +96,7 @@ def test_a_state_is_what_the_address_says() -> None:
         ({"id": 3}, "must have the key state"),
         ({"id": 3, "state": {"object": "cube"}}, "object must be one of ball, flat: got 'cube'"),
         ({"id": 3, "state": {"object": "ball", "depth_mm": 2}}, "depth_mm must be at most 0.5"),
-        ({"id": 3, "state": {"object": "ball", "depth_mm": 0.4, "x_mm": 1}}, "x_mm must lie within 0 to 0"),
+        ({"id": 3, "state": {"object": "ball", "depth_mm": 0.4, "x_mm": 2}}, "x_mm must lie within -1 to 1"),
         ({"id": 3, "state": {"object": "ball", "tissues": "wood"}}, "tissues must be one of human"),
         ({"id": 3, "state": {"object": "ball", "finger": "thumb"}}, "finger must be one of adult"),
     ],
@@ -384,6 +384,34 @@ def test_the_page_works_with_keys_and_mouse(
     assert max(json.loads((tmp_path / "touch.json").read_text())["answer"]["force_mn"]) > 1.0
     assert watched.wrong == []
     assert all(url.startswith((address, "data:", "blob:")) for url in watched.asked)
+    page.close()
+
+
+@needs_browser
+def test_the_mouse_drags_the_object_over_the_skin(
+    browser: Any, served: tuple[str, subprocess.Popen[str]]
+) -> None:
+    watched = Watched(browser, f"{served[0]}#depth_mm=0.4")
+    page, along = watched.page, watched.page.locator("input[name=x_mm]")
+    box = page.locator(".lab canvas").first.bounding_box()
+    assert box is not None
+    middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(*middle)
+    page.mouse.down()
+    seen = []
+    for part in range(1, 6):  # each way is answered while the button is down
+        watched.changes(lambda part=part: page.mouse.move(middle[0] + 8 * part, middle[1]), watched.picture)
+        seen.append(float(along.input_value()))
+    page.mouse.up()
+    assert seen == sorted(seen)
+    assert 0.3 < seen[-1] <= 1.0
+    page.mouse.move(*middle)  # without a button nothing moves
+    assert float(along.input_value()) == seen[-1]
+    page.mouse.click(box["x"] + 2, middle[1])  # beyond the range the object stays at its end
+    page.wait_for_url("**x_mm=-1**")
+    page.wait_for_timeout(200)
+    assert float(along.input_value()) == -1.0
+    assert watched.wrong == []
     page.close()
 
 

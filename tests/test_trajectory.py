@@ -218,11 +218,26 @@ def test_finger_is_released_from_a_millimetre():
     assert 0.0 < sed[-1] < 0.1 * sed.max()
 
 
+def test_skin_that_lies_higher_aside_is_pressed_above_first_touch():
+    """1.5 mm towards the tip of the tilted finger the skin is met 0.12 mm earlier."""
+
+    def aside(depth_mm):
+        times_ms, x_mm = (0.0, 50.0, 100.0, 150.0), (0.0, -1.5, -1.5, -1.5)
+        motion = Trajectory(times_ms, depth_mm=(-0.7, -0.7, depth_mm, depth_mm), x_mm=x_mm)
+        return touch_of(Fingertip(), Sphere(curvature_per_m=287.0), motion)
+
+    assert 1.0 < aside(-0.05).solve().force_mn.max() < 10.0
+    with pytest.raises(InputError, match=r"Sphere meets no resistance, .* 0\.49 mm away: press deeper"):
+        aside(-0.65).solve()
+
+
 def test_punch_that_goes_between_two_nodes_is_refused_instead_of_pressing_with_no_force(monkeypatch):
     tiny = FlatPunch(diameter_mm=0.1, fillet_mm=0.02)
     with pytest.raises(InputError, match="would go between the nodes"):
         touch_of(Fingertip(), tiny, RampAndHold(depth_mm=0.3))
     # What its size does not tell is told by the force.
     monkeypatch.setattr("fingerpad.skin.indentation.FEWEST_ACROSS_BODY", 1)
-    with pytest.raises(InputError, match="FlatPunch goes between the nodes of the skin"):
+    with pytest.raises(
+        InputError, match=r"FlatPunch meets no resistance, .* press deeper, or take a grading"
+    ):
         touch_of(Fingertip(), tiny, RampAndHold(depth_mm=0.3)).solve()

@@ -135,7 +135,9 @@ class Trajectory(Motion):
                 f"force_mn must not be negative: got {values[first]:g} mN at {times[first]:g} ms, sample "
                 f"{first + 1}."
             )
-        if values.max() <= 0.0:
+        # Aside, the skin may lie higher than at first touch.
+        aside = name == "depth_mm" and any(getattr(self, column) for column in POSE_COLUMNS)
+        if values.max() <= 0.0 and not aside:
             raise InputError(f"{name} must be above 0 at some time: the indenter would never press.")
         object.__setattr__(self, "times_ms", tuple(times.tolist()))
         object.__setattr__(self, "phases", tuple(self.phases) or self._phases_of_course())

@@ -494,7 +494,7 @@ def press(
     InputError
         If the mesh fails `check_mesh`, a material is less compressible than a solver of this machine can
         take, a depth drives the indenter into the bone, a force pushes it deeper than `deepest_mm`, or the
-        indenter is so small that it goes between the nodes of the skin.
+        indenter never touches the skin, or is so small that it goes between its nodes.
     ConvergenceError
         If a step fails even when it is cut; the history lists each attempt.
     """
@@ -535,9 +535,11 @@ def press(
     found = [equilibrium for _, equilibrium, _ in reached]
     along_axis_mn = [float(each.contact.force_mn.sum(axis=0) @ placement.axis) for each in found]
     if max(along_axis_mn) <= SMALLEST_FORCE_MN:
+        nearest_mm = min(float(each.contact.gap_mm.min()) for each in found)
         raise InputError(
-            f"{type(indenter).__name__} goes between the nodes of the skin and meets no resistance: take a "
-            "grading with elements smaller than it."
+            f"{type(indenter).__name__} meets no resistance, the nearest node of the skin is "
+            f"{nearest_mm:.2g} mm away: press deeper, or take a grading with elements smaller than it, so "
+            "that it does not go between nodes."
         )
     whole_body = 2.0 if mesh.symmetry_nodes.size else 1.0
     # Across the plane of symmetry the reactions of the two halves cancel.
