@@ -128,6 +128,11 @@ class ReducedModel:
         return squares(self.quantities)
 
     @cached_property
+    def pressures(self) -> FloatArray:
+        """Modes of the first quantity, which stands for the pressure on skin, (n_modes, n_grid²). [kPa]"""
+        return np.ascontiguousarray(self.modes[:, 0]).reshape(len(self.modes), -1)
+
+    @cached_property
     def deepest_terms(self) -> FloatArray:
         """Terms of the largest depth, (1 + n_branches, n_terms)."""
         return self.terms(self.depth_mm, np.zeros(LEVELS))

@@ -7,7 +7,6 @@ contact; its share of relaxation is read from a sheet of further places.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,10 +28,10 @@ SHEET_MM = 0.8
 FORGETS_MM = 2.0
 """Way of sliding over which the skin below the contact is replaced. [mm]"""
 
-LEAST_SHARE = 0.05
-"""Least relaxation that the pose leads to, over that of the skin, from which it counts for the force."""
+NEAR_MM = 0.03
+"""How far from the last depth that of a force is looked for first. [mm]"""
 
-CLOSEST_MM = 1e-9
+CLOSEST_MM = 1e-6
 """Tolerance of the depth of a force. [mm]"""
 
 
@@ -100,9 +99,8 @@ class ReducedTouch:
         self._at_receptors = _Filters.at_rest((n_branches, n_quantities, len(receptors)))
         self._at_sheet = _Filters.at_rest((n_branches, len(self._sheet)))
         self._springs = Springs.at_rest(n_branches)
-        self._time_ms, self._way_mm = 0.0, np.zeros(2)
-        self._share, self._largest = np.zeros(n_branches), np.zeros(n_quantities + 1)
-        self._modes = model.modes.reshape(len(model.modes), -1)
+        self._time_ms, self._below_mm, self._way_mm = 0.0, 0.0, np.zeros(2)
+        self._largest, self._modes = np.zeros(n_quantities + 1), model.modes.reshape(len(model.modes), -1)
         self.step(0.0, depth_mm=min(0.0, float(model.first_touch_mm.min())))
 
     def _places_below(self) -> FloatArray:
@@ -151,78 +149,54 @@ class ReducedTouch:
         model = self._model
         pose = finite("x_mm", x_mm, "mm"), finite("z_mm", z_mm, "mm"), finite("tilt_deg", tilt_deg, "degrees")
         weights = model.pose_weights((*pose, *self._shape))
-        first_mm = float(weights @ model.first_touch_mm)
-        totals, coefficients = weighted(weights, model.totals), weighted(weights, model.coefficients)
-        follows = _Followed(model, totals[:, 0], self._springs, step_ms, np.hypot(*(self._way_mm - pose[:2])))
+        first_mm, corner_mm = (
+            float(weights @ model.first_touch_mm),
+            weights @ model.middle_mm - model.reach_mm,
+        )
+        spacing_mm = 2 * model.reach_mm / (GRID_POINTS - 1)
+        moved_mm = np.hypot(*(self._way_mm - pose[:2]))
+        press = _Press(
+            model,
+            totals=weighted(weights, model.totals),
+            amounts=weighted(weights, model.coefficients),
+            sheet_places=(self._sheet - corner_mm) / spacing_mm,
+            springs=self._springs,
+            sheet=self._at_sheet,
+            kept=float(np.exp(-moved_mm / FORGETS_MM)),
+            step_ms=step_ms,
+        )
         if force_mn is None:
             below_mm = finite("depth_mm", depth_mm, "mm") - first_mm  # type: ignore[arg-type]
         else:
-            wanted_mn = not_negative("force_mn", force_mn, "mN")
-            below_mm = self._depth_of(
-                wanted_mn,
-                lambda at_mm: self._totals(at_mm, follows.terms(at_mm, follows.springs(at_mm)), totals)[0],
-            )
+            below_mm = press.depth_of(not_negative("force_mn", force_mn, "mN"), self._below_mm)
         if below_mm > model.depth_mm * (1 + 1e-9):
             raise InputError(
                 f"The indenter must stay within {model.depth_mm:g} mm below first touch, the range of this "
                 f"reduced touch: got {below_mm:.4g} mm; solve the touch in full, or reduce it over a "
                 "wider range."
             )
-        springs = follows.springs(below_mm)
-        terms = follows.terms(below_mm, springs)
-        fields = self._fields(terms @ coefficients)
-        corner, spacing = weights @ model.middle_mm - model.reach_mm, 2 * model.reach_mm / (GRID_POINTS - 1)
-        n_quantities = len(model.quantities)
-        at_receptors = read_local(fields, (self._receptors - corner) / spacing).reshape(
-            len(terms), n_quantities, -1
-        )
-        # The first quantity stands for the pressure on the skin.
-        at_sheet = read_local(fields[..., n_quantities::n_quantities], (self._sheet - corner) / spacing)
-        scale = depth_scale(below_mm, model.depth_mm, model.exponents)
-        factors, amplitude = filter_step(step_ms, model.times_ms), amplitudes(at_receptors[1:], model.squared)
-        self._at_receptors = self._at_receptors.after(factors, amplitude * scale[:-1, None])
-        self._at_sheet = self._at_sheet.after(factors, at_sheet * scale[-1])
-        self._springs, self._way_mm, self._time_ms = springs, np.array(pose[:2]), time_ms
-        loss = lost(amplitude, self._at_receptors.relaxed / scale[:-1, None], model.squared)
+        contact = press.to(below_mm)
+        fields = fields_of(contact.terms @ press.amounts, self._modes)
+        at_receptors = read_local(fields, (self._receptors - corner_mm) / spacing_mm)
+        at_receptors = at_receptors.reshape(len(contact.terms), len(model.quantities), -1)
+        scale = depth_scale(below_mm, model.depth_mm, model.exponents[:-1])[:, None]
+        amplitude = amplitudes(at_receptors[1:], model.squared)
+        self._at_receptors = self._at_receptors.after(press.factors, amplitude * scale)
+        self._springs, self._at_sheet = contact.springs, contact.sheet
+        self._way_mm, self._below_mm, self._time_ms = np.array(pose[:2]), below_mm, time_ms
+        loss = lost(amplitude, self._at_receptors.relaxed / scale, model.squared)
         values = np.maximum(at_receptors[0] - loss.sum(axis=0), 0.0)
-        pressing, relaxed = at_sheet.sum(axis=1), self._at_sheet.relaxed.sum(axis=1)
-        # A touch so light that its own relaxation is lost in that of an earlier one is not relaxed.
-        tells = pressing * scale[-1] > LEAST_SHARE * relaxed
-        self._share = np.divide(relaxed, pressing, out=np.zeros_like(relaxed), where=tells & (pressing > 0.0))
-        force, area = self._totals(below_mm, terms, totals)
-        self._largest = np.maximum(self._largest, [*values.max(axis=1, initial=0.0), force])
+        self._largest = np.maximum(self._largest, [*values.max(axis=1, initial=0.0), contact.force_mn])
         errors = model.error * model.error_scale(self._largest)
         return ReducedSample(
             time_ms=time_ms,
             depth_mm=below_mm + first_mm,
-            force_mn=force,
-            contact_area_mm2=area,
+            force_mn=contact.force_mn,
+            contact_area_mm2=contact.area_mm2,
             fields=dict(zip(model.quantities, values, strict=True)),
             force_error_mn=float(errors[-1]),
             field_errors=dict(zip(model.quantities, errors.tolist(), strict=False)),
         )
-
-    def _fields(self, amounts: FloatArray) -> FloatArray:
-        """Fields of the modes, (n_grid, n_grid, n * n_quantities): those of a point lie side by side."""
-        found = (amounts @ self._modes).reshape(-1, GRID_POINTS, GRID_POINTS)
-        return np.ascontiguousarray(np.moveaxis(found, 0, -1))
-
-    def _totals(self, below_mm: float, terms: FloatArray, totals: FloatArray) -> tuple[float, float]:
-        """Force and area, relaxed by the share of the skin below the contact."""
-        model = self._model
-        at_once, *relaxed = terms @ totals
-        share = self._share / depth_scale(below_mm, model.depth_mm, model.exponents[-1])
-        force, area = at_once - share @ np.array(relaxed).reshape(-1, 2)
-        return max(float(force), 0.0), max(float(area), 0.0)
-
-    def _depth_of(self, force_mn: float, force_at: Callable[[float], float]) -> float:
-        """Depth below first touch at which the indenter presses with a force, relaxed as at the last step."""
-        if force_mn <= 0.0:
-            return 0.0
-        deepest_mm = self._model.depth_mm
-        if force_at(deepest_mm) < force_mn:
-            return float("inf")
-        return float(brentq(lambda at_mm: force_at(at_mm) - force_mn, 0.0, deepest_mm, xtol=CLOSEST_MM))
 
 
 @dataclass(frozen=True)
@@ -243,34 +217,98 @@ class _Filters:
 
 
 @dataclass(frozen=True)
-class _Followed:
-    """How the springs of `retreat` follow the indenter in one step, to any depth.
+class _Contact:
+    """Contact at the end of a step, and the state that it leaves."""
 
-    `force_terms` (n_terms,) are the coefficients of the force at the pose, and `moved_mm` is the way aside.
+    terms: FloatArray
+    springs: Springs
+    sheet: _Filters
+    force_mn: float
+    area_mm2: float
+
+
+@dataclass(frozen=True)
+class _Press:
+    """One step at a pose, to any depth.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The model.
+    totals : array (n_terms, 2)
+        Coefficients of force and area at the pose.
+    amounts : array (n_terms, n_modes)
+        Those of the modes.
+    sheet_places : array (n_sheet, 2)
+        Places of the sheet, in steps of the grid.
+    springs, sheet
+        State before the step.
+    kept : float
+        Part of the skin below the contact that is still there after the way aside.
+    step_ms : float
+        Duration. [ms]
     """
 
     model: ReducedModel
-    force_terms: FloatArray
-    before: Springs
+    totals: FloatArray
+    amounts: FloatArray
+    sheet_places: FloatArray
+    springs: Springs
+    sheet: _Filters
+    kept: float
     step_ms: float
-    moved_mm: float
+
+    @cached_property
+    def factors(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Factors of the filters."""
+        return filter_step(self.step_ms, self.model.times_ms)
 
     @cached_property
     def _shares(self) -> FloatArray:
         """Part of the force that each branch relaxes in a long hold of the largest depth, (n_branches,)."""
-        at_once, *relaxed = self.model.deepest_terms @ self.force_terms
+        at_once, *relaxed = self.model.deepest_terms @ self.totals[:, 0]
         return np.array(relaxed) / at_once
 
-    def springs(self, below_mm: float) -> Springs:
-        """Springs at a depth below first touch."""
-        kept = float(np.exp(-self.moved_mm / FORGETS_MM))
-        way_mm = np.maximum(below_mm - self.model.levels_mm, 0.0)
-        return self.before.followed(self.step_ms, way_mm, self.model.times_ms, self._shares, kept)
+    def to(self, below_mm: float) -> _Contact:
+        """Go to a depth below first touch."""
+        model, way_mm = self.model, np.maximum(below_mm - self.model.levels_mm, 0.0)
+        springs = self.springs.followed(self.step_ms, way_mm, model.times_ms, self._shares, self.kept)
+        terms = model.terms(below_mm, springs.way_mm - way_mm)
+        pressing = read_local(fields_of(terms[1:] @ self.amounts, model.pressures), self.sheet_places)
+        scale = depth_scale(below_mm, model.depth_mm, model.exponents[-1])
+        sheet = self.sheet.after(self.factors, scale * pressing)
+        # What has relaxed elsewhere does not count for the force: only what has the shape of the pressure.
+        square = (pressing**2).sum(axis=1)
+        overlap = (sheet.relaxed * pressing).sum(axis=1)
+        share = np.divide(overlap, scale * square, out=np.zeros_like(square), where=square > 0.0)
+        at_once, *relaxed = terms @ self.totals
+        force, area = at_once - share @ np.array(relaxed).reshape(-1, 2)
+        return _Contact(terms, springs, sheet, max(float(force), 0.0), max(float(area), 0.0))
 
-    def terms(self, below_mm: float, springs: Springs) -> FloatArray:
-        """Factors of the terms there, (1 + n_branches, n_terms)."""
-        way_mm = np.maximum(below_mm - self.model.levels_mm, 0.0)
-        return self.model.terms(below_mm, springs.way_mm - way_mm)
+    def depth_of(self, force_mn: float, near_mm: float) -> float:
+        """Depth below first touch at which the indenter presses with a force; infinite beyond the range."""
+
+        def missing_mn(at_mm: float) -> float:
+            return self.to(at_mm).force_mn - force_mn
+
+        deepest_mm = self.model.depth_mm
+        low, high = (min(max(near_mm + way_mm, 0.0), deepest_mm) for way_mm in (-NEAR_MM, NEAR_MM))
+        if missing_mn(low) >= 0.0:
+            low, high = 0.0, low
+            # Skin that is still behind the indenter may press a little at depth 0.
+            if missing_mn(low) >= 0.0:
+                return low
+        elif missing_mn(high) < 0.0:
+            low, high = high, deepest_mm
+            if missing_mn(high) < 0.0:
+                return float("inf")
+        return float(brentq(missing_mn, low, high, xtol=CLOSEST_MM))
+
+
+def fields_of(amounts: FloatArray, modes: FloatArray) -> FloatArray:
+    """Fields (n_grid, n_grid, n) of modes (n_modes, n_grid² or a multiple), those of a point side by side."""
+    found = (amounts @ modes).reshape(-1, GRID_POINTS, GRID_POINTS)
+    return np.ascontiguousarray(np.moveaxis(found, 0, -1))
 
 
 @njit(cache=True, nogil=True)
