@@ -22,6 +22,7 @@ BENCHMARKS = (
     "mixed_population",
     "surfaces",
     "reduced",
+    "reduced_growth",
     "laboratory",
     "receptors",
     "sweeps",

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 import fingerpad as fp
 from fingerpad.cli import main
 from fingerpad.core.signals import SedTraces
-from fingerpad.reduction.building import largest_errors
+from fingerpad.reduction.building import joint_bounds, largest_errors
 from fingerpad.reduction.interpolation import Axis, chebyshev_points, lagrange
 from fingerpad.reduction.model import AT_ONCE
 from fingerpad.reduction.relaxation import amplitudes, depth_scale, filtered, lost
@@ -160,6 +160,14 @@ def test_without_relaxation_it_is_wrong(training: ReducedTraining, model: fp.Red
     elastic = replace(model, totals=model.totals * (np.arange(model.totals.shape[1]) < AT_ONCE)[:, None])
     skin = pressed(training, [0.0, 60.0, 800.0], [0.0, 0.8, 0.8])
     assert largest_errors(elastic, skin)[2] > 0.02
+
+
+def test_bounds_hold_for_all_quantities_together() -> None:
+    random, kept = np.random.default_rng(5), []
+    for _ in range(2000):
+        errors = random.lognormal(size=(20 + 1, 3)) * [1.0, 20.0, 0.01]
+        kept.append(bool((errors[-1] <= joint_bounds(errors[:-1])).all()))
+    assert np.mean(kept) == pytest.approx(20 / 21, abs=0.015)
 
 
 def test_a_force_finds_its_depth(model: fp.ReducedModel) -> None:

@@ -2,9 +2,10 @@
 
 The error is measured on random touches of the range: each presses at one pose, perhaps moves to another,
 holds, and goes to another depth. Of every touch the largest error over time counts, relative to what
-`ReducedModel.error_scale` says at that time. The bound is the conformal quantile (Vovk, Gammerman & Shafer,
-Algorithmic Learning in a Random World, 2005): with n touches, the ceil(0.95 (n + 1))-th smallest of their
-errors.
+`ReducedModel.error_scale` says at that time. The bounds hold for all quantities of a touch together: over
+their medians the errors of a touch are alike, and the largest of them is its score. The bound of the score is
+the conformal quantile (Vovk, Gammerman & Shafer, Algorithmic Learning in a Random World, 2005): with n
+touches, the ceil(0.95 (n + 1))-th smallest.
 """
 
 from __future__ import annotations
@@ -117,8 +118,29 @@ def reduce_touch(
     held_out = [draw_touch(training, model, random) for _ in range(calibration)]
     solved = solve([touch for _, touch in held_out], "calibration")
     errors = [largest_errors(model, skin, shape) for (shape, _), skin in zip(held_out, solved, strict=True)]
-    rank = math.ceil(COVERAGE * (calibration + 1)) - 1
-    return replace(model, error=np.sort(errors, axis=0)[min(rank, calibration - 1)])
+    return replace(model, error=joint_bounds(np.array(errors)))
+
+
+def joint_bounds(errors: FloatArray) -> FloatArray:
+    """Bounds of several errors, (n_errors,), that all of them keep in `COVERAGE` of new touches.
+
+    Parameters
+    ----------
+    errors : array (n_touches, n_errors)
+        Errors of touches that were not used.
+
+    Examples
+    --------
+    The touch with the largest error for its kind sets both bounds:
+
+    >>> errors = np.column_stack([np.linspace(0.5, 1.5, 19), np.full(19, 0.1)])
+    >>> joint_bounds(errors).round(3).tolist()
+    [1.5, 0.15]
+    """
+    medians = np.maximum(np.median(errors, axis=0), np.finfo(float).tiny)
+    scores = np.sort((errors / medians).max(axis=1))
+    rank = math.ceil(COVERAGE * (len(errors) + 1)) - 1
+    return np.asarray(medians * scores[min(rank, len(errors) - 1)])
 
 
 def with_exponents(model: ReducedModel, skin: SkinResponse, shape: Iterable[float] = ()) -> ReducedModel:

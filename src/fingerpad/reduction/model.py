@@ -87,8 +87,8 @@ class ReducedModel:
     largest : array (n_quantities + 1,)
         Largest values of the quantities [kPa] and of the force [mN] in the training.
     error : array (n_quantities + 1,)
-        Errors that 95 % of new touches stay within, over `error_scale` (see `building`). Infinite before that
-        is measured.
+        Errors that 95 % of new touches stay within, all of them together, over `error_scale` (see
+        `building`). Infinite before that is measured.
     exponents : array (n_quantities + 1,)
         Powers of the depth that scale what has relaxed (see `relaxation`), of the quantities and the force.
     origin : dict of str
