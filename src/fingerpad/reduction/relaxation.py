@@ -48,8 +48,8 @@ def depth_scale(depth_mm: float, deepest_mm: float, exponents: FloatArray) -> Fl
 
     Examples
     --------
-    >>> print(depth_scale(0.25, 1.0, np.array([0.0, 0.5])))
-    [1.  0.5]
+    >>> print(depth_scale(0.64, 1.0, np.array([0.0, 0.5])))
+    [1.  0.8]
     """
     return np.asarray(max(depth_mm / deepest_mm, SHALLOWEST) ** exponents)
 
