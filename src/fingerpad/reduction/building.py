@@ -208,9 +208,13 @@ def draw_touch(
 
 def largest_errors(model: ReducedModel, skin: SkinResponse, shape: Iterable[float] = ()) -> FloatArray:
     """Largest errors over a touch, of the quantities and of the force, over `ReducedModel.error_scale`."""
+    return _relative(model, _compared(model, skin, shape))
+
+
+def _relative(model: ReducedModel, rows: Iterable[_Row]) -> FloatArray:
     so_far = np.zeros(model.error.size)
     relative = so_far
-    for row in _compared(model, skin, shape):
+    for row in rows:
         so_far = np.maximum(so_far, row.reduced)
         relative = np.maximum(relative, row.wrong / model.error_scale(so_far))
     return relative
@@ -238,7 +242,7 @@ def streamed(
     """
     rows = list(_compared(model, skin, shape))
     wrong, known = (np.max([getattr(row, name) for row in rows], axis=0) for name in ("wrong", "known"))
-    return wrong, known, bool((largest_errors(model, skin, shape) <= model.error).all())
+    return wrong, known, bool((_relative(model, rows) <= model.error).all())
 
 
 class _Row(NamedTuple):

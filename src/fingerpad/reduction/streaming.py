@@ -149,10 +149,8 @@ class ReducedTouch:
         model = self._model
         pose = finite("x_mm", x_mm, "mm"), finite("z_mm", z_mm, "mm"), finite("tilt_deg", tilt_deg, "degrees")
         weights = model.pose_weights((*pose, *self._shape))
-        first_mm, corner_mm = (
-            float(weights @ model.first_touch_mm),
-            weights @ model.middle_mm - model.reach_mm,
-        )
+        first_mm = float(weights @ model.first_touch_mm)
+        corner_mm = weights @ model.middle_mm - model.reach_mm
         spacing_mm = 2 * model.reach_mm / (GRID_POINTS - 1)
         moved_mm = np.hypot(*(self._way_mm - pose[:2]))
         press = _Press(
