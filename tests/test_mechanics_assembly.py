@@ -14,7 +14,7 @@ from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import block_mesh, finger_mesh
 from fingerpad.mechanics.assembly import Sparsity, assemble, coloured_chunks
-from fingerpad.mechanics.element import element_system
+from fingerpad.mechanics.element import N_COLUMNS, add_tangent, element_system
 from fingerpad.mechanics.materials import Hyperfoam, Material, MaterialTable, Ogden, Polynomial
 
 TABLE = MaterialTable.of(
@@ -67,16 +67,19 @@ def state(name, seed=0):
 
 def slow_sum(name, displacement, history):
     """Potential, forces and sparse tangent, one element after the other."""
-    body, force, tangent = mesh(name), np.empty((8, 3)), np.empty((8, 8, 3, 3))
+    body, force, tangent = mesh(name), np.empty((8, 3)), np.empty((8, N_COLUMNS))
     potential, forces, entries = 0.0, np.zeros(displacement.size), []
     for e, nodes in enumerate(body.elements):
         law, s = TABLE.law[body.layer[e]], S[body.layer[e]]
         potential += element_system(
             body.nodes_mm[nodes], displacement[nodes], law, s, history[e], True, force, tangent
         )
+        blocks = np.zeros((64, 3, 3))
+        add_tangent(tangent, np.arange(64).reshape(8, 8), blocks)
         numbers = (3 * nodes[:, None] + np.arange(3)).ravel()
         np.add.at(forces, numbers, force.ravel())
-        entries.append((tangent.transpose(0, 2, 1, 3).ravel(), np.repeat(numbers, 24), np.tile(numbers, 24)))
+        values = blocks.reshape(8, 8, 3, 3).transpose(0, 2, 1, 3).ravel()
+        entries.append((values, np.repeat(numbers, 24), np.tile(numbers, 24)))
     values, rows, columns = (np.concatenate(parts) for parts in zip(*entries, strict=True))
     matrix = sparse.coo_matrix((values, (rows, columns)), shape=2 * (displacement.size,)).tocsr()
     return potential, forces.reshape(-1, 3), matrix

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fingerpad.mechanics.element import element_state, element_system, relaxing_norms
+from fingerpad.mechanics.element import N_COLUMNS, add_tangent, element_state, element_system, relaxing_norms
 from fingerpad.mechanics.materials import (
     Energy,
     Hencky,
@@ -146,10 +146,11 @@ def slow_force(material, nodes, displacement, s, history):
 
 def kernel(material, nodes, displacement, s=1.0, history=None):
     law = MaterialTable.of([material]).law[0]
-    force, tangent = np.empty((8, 3)), np.empty((8, 8, 3, 3))
+    force, packed, blocks = np.empty((8, 3)), np.empty((8, N_COLUMNS)), np.zeros((64, 3, 3))
     history = np.zeros((8, 6)) if history is None else history
-    energy = element_system(nodes, displacement, law, s, history, True, force, tangent)
-    return energy, force, tangent.transpose(0, 2, 1, 3).reshape(24, 24)
+    energy = element_system(nodes, displacement, law, s, history, True, force, packed)
+    add_tangent(packed, np.arange(64).reshape(8, 8), blocks)
+    return energy, force, blocks.reshape(8, 8, 3, 3).transpose(0, 2, 1, 3).reshape(24, 24)
 
 
 def random_state(nodes, seed=0, size=0.1):

@@ -18,7 +18,7 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import Chunk, even_chunks, in_chunks
 from fingerpad.geometry.mesh import Mesh
-from fingerpad.mechanics.element import N_NODES, element_system, take_nodes
+from fingerpad.mechanics.element import N_COLUMNS, N_NODES, add_tangent, element_system, take_nodes
 from fingerpad.mechanics.materials import has_formulas
 
 
@@ -187,7 +187,7 @@ def _add_chunk(  # type: ignore[no-untyped-def]
     force, blocks, formulas, first, last,
 ):  # fmt: skip
     """Add elements from `first` up to `last` and return their potential; stop at one that is inside out."""
-    element_force, element_tangent = small_array((N_NODES, 3)), small_array((N_NODES, N_NODES, 3, 3))
+    element_force, element_tangent = small_array((N_NODES, 3)), small_array((N_NODES, N_COLUMNS))
     reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3))
     potential = 0.0
     for e in range(first, last):
@@ -203,10 +203,6 @@ def _add_chunk(  # type: ignore[no-untyped-def]
         for a in range(N_NODES):
             for i in range(3):
                 force[elements[e, a], i] += element_force[a, i]
-            if with_tangent:
-                for b in range(N_NODES):
-                    target = position[e, a, b]
-                    for i in range(3):
-                        for j in range(3):
-                            blocks[target, i, j] += element_tangent[a, b, i, j]
+        if with_tangent:
+            add_tangent(element_tangent, position[e], blocks)
     return potential

@@ -28,9 +28,8 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import run_kernel
 from fingerpad.geometry.mesh import Mesh
-from fingerpad.mechanics.element import N_NODES, N_POINTS, frame_scale, gradients_at_points, take_nodes
+from fingerpad.mechanics.element import N_NODES, N_POINTS, strain_changes, take_nodes
 from fingerpad.mechanics.materials import MaterialTable
-from fingerpad.mechanics.tensors import COLUMN, ROW, invert
 from fingerpad.mechanics.viscoelastic import InstantaneousState, StressHistory
 
 FEW_STEPS = 3
@@ -269,29 +268,18 @@ def _relaxed_work(  # type: ignore[no-untyped-def]
     stress_now, first, last,
 ):  # fmt: skip
     """Return the sum over elements of w_q S : 1/2 (C_n+1 - C_n), S being the mean relaxed stress."""
-    weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
-    start, end, inverse = small_array((N_POINTS, 3, 3)), small_array((N_POINTS, 3, 3)), small_array((3, 3))
-    reference, moved, jacobians = (
-        small_array((N_NODES, 3)),
-        small_array((N_NODES, 3)),
-        small_array((2, N_POINTS)),
-    )
+    reference, start, end = (
+        small_array((N_NODES, 3)), small_array((N_NODES, 3)), small_array((N_NODES, 3)),
+    )  # fmt: skip
+    weights, changes = small_array((N_POINTS,)), small_array((6, N_POINTS))
     total = 0.0
     for e in range(first, last):
         material = layer[e]
         take_nodes(nodes, elements[e], reference)
-        take_nodes(before, elements[e], moved)
-        volume = gradients_at_points(reference, moved, weights, slopes, start)
-        take_nodes(now, elements[e], moved)
-        gradients_at_points(reference, moved, weights, slopes, end)
-        volume_before, volume_now = 0.0, 0.0
+        take_nodes(before, elements[e], start)
+        take_nodes(now, elements[e], end)
+        strain_changes(reference, start, end, law[material], weights, changes)
         for q in range(N_POINTS):
-            jacobians[0, q], jacobians[1, q] = invert(start[q], inverse), invert(end[q], inverse)
-            volume_before += weights[q] * jacobians[0, q]
-            volume_now += weights[q] * jacobians[1, q]
-        for q in range(N_POINTS):
-            scale_before = frame_scale(law[material], jacobians[0, q], volume_before / volume)
-            scale_now = frame_scale(law[material], jacobians[1, q], volume_now / volume)
             for k in range(6):
                 mean = 0.0
                 for term in range(relaxed_before.shape[0]):
@@ -299,11 +287,7 @@ def _relaxed_work(  # type: ignore[no-untyped-def]
                         mean += new[material, term] * stress_now[e, q, k]
                         mean += old[material, term] * stress_before[e, q, k]
                         mean += kept[material, term] * relaxed_before[term, e, q, k]
-                i, j, change = ROW[k], COLUMN[k], 0.0
-                for m in range(3):
-                    change += scale_now * end[q, m, i] * end[q, m, j]
-                    change -= scale_before * start[q, m, i] * start[q, m, j]
-                total += (0.5 if k < 3 else 1.0) * weights[q] * mean * change
+                total += (1.0 if k < 3 else 2.0) * weights[q] * mean * changes[k, q]
     return total
 
 

@@ -152,28 +152,25 @@ def to_nodes(columns: SingleArray, order: np.ndarray, depth: int) -> FloatArray:
     return values.reshape(-1, 3)
 
 
-@njit(cache=True, nogil=True)
-def take_blocks(first, last, row_start, column, blocks, order, place, start, neighbour, depth, free, matrix):  # type: ignore[no-untyped-def]
-    """Copy a tangent of 3 x 3 blocks (see `assembly.Sparsity`) into a matrix, zero where unknowns are held.
+@njit(cache=True)
+def find_blocks(row_start, column, order, place, start, neighbour, depth, source):  # type: ignore[no-untyped-def]
+    """Find the block of a tangent (see `assembly.Sparsity`) that each entry of a matrix is copied from.
 
     Parameters
     ----------
-    first, last : int
-        Columns.
-    row_start, column, blocks : array
-        Block rows, their columns, and the blocks (n_blocks, 3, 3).
+    row_start, column : int array
+        Block rows and their columns.
     order, place : int array (n_columns,)
         Which column of the nodes each column of the matrix is, and the inverse of that.
     start, neighbour : int array
         `ColumnGraph`.
     depth : int
         Nodes in a column.
-    free : array (n_columns, 3, lanes + 2)
-        1 for unknowns that move, 0 for others.
-    matrix : array (n_pairs, 3, 3, 3, lanes)
-        Overwritten; zero beyond the ends of the columns, as it was.
+    source : int array (n_pairs, 3, lanes)
+        Overwritten with the number of the block; -1 beyond the ends of the columns.
     """
-    for c in range(first, last):
+    source[:] = -1
+    for c in range(order.size):
         for k in range(depth):
             node = order[c] * depth + k
             pair, before = start[c], -1
@@ -183,12 +180,42 @@ def take_blocks(first, last, row_start, column, blocks, order, place, start, nei
                     pair, before = start[c], among_nodes
                     while neighbour[pair] != place[among_nodes]:
                         pair += 1
-                below = column[block] - among_nodes * depth
-                s = below - k + 1
-                for a in range(3):
-                    for b in range(3):
-                        moves = free[c, a, k + 1] * free[neighbour[pair], b, below + 1]
-                        matrix[pair, s, a, b, k] = moves * blocks[block, a, b]
+                source[pair, column[block] - among_nodes * depth - k + 1, k] = block
+
+
+@njit(cache=True, nogil=True)
+def take_blocks(first, last, source, blocks, start, neighbour, free, matrix):  # type: ignore[no-untyped-def]
+    """Copy a tangent of 3 x 3 blocks into a matrix, zero where unknowns are held.
+
+    Parameters
+    ----------
+    first, last : int
+        Columns.
+    source : int array (n_pairs, 3, lanes)
+        From `find_blocks`.
+    blocks : array (n_blocks, 3, 3)
+        The tangent.
+    start, neighbour : int array
+        `ColumnGraph`.
+    free : array (n_columns, 3, lanes + 2)
+        1 for unknowns that move, 0 for others.
+    matrix : array (n_pairs, 3, 3, 3, lanes)
+        Overwritten; zero beyond the ends of the columns, as it was.
+    """
+    for c in range(first, last):
+        for pair in range(start[c], start[c + 1]):
+            d = neighbour[pair]
+            for s in range(3):
+                for k in range(source.shape[2]):
+                    block = source[pair, s, k]
+                    if block < 0:
+                        continue
+                    x, y, z = free[d, 0, k + s], free[d, 1, k + s], free[d, 2, k + s]
+                    for a in range(3):
+                        moves = free[c, a, k + 1]
+                        matrix[pair, s, a, 0, k] = moves * x * blocks[block, a, 0]
+                        matrix[pair, s, a, 1, k] = moves * y * blocks[block, a, 1]
+                        matrix[pair, s, a, 2, k] = moves * z * blocks[block, a, 2]
 
 
 @njit(cache=True, inline="always")

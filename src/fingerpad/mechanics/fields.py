@@ -27,9 +27,17 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import run_kernel
 from fingerpad.geometry.mesh import Mesh
-from fingerpad.mechanics.element import N_NODES, N_POINTS, frame_scale, gradients_at_points, take_nodes
+from fingerpad.mechanics.element import (
+    N_NODES,
+    N_POINTS,
+    deformation_at_points,
+    frame_scales,
+    strain_changes,
+    summed,
+    take_nodes,
+)
 from fingerpad.mechanics.materials import COUPLED, MaterialTable
-from fingerpad.mechanics.tensors import COLUMN, INDEX, ROW, invert, push_forward
+from fingerpad.mechanics.tensors import COLUMN, INDEX, ROW, find_determinants, push_forward
 from fingerpad.mechanics.viscoelastic import InstantaneousState, StressHistory, instantaneous_state
 
 
@@ -240,8 +248,7 @@ class Watched:
         )  # fmt: skip
         run_kernel(
             _isochoric_work, n, self.nodes_mm, self.corners, self.layer, self.table.law,
-            before.displacement_mm, displacement_mm, before.dilatation, dilatation, before.convected_kpa,
-            convected, work,
+            before.displacement_mm, displacement_mm, before.convected_kpa, convected, work,
         )  # fmt: skip
         work += 0.5 * (before.pressure_kpa + pressure) * (dilatation - before.dilatation)
         weights, isochoric = now.energies[chosen, :, 0], now.energies[chosen, :, 1]
@@ -292,65 +299,57 @@ def _mean_fields(  # type: ignore[no-untyped-def]
     first, last,
 ):  # fmt: skip
     """Write the scaled mean gradient and the mean Cauchy stress of elements, given U'(Jbar) and Jbar."""
-    weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
-    gradients, inverse, spatial = small_array((N_POINTS, 3, 3)), small_array((3, 3)), small_array((6,))
+    weights, jacobians, scales = small_array((N_POINTS,)), small_array((N_POINTS,)), small_array((N_POINTS,))
+    local, gradients = small_array((3, 3, N_POINTS)), small_array((3, 3, N_POINTS))
+    spatial, mean = small_array((6, N_POINTS)), small_array((3, 3, 1))
     reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3))
     for e in range(first, last):
         material = law[layer[e]]
         take_nodes(nodes, corners[e], reference)
         take_nodes(displacement, corners[e], moved)
-        volume = gradients_at_points(reference, moved, weights, slopes, gradients)
-        mean_gradient[e], stress[e], spherical = 0.0, 0.0, 0.0
-        for q in range(N_POINTS):
-            scale = frame_scale(material, invert(gradients[q], inverse), dilatation[e])
-            push_forward(gradients[q], scale, convected[e, q], spatial)
-            mean = (spatial[0] + spatial[1] + spatial[2]) / 3.0
-            spherical += weights[q] * mean
-            for k in range(6):
-                stress[e, k] += weights[q] * (spatial[k] - (mean if k < 3 else 0.0))
-            for i in range(3):
-                for j in range(3):
-                    mean_gradient[e, i, j] += weights[q] / volume * gradients[q, i, j]
+        volume = deformation_at_points(reference, moved, weights, local, gradients)
+        find_determinants(gradients, jacobians)
+        frame_scales(material, jacobians, dilatation[e], scales)
+        push_forward(gradients, scales, convected[e], spatial)
+        for k in range(6):
+            stress[e, k] = summed(weights, spatial[k])
+        spherical = (stress[e, 0] + stress[e, 1] + stress[e, 2]) / 3.0
         present_volume = dilatation[e] * volume
         # Laws that couple shape and volume have their pressure in the convected stress, others in U.
         hydrostatic = pressure[e] + (spherical / present_volume if material[8] == COUPLED else 0.0)
-        for k in range(6):
-            stress[e, k] = stress[e, k] / present_volume + (hydrostatic if k < 3 else 0.0)
-        scale = (dilatation[e] / invert(mean_gradient[e], inverse)) ** (1.0 / 3.0)
+        for k in range(3):
+            stress[e, k] = (stress[e, k] - spherical) / present_volume + hydrostatic
+            stress[e, k + 3] /= present_volume
         for i in range(3):
             for j in range(3):
-                mean_gradient[e, i, j] *= scale
+                mean[i, j, 0] = summed(weights, gradients[i, j]) / volume
+        find_determinants(mean, scales[:1])
+        scale = (dilatation[e] / scales[0]) ** (1.0 / 3.0)
+        for i in range(3):
+            for j in range(3):
+                mean_gradient[e, i, j] = scale * mean[i, j, 0]
 
 
 @njit(cache=True, nogil=True)
 def _isochoric_work(  # type: ignore[no-untyped-def]
-    nodes, corners, layer, law, before, now, dilatation_before, dilatation_now,
-    convected_before, convected_now, work, first, last,
+    nodes, corners, layer, law, before, now, convected_before, convected_now, work, first, last,
 ):  # fmt: skip
-    """Write the element means of 1/2 (S_n + S_n+1) : 1/2 (C_n+1 - C_n), with C = c F'F of `frame_scale`.
+    """Write the element means of 1/2 (S_n + S_n+1) : 1/2 (C_n+1 - C_n), with C as in `strain_changes`.
 
     The trapezoidal rule is over strain, not over time: it is exact if stress is linear in strain.
     """
-    weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
-    old, new, inverse = small_array((N_POINTS, 3, 3)), small_array((N_POINTS, 3, 3)), small_array((3, 3))
-    reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3))
+    weights, changes = small_array((N_POINTS,)), small_array((6, N_POINTS))
+    reference, start, end = (
+        small_array((N_NODES, 3)), small_array((N_NODES, 3)), small_array((N_NODES, 3)),
+    )  # fmt: skip
     for e in range(first, last):
-        material = law[layer[e]]
         take_nodes(nodes, corners[e], reference)
-        take_nodes(before, corners[e], moved)
-        gradients_at_points(reference, moved, weights, slopes, old)
-        take_nodes(now, corners[e], moved)
-        volume = gradients_at_points(reference, moved, weights, slopes, new)
+        take_nodes(before, corners[e], start)
+        take_nodes(now, corners[e], end)
+        volume = strain_changes(reference, start, end, law[layer[e]], weights, changes)
         total = 0.0
         for q in range(N_POINTS):
-            scale_old = frame_scale(material, invert(old[q], inverse), dilatation_before[e])
-            scale_new = frame_scale(material, invert(new[q], inverse), dilatation_now[e])
             for k in range(6):
-                i, j = ROW[k], COLUMN[k]
-                change = 0.0
-                for m in range(3):
-                    change += scale_new * new[q, m, i] * new[q, m, j]
-                    change -= scale_old * old[q, m, i] * old[q, m, j]
                 mean = 0.5 * (convected_before[e, q, k] + convected_now[e, q, k])
-                total += weights[q] * mean * 0.5 * change * (1.0 if k < 3 else 2.0)
+                total += weights[q] * mean * changes[k, q] * (1.0 if k < 3 else 2.0)
         work[e] = total / volume

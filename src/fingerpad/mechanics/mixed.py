@@ -29,10 +29,10 @@ from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import in_chunks, run_kernel
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.assembly import Sparsity
-from fingerpad.mechanics.element import N_NODES, N_POINTS, gradients_at_points, take_nodes
+from fingerpad.mechanics.element import BY_NODE, N_NODES, N_POINTS, deformation_at_points, summed, take_nodes
 from fingerpad.mechanics.energy import CARRIED, differentiate
 from fingerpad.mechanics.materials import COUPLED, N_COEFFICIENTS, POLYNOMIAL
-from fingerpad.mechanics.tensors import invert
+from fingerpad.mechanics.tensors import invert, multiply_matrices
 
 MIXED_POISSON = 0.49
 """Poisson's ratio above which the method is used. A Newton step takes a quarter more time; a block takes 15
@@ -85,39 +85,39 @@ def _volumetric_slopes(law, jacobian):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _present_gradients(slopes, inverse, present):  # type: ignore[no-untyped-def]
-    """Write dN/dx (8, 3) of one point from dN/dX and the inverse of F."""
-    for a in range(N_NODES):
+def _present_slopes(reference, displacement, weights, jacobians, slopes):  # type: ignore[no-untyped-def]
+    """Write weights and J (8,) and dN/dx (points, 3, nodes) of one element; return its reference volume."""
+    local, gradients = small_array((3, 3, N_POINTS)), small_array((3, 3, N_POINTS))
+    inverse, onto = small_array((3, 3, N_POINTS)), small_array((3, 3, N_POINTS))
+    volume = deformation_at_points(reference, displacement, weights, local, gradients)
+    invert(gradients, inverse, jacobians)
+    multiply_matrices(local, inverse, onto)
+    for q in range(N_POINTS):
         for i in range(3):
-            present[a, i] = 0.0
-            for k in range(3):
-                present[a, i] += slopes[a, k] * inverse[k, i]
+            for a in range(N_NODES):
+                slopes[q, i, a] = 0.0
+                for k in range(3):
+                    slopes[q, i, a] += BY_NODE[q, k, a] * onto[k, i, q]
+    return volume
 
 
 @njit(cache=True, nogil=True)
 def _pressures(nodes, elements, displacement, layer, law, pressure, slope, first, last):  # type: ignore[no-untyped-def]
-    weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
-    gradients, inverse = small_array((N_POINTS, 3, 3)), small_array((3, 3))
-    present, reference, moved = (
-        small_array((N_NODES, 3)), small_array((N_NODES, 3)), small_array((N_NODES, 3)),
-    )  # fmt: skip
+    weights, jacobians = small_array((N_POINTS,)), small_array((N_POINTS,))
+    slopes = small_array((N_POINTS, 3, N_NODES))
+    reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3))
     for e in range(first, last):
         take_nodes(nodes, elements[e], reference)
         take_nodes(displacement, elements[e], moved)
-        volume = gradients_at_points(reference, moved, weights, slopes, gradients)
-        present_volume = 0.0
-        slope[e] = 0.0
-        for q in range(N_POINTS):
-            jacobian = invert(gradients[q], inverse)
-            present_volume += weights[q] * jacobian
-            _present_gradients(slopes[q], inverse, present)
-            for a in range(N_NODES):
-                for i in range(3):
-                    slope[e, a, i] += weights[q] * jacobian * present[a, i]  # dv, first
-        pressure[e], stiffness = _volumetric_slopes(law[layer[e]], present_volume / volume)
+        volume = _present_slopes(reference, moved, weights, jacobians, slopes)
+        dilatation = summed(weights, jacobians) / volume
+        pressure[e], stiffness = _volumetric_slopes(law[layer[e]], dilatation)
         for a in range(N_NODES):
             for i in range(3):
-                slope[e, a, i] *= stiffness / volume
+                change = 0.0  # dv
+                for q in range(N_POINTS):
+                    change += weights[q] * jacobians[q] * slopes[q, i, a]
+                slope[e, a, i] = change * stiffness / volume
 
 
 def exchange_pressure(
@@ -152,25 +152,23 @@ def exchange_pressure(
 @njit(cache=True, nogil=True)
 def _exchange_chunk(nodes, elements, displacement, change, position, blocks, first, last):  # type: ignore[no-untyped-def]
     """Add the elements from `first` up to `last`; each block is written once per element."""
-    weights, slopes = small_array((N_POINTS,)), small_array((N_POINTS, N_NODES, 3))
-    gradients, inverse = small_array((N_POINTS, 3, 3)), small_array((3, 3))
-    g, reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3)), small_array((N_NODES, 3))
-    sums = small_array((N_NODES, N_NODES, 3))
+    weights, jacobians = small_array((N_POINTS,)), small_array((N_POINTS,))
+    slopes, sums = small_array((N_POINTS, 3, N_NODES)), small_array((N_NODES, N_NODES, 3))
+    reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3))
     for e in range(first, last):
         if change[e] == 0.0:
             continue
         take_nodes(nodes, elements[e], reference)
         take_nodes(displacement, elements[e], moved)
-        gradients_at_points(reference, moved, weights, slopes, gradients)
+        _present_slopes(reference, moved, weights, jacobians, slopes)
         sums[:] = 0.0
         for q in range(N_POINTS):
-            factor = change[e] * weights[q] * invert(gradients[q], inverse)
-            _present_gradients(slopes[q], inverse, g)
+            factor, g = change[e] * weights[q] * jacobians[q], slopes[q]
             for a in range(N_NODES):
                 for b in range(N_NODES):
                     for k in range(3):
                         i, j = (k + 1) % 3, (k + 2) % 3
-                        sums[a, b, k] += factor * (g[a, i] * g[b, j] - g[a, j] * g[b, i])
+                        sums[a, b, k] += factor * (g[i, a] * g[j, b] - g[j, a] * g[i, b])
         for a in range(N_NODES):
             for b in range(N_NODES):
                 for k in range(3):  # antisymmetric in i and j

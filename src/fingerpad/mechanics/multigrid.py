@@ -30,7 +30,9 @@ from fingerpad.mechanics.columns import (
     SingleArray,
     colours,
     factor_columns,
+    find_blocks,
     find_scales,
+    lanes,
     multiply,
     residual_after_forward,
     round_matrix,
@@ -367,7 +369,11 @@ class Multigrid:
         )
         self._order, colour_start = _by_colour(graph)
         graph, columns = graph.sorted(self._order), columns.renumbered(self._order)
-        self._place = np.argsort(self._order)
+        self._source = np.empty((graph.neighbour.size, 3, lanes(depth)), dtype=np.int32)
+        find_blocks(
+            sparsity.row_start, sparsity.column, self._order, np.argsort(self._order), graph.start,
+            graph.neighbour, depth, self._source,
+        )  # fmt: skip
         thinnest = np.linalg.norm(np.diff(nodes_mm[grid], axis=2), axis=3).min()
         widest = max(np.linalg.norm(np.diff(skin, axis=axis), axis=2).max() for axis in (0, 1))
         moves = np.zeros((len(nodes_mm), 3))
@@ -397,11 +403,9 @@ class Multigrid:
     def follow(self, blocks: np.ndarray) -> None:
         """Take a new tangent, blocks (n_blocks, 3, 3), on the finest level; others stay as they are."""
         finest = self._levels[0]
-        _share(
-            take_blocks, 0, finest.n_columns, self._sparsity.row_start, self._sparsity.column, blocks,
-            self._order, self._place, finest.graph.start, finest.graph.neighbour, self._depth, finest.free,
-            finest.matrix,
-        )  # fmt: skip
+        pairs = finest.graph.start, finest.graph.neighbour
+        where = 0, finest.n_columns, self._source
+        _share(take_blocks, *where, blocks, *pairs, finest.free, finest.matrix)
         if self._transfers:
             finest.prepare_sweeps()
 
