@@ -264,8 +264,8 @@ class MeanRelaxed:
 
 @njit(cache=True, nogil=True)
 def _relaxed_work(  # type: ignore[no-untyped-def]
-    nodes, elements, before, now, layer, law, shares, new, old, kept, stress_before, relaxed_before,
-    stress_now, first, last,
+    nodes, elements, before, now, layer, law, new, old, kept, stress_before, relaxed_before, stress_now,
+    first, last,
 ):  # fmt: skip
     """Return the sum over elements of w_q S : 1/2 (C_n+1 - C_n), S being the mean relaxed stress."""
     reference, start, end = (
@@ -279,14 +279,12 @@ def _relaxed_work(  # type: ignore[no-untyped-def]
         take_nodes(before, elements[e], start)
         take_nodes(now, elements[e], end)
         strain_changes(reference, start, end, law[material], weights, changes)
+        all_new, all_old = new[material].sum(), old[material].sum()
         for q in range(N_POINTS):
             for k in range(6):
-                mean = 0.0
+                mean = all_new * stress_now[e, q, k] + all_old * stress_before[e, q, k]
                 for term in range(relaxed_before.shape[0]):
-                    if shares[material, term] > 0.0:
-                        mean += new[material, term] * stress_now[e, q, k]
-                        mean += old[material, term] * stress_before[e, q, k]
-                        mean += kept[material, term] * relaxed_before[term, e, q, k]
+                    mean += kept[material, term] * relaxed_before[term, e, q, k]
                 total += (1.0 if k < 3 else 2.0) * weights[q] * mean * changes[k, q]
     return total
 
@@ -327,8 +325,7 @@ def relaxed_work(
     mean = MeanRelaxed.of(table, step_ms)
     return sum(run_kernel(
         _relaxed_work, len(mesh.elements), mesh.nodes_mm, mesh.elements, before_mm, now_mm, mesh.layer,
-        table.law, table.shares, mean.new, mean.old, mean.kept, before.instantaneous, before.relaxed,
-        now.stress_kpa,
+        table.law, mean.new, mean.old, mean.kept, before.instantaneous, before.relaxed, now.stress_kpa,
     ))  # fmt: skip
 
 

@@ -93,11 +93,11 @@ def _carry(old, decay, layer, instantaneous, relaxed, total, first, last):  # ty
     """Write H = sum_i (b_i g_i S0_n + gamma_i S_i,n)."""
     for e in range(first, last):
         material = layer[e]
+        all_old = old[material].sum()
         for q in range(N_POINTS):
             for k in range(6):
-                value = 0.0
+                value = all_old * instantaneous[e, q, k]
                 for term in range(relaxed.shape[0]):
-                    value += old[material, term] * instantaneous[e, q, k]
                     value += decay[material, term] * relaxed[term, e, q, k]
                 total[e, q, k] = value
 
