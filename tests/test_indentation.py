@@ -12,6 +12,7 @@ from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenter_grading import THIN_SIZE_MM, grading_about
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.geometry.motion import RampAndHold
+from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, MaterialTable, Tissues
@@ -264,6 +265,21 @@ def test_small_bodies_and_sharp_edges_are_meshed_finer(body, size_mm):
     fillet = getattr(touch.body, "fillet_mm", getattr(touch.body, "lip_mm", np.inf))
     assert fillet >= size_mm
     assert touch.mesh.nodes_mm.shape[0] < 50_000
+
+
+def test_ridges_that_slide_meet_no_coarse_elements_near_the_place_of_contact():
+    """A grating of 0.6 mm depth slid for 0.4 mm, and found no equilibrium 8 mm beside its middle."""
+    still, slides = (
+        touch_of(Fingertip(), Grating(1.0, 1.0), motion, at_mm=(15.0, 0.0)).grading
+        for motion in (
+            RampAndHold(depth_mm=0.6),
+            Trajectory((0.0, 50.0, 100.0), depth_mm=(0.0, 0.6, 0.6), x_mm=(0.0, 0.0, 5.0)),
+        )
+    )
+    assert slides.centre_mm - slides.half_length_mm <= 5.0
+    assert slides.centre_mm + slides.half_length_mm >= 25.0
+    assert still.half_length_mm < 10.0
+    assert (slides.size_x_mm, slides.half_width_mm) == (still.size_x_mm, still.half_width_mm)
 
 
 def test_a_body_narrower_than_an_element_is_refused_before_it_is_pressed():

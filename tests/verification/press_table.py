@@ -1,10 +1,10 @@
 """Every kind of press that must not fail, and docs/presses.md, the page that lists them.
 
 A spanning set of bodies, friction, tissues and places rather than all combinations: each body once under the
-default tissues without and with friction, and the hardest of them under other tissues and at other places.
-`make verification` presses those whose row is missing or of other code, which takes hours, and keeps each row
-in docs/verification/presses.csv as soon as it is known. `python -m tests.verification.press_table quick`
-presses at one resolution.
+default tissues without and with friction, the hardest of them under other tissues and at other places, and
+some bodies that slide and roll. `make verification` presses those whose row is missing or of other code,
+which takes hours, and keeps each row in docs/verification/presses.csv as soon as it is known.
+`python -m tests.verification.press_table quick` presses at one resolution.
 """
 
 from __future__ import annotations
@@ -19,7 +19,11 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Any
 
+import numpy as np
+
+from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import FingerpadError
 from fingerpad.core.files import write_atomically
 from fingerpad.data.tissues import DEFAULT_TISSUES
@@ -28,6 +32,8 @@ from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading, Strip
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Sphere
 from fingerpad.geometry.motion import RampAndHold
+from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.mechanics.press import PressSettings
 from fingerpad.skin.behaviour import code_hash
 from fingerpad.skin.indentation import CONTACT_POINT_MM, touch_of
 
@@ -65,6 +71,50 @@ TISSUES = (
 )  # fmt: skip
 PLACES_MM = ((8.0, 0.0), (29.0, 0.0), (17.37, 3.5), (25.0, 7.0))
 
+SLIDE_SPEED_MM_PER_MS = 0.02
+ROLLER_MM, ROLLED_DEG, ROLL_SPEED_DEG_PER_MS = 7.0, 20.0, 0.08
+
+
+def moved(way: FloatArray, speed: float, **course: Any) -> Trajectory:
+    """Ramp of 50 ms, hold of 100 ms, then along a way; each part of the course is a number or of each way."""
+    n = 3 + way.size
+    columns = {name: np.array(np.broadcast_to(value, n)) for name, value in course.items()}
+    for name in columns.keys() & {"depth_mm", "force_mn"}:
+        columns[name][0] = 0.0
+    return Trajectory(np.concatenate([[0.0, 50.0, 150.0], 150.0 + way / speed]), **columns)
+
+
+def slide(axis: str, length_mm: float, **pressed: float) -> Trajectory:
+    """Slide along or across the finger, sampled finely at its onset."""
+    way = np.array([0.05, 0.1, 0.2, 0.4, *np.arange(1.0, length_mm + 0.5)])
+    return moved(way, SLIDE_SPEED_MM_PER_MS, **{axis: np.concatenate([np.zeros(3), way])}, **pressed)
+
+
+def roll(depth_mm: float) -> Trajectory:
+    """Roll a cylinder over the pad without slip, were the skin flat."""
+    way = np.linspace(0.0, ROLLED_DEG, 6)[1:]
+    tilt = np.concatenate([np.zeros(3), way])
+    x_mm = -ROLLER_MM / 2 * np.deg2rad(tilt)
+    return moved(way, ROLL_SPEED_DEG_PER_MS, depth_mm=depth_mm, tilt_deg=tilt, x_mm=x_mm)
+
+
+MOTIONS = {
+    "60 mN, slides 5 mm along": slide("x_mm", 5.0, force_mn=60.0),
+    "60 mN, slides 5 mm across": slide("z_mm", 5.0, force_mn=60.0),
+    "0.6 mm, slides 2 mm along": slide("x_mm", 2.0, depth_mm=0.6),
+    "0.8 mm, rolls by 20 degrees": roll(0.8),
+}
+"""Motions after a press, by their names in the column of depths."""
+
+MOVED: tuple[tuple[Indenter, str, tuple[float, float]], ...] = (
+    (Sphere(287.0), "60 mN, slides 5 mm along", (12.0, 0.0)),
+    (Sphere(287.0), "60 mN, slides 5 mm across", (17.37, -2.5)),
+    (Bar(), "0.6 mm, slides 2 mm along", (14.0, 0.0)),
+    (Grating(1.0, 1.0), "0.6 mm, slides 2 mm along", (15.0, 0.0)),
+    (Cylinder(ROLLER_MM), "0.8 mm, rolls by 20 degrees", (17.37, 0.0)),
+)
+MOVING_STEPS = PressSettings(ramp_steps=6, hold_steps=2)
+
 RESOLUTIONS = ("quick", "standard", "finer")
 FINER = 1.5
 """Sizes of the elements at standard over those of the finer mesh, along, across and through the layers."""
@@ -78,13 +128,14 @@ class Press:
     friction: float = 0.0
     tissues: str = DEFAULT_TISSUES
     at_mm: tuple[float, float] = CONTACT_POINT_MM
+    motion: str = ""
 
     @property
     def cells(self) -> tuple[str, ...]:
         """Body, friction, tissues, place and depth as text; no other press has the same."""
         place = f"{self.at_mm[0]:g}, {self.at_mm[1]:g}"
         body = re.sub(r"\d+\.\d+", lambda size: f"{float(size[0]):.4g}", str(self.body))
-        return body, f"{self.friction:g}", self.tissues, place, f"{depth_of(self):.3g}"
+        return body, f"{self.friction:g}", self.tissues, place, self.motion or f"{depth_of(self):.3g}"
 
 
 @dataclass(frozen=True)
@@ -107,6 +158,7 @@ def presses() -> Iterator[Press]:
         for tissues in TISSUES:
             yield from (Press(body, friction, tissues) for friction in (0.0, 0.5))
         yield from (Press(body, at_mm=at_mm) for at_mm in PLACES_MM)
+    yield from (Press(body, friction=0.5, at_mm=at_mm, motion=motion) for body, motion, at_mm in MOVED)
 
 
 def depth_of(press: Press) -> float:
@@ -118,7 +170,7 @@ def depth_of(press: Press) -> float:
 
 def resolutions_of(press: Press) -> tuple[str, ...]:
     """Names of the meshes of a press: the finer one for the default tissues with friction, or for a wire."""
-    holds = press.friction > 0.0 or press.body.grips
+    holds = (press.friction > 0.0 or press.body.grips) and not press.motion
     finer = holds and press.tissues == DEFAULT_TISSUES and press.at_mm == CONTACT_POINT_MM
     return RESOLUTIONS if finer else RESOLUTIONS[:2]
 
@@ -146,9 +198,13 @@ def finer(grading: Grading) -> Grading:
 def solved(press: Press, resolution: str, depth_mm: float | None = None) -> Outcome:
     """Solve one press of the table."""
     named = "standard" if resolution == "finer" else resolution
+    if press.motion:
+        motion, settings = MOTIONS[press.motion], MOVING_STEPS
+    else:
+        motion, settings = RampAndHold(depth_mm=depth_mm or depth_of(press)), None
     touch = touch_of(
-        Fingertip(), press.body, RampAndHold(depth_mm=depth_mm or depth_of(press)), press.tissues, named,
-        press.at_mm, friction=press.friction,
+        Fingertip(), press.body, motion, press.tissues, named, press.at_mm, settings=settings,
+        friction=press.friction,
     )  # fmt: skip
     if resolution == "finer":
         touch = replace(touch, grading=finer(touch.grading))
@@ -247,7 +303,8 @@ INTRODUCTION = """\
 # Presses that must not fail
 
 Each body is pressed 2 mm deep, or 3.5 mm where its radius is at least 1.5 mm, but at most 0.79 of the way to
-the bone: by the paper's ramp of 50 ms, with the hold of 950 ms. Largest force [mN], largest SED of the living
+the bone: by the paper's ramp of 50 ms, with the hold of 950 ms. The last rows slide and roll after a press
+of 50 ms and a hold of 100 ms. Largest force [mN], largest SED of the living
 epidermis [kPa], energy imbalance (wanted: at most 0.005) and time [s] of one process while others had the
 machine. Differences are relative (wanted: 5 % in force and 10 % in SED for quick, 2 % and 4 % for standard).
 The finer mesh divides all elements of standard by 1.5 in each direction; default tissues, with friction.

@@ -48,8 +48,10 @@ the x axis the rim runs across lines of x that are 1 / cos a times as far apart.
 LEAST_ACROSS_RADIUS = 5
 """Least number of elements across the radius of a face, if those at the rim are no larger."""
 
-LONGEST_REACH_MM = 5.0
-"""Largest half-extent of a fine zone: skin farther away curves away from any indenter. [mm]"""
+LONGEST_REACH_MM, LONGEST_SLIDING_REACH_MM = 5.0, 10.0
+"""Largest half-extents of a fine zone, of an indenter that stays and along one that moves aside: skin farther
+away curves away. Far from its middle a wide body presses lightly, which a coarse mesh bears; but ridges that
+slide over elements of their own size find no equilibrium. [mm]"""
 
 
 def grading_about(
@@ -59,6 +61,7 @@ def grading_about(
     z_mm: float = 0.0,
     spin_deg: float = 0.0,
     finger_size: float = 1.0,
+    moves: bool = False,
 ) -> Grading:
     """Grading that is fine under an indenter at (x, z) and 1 mm beyond, and finer about its edges.
 
@@ -74,6 +77,8 @@ def grading_about(
         Rotation about its direction of pressing, as of a `Touch`. [degrees]
     finger_size : float
         `Fingertip.relative_size`, see `resolution_grading`.
+    moves : bool
+        Whether it moves aside, which takes a longer fine zone below a wide body.
 
     Returns
     -------
@@ -89,8 +94,9 @@ def grading_about(
     reach = indenter.half_width_mm + 1.0
     if not indenter.mirrors(spin_deg):  # extent of a turned square along and across
         reach *= sum(map(abs, cosine_and_sine(spin_deg)))
-    reach = min(reach, LONGEST_REACH_MM * min(finger_size, 1.0))
-    grading = resolution_grading(resolution, x_mm, reach, abs(z_mm) + reach, finger_size)
+    longest = LONGEST_SLIDING_REACH_MM if moves else LONGEST_REACH_MM
+    far, reach = (min(reach, most_mm * min(finger_size, 1.0)) for most_mm in (longest, LONGEST_REACH_MM))
+    grading = resolution_grading(resolution, x_mm, far, abs(z_mm) + reach, finger_size)
     if z_mm != 0.0 or not indenter.mirrors(spin_deg):
         grading = replace(grading, full=True)
     if np.isfinite(indenter.relief_mm):
@@ -195,7 +201,9 @@ def grading_along(
     places = {(pose.x_mm, pose.z_mm, pose.spin_deg) for pose in poses}
     outermost = sorted(places, key=lambda place: (place[2], place[0], place[1]))
     gradings = [
-        grading_about(indenter, resolution, x_mm + x, z_mm + z, spin_deg + spin, finger_size)
+        grading_about(
+            indenter, resolution, x_mm + x, z_mm + z, spin_deg + spin, finger_size, moves=len(places) > 1
+        )
         for x, z, spin in outermost
     ]
     joint = covering(gradings)
