@@ -30,7 +30,7 @@ from fingerpad.core.threads import run_kernel
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.element import N_NODES, N_POINTS, strain_changes, take_nodes
 from fingerpad.mechanics.materials import MaterialTable
-from fingerpad.mechanics.viscoelastic import InstantaneousState, StressHistory
+from fingerpad.mechanics.viscoelastic import N_STRESSES, InstantaneousState, StressHistory, flat
 
 FEW_STEPS = 3
 """Points of a phase below which a cubic cannot be drawn and straight lines take its place."""
@@ -271,7 +271,7 @@ def _relaxed_work(  # type: ignore[no-untyped-def]
     reference, start, end = (
         small_array((N_NODES, 3)), small_array((N_NODES, 3)), small_array((N_NODES, 3)),
     )  # fmt: skip
-    weights, changes = small_array((N_POINTS,)), small_array((6, N_POINTS))
+    weights, changes, means = small_array((N_POINTS,)), small_array((6, N_POINTS)), small_array((N_STRESSES,))
     total = 0.0
     for e in range(first, last):
         material = layer[e]
@@ -280,12 +280,15 @@ def _relaxed_work(  # type: ignore[no-untyped-def]
         take_nodes(now, elements[e], end)
         strain_changes(reference, start, end, law[material], weights, changes)
         all_new, all_old = new[material].sum(), old[material].sum()
+        for k in range(N_STRESSES):
+            means[k] = all_new * stress_now[e, k] + all_old * stress_before[e, k]
+        for term in range(relaxed_before.shape[0]):
+            share = kept[material, term]
+            for k in range(N_STRESSES):
+                means[k] += share * relaxed_before[term, e, k]
         for q in range(N_POINTS):
             for k in range(6):
-                mean = all_new * stress_now[e, q, k] + all_old * stress_before[e, q, k]
-                for term in range(relaxed_before.shape[0]):
-                    mean += kept[material, term] * relaxed_before[term, e, q, k]
-                total += (1.0 if k < 3 else 2.0) * weights[q] * mean * changes[k, q]
+                total += (1.0 if k < 3 else 2.0) * weights[q] * means[6 * q + k] * changes[k, q]
     return total
 
 
@@ -325,7 +328,8 @@ def relaxed_work(
     mean = MeanRelaxed.of(table, step_ms)
     return sum(run_kernel(
         _relaxed_work, len(mesh.elements), mesh.nodes_mm, mesh.elements, before_mm, now_mm, mesh.layer,
-        table.law, mean.new, mean.old, mean.kept, before.instantaneous, before.relaxed, now.stress_kpa,
+        table.law, mean.new, mean.old, mean.kept, flat(before.instantaneous), flat(before.relaxed),
+        flat(now.stress_kpa),
     ))  # fmt: skip
 
 

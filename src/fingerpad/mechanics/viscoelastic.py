@@ -25,6 +25,14 @@ from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.element import N_NODES, N_POINTS, element_state, relaxing_norms, take_nodes
 from fingerpad.mechanics.materials import MaterialTable, has_formulas
 
+N_STRESSES = 6 * N_POINTS
+"""Numbers of an element's stresses at its points, which lie side by side in memory."""
+
+
+def flat(stresses: FloatArray) -> FloatArray:
+    """Return the same stresses (..., 8, 6) with those of an element in one row, (..., 48)."""
+    return stresses.reshape(*stresses.shape[:-2], N_STRESSES)
+
 
 @dataclass(frozen=True)
 class StepCoefficients:
@@ -75,15 +83,16 @@ class StressHistory:
     def carried(self, step: StepCoefficients, layer: np.ndarray) -> FloatArray:
         """H of the next step, (n_elements, 8, 6). [kPa]"""
         total = np.empty_like(self.instantaneous)
-        run_kernel(_carry, len(layer), step.old, step.decay, layer, self.instantaneous, self.relaxed, total)
+        before = flat(self.instantaneous), flat(self.relaxed)
+        run_kernel(_carry, len(layer), step.old, step.decay, layer, *before, flat(total))
         return total
 
     def advanced(self, step: StepCoefficients, layer: np.ndarray, instantaneous: FloatArray) -> StressHistory:
         """State at the end of the step, given S0 there."""
         relaxed = np.empty_like(self.relaxed)
         run_kernel(
-            _relax, len(layer), step.new, step.old, step.decay, layer, instantaneous, self.instantaneous,
-            self.relaxed, relaxed,
+            _relax, len(layer), step.new, step.old, step.decay, layer, flat(instantaneous),
+            flat(self.instantaneous), flat(self.relaxed), flat(relaxed),
         )  # fmt: skip
         return StressHistory(instantaneous, relaxed)
 
@@ -94,12 +103,12 @@ def _carry(old, decay, layer, instantaneous, relaxed, total, first, last):  # ty
     for e in range(first, last):
         material = layer[e]
         all_old = old[material].sum()
-        for q in range(N_POINTS):
-            for k in range(6):
-                value = all_old * instantaneous[e, q, k]
-                for term in range(relaxed.shape[0]):
-                    value += decay[material, term] * relaxed[term, e, q, k]
-                total[e, q, k] = value
+        for k in range(N_STRESSES):
+            total[e, k] = all_old * instantaneous[e, k]
+        for term in range(relaxed.shape[0]):
+            gamma = decay[material, term]
+            for k in range(N_STRESSES):
+                total[e, k] += gamma * relaxed[term, e, k]
 
 
 @njit(cache=True, nogil=True)
@@ -108,11 +117,8 @@ def _relax(new, old, decay, layer, now, before, relaxed_before, relaxed, first, 
     for term in range(relaxed.shape[0]):
         for e in range(first, last):
             a, b, gamma = new[layer[e], term], old[layer[e], term], decay[layer[e], term]
-            for q in range(N_POINTS):
-                for k in range(6):
-                    relaxed[term, e, q, k] = (
-                        a * now[e, q, k] + b * before[e, q, k] + gamma * relaxed_before[term, e, q, k]
-                    )
+            for k in range(N_STRESSES):
+                relaxed[term, e, k] = a * now[e, k] + b * before[e, k] + gamma * relaxed_before[term, e, k]
 
 
 @njit(cache=True, nogil=True)
@@ -136,14 +142,15 @@ def _stored_energy(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     n_terms = relaxed.shape[0]
     tensors, norms = np.empty((n_terms + 1, N_POINTS, 6)), np.empty((n_terms + 1, N_POINTS))
+    stresses = tensors.reshape(n_terms + 1, N_STRESSES)
     reference, moved = small_array((N_NODES, 3)), small_array((N_NODES, 3))
     for e in range(first, last):
-        for q in range(N_POINTS):
-            for k in range(6):
-                tensors[0, q, k] = instantaneous[e, q, k]
-                for term in range(n_terms):
-                    whole = shares[layer[e], term] * instantaneous[e, q, k]
-                    tensors[term + 1, q, k] = whole - relaxed[term, e, q, k]
+        for k in range(N_STRESSES):
+            stresses[0, k] = instantaneous[e, k]
+        for term in range(n_terms):
+            share = shares[layer[e], term]
+            for k in range(N_STRESSES):
+                stresses[term + 1, k] = share * instantaneous[e, k] - relaxed[term, e, k]
         take_nodes(nodes, elements[e], reference)
         take_nodes(displacement, elements[e], moved)
         relaxing_norms(reference, moved, law[layer[e]], tensors, norms)
@@ -217,6 +224,7 @@ def stored_energy_density(
     stored = np.empty(len(mesh.elements))
     run_kernel(
         _stored_energy, stored.size, mesh.nodes_mm, mesh.elements, displacement, mesh.layer, table.law,
-        table.shares, history.instantaneous, history.relaxed, now.energies, now.volumetric_kpa, stored,
+        table.shares, flat(history.instantaneous), flat(history.relaxed), now.energies, now.volumetric_kpa,
+        stored,
     )  # fmt: skip
     return stored
