@@ -15,6 +15,7 @@ from fingerpad.mechanics.materials import (
     Ogden,
     Polynomial,
 )
+from fingerpad.mechanics.tensors import power_minus_two_thirds
 
 NEO_HOOKE = Material.neo_hooke(shear_kpa=11.0, poisson=0.48)
 MOONEY = Material(Polynomial(c10=4.0, c01=1.5, bulk_linear=130.0))
@@ -39,6 +40,13 @@ BRICK = np.array(
 DISTORTED = BRICK + np.random.default_rng(3).uniform(-0.15, 0.15, BRICK.shape)
 WEDGE = DISTORTED[[0, 1, 1, 3, 4, 5, 5, 7]]  # two pairs of equal nodes: one side collapsed to an edge
 SHAPES = pytest.mark.parametrize("nodes", [DISTORTED, WEDGE], ids=["brick", "wedge"])
+
+
+def test_power_is_that_of_the_library_near_1_and_far_from_it():
+    values = np.concatenate([np.geomspace(1e-6, 1e6, 241), np.linspace(0.9, 1.1, 21)])
+    powers = np.empty_like(values)
+    power_minus_two_thirds(values, powers)
+    np.testing.assert_allclose(powers, values ** (-2 / 3), rtol=2e-15)
 
 
 def local_corners():
