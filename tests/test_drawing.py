@@ -7,8 +7,58 @@ from matplotlib.figure import Figure
 
 import fingerpad as fp
 from fingerpad.core.errors import InputError
+from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse
+from fingerpad.experiments.discrimination.task_files import parse_task
+from fingerpad.experiments.discrimination.task_stimuli import task_population, task_stimuli
+from fingerpad.experiments.fit.fit import fit_recordings
+from fingerpad.export.result_tables import TABLES
+from fingerpad.inference.recordings import RateRecordings
+from fingerpad.inference.spike_fit import SpikeFit
 from fingerpad.psychophysics.psychometric import fit_psychometric
 from fingerpad.report.drawing import DRAWINGS
+
+TASK = {
+    "question": "How strong?",
+    "tissues": "trial3",
+    "object": {"kind": "sphere"},
+    "stimuli": {"vary": "object.curvature_per_m", "values": [200, 220, 240]},
+    "standard": 200,
+    "population": {"rows": 3, "columns": 3},
+    "code": ["gradient_sum"],
+    "measure": ["static", "latency"],
+    "noise": 0.1,
+    "experiment": {"seed": 5, "distributions": 5, "hit_rates": 10},
+}
+
+
+class Strength:
+    """A skin that is pressed the more strongly, the more the sphere is curved."""
+
+    caveats = ()
+
+    def __init__(self, curvature_per_m):
+        self.peak_kpa = curvature_per_m / 70.0
+
+    def sed(self, sites, *quantities):
+        squared = np.square(np.asarray(sites)[:, [0, -1]] - [17.37, 0.0]).sum(axis=1)
+        peaks = self.peak_kpa * np.exp(-squared / 4.0)
+        return fp.SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.9], peaks), kinks_ms=[50.0])
+
+
+def discriminated():
+    task = parse_task(TASK)
+    prepared = PreparedTask(task, task_stimuli(task), task_population(task))
+    return analyse(
+        prepared, {each.name: Strength(each.indenter.curvature_per_m) for each in prepared.stimuli}
+    )
+
+
+def fitted():
+    afferent = fp.Afferent.for_tissues("paper")
+    times_ms = np.array([0.0, 25.0, 50.0, 100.0, 300.0, 1000.0])
+    traces = fp.SedTraces(times_ms, np.outer([0, 0.3, 1, 0.9, 0.8, 0.7], np.linspace(2, 9, 6)), [50.0])
+    names = tuple(f"height {number}" for number in range(6))
+    return fit_recordings(traces, RateRecordings(names, *afferent.rates(traces)), np.arange(6) % 2)
 
 
 @pytest.fixture(scope="module")
@@ -22,6 +72,28 @@ def results():
         "ResponseMap": response,
         "SpikeTrains": response.spikes,
         "SedTraces": skin.sed([(17.37, 0.0), (19.0, 0.0)]),
+        "CurrentTraces": fp.CurrentTraces([0.0, 50.0, 50.0, 90.0], [[0.0], [2e-3], [1e-3], [1e-3]]),
+        "MixedResponse": fp.MixedResponse({"SAI": response, "RA": response}),
+        "SurfaceProfile": skin.surface_profile(),
+        "HitRates": fp.HitRates([0.6, 0.9], [0.05, 0.02], seed=1),
+        "FitResult": fitted(),
+        "SpikeFit": SpikeFit(
+            np.array([0.01, 4.0, 0.02, 40.0, 0.5]),
+            np.diag([1e-6, 0.04, 1e-5, 9.0, 0.01]),
+            -120.0,
+            60,
+            (-120.0,),
+        ),
+        "TaskResult": discriminated(),
+        "ReducedSample": fp.ReducedSample(
+            time_ms=12.0,
+            depth_mm=0.4,
+            force_mn=25.0,
+            contact_area_mm2=9.0,
+            fields={"stored": np.array([0.1, 0.4])},
+            force_error_mn=0.2,
+            field_errors={"stored": 0.02},
+        ),
         "PsychometricFit": fit_psychometric([10.0, 20.0, 40.0], [55, 70, 95], [100] * 3),
         "Fingertip": finger,
     }
@@ -72,12 +144,42 @@ def test_unknown_drawings_and_quantities_are_refused(results):
         results["ResponseMap"].plot(Figure().add_subplot(), "map", quantity="rate")
 
 
-def test_results_become_tables_and_data_sets(results):
-    skin, response = results["SkinResponse"], results["ResponseMap"]
+@pytest.mark.parametrize("kind", TABLES)
+def test_every_result_becomes_a_table_and_a_data_set_with_units(results, kind):
+    table, data = results[kind].to_pandas(), results[kind].to_xarray()
+    assert len(table) > 0
+    assert table.index.name
+    numbers = [values for values in data.data_vars.values() if values.dtype.kind == "f"]
+    assert numbers
+    assert all("units" in values.attrs for values in numbers)
+
+
+def test_tables_hold_the_numbers_of_the_result(results):
+    skin, response, traces = results["SkinResponse"], results["ResponseMap"], results["SedTraces"]
     table = response.to_pandas()
     assert table.static_rate_hz.tolist() == response.static_rate_hz.tolist()
     assert table.spikes.sum() == response.spikes.times_ms.size
+    assert skin.to_pandas().force_mn.tolist() == skin.force_mn.tolist()
     assert np.array_equal(skin.to_xarray(response).force_mn.values, skin.force_mn)
+    assert np.array_equal(traces.to_pandas().values, traces.sed_kpa)
+    assert np.array_equal(traces.to_xarray().stored.values, traces.sed_kpa)
+    spikes = response.spikes.to_pandas()
+    assert [spikes.time_ms[spikes.index == n].tolist() for n in range(len(response.spikes))] == [
+        train.tolist() for train in response.spikes
+    ]
+    assert response.to_xarray().spike_time_ms.units == "ms"
+    mixed = results["MixedResponse"].to_pandas()
+    assert mixed.type.value_counts().to_dict() == {"SAI": len(response.spikes), "RA": len(response.spikes)}
+    fit = results["FitResult"]
+    static = fit.to_pandas().query("phase == 'static'")
+    assert static.observed_hz.tolist() == fit.phases["static"].observed_hz.tolist()
+    task = results["TaskResult"]
+    decoded = task.to_pandas().query("measure == 'static'")
+    assert decoded.hit_rate.tolist() == task.decodings[0].hit_rate.tolist()
+    assert (
+        results["SpikeFit"].to_pandas().standard_error.tolist()
+        == results["SpikeFit"].standard_errors.tolist()
+    )
 
 
 def test_silent_afferents_are_drawn_as_silent():

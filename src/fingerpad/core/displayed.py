@@ -1,4 +1,8 @@
-"""Results that draw themselves: `plot` for figures, and a picture with one line in a notebook."""
+"""Results that draw themselves and turn into tables: `plot`, a picture in a notebook, pandas and xarray.
+
+What draws and what makes tables lies in packages above; it is named here as text, and loaded when it is first
+used (docs/decisions/results-that-draw.md).
+"""
 
 from __future__ import annotations
 
@@ -6,14 +10,19 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import pandas
+    import xarray
     from matplotlib.axes import Axes
 
 DRAWING = "fingerpad.report.drawing"
-"""Module that draws: named here, and loaded when something is drawn (docs/decisions/results-that-draw.md)."""
+"""Module that draws."""
+
+TABLES = "fingerpad.export.result_tables"
+"""Module that makes tables and data sets."""
 
 
 class Displayed:
-    """Base of results that draw themselves."""
+    """Base of values that draw themselves."""
 
     def plot(self, axes: Axes | None = None, what: str | None = None, **options: Any) -> Axes:
         """Draw this result.
@@ -43,3 +52,38 @@ class Displayed:
         """Return a small picture and the line of `repr`, for notebooks."""
         shown: str = resolve_name(f"{DRAWING}:html")(self)
         return shown
+
+
+class Result(Displayed):
+    """Base of results: they draw themselves, and turn into a table or a labelled data set."""
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return this result as a table; names of columns carry units.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the rows that `fingerpad.export.result_tables.TABLES` says.
+
+        Raises
+        ------
+        InputError
+            Without the extra `fingerpad[netcdf]`, which brings pandas.
+        """
+        made: pandas.DataFrame = resolve_name(f"{TABLES}:table")(self)
+        return made
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return this result as a labelled data set; every variable has an attribute `units`.
+
+        Returns
+        -------
+        xarray.Dataset
+
+        Raises
+        ------
+        InputError
+            Without the extra `fingerpad[netcdf]`, which brings xarray.
+        """
+        made: xarray.Dataset = resolve_name(f"{TABLES}:dataset")(self)
+        return made

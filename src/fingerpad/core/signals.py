@@ -9,20 +9,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from inspect import signature
-from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array, increasing, int_array, positive
-from fingerpad.core.displayed import Displayed
+from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase, ramp_and_hold_phases
 from fingerpad.core.values import converted
 
-if TYPE_CHECKING:
-    import pandas
+MOST_SHOWN = 8
+"""Numbers of a list that `repr` shows."""
 
 STORED_ENERGY = "stored"
 """Name of the quantity that drives both terms of the current in the paper: strain energy density."""
@@ -64,7 +63,7 @@ def _traces(kind: str, name: str, times_ms: ArrayLike, values: ArrayLike) -> tup
 
 @dataclass(frozen=True)
 @converted
-class SedTraces(Displayed):
+class SedTraces(Result):
     """Strain energy density at receptor sites and at given times.
 
     Parameters
@@ -267,7 +266,7 @@ def traces_below(skin: Skin, sites: ArrayLike, dynamic_quantity: str, static_qua
 
 @dataclass(frozen=True)
 @converted
-class CurrentTraces:
+class CurrentTraces(Result):
     """Membrane current at receptor sites, piecewise linear between its times.
 
     A repeated time is a discontinuity: its first row is the current just before, its second just after.
@@ -296,6 +295,12 @@ class CurrentTraces:
             raise InputError(f"times_ms must not decrease, nor repeat more than once: got {times[:4]} ...")
         _freeze(self, times_ms=times, current_ma=current)
 
+    def __repr__(self) -> str:
+        return (
+            f"CurrentTraces({self.times_ms.size} times to {self.times_ms[-1]:g} ms, {self.n_sites} sites, "
+            f"at most {self.current_ma.max(initial=0.0):.3g} mA)"
+        )
+
     @property
     def n_sites(self) -> int:
         """Number of receptor sites."""
@@ -310,7 +315,7 @@ class CurrentTraces:
 
 @dataclass(frozen=True)
 @converted
-class SpikeTrains(Displayed):
+class SpikeTrains(Result):
     """Spike times of several afferents, one after the other in one array.
 
     Parameters
@@ -399,7 +404,7 @@ class SpikeTrains(Displayed):
 
 @dataclass(frozen=True)
 @converted
-class ResponseMap(Displayed):
+class ResponseMap(Result):
     """Response of a population of afferents to one touch.
 
     Parameters
@@ -434,19 +439,8 @@ class ResponseMap(Displayed):
         return (
             f"ResponseMap({firing} of {len(self.spikes)} afferents fire {self.spikes.times_ms.size} spikes, "
             f"at most {self.dynamic_rate_hz.max(initial=0.0):.3g} spikes/s in the ramp and "
-            f"{self.static_rate_hz.max(initial=0.0):.3g} in the hold)"
+            f"{self.static_rate_hz.max(initial=0.0):.3g} spikes/s in the hold)"
         )
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return a table with a row per afferent: its place, rates, latency and number of spikes.
-
-        Raises
-        ------
-        InputError
-            Without the extra `fingerpad[netcdf]`, which brings pandas.
-        """
-        made: pandas.DataFrame = resolve_name("fingerpad.export.dataset:response_table")(self)
-        return made
 
     def __post_init__(self) -> None:
         if self.duration_ms is not None:
@@ -481,7 +475,7 @@ class ResponseMap(Displayed):
 
 @dataclass(frozen=True)
 @converted
-class HitRates:
+class HitRates(Result):
     """Hit rate of each comparison with the standard.
 
     Parameters
@@ -507,3 +501,8 @@ class HitRates:
         if ((mean < 0) | (mean > 1)).any() or (spread < 0).any():
             raise InputError("hit_rate must lie within 0 ... 1 and hit_rate_sd must not be negative.")
         _freeze(self, hit_rate=mean, hit_rate_sd=spread)
+
+    def __repr__(self) -> str:
+        rates = ", ".join(f"{rate:.2f}" for rate in self.hit_rate[:MOST_SHOWN])
+        more = f" and {self.hit_rate.size - MOST_SHOWN} more" if self.hit_rate.size > MOST_SHOWN else ""
+        return f"HitRates({rates}{more} of 1, seed {self.seed})"

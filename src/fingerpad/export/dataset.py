@@ -37,7 +37,6 @@ from fingerpad.skin.fields import FIELDS, Field, Place, Times, stored_fields
 from fingerpad.skin.sampling import SkinResponse
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
     from fingerpad.geometry.indenters import Indenter
@@ -60,6 +59,13 @@ _PLACES = {
 }
 _COMPONENTS: dict[int, tuple[str, ...]] = {1: (), 3: ("axis",), 6: ("component",)}
 _UDUNITS = {"": "1", "mm²": "mm2", "µJ": "uJ"}
+_ENDINGS = (
+    ("_per_cm2", "cm-2"), ("_per_m", "m-1"), ("_mm_per_s", "mm s-1"), ("_mm2", "mm2"), ("_mm", "mm"),
+    ("_ms", "ms"), ("_mn", "mN"), ("_deg", "degree"), ("_hz", "s-1"), ("_kpa", "kPa"), ("_mv", "mV"),
+    ("_ma", "mA"), ("_uj", "uJ"),
+)  # fmt: skip
+"""Units by the end of a name."""
+
 Attributes = dict[str, str | float | list[float] | np.ndarray]
 """Attributes of a variable or of the whole data set."""
 
@@ -555,6 +561,17 @@ def unit_of(field: Field) -> str:
     return _UDUNITS.get(field.unit, field.unit)
 
 
+def unit_of_name(name: str) -> str:
+    """Return the unit that the name of a value ends with, as UDUNITS reads it; "1" without one.
+
+    Examples
+    --------
+    >>> unit_of_name("static_rate_hz"), unit_of_name("hit_rate")
+    ('s-1', '1')
+    """
+    return next((unit for ending, unit in _ENDINGS if name.endswith(ending)), "1")
+
+
 def field_dimensions(field: Field) -> tuple[str, ...]:
     """Dimensions of a field as it is stored."""
     time = ("time",) if field.stored is Times.ALL else ()
@@ -570,31 +587,6 @@ def require_netcdf() -> None:
     """Raise `InputError` if a library that writes data sets is not installed."""
     for name in ("xarray", "h5netcdf", "zarr"):
         library(name)
-
-
-def response_table(response: ResponseMap) -> pandas.DataFrame:
-    """Return the response of a population as a table; see `ResponseMap.to_pandas`.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from fingerpad.core.signals import SpikeTrains
-    >>> spikes, rates = SpikeTrains.from_lists([[12.0, 40.0], []]), np.array([30.0, 0.0])
-    >>> places, latency = [[17.0, 0.0], [18.0, 0.0]], np.array([12.0, np.nan])
-    >>> table = response_table(ResponseMap(places, 1.0, spikes, rates, rates, latency))
-    >>> table.columns.tolist(), table.spikes.tolist()
-    (['x_mm', 'z_mm', 'dynamic_rate_hz', 'static_rate_hz', 'first_spike_latency_ms', 'spikes'], [2, 0])
-    """
-    axes = ("x_mm", "z_mm") if response.positions_mm.shape[1] == 2 else ("x_mm", "y_mm", "z_mm")
-    columns = dict(zip(axes, response.positions_mm.T, strict=True))
-    columns |= {
-        name: getattr(response, name)
-        for name in ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms")
-    }
-    table: pandas.DataFrame = library("pandas").DataFrame(
-        columns | {"spikes": np.diff(response.spikes.offsets)}
-    )
-    return table.rename_axis("afferent")
 
 
 def library(name: str) -> Any:

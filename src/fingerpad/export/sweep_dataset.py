@@ -37,6 +37,7 @@ from fingerpad.export.dataset import (
     library,
     response_values,
     unit_of,
+    unit_of_name,
 )
 from fingerpad.skin.fields import FIELDS, Place
 
@@ -58,10 +59,6 @@ _SETTINGS_IN_CHUNK = 64
 _CHUNKS = {"time": 64, "receptor": 512, "spike": 1024}
 _PLACES_IN_CHUNK = 4096
 _NAMES = {"times_ms": "time_ms"}
-_ENDINGS = (
-    ("_per_cm2", "cm-2"), ("_per_m", "m-1"), ("_mm_per_s", "mm s-1"), ("_mm", "mm"), ("_ms", "ms"),
-    ("_mn", "mN"), ("_deg", "degree"), ("_hz", "s-1"), ("_kpa", "kPa"), ("_mv", "mV"), ("_ma", "mA"),
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -159,7 +156,7 @@ class SweepFile:
                     shape=(len(values),),
                     dtype=str if text else "f8",
                     dimension_names=[axis.name],
-                    attributes={"long_name": field, "units": "1" if text else _unit(field)},
+                    attributes={"long_name": field, "units": "1" if text else unit_of_name(field)},
                 )
                 array[:] = np.array(spelled, dtype=object) if text else np.array(values, dtype=float)
         flags = {"flag_values": [PENDING, DONE, FAILED, LEFT_OUT], "flag_meanings": MEANINGS}
@@ -491,7 +488,3 @@ def _padded(values: np.ndarray, shape: tuple[int, ...], fill: Any) -> np.ndarray
     padded = np.full(shape, fill, dtype=values.dtype)
     padded[tuple(slice(0, size) for size in values.shape)] = values
     return padded
-
-
-def _unit(field: str) -> str:
-    return next((unit for ending, unit in _ENDINGS if field.endswith(ending)), "1")

@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, whole
+from fingerpad.core.displayed import Result
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.inference.spike_likelihood import SpikeLikelihood
 from fingerpad.inference.spike_parameters import (
     N_PARAMETERS,
+    SPIKE_PARAMETER_NAMES,
     canonical,
     canonical_jacobian,
     checked_spike_parameters,
@@ -34,7 +36,7 @@ _LONGEST_STEP_OF_LOG_TAU = 1.0
 
 
 @dataclass(frozen=True)
-class SpikeFit:
+class SpikeFit(Result):
     """Maximum-likelihood parameters and their covariance.
 
     Parameters
@@ -56,6 +58,18 @@ class SpikeFit:
     log_likelihood: float
     n_spikes: int
     history: tuple[float, ...]
+
+    def __repr__(self) -> str:
+        (memory_ms, width), (memory_error, width_error) = self.parameters[3:], self.standard_errors[3:]
+        return (
+            f"SpikeFit({self.n_spikes} spikes, log L = {self.log_likelihood:.4g}, time constant "
+            f"{memory_ms:.3g} ± {memory_error:.1g} ms, threshold width {width:.2g} ± {width_error:.1g})"
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return SPIKE_PARAMETER_NAMES
 
     @property
     def standard_errors(self) -> FloatArray:

@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, instance, positive, whole
+from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Place
 from fingerpad.core.patterns import poisson_disc
@@ -39,7 +40,7 @@ def types_of_afferents() -> dict[str, AnyAfferent]:
 
 
 @dataclass(frozen=True)
-class MixedResponse:
+class MixedResponse(Result):
     """Responses of a mixed population to one touch.
 
     Parameters
@@ -53,6 +54,11 @@ class MixedResponse:
     """
 
     maps: Mapping[str, ResponseMap]
+
+    def __repr__(self) -> str:
+        counts = {name: np.diff(each.spikes.offsets) for name, each in self.maps.items()}
+        parts = (f"{np.count_nonzero(n)} of {n.size} {name} fire {n.sum()}" for name, n in counts.items())
+        return f"MixedResponse({', '.join(parts)} spikes)"
 
     def __getitem__(self, name: str) -> ResponseMap:
         if name not in self.maps:
@@ -118,6 +124,9 @@ class MixedPopulation:
             if not isinstance(part, Population):
                 raise InputError(f"parts[{name!r}] must be a Population: got {part!r}.")
         object.__setattr__(self, "parts", MappingProxyType(dict(self.parts)))
+
+    def __repr__(self) -> str:
+        return f"MixedPopulation({', '.join(f'{len(part)} {name}' for name, part in self.parts.items())})"
 
     def __len__(self) -> int:
         return sum(len(part) for part in self.parts.values())

@@ -140,6 +140,11 @@ class Population:
         object.__setattr__(self, "positions_mm", positions)
         object.__setattr__(self, "places_mm", places)
 
+    def __repr__(self) -> str:
+        unequal = "" if self.sensitivity is None else ", each with its sensitivity"
+        kind = type(self.afferent).__name__
+        return f"Population({len(self)} afferents of type {kind}, {self.pitch_mm:.3g} mm apart{unequal})"
+
     def __len__(self) -> int:
         return len(self.positions_mm)
 

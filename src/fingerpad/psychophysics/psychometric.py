@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, finite, one_of
-from fingerpad.core.displayed import Displayed
+from fingerpad.core.displayed import Result
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.psychophysics.counts import SMALLEST_OVERDISPERSION, JudgementCounts, log_probability
 from fingerpad.psychophysics.functions import SIGMOIDS, PsychometricFunction, checked_levels
@@ -32,7 +32,7 @@ NARROWEST, WIDEST = 0.5, 5.0
 
 
 @dataclass(frozen=True, repr=False)
-class PsychometricFit(Displayed):
+class PsychometricFit(Result):
     """A psychometric function fitted to counts.
 
     Parameters
@@ -57,8 +57,8 @@ class PsychometricFit(Displayed):
 
     def __repr__(self) -> str:
         return (
-            f"PsychometricFit({self.function.sigmoid}, threshold {self.threshold():.3g}, "
-            f"{int(self.counts.n_trials.sum())} judgements of {self.counts.levels.size} levels)"
+            f"PsychometricFit({self.function.sigmoid}, threshold {self.threshold():.3g} in the unit of "
+            f"the levels, {int(self.counts.n_trials.sum())} judgements of {self.counts.levels.size} levels)"
         )
 
     @property

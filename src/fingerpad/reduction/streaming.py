@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from fingerpad.core.checks import FloatArray, finite, float_array, instance, not_negative
+from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.reduction.interpolation import weighted
 from fingerpad.reduction.model import GRID_POINTS, ReducedModel
@@ -36,7 +37,7 @@ CLOSEST_MM = 1e-6
 
 
 @dataclass(frozen=True)
-class ReducedSample:
+class ReducedSample(Result):
     """A touch at one time.
 
     Parameters
@@ -64,6 +65,15 @@ class ReducedSample:
     fields: dict[str, FloatArray]
     force_error_mn: float
     field_errors: dict[str, float]
+
+    def __repr__(self) -> str:
+        highest = (
+            f"{name} at most {values.max(initial=0.0):.3g} kPa" for name, values in self.fields.items()
+        )
+        return (
+            f"ReducedSample({self.time_ms:g} ms, {self.depth_mm:.3g} mm, {self.force_mn:.3g} ± "
+            f"{self.force_error_mn:.1g} mN, {', '.join(highest)})"
+        )
 
 
 class ReducedTouch:

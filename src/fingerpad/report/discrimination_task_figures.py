@@ -167,20 +167,27 @@ def draw_task_curves(found: TaskResult) -> Figure:
     figure = new_figure(min(10.0, 3.6 * len(measures) + 2.0), 4.6)
     grid = figure.subplots(1, len(measures), sharey=True, squeeze=False)
     for axes, measure in zip(grid[0], measures, strict=True):
-        of_measure = [decoding for decoding in found.decodings if decoding.measure == measure]
-        axes.set_title(MEASURE_LABELS[measure][0])
-        axes.axhline(_CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)))
-        if all(decoding.hit_rate is None for decoding in of_measure):
-            say_nothing_to_draw(axes, why_silent(of_measure[0]))
-            continue
-        for decoding, style in zip(of_measure, _STYLES, strict=False):
-            _curve(axes, found, decoding, style)
-        _people(axes, found)
-        _name_axis(axes, found)
-        axes.set_ylim(0.4, 1.03)
-    grid[0, 0].set_ylabel("hit rate [fraction]")
+        draw_curves_of_measure(axes, found, measure)
+    for axes in grid[0, 1:]:
+        axes.set_ylabel("")
     shared_legend(figure, grid[0], columns=4)
     return figure
+
+
+def draw_curves_of_measure(axes: Axes, found: TaskResult, measure: str) -> None:
+    """Draw what all codes make of one measure: hit rates and psychometric curves, and those of people."""
+    of_measure = [decoding for decoding in found.decodings if decoding.measure == measure]
+    axes.set_title(MEASURE_LABELS[measure][0])
+    axes.axhline(_CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)))
+    if all(decoding.hit_rate is None for decoding in of_measure):
+        say_nothing_to_draw(axes, why_silent(of_measure[0]))
+        return
+    for decoding, style in zip(of_measure, _STYLES, strict=False):
+        _curve(axes, found, decoding, style)
+    _people(axes, found)
+    _name_axis(axes, found)
+    axes.set_ylim(0.4, 1.03)
+    axes.set_ylabel("hit rate [fraction]")
 
 
 def _curve(axes: Axes, found: TaskResult, decoding: Decoding, style: Any) -> None:

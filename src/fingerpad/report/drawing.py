@@ -13,19 +13,30 @@ from matplotlib.figure import Figure
 
 from fingerpad.core.checks import one_of
 from fingerpad.core.displayed import Displayed
-from fingerpad.core.signals import ResponseMap, SedTraces, SpikeTrains
+from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
+from fingerpad.experiments.discrimination.analysis import TaskResult
+from fingerpad.experiments.fit.results import FitResult
+from fingerpad.report.discrimination_task_figures import draw_curves_of_measure, main_decoding
+from fingerpad.report.mixed_responses import draw_map_by_type, draw_raster_by_type
 from fingerpad.report.population import QUANTITIES
+from fingerpad.report.recording_fit import draw_phase, recorded_phases
 from fingerpad.report.style import BLACK, BLUE, GREY, new_figure, png, say_nothing_to_draw
 from fingerpad.report.touch import BONE, draw_section
 
 if TYPE_CHECKING:
     from fingerpad.geometry.fingertip import Fingertip
+    from fingerpad.inference.spike_fit import SpikeFit
+    from fingerpad.neuron.mixed_population import MixedResponse
     from fingerpad.psychophysics.psychometric import PsychometricFit
-    from fingerpad.skin.sampling import SkinResponse
+    from fingerpad.reduction.streaming import ReducedSample
+    from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
 
 PALE_SKIN = "#f7ece1"
 
 CURVE_POINTS = 200
+
+QUANTITY_LABELS = {"stored": "strain energy density", "work": "work of the stress"}
+"""Names of quantities in words, where these are not those of `SkinResponse.sample`."""
 
 
 def draw_force(axes: Axes, skin: SkinResponse) -> None:
@@ -42,7 +53,11 @@ def draw_depth(axes: Axes, skin: SkinResponse) -> None:
 
 def draw_profile(axes: Axes, skin: SkinResponse) -> None:
     """Draw the deflection of the skin along the midline at the end."""
-    profile = skin.surface_profile()
+    draw_surface_profile(axes, skin.surface_profile())
+
+
+def draw_surface_profile(axes: Axes, profile: SurfaceProfile) -> None:
+    """Draw a deflection of the skin along the midline."""
     axes.plot(profile.distance_mm, profile.deflection_mm, color=BLACK)
     axes.set(xlabel="distance from the object's axis [mm]", ylabel="deflection towards the bone [mm]")
 
@@ -68,7 +83,8 @@ def draw_pad(axes: Axes, skin: SkinResponse, quantity: str = "stored", reach_mm:
     values = skin.sample(quantity, sites)[-1].reshape(x.size, z.size)
     drawn = axes.pcolormesh(z, x, values, cmap="viridis", shading="gouraud")
     unit = "" if quantity == "compressive_strain" else " [kPa]"
-    axes.figure.colorbar(drawn, ax=axes, label=quantity.replace("_", " ") + unit)
+    label = QUANTITY_LABELS.get(quantity, quantity.replace("_", " "))
+    axes.figure.colorbar(drawn, ax=axes, label=label + unit)
     axes.set(xlabel="across, z [mm]", ylabel="along, x [mm]", aspect="equal")
     axes.grid(visible=False)
 
@@ -109,7 +125,89 @@ def draw_map(axes: Axes, response: ResponseMap, quantity: str = "static_rate_hz"
 def draw_traces(axes: Axes, traces: SedTraces) -> None:
     """Draw what the static term follows over time, a line per site."""
     axes.plot(traces.times_ms, traces.sed_kpa, color=BLACK, linewidth=0.8)
-    axes.set(xlabel="time [ms]", ylabel=f"{traces.static_quantity.replace('_', ' ')} [kPa]")
+    quantity = traces.static_quantity
+    unit = "" if quantity == "compressive_strain" else " [kPa]"
+    label = QUANTITY_LABELS.get(quantity, quantity.replace("_", " "))
+    axes.set(xlabel="time [ms]", ylabel=label + unit)
+
+
+def draw_currents(axes: Axes, traces: CurrentTraces) -> None:
+    """Draw membrane currents over time, a line per site."""
+    axes.plot(traces.times_ms, traces.current_ma, color=BLACK, linewidth=0.8)
+    axes.set(xlabel="time [ms]", ylabel="current [mA]")
+
+
+def draw_types(axes: Axes, response: MixedResponse) -> None:
+    """Draw all spikes over time, in a band per type."""
+    draw_raster_by_type(axes, response.maps)
+
+
+def draw_types_map(axes: Axes, response: MixedResponse) -> None:
+    """Draw where the afferents of each type lie, with larger marks for more spikes."""
+    draw_map_by_type(axes, response.maps)
+    axes.legend(fontsize="small")
+
+
+def draw_hit_rates(axes: Axes, rates: HitRates) -> None:
+    """Draw the hit rate of each comparison with its standard deviation."""
+    comparison = np.arange(1, rates.hit_rate.size + 1)
+    axes.errorbar(comparison, rates.hit_rate, rates.hit_rate_sd, fmt="o", color=BLUE, capsize=3.0)
+    axes.set(xlabel="comparison", ylabel="hit rate [fraction]", ylim=(0.0, 1.05), xticks=comparison)
+
+
+def draw_fit(axes: Axes, fit: FitResult, phase: str | None = None) -> None:
+    """Draw observed, fitted and predicted rates.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where.
+    fit : FitResult
+        From `fit_recordings`.
+    phase : {"static", "dynamic"}, optional
+        By default the static one, if it was recorded.
+    """
+    recorded = recorded_phases(fit)
+    by_default = "static" if "static" in recorded else recorded[0]
+    draw_phase(axes, fit, one_of("phase", phase or by_default, tuple(recorded)))
+    axes.legend(fontsize="small")
+
+
+def draw_parameters(axes: Axes, fit: SpikeFit) -> None:
+    """Draw the standard error of each parameter, as a share of its value."""
+    relative = fit.standard_errors / np.abs(fit.parameters)
+    rows = np.arange(relative.size)
+    names = [f"{name} = {value:.3g}" for name, value in zip(fit.names, fit.parameters, strict=True)]
+    axes.errorbar(np.ones(rows.size), rows, xerr=relative, fmt="o", color=BLUE, capsize=3.0)
+    axes.set_yticks(rows, names)
+    axes.set(
+        xlabel="over the estimate, ± one standard error", ylabel="parameter", ylim=(rows.size - 0.5, -0.5)
+    )
+
+
+def draw_task(axes: Axes, task: TaskResult, measure: str | None = None) -> None:
+    """Draw hit rates and psychometric curves of all codes.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where.
+    task : TaskResult
+        Of `discriminate`.
+    measure : {"static", "dynamic", "latency"}, optional
+        What is decoded; by default what the first decoding with an answer decodes.
+    """
+    measures = tuple(dict.fromkeys(decoding.measure for decoding in task.decodings))
+    draw_curves_of_measure(axes, task, one_of("measure", measure or main_decoding(task).measure, measures))
+    axes.legend(fontsize="small")
+
+
+def draw_sample(axes: Axes, sample: ReducedSample) -> None:
+    """Draw the first quantity at each receptor, with the error of the reduced touch."""
+    name, values = next(iter(sample.fields.items()))
+    receptors = np.arange(values.size)
+    axes.errorbar(receptors, values, sample.field_errors[name], fmt="o", color=BLUE, markersize=3.0)
+    axes.set(xlabel="receptor", ylabel=f"{QUANTITY_LABELS.get(name, name)} [kPa]")
 
 
 def draw_curve(axes: Axes, fit: PsychometricFit) -> None:
@@ -157,7 +255,15 @@ DRAWINGS: Mapping[str, Mapping[str, Callable[..., None]]] = {
     "ResponseMap": {"raster": draw_raster, "map": draw_map},
     "SpikeTrains": {"raster": draw_raster},
     "SedTraces": {"traces": draw_traces},
+    "CurrentTraces": {"traces": draw_currents},
+    "MixedResponse": {"raster": draw_types, "map": draw_types_map},
+    "SurfaceProfile": {"profile": draw_surface_profile},
+    "HitRates": {"hit_rates": draw_hit_rates},
     "PsychometricFit": {"curve": draw_curve},
+    "FitResult": {"rates": draw_fit},
+    "SpikeFit": {"parameters": draw_parameters},
+    "TaskResult": {"curves": draw_task},
+    "ReducedSample": {"quantity": draw_sample},
     "Fingertip": {"outline": draw_finger},
 }
 """Drawings by the name of a result's class, the default first."""

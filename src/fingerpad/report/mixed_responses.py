@@ -48,13 +48,14 @@ def draw_mixed_responses(touches: Mapping[str, Mapping[str, ResponseMap]]) -> Fi
     grid = figure.subplots(len(touches), 2, squeeze=False, width_ratios=(1.7, 1.0))
     for (raster, places), (name, maps) in zip(grid, touches.items(), strict=True):
         raster.set_title(name)
-        _raster(raster, maps)
-        _map(places, maps)
+        draw_raster_by_type(raster, maps)
+        draw_map_by_type(places, maps)
     grid[0, 1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
 
-def _raster(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
+def draw_raster_by_type(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
+    """Draw all spikes over time, in a band per type."""
     for band, (response, (colour, _)) in enumerate(zip(maps.values(), _styles(len(maps)), strict=True)):
         middle = response.positions_mm.mean(axis=0)
         order = np.argsort(np.linalg.norm(response.positions_mm - middle, axis=1))
@@ -71,7 +72,8 @@ def _raster(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
     axes.grid(visible=False)
 
 
-def _map(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
+def draw_map_by_type(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
+    """Draw where the afferents lie, with larger marks for more spikes."""
     for (name, response), (colour, marker) in zip(maps.items(), _styles(len(maps)), strict=True):
         counts = np.diff(response.spikes.offsets)
         x, z = response.positions_mm[:, 0], response.positions_mm[:, -1]

@@ -56,30 +56,33 @@ def draw_fit(found: FitResult) -> Figure:
     Figure
     """
     figure = new_figure(10.0, 4.5)
-    phases = _recorded(found)
-    where, order = _places(found)
-    for axes, (phase, rates, observed_hz) in zip(
-        np.ravel(figure.subplots(1, len(phases))), phases, strict=True
-    ):
-        if found.posterior and phase in found.posterior.bands:
-            band = found.posterior.bands[phase].predicted
-            label = f"{found.posterior.level:.0%} credible"
-            axes.fill_between(
-                where,
-                band.low_hz[order],
-                band.high_hz[order],
-                color=BLUE,
-                alpha=0.2,
-                linewidth=0.0,
-                label=label,
-            )
-        without = rates.out_of_sample_hz[order]
-        axes.plot(where, without, "x", color=ORANGE, zorder=3, label="predicted without its fold")
-        draw_rates(axes, where, rates.fitted_hz[order], observed_hz[order], "fitted to all")
-        axes.set_title(f"{PHASE_LABELS[phase]}, FSS = {rates.fss_in_sample:.2f}")
-        _name_places(axes, found)
+    phases = recorded_phases(found)
+    for axes, phase in zip(np.ravel(figure.subplots(1, len(phases))), phases, strict=True):
+        draw_phase(axes, found, phase)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
+
+
+def recorded_phases(found: FitResult) -> list[str]:
+    """Names of the phases whose rates were recorded."""
+    return [phase for phase, *_ in _recorded(found)]
+
+
+def draw_phase(axes: Axes, found: FitResult, phase: str) -> None:
+    """Draw the observed rates of one phase, the fitted ones, and those predicted without each fold."""
+    where, order = _places(found)
+    rates, observed_hz = next((rates, hz) for name, rates, hz in _recorded(found) if name == phase)
+    if found.posterior and phase in found.posterior.bands:
+        band = found.posterior.bands[phase].predicted
+        label = f"{found.posterior.level:.0%} credible"
+        axes.fill_between(
+            where, band.low_hz[order], band.high_hz[order], color=BLUE, alpha=0.2, linewidth=0.0, label=label
+        )
+    without = rates.out_of_sample_hz[order]
+    axes.plot(where, without, "x", color=ORANGE, zorder=3, label="predicted without its fold")
+    draw_rates(axes, where, rates.fitted_hz[order], observed_hz[order], "fitted to all")
+    axes.set_title(f"{PHASE_LABELS[phase]}, FSS = {rates.fss_in_sample:.2f}")
+    _name_places(axes, found)
 
 
 def draw_fit_residuals(found: FitResult) -> Figure:

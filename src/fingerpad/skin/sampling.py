@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array, increasing, instance, one_of
-from fingerpad.core.displayed import Displayed
+from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap, SedTraces
@@ -58,7 +58,7 @@ class Receptors(Protocol):
 
 
 @dataclass(frozen=True)
-class SurfaceProfile:
+class SurfaceProfile(Result):
     """Deflection of the skin along the midline of the finger.
 
     Parameters
@@ -83,13 +83,19 @@ class SurfaceProfile:
         object.__setattr__(self, "distance_mm", distance)
         object.__setattr__(self, "deflection_mm", deflection)
 
+    def __repr__(self) -> str:
+        return (
+            f"SurfaceProfile({self.distance_mm.size} nodes from {self.distance_mm[0]:.3g} to "
+            f"{self.distance_mm[-1]:.3g} mm, deflected by at most {self.deflection_mm.max():.3g} mm)"
+        )
+
     def at(self, distance_mm: ArrayLike) -> FloatArray:
         """Deflection at other distances, linear between nodes. [mm]"""
         return np.interp(np.asarray(distance_mm, dtype=float), self.distance_mm, self.deflection_mm)
 
 
 @dataclass(frozen=True, repr=False)
-class SkinResponse(Displayed):
+class SkinResponse(Result):
     """Response of the skin to one indentation; the end of the mechanical half of the chain.
 
     Parameters

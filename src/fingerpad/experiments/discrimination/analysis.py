@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from fingerpad.core.checks import FloatArray, IntArray
+from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.results import Matrix, Vector, result_class
 from fingerpad.core.signals import ResponseMap, Skin
@@ -254,7 +255,7 @@ class TaskObservations:
 
 
 @result_class
-class TaskResult:
+class TaskResult(Result):
     """Result of a discrimination task.
 
     Parameters
@@ -288,6 +289,12 @@ class TaskResult:
     responses: dict[str, Matrix]
     decodings: tuple[Decoding, ...]
     observed: TaskObservations | None
+
+    def __repr__(self) -> str:
+        return (
+            f"TaskResult({self.population.n_receptors} afferents, {len(self.stimulus) - 1} comparisons with "
+            f"{self.stimulus[0]}, {len(self.decodings)} decodings, noise {self.noise.sigma:.3g})"
+        )
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fingerpad.core.displayed import Result
 from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_class
 
 
@@ -231,7 +232,7 @@ class FittedFold:
 
 
 @result_class
-class FitResult:
+class FitResult(Result):
     """Result of a fit to recordings.
 
     Parameters
@@ -303,3 +304,9 @@ class FitResult:
     shift_mm: Vector | None = None
     presentations: tuple[int, ...] = ()
     spikes_after_hold: int = 0
+
+    def __repr__(self) -> str:
+        return (
+            f"FitResult({self.method} on {len(self.stimulus)} stimuli, fractional sum of squares "
+            f"{self.fss_in_sample:.3g} in sample and {self.fss_out_of_sample:.3g} out of sample)"
+        )

@@ -1,0 +1,250 @@
+"""Results as tables of pandas and as labelled data sets of xarray: what `to_pandas` and `to_xarray` return.
+
+A table has one row per time, afferent, spike, stimulus or parameter, as `TABLES` says for each type. A data
+set has the same values with named dimensions and units. The extra `fingerpad[netcdf]` is required.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fingerpad.core.displayed import Result
+from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
+from fingerpad.export.dataset import PARTS, library, response_values, touch_dataset, unit_of_name
+from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_UNITS
+from fingerpad.skin.fields import Place, stored_fields
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+    from fingerpad.experiments.discrimination.analysis import TaskResult
+    from fingerpad.experiments.fit.results import FitResult
+    from fingerpad.inference.spike_fit import SpikeFit
+    from fingerpad.neuron.mixed_population import MixedResponse
+    from fingerpad.psychophysics.psychometric import PsychometricFit
+    from fingerpad.reduction.streaming import ReducedSample
+    from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
+
+Columns = Mapping[Any, Any]
+"""Columns of a table by name, the index first."""
+
+
+def skin_columns(skin: SkinResponse) -> Columns:
+    """Return every quantity of the whole press, by time."""
+    numbers = (each.name for each in stored_fields() if each.place is Place.PRESS and each.components == 1)
+    return {name: skin.fields[name] for name in numbers if name in skin.fields}
+
+
+def profile_columns(profile: SurfaceProfile) -> Columns:
+    """Deflection of the skin, by the distance from the object's axis."""
+    return {"distance_mm": profile.distance_mm, "deflection_mm": profile.deflection_mm}
+
+
+def traces_columns(traces: SedTraces) -> Columns:
+    """Return what the static term follows, a column per site, by time."""
+    return {"time_ms": traces.times_ms} | dict(enumerate(traces.sed_kpa.T))
+
+
+def current_columns(traces: CurrentTraces) -> Columns:
+    """Currents, a column per site, by time; a time is repeated where the current jumps. [mA]"""
+    return {"time_ms": traces.times_ms} | dict(enumerate(traces.current_ma.T))
+
+
+def spike_columns(trains: SpikeTrains) -> Columns:
+    """Spikes, by afferent."""
+    counts = np.diff(trains.offsets)
+    return {"afferent": np.repeat(np.arange(counts.size), counts), "time_ms": trains.times_ms}
+
+
+def response_columns(response: ResponseMap) -> Columns:
+    """Place, rates, latency and number of spikes, by afferent.
+
+    Examples
+    --------
+    >>> spikes, rates = SpikeTrains.from_lists([[12.0, 40.0], []]), np.array([30.0, 0.0])
+    >>> places, latency = [[17.0, 0.0], [18.0, 0.0]], np.array([12.0, np.nan])
+    >>> columns = response_columns(ResponseMap(places, 1.0, spikes, rates, rates, latency))
+    >>> list(columns), columns["spikes"].tolist()  # doctest: +NORMALIZE_WHITESPACE
+    (['afferent', 'x_mm', 'z_mm', 'dynamic_rate_hz', 'static_rate_hz', 'first_spike_latency_ms', 'spikes'],
+     [2, 0])
+    """
+    axes = ("x_mm", "z_mm") if response.positions_mm.shape[1] == 2 else ("x_mm", "y_mm", "z_mm")
+    rates = ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms")
+    return {
+        "afferent": np.arange(len(response.spikes)),
+        **dict(zip(axes, response.positions_mm.T, strict=True)),
+        **{name: getattr(response, name) for name in rates},
+        "spikes": np.diff(response.spikes.offsets),
+    }
+
+
+def mixed_columns(response: MixedResponse) -> Columns:
+    """Those of `response_columns` and the type, by afferent."""
+    parts = [response_columns(part) for part in response.maps.values()]
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return {"afferent": np.arange(len(response.types)), "type": response.types} | {
+        name: values for name, values in columns.items() if name != "afferent"
+    }
+
+
+def hit_rate_columns(rates: HitRates) -> Columns:
+    """Hit rate and its standard deviation, by comparison."""
+    comparison = np.arange(1, rates.hit_rate.size + 1)
+    return {"comparison": comparison, "hit_rate": rates.hit_rate, "hit_rate_sd": rates.hit_rate_sd}
+
+
+def psychometric_columns(fit: PsychometricFit) -> Columns:
+    """Judgements, and the proportion that was observed and fitted, by level."""
+    counts = fit.counts
+    return {
+        "level": counts.levels,
+        "n_correct": counts.n_correct,
+        "n_trials": counts.n_trials,
+        "observed": counts.proportion,
+        "fitted": fit.predict(counts.levels),
+    }
+
+
+def fit_columns(fit: FitResult) -> Columns:
+    """Rates that were observed, fitted and predicted without the stimulus' fold, by stimulus and phase."""
+    phases, n_stimuli = fit.phases, len(fit.stimulus)
+    unknown = np.full(n_stimuli, np.nan)
+    observed = [unknown if part.observed_hz is None else part.observed_hz for part in phases.values()]
+    return {
+        "stimulus": np.tile(fit.stimulus, len(phases)),
+        "phase": np.repeat(list(phases), n_stimuli),
+        "fold": np.tile(fit.fold, len(phases)),
+        "observed_hz": np.concatenate(observed),
+        "fitted_hz": np.concatenate([part.fitted_hz for part in phases.values()]),
+        "out_of_sample_hz": np.concatenate([part.out_of_sample_hz for part in phases.values()]),
+    }
+
+
+def spike_fit_columns(fit: SpikeFit) -> Columns:
+    """Value, standard error and unit, by parameter."""
+    return {
+        "parameter": fit.names,
+        "value": fit.parameters,
+        "standard_error": fit.standard_errors,
+        "unit": SPIKE_PARAMETER_UNITS,
+    }
+
+
+def task_columns(task: TaskResult) -> Columns:
+    """Return what each decoding makes of each comparison; NaN where it has no answer."""
+    n_comparisons, decodings = len(task.stimulus) - 1, task.decodings
+    level = np.full(n_comparisons, np.nan) if task.level is None else task.level[1:]
+    columns: dict[str, Any] = {
+        "comparison": np.tile(task.stimulus[1:], len(decodings)),
+        "level": np.tile(level, len(decodings)),
+        "code": np.repeat([decoding.code for decoding in decodings], n_comparisons),
+        "measure": np.repeat([decoding.measure for decoding in decodings], n_comparisons),
+    }
+    for name in ("hit_rate", "hit_rate_sd", "d_prime", "efficiency"):
+        given = (getattr(decoding, name) for decoding in decodings)
+        columns[name] = np.concatenate(
+            [np.full(n_comparisons, np.nan) if values is None else values for values in given]
+        )
+    return columns
+
+
+def sample_columns(sample: ReducedSample) -> Columns:
+    """Each quantity, and the error within which that of a full solution lies, by receptor. [kPa]"""
+    n_receptors = len(next(iter(sample.fields.values())))
+    errors = {f"{name}_error": np.full(n_receptors, error) for name, error in sample.field_errors.items()}
+    return {"receptor": np.arange(n_receptors), **sample.fields, **errors}
+
+
+TABLES: Mapping[str, Callable[[Any], Columns]] = {
+    "SkinResponse": skin_columns,
+    "SurfaceProfile": profile_columns,
+    "SedTraces": traces_columns,
+    "CurrentTraces": current_columns,
+    "SpikeTrains": spike_columns,
+    "ResponseMap": response_columns,
+    "MixedResponse": mixed_columns,
+    "HitRates": hit_rate_columns,
+    "PsychometricFit": psychometric_columns,
+    "FitResult": fit_columns,
+    "SpikeFit": spike_fit_columns,
+    "TaskResult": task_columns,
+    "ReducedSample": sample_columns,
+}
+"""Columns by the name of a result's class; the first is the index of the table."""
+
+
+def table(result: Result) -> pandas.DataFrame:
+    """Return a result as a table; see `Result.to_pandas`.
+
+    Examples
+    --------
+    >>> table(SpikeTrains.from_lists([[12.0, 40.0], [], [15.5]])).time_ms.groupby("afferent").size().to_dict()
+    {0: 2, 2: 1}
+    """
+    columns = TABLES[type(result).__name__](result)
+    made: pandas.DataFrame = library("pandas").DataFrame(columns)
+    return made.set_index(next(iter(columns)))
+
+
+def traces_dataset(traces: SedTraces) -> xarray.Dataset:
+    """Return what the two terms of the current follow, by time and site."""
+    values = {traces.static_quantity: traces.sed_kpa}
+    if traces.dynamic_kpa is not None:
+        values[traces.dynamic_quantity] = traces.dynamic_kpa
+    units = {name: "1" if name == "compressive_strain" else "kPa" for name in values}
+    return _by_time_and_site(traces.times_ms, values, units)
+
+
+def current_dataset(traces: CurrentTraces) -> xarray.Dataset:
+    """Currents by time and site; a time is repeated where the current jumps."""
+    return _by_time_and_site(traces.times_ms, {"current_ma": traces.current_ma}, {"current_ma": "mA"})
+
+
+def _by_time_and_site(
+    times_ms: np.ndarray, values: Mapping[str, np.ndarray], units: Mapping[str, str]
+) -> xarray.Dataset:
+    variables = {name: (("time", "site"), each, {"units": units[name]}) for name, each in values.items()}
+    coordinates = {"time": ("time", times_ms, {"units": "ms"})}
+    made: xarray.Dataset = library("xarray").Dataset(variables, coordinates)
+    return made
+
+
+def response_dataset(response: ResponseMap) -> xarray.Dataset:
+    """Receptors and spikes as `write_touch` writes them."""
+    variables = {
+        name: (PARTS[name].dims, values, {"long_name": PARTS[name].long_name, "units": PARTS[name].unit})
+        for name, values in response_values(response).items()
+    }
+    made: xarray.Dataset = library("xarray").Dataset(variables)
+    made["spike_count"].attrs["sample_dimension"] = "spike"
+    return made
+
+
+DATASETS: Mapping[str, Callable[[Any], xarray.Dataset]] = {
+    "SkinResponse": touch_dataset,
+    "SedTraces": traces_dataset,
+    "CurrentTraces": current_dataset,
+    "ResponseMap": response_dataset,
+}
+"""Data sets with more dimensions than a table, by the name of a result's class."""
+
+
+def dataset(result: Result) -> xarray.Dataset:
+    """Return a result as a labelled data set; see `Result.to_xarray`.
+
+    What has no data set of its own is the table, with the row as its dimension.
+    """
+    made_by = DATASETS.get(type(result).__name__)
+    if made_by is not None:
+        return made_by(result)
+    library("xarray")
+    rows = table(result).reset_index()
+    made: xarray.Dataset = rows.rename_axis("row").to_xarray().drop_vars("row")
+    for name, values in made.data_vars.items():
+        if values.dtype.kind in "fiu":
+            values.attrs["units"] = unit_of_name(str(name))
+    return made
