@@ -1,13 +1,17 @@
 """What a command tells while it runs: lines where it is piped, nothing or more on request."""
 
 import logging
+import threading
+import time
 
 import pytest
 
+import fingerpad as fp
 from fingerpad.cli import main
-from fingerpad.cli.running import Bars, progress
+from fingerpad.cli.running import progress
+from fingerpad.core import progress as progress_module
 from fingerpad.core.logger import LOGGER
-from fingerpad.core.progress import Lines, NoProgress
+from fingerpad.core.progress import Bars, Lines, NoProgress, share_done
 
 TOUCH = "object: sphere\nmotion: {depth_mm: 0.2, hold_ms: 60}\nafferents: {windows_ms: {static: [60, 100]}}\n"
 
@@ -35,6 +39,45 @@ def test_lines_tell_the_way_and_the_end_of_a_long_stage_only():
         advance()
         advance()
     assert len(told) == 3
+
+
+def test_a_long_part_is_told_of_before_it_ends(monkeypatch):
+    monkeypatch.setattr(progress_module, "SHORTEST_WAIT_S", 0.02)
+    told = []
+    with Lines(told.append, every_s=0.02).stage("presses", 2) as advance:
+        wait_until(lambda: told)
+        assert told[0] == "presses: 0 of 2 after 0 s"
+        share_done(0.5)
+        wait_until(lambda: "50 % of number 1 of 2" in told[-1])
+        advance()
+        wait_until(lambda: told[-1].startswith("presses: 1 of 2, "))
+    said = len(told)
+    share_done(0.9)  # after the stage nobody listens
+    time.sleep(0.1)
+    assert len(told) == said
+    assert not [thread for thread in threading.enumerate() if thread.name == "progress"]
+
+
+def wait_until(true, most_s=5.0):
+    began = time.monotonic()
+    while not true():
+        assert time.monotonic() - began < most_s
+        time.sleep(0.005)
+
+
+def test_a_press_tells_how_far_it_is(monkeypatch, caplog):
+    told = []
+    caplog.set_level(logging.INFO, "fingerpad.mechanics.press")
+    progress = Lines(told.append, every_s=0.0)
+    skin = fp.indent(
+        fp.Fingertip(), fp.Sphere(287.0), fp.RampAndHold(depth_mm=0.2, hold_ms=60), progress=progress
+    )
+    shares = [int(line.removeprefix("press: ").partition(" %")[0]) for line in told if "%" in line]
+    assert shares == sorted(shares)
+    assert shares[-1] == 100
+    assert told[-1] == "press: 1 of 1, 0 s left"
+    assert len(caplog.messages) == skin.times_ms.size - 1
+    assert caplog.messages[-1].startswith("110 of 110 ms: depth 0.2 mm, ")
 
 
 def test_progress_is_lines_where_it_is_piped_bars_on_a_terminal_and_nothing_when_quiet(monkeypatch):

@@ -7,7 +7,7 @@ import os
 import signal
 import tempfile
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -17,11 +17,9 @@ import typer
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.logger import LOGGER
-from fingerpad.core.progress import Lines, NoProgress, Progress
+from fingerpad.core.progress import Bars, Lines, NoProgress, Progress
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fingerpad.core.engine import Engine
 
 INTERRUPTED, TERMINATED = 130, 143
@@ -120,31 +118,3 @@ def progress() -> Progress:
         return NoProgress()
     console = Console(stderr=True)
     return Bars(console) if console.is_terminal else Lines(partial(typer.echo, err=True), short=False)
-
-
-class Bars:
-    """One progress bar per stage on a terminal; nothing elsewhere."""
-
-    def __init__(self, console: Console):
-        self._console = console
-
-    @contextmanager
-    def stage(self, name: str, total: int) -> Iterator[Callable[[], None]]:
-        """Show one stage with its expected time."""
-        from rich.progress import (
-            BarColumn,
-            MofNCompleteColumn,
-            Progress,
-            TextColumn,
-            TimeElapsedColumn,
-            TimeRemainingColumn,
-        )
-
-        bars = Progress(
-            TextColumn(f"{name:<24}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-            TextColumn("left"), TimeRemainingColumn(),
-            console=self._console, disable=not self._console.is_terminal,
-        )  # fmt: skip
-        with bars:
-            task = bars.add_task(name, total=total)
-            yield lambda: bars.advance(task)

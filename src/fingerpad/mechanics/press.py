@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from importlib import import_module
@@ -11,6 +12,7 @@ from scipy.optimize import brentq
 
 from fingerpad.core.checks import FloatArray, float_array, increasing, positive, whole
 from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.progress import share_done
 from fingerpad.core.values import converted
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
@@ -54,6 +56,8 @@ from fingerpad.mechanics.viscoelastic import (
     instantaneous_state,
     stored_energy_density,
 )
+
+LOGGER = logging.getLogger(__name__)
 
 MOST_SOLVED = 10
 """Equal cycles up to which all are solved."""
@@ -520,7 +524,13 @@ def press(
     job = _Press(body, contact, stimulus, solver, newton, follow, longest_step_mm)
     moment = job.unloaded()
     reached, slips, values = [], [], [moment.fields.values]
+    planned_ms = settings.steps_ms(stimulus)
     for moment in _moments(job, settings):
+        share_done(float(np.searchsorted(planned_ms, moment.time_ms)) / (planned_ms.size - 1))
+        LOGGER.info(
+            "%.4g of %.4g ms: depth %.4g mm, %d Newton steps so far",
+            moment.time_ms, stimulus.end_ms, moment.found.depth_mm, job.newton_steps,
+        )  # fmt: skip
         if moment.found.depth_mm > deepest_mm and stimulus.by_force and stimulus.stays:
             raise InputError(
                 f"force_mn must not push the indenter deeper than {deepest_mm:.2f} mm: it is there after "

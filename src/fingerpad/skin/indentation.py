@@ -15,6 +15,7 @@ from fingerpad.core.checks import FloatArray, finite, instance, one_of, pair
 from fingerpad.core.compilation import announce_compilation
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords, known_keywords
+from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.threads import compiled_threads
 from fingerpad.core.values import converted
 from fingerpad.data import fingertip as published
@@ -349,6 +350,7 @@ def indent(
     settings: PressSettings | None = None,
     whole: bool = False,
     times_ms: Sequence[float] = (),
+    progress: Progress | None = None,
 ) -> SkinResponse:
     """Press an indenter into a finger and return the response of the skin.
 
@@ -379,6 +381,8 @@ def indent(
     times_ms : sequence of float
         Times at which the response is wanted: it has them among its times, which the motion and the settings
         choose. [ms]
+    progress : Progress, optional
+        Shown how far the press is, such as `fp.notebook_progress()`.
 
     Returns
     -------
@@ -402,7 +406,10 @@ def indent(
     touch = touch_of(
         finger, indenter, stimulus, materials, resolution, at_mm, settings=settings, times_ms=times_ms
     )
-    return touch.solve(whole=whole)
+    with (progress or NoProgress()).stage("press", 1) as advance:
+        skin = touch.solve(whole=whole)
+        advance()
+    return skin
 
 
 def settings_of(resolution: str) -> PressSettings:
