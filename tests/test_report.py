@@ -41,6 +41,7 @@ from fingerpad.report import formatting as words
 from fingerpad.report import mesh_picture as mesh_picture_figure
 from fingerpad.report import page as page_module
 from fingerpad.report.comparison import KINDS, MEANINGS, SIGNS, TITLES, comparison_tables
+from fingerpad.report.discrimination_steps import draw_steps
 from fingerpad.report.page import write_html
 from fingerpad.report.parts import Chapter, Drawing, Page, Paragraph, Row, Table
 from fingerpad.report.reproduction import reproduction_page, reproduction_summary, write_report
@@ -421,7 +422,7 @@ def test_one_picture_per_figure_of_the_paper_at_its_resolution(report):
     numbers = [drawing.number for drawing in DRAWINGS if drawing.number]
     numbered = [picture for picture in pictures if picture.name.startswith("figure_")]
     assert sorted(int(picture.name.split("_")[1]) for picture in numbered) == numbers
-    assert numbers == [1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12]
+    assert numbers == [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]
     for picture in pictures:
         assert pixels_per_metre(picture.read_bytes()) == round(RESOLUTION_DPI / 0.0254)
 
@@ -823,6 +824,18 @@ def test_colours_of_layers_become_lighter_inwards():
         for colour in mesh_picture_figure.LAYER_COLOURS
     ]
     assert (np.diff(greys) > 0.15).all()
+
+
+def test_figure_3_names_the_steps_of_the_paper_with_the_numbers_of_the_run():
+    section = typed(ReproductionResult, synthetic_results()).discrimination
+    texts = [text.get_text() for text in draw_steps(section).axes[0].texts]
+    for letter in ("(a)", "(b)", "(c)", "(d-h)", "(i-k)", "(b*, c*)", "(d*-f*)", "(g*, h*)"):
+        assert any(text.startswith(letter) for text in texts)
+    last = next(text for text in texts if text.startswith("(i-k)"))
+    rates = section.gradient_sum["static"]
+    assert f"{section.curvature_per_m[-1]:g} 1/m: {rates.hit_rate[-1]:.2f} ± {rates.hit_rate_sd[-1]:.2f}" in last
+    silent = replace(section, gradient_sum={})
+    assert any("no hit rates" in text.get_text() for text in draw_steps(silent).axes[0].texts)
 
 
 def test_figure_6_leaves_silent_places_open():

@@ -1,9 +1,17 @@
-"""Pages of the reference: one per package of `fingerpad`, with its public names."""
+"""Pages of the reference: one per package of `fingerpad`, with its public names.
 
-from itertools import groupby
+Public are the names of `fingerpad` itself, those that a package exports in `__all__`, those that a page,
+an example or a notebook imports from a module, and the entries of `FURTHER`.
+"""
+
+import re
+from collections import defaultdict
+from importlib import import_module
 from pathlib import Path
 
 import fingerpad
+
+ROOT = Path(__file__).parents[2]
 
 TITLES = {
     "core": "Values, errors and results",
@@ -12,6 +20,7 @@ TITLES = {
     "export": "Files for other programs",
     "geometry": "Fingers, objects and motions",
     "inference": "Fits",
+    "lab": "Laboratory",
     "mechanics": "Tissues and presses",
     "neuron": "Afferents and populations",
     "psychophysics": "Observers",
@@ -20,22 +29,72 @@ TITLES = {
     "skin": "Skin and receptors",
 }
 
+FURTHER = {
+    "core.displayed": ("Displayed", "Result"),
+    "core.regions": ("Rectangle",),
+    "core.progress": ("Lines", "NoProgress", "Progress", "share_done"),
+    "experiments.discrimination.analysis": ("TaskResult",),
+    "experiments.fit.results": ("FitResult",),
+    "inference.rate_model": ("AfferentModel",),
+    "inference.recordings": ("SpikeRecordings",),
+    "inference.spike_fit": ("SpikeFit", "fit_spikes"),
+    "inference.spike_likelihood": ("SpikeLikelihood", "time_rescaling"),
+    "neuron.escape_rate": ("EscapeRate",),
+    "neuron.transduction": ("Transduction",),
+}
+"""Names that the interface returns or takes, by module: no page imports them."""
+
+IMPORTED = re.compile(r"^[ \"]*from fingerpad\.([\w.]+) import (\([^)]*\)|[\w, ]+)", re.MULTILINE)
+
+
+def public_names() -> dict[str, dict[str, object]]:
+    """Names and values of each package, in the order of the alphabet."""
+    modules = {home: set(names) for home, names in fingerpad._HOMES.items()}
+    for home, names in (*FURTHER.items(), *_imported_by_pages()):
+        modules.setdefault(home, set()).update(names)
+    found: dict[str, dict[str, object]] = defaultdict(dict)
+    for home, names in modules.items():
+        package, module = home.partition(".")[0], import_module(f"fingerpad.{home}")
+        values = {name: getattr(module, name, None) for name in names}  # None for a module of the package
+        found[package] |= {name: value for name, value in values.items() if callable(value)}
+    for package in TITLES:
+        exports = import_module(f"fingerpad.{package}")
+        values = {name: getattr(exports, name) for name in getattr(exports, "__all__", ())}
+        found[package] |= {name: value for name, value in values.items() if callable(value)}
+    return {package: dict(sorted(found[package].items(), key=_order)) for package in TITLES}
+
+
+def _order(item: tuple[str, object]) -> tuple[bool, str]:
+    """Put classes first."""
+    name, value = item
+    return not isinstance(value, type), name.lower()
+
+
+def _imported_by_pages() -> list[tuple[str, list[str]]]:
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    pages += [*(ROOT / "docs/gallery").glob("*.py"), *(ROOT / "docs/notebooks").glob("*.ipynb")]
+    return [
+        (module, re.findall(r"\w+", names))
+        for page in sorted(pages)
+        for module, names in IMPORTED.findall(page.read_text(encoding="utf-8"))
+    ]
+
 
 def write_reference(folder: Path) -> None:
     """Write the pages into a folder; files that have not changed are left alone."""
     folder.mkdir(exist_ok=True)
-    packages = []
-    for package, modules in groupby(
-        sorted(fingerpad._HOMES.items()), key=lambda home: home[0].partition(".")[0]
-    ):
+    packages = public_names()
+    for package, names in packages.items():
         text = [*_heading(TITLES[package], "="), f"Public names of ``fingerpad.{package}``.", ""]
-        for _, names in modules:
-            for name in names:
-                value = getattr(fingerpad, name)
-                directive = "autoclass" if isinstance(value, type) else "autofunction"
-                text += [*_heading(name, "-"), f".. {directive}:: fingerpad.{name}", ""]
+        for name, value in names.items():
+            short = name in fingerpad.__all__
+            directive = "autoclass" if isinstance(value, type) else "autofunction"
+            home = "fingerpad" if short else value.__module__
+            text += [*_heading(name, "-")]
+            if not short:
+                text += [f"``from {home} import {name}``", ""]
+            text += [f".. {directive}:: {home}.{name}", ""]
         _write(folder / f"{package}.rst", text)
-        packages.append(package)
     units = "Units are mm, ms, kPa, mN, mA, mF and mV; names carry them."
     tree = [".. toctree::", "", *(f"   {package}" for package in packages), ""]
     _write(folder / "index.rst", [*_heading("Reference", "="), units, "", *tree])

@@ -20,6 +20,7 @@ from fingerpad.report.discrimination import (
     draw_noise,
     draw_observers,
 )
+from fingerpad.report.discrimination_steps import caption_steps, draw_steps
 from fingerpad.report.first_screen import first_screen
 from fingerpad.report.formatting import plain
 from fingerpad.report.manifest import edition, manifest_chapter
@@ -79,7 +80,6 @@ def reproduction_page(result: ReproductionResult) -> Page:
         [
             Chapter("Comparison with the paper", comparison_tables(result.comparison)),
             *_levels(result),
-            Chapter("Tissues", [tissue_table(result.tissues)]),
             Chapter("Published numbers used", input_tables(result.inputs)),
             manifest_chapter(result.manifest),
         ],
@@ -95,10 +95,14 @@ def _levels(result: ReproductionResult) -> list[Chapter]:
             None,
             (1, "mesh", "Mesh of the finger and its four layers", draw_mesh, caption_mesh),
         ),
+        "Tissues": [tissue_table(result.tissues)],
         "Three levels": illustrated(
             result.levels,
             None,
             (2, "three_levels", "One sphere on three levels", draw_levels, caption_levels),
+        ),
+        "From rates to a percept": illustrated(
+            result.discrimination, None, (3, "steps", "Steps to a hit rate", draw_steps, caption_steps)
         ),
         "Level 1: skin": illustrated(
             result.skin_deflection,
@@ -126,13 +130,13 @@ def _levels(result: ReproductionResult) -> list[Chapter]:
             None,
             (9, "nail", "Stress at the border of the nail", draw_nail, caption_nail),
         ),
+        "Beyond the paper: noise": illustrated(
+            result.discrimination, None, (10, "noise", "Amount of noise", draw_noise, caption_noise)
+        ),
         "Beyond the paper: uncertainty of the fit": illustrated(
             result.single_unit_uncertainty,
             uncertainty_tables,
-            (10, "uncertainty", "Uncertainty of the fit", draw_uncertainty, caption_uncertainty),
-        ),
-        "Beyond the paper: noise": illustrated(
-            result.discrimination, None, (11, "noise", "Amount of noise", draw_noise, caption_noise)
+            (11, "uncertainty", "Uncertainty of the fit", draw_uncertainty, caption_uncertainty),
         ),
         "Beyond the paper: curvature thresholds": illustrated(
             result.curvature_thresholds,

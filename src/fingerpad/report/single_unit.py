@@ -224,8 +224,8 @@ def _steps(search: Search, section: SingleUnitResult, as_printed: bool) -> Table
         f"{fixed(search.fss_test, 3)}. results.json holds these steps for each fold and start."
     )
     title = f"Steps of the fit: fold {PAPER_FOLD}, start {search.start}"
+    title += f" (the paper's Table 4{'' if as_printed else ', from another start'})"
     if as_printed:
-        title += " (the paper's Table 4)"
         note += (
             f" In the paper FSS rose from {number(paper.FOLD_3_FSS_START.value)} to "
             f"{number(paper.FOLD_3_FSS_FITTED.value)} in {number(paper.FOLD_3_ITERATIONS.value)} iterations, "

@@ -59,7 +59,7 @@ def tissue_table(layers: Sequence[TissueLayer]) -> Table:
         )
         for layer in layers
     ]
-    return Table("Tissues by set and layer", COLUMNS, rows, NOTE)
+    return Table("Tissues by set and layer (in place of the paper's Tables 1 and 2)", COLUMNS, rows, NOTE)
 
 
 def _prony(layer: TissueLayer) -> str:
