@@ -12,7 +12,7 @@ from studies.pages.markdown import markdown_table as table
 INTRODUCTION = """# Command line
 
 `fingerpad` has thirteen commands. The option `--help` of each shows the same text.
-Before the command, as in `fingerpad --quiet touch touch.yaml`, `--quiet` leaves out progress and notices, and
+With every command, as in `fingerpad touch touch.yaml --quiet`, `--quiet` leaves out progress and notices, and
 `--verbose` also tells what is stored and how long each stage takes.
 `make reproduce ARGS="--resolution quick"` runs `fingerpad reproduce` in the environment of the repository.
 `python -m studies results` writes this page.

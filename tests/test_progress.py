@@ -90,7 +90,7 @@ def test_progress_is_lines_where_it_is_piped_bars_on_a_terminal_and_nothing_when
 
 def test_quiet_says_nothing_but_results_and_verbose_tells_of_stages(run_program, tmp_path, caplog):
     (tmp_path / "touch.yaml").write_text(TOUCH)
-    status, out, errors = run_program(main, "fingerpad", "--quiet", "touch", "touch.yaml", "--out", "quiet")
+    status, out, errors = run_program(main, "fingerpad", "touch", "touch.yaml", "--out", "quiet", "--quiet")
     assert (status, errors, caplog.text) == (0, "", "")
     assert out
     status, _, _ = run_program(main, "fingerpad", "--verbose", "touch", "touch.yaml", "--out", "verbose")

@@ -40,6 +40,10 @@ MISUSE: Any = typer.BadParameter.__base__
 """What typer raises for options that it does not know or cannot read; it names only this child of it."""
 
 
+GENERAL_OPTIONS = ("--quiet", "--verbose")
+"""Options of every command, which may stand before its name or after it."""
+
+
 def _show_version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"fingerpad {__version__}")
@@ -92,6 +96,13 @@ def main() -> None:
     run(app, "fingerpad")
 
 
+def _general_first(words: list[str]) -> list[str]:
+    """Put the options of all commands before the name of the command, where they are read."""
+    end = words.index("--") if "--" in words else len(words)
+    general = [word for word in words[:end] if word in GENERAL_OPTIONS]
+    return [*general, *(word for word in words[:end] if word not in GENERAL_OPTIONS), *words[end:]]
+
+
 def _give_up_output() -> None:
     """Leave nothing in standard output that Python would try to write once more at its end."""
     with suppress(OSError):
@@ -110,7 +121,7 @@ def run(commands: typer.Typer, program: str) -> None:
     try:
         with signals_raise(), warnings.catch_warnings():
             warnings.showwarning = _show_warning
-            status = commands(standalone_mode=False)
+            status = commands(_general_first(sys.argv[1:]), standalone_mode=False)
             sys.stdout.flush()
         sys.exit(status)
     except (typer.Abort, KeyboardInterrupt) as stop:  # click makes the first of the second

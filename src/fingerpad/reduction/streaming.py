@@ -35,6 +35,12 @@ NEAR_MM = 0.03
 CLOSEST_MM = 1e-6
 """Tolerance of the depth of a force. [mm]"""
 
+MOST_SECANTS = 8
+"""Steps of the secant method before the depth of a force is looked for between two others."""
+
+LEAST_APART_MM = 1e-3
+"""Distance of the first two depths of the secant method where the last step was shorter. [mm]"""
+
 
 @dataclass(frozen=True)
 class ReducedSample(Result):
@@ -109,7 +115,7 @@ class ReducedTouch:
         self._at_receptors = _Filters.at_rest((n_branches, n_quantities, len(receptors)))
         self._at_sheet = _Filters.at_rest((n_branches, len(self._sheet)))
         self._springs = Springs.at_rest(n_branches)
-        self._time_ms, self._below_mm, self._way_mm = 0.0, 0.0, np.zeros(2)
+        self._time_ms, self._below_mm, self._further_mm, self._way_mm = 0.0, 0.0, 0.0, np.zeros(2)
         self._largest, self._modes = np.zeros(n_quantities + 1), model.modes.reshape(len(model.modes), -1)
         self.step(0.0, depth_mm=min(0.0, float(model.first_touch_mm.min())))
 
@@ -176,7 +182,8 @@ class ReducedTouch:
         if force_mn is None:
             below_mm = finite("depth_mm", depth_mm, "mm") - first_mm  # type: ignore[arg-type]
         else:
-            below_mm = press.depth_of(not_negative("force_mn", force_mn, "mN"), self._below_mm)
+            wanted_mn = not_negative("force_mn", force_mn, "mN")
+            below_mm = press.depth_of(wanted_mn, self._below_mm, self._further_mm)
         if below_mm > model.depth_mm * (1 + 1e-9):
             raise InputError(
                 f"The indenter must stay within {model.depth_mm:g} mm below first touch, the range of this "
@@ -191,6 +198,7 @@ class ReducedTouch:
         amplitude = amplitudes(at_receptors[1:], model.squared)
         self._at_receptors = self._at_receptors.after(press.factors, amplitude * scale)
         self._springs, self._at_sheet = contact.springs, contact.sheet
+        self._further_mm = below_mm - self._below_mm
         self._way_mm, self._below_mm, self._time_ms = np.array(pose[:2]), below_mm, time_ms
         loss = lost(amplitude, self._at_receptors.relaxed / scale, model.squared)
         values = np.maximum(at_receptors[0] - loss.sum(axis=0), 0.0)
@@ -293,13 +301,29 @@ class _Press:
         force, area = at_once - share @ np.array(relaxed).reshape(-1, 2)
         return _Contact(terms, springs, sheet, max(float(force), 0.0), max(float(area), 0.0))
 
-    def depth_of(self, force_mn: float, near_mm: float) -> float:
-        """Depth below first touch at which the indenter presses with a force; infinite beyond the range."""
+    def depth_of(self, force_mn: float, near_mm: float, further_mm: float) -> float:
+        """Depth below first touch at which the indenter presses with a force; infinite beyond the range.
+
+        It is looked for about `near_mm`, the depth before, and further on by as much as in the step before.
+        """
 
         def missing_mn(at_mm: float) -> float:
             return self.to(at_mm).force_mn - force_mn
 
         deepest_mm = self.model.depth_mm
+        # The secant method usually ends after three depths; where it fails, two depths enclose the force.
+        apart_mm = further_mm if abs(further_mm) > LEAST_APART_MM else LEAST_APART_MM
+        last_mm, at_mm = near_mm + further_mm - apart_mm, near_mm + further_mm
+        last_mn = missing_mn(last_mm)
+        for _ in range(MOST_SECANTS if force_mn > 0.0 else 0):
+            if not 0.0 < at_mm < deepest_mm:
+                break
+            now_mn = missing_mn(at_mm)
+            if now_mn == last_mn:
+                break
+            last_mm, last_mn, at_mm = at_mm, now_mn, at_mm - now_mn * (at_mm - last_mm) / (now_mn - last_mn)
+            if abs(at_mm - last_mm) <= CLOSEST_MM:
+                return at_mm
         low, high = (min(max(near_mm + way_mm, 0.0), deepest_mm) for way_mm in (-NEAR_MM, NEAR_MM))
         if missing_mn(low) >= 0.0:
             low, high = 0.0, low
