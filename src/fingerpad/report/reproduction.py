@@ -89,7 +89,7 @@ def reproduction_page(result: ReproductionResult) -> Page:
 
 def _levels(result: ReproductionResult) -> list[Chapter]:
     """Return the chapters in the paper's order of figures, 1 to 9, then what goes beyond the paper."""
-    chapters = {
+    chapters: dict[str, Sequence[Part]] = {
         "The finger": illustrated(
             result.mesh,
             None,
