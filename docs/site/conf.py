@@ -6,6 +6,9 @@ The source folder is the root of the repository, so that pages keep their links 
 import sys
 from pathlib import Path
 
+import latex2mathml.converter
+from docutils import nodes
+
 import fingerpad
 
 HERE = Path(__file__).parent
@@ -25,7 +28,6 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx_gallery.gen_gallery",
@@ -56,6 +58,7 @@ sphinx_gallery_conf = {
     "min_reported_time": 3600,
 }
 
+html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = "fingerpad"
 html_extra_path = ["root"]  # the address of the site leads to its first page
@@ -63,6 +66,14 @@ html_copy_source = False
 html_show_sourcelink = False
 
 
-def setup(app: object) -> None:
+def mathml(translator, node) -> None:  # type: ignore[no-untyped-def]
+    """Write a formula as MathML, which browsers show without a script from another server."""
+    display = "block" if isinstance(node, nodes.math_block) else "inline"
+    translator.body.append(latex2mathml.converter.convert(node.astext(), display=display))
+    raise nodes.SkipNode
+
+
+def setup(app) -> None:  # type: ignore[no-untyped-def]
     """Write the pages of the reference, which follow the list of public names."""
+    app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
     write_reference(HERE.parent / "reference")

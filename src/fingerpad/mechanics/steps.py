@@ -14,6 +14,7 @@ touch, which would be underestimated after a long step.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
@@ -22,6 +23,8 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError
+
+LOGGER = logging.getLogger(__name__)
 
 SMALLEST_CUT = 1.0 / 32
 """Shortest step that is tried, over the step asked for."""
@@ -110,6 +113,7 @@ def steps_at(
                 moment = solve(moment, target_ms)
             except ConvergenceError as error:
                 attempts.append(_attempt(moment, target_ms, error))
+                LOGGER.info("%s", attempts[-1])
                 share, converged = share / 2, 0
                 if share < SMALLEST_CUT:
                     raise stop(moment, tuple(attempts), error.args[0]) from None
