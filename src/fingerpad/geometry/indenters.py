@@ -320,7 +320,7 @@ class Sphere(Indenter):
     Examples
     --------
     >>> round(Sphere(curvature_per_m=287).radius_mm, 3), Sphere(radius_mm=2.0)
-    (3.484, Sphere(curvature_per_m=500.0))
+    (3.484, Sphere(radius_mm=2.0))
     """
 
     symmetry_deg = None
@@ -344,6 +344,11 @@ class Sphere(Indenter):
 
     def __post_init__(self) -> None:
         positive("curvature_per_m", self.curvature_per_m, "1/m")
+
+    def __repr__(self) -> str:
+        # By curvature or by radius: one of the two is usually a short number.
+        sizes = (f"curvature_per_m={self.curvature_per_m!r}", f"radius_mm={self.radius_mm!r}")
+        return f"{type(self).__name__}({min(sizes, key=len)})"
 
     @property
     def half_width_mm(self) -> float:

@@ -111,7 +111,7 @@ class TouchDescription(StimulusDescription, FingerDescription):
     --------
     >>> touch = TouchDescription.model_validate({"object": {"kind": "sphere", "radius_mm": 4}})
     >>> touch.object.made()
-    Sphere(curvature_per_m=250.0)
+    Sphere(radius_mm=4.0)
     """
 
     title: Text = "One touch"
