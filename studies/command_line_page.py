@@ -13,7 +13,7 @@ INTRODUCTION = """# Command line
 
 `fingerpad` has thirteen commands. The option `--help` of each shows the same text.
 With every command, as in `fingerpad touch touch.yaml --quiet`, `--quiet` leaves out progress and notices, and
-`--verbose` also tells what is stored and how long each stage takes.
+`--verbose` also tells of the steps of a press, what is stored and how long each stage takes.
 `make reproduce ARGS="--resolution quick"` runs `fingerpad reproduce` in the environment of the repository.
 `python -m studies results` writes this page.
 """

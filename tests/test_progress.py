@@ -67,7 +67,7 @@ def wait_until(true, most_s=5.0):
 
 def test_a_press_tells_how_far_it_is(monkeypatch, caplog):
     told = []
-    caplog.set_level(logging.INFO, "fingerpad.mechanics.press")
+    caplog.set_level(logging.DEBUG, "fingerpad.mechanics.press")
     progress = Lines(told.append, every_s=0.0)
     skin = fp.indent(
         fp.Fingertip(), fp.Sphere(287.0), fp.RampAndHold(depth_mm=0.2, hold_ms=60), progress=progress

@@ -833,7 +833,8 @@ def test_figure_3_names_the_steps_of_the_paper_with_the_numbers_of_the_run():
         assert any(text.startswith(letter) for text in texts)
     last = next(text for text in texts if text.startswith("(i-k)"))
     rates = section.gradient_sum["static"]
-    assert f"{section.curvature_per_m[-1]:g} 1/m: {rates.hit_rate[-1]:.2f} ± {rates.hit_rate_sd[-1]:.2f}" in last
+    mean, spread = rates.hit_rate[-1], rates.hit_rate_sd[-1]
+    assert f"{section.curvature_per_m[-1]:g} 1/m: {mean:.2f} ± {spread:.2f}" in last
     silent = replace(section, gradient_sum={})
     assert any("no hit rates" in text.get_text() for text in draw_steps(silent).axes[0].texts)
 

@@ -61,12 +61,16 @@ def _options(
         bool, typer.Option("--quiet", help="Show no progress and no notices, only results and errors.")
     ] = False,
     verbose: Annotated[
-        bool, typer.Option("--verbose", help="Also tell what is stored and how long each stage takes.")
+        bool,
+        typer.Option(
+            "--verbose",
+            help="Also tell of the steps of a press, what is stored and how long each stage takes.",
+        ),
     ] = False,
 ) -> None:
     if quiet and verbose:
         raise InputError("--quiet and --verbose exclude each other: leave one out.")
-    LOGGER.setLevel(logging.ERROR if quiet else logging.INFO if verbose else logging.NOTSET)
+    LOGGER.setLevel(logging.ERROR if quiet else logging.DEBUG if verbose else logging.NOTSET)
     if verbose:
         logging.basicConfig(format="%(asctime)s %(name)s: %(message)s", datefmt="%H:%M:%S")
     if context.invoked_subcommand is None:

@@ -527,7 +527,7 @@ def press(
     planned_ms = settings.steps_ms(stimulus)
     for moment in _moments(job, settings):
         share_done(float(np.searchsorted(planned_ms, moment.time_ms)) / (planned_ms.size - 1))
-        LOGGER.info(
+        LOGGER.debug(
             "%.4g of %.4g ms: depth %.4g mm, %d Newton steps so far",
             moment.time_ms, stimulus.end_ms, moment.found.depth_mm, job.newton_steps,
         )  # fmt: skip

@@ -113,7 +113,7 @@ def steps_at(
                 moment = solve(moment, target_ms)
             except ConvergenceError as error:
                 attempts.append(_attempt(moment, target_ms, error))
-                LOGGER.info("%s", attempts[-1])
+                LOGGER.debug("%s", attempts[-1])
                 share, converged = share / 2, 0
                 if share < SMALLEST_CUT:
                     raise stop(moment, tuple(attempts), error.args[0]) from None
