@@ -699,7 +699,7 @@ def test_a_fit_without_the_papers_start_points_is_not_shown_beside_them():
         fold |= {"start": 1, "fss_start": [0.9], "climbs": fold["climbs"][:1]}
     _, parameters, _, _, steps, _ = single_unit.single_unit_tables(typed(SingleUnitResult, section))
     assert parameters.columns == ("parameter", "fitted", "unit")
-    assert steps.title == "Steps of the fit: fold 3, start 1"
+    assert steps.title == "Steps of the fit: fold 3, start 1 (the paper's Table 4, from another start)"
     assert "In the paper" not in steps.note
 
 

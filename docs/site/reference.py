@@ -7,6 +7,7 @@ an example or a notebook imports from a module, and the entries of `FURTHER`.
 import re
 from collections import defaultdict
 from importlib import import_module
+from inspect import isclass, isroutine
 from pathlib import Path
 
 import fingerpad
@@ -56,12 +57,17 @@ def public_names() -> dict[str, dict[str, object]]:
     for home, names in modules.items():
         package, module = home.partition(".")[0], import_module(f"fingerpad.{home}")
         values = {name: getattr(module, name, None) for name in names}  # None for a module of the package
-        found[package] |= {name: value for name, value in values.items() if callable(value)}
+        found[package] |= _documented(values)
     for package in TITLES:
         exports = import_module(f"fingerpad.{package}")
         values = {name: getattr(exports, name) for name in getattr(exports, "__all__", ())}
-        found[package] |= {name: value for name, value in values.items() if callable(value)}
+        found[package] |= _documented(values)
     return {package: dict(sorted(found[package].items(), key=_order)) for package in TITLES}
+
+
+def _documented(values: dict[str, object]) -> dict[str, object]:
+    """Keep classes and functions: constants and names of types have no docstring of their own."""
+    return {name: value for name, value in values.items() if isclass(value) or isroutine(value)}
 
 
 def _order(item: tuple[str, object]) -> tuple[bool, str]:

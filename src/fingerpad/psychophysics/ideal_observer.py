@@ -222,7 +222,7 @@ def gaussian_information(
     """Fisher information of responses with the paper's noise, the limit of the ideal observer.
 
         V_i = (sigma_1 mu_i)^2 + s^2
-        J = sum_i mu_i'^2 / V_i + 2 (sigma_1^2 mu_i mu_i' / V_i)^2,    d' -> |dx| sqrt J
+        J = sum_i mu_i'^2 / V_i + 2 (sigma_1^2 mu_i mu_i' / V_i)^2,    d' -> dx sqrt J,  dx > 0
 
     The second term is the information in the variance, which depends on the mean. Without a noise floor s,
     J = sum_i (mu_i' / mu_i)^2 (1 / sigma_1^2 + 2).
