@@ -30,7 +30,7 @@ def draw_steps(section: SphereDiscrimination) -> Figure:
     -------
     Figure
     """
-    figure = new_figure(12.5, 3.4)
+    figure = new_figure(10.6, 3.3)
     axes = figure.add_subplot()
     axes.set(xlim=(-0.45, 6.5), ylim=(-0.85, 2.85))
     axes.set_axis_off()
