@@ -35,6 +35,7 @@ extensions = [
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
+myst_url_schemes = dict.fromkeys(("http", "https", "mailto")) | {"doi": "https://doi.org/{{path}}"}
 # Decisions are listed on their own page. Shapes such as (n_sites,) are no references.
 suppress_warnings = ["config.cache", "toc.not_included", "ref.python"]
 
