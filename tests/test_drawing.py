@@ -142,6 +142,18 @@ def test_unknown_drawings_and_quantities_are_refused(results):
         results["SkinResponse"].plot(what="sed")
     with pytest.raises(InputError, match="quantity must be one of"):
         results["ResponseMap"].plot(Figure().add_subplot(), "map", quantity="rate")
+    with pytest.raises(
+        InputError, match=r"axes must be axes of Matplotlib: got 'force'; name a drawing by what="
+    ):
+        results["SkinResponse"].plot("force")
+    with pytest.raises(InputError, match="Options of the drawing force are: none; got quantity"):
+        results["SkinResponse"].plot(quantity="stored")
+    with pytest.raises(InputError, match="Options of the drawing pad are: quantity, reach_mm; got reach"):
+        results["SkinResponse"].plot(what="pad", reach=2.0)
+    with pytest.raises(
+        InputError, match=r"progress must have a method stage, as fp.notebook_progress\(\) has"
+    ):
+        fp.indent(fp.Fingertip(), fp.Sphere(287.0), progress=True)
 
 
 @pytest.mark.parametrize("kind", TABLES)

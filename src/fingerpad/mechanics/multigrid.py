@@ -46,7 +46,7 @@ from fingerpad.mechanics.factors import SuperLuFactor
 MERGED_OVER_FINEST = 4.0
 """Largest distance of two lines that become one step, over the smallest distance on the grid."""
 
-COARSEST_COLUMNS = 100
+COARSEST_COLUMNS = 60
 """A grid with fewer columns is not coarsened: its factor costs less than a level."""
 
 FEWEST_COLUMNS = 200

@@ -5,6 +5,7 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Callable, Mapping
 from html import escape
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from matplotlib.figure import Figure
 
 from fingerpad.core.checks import one_of
 from fingerpad.core.displayed import Displayed
+from fingerpad.core.errors import InputError
 from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
 from fingerpad.experiments.discrimination.analysis import TaskResult
 from fingerpad.experiments.fit.results import FitResult
@@ -276,12 +278,18 @@ def plot(result: Displayed, axes: Axes | None = None, what: str | None = None, *
     """Draw a result; see `Displayed.plot`."""
     drawings = DRAWINGS[type(result).__name__]
     name = one_of("what", what or next(iter(drawings)), tuple(drawings))
+    draw = drawings[name]
+    for option in options.keys() - list(signature(draw).parameters)[2:]:
+        allowed = ", ".join(list(signature(draw).parameters)[2:]) or "none"
+        raise InputError(f"Options of the drawing {name} are: {allowed}; got {option}.")
+    if axes is not None and not isinstance(axes, Axes):
+        raise InputError(f"axes must be axes of Matplotlib: got {axes!r:.60}; name a drawing by what=.")
     if axes is None:
         # Only a figure of pyplot is shown by a notebook or a window.
         from matplotlib import pyplot
 
         axes = pyplot.subplots(layout="constrained")[1]
-    drawings[name](axes, result, **options)
+    draw(axes, result, **options)
     return axes
 
 

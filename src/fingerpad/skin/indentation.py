@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from fingerpad.core.checks import FloatArray, finite, instance, one_of, pair
 from fingerpad.core.compilation import announce_compilation
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import InputError, shown
 from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.threads import compiled_threads
@@ -406,6 +406,10 @@ def indent(
     touch = touch_of(
         finger, indenter, stimulus, materials, resolution, at_mm, settings=settings, times_ms=times_ms
     )
+    if progress is not None and not callable(getattr(progress, "stage", None)):
+        raise InputError(
+            f"progress must have a method stage, as fp.notebook_progress() has: got {shown(progress)}."
+        )
     with (progress or NoProgress()).stage("press", 1) as advance:
         skin = touch.solve(whole=whole)
         advance()
