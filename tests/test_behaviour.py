@@ -186,6 +186,7 @@ def test_every_source_that_mechanics_imports_counts():
             "keywords",
             "logger",
             "phases",
+            "progress",
             "tables",
             "values",
         )

@@ -400,7 +400,7 @@ def test_a_large_file_is_refused_by_its_size(tmp_path, monkeypatch):
 
 
 def test_an_error_of_the_system_is_one_sentence(capsys):
-    def without_rights(standalone_mode):
+    def without_rights(**options):
         raise PermissionError(13, "Permission denied", "indentations")
 
     with pytest.raises(SystemExit) as ended:

@@ -530,3 +530,22 @@ def test_the_estimate_grows_with_mesh_steps_force_and_friction():
     ]
     assert all(other.time_s > 1.5 * base.time_s for other in more)
     assert more[0].memory_mb > base.memory_mb
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("finger: baby", "touch.yaml, line 2, finger: like must be one of adult, "),
+        ("finger: nope.msh", "touch.yaml, line 2, finger: nope.msh must be a file that can be read: "),
+        (
+            "afferents: {afferent: RA}",
+            "afferent must be SAI's, as default, numbers or a file of a fit: got RA",
+        ),
+    ],
+)
+def test_an_error_of_a_part_names_the_file_once(run_program, tmp_path, line, said):
+    (tmp_path / "touch.yaml").write_text(f"object: sphere\n{line}\nmotion: {{depth_mm: 0.2}}\n")
+    status, _, errors = run_program(cli.main, "fingerpad", "touch", "touch.yaml", "--out", "out")
+    assert status == 2
+    assert said in errors
+    assert errors.count("touch.yaml") <= 1

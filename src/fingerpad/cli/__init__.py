@@ -125,7 +125,7 @@ def run(commands: typer.Typer, program: str) -> None:
     try:
         with signals_raise(), warnings.catch_warnings():
             warnings.showwarning = _show_warning
-            status = commands(_general_first(sys.argv[1:]), standalone_mode=False)
+            status = commands(args=_general_first(sys.argv[1:]), standalone_mode=False)
             sys.stdout.flush()
         sys.exit(status)
     except (typer.Abort, KeyboardInterrupt) as stop:  # click makes the first of the second

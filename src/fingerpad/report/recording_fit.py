@@ -80,7 +80,9 @@ def draw_phase(axes: Axes, found: FitResult, phase: str) -> None:
         )
     without = rates.out_of_sample_hz[order]
     axes.plot(where, without, "x", color=ORANGE, zorder=3, label="predicted without its fold")
-    draw_rates(axes, where, rates.fitted_hz[order], observed_hz[order], "fitted to all")
+    # Stimuli without a place on an axis have no order: no line joins them.
+    has_axis = found.shift_mm is not None
+    draw_rates(axes, where, rates.fitted_hz[order], observed_hz[order], "fitted to all", line=has_axis)
     axes.set_title(f"{PHASE_LABELS[phase]}, FSS = {rates.fss_in_sample:.2f}")
     _name_places(axes, found)
 

@@ -116,10 +116,18 @@ def write_png(draw: Callable[[Any], Figure], section: Any, path: Path) -> Path:
 
 
 def draw_rates(
-    axes: Axes, where: FloatArray, predicted_hz: FloatArray, observed_hz: FloatArray, label: str = "predicted"
+    axes: Axes,
+    where: FloatArray,
+    predicted_hz: FloatArray,
+    observed_hz: FloatArray,
+    label: str = "predicted",
+    line: bool = True,
 ) -> None:
-    """Draw predicted firing rates of an afferent as a line, and the observed ones as open circles."""
-    axes.plot(where, predicted_hz, color=BLUE, label=label)
+    """Draw predicted firing rates as a line or as dashes, and the observed ones as open circles."""
+    style: Any = (
+        {} if line else {"linestyle": "none", "marker": "_", "markersize": 12.0, "markeredgewidth": 2.0}
+    )
+    axes.plot(where, predicted_hz, color=BLUE, label=label, **style)
     open_circles: Any = {"color": BLACK, "markerfacecolor": "white", "markersize": 5.0}
     axes.plot(where, observed_hz, "o", label="observed", **open_circles)
     axes.set_ylabel("firing rate [spikes/s]")

@@ -24,6 +24,9 @@ from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population, sensitivities
 from fingerpad.psychophysics.encoding import neighbours_of
 
+ELSEWHERE = ("RA", "PC", "SAII")
+"""Types of afferents that no file describes."""
+
 _OF_LAYOUT = {
     "rows": (GRID, NAIL_ROWS),
     "columns": (GRID,),
@@ -55,6 +58,11 @@ def afferent_of(chosen: AfferentSettings | str, tissues: str, beside: Path = Pat
     InputError
         If the file cannot be read or holds no fitted parameters.
     """
+    if chosen in ELSEWHERE:
+        raise InputError(
+            f"afferent must be SAI's, as default, numbers or a file of a fit: got {chosen}, which is "
+            "simulated in Python, by fingerpad.MixedPopulation."
+        )
     fitted = Afferent.for_tissues(tissues)
     if isinstance(chosen, AfferentSettings):
         return replace(fitted, **chosen.given)

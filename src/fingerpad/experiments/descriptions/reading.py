@@ -87,6 +87,8 @@ class Origin:
         try:
             yield
         except InputError as error:
+            if str(error).startswith(f"{self.name}, "):  # from a part of the same description
+                raise
             place = error.place if isinstance(error, PlacedError) else _unspelled(str(error))
             raise InputError(self.sentence(str(error), place)) from error
 
