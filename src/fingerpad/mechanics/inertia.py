@@ -122,7 +122,7 @@ def warn_of_inertia(motion: Motion, materials: Sequence[Material], thickness_mm:
     if share > LARGEST_SHARE:
         warnings.warn(
             f"The fastest part of the motion is as fast as a vibration of {fastest:.3g} Hz, at which the "
-            f"inertia of the tissue, which is neglected, is about {share:.2g} of its elastic force: stay "
+            f"inertia of the tissue, which is neglected, is about {share:.2g} times its elastic force: stay "
             f"below {np.sqrt(LARGEST_SHARE) * resonance:.2g} Hz, or read the results as those of tissue "
             "without mass.",
             InertiaWarning,

@@ -94,7 +94,7 @@ def frequency(skin: SkinResponse) -> Caveat | None:
     share, fastest_hz, _ = inertial_share(touch.stimulus, touch.tissues.layers, touch.layers_mm)
     text = (
         f"The motion is as fast as a vibration of {fastest_hz:.3g} Hz, at which the neglected inertia of the "
-        f"tissue is about {share:.2g} of its elastic force; up to {LARGEST_SHARE:g} it was compared."
+        f"tissue is about {share:.2g} times its elastic force; up to {LARGEST_SHARE:g} it was compared."
     )
     return Caveat("inertia", share, LARGEST_SHARE, text) if share > LARGEST_SHARE else None
 
