@@ -41,6 +41,12 @@ QUANTITY_LABELS = {"stored": "strain energy density", "work": "work of the stres
 """Names of quantities in words, where these are not those of `SkinResponse.sample`."""
 
 
+def _label(quantity: str) -> str:
+    """Name a quantity at an end organ in words, with its unit."""
+    unit = "" if quantity == "compressive_strain" else " [kPa]"
+    return QUANTITY_LABELS.get(quantity, quantity.replace("_", " ")) + unit
+
+
 def draw_force(axes: Axes, skin: SkinResponse) -> None:
     """Draw the force on the object over time."""
     axes.plot(skin.times_ms, skin.force_mn, color=BLACK)
@@ -84,9 +90,7 @@ def draw_pad(axes: Axes, skin: SkinResponse, quantity: str = "stored", reach_mm:
     sites = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
     values = skin.sample(quantity, sites)[-1].reshape(x.size, z.size)
     drawn = axes.pcolormesh(z, x, values, cmap="viridis", shading="gouraud")
-    unit = "" if quantity == "compressive_strain" else " [kPa]"
-    label = QUANTITY_LABELS.get(quantity, quantity.replace("_", " "))
-    axes.figure.colorbar(drawn, ax=axes, label=label + unit)
+    axes.figure.colorbar(drawn, ax=axes, label=_label(quantity))
     axes.set(xlabel="across, z [mm]", ylabel="along, x [mm]", aspect="equal")
     axes.grid(visible=False)
 
@@ -127,10 +131,7 @@ def draw_map(axes: Axes, response: ResponseMap, quantity: str = "static_rate_hz"
 def draw_traces(axes: Axes, traces: SedTraces) -> None:
     """Draw what the static term follows over time, a line per site."""
     axes.plot(traces.times_ms, traces.sed_kpa, color=BLACK, linewidth=0.8)
-    quantity = traces.static_quantity
-    unit = "" if quantity == "compressive_strain" else " [kPa]"
-    label = QUANTITY_LABELS.get(quantity, quantity.replace("_", " "))
-    axes.set(xlabel="time [ms]", ylabel=label + unit)
+    axes.set(xlabel="time [ms]", ylabel=_label(traces.static_quantity))
 
 
 def draw_currents(axes: Axes, traces: CurrentTraces) -> None:
@@ -209,7 +210,7 @@ def draw_sample(axes: Axes, sample: ReducedSample) -> None:
     name, values = next(iter(sample.fields.items()))
     receptors = np.arange(values.size)
     axes.errorbar(receptors, values, sample.field_errors[name], fmt="o", color=BLUE, markersize=3.0)
-    axes.set(xlabel="receptor", ylabel=f"{QUANTITY_LABELS.get(name, name)} [kPa]")
+    axes.set(xlabel="receptor", ylabel=_label(name))
 
 
 def draw_curve(axes: Axes, fit: PsychometricFit) -> None:
