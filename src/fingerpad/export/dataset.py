@@ -192,10 +192,7 @@ def touch_dataset(
     if response is not None:
         values |= response_values(instance("response", response, ResponseMap))
     for name, value in values.items():
-        part = PARTS[name]
-        attributes: Attributes = {"long_name": part.long_name}
-        attributes |= {"units": part.unit} if part.unit else {}
-        (coordinates if part.dims == (name,) else variables)[name] = (part.dims, value, attributes)
+        (coordinates if PARTS[name].dims == (name,) else variables)[name] = part_variable(name, value)
     variables["layer"][2].update(
         flag_values=np.arange(len(LAYERS), dtype=np.int32),
         flag_meanings=" ".join(name.replace(" ", "_") for name in LAYERS),
@@ -399,6 +396,14 @@ def _face(body: Indenter, reach_mm: Sequence[float]) -> tuple[np.ndarray, np.nda
     x, z = (np.linspace(-reach, reach, _OBJECT_STEPS + 1) for reach in reach_mm)
     points = np.stack(np.meshgrid(x, [0.0], z, indexing="ij"), axis=-1).reshape(-1, 3)
     return x, z, body.front(points).reshape(x.size, z.size)
+
+
+def part_variable(name: str, value: np.ndarray) -> tuple[tuple[str, ...], np.ndarray, Attributes]:
+    """Dimensions, values and attributes of one of `PARTS`."""
+    part = PARTS[name]
+    attributes: Attributes = {"long_name": part.long_name}
+    attributes |= {"units": part.unit} if part.unit else {}
+    return part.dims, value, attributes
 
 
 def response_values(response: ResponseMap) -> dict[str, np.ndarray]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from fingerpad.core.displayed import Result
 from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
-from fingerpad.export.dataset import PARTS, library, response_values, touch_dataset, unit_of_name
+from fingerpad.export.dataset import library, part_variable, response_values, touch_dataset, unit_of_name
 from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_UNITS
 from fingerpad.skin.fields import Place, stored_fields
 
@@ -215,10 +215,7 @@ def _by_time_and_site(
 
 def response_dataset(response: ResponseMap) -> xarray.Dataset:
     """Receptors and spikes as `write_touch` writes them."""
-    variables = {
-        name: (PARTS[name].dims, values, {"long_name": PARTS[name].long_name, "units": PARTS[name].unit})
-        for name, values in response_values(response).items()
-    }
+    variables = {name: part_variable(name, values) for name, values in response_values(response).items()}
     made: xarray.Dataset = library("xarray").Dataset(variables)
     made["spike_count"].attrs["sample_dimension"] = "spike"
     return made
