@@ -51,6 +51,19 @@ def some_anchors(n=30, seed=0):
     return anchors, anchor + generator.uniform(-0.01, 0.01, (n, 3)), generator.uniform(100.0, 300.0, n)
 
 
+def test_anchors_between_two_have_a_normal_and_a_limit_between():
+    """The normal has unit length; between opposite normals the later one stays."""
+    early, _, _ = some_anchors(seed=1)
+    late, _, _ = some_anchors(seed=2)
+    late = replace(late, normal=np.vstack([-early.normal[:1], late.normal[1:]]))
+    between = late.halfway_from(early)
+    np.testing.assert_allclose(between.limit_mn, (early.limit_mn + late.limit_mn) / 2)
+    np.testing.assert_allclose(np.linalg.norm(between.normal, axis=1), 1.0)
+    np.testing.assert_array_equal(between.normal[0], late.normal[0])
+    to_early, to_late = ((each.normal * between.normal).sum(axis=1)[1:] for each in (early, late))
+    np.testing.assert_allclose(to_early, to_late)
+
+
 def test_force_is_the_slope_of_the_potential_and_stays_within_the_limit():
     anchors, local, stiffness = some_anchors()
     found = friction(anchors, local, stiffness)

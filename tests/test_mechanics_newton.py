@@ -121,7 +121,7 @@ def test_balance_tolerance_is_a_number_above_zero(tolerance):
         NewtonSettings(balance_tolerance=tolerance)
 
 
-def test_a_search_with_friction_about_a_small_body_may_take_more_newton_steps(monkeypatch):
+def test_a_search_about_a_small_body_may_take_more_newton_steps(monkeypatch):
     """Nodes find their place one after the other, and friction is renewed after each."""
 
     mesh, few = block(), NewtonSettings(most_iterations=5)
@@ -138,6 +138,6 @@ def test_a_search_with_friction_about_a_small_body_may_take_more_newton_steps(mo
         longest_step_mm=0.2,
     )
     assert small_body().force_mn[-1] > 0.0
-    monkeypatch.setattr("fingerpad.mechanics.press.RENEWED", 1)
+    monkeypatch.setattr("fingerpad.mechanics.press.SMALL_BODY_STEPS", 1)
     with pytest.raises(ConvergenceError, match="after 5 Newton steps"):
         small_body()

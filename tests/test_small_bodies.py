@@ -7,9 +7,9 @@ import pytest
 
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.indenters import FlatPunch, Sphere
+from fingerpad.geometry.indenters import Bar, FlatPunch, Sphere
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.press import _Press
+from fingerpad.mechanics.press import PressSettings, _Press
 from fingerpad.skin.indentation import touch_of
 
 
@@ -29,6 +29,24 @@ def test_small_bodies_are_pressed_deep(body, depth_mm, friction, force_mn):
     assert skin.force_mn[peak] == pytest.approx(force_mn, rel=0.05)
     assert (np.diff(skin.force_mn[: peak + 1]) > 0.0).all()
     assert skin.energy_imbalance <= 0.005
+
+
+@pytest.mark.parametrize(
+    ("body", "tissues", "friction", "depth_mm"),
+    [
+        # Each stopped before, at 1.38, 0.79 and 0.75 mm.
+        (FlatPunch(1.0, 0.1), "trial2", 0.0, 1.6),
+        (Bar(3.0, 0.05), "gerling2014_fit", 0.0, 1.0),
+        (Bar(3.0, 0.05), "trial2_wu", 0.5, 0.9),
+    ],
+    ids=["a rim", "an edge", "an edge with friction"],
+)
+def test_nodes_that_slide_round_a_sharp_edge_do_not_stop_a_press(body, tissues, friction, depth_mm):
+    """Each node that slides over the edge is a small instability, which the search has to pass."""
+    motion, steps = RampAndHold(depth_mm=depth_mm), PressSettings(hold_steps=1)
+    skin = touch_of(Fingertip(), body, motion, tissues, settings=steps, friction=friction).solve()
+    assert (np.diff(skin.force_mn[:-1]) > 0.0).all()
+    assert skin.force_imbalance <= 1e-4
 
 
 def test_skin_that_slips_past_the_indenter_is_no_result():

@@ -103,6 +103,14 @@ class Anchors:
         n, zero = len(approach.local_mm), np.zeros_like(approach.local_mm)
         return cls(approach.local_mm, zero, np.zeros(n), zero, np.zeros(n, dtype=bool), approach)
 
+    def halfway_from(self, before: Anchors) -> Anchors:
+        """Return these anchors with the limits and normals halfway from earlier ones."""
+        mean = 0.5 * (self.normal + before.normal)
+        length = np.linalg.norm(mean, axis=1, keepdims=True)
+        # Opposite normals have no direction between them.
+        normal = np.where(length > 0.1, mean / np.maximum(length, 0.1), self.normal)
+        return replace(self, normal=normal, limit_mn=0.5 * (self.limit_mn + before.limit_mn))
+
 
 @dataclass(frozen=True)
 class Friction:

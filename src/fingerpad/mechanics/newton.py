@@ -55,15 +55,19 @@ for ever, and the residual with them."""
 MOST_STRAIGHT = 5
 """Newton steps of one search without the curvature of the indenter; then the tangent is shifted."""
 
-FIRST_SHIFT, RAISE_SHIFT, LOWER_SHIFT = 1e-4, 4.0, 8.0
-"""Smallest shift of a tangent, over its diagonal, and the factors by which it rises until the tangent is
-positive definite and falls after a step."""
+FIRST_SHIFT, CHANGE_SHIFT = 1e-6, 10.0
+"""Smallest shift of a tangent, over its diagonal, and the factor by which it rises until the tangent is
+positive definite and falls after a step. The diagonal is that of single nodes; where many nodes slide
+together the negative stiffness is a millionth of it, and with a shift of 1e-4 the steps were too short."""
 
 LARGEST_SHIFTS = {True: 0.05, False: 2.0}
 """Largest shifts of a tangent with and without the curvature of the indenter."""
 
 MOST_FULL_AUGMENTATIONS = 5
 """Augmentations after which multipliers change by half: nodes at a rim may alternate between two places."""
+
+MOST_FULL_RENEWALS = 10
+"""Renewals of friction after which its limits and normals change by half, for the same reason."""
 
 AT_REST = 1e-2
 """Residual over contact force below which the depth is moved towards the given force."""
@@ -210,6 +214,7 @@ class _Search:
     shift: float = 0.0
     was_shifted: bool = False
     augmentations: int = 0
+    renewals: int = 0
 
     def __post_init__(self) -> None:
         self.blocks = np.empty((self.body.sparsity.column.size, 3, 3), self.solver.number_type)
@@ -313,7 +318,7 @@ class _Search:
         The step leads downhill, and `line_search` takes it only as far as the potential falls. Without the
         curvature of the indenter a smaller shift suffices, but the step is further from Newton's.
         """
-        first = FIRST_SHIFT if self.shift == 0.0 else self.shift / LOWER_SHIFT
+        first = FIRST_SHIFT if self.shift == 0.0 else self.shift / CHANGE_SHIFT
         if first < FIRST_SHIFT:
             first = 0.0
         where, axes = self.body.sparsity.diagonal, np.arange(3)
@@ -328,7 +333,7 @@ class _Search:
                 try:
                     direction = self.solver.solve(self.blocks, now.residual_mn, forcing)
                 except ConvergenceError:
-                    shift = max(RAISE_SHIFT * shift, FIRST_SHIFT)
+                    shift = max(CHANGE_SHIFT * shift, FIRST_SHIFT)
                     continue
                 self.shift = shift
                 self.was_shifted |= shift > 0.0
@@ -359,6 +364,9 @@ class _Search:
             multipliers = 0.5 * (multipliers + self.lagging.multipliers_mn)
         if anchors is not None:
             anchors = contact.renewed(anchors, now.contact, now.depth_mm)
+            self.renewals += 1
+            if self.persistent and self.lagging.anchors and self.renewals > MOST_FULL_RENEWALS:
+                anchors = anchors.halfway_from(self.lagging.anchors)
         self.lagging = Lagging(multipliers, anchors)
         return evaluate(self.body, self.load, now.displacement_mm, now.depth_mm, self.lagging, self.blocks)
 

@@ -30,7 +30,7 @@ from fingerpad.mechanics.balance import (
     relaxed_work,
 )
 from fingerpad.mechanics.configuration import SMALLEST_FORCE_MN, Balance, Body, Load, Reached
-from fingerpad.mechanics.contact import Contact, Placement, check_friction
+from fingerpad.mechanics.contact import PENALTY_KPA_PER_MM, Contact, Placement, check_friction
 from fingerpad.mechanics.fields import (
     ElementFields,
     FieldState,
@@ -79,10 +79,13 @@ PENETRATION_PER_STEP = 0.04
 """Penetration accepted about a small body, over its longest step: a tenth of its smallest elements."""
 
 
-RENEWED = 3
-"""Newton steps of one search about a small body with friction, over those of others. There nodes find their
-place one after the other, and friction is renewed after each. Without friction a shorter step is the remedy:
-a long search ends in another branch."""
+SMALL_BODY_PENALTY = 4.0
+"""Penalty of contact about a small body, over that of others: its edge presses the skin with 300 kPa and
+more, which would penetrate by 20 microns. Each augmentation that corrects this sets nodes there free."""
+
+SMALL_BODY_STEPS = 3
+"""Newton steps of one search about a small body, over those of others: nodes find their place one after the
+other, and friction is renewed after each."""
 
 LARGEST_DROP = 0.1
 """Largest share by which the force may fall in a step that drives the indenter deeper."""
@@ -509,7 +512,8 @@ def press(
     undeformed = placement.to_local(mesh.nodes_mm[mesh.skin_nodes], depth_mm=0.0)
     candidates = indenter.may_touch(undeformed) & ~np.isin(mesh.skin_nodes, mesh.fixed_nodes)
     nodes, area_mm2 = mesh.skin_nodes[candidates], mesh.skin_area_mm2[candidates]
-    contact = Contact(indenter, placement, nodes, area_mm2, friction=check_friction(friction, indenter))
+    penalty = PENALTY_KPA_PER_MM * (SMALL_BODY_PENALTY if np.isfinite(longest_step_mm) else 1.0)
+    contact = Contact(indenter, placement, nodes, area_mm2, penalty, check_friction(friction, indenter))
     gripped = contact.nodes if indenter.grips else NO_NODES
     free = free_degrees_of_freedom(len(mesh.nodes_mm), mesh.fixed_nodes, mesh.symmetry_nodes, gripped)
     sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
@@ -520,7 +524,7 @@ def press(
 
     chosen = np.arange(len(mesh.elements)) if watched is None else watched
     follow = Watched(chosen, mesh.nodes_mm, mesh.elements[chosen], mesh.layer[chosen], table)
-    newton = _newton_settings(settings, longest_step_mm, contact.friction)
+    newton = _newton_settings(settings, longest_step_mm)
     job = _Press(body, contact, stimulus, solver, newton, follow, longest_step_mm)
     moment = job.unloaded()
     reached, slips, values = [], [], [moment.fields.values]
@@ -611,12 +615,12 @@ def _check_bone(mesh: Mesh, indenter: Indenter, placement: Placement, stimulus: 
         )
 
 
-def _newton_settings(settings: PressSettings, longest_step_mm: float, friction: float) -> NewtonSettings:
+def _newton_settings(settings: PressSettings, longest_step_mm: float) -> NewtonSettings:
     """Tolerances of each step, tight enough for the bound on SED, and persistence about a small body."""
     newton = settings.newton
     if np.isfinite(longest_step_mm):
         least_mm = PENETRATION_PER_STEP * longest_step_mm
-        most = newton.most_iterations * (1 if friction == 0.0 else RENEWED)
+        most = SMALL_BODY_STEPS * newton.most_iterations
         newton = replace(newton, persistent=True, most_iterations=most, least_penetration_mm=least_mm)
     if settings.sed_tolerance is None:
         return newton
