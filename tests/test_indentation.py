@@ -286,6 +286,6 @@ def test_a_body_narrower_than_an_element_is_refused_before_it_is_pressed():
     coarse = grading_about(Sphere(287.0), "quick", 17.37)
     with pytest.raises(InputError, match=r"at most 0.0333333 mm, .*: got 0.45 mm"):
         touch_of(Fingertip(), FlatPunch(0.1, 0.01), grading=coarse)
-    with pytest.raises(InputError, match=r"got 0.05 mm; give a finer grading or a wider body"):
+    with pytest.raises(InputError, match=r"got 0.05 mm; give a finer grading or a wider body than 0.1 mm\."):
         touch_of(Fingertip(), FlatPunch(0.1, 0.01))
     touch_of(Fingertip(), FlatPunch(0.2, 0.01))

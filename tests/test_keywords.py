@@ -109,6 +109,8 @@ def test_editors_see_every_name():
         (lambda: fp.Grating(period_mm=0.0), "period_mm must be greater than 0 [mm]: got 0.0."),
         (lambda: fp.indent(fp.Fingertip(), fp.Sphere(), resolutoin="quick"), "did you mean resolution?"),
         (lambda: fp.touch_of(fp.Fingertip(), fp.Sphere(), tilt=3.0), "did you mean tilt_deg?"),
+        (lambda: fp.Population.grid(dens=3), "Population.grid has no dens: did you mean density_per_cm2?"),
+        (lambda: fp.Population.grid(zzz=3), "Population.grid has density_per_cm2, rows, columns"),
         (lambda: fp.RampAndHold(depth=1.0), "RampAndHold has no depth: did you mean depth_mm?"),
         (lambda: fp.sine(0.8, 0.1, 20.0, cycels=3), "sine has no cycels: did you mean cycles?"),
         (lambda: fp.Fingertip(lenght_mm=30.0), "Fingertip has no lenght_mm: did you mean length_mm?"),

@@ -460,7 +460,7 @@ def test_the_example_runs_as_it_is_and_is_never_overwritten(call):
     status, printed, error = call("check", "mine/touch.yaml")
     assert (status, error) == (0, "")
     assert re.search(r"\d+ nodes, \d+ elements, 10 steps", printed)
-    assert re.search(r"about \d+ s on two cores and \d+ MB", printed)
+    assert re.search(r"about \d+ s on two idle cores and \d+ MB", printed)
     assert sorted(path.name for path in Path("mine").iterdir()) == [schemas.TOUCH_SCHEMA, "touch.yaml"]
 
 

@@ -11,6 +11,7 @@ from PIL import Image
 
 import fingerpad as fp
 from fingerpad.cli import main
+from fingerpad.core.progress import Lines
 from fingerpad.core.signals import ResponseMap, SpikeTrains
 from fingerpad.export import view
 from fingerpad.export.dataset import read_touch, touch_dataset, write_touch
@@ -93,7 +94,11 @@ def test_pictures_and_films_are_written(data, tmp_path):
     assert save_view(tmp_path / "deep" / "a.png", data, time_ms=30.0) == (tmp_path / "deep" / "a.png",)
     with Image.open(tmp_path / "deep" / "a.png") as picture:
         assert picture.size[0] > 1200
-    save_view(tmp_path / "a.gif", data, field="pressure", frames=3)
+    said: list[str] = []
+    told = Lines(said.append, every_s=0.0)
+    save_view(tmp_path / "a.gif", data, field="pressure", frames=3, progress=told)
+    assert said[-1].startswith("pictures: 3 of 3")
+    assert any(line.startswith("pictures: 1 of 3") for line in said)
     with Image.open(tmp_path / "a.gif") as film:
         assert film.n_frames == 3
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.gif", "deep"]

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from fingerpad.cli.options import integer_option, number_option
-from fingerpad.cli.running import interruptible
+from fingerpad.cli.running import interruptible, progress
 from fingerpad.core.errors import InputError
 
 
@@ -35,5 +35,5 @@ def view_command(
     if path.is_dir():
         raise InputError(f"--out must be a file: {path} is a folder.")
     with interruptible("Nothing was written."):
-        (written,) = save_view(path, result, field=field, time_ms=time, frames=frames)
+        (written,) = save_view(path, result, field=field, time_ms=time, frames=frames, progress=progress())
     typer.echo(f"Open: {written}")

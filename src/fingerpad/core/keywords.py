@@ -19,6 +19,9 @@ _Made = TypeVar("_Made")
 _CLOSE = 0.6
 """Similarity of two names from which one is taken for the other, of `difflib`."""
 
+_SHORTEST_STEM = 3
+"""Letters from which the beginning of a name is taken for it."""
+
 
 def did_you_mean(wrong: str, known: Collection[str], owner: str = "") -> str:
     """Name the known word that is closest to a wrong one, or all of them.
@@ -47,6 +50,7 @@ def closest(wrong: Any, known: Collection[str]) -> str | None:
     names = [name for name in known if isinstance(name, str)]
     # A name without its unit, such as `depth`, means the first unit that is known, not the most similar one.
     near = [name for name in names if wrong and name.startswith(f"{wrong}_")]
+    near = near or [name for name in names if len(wrong) >= _SHORTEST_STEM and name.startswith(wrong)]
     near = near or difflib.get_close_matches(wrong, names, n=1, cutoff=_CLOSE)
     return near[0] if near else None
 
@@ -77,7 +81,7 @@ def known_keywords(function: Callable[_Given, _Made]) -> Callable[_Given, _Made]
     Traceback (most recent call last):
     fingerpad.core.errors.InputError: area_mm2 has no heigth_mm: did you mean height_mm?
     """
-    names = tuple(inspect.signature(function).parameters)
+    names = tuple(name for name in inspect.signature(function).parameters if name != "cls")
     owner = function.__qualname__.rpartition("<locals>.")[2]
 
     @wraps(function)

@@ -13,7 +13,7 @@ import json
 import os
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
@@ -33,6 +33,7 @@ from scipy.spatial import cKDTree
 from fingerpad.core.checks import FloatArray, finite, instance, one_of, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
+from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.export.dataset import check_touch, read_touch, spike_trains
 from fingerpad.report.style import BLACK, BLUE, STYLE, new_figure, say_nothing_to_draw
 from fingerpad.report.touch import BONE, DECADES, SKIN
@@ -79,6 +80,7 @@ def save_view(
     field: str = "sed",
     time_ms: float | None = None,
     frames: int = 40,
+    progress: Progress | None = None,
 ) -> tuple[Path, ...]:
     """Draw a touch in three dimensions: a picture at one time, or a film.
 
@@ -95,6 +97,8 @@ def save_view(
         Time of a picture; by default that of the largest depth. [ms]
     frames : int
         Number of pictures of a film. They follow the steps of the press, which are short where much happens.
+    progress : Progress, optional
+        Shown how many pictures of a film are drawn, such as `fp.notebook_progress()`.
 
     Returns
     -------
@@ -142,9 +146,17 @@ def save_view(
     steps = np.linspace(0.0, times.size - 1.0, frames)
     shown = np.interp(steps, np.arange(times.size), times)
     view.checked(float(times[0]))
-    pictures = (Image.open(io.BytesIO(view.png(float(time)))).convert("RGB") for time in shown)
-    write_atomically(path, _gif(pictures) if path.suffix.lower() == ".gif" else _mp4(pictures))
+    as_film = _gif if path.suffix.lower() == ".gif" else _mp4
+    with (progress or NoProgress()).stage("pictures", frames) as advance:
+        write_atomically(path, as_film(_pictures(view, shown.tolist(), advance)))
     return (path,)
+
+
+def _pictures(view: _View, times_ms: list[float], advance: Callable[[], None]) -> Iterator[Image.Image]:
+    """Draw the pictures of a film one after the other."""
+    for time_ms in times_ms:
+        yield Image.open(io.BytesIO(view.png(time_ms))).convert("RGB")
+        advance()
 
 
 def require_pyvista() -> None:

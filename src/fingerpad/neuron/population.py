@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array, not_negative, pair, positive, whole
 from fingerpad.core.errors import InputError, shown
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.layouts import MOST_RECEPTORS, Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import ResponseMap, SedTraces, Skin, traces_below
@@ -149,6 +150,7 @@ class Population:
         return len(self.positions_mm)
 
     @classmethod
+    @known_keywords
     def of_layout(
         cls,
         layout: Layout,
@@ -190,6 +192,7 @@ class Population:
         return cls(positions, layout.pitch_mm, afferent or Afferent(), factors, layout.places_mm, ends)
 
     @classmethod
+    @known_keywords
     def grid(
         cls,
         density_per_cm2: float = psychophysics.RECEPTOR_DENSITY.value,

@@ -177,7 +177,7 @@ class Touch(metaclass=KnownKeywords):
             raise InputError(
                 f"grading must have elements of at most {largest_mm:g} mm, because the "
                 f"{type(self.indenter).__name__} would go between the nodes: got {size_mm:g} mm; "
-                "give a finer grading or a wider body."
+                f"give a finer grading or a wider body than {2 * self.indenter.half_width_mm:g} mm."
             )
         if size_mm > narrowest_mm / FEWEST_ACROSS_GROOVE:
             raise InputError(
@@ -304,8 +304,6 @@ def touch_of(
         Mesh to use instead of the one that `resolution` grades about the indenter.
     tilt_deg : float
         Rotation of the indenter about z, see `Touch`. [degrees]
-    friction : float
-        Coulomb's coefficient between skin and indenter; the paper mentions none.
     spin_deg : float
         Rotation of the indenter about its direction of pressing, see `Touch`. Without a `grading` both halves
         of the finger are meshed if the turned indenter is not its own mirror image. [degrees]
@@ -351,6 +349,7 @@ def indent(
     whole: bool = False,
     times_ms: Sequence[float] = (),
     progress: Progress | None = None,
+    friction: float = 0.0,
 ) -> SkinResponse:
     """Press an indenter into a finger and return the response of the skin.
 
@@ -383,6 +382,8 @@ def indent(
         choose. [ms]
     progress : Progress, optional
         Shown how far the press is, such as `fp.notebook_progress()`.
+    friction : float
+        Coulomb's coefficient between skin and indenter; the paper mentions none.
 
     Returns
     -------
@@ -404,8 +405,9 @@ def indent(
     0.3 mm deep
     """
     touch = touch_of(
-        finger, indenter, stimulus, materials, resolution, at_mm, settings=settings, times_ms=times_ms
-    )
+        finger, indenter, stimulus, materials, resolution, at_mm, settings=settings, friction=friction,
+        times_ms=times_ms,
+    )  # fmt: skip
     if progress is not None and not callable(getattr(progress, "stage", None)):
         raise InputError(
             f"progress must have a method stage, as fp.notebook_progress() has: got {shown(progress)}."

@@ -48,7 +48,7 @@ class PressEstimate:
         """The estimate in words."""
         return (
             f"The touch is possible: {self.nodes} nodes, {self.elements} elements, {self.steps} steps.",
-            f"A press will take about {self.time_s:.0f} s on two cores and {self.memory_mb:.0f} MB.",
+            f"A press will take about {self.time_s:.0f} s on two idle cores and {self.memory_mb:.0f} MB.",
         )
 
 
