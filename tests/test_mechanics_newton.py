@@ -135,7 +135,7 @@ def test_a_search_about_a_small_body_may_take_more_newton_steps(monkeypatch):
         MOTION,
         PressSettings(1, 1, few),
         friction=0.5,
-        longest_step_mm=0.2,
+        finest_mm=0.08,
     )
     assert small_body().force_mn[-1] > 0.0
     monkeypatch.setattr("fingerpad.mechanics.press.SMALL_BODY_STEPS", 1)

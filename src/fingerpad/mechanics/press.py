@@ -75,8 +75,12 @@ MOST_CONTINUED = 4.0
 SAME_TIME = 1e-9
 """Times closer than this, over the end of the motion, are one."""
 
-PENETRATION_PER_STEP = 0.04
-"""Penetration accepted about a small body, over its longest step: a tenth of its smallest elements."""
+LONGEST_SLIDING_STEP, LONGEST_RUBBED_STEP = 1.0, 2.5
+"""Largest advance of a small body in one step, over its smallest elements, without and with friction. In
+longer steps without friction, skin at the rim of a punch of 1 mm slid off it where shorter ones hold it."""
+
+SMALL_BODY_PENETRATION = 0.1
+"""Penetration accepted about a small body, over its smallest elements."""
 
 
 SMALL_BODY_PENALTY = 4.0
@@ -260,7 +264,7 @@ class _Press:
     solver: LinearSolver
     newton: NewtonSettings
     watched: Watched
-    longest_step_mm: float = np.inf
+    finest_mm: float = np.inf
     newton_steps: int = 0
 
     def contact_at(self, time_ms: float) -> Contact:
@@ -365,7 +369,8 @@ class _Press:
         if self.stimulus.by_force:
             return 1
         before_mm, after_mm = self.stimulus.prescribed_at([begin_ms, end_ms])
-        return max(1, int(np.ceil(abs(after_mm - before_mm) / self.longest_step_mm - 1e-9)))
+        longest = LONGEST_RUBBED_STEP if self.contact.friction > 0.0 else LONGEST_SLIDING_STEP
+        return max(1, int(np.ceil(abs(after_mm - before_mm) / (longest * self.finest_mm) - 1e-9)))
 
     def continued(self, start: _Moment, target_ms: float) -> float:
         """Advance of the indenter in a step over that in the step before: how far the skin is expected to go.
@@ -451,7 +456,7 @@ class _Press:
     def is_sharp(self) -> bool:
         """Whether the indenter is small or has an edge, round which skin slides."""
         body = self.contact.indenter
-        return np.isfinite(self.longest_step_mm) or body.rim_mm is not None or body.edge_reach_mm > 0.0
+        return np.isfinite(self.finest_mm) or body.rim_mm is not None or body.edge_reach_mm > 0.0
 
 
 def press(
@@ -464,7 +469,7 @@ def press(
     deepest_mm: float = np.inf,
     watched: np.ndarray | None = None,
     friction: float = 0.0,
-    longest_step_mm: float = np.inf,
+    finest_mm: float = np.inf,
 ) -> Deformation:
     """Solve a whole ramp and hold.
 
@@ -488,8 +493,9 @@ def press(
         Elements whose stress and strain are kept over time; all by default.
     friction : float
         Coulomb's coefficient between skin and indenter.
-    longest_step_mm : float
-        Largest change of a prescribed depth in one step: further, a small body may slip between nodes. [mm]
+    finest_mm : float
+        Size of the smallest elements about a small body or a sharp edge, which limits steps and penetration;
+        infinite about others. [mm]
 
     Returns
     -------
@@ -512,7 +518,7 @@ def press(
     undeformed = placement.to_local(mesh.nodes_mm[mesh.skin_nodes], depth_mm=0.0)
     candidates = indenter.may_touch(undeformed) & ~np.isin(mesh.skin_nodes, mesh.fixed_nodes)
     nodes, area_mm2 = mesh.skin_nodes[candidates], mesh.skin_area_mm2[candidates]
-    penalty = PENALTY_KPA_PER_MM * (SMALL_BODY_PENALTY if np.isfinite(longest_step_mm) else 1.0)
+    penalty = PENALTY_KPA_PER_MM * (SMALL_BODY_PENALTY if np.isfinite(finest_mm) else 1.0)
     contact = Contact(indenter, placement, nodes, area_mm2, penalty, check_friction(friction, indenter))
     gripped = contact.nodes if indenter.grips else NO_NODES
     free = free_degrees_of_freedom(len(mesh.nodes_mm), mesh.fixed_nodes, mesh.symmetry_nodes, gripped)
@@ -524,8 +530,8 @@ def press(
 
     chosen = np.arange(len(mesh.elements)) if watched is None else watched
     follow = Watched(chosen, mesh.nodes_mm, mesh.elements[chosen], mesh.layer[chosen], table)
-    newton = _newton_settings(settings, longest_step_mm)
-    job = _Press(body, contact, stimulus, solver, newton, follow, longest_step_mm)
+    newton = _newton_settings(settings, finest_mm)
+    job = _Press(body, contact, stimulus, solver, newton, follow, finest_mm)
     moment = job.unloaded()
     reached, slips, values = [], [], [moment.fields.values]
     planned_ms = settings.steps_ms(stimulus)
@@ -615,11 +621,11 @@ def _check_bone(mesh: Mesh, indenter: Indenter, placement: Placement, stimulus: 
         )
 
 
-def _newton_settings(settings: PressSettings, longest_step_mm: float) -> NewtonSettings:
+def _newton_settings(settings: PressSettings, finest_mm: float) -> NewtonSettings:
     """Tolerances of each step, tight enough for the bound on SED, and persistence about a small body."""
     newton = settings.newton
-    if np.isfinite(longest_step_mm):
-        least_mm = PENETRATION_PER_STEP * longest_step_mm
+    if np.isfinite(finest_mm):
+        least_mm = SMALL_BODY_PENETRATION * finest_mm
         most = SMALL_BODY_STEPS * newton.most_iterations
         newton = replace(newton, persistent=True, most_iterations=most, least_penetration_mm=least_mm)
     if settings.sed_tolerance is None:

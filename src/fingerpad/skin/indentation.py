@@ -41,9 +41,6 @@ CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
 STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
 """Steps in ramp and hold of each resolution."""
 
-LONGEST_STEP = 2.5
-"""Largest advance of an indenter in one step, over the size of the smallest elements in strips about it."""
-
 LARGEST_TILT_DEG = 45.0
 
 FEWEST_ACROSS_BODY = 3
@@ -246,7 +243,7 @@ class Touch(metaclass=KnownKeywords):
         with announce_compilation(KERNELS), compiled_threads(threads), threadpool_limits(limits=1):
             return press(
                 self.mesh, self.tissues.layers, self.body, self.placement, self.stimulus, self.settings,
-                self.deepest_mm, watched, self.friction, LONGEST_STEP * self.grading.finest_strip_mm,
+                self.deepest_mm, watched, self.friction, self.grading.finest_strip_mm,
             )  # fmt: skip
 
     @property
