@@ -56,10 +56,13 @@ def test_skin_that_slips_past_the_indenter_is_no_result():
         contact = SimpleNamespace(force_mn=np.array([[0.0, force_mn, 0.0]]))
         return SimpleNamespace(depth_mm=depth_mm, contact=contact, was_shifted=was_shifted)
 
-    job = SimpleNamespace(stimulus=SimpleNamespace(stays=True))
+    placement = SimpleNamespace(axis=np.array([0.0, 1.0, 0.0]))
+    job = SimpleNamespace(stimulus=SimpleNamespace(stays=True), contact=SimpleNamespace(placement=placement))
     start = SimpleNamespace(found=state(1.0, 20.0))
     with pytest.raises(ConvergenceError, match="slips past the indenter: its force falls from 20 to 5 mN"):
         _Press.check_that_it_holds(job, start, state(1.1, 5.0, was_shifted=True))
+    with pytest.raises(ConvergenceError, match="its force falls from 20 to 0 mN"):
+        _Press.check_that_it_holds(job, start, state(1.1, 0.0))
     _Press.check_that_it_holds(job, start, state(1.1, 5.0))
     _Press.check_that_it_holds(job, start, state(0.9, 5.0, was_shifted=True))
     _Press.check_that_it_holds(job, start, state(1.1, 21.0, was_shifted=True))

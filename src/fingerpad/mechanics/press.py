@@ -335,20 +335,18 @@ class _Press:
         return self.step(start, target_ms, persistent=True)
 
     def check_that_it_holds(self, start: _Moment, found: Equilibrium) -> None:
-        """Refuse a step with a shifted tangent after which less force drives the indenter deeper.
+        """Refuse a step after which no force, or with a shifted tangent less, drives the indenter deeper.
 
-        A shift leads through an unstable state, beyond which skin may lie beside or behind the indenter.
+        Skin may lie beside or behind the indenter then. A shift leads through an unstable state.
         """
-        before_mn, after_mn = (
-            float(np.linalg.norm(each.contact.force_mn.sum(axis=0))) for each in (start.found, found)
-        )
+        before, after = (each.contact.force_mn.sum(axis=0) for each in (start.found, found))
+        before_mn, after_mn = float(np.linalg.norm(before)), float(np.linalg.norm(after))
+        axis = self.contact.placement.axis
         deeper = found.depth_mm > start.found.depth_mm
-        if (
-            found.was_shifted
-            and self.stimulus.stays
-            and deeper
-            and after_mn < (1.0 - LARGEST_DROP) * before_mn
-        ):
+        # Skin beside the indenter may press on its sides.
+        is_lost = after @ axis <= SMALLEST_FORCE_MN < before @ axis
+        drops = found.was_shifted and after_mn < (1.0 - LARGEST_DROP) * before_mn
+        if self.stimulus.stays and deeper and (is_lost or drops):
             raise ConvergenceError(
                 f"The skin slips past the indenter: its force falls from {before_mn:.3g} to {after_mn:.3g} "
                 "mN as it advances."
