@@ -59,6 +59,36 @@ def test_a_signal_ends_everything_at_once_with_a_sentence(
         program.communicate()
 
 
+def test_a_worker_that_is_just_starting_ignores_ctrl_c(tmp_path: Path) -> None:
+    """Else it might write Python's own traceback before its parent ends it."""
+    script = (
+        "import time\n"
+        "from fingerpad.core.engine import Processes\n"
+        "def work(item, threads):\n"
+        "    return item\n"
+        "if __name__ == '__main__':\n"
+        "    print(sum(outcome() for _, outcome in Processes(2).map(work, [1, 2])))\n"
+        "else:\n"
+        "    print('starts', flush=True)\n"
+        "    time.sleep(1)\n"
+    )
+    (tmp_path / "starting.py").write_text(script, encoding="utf-8")
+    command = [sys.executable, "starting.py"]
+    pipe = subprocess.PIPE
+    program = subprocess.Popen(command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True)
+    try:
+        assert program.stdout is not None
+        assert program.stdout.readline() == "starts\n"
+        for worker in descendants(program):
+            worker.send_signal(signal.SIGINT)
+        printed, said = program.communicate(timeout=LIMIT_S)
+        assert (program.returncode, said) == (0, "")
+        assert printed.splitlines()[-1] == "3"
+    finally:
+        program.kill()
+        program.communicate()
+
+
 def test_a_second_signal_ends_the_process_whatever_it_does(tmp_path: Path) -> None:
     script = (
         "import time\n"

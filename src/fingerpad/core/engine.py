@@ -110,7 +110,8 @@ class Processes:
             while True:
                 # A few wait in line, so that no process is idle, and not all: there may be a million.
                 for _, number in zip(range(4 * processes - len(under_way)), numbers, strict=False):
-                    under_way[pool.submit(work, items[number], threads)] = number
+                    with _ctrl_c_later():
+                        under_way[pool.submit(work, items[number], threads)] = number
                 if not under_way:
                     break
                 done, _ = wait(under_way, return_when=FIRST_COMPLETED)
@@ -135,6 +136,19 @@ def _workers(processes: int) -> Iterator[ProcessPoolExecutor]:
             _kill_workers(pool)
             raise
         raise
+
+
+@contextmanager
+def _ctrl_c_later() -> Iterator[None]:
+    """Let Ctrl-C wait for the end of the block: a process that starts within it never receives it."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _result(future: Future[Any]) -> Any:
