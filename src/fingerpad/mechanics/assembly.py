@@ -61,6 +61,12 @@ class Sparsity:
         diagonal = np.flatnonzero(np.repeat(np.arange(n_nodes), np.diff(row_start)) == column)
         return cls(row_start, column, position, diagonal, coloured_chunks(elements, n_nodes))
 
+    def blocks_of(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Block of each pair of nodes that share an element; both broadcast against each other."""
+        n_nodes = len(self.row_start) - 1
+        pairs = np.repeat(np.arange(n_nodes), np.diff(self.row_start)) * n_nodes + self.column
+        return np.searchsorted(pairs, rows * n_nodes + columns)
+
     def entries(self, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Row and column of every entry (n_blocks, 3, 3) among the free degrees of freedom, -1 if held."""
         n_nodes = len(self.row_start) - 1

@@ -116,8 +116,8 @@ class Load:
         Pressures at the start of the step, for a mixed method. [kPa]
     reached : Reached, optional
         Largest force and depth before the step.
-    pressed_before : bool array (n_candidates,), optional
-        Nodes that were pressed before the step.
+    pressed_before : bool array (n_points,), optional
+        Points that were pressed before the step.
     """
 
     contact: Contact
@@ -163,7 +163,7 @@ class Lagging:
 
     Parameters
     ----------
-    multipliers_mn : array (n_candidates,)
+    multipliers_mn : array (n_points,)
         Normal contact forces of earlier augmentations. [mN]
     anchors : Anchors, optional
         Where the skin holds on to the indenter, and how strongly; without friction nothing.
@@ -183,11 +183,11 @@ class Configuration:
         Displacements. [mm]
     depth_mm : float
         How far the indenter has advanced. [mm]
-    positions_mm : array (n_candidates, 3)
-        Where the candidates for contact are. [mm]
+    positions_mm : array (n_points, 3)
+        Where the points are that may touch. [mm]
     contact : ContactState
         Contact there.
-    contact_stiffness : array (n_candidates, 3, 3)
+    contact_stiffness : array (n_points, 3, 3)
         Its part of the tangent. [mN/mm]
     potential_uj : float
         Incremental potential, NaN if an element is turned inside out. [µJ]
@@ -279,7 +279,7 @@ def evaluate(
     curved : bool
         Whether the tangent may have the indenter's curvature, near the solution.
     closed : bool
-        Whether nodes that were pressed before the step resist in the tangent even where they are free now.
+        Whether points that were pressed before the step resist in the tangent even where they are free now.
 
     Returns
     -------
@@ -297,10 +297,10 @@ def evaluate(
         if pressure_kpa is not None and has_tangent:
             change = pressure_kpa - pressures.pressure_kpa
             exchange_pressure(mesh, displacement_mm, change, body.sparsity, blocks)
-    positions = mesh.nodes_mm[contact.nodes] + displacement_mm[contact.nodes]
+    positions = contact.points_mm(mesh.nodes_mm + displacement_mm)
     touch = contact.state(positions, depth_mm, lagging.multipliers_mn, lagging.anchors, before)
     np.negative(force, out=force)
-    force[contact.nodes] += touch.force_mn
+    contact.add_to_nodes(force, touch.force_mn)
     residual = force.ravel()[body.free]
     pressed = float(np.linalg.norm(touch.force_mn.sum(axis=0)))
     # Of a folded element forces were left half summed, and could look balanced.
@@ -313,7 +313,7 @@ def evaluate(
     if closed and load.pressed_before is not None:
         stiffness = stiffness + contact.closed_stiffness(touch, load.pressed_before)
     if has_tangent:
-        blocks[body.sparsity.diagonal[contact.nodes]] += stiffness
+        contact.add_to_tangent(blocks, body.sparsity.diagonal, stiffness)
     return Configuration(
         displacement_mm=displacement_mm,
         depth_mm=depth_mm,

@@ -1,19 +1,21 @@
-"""Contact of skin nodes with a rigid indenter: penalty with augmented multipliers, frictionless or not.
+"""Contact of skin with a rigid indenter: penalty with augmented multipliers, frictionless or not.
 
-A node that penetrates by -g is pushed out along the indenter's normal n with
+Contact is found at points: nodes of the skin, and about small bodies middles of its facets and edges
+(`fingerpad.mechanics.middles`). A point that penetrates by -g is pushed out along the indenter's normal n
+with
 
     lambda = <lambda_k - epsilon A g>,   f = lambda n,   potential = lambda² / (2 epsilon A),
 
-A being the node's tributary area in the undeformed skin, lambda_k its multiplier from earlier augmentations
+A being the point's tributary area in the undeformed skin, lambda_k its multiplier from earlier augmentations
 and <> the positive part (Laursen & Simo 1993). The exact stiffness is epsilon A n n' - lambda dn/dx. Its
-second part, the curvature of the indenter, makes the tangent indefinite while nodes still penetrate deeply,
+second part, the curvature of the indenter, makes the tangent indefinite while points still penetrate deeply,
 so it is taken along only near the solution, where it keeps Newton's method quadratic. Friction adds a
 potential of its own (`fingerpad.mechanics.friction`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,6 +25,7 @@ from fingerpad.core.units import cosine_and_sine
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.motion import STILL, Pose
 from fingerpad.mechanics.friction import Anchors, Approach, Friction, dragged, friction
+from fingerpad.mechanics.middles import Middles
 
 PENALTY_KPA_PER_MM = 15_000.0
 """Contact stiffness per area; skin pressures of 10-100 kPa then penetrate by a few microns. [kPa/mm]"""
@@ -154,15 +157,15 @@ class ContactState:
     Parameters
     ----------
     gap_mm : array (n,)
-        Signed gap of every candidate node. [mm]
+        Signed gap of every point; of a middle, with the sag that it may have. [mm]
     normal : array (n, 3)
-        Outward normal of the indenter at every node.
+        Outward normal of the indenter at every point.
     pressed_mn : array (n,)
-        lambda, the normal force on each node. [mN]
+        lambda, the normal force on each point. [mN]
     force_mn : array (n, 3)
-        Whole force of the indenter on each node: lambda n and friction. [mN]
+        Whole force of the indenter on each point: lambda n and friction. [mN]
     stiffness : array (n, 3, 3)
-        epsilon A n n' of the nodes in contact and that of friction, without the curvature of the indenter.
+        epsilon A n n' of the points in contact and that of friction, without the curvature of the indenter.
         [mN/mm]
     potential : float
         Energy of the penalty and of friction. [µJ]
@@ -180,19 +183,19 @@ class ContactState:
 
     @property
     def friction_mn(self) -> FloatArray:
-        """Friction on each node, (n, 3). [mN]"""
+        """Friction on each point, (n, 3). [mN]"""
         return self.force_mn - self.pressed_mn[:, None] * self.normal
 
     @property
     def penetration_mm(self) -> float:
-        """Deepest penetration of any node. [mm]"""
+        """Deepest penetration of any point. [mm]"""
         return float(max(0.0, -self.gap_mm.min()))
 
     @property
     def misfit_mm(self) -> float:
-        """Largest distance from the indenter's surface of a node that penetrates or is pressed. [mm]
+        """Largest distance from the indenter's surface of a point that penetrates or is pressed. [mm]
 
-        A pressed node may also hover above the surface: while the skin relaxes, its multiplier is too large.
+        A pressed point may also hover above the surface: while the skin relaxes, its multiplier is too large.
         """
         touching = (self.gap_mm < 0.0) | (self.pressed_mn > 0.0)
         return float(np.abs(self.gap_mm[touching]).max(initial=0.0))
@@ -200,7 +203,7 @@ class ContactState:
 
 @dataclass(frozen=True)
 class Contact:
-    """Skin nodes that may touch one placed indenter.
+    """Skin that may touch one placed indenter.
 
     Parameters
     ----------
@@ -208,14 +211,18 @@ class Contact:
         The rigid body.
     placement : Placement
         Where it stands at first touch.
-    nodes : int array (n,)
-        Candidate nodes.
-    area_mm2 : array (n,)
+    nodes : int array (n_nodes,)
+        Candidate nodes, the first of the points.
+    area_mm2 : array (n_nodes,)
         Their tributary areas. [mm²]
     penalty : float
         epsilon. [kPa/mm]
     friction : float
         mu, Coulomb's coefficient.
+    stick_penalty : float
+        Stiffness per area of skin that sticks. [kPa/mm]
+    middles : Middles
+        The other points; none by default.
     """
 
     indenter: Indenter
@@ -224,11 +231,50 @@ class Contact:
     area_mm2: FloatArray
     penalty: float = PENALTY_KPA_PER_MM
     friction: float = 0.0
+    stick_penalty: float = PENALTY_KPA_PER_MM
+    middles: Middles = field(default_factory=Middles.none)
 
     @property
     def stiffness(self) -> FloatArray:
-        """Penalty of every node, epsilon A, (n,). [mN/mm]"""
-        return self.penalty * self.area_mm2
+        """Penalty of every point, epsilon A, (n,). [mN/mm]"""
+        return self.penalty * self._points_mm2
+
+    @property
+    def stick_stiffness(self) -> FloatArray:
+        """Stiffness of every point that sticks, (n,). [mN/mm]"""
+        return self.stick_penalty * self._points_mm2
+
+    @property
+    def _points_mm2(self) -> FloatArray:
+        return np.concatenate([self.area_mm2, self.middles.area_mm2])
+
+    def points_mm(self, nodes_mm: FloatArray) -> FloatArray:
+        """Points, (n, 3), of a mesh whose nodes are at `nodes_mm` (n_mesh_nodes, 3). [mm]"""
+        return np.concatenate([nodes_mm[self.nodes], nodes_mm[self.middles.corners].mean(axis=1)])
+
+    def add_to_nodes(self, at_nodes: FloatArray, at_points: FloatArray) -> None:
+        """Add values of the points (n, ...) to those of the nodes of the mesh (n_mesh_nodes, ...)."""
+        n_nodes = self.nodes.size
+        at_nodes[self.nodes] += at_points[:n_nodes]
+        self.middles.add_to_nodes(at_nodes, at_points[n_nodes:])
+
+    def on_nodes(self, at_points: FloatArray) -> FloatArray:
+        """Sum values of the points (n, ...) at the candidate nodes, (n_nodes, ...)."""
+        at_nodes = np.zeros((self.nodes.max() + 1, *at_points.shape[1:]))
+        self.add_to_nodes(at_nodes, at_points)
+        return at_nodes[self.nodes]
+
+    def add_to_tangent(self, tangent: np.ndarray, diagonal: np.ndarray, stiffness: FloatArray) -> None:
+        """Add stiffnesses of the points (n, 3, 3) to a tangent; `diagonal` as of `Sparsity`."""
+        n_nodes = self.nodes.size
+        tangent[diagonal[self.nodes]] += stiffness[:n_nodes]
+        self.middles.add_to_tangent(tangent, stiffness[n_nodes:])
+
+    def gap(self, local_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Gap of each point (n,) [mm] and normal (n, 3), in the indenter's frame."""
+        gap, normal = self.indenter.gap(local_mm)
+        n_nodes = self.nodes.size
+        return np.concatenate([gap[:n_nodes], gap[n_nodes:] + self.middles.sag_mm]), normal
 
     def state(
         self,
@@ -238,10 +284,10 @@ class Contact:
         anchors: Anchors | None = None,
         before: Friction | None = None,
     ) -> ContactState:
-        """Contact of the nodes at `positions_mm` (n, 3) with multipliers (n,), with friction if anchored."""
+        """Contact of the points at `positions_mm` (n, 3) with multipliers (n,), with friction if anchored."""
         local = self.placement.to_local(positions_mm, depth_mm)
         rotation = self.placement.rotation
-        gap, local_normal = self.indenter.gap(local)
+        gap, local_normal = self.gap(local)
         normal = local_normal @ rotation.T
         pressed = np.maximum(multipliers_mn - self.stiffness * gap, 0.0)
         active = np.where(pressed > 0.0, self.stiffness, 0.0)
@@ -255,7 +301,7 @@ class Contact:
         )
         if anchors is None:
             return state
-        rubbed = friction(anchors, local, self.stiffness, before)
+        rubbed = friction(anchors, local, self.stick_stiffness, before)
         return replace(
             state,
             force_mn=state.force_mn + rubbed.force_mn @ rotation.T,
@@ -265,22 +311,23 @@ class Contact:
         )
 
     def free_anchors(self, skin_mm: FloatArray) -> Anchors:
-        """Anchors of the candidate nodes at rest, `skin_mm` (n, 3), before anything touches them."""
+        """Anchors of the points at rest, `skin_mm` (n, 3), before anything touches them."""
         local_mm = self.placement.to_local(skin_mm, depth_mm=0.0)
         return Anchors.none_held(Approach.at_rest(local_mm, skin_mm, self.placement.tip_mm(0.0)))
 
     def renewed(self, start: Anchors, state: ContactState, depth_mm: float) -> Anchors:
         """Anchors with the normals and limits of the contact found.
 
-        A node that was free at the start of the step is anchored where it would have met the indenter, had it
-        gone on as in the step before; if it would not have met it, where it would be at the end of the step.
-        Both do not depend on the search: an anchor that followed its node would let it creep at each renewal.
+        A point that was free at the start of the step is anchored where it would have met the indenter, had
+        it gone on as in the step before; if it would not have met it, where it would be at the end of the
+        step. Both do not depend on the search: an anchor that followed its point would let it creep at each
+        renewal.
         """
         expected_mm = start.approach.expected_mm(self.placement.tip_mm(depth_mm))
         before = start.approach.local_mm
         way = self.placement.to_local(expected_mm, depth_mm) - before
-        gap_before = np.maximum(self.indenter.gap(before)[0], 0.0)
-        gap_after = self.indenter.gap(before + way)[0]
+        gap_before = np.maximum(self.gap(before)[0], 0.0)
+        gap_after = self.gap(before + way)[0]
         met = gap_after < 0.0
         share = np.where(met, gap_before / np.where(met, gap_before - gap_after, 1.0), 1.0)
         first_touch = before + share[:, None] * way
@@ -297,7 +344,7 @@ class Contact:
     ) -> Anchors:
         """Anchors with which the next step starts."""
         local = self.placement.to_local(positions_mm, depth_mm)
-        after = dragged(anchors, local, self.stiffness, state.pressed_mn > 0.0)
+        after = dragged(anchors, local, self.stick_stiffness, state.pressed_mn > 0.0)
         approach = anchors.approach.after(local, positions_mm, self.placement.tip_mm(depth_mm))
         return replace(after, approach=approach)
 
@@ -319,7 +366,7 @@ class Contact:
         return stiffness
 
     def closed_stiffness(self, state: ContactState, closed: np.ndarray) -> FloatArray:
-        """Penalty of the `closed` nodes that carry no force, as if they were pressed, (n, 3, 3). [mN/mm]"""
+        """Penalty of the `closed` points that carry no force, as if they were pressed, (n, 3, 3). [mN/mm]"""
         apart = np.where(closed & (state.pressed_mn == 0.0), self.stiffness, 0.0)
         return apart[:, None, None] * state.normal[:, :, None] * state.normal[:, None, :]
 

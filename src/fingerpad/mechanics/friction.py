@@ -8,8 +8,8 @@ from there, at x, costs
            = L (s - L / (2 k))    beyond             (it slips),
     f = -phi'(s) g / s,           |f| = min(k s, L) <= L = mu lambda,
 
-with the stiffness k = epsilon A of the normal contact, so that a sticking node moves by a micron or two. At
-the end of a step the anchor of a node that slipped is moved until |f| = k s (return mapping).
+with the stiffness k of skin that sticks, which moves by a few microns. At the end of a step the anchor of a
+node that slipped is moved until |f| = k s (return mapping).
 
 Coulomb's law has no potential, since the limit L depends on the normal force lambda: its tangent is not
 symmetric. Here L, n and a stay as they are while Newton's method runs, which keeps the tangent symmetric and

@@ -128,7 +128,7 @@ class Equilibrium:
         How far the indenter has advanced since first touch. [mm]
     contact : ContactState
         Contact there.
-    multipliers_mn : array (n_candidates,)
+    multipliers_mn : array (n_points,)
         Contact multipliers to start the next step from. [mN]
     iterations : int
         Newton steps taken.
@@ -136,8 +136,8 @@ class Equilibrium:
         Reaction of the supports.
     anchors : Anchors, optional
         Where the skin holds on to the indenter when the next step starts.
-    slid_mm : array (n_candidates,), optional
-        How far each node slid over the indenter in this step, with friction. [mm]
+    slid_mm : array (n_points,), optional
+        How far each point slid over the indenter in this step, with friction. [mm]
     rubbed_uj : float
         Energy that friction has turned into heat in this step. [µJ]
     pressure_kpa : array (n_elements,), optional
@@ -180,7 +180,7 @@ def find_equilibrium(
         Keeps its preconditioner from call to call.
     guess_mm : array (n_nodes, 3)
         Displacements to start from; fixed nodes must be at their place. [mm]
-    multipliers_mn : array (n_candidates,)
+    multipliers_mn : array (n_points,)
         Contact multipliers to start from. [mN]
     settings : NewtonSettings
         When to stop.
@@ -341,7 +341,7 @@ class _Search:
         raise NotPositiveDefiniteError
 
     def is_set_free(self, now: Configuration) -> bool:
-        """Whether a node that was pressed before the step carries no force now."""
+        """Whether a point that was pressed before the step carries no force now."""
         before = self.load.pressed_before
         return before is not None and bool((before & (now.contact.pressed_mn == 0.0)).any())
 
@@ -439,7 +439,7 @@ class _Search:
         """
         axis, free = self.load.contact.placement.axis, self.body.free
         coupling = np.zeros_like(start.displacement_mm)
-        coupling[self.load.contact.nodes] = -start.contact_stiffness @ axis
+        self.load.contact.add_to_nodes(coupling, -start.contact_stiffness @ axis)
         b = coupling.ravel()[free]
         c = float(axis @ start.contact_stiffness.sum(axis=0) @ axis)
         x = self.solver.solve(self.blocks, start.residual_mn, FORCING_RANGE[1])

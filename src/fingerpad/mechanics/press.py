@@ -30,7 +30,7 @@ from fingerpad.mechanics.balance import (
     relaxed_work,
 )
 from fingerpad.mechanics.configuration import SMALLEST_FORCE_MN, Balance, Body, Load, Reached
-from fingerpad.mechanics.contact import PENALTY_KPA_PER_MM, Contact, Placement, check_friction
+from fingerpad.mechanics.contact import Contact, Placement, check_friction
 from fingerpad.mechanics.fields import (
     ElementFields,
     FieldState,
@@ -46,6 +46,7 @@ from fingerpad.mechanics.linear import (
     free_degrees_of_freedom,
 )
 from fingerpad.mechanics.materials import Material, MaterialTable
+from fingerpad.mechanics.middles import Middles
 from fingerpad.mechanics.mixed import MIXED_POISSON
 from fingerpad.mechanics.newton import FIRST_DEPTH_MM, Equilibrium, NewtonSettings, find_equilibrium
 from fingerpad.mechanics.skin_contact import SkinContact, skin_contact
@@ -75,17 +76,20 @@ MOST_CONTINUED = 4.0
 SAME_TIME = 1e-9
 """Times closer than this, over the end of the motion, are one."""
 
-LONGEST_SLIDING_STEP, LONGEST_RUBBED_STEP = 1.0, 2.5
-"""Largest advance of a small body in one step, over its smallest elements, without and with friction. In
-longer steps without friction, skin at the rim of a punch of 1 mm slid off it where shorter ones hold it."""
+LONGEST_STEP = 1.0
+"""Largest advance of a small body in one step, over its smallest elements. In longer steps, skin at the rim
+of a punch of 1 mm slid off it where shorter ones hold it."""
 
 SMALL_BODY_PENETRATION = 0.1
 """Penetration accepted about a small body, over its smallest elements."""
 
+SMALL_BODY_SAG = 0.125
+"""Sag of a facet that follows a small body, over its smallest elements, which are as long as its radius."""
 
-SMALL_BODY_PENALTY = 4.0
-"""Penalty of contact about a small body, over that of others: its edge presses the skin with 300 kPa and
-more, which would penetrate by 20 microns. Each augmentation that corrects this sets nodes there free."""
+SMALL_BODY_STIFFNESS_KPA = 20_000.0
+"""Penalty of contact about a small body, times its smallest elements. Such a body presses with 300 kPa and
+more on skin that is stretched. Each augmentation that corrects a penetration sets points there free, so they
+may not penetrate by more than a few percent of these elements. [kPa]"""
 
 SMALL_BODY_STEPS = 3
 """Newton steps of one search about a small body, over those of others: nodes find their place one after the
@@ -238,7 +242,7 @@ class _Moment:
     """The press at one time: what the next step starts from.
 
     `step_mm`, `step_depth_mm` and `advance` are the changes of displacements, of depth and of the prescribed
-    course in the step that ends here. `slip_mm` is how far each candidate node has slid since it touched.
+    course in the step that ends here. `slip_mm` is how far each point has slid since it touched.
     """
 
     time_ms: float
@@ -276,8 +280,8 @@ class _Press:
     def unloaded(self) -> _Moment:
         """Return the moment before the first step."""
         mesh, table = self.body.mesh, self.body.table
-        nowhere, no_force = np.zeros_like(mesh.nodes_mm), np.zeros(self.contact.nodes.size)
-        touch = self.contact.state(mesh.nodes_mm[self.contact.nodes], 0.0, no_force)
+        nowhere, no_force = np.zeros_like(mesh.nodes_mm), np.zeros(self.contact.stiffness.size)
+        touch = self.contact.state(self.contact.points_mm(mesh.nodes_mm), 0.0, no_force)
         rest = Equilibrium(
             nowhere, 0.0, touch, no_force, 0, Balance(np.zeros(3), np.zeros(3), 0.0), self.free_skin()
         )
@@ -292,7 +296,7 @@ class _Press:
         """Skin that does not yet hold on to the indenter, if there is friction."""
         if self.contact.friction == 0.0:
             return None
-        return self.contact.free_anchors(self.body.mesh.nodes_mm[self.contact.nodes])
+        return self.contact.free_anchors(self.contact.points_mm(self.body.mesh.nodes_mm))
 
     def step(self, start: _Moment, target_ms: float, persistent: bool = False) -> _Moment:
         """Solve one step; `start` stays as it is, so a step that fails or is too long can be repeated."""
@@ -367,8 +371,7 @@ class _Press:
         if self.stimulus.by_force:
             return 1
         before_mm, after_mm = self.stimulus.prescribed_at([begin_ms, end_ms])
-        longest = LONGEST_RUBBED_STEP if self.contact.friction > 0.0 else LONGEST_SLIDING_STEP
-        return max(1, int(np.ceil(abs(after_mm - before_mm) / (longest * self.finest_mm) - 1e-9)))
+        return max(1, int(np.ceil(abs(after_mm - before_mm) / (LONGEST_STEP * self.finest_mm) - 1e-9)))
 
     def continued(self, start: _Moment, target_ms: float) -> float:
         """Advance of the indenter in a step over that in the step before: how far the skin is expected to go.
@@ -398,7 +401,7 @@ class _Press:
         spent_uj = lost_uj - last.lost_uj + parts * (found.rubbed_uj - tissue.relaxed_work_uj)
         squeezed = contact_energy(before.gap_mm, before.pressed_mn, now.gap_mm, now.pressed_mn)
         pose = self.stimulus.pose_at(target_ms)
-        skin_mm = (self.body.mesh.nodes_mm + found.displacement_mm)[contact.nodes]
+        skin_mm = contact.points_mm(self.body.mesh.nodes_mm + found.displacement_mm)
         force = contact.placement.generalised_force(now.force_mn, skin_mm, found.depth_mm)
         return Entry(
             time_ms=target_ms,
@@ -516,11 +519,13 @@ def press(
     undeformed = placement.to_local(mesh.nodes_mm[mesh.skin_nodes], depth_mm=0.0)
     candidates = indenter.may_touch(undeformed) & ~np.isin(mesh.skin_nodes, mesh.fixed_nodes)
     nodes, area_mm2 = mesh.skin_nodes[candidates], mesh.skin_area_mm2[candidates]
-    penalty = PENALTY_KPA_PER_MM * (SMALL_BODY_PENALTY if np.isfinite(finest_mm) else 1.0)
-    contact = Contact(indenter, placement, nodes, area_mm2, penalty, check_friction(friction, indenter))
-    gripped = contact.nodes if indenter.grips else NO_NODES
-    free = free_degrees_of_freedom(len(mesh.nodes_mm), mesh.fixed_nodes, mesh.symmetry_nodes, gripped)
     sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
+    contact = Contact(indenter, placement, nodes, area_mm2, friction=check_friction(friction, indenter))
+    if np.isfinite(finest_mm):
+        middles = Middles.of(mesh, sparsity, nodes, SMALL_BODY_SAG * finest_mm)
+        contact = replace(contact, penalty=SMALL_BODY_STIFFNESS_KPA / finest_mm, middles=middles)
+    gripped = nodes if indenter.grips else NO_NODES
+    free = free_degrees_of_freedom(len(mesh.nodes_mm), mesh.fixed_nodes, mesh.symmetry_nodes, gripped)
     poisson = max(materials[layer].poisson for layer in np.unique(mesh.layer))
     body = Body(mesh, table, sparsity, free, is_mixed=poisson > MIXED_POISSON)
     approximate, reason = choose_preconditioner(sparsity, free, mesh, poisson)
@@ -565,11 +570,11 @@ def press(
     displacement = _from_rest(each.displacement_mm for each in found)
     pressed, slip = np.zeros((2, times.size, mesh.skin_nodes.size))
     rubbed, gap = np.zeros((*pressed.shape, 3)), np.full_like(pressed, np.inf)
-    pressed[1:, candidates] = [each.contact.pressed_mn for each in found]
-    slip[1:, candidates] = slips
+    pressed[1:, candidates] = [contact.on_nodes(each.contact.pressed_mn) for each in found]
+    slip[1:, candidates] = [each[: nodes.size] for each in slips]
     if friction > 0.0:
-        rubbed[1:, candidates] = [each.contact.friction_mn for each in found]
-    gap[1:, candidates] = [each.contact.gap_mm for each in found]
+        rubbed[1:, candidates] = [contact.on_nodes(each.contact.friction_mn) for each in found]
+    gap[1:, candidates] = [each.contact.gap_mm[: nodes.size] for each in found]
     e_star_kpa = materials[mesh.layer[0]].contact_modulus_kpa
     return Deformation(
         times_ms=times,
