@@ -91,6 +91,10 @@ SMALL_BODY_STIFFNESS_KPA = 20_000.0
 more on skin that is stretched. Each augmentation that corrects a penetration sets points there free, so they
 may not penetrate by more than a few percent of these elements. [kPa]"""
 
+SMALL_BODY_STICK = 60_000.0
+"""Stiffness per area of skin that sticks to a small body. Softer skin yields by a good part of an element
+under 1 MPa; with a stiffer one the renewal of friction finds no end. [kPa/mm]"""
+
 SMALL_BODY_STEPS = 3
 """Newton steps of one search about a small body, over those of others: nodes find their place one after the
 other, and friction is renewed after each."""
@@ -523,7 +527,8 @@ def press(
     contact = Contact(indenter, placement, nodes, area_mm2, friction=check_friction(friction, indenter))
     if np.isfinite(finest_mm):
         middles = Middles.of(mesh, sparsity, nodes, SMALL_BODY_SAG * finest_mm)
-        contact = replace(contact, penalty=SMALL_BODY_STIFFNESS_KPA / finest_mm, middles=middles)
+        penalty = SMALL_BODY_STIFFNESS_KPA / finest_mm
+        contact = replace(contact, penalty=penalty, stick_penalty=SMALL_BODY_STICK, middles=middles)
     gripped = nodes if indenter.grips else NO_NODES
     free = free_degrees_of_freedom(len(mesh.nodes_mm), mesh.fixed_nodes, mesh.symmetry_nodes, gripped)
     poisson = max(materials[layer].poisson for layer in np.unique(mesh.layer))
