@@ -247,6 +247,7 @@ def test_the_server_listens_on_loopback_alone_and_survives_users(
             each.close()
             while await each.read_message() is not None:
                 pass
+            each.stream.close()  # else it may outlive the loop that would close it
 
     asyncio.run(use())
     with urllib.request.urlopen(address) as page:
@@ -269,7 +270,8 @@ def test_a_page_of_another_origin_is_refused(served: tuple[str, subprocess.Popen
         "Origin": "http://elsewhere.org", "Connection": "Upgrade", "Upgrade": "websocket",
         "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "x" * 22 + "==",
     })  # fmt: skip
-    assert connection.getresponse().status == 403
+    with connection.getresponse() as answer:
+        assert answer.status == 403
     connection.close()
 
 
