@@ -23,12 +23,12 @@ def block(symmetric=False):
     return block_mesh(lines, np.array([0.0, 0.3, 0.8, 1.6]), across, layers=[0, 0, 0], symmetric=symmetric)
 
 
-def contact_of(mesh, sag_mm=0.0, at_mm=(0.0, 0.0, 0.0), friction=0.0):
+def contact_of(mesh, sag_mm=0.0, at_mm=(0.0, 0.0, 0.0)):
     """A ball over the skin of a block whose nodes and middles may all touch."""
     nodes = mesh.skin_nodes
     middles = Middles.of(mesh, Sparsity.of(mesh.elements, len(mesh.nodes_mm)), nodes, sag_mm)
     placement = Placement(np.array(at_mm), np.eye(3))
-    return Contact(BALL, placement, nodes, mesh.skin_area_mm2, friction=friction, middles=middles)
+    return Contact(BALL, placement, nodes, mesh.skin_area_mm2, middles=middles)
 
 
 def rough(mesh, seed=1):

@@ -16,6 +16,7 @@ potential of its own (`fingerpad.mechanics.friction`).
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -244,7 +245,7 @@ class Contact:
         """Stiffness of every point that sticks, (n,). [mN/mm]"""
         return self.stick_penalty * self._points_mm2
 
-    @property
+    @cached_property
     def _points_mm2(self) -> FloatArray:
         return np.concatenate([self.area_mm2, self.middles.area_mm2])
 
