@@ -54,7 +54,7 @@ class SmoothedAggregation:
         self._sparsity, self._free = sparsity, free
         moves = np.zeros((len(nodes_mm), 3))
         moves.ravel()[free] = 1.0
-        first = np.repeat(np.arange(len(nodes_mm)), np.diff(sparsity.row_start))
+        first = sparsity.row
         # Unknowns that are held keep their place in the blocks: their rows and columns have a diagonal only.
         self._kept = moves[first][:, :, None] * moves[sparsity.column][:, None]
         self._held = (1.0 - moves)[:, :, None] * np.eye(3)

@@ -61,24 +61,31 @@ class Sparsity:
         diagonal = np.flatnonzero(np.repeat(np.arange(n_nodes), np.diff(row_start)) == column)
         return cls(row_start, column, position, diagonal, coloured_chunks(elements, n_nodes))
 
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes, which is that of block rows."""
+        return len(self.row_start) - 1
+
+    @property
+    def row(self) -> np.ndarray:
+        """Block row of each block (n_blocks,)."""
+        return np.repeat(np.arange(self.n_nodes), np.diff(self.row_start))
+
     def blocks_of(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Block of each pair of nodes that share an element; both broadcast against each other."""
-        n_nodes = len(self.row_start) - 1
-        pairs = np.repeat(np.arange(n_nodes), np.diff(self.row_start)) * n_nodes + self.column
-        return np.searchsorted(pairs, rows * n_nodes + columns)
+        return np.searchsorted(self.row * self.n_nodes + self.column, rows * self.n_nodes + columns)
 
     def entries(self, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Row and column of every entry (n_blocks, 3, 3) among the free degrees of freedom, -1 if held."""
-        n_nodes = len(self.row_start) - 1
-        number = np.full((n_nodes, 3), -1, dtype=np.int32)
+        number = np.full((self.n_nodes, 3), -1, dtype=np.int32)
         number.ravel()[free] = np.arange(free.size)
+        rows, columns = number[self.row][:, :, None], number[self.column][:, None]
         shape = (self.column.size, 3, 3)
-        row = np.repeat(number, np.diff(self.row_start), axis=0)
-        return np.broadcast_to(row[:, :, None], shape), np.broadcast_to(number[self.column][:, None], shape)
+        return np.broadcast_to(rows, shape), np.broadcast_to(columns, shape)
 
     def matrix(self, blocks: FloatArray) -> sparse.bsr_matrix:
         """Tangent as a block matrix that shares `blocks` (n_blocks, 3, 3)."""
-        size = 3 * (len(self.row_start) - 1)
+        size = 3 * self.n_nodes
         return sparse.bsr_matrix((blocks, self.column, self.row_start), shape=(size, size), copy=False)
 
 

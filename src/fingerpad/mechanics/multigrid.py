@@ -363,7 +363,7 @@ class Multigrid:
             np.linalg.norm(np.diff(skin, axis=0), axis=2).mean(axis=1),
             np.linalg.norm(np.diff(skin, axis=1), axis=2).mean(axis=0),
         )
-        row = np.repeat(np.arange(len(nodes_mm)), np.diff(sparsity.row_start)) // depth
+        row = sparsity.row // depth
         graph = ColumnGraph.of(
             np.unique(row * columns.n_columns + sparsity.column // depth), columns.n_columns
         )
@@ -426,7 +426,7 @@ class Multigrid:
 
     def enter(self, values: FloatArray) -> SingleArray:
         """Vector of this module, flat, of values of the free degrees of freedom (n_free,)."""
-        nodal = np.zeros(3 * (len(self._sparsity.row_start) - 1))
+        nodal = np.zeros(3 * self._sparsity.n_nodes)
         nodal[self._free] = values
         return to_columns(nodal.reshape(-1, 3), self._order, self._depth).ravel()
 

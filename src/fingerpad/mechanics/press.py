@@ -347,14 +347,15 @@ class _Press:
 
         Skin may lie beside or behind the indenter then. A shift leads through an unstable state.
         """
-        before, after = (each.contact.force_mn.sum(axis=0) for each in (start.found, found))
-        before_mn, after_mn = float(np.linalg.norm(before)), float(np.linalg.norm(after))
-        axis = self.contact.placement.axis
         deeper = found.depth_mm > start.found.depth_mm
+        forces_mn = [each.contact.force_mn.sum(axis=0) for each in (start.found, found)]
         # Skin beside the indenter may press on its sides.
-        is_lost = after @ axis <= SMALLEST_FORCE_MN < before @ axis
-        drops = found.was_shifted and after_mn < (1.0 - LARGEST_DROP) * before_mn
+        along_mn = [float(force_mn @ self.contact.placement.axis) for force_mn in forces_mn]
+        whole_mn = [float(np.linalg.norm(force_mn)) for force_mn in forces_mn]
+        is_lost = along_mn[1] <= SMALLEST_FORCE_MN < along_mn[0]
+        drops = found.was_shifted and whole_mn[1] < (1.0 - LARGEST_DROP) * whole_mn[0]
         if self.stimulus.stays and deeper and (is_lost or drops):
+            before_mn, after_mn = along_mn if is_lost else whole_mn
             raise ConvergenceError(
                 f"The skin slips past the indenter: its force falls from {before_mn:.3g} to {after_mn:.3g} "
                 "mN as it advances."
@@ -543,7 +544,7 @@ def press(
     moment = job.unloaded()
     reached, slips, values = [], [], [moment.fields.values]
     planned_ms = settings.steps_ms(stimulus)
-    for moment in _moments(job, settings):
+    for moment in _moments(job, settings, planned_ms[1:]):
         share_done(float(np.searchsorted(planned_ms, moment.time_ms)) / (planned_ms.size - 1))
         LOGGER.debug(
             "%.4g of %.4g ms: depth %.4g mm, %d Newton steps so far",
@@ -642,10 +643,9 @@ def _newton_settings(settings: PressSettings, finest_mm: float) -> NewtonSetting
     return replace(newton, penetration_tolerance=penetration)
 
 
-def _moments(job: _Press, settings: PressSettings) -> Iterator[_Moment]:
-    """Solved times after the unloaded one."""
+def _moments(job: _Press, settings: PressSettings, times: FloatArray) -> Iterator[_Moment]:
+    """Solved times after the unloaded one, which without a bound on the error of SED are `times`."""
     stimulus, mesh, start = job.stimulus, job.body.mesh, job.unloaded()
-    times = settings.steps_ms(stimulus)[1:]
     receptors = mesh.living_epidermis.ravel()
     where = receptors if receptors.size else np.arange(len(mesh.elements))
     if settings.sed_tolerance is None:
