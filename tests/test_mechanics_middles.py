@@ -11,7 +11,7 @@ from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.contact import Contact, Placement, place
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.middles import Middles
-from fingerpad.mechanics.press import SMALL_BODY_SAG, PressSettings, press
+from fingerpad.mechanics.press import PressSettings, press, sag_mm
 
 SPACING_MM = 0.5
 BALL = Sphere(curvature_per_m=1000.0 / 0.4)
@@ -134,14 +134,14 @@ def test_facets_do_not_cut_through_a_small_ball(friction):
         skin_mm = (mesh.nodes_mm + done.displacement_mm[-1])[contact_of(mesh).middles.corners].mean(axis=1)
         return -BALL.gap(placement.to_local(skin_mm, done.depth_mm[-1]))[0].min()
 
-    sag_mm = SMALL_BODY_SAG * size_mm
+    allowed_mm = sag_mm(BALL, size_mm)
     if friction > 0.0:
-        assert sunk_mm(pressed(np.inf)) > 1.5 * sag_mm
+        assert sunk_mm(pressed(np.inf)) > 1.5 * allowed_mm
     else:
         with pytest.raises(ConvergenceError, match="The press stopped at"):
             pressed(np.inf)
     done = pressed(size_mm)
-    assert sunk_mm(done) < sag_mm + 0.005
+    assert sunk_mm(done) < allowed_mm + 0.005
     assert (np.diff(done.force_mn[:-1]) > 0.0).all()
     assert done.energy.relative_imbalance < 0.005
     # The pressures at nodes hold the forces of the middles too.

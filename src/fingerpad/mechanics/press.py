@@ -83,8 +83,10 @@ of a punch of 1 mm slid off it where shorter ones hold it."""
 SMALL_BODY_PENETRATION = 0.1
 """Penetration accepted about a small body, over its smallest elements."""
 
-SMALL_BODY_SAG = 0.125
-"""Sag of a facet that follows a small body, over its smallest elements, which are as long as its radius."""
+SMALL_BODY_SAGS, SAG_OF_WIDTH = (0.125, 0.5), 1.0 / 60
+"""Least and largest sag of a facet that follows a small body, over its smallest elements, and the sag over
+its half-width. The least is that of a chord as long as the radius. More often than that, skin at the edge of
+a wide body changes sides between nodes and middles, which its force does not see."""
 
 SMALL_BODY_STIFFNESS_KPA = 20_000.0
 """Penalty of contact about a small body, times its smallest elements. Such a body presses with 300 kPa and
@@ -527,7 +529,7 @@ def press(
     sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
     contact = Contact(indenter, placement, nodes, area_mm2, friction=check_friction(friction, indenter))
     if np.isfinite(finest_mm):
-        middles = Middles.of(mesh, sparsity, nodes, SMALL_BODY_SAG * finest_mm)
+        middles = Middles.of(mesh, sparsity, nodes, sag_mm(indenter, finest_mm))
         penalty = SMALL_BODY_STIFFNESS_KPA / finest_mm
         contact = replace(contact, penalty=penalty, stick_penalty=SMALL_BODY_STICK, middles=middles)
     gripped = nodes if indenter.grips else NO_NODES
@@ -628,6 +630,20 @@ def _check_bone(mesh: Mesh, indenter: Indenter, placement: Placement, stimulus: 
             f"depth_mm must stay below {deepest_mm:.4g} mm{at}, where the {type(indenter).__name__} meets "
             f"the bone: got {depth_mm:g} mm."
         )
+
+
+def sag_mm(indenter: Indenter, finest_mm: float) -> float:
+    """How deep the middle of a facet may lie within a small body. [mm]
+
+    Examples
+    --------
+    >>> from fingerpad.geometry.indenters import Bar, Sphere
+    >>> sag_mm(Sphere(4000.0), finest_mm=0.08), sag_mm(Bar(3.0, 0.05), finest_mm=0.05)
+    (0.01, 0.025)
+    """
+    narrowest_mm = min(indenter.half_width_mm, indenter.narrowest_mm / 2)
+    least, most = SMALL_BODY_SAGS
+    return float(np.clip(SAG_OF_WIDTH * narrowest_mm, least * finest_mm, most * finest_mm))
 
 
 def _newton_settings(settings: PressSettings, finest_mm: float) -> NewtonSettings:
