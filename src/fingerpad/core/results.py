@@ -32,10 +32,13 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import LARGEST_TEXT_MB, check_file, write_atomically
 
+JsonSchema = dict[str, Any]
+"""JSON schema, as `json` reads it."""
+
 _Kind = TypeVar("_Kind")
 
 
-def _array(dtype: type, ndim: int | None, item: dict[str, Any]) -> GetPydanticSchema:
+def _array(dtype: type, ndim: int | None, item: JsonSchema) -> GetPydanticSchema:
     """Make the validation, JSON and schema of a read-only array; null stands for NaN."""
 
     def validated(value: Any) -> NDArray[Any]:
@@ -197,14 +200,14 @@ def from_json(cls: type[_Kind], content: bytes) -> _Kind:
         raise InputError(f"{place} is not as {cls.__name__} needs it: {first['msg']}.") from error
 
 
-def schema_of(cls: type) -> dict[str, Any]:
+def schema_of(cls: type) -> JsonSchema:
     """JSON schema of a class of results, as a file holds it."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | TypeAdapter(cls).json_schema(
         mode="serialization"
     )
 
 
-def write_results(path: Path, results: ResultFile, schema: dict[str, Any]) -> None:
+def write_results(path: Path, results: ResultFile, schema: JsonSchema) -> None:
     """Write a file of results atomically.
 
     Parameters
@@ -226,7 +229,7 @@ def write_results(path: Path, results: ResultFile, schema: dict[str, Any]) -> No
     write_atomically(path, content + b"\n")
 
 
-def check_schema(path: Path, values: dict[str, Any], schema: dict[str, Any]) -> None:
+def check_schema(path: Path, values: dict[str, Any], schema: JsonSchema) -> None:
     """Raise `StoreError` if the values of a file do not meet a JSON schema."""
     try:
         fastjsonschema.compile(schema)(values)

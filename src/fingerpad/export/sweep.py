@@ -9,13 +9,13 @@ from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.progress import NoProgress, Progress
+from fingerpad.experiments.descriptions.values import Content
 from fingerpad.experiments.manifest import software
 from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.experiments.sweep.description import Sweep, SweepDescription, read_sweep, sweep_of
@@ -68,7 +68,7 @@ class SweepOutcome:
         )
 
 
-def as_sweep(sweep: str | Path | Mapping[str, Any] | SweepDescription | Sweep) -> Sweep:
+def as_sweep(sweep: str | Path | Content | SweepDescription | Sweep) -> Sweep:
     """Return what `run_sweep` takes as a `Sweep`."""
     if isinstance(sweep, Sweep):
         return sweep
@@ -91,7 +91,7 @@ def check_sweep(sweep: Sweep, out: Path, any_size: bool = False) -> None:
 
 
 def run_sweep(
-    sweep: str | Path | Mapping[str, Any] | SweepDescription | Sweep,
+    sweep: str | Path | Content | SweepDescription | Sweep,
     out: str | Path,
     jobs: int | Engine = 1,
     *,

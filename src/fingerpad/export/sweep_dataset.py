@@ -27,6 +27,7 @@ import numpy as np
 from fingerpad.core.errors import InputError, StoreError, shown
 from fingerpad.core.files import path_of
 from fingerpad.core.signals import SpikeTrains
+from fingerpad.experiments.descriptions.values import Content
 from fingerpad.experiments.sweep.description import OBSERVER, Sweep, sweep_of
 from fingerpad.experiments.sweep.observers import MEASURED, observe
 from fingerpad.experiments.sweep.settle import PLACES_MM, Settled
@@ -338,9 +339,7 @@ def check_sweep_data(data: xarray.Dataset) -> None:
         raise InputError(f"data must be a data set from open_sweep: got {shown(data)}.")
 
 
-def observe_sweep(
-    data: xarray.Dataset, observer: Mapping[str, Any], grid: Mapping[str, Any] | None = None
-) -> xarray.DataArray:
+def observe_sweep(data: xarray.Dataset, observer: Content, grid: Content | None = None) -> xarray.DataArray:
     """Hit rates of other observers than those of the sweep; nothing is pressed and no afferent responds.
 
     Parameters
@@ -386,7 +385,7 @@ def sweep_settings(data: xarray.Dataset) -> Sweep:
     return sweep_of(json.loads(data.attrs["sweep"]), data.attrs.get("source", "sweep"))
 
 
-def setting_touch(data: xarray.Dataset, **where: int) -> dict[str, Any]:
+def setting_touch(data: xarray.Dataset, **where: int) -> Content:
     """Touch of one setting in the words of a file, for `run_touch`: figures, NWB, VTU and other files of it.
 
     Parameters

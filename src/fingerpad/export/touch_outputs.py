@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.progress import Progress
@@ -18,6 +17,7 @@ from fingerpad.experiments.descriptions.touch import (
     described_touch,
     read_touch_description,
 )
+from fingerpad.experiments.descriptions.values import Content
 from fingerpad.export.dataset import write_touch
 from fingerpad.export.formats import DECKS, REQUIRED, RESULTS, write_deck
 from fingerpad.export.job import job_of
@@ -88,7 +88,7 @@ def check_described(described: DescribedTouch) -> None:
 
 
 def run_touch(
-    touch: str | Path | Mapping[str, Any] | TouchDescription | DescribedTouch,
+    touch: str | Path | Content | TouchDescription | DescribedTouch,
     out: str | Path,
     progress: Progress | None = None,
     command: str | None = None,
@@ -144,7 +144,7 @@ def run_touch(
     return pressed
 
 
-def as_described(touch: str | Path | Mapping[str, Any] | TouchDescription | DescribedTouch) -> DescribedTouch:
+def as_described(touch: str | Path | Content | TouchDescription | DescribedTouch) -> DescribedTouch:
     """Return what `run_touch` takes as a `DescribedTouch`."""
     if isinstance(touch, DescribedTouch):
         return touch

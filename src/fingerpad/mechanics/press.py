@@ -85,8 +85,8 @@ SMALL_BODY_PENETRATION = 0.1
 
 SMALL_BODY_SAGS, SAG_OF_WIDTH = (0.125, 0.5), 1.0 / 60
 """Least and largest sag of a facet that follows a small body, over its smallest elements, and the sag over
-its half-width. The least is that of a chord as long as the radius. With the least everywhere, nodes and middles at
-the edge of a wide body take turns in contact, and each turn loses a little work."""
+its half-width. The least is that of a chord as long as the radius. With the least everywhere, nodes and
+middles at the edge of a wide body take turns in contact, and each turn loses a little work."""
 
 SMALL_BODY_STIFFNESS_KPA = 20_000.0
 """Penalty of contact about a small body, times its smallest elements. Such a body presses with 300 kPa and

@@ -6,13 +6,14 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from fingerpad.core.results import JsonSchema
 from fingerpad.experiments.descriptions.pressing import MEASURED, RAMP_AND_HOLD
 from fingerpad.experiments.descriptions.reading import parts_in
 from fingerpad.experiments.descriptions.signatures import UNKNOWN_MODEL, described
 from fingerpad.experiments.descriptions.values import Part
 
 
-def explained_schema(kind: type[Part]) -> dict[str, Any]:
+def explained_schema(kind: type[Part]) -> JsonSchema:
     """JSON schema of a description as it is written, with the explanations of the docstrings.
 
     Parameters

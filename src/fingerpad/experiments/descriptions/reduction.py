@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,7 +15,7 @@ from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.experiments.descriptions.pressing import finger_of
 from fingerpad.experiments.descriptions.reading import Origin, at, part_from
 from fingerpad.experiments.descriptions.stimulus import FingerDescription, StimulusDescription
-from fingerpad.experiments.descriptions.values import Pair, Part, Positive, Seed, Text
+from fingerpad.experiments.descriptions.values import Content, Pair, Part, Positive, Seed, Text
 from fingerpad.experiments.runner import Runner
 from fingerpad.reduction.building import reduce_touch
 from fingerpad.reduction.model import ReducedModel
@@ -101,9 +101,7 @@ def read_reduction(source: str | Path) -> DescribedReduction:
     return described_reduction(read_yaml(text, str(source)), str(source), text)
 
 
-def described_reduction(
-    content: Mapping[str, Any] | Any, source: str = "range", text: str = ""
-) -> DescribedReduction:
+def described_reduction(content: Content | Any, source: str = "range", text: str = "") -> DescribedReduction:
     """Build the description of a reduced touch from plain values; arguments as of `DescribedTouch`."""
     origin = Origin(source, text)
     with origin.located():

@@ -20,6 +20,7 @@ from pydantic import Discriminator, Field, GetJsonSchemaHandler, Tag, create_mod
 from pydantic_core import CoreSchema, core_schema
 
 from fingerpad.core.keywords import other_names
+from fingerpad.core.results import JsonSchema
 from fingerpad.experiments.descriptions.values import (
     NAMED,
     UNKNOWN,
@@ -185,7 +186,7 @@ class LateKind:
             serialization=core_schema.plain_serializer_function_ser_schema(lambda made: made.model_dump()),
         )
 
-    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchema:
         return handler(self.part.__pydantic_core_schema__)
 
 

@@ -6,7 +6,6 @@ docs/touch.md explains every key.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -22,6 +21,7 @@ from fingerpad.experiments.descriptions.pressing import finger_of, named_files
 from fingerpad.experiments.descriptions.reading import Origin, at, part_from
 from fingerpad.experiments.descriptions.stimulus import FingerDescription, StimulusDescription
 from fingerpad.experiments.descriptions.values import (
+    Content,
     NotNegative,
     Numbers,
     Pair,
@@ -243,9 +243,7 @@ def read_touch_description(source: str | Path) -> DescribedTouch:
     return described_touch(read_yaml(text, str(source)), str(source), text)
 
 
-def described_touch(
-    content: Mapping[str, Any] | Any, source: str = "touch", text: str = ""
-) -> DescribedTouch:
+def described_touch(content: Content | Any, source: str = "touch", text: str = "") -> DescribedTouch:
     """Build the description of a touch from plain values; arguments as of `DescribedTouch`."""
     with Origin(source, text).located():
         return DescribedTouch(part_from(TouchDescription, content), source, text)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -19,6 +19,8 @@ from pydantic import (
     model_serializer,
 )
 from pydantic_core import CoreSchema, PydanticCustomError
+
+from fingerpad.core.results import JsonSchema
 
 _FORM = "form "
 LISTED, VARIED, NAMED, SPELLED, UNKNOWN = (
@@ -95,7 +97,7 @@ class _Choice(WrapValidator):
 
     names: tuple[str, ...] = ()
 
-    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchema:
         return handler(core) | {"enum": list(self.names)}
 
 
@@ -131,6 +133,8 @@ Truth = Annotated[bool, with_message("true or false")]
 Numbers = Annotated[tuple[FiniteNumber, ...], Strict(False), with_message("a list of finite numbers")]
 Pairs = Annotated[tuple[Pair, ...], Strict(False), with_message("a list of pairs of numbers")]
 Outlines = Annotated[tuple[Pairs, ...], Strict(False), with_message("a list of lists of pairs of numbers")]
+Content = Mapping[str, Any]
+"""Keys and values of a description, as its file holds them."""
 Block = Annotated[dict[str, Any], with_message("a mapping of keys to values")]
 """Keys and values that are checked once it is known what they belong to."""
 LevelOrName = Annotated[float | str, Field(union_mode="left_to_right"), with_message("a number or a name")]

@@ -11,14 +11,14 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from fingerpad.core.results import ResultFile, check_schema, read_format, write_results
+from fingerpad.core.results import JsonSchema, ResultFile, check_schema, read_format, write_results
 
 TOUCH_SCHEMA = "fingerpad-touch.schema.json"
 """Schema of the description of a touch, from which editors complete."""
 
 
 @cache
-def schema(file_format: str) -> dict[str, Any]:
+def schema(file_format: str) -> JsonSchema:
     """JSON schema of a format, as packaged.
 
     Parameters
@@ -29,12 +29,12 @@ def schema(file_format: str) -> dict[str, Any]:
     return _packaged(file_name(file_format))
 
 
-def touch_schema() -> dict[str, Any]:
+def touch_schema() -> JsonSchema:
     """JSON schema of the description of a touch."""
     return _packaged(TOUCH_SCHEMA)
 
 
-def _packaged(name: str) -> dict[str, Any]:
+def _packaged(name: str) -> JsonSchema:
     return json.loads((files(__name__) / name).read_text(encoding="utf-8"))
 
 

@@ -25,6 +25,7 @@ from fingerpad.experiments.descriptions.reading import Origin, at, part_from
 from fingerpad.experiments.descriptions.touch import DescribedTouch, described_touch
 from fingerpad.experiments.descriptions.values import (
     Block,
+    Content,
     Count,
     FiniteNumber,
     LevelOrName,
@@ -361,7 +362,7 @@ class Sweep:
             return ()
         return tuple(self._observer(dict(content), place) for place in np.ndindex(self.observer_shape))
 
-    def _observer(self, content: dict[str, Any], place: tuple[int, ...]) -> ObserverSettings:
+    def _observer(self, content: Content, place: tuple[int, ...]) -> ObserverSettings:
         with self.origin.located(), at(OBSERVER):
             for axis, number in zip(self.observer_axes, place, strict=True):
                 for field, values in axis.values.items():
@@ -394,7 +395,7 @@ class Sweep:
         each = self.size // self.presses
         return range(press * each, (press + 1) * each)
 
-    def values(self, setting: int) -> dict[str, Any]:
+    def values(self, setting: int) -> Content:
         """Values of the fields that vary, in a setting."""
         place = np.unravel_index(setting, self.shape)
         return {
@@ -403,9 +404,9 @@ class Sweep:
             for field, values in axis.values.items()
         }
 
-    def content(self, setting: int) -> dict[str, Any]:
+    def content(self, setting: int) -> Content:
         """Touch of a setting, as plain values."""
-        content = dict(self.description.touch)
+        content: Content = dict(self.description.touch)
         with self.origin.located(), at("touch"):
             for field, value in self.values(setting).items():
                 content = _with(content, field.split("."), value)
@@ -495,7 +496,7 @@ class Constraint:
         for _ in self._fields(self._tree):
             pass
 
-    def __call__(self, content: Mapping[str, Any]) -> bool:
+    def __call__(self, content: Content) -> bool:
         """Whether a touch meets it."""
         return bool(self._value(self._tree, content))
 
@@ -516,7 +517,7 @@ class Constraint:
             if isinstance(child, ast.expr):
                 yield from self._fields(child)
 
-    def _value(self, node: ast.AST, content: Mapping[str, Any]) -> Any:
+    def _value(self, node: ast.AST, content: Content) -> Any:
         def value(part: ast.AST) -> Any:
             return self._value(part, content)
 
@@ -564,7 +565,7 @@ def read_sweep(source: str | Path) -> Sweep:
     return sweep_of(read_yaml(text, str(source)), str(source), text)
 
 
-def sweep_of(content: Mapping[str, Any] | Any, source: str = "sweep", text: str = "") -> Sweep:
+def sweep_of(content: Content | Any, source: str = "sweep", text: str = "") -> Sweep:
     """Build the description of a sweep from plain values; arguments as of `Sweep`."""
     with Origin(source, text).located():
         return Sweep(part_from(SweepDescription, content), source, text)
@@ -584,7 +585,7 @@ def _dimension(field: str) -> str:
     return field.replace(".", "_")
 
 
-def _with(content: Mapping[str, Any], keys: list[str], value: Any) -> dict[str, Any]:
+def _with(content: Content, keys: list[str], value: Any) -> Content:
     """Return the content with another value at a place; a text such as `sphere` is a block of that kind."""
     first, *rest = keys
     if not rest:
