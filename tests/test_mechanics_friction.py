@@ -12,7 +12,7 @@ from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics import press as press_module
 from fingerpad.mechanics.contact import Contact, Placement, place
-from fingerpad.mechanics.friction import Anchors, Approach, dragged, friction, slid_mm
+from fingerpad.mechanics.friction import Anchors, Approach, by_secants, dragged, friction, slid_mm
 from fingerpad.mechanics.linear import free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings
@@ -51,17 +51,42 @@ def some_anchors(n=30, seed=0):
     return anchors, anchor + generator.uniform(-0.01, 0.01, (n, 3)), generator.uniform(100.0, 300.0, n)
 
 
-def test_anchors_between_two_have_a_normal_and_a_limit_between():
-    """The normal has unit length; between opposite normals the later one stays."""
-    early, _, _ = some_anchors(seed=1)
-    late, _, _ = some_anchors(seed=2)
-    late = replace(late, normal=np.vstack([-early.normal[:1], late.normal[1:]]))
-    between = late.halfway_from(early)
-    np.testing.assert_allclose(between.limit_mn, (early.limit_mn + late.limit_mn) / 2)
-    np.testing.assert_allclose(np.linalg.norm(between.normal, axis=1), 1.0)
-    np.testing.assert_array_equal(between.normal[0], late.normal[0])
-    to_early, to_late = ((each.normal * between.normal).sum(axis=1)[1:] for each in (early, late))
-    np.testing.assert_allclose(to_early, to_late)
+def test_other_cones_give_their_normals_and_limits():
+    """A node that would be turned round, and one that is free, keep their own."""
+    anchors, _, _ = some_anchors()
+    aside = np.cross(anchors.normal, np.roll(anchors.normal, 1, axis=0))
+    asked = anchors.cone_mn * np.linspace(0.5, 1.5, 30)[:, None] + 0.2 * aside
+    asked[0] *= -1.0
+    given = anchors.with_cones(asked)
+    np.testing.assert_allclose(given.cone_mn[1:-1], asked[1:-1])
+    np.testing.assert_allclose(np.linalg.norm(given.normal, axis=1), 1.0)
+    for node in (0, -1):
+        np.testing.assert_array_equal(given.normal[node], anchors.normal[node])
+        assert given.limit_mn[node] == anchors.limit_mn[node]
+
+
+@pytest.mark.parametrize("rate", [1.5, -1.5])
+def test_secants_find_the_friction_that_repetition_runs_away_from(rate):
+    """Contact answers to friction in three ways, in one of them by more than the friction has changed."""
+    final, _, _ = some_anchors(seed=1)
+    generator = np.random.default_rng(2)
+    ways, _ = np.linalg.qr(generator.normal(size=(final.cone_mn.size, 3)))
+
+    def answer(anchors):
+        off = ways.T @ (anchors.cone_mn - final.cone_mn).ravel()
+        return final.with_cones(final.cone_mn + (ways @ ([rate, 0.5, -0.2] * off)).reshape(-1, 3))
+
+    def error(anchors):
+        return np.abs(anchors.cone_mn - final.cone_mn).max()
+
+    start = final.with_cones(final.cone_mn + 1e-3 * (ways @ np.ones(3)).reshape(-1, 3))
+    repeated, tried = start, [(start, answer(start))]
+    for _ in range(5):
+        repeated = answer(repeated)
+        given = by_secants(tried[-4:])
+        tried.append((given, answer(given)))
+    assert error(repeated) > error(start)
+    assert error(tried[-1][1]) < 1e-6 * error(start)
 
 
 def test_force_is_the_slope_of_the_potential_and_stays_within_the_limit():

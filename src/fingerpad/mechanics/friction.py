@@ -14,16 +14,20 @@ node that slipped is moved until |f| = k s (return mapping).
 Coulomb's law has no potential, since the limit L depends on the normal force lambda: its tangent is not
 symmetric. Here L, n and a stay as they are while Newton's method runs, which keeps the tangent symmetric and
 not indefinite; they are renewed between its runs until the equilibrium no longer changes
-(docs/decisions/friction.md).
+(docs/decisions/friction.md); after some renewals by the secants of the last few.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
+
+LEAST_SECANT = 1e-6
+"""Size below which a combination of secants counts as none, over that of the largest."""
 
 MOST_EXPECTED = 4.0
 """Largest factor by which the last step of free skin is extended to where it is expected next."""
@@ -103,13 +107,24 @@ class Anchors:
         n, zero = len(approach.local_mm), np.zeros_like(approach.local_mm)
         return cls(approach.local_mm, zero, np.zeros(n), zero, np.zeros(n, dtype=bool), approach)
 
-    def halfway_from(self, before: Anchors) -> Anchors:
-        """Return these anchors with the limits and normals halfway from earlier ones."""
-        mean = 0.5 * (self.normal + before.normal)
-        length = np.linalg.norm(mean, axis=1, keepdims=True)
-        # Opposite normals have no direction between them.
-        normal = np.where(length > 0.1, mean / np.maximum(length, 0.1), self.normal)
-        return replace(self, normal=normal, limit_mn=0.5 * (self.limit_mn + before.limit_mn))
+    @property
+    def cone_mn(self) -> FloatArray:
+        """L n, the cone of friction of each node: its axis, as long as its radius, (n, 3). [mN]"""
+        return self.limit_mn[:, None] * self.normal
+
+    def with_cones(self, cone_mn: FloatArray) -> Anchors:
+        """Return anchors with the limits and normals of other cones.
+
+        A node that is free, or whose normal would turn by more than 60 degrees, keeps its own.
+        """
+        limit = np.linalg.norm(cone_mn, axis=1)
+        fits = (self.limit_mn > 0.0) & ((cone_mn * self.normal).sum(axis=1) > 0.5 * limit)
+        normal = cone_mn / np.where(fits, limit, 1.0)[:, None]
+        return replace(
+            self,
+            normal=np.where(fits[:, None], normal, self.normal),
+            limit_mn=np.where(fits, limit, self.limit_mn),
+        )
 
 
 @dataclass(frozen=True)
@@ -241,6 +256,27 @@ def dragged(anchors: Anchors, local_mm: FloatArray, stiffness: FloatArray, touch
         pull_mn=pull,
         held=touching,
     )
+
+
+def by_secants(tried: Sequence[tuple[Anchors, Anchors]]) -> Anchors:
+    """Anchors that are likely to be those of the equilibrium that they lead to (Anderson 1965).
+
+    Parameters
+    ----------
+    tried : sequence of (given, found)
+        Anchors under which an equilibrium was sought, and those of the contact there, oldest first.
+
+    Notes
+    -----
+    With x the cones given and g(x) those found, the next guess is the combination of the latest g whose rest
+    g - x is smallest, were g linear. Repeating x = g(x) converges only if a change of x changes g by less. At
+    the sides of a ball that is drawn in deep, more friction presses the skin by more than itself.
+    """
+    found = np.array([after.cone_mn.ravel() for _, after in tried])
+    rest = found - np.array([before.cone_mn.ravel() for before, _ in tried])
+    shares, *_ = np.linalg.lstsq((rest[-1] - rest[:-1]).T, rest[-1], rcond=LEAST_SECANT)
+    likely = found[-1] - shares @ (found[-1] - found[:-1])
+    return tried[-1][1].with_cones(likely.reshape(-1, 3))
 
 
 def slid_mm(found: Anchors, after: Anchors) -> FloatArray:

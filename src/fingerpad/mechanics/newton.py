@@ -26,7 +26,7 @@ from fingerpad.geometry.mesh_quality import element_place, squeezed_most
 from fingerpad.mechanics.configuration import Balance, Body, Configuration, Lagging, Load, evaluate
 from fingerpad.mechanics.contact import ContactState
 from fingerpad.mechanics.factors import NotPositiveDefiniteError
-from fingerpad.mechanics.friction import Anchors, slid_mm
+from fingerpad.mechanics.friction import Anchors, by_secants, slid_mm
 from fingerpad.mechanics.linear import LinearSolver
 
 SUFFICIENT_DECREASE = 1e-4
@@ -66,8 +66,9 @@ LARGEST_SHIFTS = {True: 0.05, False: 2.0}
 MOST_FULL_AUGMENTATIONS = 5
 """Augmentations after which multipliers change by half: nodes at a rim may alternate between two places."""
 
-MOST_FULL_RENEWALS = 10
-"""Renewals of friction after which its limits and normals change by half, for the same reason."""
+MOST_PLAIN_RENEWALS, SECANTS = 7, 3
+"""Renewals of friction after which its limits and normals follow secants, and the number of these: near the
+limit of jamming a plain renewal changes them by as much as the one before, or more."""
 
 AT_REST = 1e-2
 """Residual over contact force below which the depth is moved towards the given force."""
@@ -214,7 +215,7 @@ class _Search:
     shift: float = 0.0
     was_shifted: bool = False
     augmentations: int = 0
-    renewals: int = 0
+    renewals: list[tuple[Anchors, Anchors]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.blocks = np.empty((self.body.sparsity.column.size, 3, 3), self.solver.number_type)
@@ -362,11 +363,11 @@ class _Search:
         self.augmentations += augmented
         if self.persistent and self.augmentations > MOST_FULL_AUGMENTATIONS:
             multipliers = 0.5 * (multipliers + self.lagging.multipliers_mn)
-        if anchors is not None:
+        if anchors is not None and self.lagging.anchors is not None:
             anchors = contact.renewed(anchors, now.contact, now.depth_mm)
-            self.renewals += 1
-            if self.persistent and self.lagging.anchors and self.renewals > MOST_FULL_RENEWALS:
-                anchors = anchors.halfway_from(self.lagging.anchors)
+            self.renewals.append((self.lagging.anchors, anchors))
+            if len(self.renewals) > MOST_PLAIN_RENEWALS:
+                anchors = by_secants(self.renewals[-SECANTS - 1 :])
         self.lagging = Lagging(multipliers, anchors)
         return evaluate(self.body, self.load, now.displacement_mm, now.depth_mm, self.lagging, self.blocks)
 
