@@ -25,8 +25,9 @@ OBLIQUE_SIZE_MM = {"quick": 0.3, "standard": 0.2, "paper": 0.1}
 ACROSS_GROOVE, FEWEST_ACROSS_GROOVE = 4, 2
 """Number of elements across the narrowest groove or ridge: in a mesh graded for it, and the least in any."""
 
-TIP_SHARE = {"quick": 1 / 3, "standard": 1 / 4, "paper": 1 / 4}
-"""Largest size of elements under a round tip, over its radius."""
+TIP_SHARE, LARGEST_TIP_MM = 1 / 4, 0.3
+"""Size of elements under a round tip over its radius, and the size from which those of the fine zone will do:
+they are at most 1.5 times as large. [mm]"""
 
 BEYOND_TIP = 1.1
 """End of the small elements about a round tip or face, over its radius: skin is drawn in below it."""
@@ -44,6 +45,9 @@ MOST_ACROSS_FACE = {"quick": 40, "standard": 50, "paper": 100}
 RIM_STRIPS = ((0.7, 1.0), (0.4, 1.6), (0.0, 3.0))
 """Where strips about a rim begin, over its radius, and the size there over that at the rim. At an angle a to
 the x axis the rim runs across lines of x that are 1 / cos a times as far apart."""
+
+FEWEST_BELOW_RIM = 4
+"""Number of elements through the stratum corneum below a rim at least: it bends sharply there."""
 
 LEAST_ACROSS_RADIUS = 5
 """Least number of elements across the radius of a face, if those at the rim are no larger."""
@@ -105,7 +109,9 @@ def grading_about(
         return replace(grading, size_x_mm=along, size_z_mm=across)
     if indenter.rim_mm is not None:
         return _about_rim(grading, resolution, *indenter.rim_mm, z_mm)
-    size = max(TIP_SHARE[resolution] * indenter.tip_radius_mm, THIN_SIZE_MM)
+    size = max(TIP_SHARE * indenter.tip_radius_mm, THIN_SIZE_MM)
+    if size > LARGEST_TIP_MM:
+        size = np.inf
     if indenter.symmetry_deg is None:
         reach = BEYOND_TIP * indenter.tip_radius_mm
         return _with_strips(grading, [(-reach, reach, size)], True, True, z_mm)
@@ -149,7 +155,8 @@ def _about_rim(grading: Grading, resolution: str, radius_mm: float, rim_mm: floa
         begin, end = inner * radius_mm, BEYOND_TIP * radius_mm
         largest = min(times * size, max(size, radius_mm / LEAST_ACROSS_RADIUS))
         strips += [(begin, end, largest), (-end, -begin, largest)]
-    return _with_strips(grading, strips, True, True, z_mm)
+    through = max(FEWEST_BELOW_RIM, grading.stratum_corneum)
+    return _with_strips(replace(grading, stratum_corneum=through), strips, True, True, z_mm)
 
 
 def _with_strips(
