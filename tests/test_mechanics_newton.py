@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -141,3 +142,31 @@ def test_a_search_about_a_small_body_may_take_more_newton_steps(monkeypatch):
     monkeypatch.setattr("fingerpad.mechanics.press.SMALL_BODY_STEPS", 1)
     with pytest.raises(ConvergenceError, match="after 5 Newton steps"):
         small_body()
+
+
+@pytest.mark.parametrize("persistent", [True, False])
+def test_node_that_only_just_left_comes_back_by_a_short_step(persistent, monkeypatch):
+    """At the edge of a grating each Newton step drove such a node in by 54 nm, and the next one out again."""
+    push_mn, soft, hard, gap_mm = 6e-3, 120.0, 5e4, 8e-9
+
+    def at(x_mm):
+        deep_mm = max(x_mm - gap_mm, 0.0)
+        rest_mn = push_mn - soft * x_mm - hard * deep_mm
+        potential = 0.5 * soft * x_mm**2 + 0.5 * hard * deep_mm**2 - push_mn * x_mm
+        return SimpleNamespace(
+            x_mm=x_mm, residual_mn=np.array([rest_mn]), residual_norm_mn=abs(rest_mn),
+            relative_residual=abs(rest_mn) / 100.0, potential_uj=potential, whole=True,
+        )  # fmt: skip
+
+    monkeypatch.setattr(_Search, "moved", lambda search, start, step: at(start.x_mm + step[0]))
+    search = object.__new__(_Search)
+    search.persistent, search.shift, search.history = persistent, 0.0, [""] * 20
+    start = at(0.0)
+    step = np.array([push_mn / soft])
+    if not persistent:
+        with pytest.raises(ConvergenceError, match="found no better configuration"):
+            search.line_search(start, step, [start.potential_uj])
+        return
+    found = search.line_search(start, step, [start.potential_uj])
+    assert found.potential_uj < start.potential_uj
+    assert found.x_mm > gap_mm  # pressed again: the next tangent knows of the contact

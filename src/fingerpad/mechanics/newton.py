@@ -30,7 +30,10 @@ from fingerpad.mechanics.friction import Anchors, by_secants, slid_mm
 from fingerpad.mechanics.linear import LinearSolver
 
 SUFFICIENT_DECREASE = 1e-4
-SHORTEST_STEP = 1.0 / 64
+SHORTEST_STEP, SHORTEST_NEAR_REST = 1.0 / 64, 2.0**-15
+"""Shortest share of a Newton step that is tried, and that of a persistent search near rest: the tangent at a
+node that has only just left the indenter lacks its stiffness, and drives it in a thousand times too far."""
+
 REMEMBERED_POTENTIALS = 6
 
 FORCING, FORCING_RANGE = 0.1, (1e-4, 5e-3)
@@ -415,15 +418,17 @@ class _Search:
         """
         highest_uj = max(potentials[-(1 if self.is_monotone else REMEMBERED_POTENTIALS) :])
         slope = -float(direction @ start.residual_mn)
+        at_rest = start.relative_residual < LAST_STEP
+        shortest = SHORTEST_NEAR_REST if self.persistent and at_rest else SHORTEST_STEP
         length = 1.0
-        while length >= SHORTEST_STEP:
+        while length >= shortest:
             trial = self.moved(start, length * direction)
             falls = trial.potential_uj <= highest_uj + SUFFICIENT_DECREASE * length * slope
             # Near the solution the decrease of the potential is below round-off: compare residuals. They are
             # not compared relative to the contact force of each: a retreat sets all nodes free at first, and
             # any step that drives skin into the indenter would then count as better. With a shifted tangent
             # a smaller residual may be that of a saddle, so only the potential counts until near the end.
-            near = not self.is_monotone or start.relative_residual < LAST_STEP
+            near = not self.is_monotone or at_rest
             if falls or (near and trial.residual_norm_mn < 0.9 * start.residual_norm_mn):
                 return trial
             length /= 2
