@@ -58,6 +58,14 @@ def test_spikes_that_cannot_be_are_refused(trains, duration_ms, said):
         SpikeRecordings(("a", "b"), SpikeTrains.from_lists(trains), duration_ms)
 
 
+def test_window_may_end_with_a_recording_whose_seconds_were_rounded():
+    """A trial from 1.35 to 1.7 s lasts 349.9999999999999 ms."""
+    trains = SpikeTrains.from_lists([[160.0, 200.0]])
+    recordings = SpikeRecordings(("a",), trains, (1.7 - 1.35) * 1e3)
+    assert recordings.duration_ms[0] < 350.0
+    assert recordings.rates(((30.0, 50.0), (150.0, 350.0))).static_rate_hz[0] > 0.0
+
+
 def test_a_window_beyond_the_recording_has_no_rate():
     recordings = SpikeRecordings(("a",), SpikeTrains.from_lists([[1.0]]), 900.0)
     with pytest.raises(InputError, match="one ends at 950 ms"):

@@ -52,7 +52,7 @@ def touch_command(
     described = read_touch_description(touch)
     check_described(described)
     make_writable(out)
-    with interruptible():
+    with interruptible("Nothing of this touch was kept: the same command presses it again."):
         pressed = run_touch(described, out, progress(), shlex.join(["fingerpad", *sys.argv[1:]]))
     for paragraph in touch_summary(pressed.result):
         typer.echo(paragraph)

@@ -18,6 +18,9 @@ from fingerpad.neuron.spikes import firing_rate_hz
 PHASES = ("dynamic", "static")
 """The ramp and the hold."""
 
+ROUNDING_MS = 1e-6
+"""By how much the duration of a recording may fall short: files count seconds from their start. [ms]"""
+
 
 @dataclass(frozen=True)
 @converted
@@ -170,7 +173,7 @@ class SpikeRecordings:
             If a window does not end within a recording.
         """
         end = max(window[-1] for window in windows_ms)
-        if self.duration_ms.size and end > self.duration_ms.min():
+        if self.duration_ms.size and end > self.duration_ms.min() + ROUNDING_MS:
             raise InputError(
                 f"windows_ms must end within the recordings of {self.duration_ms.min():g} ms: "
                 f"one ends at {end:g} ms."

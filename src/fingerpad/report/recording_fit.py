@@ -135,9 +135,9 @@ def caption_fit_residuals(found: FitResult) -> str:
     for phase, rates, observed_hz in _recorded(found):
         residual = observed_hz - rates.out_of_sample_hz
         row = int(np.argmax(np.abs(residual)))
-        worst.append(f"{PHASE_LABELS[phase]}: {found.stimulus[row]}, {number(residual[row])}")
+        worst.append(f"{PHASE_LABELS[phase]} under {found.stimulus[row]}: {number(residual[row])}")
     return (
-        "Residuals. Where adjacent residuals have the same sign, the misfit is systematic and not noise. "
+        "Where adjacent residuals have the same sign, the misfit is systematic and not noise. "
         f"Largest residuals out of sample [spikes/s]: {'; '.join(worst)}."
     )
 

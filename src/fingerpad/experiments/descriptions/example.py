@@ -13,7 +13,7 @@ EXAMPLE = f"""\
 # yaml-language-server: $schema={schemas.TOUCH_SCHEMA}
 #
 # One touch. Try: fingerpad check touch.yaml, then fingerpad touch touch.yaml --out touch
-# Keys that are left out have the paper's values. docs/touch.md explains every key.
+# Keys that are left out have the values below or the paper's. docs/touch.md explains every key.
 
 title: A ball on the finger pad
 
