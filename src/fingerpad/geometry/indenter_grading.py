@@ -46,8 +46,9 @@ RIM_STRIPS = ((0.7, 1.0), (0.4, 1.6), (0.0, 3.0))
 """Where strips about a rim begin, over its radius, and the size there over that at the rim. At an angle a to
 the x axis the rim runs across lines of x that are 1 / cos a times as far apart."""
 
-FEWEST_BELOW_RIM = 4
-"""Number of elements through the stratum corneum below a rim at least: it bends sharply there."""
+FEWEST_BELOW_RIM, NEEDLE_MM = 4, 0.5
+"""Number of elements through the stratum corneum below a rim at least, where it bends sharply, and the radius
+below which a punch keeps the number of the resolution. [mm]"""
 
 LEAST_ACROSS_RADIUS = 5
 """Least number of elements across the radius of a face, if those at the rim are no larger."""
@@ -155,8 +156,9 @@ def _about_rim(grading: Grading, resolution: str, radius_mm: float, rim_mm: floa
         begin, end = inner * radius_mm, BEYOND_TIP * radius_mm
         largest = min(times * size, max(size, radius_mm / LEAST_ACROSS_RADIUS))
         strips += [(begin, end, largest), (-end, -begin, largest)]
-    through = max(FEWEST_BELOW_RIM, grading.stratum_corneum)
-    return _with_strips(replace(grading, stratum_corneum=through), strips, True, True, z_mm)
+    if radius_mm >= NEEDLE_MM:
+        grading = replace(grading, stratum_corneum=max(FEWEST_BELOW_RIM, grading.stratum_corneum))
+    return _with_strips(grading, strips, True, True, z_mm)
 
 
 def _with_strips(
