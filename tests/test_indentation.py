@@ -252,7 +252,7 @@ def test_bodies_of_the_paper_keep_their_meshes(resolution):
 @pytest.mark.parametrize(
     ("body", "size_mm"),
     [
-        (Sphere(4000.0), 0.25 / 3), (Cylinder(0.5), 0.25 / 3), (FlatPunch(1.0, 0.1), 0.1),
+        (Sphere(4000.0), 0.25 / 4), (Cylinder(0.5), 0.25 / 4), (FlatPunch(1.0, 0.1), 0.1),
         (FlatPunch(10.0, 0.05), 0.2), (Bar(3.0, 0.05), 0.05), (Edge(0.0), 0.05),
         (Grating(1.0, 1.0, 0.05), 0.05),
     ],
@@ -265,6 +265,21 @@ def test_small_bodies_and_sharp_edges_are_meshed_finer(body, size_mm):
     fillet = getattr(touch.body, "fillet_mm", getattr(touch.body, "lip_mm", np.inf))
     assert fillet >= size_mm
     assert touch.mesh.nodes_mm.shape[0] < 50_000
+
+
+@pytest.mark.parametrize(
+    ("body", "size_mm", "through"),
+    [
+        (Sphere(radius_mm=1.1), 1.1 / 4, 2), (Sphere(radius_mm=1.3), 0.45, 2),
+        (FlatPunch(0.5, 0.1), 0.1, 2), (FlatPunch(1.0, 0.1), 0.1, 4),
+    ],
+    ids=lambda value: str(value) if not isinstance(value, float) else "",
+)  # fmt: skip
+def test_quick_is_finer_from_where_it_was_too_coarse(body, size_mm, through):
+    """Under a tip of less than 1.2 mm radius, and through the horny layer below a punch of 1 mm."""
+    grading = grading_about(body, "quick", 17.37)
+    assert grading.finest_x_mm == pytest.approx(size_mm)
+    assert grading.stratum_corneum == through
 
 
 def test_ridges_that_slide_meet_no_coarse_elements_near_the_place_of_contact():
