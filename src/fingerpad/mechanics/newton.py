@@ -15,7 +15,9 @@ potential.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -218,7 +220,9 @@ class _Search:
     shift: float = 0.0
     was_shifted: bool = False
     augmentations: int = 0
-    renewals: list[tuple[Anchors, Anchors]] = field(default_factory=list)
+    renewals: deque[tuple[Anchors, Anchors]] = field(
+        default_factory=partial(deque, maxlen=MOST_PLAIN_RENEWALS + 1)
+    )
 
     def __post_init__(self) -> None:
         self.blocks = np.empty((self.body.sparsity.column.size, 3, 3), self.solver.number_type)
@@ -370,7 +374,7 @@ class _Search:
             anchors = contact.renewed(anchors, now.contact, now.depth_mm)
             self.renewals.append((self.lagging.anchors, anchors))
             if len(self.renewals) > MOST_PLAIN_RENEWALS:
-                anchors = by_secants(self.renewals[-SECANTS - 1 :])
+                anchors = by_secants([*self.renewals][-SECANTS - 1 :])
         self.lagging = Lagging(multipliers, anchors)
         return evaluate(self.body, self.load, now.displacement_mm, now.depth_mm, self.lagging, self.blocks)
 
