@@ -28,3 +28,4 @@ for name, style in (("SAI", "k"), ("RA", "tab:blue"), ("PC", "tab:orange"), ("SA
     print(f"{name}: {sum(train.size > 0 for train in response[name].spikes)} afferents fire")
 axes.set(xlabel="time [ms]", ylabel="afferents that fire: SAI, RA, PC, SAII", xlim=(0, 250))
 axes.yaxis.get_major_locator().set_params(integer=True)
+plt.show()

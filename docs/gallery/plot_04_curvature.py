@@ -19,3 +19,4 @@ for curvature, line in ((144, "k-"), (287, "k--"), (694, "k:")):
     axes.plot(response.positions_mm[:, 1], response.static_rate_hz, line, label=f"{curvature} /m")
 axes.set(xlabel="across the finger [mm]", ylabel="rate in the hold [spikes/s]")
 axes.legend(title="curvature")
+plt.show()

@@ -19,3 +19,4 @@ for (name, tissues), line in zip(sets.items(), ("k-", "k--", "k:", "k-."), stric
     axes.plot(skin.depth_mm[skin.times_ms <= 50], skin.force_mn[skin.times_ms <= 50], line, label=name)
 axes.set(xlabel="depth [mm]", ylabel="force [mN]")
 axes.legend()
+plt.show()

@@ -17,3 +17,4 @@ for name, line in (("adult", "k-"), ("child", "k--")):
     axes.plot(skin.times_ms, skin.depth_mm, line, label=name)
 axes.set(xlabel="time [ms]", ylabel="depth [mm]")
 axes.legend()
+plt.show()

@@ -21,3 +21,4 @@ for row, afferent in enumerate((fp.SAI(), fp.RA())):
     (train,) = afferent.spikes(traces)
     below.plot(train, [row] * train.size, "k|", markersize=20)
 below.set(xlabel="time [ms]", yticks=[0, 1], yticklabels=["SAI", "RA"], ylim=(-0.6, 1.6))
+plt.show()

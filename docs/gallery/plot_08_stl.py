@@ -19,3 +19,4 @@ fp.save_figure("bar.png", skin, fp.Population.grid(density_per_cm2=100).respond(
 figure, axes = plt.subplots(figsize=(9, 4.5), layout="constrained")
 axes.imshow(matplotlib.image.imread("bar.png"))
 axes.set_axis_off()
+plt.show()

@@ -20,3 +20,4 @@ for skin, line, name in ((by_depth, "k-", "depth held"), (by_force, "k--", "forc
 left.set(xlabel="time [ms]", ylabel="force [mN]")
 right.set(xlabel="time [ms]", ylabel="depth [mm]")
 left.legend()
+plt.show()

@@ -20,3 +20,4 @@ forces_mn = [stream.step(t, depth_mm=d).force_mn for t, d in zip(times_ms, depth
 figure, axes = plt.subplots(figsize=(6, 3.5), layout="constrained")
 axes.plot(times_ms, forces_mn, "k-")
 axes.set(xlabel="time [ms]", ylabel="force [mN]")
+plt.show()

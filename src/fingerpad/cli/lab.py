@@ -35,12 +35,11 @@ def lab_command(
     from fingerpad.lab.server import serve
     from fingerpad.lab.static import write_static
 
-    make_writable(folder, "--folder")
-    if static is not None:
-        make_writable(static, "--static")
     with interruptible("The next laboratory in the same folder presses nothing again."):
         laboratory = Laboratory(folder, ranges or (), engine(jobs, None))
+        make_writable(folder, "--folder")
         if static is not None:
+            make_writable(static, "--static")
             written = write_static(laboratory, static, progress())
             typer.echo(f"Open: {written} ({written.stat().st_size / 1e6:.1f} MB)")
             return

@@ -280,6 +280,11 @@ def read_touch(path: str | Path) -> xarray.Dataset:
         elements that do not exist.
     """
     found = touch_file(path_of("path", path))
+    if found.suffix not in SUFFIXES:
+        raise InputError(
+            f"{found} must be a touch that fingerpad wrote, as {' or '.join(SUFFIXES)}: its name has another "
+            "ending."
+        )
     xarray = library("xarray")
     engine = "zarr" if found.is_dir() else "h5netcdf"
     library(engine)

@@ -479,7 +479,7 @@ class Fingertip(Displayed, Finger):
         if outside.any():
             raise InputError(
                 f"A position must lie on the finger, x within 0 ... {self.length_mm} mm and |z| within its "
-                f"half-width: got x = {x[outside].flat[0]}, z = {z[outside].flat[0]} mm."
+                f"half-width: got x = {x[outside].flat[0]:.6g}, z = {z[outside].flat[0]:.6g} mm."
             )
         # At the very tip width and depth are 0 together; the quotient is then taken as 0.
         share = z / np.where(half_width > 0.0, half_width, 1.0)

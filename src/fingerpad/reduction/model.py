@@ -55,7 +55,7 @@ def depth_basis(depth_mm: FloatArray, deepest_mm: float, degree: int) -> FloatAr
     return lagrange(chebyshev_points(degree + 1), share)[..., 1:] * (np.asarray(depth_mm) > 0.0)[..., None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ReducedModel:
     """What a reduced touch is evaluated from.
 
@@ -110,6 +110,17 @@ class ReducedModel:
     error: FloatArray
     exponents: FloatArray
     origin: Mapping[str, str]
+
+    def __repr__(self) -> str:
+        ranges = ", ".join(
+            f"{axis.name} {axis.low:g}" + (f" to {axis.high:g}" if axis.high > axis.low else "")
+            for axis in self.axes
+        )
+        known = "known" if np.isfinite(self.error).all() else "not measured"
+        return (
+            f"ReducedModel({self.origin['indenter']}, to {self.depth_mm:g} mm, {ranges}, "
+            f"{len(self.modes)} modes, errors {known})"
+        )
 
     def error_scale(self, so_far: FloatArray) -> FloatArray:
         """Return what errors are relative to: the largest values so far, and a part of the training's."""

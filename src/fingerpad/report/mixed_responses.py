@@ -20,12 +20,15 @@ STYLES = ((BLUE, "o"), (ORANGE, "^"), (BLACK, "s"), (GREEN, "D"), (GREY, "v"))
 LARGEST_MARK, SILENT_MARK = 60.0, 4.0
 """Area of the mark of the most active afferent of a type, and of a silent one. [points²]"""
 
+ROW_DRAWN = 0.85
+"""Length of the mark of a spike, over the height of the row of its afferent."""
+
 
 def draw_mixed_responses(touches: Mapping[str, Mapping[str, ResponseMap]]) -> Figure:
     """Draw the responses to touches, one per row: all spikes over time, and where the afferents lie.
 
-    A raster has a band per type, in which afferents are sorted by the distance from the middle. In the map
-    the area of a mark grows with the number of spikes over the largest of its type; silent ones are dots.
+    A raster has a band per type, in which those that fire are sorted by the distance from the middle. In the
+    map the area of a mark grows with the number of spikes over the largest of its type; silent ones are dots.
 
     Parameters
     ----------
@@ -55,19 +58,25 @@ def draw_mixed_responses(touches: Mapping[str, Mapping[str, ResponseMap]]) -> Fi
 
 
 def draw_raster_by_type(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
-    """Draw all spikes over time, in a band per type."""
-    for band, (response, (colour, _)) in enumerate(zip(maps.values(), _styles(len(maps)), strict=True)):
+    """Draw all spikes over time, in a band per type that the afferents which fire divide among them."""
+    labels = []
+    for band, ((name, response), (colour, _)) in enumerate(
+        zip(maps.items(), _styles(len(maps)), strict=True)
+    ):
+        counts = np.diff(response.spikes.offsets)
         middle = response.positions_mm.mean(axis=0)
         order = np.argsort(np.linalg.norm(response.positions_mm - middle, axis=1))
-        row_of = np.empty(order.size)
-        row_of[order] = band + (0.5 + np.arange(order.size)) / order.size
-        rows = np.repeat(row_of, np.diff(response.spikes.offsets))
-        axes.plot(
-            response.spikes.times_ms, rows, "|", color=colour, markersize=2.0, markeredgewidth=0.6,
+        firing = order[counts[order] > 0]
+        top_of = np.zeros(order.size)
+        top_of[firing] = band + np.arange(firing.size) / max(firing.size, 1)
+        tops = np.repeat(top_of, counts)
+        axes.vlines(
+            response.spikes.times_ms, tops, tops + ROW_DRAWN / max(firing.size, 1), color=colour,
+            linewidth=0.6,
         )  # fmt: skip
         axes.axhline(band, color=GREY, linewidth=0.5)
-    labels = [f"{name}\n{len(response.spikes)}" for name, response in maps.items()]
-    axes.set(xlabel="time [ms]", ylabel="afferents", ylim=(len(maps), 0.0))
+        labels.append(f"{name}\n{firing.size} of {order.size}")
+    axes.set(xlabel="time [ms]", ylabel="afferents that fire, nearest on top", ylim=(len(maps), 0.0))
     axes.set_yticks(0.5 + np.arange(len(maps)), labels)
     axes.grid(visible=False)
 

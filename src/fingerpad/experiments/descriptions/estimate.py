@@ -35,6 +35,8 @@ class PressEstimate:
         Size of the mesh, and number of steps that are solved at least.
     time_s, memory_mb : float
         Time on two cores with compiled kernels, and memory of the process. [s], [MB]
+    by_force : bool
+        Whether the force is given, so that the depth is not known before the press.
     """
 
     nodes: int
@@ -42,13 +44,16 @@ class PressEstimate:
     steps: int
     time_s: float
     memory_mb: float
+    by_force: bool = False
 
     @property
     def lines(self) -> tuple[str, ...]:
         """The estimate in words."""
+        depth = " How deep this force presses, and whether into the bone, only the press shows."
         return (
             f"The touch is possible: {self.nodes} nodes, {self.elements} elements, {self.steps} steps.",
-            f"A press will take about {self.time_s:.0f} s on two idle cores and {self.memory_mb:.0f} MB.",
+            f"A press will take about {self.time_s:.0f} s on two idle cores and {self.memory_mb:.0f} MB."
+            f"{depth if self.by_force else ''}",
         )
 
 
@@ -106,4 +111,5 @@ def estimate_press(described: DescribedTouch) -> PressEstimate:
         memory_mb=(
             BASE_MB + NODE_MB * nodes**NODE_EXPONENT + (OWN_NODE_MB * nodes**OWN_EXPONENT if own else 0.0)
         ),
+        by_force=touch.stimulus.by_force,
     )
