@@ -31,9 +31,9 @@ def block(symmetric=True):
     return block_mesh(both, depth, lines if symmetric else both, layers=[0, 1, 2, 3, 3], symmetric=symmetric)
 
 
-def pressed(mesh, indenter, newton_settings, at_mm=(0.0, 0.0, 0.0)):
+def pressed(mesh, indenter, newton_settings, at_mm=(0.0, 0.0, 0.0), ramp_steps=3):
     placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.array(at_mm), np.eye(3))
-    return press(mesh, RELAXING, indenter, placement, MOTION, PressSettings(3, 3, newton_settings))
+    return press(mesh, RELAXING, indenter, placement, MOTION, PressSettings(ramp_steps, 3, newton_settings))
 
 
 @pytest.mark.parametrize("indenter", SIX, ids=lambda body: type(body).__name__)
@@ -92,10 +92,10 @@ def test_a_shifted_tangent_leads_to_the_same_equilibrium(monkeypatch):
         "found",
         lambda search, *how: shifted.append(search.was_shifted) or found(search, *how),
     )
-    done = pressed(block(), Bar(1.7, 0.1), NewtonSettings(persistent=True))
+    done = pressed(block(), Bar(1.7, 0.1), NewtonSettings(persistent=True), ramp_steps=6)
     assert any(shifted)
     np.testing.assert_allclose(done.force_mn[-1], usual.force_mn[-1], rtol=1e-3)
-    # Without shifts the path, and with it the energy that it loses, depends on rounding: 0.5 to 1.2 %.
+    # The work is a sum over few steps: with three of them 0.7 to 1.2 % are missing.
     assert done.energy.relative_imbalance <= 0.01  # skin that snaps to another state loses 2 %
 
 
@@ -170,3 +170,75 @@ def test_node_that_only_just_left_comes_back_by_a_short_step(persistent, monkeyp
     found = search.line_search(start, step, [start.potential_uj])
     assert found.potential_uj < start.potential_uj
     assert found.x_mm > gap_mm  # pressed again: the next tangent knows of the contact
+
+
+class PiecewiseQuadratic:
+    """Potential about a configuration to second order, with dense matrices: the points press or do not.
+
+    Without the curvature of the indenter it is convex, and Newton's method with a line search minimises it.
+    """
+
+    def __init__(self, search, now):
+        contact, self.free = search.load.contact, search.body.free
+        self.stiffness = contact.stiffness
+        self.here_mn = search.lagging.multipliers_mn - contact.stiffness * now.contact.gap_mm
+        self.closing = np.stack(
+            [self.closing_of(search, now, unit) for unit in np.eye(self.free.size)], axis=1
+        )
+        pressed = now.contact.pressed_mn > 0.0
+        tangent = search.body.sparsity.matrix(search.blocks).toarray()[np.ix_(self.free, self.free)]
+        self.tissue = tangent - self.contact_tangent(pressed)
+        self.tissue_mn = now.residual_mn - self.closing.T @ now.contact.pressed_mn
+
+    def closing_of(self, search, now, step):
+        moved = np.zeros_like(now.displacement_mm)
+        moved.ravel()[self.free] = step
+        return (search.load.contact.points_mm(moved) * now.contact.normal).sum(axis=1)
+
+    def contact_tangent(self, pressed):
+        return (self.closing * np.where(pressed, self.stiffness, 0.0)[:, None]).T @ self.closing
+
+    def pressed_mn(self, step):
+        return np.maximum(self.here_mn - self.stiffness * (self.closing @ step), 0.0)
+
+    def value(self, step):
+        contact = 0.5 * (self.pressed_mn(step) ** 2 / self.stiffness).sum()
+        return 0.5 * step @ self.tissue @ step - self.tissue_mn @ step + contact
+
+    def minimum(self):
+        step = np.zeros(self.free.size)
+        for _ in range(200):
+            slope = self.tissue @ step - self.tissue_mn - self.closing.T @ self.pressed_mn(step)
+            if np.linalg.norm(slope) <= 1e-9 * np.linalg.norm(self.tissue_mn):
+                return step
+            newton = np.linalg.solve(self.tissue + self.contact_tangent(self.pressed_mn(step) > 0.0), -slope)
+            length = 1.0
+            while self.value(step + length * newton) > self.value(step) + 1e-4 * length * (slope @ newton):
+                length /= 2
+            step = step + length * newton
+        raise AssertionError("No minimum was found.")
+
+
+def test_a_step_leads_to_the_minimum_over_all_points_that_may_be_pressed(monkeypatch):
+    """A plain Newton step takes the points that are pressed now as those that will be."""
+    left_open, left_open_by_newton = [], []
+    found_for = _Search.contact_direction
+
+    def checked(search, now, direction, forcing):
+        if now.is_curved or search.shift > 0.0:
+            return found_for(search, now, direction, forcing)
+        model = PiecewiseQuadratic(search, now)
+        found = found_for(search, now, direction, forcing)
+        lowest, zero = model.value(model.minimum()), model.value(np.zeros_like(found))
+        left_open.append((model.value(found) - lowest) / (zero - lowest))
+        left_open_by_newton.append((model.value(direction) - lowest) / (zero - lowest))
+        return found
+
+    monkeypatch.setattr(_Search, "contact_direction", checked)
+    mesh, bar = block(), Bar(1.7, 0.1)
+    placement = place(bar, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
+    done = press(mesh, RELAXING, bar, placement, MOTION, PressSettings(3, 1), finest_mm=0.1)
+    assert done.force_mn[-1] > 0.0
+    assert len(left_open) > 10
+    assert max(left_open) <= 0.05
+    assert max(left_open_by_newton) > 1.0  # such a step leads uphill

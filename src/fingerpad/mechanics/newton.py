@@ -57,6 +57,10 @@ PATIENCE = 15
 """Newton steps of one search after which the potential must fall in each: nodes at an edge may change sides
 for ever, and the residual with them."""
 
+CONTACT_FORCING, MOST_CONTACT_CHANGES = 0.02, 8
+"""Force, over the residual, of points on the wrong side after a Newton step with which it is taken, and most
+solutions for one step, each for the points that the one before presses."""
+
 MOST_STRAIGHT = 5
 """Newton steps of one search without the curvature of the indenter; then the tangent is shifted."""
 
@@ -270,7 +274,7 @@ class _Search:
             enough = ENOUGH * settings.residual_tolerance / now.relative_residual
             forcing = float(np.clip(max(FORCING * now.relative_residual, enough), *FORCING_RANGE))
             try:
-                now = self.line_search(*self.newton_direction(self.with_tangent(now), forcing), potentials)
+                now = self.line_search(*self.direction_from(now, forcing), potentials)
             except ConvergenceError:
                 if not self.is_set_free(now):
                     raise
@@ -295,6 +299,52 @@ class _Search:
             return now
         where = now.displacement_mm, now.depth_mm
         return evaluate(self.body, self.load, *where, self.lagging, self.blocks, curved=curved is not False)
+
+    def direction_from(self, now: Configuration, forcing: float) -> tuple[Configuration, FloatArray]:
+        """Solve for a Newton step, and of a persistent search for the points that are in contact after it."""
+        now, direction = self.newton_direction(self.with_tangent(now), forcing)
+        if not self.persistent:
+            return now, direction
+        return now, self.contact_direction(now, direction, forcing)
+
+    def contact_direction(self, now: Configuration, direction: FloatArray, forcing: float) -> FloatArray:
+        """Repeat a Newton step for the points that it presses, until they are those it was solved for.
+
+        A Newton step takes the points that are pressed now as those that will be. At an edge many change
+        sides, and points that are set free in one step are driven deep into the indenter in the next. To
+        second order the potential is piecewise quadratic: its minimum, not that of one piece, is the step
+        (primal-dual active set strategy; Hintermüller, Ito & Kunisch 2002).
+        """
+        contact, touch, free = self.load.contact, now.contact, self.body.free
+        assumed = touch.pressed_mn > 0.0
+        stiffness = contact.stiffness[:, None, None] * touch.normal[:, :, None] * touch.normal[:, None]
+        stiffness[assumed] += (now.contact_stiffness - touch.stiffness)[assumed]  # the curvature
+        here_mn = self.lagging.multipliers_mn - contact.stiffness * touch.gap_mm
+        found, best, least = direction, direction, np.inf
+        seen: set[bytes] = set()
+        while assumed.tobytes() not in seen:
+            seen.add(assumed.tobytes())
+            step = np.zeros_like(now.displacement_mm)
+            step.ravel()[free] = found
+            closing_mm = (contact.points_mm(step) * touch.normal).sum(axis=1)
+            there_mn = here_mn - contact.stiffness * closing_mm
+            changed = (there_mn > 0.0) != assumed
+            wrong_mn = float(np.linalg.norm(there_mn[changed]))
+            if wrong_mn < least and found @ now.residual_mn > 0.0:
+                best, least = found, wrong_mn
+            if wrong_mn <= CONTACT_FORCING * now.residual_norm_mn or len(seen) > MOST_CONTACT_CHANGES:
+                break
+            assumed = there_mn > 0.0
+            sign = np.where(assumed, 1.0, -1.0) * changed
+            contact.add_to_tangent(self.blocks, self.body.sparsity.diagonal, sign[:, None, None] * stiffness)
+            more_mn = np.where(assumed, here_mn, 0.0) - touch.pressed_mn
+            forces = np.zeros_like(now.displacement_mm)
+            contact.add_to_nodes(forces, more_mn[:, None] * touch.normal)
+            try:
+                found = self.solver.solve(self.blocks, now.residual_mn + forces.ravel()[free], forcing)
+            except ConvergenceError:
+                break
+        return best
 
     def newton_direction(self, now: Configuration, forcing: float) -> tuple[Configuration, FloatArray]:
         """Solve for a Newton step, and return the configuration with the tangent that could be solved.
