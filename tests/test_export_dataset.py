@@ -191,6 +191,12 @@ def _bytes(content):
     return make
 
 
+def _renamed(path: Path, data: xarray.Dataset) -> Path:
+    """A file of spikes, which is HDF5 as well."""
+    (path / "touch.nwb").write_bytes(Path(data.encoding["source"]).read_bytes())
+    return path / "touch.nwb"
+
+
 def _other_program(path: Path, data: xarray.Dataset) -> Path:
     xarray.Dataset({"t": ("x", [1.0, 2.0])}).to_netcdf(path / "touch.nc", engine="h5netcdf")
     return path
@@ -225,6 +231,7 @@ MALFORMED = {
         _bytes(lambda content: content[:600] + bytes(3000) + content[3600:]),
         "cannot be read|must ",
     ),
+    "another ending": (_renamed, "its name has another ending"),
     "an image": (_bytes(lambda content: b"\x89PNG\r\n\x1a\n" + bytes(64)), "cannot be read"),
     "a file of another program": (_other_program, "another program wrote this file"),
     "an empty store": (_empty_zarr, "cannot be read|another program"),

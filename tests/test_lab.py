@@ -217,6 +217,15 @@ def test_the_shipped_ranges_are_whole(tmp_path: Path) -> None:
         Laboratory(tmp_path, [shipped()[0], shipped()[0]])
 
 
+def test_a_laboratory_that_is_refused_leaves_no_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "lab"
+    command = [sys.executable, "-m", "fingerpad", "lab", str(tmp_path / "none.yaml"), "--folder", str(folder)]
+    refused = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert refused.returncode == 2
+    assert "none.yaml" in refused.stderr
+    assert not folder.exists()
+
+
 @pytest.fixture(scope="module")
 def served(laboratory: Laboratory) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """Start the command, and give the address of the page."""

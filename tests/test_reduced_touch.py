@@ -215,6 +215,9 @@ def test_a_file_has_the_same_bits_and_tells_damage(tmp_path: Path, model: fp.Red
     read = fp.read_reduced(path)
     assert (read.modes == model.modes).all()
     assert read.axes == model.axes
+    assert repr(read) == repr(model)
+    assert "\n" not in repr(read)
+    assert "errors not measured" in repr(read)
     content = bytearray(path.read_bytes())
     for damaged in (
         content[:-200],

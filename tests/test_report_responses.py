@@ -81,9 +81,11 @@ def test_a_mixed_population_has_a_raster_and_a_map_per_touch():
     maps = {"SAI": response(), "RA": response(columns=3)}
     figure = draw_mixed_responses({"press": maps, "hold": maps})
     raster, places = figure.axes[:2]
-    lines = [line for line in raster.lines if line.get_marker() == "|"]
-    assert [line.get_xdata().tolist() for line in lines] == [[5.0] * 8, [5.0] * 8]
-    assert [set(np.floor(line.get_ydata())) for line in lines] == [{0.0}, {1.0}]
+    marks = [np.array(lines.get_segments()) for lines in raster.collections]
+    assert [each[:, :, 0].ravel().tolist() for each in marks] == [[5.0] * 16, [5.0] * 16]
+    assert [set(np.floor(each[:, :, 1]).ravel()) for each in marks] == [{0.0}, {1.0}]
+    assert [len(np.unique(each[:, 0, 1])) for each in marks] == [8, 8]
+    assert [label.get_text() for label in raster.get_yticklabels()] == ["SAI\n8 of 12", "RA\n8 of 12"]
     assert [len(dots.get_offsets()) for dots in places.collections] == [4, 8, 4, 8]
     assert len(figure.axes) == 4
     assert [text.get_text() for text in places.get_legend().get_texts()] == ["SAI", "RA"]

@@ -462,6 +462,11 @@ def test_the_example_runs_as_it_is_and_is_never_overwritten(call):
     assert re.search(r"\d+ nodes, \d+ elements, 10 steps", printed)
     assert re.search(r"about \d+ s on two idle cores and \d+ MB", printed)
     assert sorted(path.name for path in Path("mine").iterdir()) == [schemas.TOUCH_SCHEMA, "touch.yaml"]
+    assert "only the press shows" not in printed
+    Path("forced.yaml").write_text('{"object": "sphere", "motion": {"force_mn": 50}}', encoding="utf-8")
+    status, printed, error = call("check", "forced.yaml")
+    assert (status, error) == (0, "")
+    assert "How deep this force presses, and whether into the bone, only the press shows." in printed
 
 
 def test_a_touch_is_pressed_once_and_its_outputs_are_what_python_computes(call, monkeypatch):
