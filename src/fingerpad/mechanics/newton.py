@@ -16,7 +16,7 @@ potential.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -71,6 +71,9 @@ together the negative stiffness is a millionth of it, and with a shift of 1e-4 t
 
 LARGEST_SHIFTS = {True: 0.05, False: 2.0}
 """Largest shifts of a tangent with and without the curvature of the indenter."""
+
+LONGEST_SHIFTED_STEP = 16.0
+"""Largest multiple of a step with a shifted tangent that is tried."""
 
 MOST_FULL_AUGMENTATIONS = 5
 """Augmentations after which multipliers change by half: nodes at a rim may alternate between two places."""
@@ -455,12 +458,36 @@ class _Search:
         displacement = start.displacement_mm.copy()
         displacement.ravel()[self.body.free] += step
         depth_mm, before, pressure = start.depth_mm + advance_mm, start.contact.friction, None
+        if self.persistent:
+            displacement.ravel()[self.body.free] += self.along_surface(start, displacement, depth_mm)
         if start.pressures is not None:
             pressure = start.pressures.after(self.body.mesh.elements, displacement - start.displacement_mm)
         # Friction and mixed methods carry more than the displacements over to the tangent.
         carries = self.load.anchors is not None or self.body.is_mixed
         blocks = self.blocks if carries or start.relative_residual > LAST_STEP else self.blocks[:0]
         return evaluate(self.body, self.load, displacement, depth_mm, self.lagging, blocks, before, pressure)
+
+    def along_surface(self, start: Configuration, displacement_mm: FloatArray, depth_mm: float) -> FloatArray:
+        """Displacements that keep pressed nodes as deep in the indenter as the linear step leaves them.
+
+        A node that moves straight on leaves a curved surface, or enters it, by the square of its step over
+        twice the radius. The penalty turns this into a large force, so that steps along an edge had to be
+        short (the effect of Maratos and its correction; Nocedal & Wright 2006, sections 15.5 and 15.6).
+        """
+        contact, n_nodes = self.load.contact, self.load.contact.nodes.size
+        positions_mm = contact.points_mm(self.body.mesh.nodes_mm + displacement_mm)
+        gap_mm, normal = contact.gap(contact.placement.to_local(positions_mm, depth_mm))
+        touch, rotation = start.contact, contact.placement.rotation
+        advance_mm = (depth_mm - start.depth_mm) * contact.placement.axis
+        moved_mm = positions_mm - start.positions_mm - advance_mm
+        linear_mm = touch.gap_mm + (moved_mm * touch.normal).sum(axis=1)
+        pressed = self.lagging.multipliers_mn - contact.stiffness * linear_mm > 0.0
+        error_mm = np.where(pressed, gap_mm - linear_mm, 0.0)[:n_nodes]
+        # A node that moves by more than the radius has passed the edge.
+        error_mm[2.0 * np.abs(error_mm) > np.linalg.norm(moved_mm[:n_nodes], axis=1)] = 0.0
+        correction = np.zeros_like(displacement_mm)
+        correction[contact.nodes] = -error_mm[:, None] * (normal[:n_nodes] @ rotation.T)
+        return correction.ravel()[self.body.free]
 
     def line_search(
         self, start: Configuration, direction: FloatArray, potentials: list[float]
@@ -483,11 +510,27 @@ class _Search:
             # any step that drives skin into the indenter would then count as better. With a shifted tangent
             # a smaller residual may be that of a saddle, so only the potential counts until near the end.
             near = not self.is_monotone or at_rest
+            if falls and length == 1.0 and self.shift > 0.0:
+                return self.lengthened(start, direction, trial)
             if falls or (near and trial.residual_norm_mn < 0.9 * start.residual_norm_mn):
                 return trial
             length /= 2
         folds = "" if trial.whole else f": it turns {self.folded(trial.displacement_mm)} inside out"
         raise ConvergenceError(f"The line search found no better configuration{folds}.")
+
+    def lengthened(self, start: Configuration, direction: FloatArray, trial: Configuration) -> Configuration:
+        """Double a step with a shifted tangent while the potential falls.
+
+        Away from an unstable state each step is a multiple of the one before, which a shift much larger than
+        the negative stiffness makes little more than one.
+        """
+        length = 1.0
+        while self.load.anchors is None and length < LONGEST_SHIFTED_STEP:
+            further = self.moved(start, 2.0 * length * direction)
+            if not further.potential_uj < trial.potential_uj:
+                return replace(trial, has_tangent=False)  # the tangent is now that of the step refused
+            trial, length = further, 2.0 * length
+        return trial
 
     def advance_indenter(self, start: Configuration) -> Configuration:
         """Newton step of displacements and depth together, towards the given force.
