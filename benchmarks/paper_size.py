@@ -9,6 +9,27 @@ from benchmarks.results import Report, Table
 RESOLUTION = "paper"
 
 
+def what_limits(both_s: float, cores: float, one_s: float, cores_of_one: float) -> str:
+    """Say what keeps two threads from twice the speed of one, from times and cores used.
+
+    Examples
+    --------
+    >>> what_limits(60.0, 1.75, 100.0, 1.0)
+    'For 15 s of the 60 s on two threads one of them waits: serial parts. Both take 5 s more processor time \
+than one: memory bandwidth and locks. Without the serial parts the factor would be 1.90, without the other \
+1.74.'
+    """
+    serial_s, work_s = (2.0 - cores) * both_s, cores_of_one * one_s
+    more_s = cores * both_s - work_s
+    without_serial = work_s / (0.5 * cores * both_s)
+    without_more = work_s / (serial_s + 0.5 * (work_s - serial_s))
+    return (
+        f"For {serial_s:.0f} s of the {both_s:.0f} s on two threads one of them waits: serial parts. Both take "
+        f"{more_s:.0f} s more processor time than one: memory bandwidth and locks. Without the serial parts the "
+        f"factor would be {without_serial:.2f}, without the other {without_more:.2f}."
+    )
+
+
 def measure(resolution: str = RESOLUTION) -> Report:
     """Press once on two threads and once on one.
 
@@ -57,6 +78,7 @@ def measure(resolution: str = RESOLUTION) -> Report:
         },
         notes=[
             f"Force and largest SED on one and two threads: {'equal bits' if same else 'not equal'}.",
+            what_limits(both["solve_s"], runs[2].cores, one["solve_s"], runs[1].cores),
             "The time is that of `solve`; it includes meshing and loading of compiled kernels and "
             "excludes imports.",
             both["linear_solver"],
