@@ -10,14 +10,14 @@ RESOLUTION = "paper"
 
 
 def what_limits(both_s: float, cores: float, one_s: float, cores_of_one: float) -> str:
-    """Say what keeps two threads from twice the speed of one, from times and cores used.
+    r"""Say what keeps two threads from twice the speed of one, from times and cores used.
 
     Examples
     --------
-    >>> what_limits(60.0, 1.75, 100.0, 1.0)
-    'For 15 s of the 60 s on two threads one of them waits: serial parts. Both take 5 s more processor time \
-than one: memory bandwidth and locks. Without the serial parts the factor would be 1.90, without the other \
-1.74.'
+    >>> print(what_limits(60.0, 1.75, 100.0, 1.0).replace(". ", ".\n"))
+    For 15 s of the 60 s on two threads one of them waits: serial parts.
+    Both take 5 s more processor time than one: memory bandwidth and locks.
+    Without the serial parts the factor would be 1.90, without the other 1.74.
     """
     serial_s, work_s = (2.0 - cores) * both_s, cores_of_one * one_s
     more_s = cores * both_s - work_s
