@@ -24,9 +24,10 @@ def what_limits(both_s: float, cores: float, one_s: float, cores_of_one: float) 
     without_serial = work_s / (0.5 * cores * both_s)
     without_more = work_s / (serial_s + 0.5 * (work_s - serial_s))
     return (
-        f"For {serial_s:.0f} s of the {both_s:.0f} s on two threads one of them waits: serial parts. Both take "
-        f"{more_s:.0f} s more processor time than one: memory bandwidth and locks. Without the serial parts the "
-        f"factor would be {without_serial:.2f}, without the other {without_more:.2f}."
+        f"For {serial_s:.0f} s of the {both_s:.0f} s on two threads one of them waits: serial parts. "
+        f"Both take {more_s:.0f} s more processor time than one: memory bandwidth and locks. "
+        f"Without the serial parts the factor would be {without_serial:.2f}, without the other "
+        f"{without_more:.2f}."
     )
 
 
