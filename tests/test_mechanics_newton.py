@@ -11,7 +11,7 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.geometry.edged_indenters import Gap
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.motion import RampAndHold
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings, _Search
@@ -283,3 +283,18 @@ def test_nodes_follow_the_surface_where_a_straight_step_would_leave_it(monkeypat
     assert done.force_mn[-1] > 0.0
     assert max(missed_by_straight_step) > 1e-3
     assert np.linalg.norm(missed) < 0.1 * np.linalg.norm(missed_by_straight_step)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_both_searches_find_the_same_depth_for_a_force(friction):
+    mesh, bar, motion = block(), Bar(1.7, 0.1), ForceRampAndHold(force_mn=60.0, ramp_ms=50.0, hold_ms=200.0)
+    placement = place(bar, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
+    plain, persistent = (
+        press(
+            mesh, RELAXING, bar, placement, motion, PressSettings(4, 3, NewtonSettings(persistent=persistent)),
+            deepest_mm=1.0, friction=friction,
+        )
+        for persistent in (False, True)
+    )  # fmt: skip
+    np.testing.assert_allclose(persistent.force_mn, plain.force_mn, rtol=1e-4)
+    np.testing.assert_allclose(persistent.depth_mm, plain.depth_mm, rtol=2e-4)
