@@ -287,14 +287,15 @@ def test_nodes_follow_the_surface_where_a_straight_step_would_leave_it(monkeypat
 
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_both_searches_find_the_same_depth_for_a_force(friction):
-    mesh, bar, motion = block(), Bar(1.7, 0.1), ForceRampAndHold(force_mn=60.0, ramp_ms=50.0, hold_ms=200.0)
+    mesh, bar = block(), Bar(1.7, 0.1)
+    motion = ForceRampAndHold(force_mn=60.0, ramp_ms=50.0, hold_ms=200.0)
     placement = place(bar, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
     plain, persistent = (
         press(
-            mesh, RELAXING, bar, placement, motion, PressSettings(4, 3, NewtonSettings(persistent=persistent)),
+            mesh, RELAXING, bar, placement, motion, PressSettings(4, 3, NewtonSettings(persistent=search)),
             deepest_mm=1.0, friction=friction,
         )
-        for persistent in (False, True)
+        for search in (False, True)
     )  # fmt: skip
     np.testing.assert_allclose(persistent.force_mn, plain.force_mn, rtol=1e-4)
     np.testing.assert_allclose(persistent.depth_mm, plain.depth_mm, rtol=2e-4)
