@@ -271,12 +271,13 @@ def test_small_bodies_and_sharp_edges_are_meshed_finer(body, size_mm):
     ("body", "size_mm", "through"),
     [
         (Sphere(radius_mm=1.1), 1.1 / 4, 2), (Sphere(radius_mm=1.3), 0.45, 2),
-        (FlatPunch(0.5, 0.1), 0.1, 2), (FlatPunch(1.0, 0.1), 0.1, 4),
+        (FlatPunch(0.5, 0.1), 0.1, 2), (FlatPunch(1.0, 0.1), 0.1, 4), (Bar(3.0, 0.1), 0.1, 4),
+        (Bar(3.0, 0.3), 0.2, 2), (Edge(0.05), 0.05, 4), (Grating(1.0, 1.0, 0.05), 0.05, 2),
     ],
     ids=lambda value: str(value) if not isinstance(value, float) else "",
 )  # fmt: skip
 def test_quick_is_finer_from_where_it_was_too_coarse(body, size_mm, through):
-    """Under a tip of less than 1.2 mm radius, and through the horny layer below a punch of 1 mm."""
+    """Under a tip of less than 1.2 mm radius; through the horny layer below a punch of 1 mm or an edge."""
     grading = grading_about(body, "quick", 17.37)
     assert grading.finest_x_mm == pytest.approx(size_mm)
     assert grading.stratum_corneum == through

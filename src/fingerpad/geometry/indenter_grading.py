@@ -46,9 +46,9 @@ RIM_STRIPS = ((0.7, 1.0), (0.4, 1.6), (0.0, 3.0))
 """Where strips about a rim begin, over its radius, and the size there over that at the rim. At an angle a to
 the x axis the rim runs across lines of x that are 1 / cos a times as far apart."""
 
-FEWEST_BELOW_RIM, NEEDLE_MM = 4, 0.5
-"""Number of elements through the stratum corneum below a rim at least, where it bends sharply, and the radius
-below which a punch keeps the number of the resolution. [mm]"""
+FEWEST_BELOW_RIM, NEEDLE_MM, BENT_MM = 4, 0.5, 0.1
+"""Number of elements through the stratum corneum below a rim or an edge at least, where it bends sharply, the
+radius below which a punch keeps the number of the resolution, and the largest radius of such an edge. [mm]"""
 
 LEAST_ACROSS_RADIUS = 5
 """Least number of elements across the radius of a face, if those at the rim are no larger."""
@@ -144,6 +144,9 @@ def grading_about(
         for place, radius in edges
         if abs(place) <= reach
     ]
+    few = len(sharp) <= 2  # below lips of ridges the mesh is large enough
+    if few and any(size <= BENT_MM for _, _, size in sharp):
+        grading = replace(grading, stratum_corneum=max(FEWEST_BELOW_RIM, grading.stratum_corneum))
     return _with_strips(grading, sharp, along, across, z_mm)
 
 
