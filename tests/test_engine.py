@@ -1,5 +1,6 @@
 """One protocol for work that processes share: on this computer, and on the workers of a real scheduler."""
 
+import gc
 import json
 import os
 import pickle
@@ -28,6 +29,13 @@ pytestmark = pytest.mark.filterwarnings("default")
 """Dask's own warnings are none of ours."""
 
 TOUCHES = SIX[:2]
+
+
+@pytest.fixture(autouse=True)
+def collected():
+    """Sockets that Dask leaves open warn here: collected later, they failed a test of another file."""
+    yield
+    gc.collect()
 
 
 @pytest.fixture
