@@ -144,9 +144,9 @@ def grading_about(
         for place, radius in edges
         if abs(place) <= reach
     ]
-    few = len(sharp) <= 2  # below lips of ridges the mesh is large enough
+    few = len(sharp) <= 2  # with the many lips of a grating the mesh would be too large
     if few and any(size <= BENT_MM for _, _, size in sharp):
-        grading = replace(grading, stratum_corneum=max(FEWEST_BELOW_RIM, grading.stratum_corneum))
+        grading = _fine_where_bent(grading)
     return _with_strips(grading, sharp, along, across, z_mm)
 
 
@@ -160,8 +160,13 @@ def _about_rim(grading: Grading, resolution: str, radius_mm: float, rim_mm: floa
         largest = min(times * size, max(size, radius_mm / LEAST_ACROSS_RADIUS))
         strips += [(begin, end, largest), (-end, -begin, largest)]
     if radius_mm >= NEEDLE_MM:
-        grading = replace(grading, stratum_corneum=max(FEWEST_BELOW_RIM, grading.stratum_corneum))
+        grading = _fine_where_bent(grading)
     return _with_strips(grading, strips, True, True, z_mm)
+
+
+def _fine_where_bent(grading: Grading) -> Grading:
+    """Divide the stratum corneum into `FEWEST_BELOW_RIM` elements at least."""
+    return replace(grading, stratum_corneum=max(FEWEST_BELOW_RIM, grading.stratum_corneum))
 
 
 def _with_strips(
