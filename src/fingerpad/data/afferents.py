@@ -110,7 +110,7 @@ TUNING_FREQUENCIES = Published(
 )
 _TUNING = Source(
     "read off our memory of figures in Talbot, Darian-Smith, Kornhuber & Mountcastle 1968, Mountcastle, "
-    "LaMotte & Carli 1972 and Johansson, Landgren & Lundström 1982; certain to a factor of two at best",
+    "LaMotte & Carli 1972 and Johansson, Landström & Lundström 1982; certain to a factor of two at best",
     "recalled",
 )
 RA_TUNING = _TUNING(
@@ -132,6 +132,6 @@ BEST_FREQUENCIES = Published(
     "range of frequencies at which RA units are most easily excited, and lower limit for PC units",
     (8.0, 64.0, 64.0),
     "Hz",
-    "Johansson, Landgren & Lundström 1982, Brain Res 244:17, abstract",
+    "Johansson, Landström & Lundström 1982, Brain Res 244:17, abstract",
     "read",
 )
