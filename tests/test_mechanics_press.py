@@ -307,18 +307,19 @@ def test_press_that_does_not_converge_is_one_error_of_one_line_without_a_chain()
 
 
 @pytest.mark.parametrize(
-    ("friction", "is_sharp", "remedy"),
+    ("indenter", "friction", "is_sharp", "remedy"),
     [
-        (0.0, True, "an edge: try friction=0.5, a larger fillet or a smaller depth."),
-        (0.5, True, "; try a smaller depth or more ramp steps."),
-        (0.0, False, "; try a smaller depth or more ramp steps."),
+        (FlatPunch(1.0, 0.1), 0.0, True, "an edge: try friction=0.5, a larger fillet or a smaller depth."),
+        (FlatPunch(1.0, 0.1), 0.5, True, "; try a smaller depth or more ramp steps."),
+        (BALL, 0.0, False, "; try a smaller depth or more ramp steps."),
+        (Line(), 0.0, False, "try a thin Cylinder with friction=0.5, or a smaller depth."),
     ],
 )
-def test_the_remedy_depends_on_what_stopped_the_press(friction, is_sharp, remedy):
+def test_the_remedy_depends_on_what_stopped_the_press(indenter, friction, is_sharp, remedy):
     mesh = block()
     job = SimpleNamespace(
-        stimulus=RampAndHold(0.4), contact=SimpleNamespace(friction=friction), is_sharp=is_sharp,
-        body=SimpleNamespace(mesh=mesh),
+        stimulus=RampAndHold(0.4), contact=SimpleNamespace(friction=friction, indenter=indenter),
+        is_sharp=is_sharp, body=SimpleNamespace(mesh=mesh),
     )  # fmt: skip
     found = SimpleNamespace(displacement_mm=np.zeros_like(mesh.nodes_mm), depth_mm=0.2)
     error = _Press.stopped(job, SimpleNamespace(time_ms=10.0, found=found), (), "No equilibrium.")

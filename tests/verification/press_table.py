@@ -56,6 +56,7 @@ BODIES: tuple[Indenter, ...] = (
     FlatPunch(6.35, 0.3),
     Bar(3.0, SHARP_MM),
     Bar(),
+    Cylinder(0.05),
     Cylinder(0.5),
     Cylinder(),
     Edge(SHARP_MM),

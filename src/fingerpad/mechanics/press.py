@@ -447,6 +447,11 @@ class _Press:
         aim = f"{self.stimulus.largest:g} {'mN' if self.stimulus.by_force else 'mm'}"
         if last.time_ms == 0.0:
             remedy = f"try a smaller {less} or more ramp steps, and check the moduli of the tissues, in kPa"
+        elif self.contact.indenter.grips:
+            remedy = (
+                "the skin below a wire cannot slide and is cut by its edges: "
+                f"try a thin Cylinder with friction=0.5, or a smaller {less}"
+            )
         elif self.contact.friction == 0.0 and self.is_sharp:
             remedy = (
                 "without friction skin slides round a small body or an edge: "
