@@ -113,6 +113,7 @@ def test_without_a_command_the_help_is_shown(call):
         (["export", "out", "--curvature", "round"], "'--curvature': must be a number", "'round'"),
         (["export", "out", "--depth", "-1"], "depth_mm must be greater than 0", "-1"),
         (["export", "out", "--depth", "1", "--trajectory", "a.csv"], "--depth is that of a hold", "a.csv"),
+        (["export", "out", "--tolerance", "0.02"], "--tolerance is that of a --trajectory", "give both"),
         (["export", "out", "--trajectory", "gone.csv"], "gone.csv must be a file", "No such file"),
         (["export", "out", "--materials", "steel"], "tissues must be one of", "'steel'"),
         (["export", "out", "--resolution", "fine"], "resolution must be one of", "'fine'"),
@@ -204,10 +205,14 @@ def test_options_reach_the_export(call, monkeypatch, tmp_path):
     assert call("export", "d", "--format", "calculix", "--elastic-moduli", "long_term")[0] == 0
     (tmp_path / "press.csv").write_text("time_ms,depth_mm\n0,0\n50,0.5\n100,0\n", encoding="utf-8")
     assert call("export", "e", "--trajectory", "press.csv")[0] == 0
+    (tmp_path / "bent.csv").write_text("time_ms,depth_mm\n0,0\n25,0.26\n50,0.5\n", encoding="utf-8")
+    assert call("export", "e", "--trajectory", "bent.csv")[0] == 0
+    assert call("export", "e", "--trajectory", "bent.csv", "--tolerance", "0.05")[0] == 0
     (tmp_path / "touch.yaml").write_text("object: plate\nplace: {tilt_deg: 0}\n", encoding="utf-8")
     assert call("export", "f", "--touch", "touch.yaml")[0] == 0
     (touch, folder, format_name, _), (default, _, _, relaxing), (*_, elastic), *rest = exported
-    (played, *_), (same, *_) = rest
+    (played, *_), (bent, *_), (straight, *_), (same, *_) = rest
+    assert (len(bent.stimulus.times_ms), len(straight.stimulus.times_ms)) == (3, 2)
     assert same == default
     assert played.stimulus == Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 0.0))
     assert (relaxing, elastic) == (None, "long_term")

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import kstest
 
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import InputError, TissuesWarning
 from fingerpad.core.patterns import jittered
 from fingerpad.core.regions import Ellipse
 from fingerpad.core.signals import SedTraces
@@ -141,6 +141,22 @@ class BumpWithStress(Bump):
             dynamic_quantity,
             static_quantity,
         )
+
+
+@pytest.mark.parametrize("tissues", ["", "human"])
+def test_the_default_afferent_responds_to_its_own_tissues_without_a_warning(tissues):
+    skin = BumpWithStress(17.37, 0.0)
+    skin.tissues_name = tissues
+    assert Population.grid(rows=1, columns=1).respond(skin).spikes
+
+
+def test_the_default_afferent_warns_of_other_tissues_and_their_own_does_not():
+    skin = BumpWithStress(17.37, 0.0)
+    skin.tissues_name = "paper"
+    with pytest.warns(TissuesWarning, match=r"the skin has 'paper': give .*for_tissues\('paper'\)") as found:
+        Population.grid(rows=1, columns=1).respond(skin)
+    assert found[0].filename == __file__
+    Population.grid(rows=1, columns=1, afferent=Afferent.for_tissues("paper")).respond(skin)
 
 
 def test_a_population_samples_what_the_dynamic_term_of_its_afferent_follows():

@@ -604,6 +604,9 @@ def test_the_example_prints_its_command_and_writes_recordings(call, tmp_path):
     assert said == "Try: fingerpad fit try/bar.csv --stimulus bar --resolution quick\n"
     tried = said.split()[3:]
     assert read_recordings(tmp_path / tried[0], ShiftedBar()).recordings.n_rates == 72
+    assert call("--example", "try") == (
+        2, "", "fingerpad: try/bar.csv exists and is not overwritten: choose another folder.\n"
+    )  # fmt: skip
 
 
 def test_options_and_their_defaults_are_those_of_the_modules():

@@ -509,6 +509,9 @@ def test_an_example_can_be_tried_as_it_says(call, tmp_path, kind):
     assert (status, errors) == (0, "")
     assert said == f"Try: fingerpad validate try/{kind}.csv --resolution quick\n"
     assert read_observations(tmp_path / "try" / f"{kind}.csv").kind.name == kind
+    assert call("--example", kind, "--out", "try") == (
+        2, "", f"fingerpad: try/{kind}.csv exists and is not overwritten: choose another folder.\n"
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(

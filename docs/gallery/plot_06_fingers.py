@@ -2,7 +2,7 @@
 A child's finger and an adult's
 ===============================
 
-The same force presses deeper into a smaller finger.
+The same force presses less deep into a smaller finger: it has less tissue above the bone.
 """
 
 import matplotlib.pyplot as plt

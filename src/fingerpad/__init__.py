@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         InputError,
         MaterialWarning,
         StoreError,
+        TissuesWarning,
     )
     from fingerpad.core.phases import Phase
     from fingerpad.core.progress import notebook_progress
@@ -148,6 +149,7 @@ __all__ = [
     "Surface",
     "SurfaceProfile",
     "Tissues",
+    "TissuesWarning",
     "Touch",
     "TouchDescription",
     "Trajectory",
@@ -231,6 +233,7 @@ _HOMES = {
         "InputError",
         "MaterialWarning",
         "StoreError",
+        "TissuesWarning",
     ),
     "geometry.fingertip": ("Fingertip",),
     "geometry.free_mesh": ("FingerMesh",),

@@ -28,8 +28,15 @@ def export_command(
     trajectory: Annotated[
         Path | None,
         typer.Option(
-            help="CSV file with a motion instead of ramp and hold (docs/motions.md); samples within 0.5 % of "
-            "a line are left out."
+            help="CSV file with a motion instead of ramp and hold (docs/motions.md); samples close to a line "
+            "are left out."
+        ),
+    ] = None,
+    tolerance: Annotated[
+        float | None,
+        number_option(
+            "How close, over the range of each column of --trajectory: above the noise of the recording. "
+            "Default: 0.005."
         ),
     ] = None,
     finger: Annotated[
@@ -64,6 +71,8 @@ def export_command(
         )
     if trajectory is not None and depth is not None:
         raise InputError(f"--depth is that of a hold, and {trajectory} has its own: leave it out.")
+    if tolerance is not None and trajectory is None:
+        raise InputError("--tolerance is that of a --trajectory: give both, or leave it out.")
     if described is not None:
         given = (indenter, curvature, depth, trajectory, finger, materials, resolution)
         if given != (SPHERE, None, None, None, ADULT, DEFAULT_TISSUES, QUICK):
@@ -73,11 +82,15 @@ def export_command(
             )
         touch = read_touch_description(described).touch
     else:
-        held = {} if depth is None else {"depth_mm": depth}
+        motion: dict[str, object] = {} if depth is None else {"depth_mm": depth}
+        if trajectory is not None:
+            motion = {"kind": "recorded", "file": str(trajectory)}
+        if tolerance is not None:
+            motion["tolerance"] = tolerance
         touch = described_touch(
             {
                 "object": indenter if curvature is None else {"kind": SPHERE, "curvature_per_m": curvature},
-                "motion": held if trajectory is None else {"kind": "recorded", "file": str(trajectory)},
+                "motion": motion,
                 "finger": finger,
                 "tissues": materials,
                 "resolution": resolution,

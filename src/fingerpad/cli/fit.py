@@ -18,9 +18,8 @@ from fingerpad.cli.choices import (
     RESOLUTION_CHOICES,
 )
 from fingerpad.cli.options import Jobs, Scheduler, Seed, integer_option, number_option
-from fingerpad.cli.running import engine, interruptible, make_writable, progress
+from fingerpad.cli.running import engine, interruptible, make_writable, progress, write_examples
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import write_atomically
 
 if TYPE_CHECKING:
     from fingerpad.experiments.stimuli import Stimuli
@@ -130,9 +129,7 @@ def fit_command(
     from fingerpad.report.recording_fit import fit_summary, write_fit_page
 
     if example is not None:
-        make_writable(example, "--example")
-        for file, content in example_recordings().items():
-            write_atomically(example / file, content)
+        write_examples(example, example_recordings(), "--example")
         typer.echo(f"Try: fingerpad fit {example / EXAMPLE} --stimulus bar --resolution quick")
         return
     if recordings is None or stimulus is None:

@@ -7,7 +7,7 @@ import os
 import signal
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from fingerpad.core.errors import InputError
+from fingerpad.core.files import write_atomically
 from fingerpad.core.logger import LOGGER
 from fingerpad.core.progress import Bars, Lines, NoProgress, Progress
 
@@ -108,6 +109,16 @@ def make_writable(folder: Path, name: str = "--out") -> None:
             pass
     except OSError as error:
         raise InputError(f"{name} must be a writable folder: {folder} is not ({error.strerror}).") from error
+
+
+def write_examples(folder: Path, files: Mapping[str, bytes], name: str = "--out") -> None:
+    """Write example files into a folder, unless one of them exists: a user may have changed it."""
+    for file in files:
+        if (folder / file).exists():
+            raise InputError(f"{folder / file} exists and is not overwritten: choose another folder.")
+    make_writable(folder, name)
+    for file, content in files.items():
+        write_atomically(folder / file, content)
 
 
 def progress() -> Progress:

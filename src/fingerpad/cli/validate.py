@@ -11,9 +11,8 @@ import typer
 
 from fingerpad.cli.choices import DEFAULT_TISSUES, KIND_CHOICES, LOADING_CHOICES
 from fingerpad.cli.options import Jobs, Materials, Resolution, Scheduler
-from fingerpad.cli.running import engine, interruptible, make_writable, progress
+from fingerpad.cli.running import engine, interruptible, make_writable, progress, write_examples
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import write_atomically
 
 INCOMPLETE = 3
 """Exit status if some rows have no prediction; all others are scored."""
@@ -63,9 +62,7 @@ def validate_command(
     from fingerpad.report.validation import validation_summary, write_validation_page
 
     if example is not None:
-        content = example_file(example)
-        make_writable(out)
-        write_atomically(out / f"{example}.csv", content.encode())
+        write_examples(out, {f"{example}.csv": example_file(example).encode()})
         typer.echo(f"Try: fingerpad validate {out / example}.csv --resolution quick")
         return
     if observations is None:

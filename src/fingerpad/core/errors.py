@@ -79,6 +79,10 @@ class InertiaWarning(UserWarning):
     """A motion so fast that the inertia of the tissue, which is neglected, matters."""
 
 
+class TissuesWarning(UserWarning):
+    """An afferent that responds to other tissues than those with which it was fitted."""
+
+
 def level_of_caller() -> int:
     """`stacklevel` of `warnings.warn` with which a warning names the line that called the package."""
     inside = __name__.partition(".")[0], "functools", "contextlib"

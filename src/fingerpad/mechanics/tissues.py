@@ -137,3 +137,14 @@ def named_tissues(name: str) -> Tissues:
     27.03
     """
     return TISSUES[one_of("materials", name, tuple(TISSUES))]()
+
+
+def name_of_tissues(tissues: Tissues) -> str:
+    """Name of a set of tissues that ships; empty for any other.
+
+    Examples
+    --------
+    >>> name_of_tissues(named_tissues("paper")), name_of_tissues(named_tissues("paper").scaled(1.1))
+    ('paper', '')
+    """
+    return next((name for name, made in TISSUES.items() if made() == tissues), "")

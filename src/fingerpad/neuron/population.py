@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -10,13 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array, not_negative, pair, positive, whole
-from fingerpad.core.errors import InputError, shown
+from fingerpad.core.errors import InputError, TissuesWarning, level_of_caller, shown
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.layouts import MOST_RECEPTORS, Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import ResponseMap, SedTraces, Skin, traces_below
 from fingerpad.core.values import converted
 from fingerpad.data import fingertip, psychophysics
+from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
 from fingerpad.neuron.end_organs import EndOrgans
 from fingerpad.neuron.rate_windows import Window, rate_windows_ms
@@ -307,10 +309,27 @@ class Population:
         InputError
             If the skin does not return one trace per receptor, or lacks what the afferent follows, or a
             window is not given and the touch has no ramp or no hold.
+
+        Warns
+        -----
+        TissuesWarning
+            If the afferent is the default one and the skin has another set of tissues that ships.
         """
+        self._check_tissues(skin)
         there = self.on(skin)
         traces = traces_below(skin, there.sites_mm, *self.quantities)
         return there.respond_to(traces, dynamic_window_ms, static_window_ms)
+
+    def _check_tissues(self, skin: Skin) -> None:
+        """Warn if the default afferent responds to tissues with which it was not fitted."""
+        tissues = getattr(skin, "tissues_name", "")
+        if tissues not in ("", DEFAULT_TISSUES) and self.afferent == Afferent():
+            warnings.warn(
+                f"The default afferent was fitted with the tissues {DEFAULT_TISSUES!r}, and the skin has "
+                f"{tissues!r}: give the population afferent=fp.Afferent.for_tissues({tissues!r}).",
+                TissuesWarning,
+                stacklevel=level_of_caller(),
+            )
 
     @property
     def sites_mm(self) -> FloatArray:

@@ -19,6 +19,7 @@ from fingerpad.core.phases import Phase
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap, SedTraces
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.motion import STILL, Pose
+from fingerpad.mechanics.tissues import name_of_tissues
 from fingerpad.skin.caveats import Caveat, caveats_of
 from fingerpad.skin.fields import Place, sampled_fields, stored_fields
 from fingerpad.skin.receptor_sheet import ReceptorSheet
@@ -199,6 +200,11 @@ class SkinResponse(Result):
     def pad_mm(self) -> tuple[float, float] | None:
         """X and z of the middle of the pad of the finger, None if `touch` is not known. [mm]"""
         return None if self.touch is None else self.touch.finger.contact_mm
+
+    @cached_property
+    def tissues_name(self) -> str:
+        """Name of the set of tissues; empty for tissues of your own, or if `touch` is not known."""
+        return "" if self.touch is None else name_of_tissues(self.touch.tissues)
 
     @property
     def force_mn(self) -> FloatArray:
