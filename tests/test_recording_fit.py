@@ -601,7 +601,7 @@ def test_bad_input_is_one_sentence_and_status_2_and_nothing_is_written(
 def test_the_example_prints_its_command_and_writes_recordings(call, tmp_path):
     status, said, errors = call("--example", "try")
     assert (status, errors) == (0, "")
-    assert said == "Try: fingerpad fit try/bar.csv --stimulus bar --resolution quick\n"
+    assert said == "Try: fingerpad fit try/bar.csv --stimulus bar --resolution quick --out try/fit\n"
     tried = said.split()[3:]
     assert read_recordings(tmp_path / tried[0], ShiftedBar()).recordings.n_rates == 72
     assert call("--example", "try") == (

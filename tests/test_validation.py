@@ -507,7 +507,7 @@ def test_an_interrupted_run_keeps_what_is_finished_and_goes_on(call, folder, tmp
 def test_an_example_can_be_tried_as_it_says(call, tmp_path, kind):
     status, said, errors = call("--example", kind, "--out", "try")
     assert (status, errors) == (0, "")
-    assert said == f"Try: fingerpad validate try/{kind}.csv --resolution quick\n"
+    assert said == f"Try: fingerpad validate try/{kind}.csv --resolution quick --out try/{kind}\n"
     assert read_observations(tmp_path / "try" / f"{kind}.csv").kind.name == kind
     assert call("--example", kind, "--out", "try") == (
         2, "", f"fingerpad: try/{kind}.csv exists and is not overwritten: choose another folder.\n"

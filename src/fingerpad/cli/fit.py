@@ -130,7 +130,8 @@ def fit_command(
 
     if example is not None:
         write_examples(example, example_recordings(), "--example")
-        typer.echo(f"Try: fingerpad fit {example / EXAMPLE} --stimulus bar --resolution quick")
+        options = f"--stimulus bar --resolution quick --out {example / 'fit'}"
+        typer.echo(f"Try: fingerpad fit {example / EXAMPLE} {options}")
         return
     if recordings is None or stimulus is None:
         raise InputError(

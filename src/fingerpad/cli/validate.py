@@ -63,7 +63,7 @@ def validate_command(
 
     if example is not None:
         write_examples(out, {f"{example}.csv": example_file(example).encode()})
-        typer.echo(f"Try: fingerpad validate {out / example}.csv --resolution quick")
+        typer.echo(f"Try: fingerpad validate {out / example}.csv --resolution quick --out {out / example}")
         return
     if observations is None:
         raise InputError("validate needs a file of observations, or --example KIND: see --help.")

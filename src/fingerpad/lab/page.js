@@ -209,6 +209,15 @@ export function start(root, spec, ask) {
   }
   function tell(text, wrong = false) { said.textContent = text; said.className = wrong ? "said wrong" : "said"; }
 
+  let first = null; // when presses for what is made now were first seen, and how many were done
+  function progressOf({ what, done, total }) {
+    if (!first || first.what !== what || first.total !== total) first = { what, done, total, at: Date.now() };
+    if (!total) return `Pressing for ${what}: begins. This is needed once.`;
+    const pressed = done - first.done, minutes = (Date.now() - first.at) / 60000 / pressed * (total - done);
+    const left = pressed < 2 ? "" : `, about ${Math.max(1, Math.round(minutes))} min left`;
+    return `Pressing for ${what}: ${done} of ${total} done${left}. This is needed once.`;
+  }
+
   async function update() {
     wanted = true;
     if (busy) return;
@@ -221,8 +230,7 @@ export function start(root, spec, ask) {
       if (reply.error) tell(reply.error, true);
       if (reply.view) { view = reply.view; tell(view.said); python.textContent = view.python; draw(); }
       if (reply.making && !wanted) {
-        const { what, done, total } = reply.making;
-        tell(`Pressing for ${what}: ${total ? `${done} of ${total} done` : "begins"}. This is needed once.`);
+        tell(progressOf(reply.making));
         await new Promise(resolve => setTimeout(resolve, 400));
         wanted = true;
       }
