@@ -133,9 +133,14 @@ def test_force_that_reaches_the_bone_is_refused_while_solving():
         InputError, match=r"force_mn must not push the indenter deeper than 0.15 mm"
     ) as refusal:
         pressed(block(), ForceRampAndHold(20.0, 50.0, 100.0), settings=PressSettings(4, 1), deepest_mm=0.15)
-    assert str(refusal.value).endswith("of 20 mN.")
+    assert str(refusal.value).endswith("of 20 mN; give less force, in mN.")
     finger = touch(ForceRampAndHold(60.0))
     assert 1.5 < finger.deepest_mm < Fingertip().depth_available_mm(17.37, 0.0)
+
+
+def test_a_force_far_too_large_is_refused_within_a_step_that_was_cut():
+    with pytest.raises(InputError, match=r"deeper than 0.15 mm: it is there after .* of 2000 mN"):
+        pressed(block(), ForceRampAndHold(2000.0, 50.0, 100.0), settings=PressSettings(1, 1), deepest_mm=0.15)
 
 
 def test_force_beyond_the_limit_of_the_mesh_is_an_error_that_advises_less_force():

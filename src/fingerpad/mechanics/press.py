@@ -275,6 +275,7 @@ class _Press:
     newton: NewtonSettings
     watched: Watched
     finest_mm: float = np.inf
+    deepest_mm: float = np.inf
     newton_steps: int = 0
 
     def contact_at(self, time_ms: float) -> Contact:
@@ -313,6 +314,7 @@ class _Press:
         newton = replace(self.newton, persistent=True) if persistent else self.newton
         before = start.found.multipliers_mn, newton, start.found.displacement_mm
         found = find_equilibrium(self.body, load, self.solver, guess, *before)
+        self.check_depth(target_ms, found.depth_mm)
         self.check_that_it_holds(start, found)
         if self.stimulus.by_force and load.force_mn is None:
             found = replace(found, depth_mm=self.touching_mm(load.contact, found.displacement_mm))
@@ -343,6 +345,15 @@ class _Press:
     def last_resort(self, start: _Moment, target_ms: float) -> _Moment:
         """Solve a step as `step` does, through states in which the tangent is indefinite."""
         return self.step(start, target_ms, persistent=True)
+
+    def check_depth(self, time_ms: float, depth_mm: float) -> None:
+        """Refuse a force as soon as it has pushed the indenter too deep."""
+        if depth_mm > self.deepest_mm and self.stimulus.by_force and self.stimulus.stays:
+            raise InputError(
+                f"force_mn must not push the indenter deeper than {self.deepest_mm:.2f} mm: it is there after "
+                f"{time_ms:.4g} ms, at {self.stimulus.prescribed_at(time_ms):.4g} of "
+                f"{self.stimulus.largest:g} mN; give less force, in mN."
+            )
 
     def check_that_it_holds(self, start: _Moment, found: Equilibrium) -> None:
         """Refuse a step after which no force, or with a shifted tangent less, drives the indenter deeper.
@@ -547,7 +558,7 @@ def press(
     chosen = np.arange(len(mesh.elements)) if watched is None else watched
     follow = Watched(chosen, mesh.nodes_mm, mesh.elements[chosen], mesh.layer[chosen], table)
     newton = _newton_settings(settings, finest_mm)
-    job = _Press(body, contact, stimulus, solver, newton, follow, finest_mm)
+    job = _Press(body, contact, stimulus, solver, newton, follow, finest_mm, deepest_mm)
     moment = job.unloaded()
     reached, slips, values = [], [], [moment.fields.values]
     planned_ms = settings.steps_ms(stimulus)
@@ -557,12 +568,6 @@ def press(
             "%.4g of %.4g ms: depth %.4g mm, %d Newton steps so far",
             moment.time_ms, stimulus.end_ms, moment.found.depth_mm, job.newton_steps,
         )  # fmt: skip
-        if moment.found.depth_mm > deepest_mm and stimulus.by_force and stimulus.stays:
-            raise InputError(
-                f"force_mn must not push the indenter deeper than {deepest_mm:.2f} mm: it is there after "
-                f"{moment.time_ms:.4g} ms, at {stimulus.prescribed_at(moment.time_ms):.4g} of "
-                f"{stimulus.largest:g} mN."
-            )
         # Without its history, which is as large as all else together.
         reached.append((moment.time_ms, moment.found, moment.sed_kpa))
         slips.append(moment.slip_mm)
