@@ -16,7 +16,8 @@ from matplotlib.patches import Circle
 
 from fingerpad.core.results import schema_of, to_json
 from fingerpad.data import all_published
-from fingerpad.experiments.gerling2014.claim_row import Group, Verdict
+from fingerpad.data.paper import DYNAMIC_RATE_MINIMUM
+from fingerpad.experiments.gerling2014.claim_row import Group, Verdict, measured_row
 from fingerpad.experiments.gerling2014.mesh_picture import mesh_picture
 from fingerpad.experiments.gerling2014.nail_border import NailBorder
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
@@ -364,7 +365,7 @@ def _curvature_thresholds() -> dict:
 def _population() -> dict:
     x, z = np.linspace(12.0, 22.0, 11), np.linspace(-5.0, 5.0, 13)
     away = np.hypot(x[:, None] - 17.4, z[None, :])
-    static = 50.0 * np.exp(-((away / 2.0) ** 2))
+    static = np.where(away > 4.0, 0.0, 50.0 * np.exp(-((away / 2.0) ** 2)))
     latency = [[None if r > 4.0 else 6.0 + 6.0 * r for r in row] for row in away]
     return {
         "curvature_per_m": 287.0,
@@ -622,7 +623,30 @@ def test_each_group_has_its_table_and_a_fitted_number_is_not_counted_as_a_predic
     assert [len(table.rows) for table in tables] == [5, 2, 1]
     assert ["what was fitted" in table.columns for table in tables] == [False, True, False]
     brief = comparison_tables(rows, brief=True)[2]
-    assert brief.columns == ("quantity", "paper", "this run", "verdict", "what was fitted", "note")
+    assert brief.columns == ("quantity", "verdict", "paper", "this run", "what was fitted", "note")
+
+
+def test_the_status_that_all_rows_share_stands_once_below_the_table():
+    results = synthetic_results()
+    for row, more in zip(results["comparison"], ("", "; read", "; read; assumed"), strict=False):
+        row["status"] = f"tissues; finger{more}"
+    results["comparison"] = results["comparison"][:3]
+    (_, table) = comparison_tables(typed(ReproductionResult, results).comparison)
+    assert table.columns[-2] == "status of further inputs"
+    assert [row.cells[-2] for row in table.rows] == ["", "read", "read; assumed"]
+    assert table.note.endswith("Status of the inputs of all rows: tissues; finger.")
+    same = [{**row, "status": "tissues"} for row in results["comparison"]]
+    (_, table) = comparison_tables(typed(ReproductionResult, {**results, "comparison": same}).comparison)
+    assert not any("status" in column for column in table.columns)
+
+
+def test_a_difference_that_rounds_to_nothing_has_no_sign():
+    least = DYNAMIC_RATE_MINIMUM
+    rows = [
+        measured_row(Group.FITTED, "rate", least, least.value + more, "", 0, fitted_to="rates")
+        for more in (-0.4, 0.6)
+    ]
+    assert [row.difference for row in rows] == ["0", "+1"]
 
 
 def test_signs_of_the_verdicts_differ_without_colour():
@@ -636,7 +660,8 @@ def test_the_first_screen_has_a_picture_and_a_sentence_per_level(report):
     opening = reproduction_page(typed(ReproductionResult, synthetic_results())).opening
     assert [drawing.title for drawing in opening] == ["Skin", "Afferent", "Percept"]
     assert not any(re.search(r"\. [A-Z]", drawing.caption) for drawing in opening), "one sentence each"
-    first = page[: page.index('<div class="summary">')]
+    verdicts, first = page[: page.index("<nav")].split('<div class="opening">')
+    assert "Of the statements of the paper that can fail" in verdicts, "the verdict stands above the pictures"
     assert first.count("<img") == 3
     assert first.count("<figcaption>") == 3
 
@@ -644,7 +669,8 @@ def test_the_first_screen_has_a_picture_and_a_sentence_per_level(report):
 def test_the_summary_counts_and_names_what_was_missed():
     results = typed(ReproductionResult, synthetic_results())
     skin, afferent, percept = (drawing.caption for drawing in reproduction_page(results).opening)
-    assert "Trial 3 is closest" in skin
+    assert skin.startswith("Of the material trials, Trial 3 is closest")
+    assert skin.endswith(", as in the paper.")
     assert "0.84" in afferent
     assert "296 1/m in 63 % of trials (observed: 58 %)" in percept
     (verdicts,) = reproduction_summary(results)
@@ -660,7 +686,9 @@ def test_the_summary_follows_the_numbers():
     results["skin_deflection"]["trial1"]["cylinder"]["r2"] = 0.99
     results["comparison"] = [{**row, "verdict": "met"} for row in results["comparison"]]
     changed = typed(ReproductionResult, results)
-    assert "Trial 1 is closest" in reproduction_page(changed).opening[0].caption
+    skin = reproduction_page(changed).opening[0].caption
+    assert "Trial 1 is closest" in skin
+    assert skin.endswith("; in the paper Trial 3 is closest.")
     (verdicts,) = reproduction_summary(changed)
     assert verdicts == (
         "Of the statements of the paper that can fail, 5 met and 0 missed. Of the numbers that were fitted "
@@ -750,15 +778,15 @@ def test_figure_4_draws_the_profiles_given_and_sets_the_artefact_apart():
     assert near.get_xlim() == (-skin_deflection.NEAR_MM, skin_deflection.NEAR_MM)
 
 
-def test_figure_5_draws_predicted_lines_over_observed_points():
+def test_figure_5_draws_the_fitted_line_over_observed_points():
     section = _single_unit()
     given = typed(ReproductionResult, synthetic_results()).single_unit
     for axes, phase in zip(single_unit.draw_single_unit(given).axes, ("dynamic", "static"), strict=True):
         drawn = lines(axes)
-        np.testing.assert_array_equal(drawn["predicted"].get_ydata(), section[f"{phase}_rate_hz"])
+        np.testing.assert_array_equal(drawn["model (fitted)"].get_ydata(), section[f"{phase}_rate_hz"])
         np.testing.assert_array_equal(drawn["observed"].get_ydata(), section[f"observed_{phase}_rate_hz"])
         assert drawn["observed"].get_marker() == "o"
-        assert drawn["predicted"].get_marker() in ("None", "")
+        assert drawn["model (fitted)"].get_marker() in ("None", "")
 
 
 def test_figure_1_draws_every_element_of_the_planes_by_its_layer():
@@ -845,10 +873,11 @@ def test_figure_6_leaves_silent_places_open():
         axes for axes in population.draw_population(section).axes if axes.name != "3d" and axes.get_xlabel()
     ]
     assert len(maps) == 3
-    shown = np.ma.getmaskarray(maps[2].collections[0].get_array()).reshape(13, 11)
-    silent = np.isnan(section.first_spike_latency_ms)
-    assert 0 < silent.sum() < silent.size
-    np.testing.assert_array_equal(shown, silent.T)
+    for axes, name in zip(maps, population.QUANTITIES, strict=True):
+        shown = np.ma.getmaskarray(axes.collections[0].get_array()).reshape(13, 11)
+        silent = ~(getattr(section, name) > 0.0)
+        assert 0 < silent.sum() < silent.size
+        np.testing.assert_array_equal(shown, silent.T)
     for axes in maps:
         np.testing.assert_array_equal(axes.get_lines()[0].get_xydata(), section.receptors_mm)
 
@@ -986,6 +1015,12 @@ def test_figure_9_has_one_scale_for_the_whole_finger_and_one_for_the_nail():
     peak = max(np.max(section.von_mises_kpa), np.max(section.middle.von_mises_kpa))
     assert wide == {(peak / 1e4, peak)}
     assert near == {(0.0, section.border_kpa)}
+
+
+def test_the_caption_of_figure_9_has_the_ratio_once():
+    caption = nail.caption_nail(replace(typed(NailBorder, nail_section()), text="It is 1.5 times."))
+    assert caption.count("times") == caption.count("1.5") == 1
+    assert "Ratio" not in caption
 
 
 def test_figure_9_draws_the_nail_on_both_halves():

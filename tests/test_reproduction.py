@@ -159,10 +159,11 @@ def test_a_run_ends_with_status_0_and_names_results_and_missed_criteria(first):
     # The kernels may be compiled only now.
     assert told(first)[0].startswith("Reproducing at quick resolution with 2 process(es)")
     assert all(PROGRESS.fullmatch(line) for line in told(first)[1:])
-    report, results, missed = first.said.splitlines()
+    report, results, verdicts, missed = first.said.splitlines()
     assert report == f"Report: {first.folder / 'report.html'}"
     assert results == f"Results: {first.folder / 'results.json'}"
     names = [row["quantity"] for row in first.results["comparison"] if row["verdict"] == "missed"]
+    assert verdicts.startswith("Of the statements of the paper that can fail, ")
     assert missed == "Missed: " + ("; ".join(names) if names else "nothing")
 
 

@@ -40,6 +40,7 @@ def reproduce_command(
     from fingerpad.experiments.gerling2014 import Reproduction, reproduce
     from fingerpad.experiments.gerling2014.claim_row import Verdict
     from fingerpad.experiments.schemas import write
+    from fingerpad.report.comparison import verdict_sentence
     from fingerpad.report.reproduction import write_report
 
     conditions = Conditions(resolution=resolution, seed=seed, materials=materials)
@@ -61,4 +62,5 @@ def reproduce_command(
     missed = [row.quantity for row in results.comparison if row.verdict is Verdict.MISSED]
     typer.echo(f"Report: {report}")
     typer.echo(f"Results: {out / 'results.json'}")
+    typer.echo(verdict_sentence(results.comparison))
     typer.echo(f"Missed: {'; '.join(missed) if missed else 'nothing'}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import takewhile
 
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Verdict, count_by_verdict
 from fingerpad.report.formatting import joined, plain
@@ -98,15 +99,29 @@ def _counts(rows: Sequence[ClaimRow]) -> Table:
 
 
 def _of_group(group: Group, rows: Sequence[ClaimRow], brief: bool) -> Table:
-    """Return the rows of one group; what was fitted has a column where something was."""
+    """Return the rows of one group; what was fitted has a column where something was.
 
-    def cells(row: ClaimRow) -> dict[str, str]:
-        found = {"quantity": row.quantity, "paper": row.paper, "this run": row.ours}
+    The status that all rows share stands once, below the table.
+    """
+    shared = "; ".join(_leading([row.status.split("; ") for row in rows]))
+    own = [row.status.removeprefix(shared).removeprefix("; ") for row in rows]
+    show = any(own) and not brief
+
+    def cells(row: ClaimRow, status: str) -> dict[str, str]:
+        found = {"quantity": row.quantity, "verdict": verdict_text(row)}
+        found |= {"paper": row.paper, "this run": row.ours}
         found |= {} if brief else {"difference": row.difference}
-        found["verdict"] = verdict_text(row)
         found |= {"what was fitted": row.fitted_to} if group is Group.FITTED else {}
-        found |= {} if brief else {"status of the inputs": row.status}
+        found |= {"status of further inputs" if shared else "status of the inputs": status} if show else {}
         return found | {"note": row.note}
 
-    listed = [Row(tuple(cells(row).values()), KINDS[row.verdict]) for row in rows]
-    return Table(TITLES[group], tuple(cells(rows[0])), listed, MEANINGS[group])
+    found = [cells(row, status) for row, status in zip(rows, own, strict=True)]
+    listed = [Row(tuple(each.values()), KINDS[row.verdict]) for each, row in zip(found, rows, strict=True)]
+    note = f" Status of the inputs of all rows: {shared}." if shared and not brief else ""
+    return Table(TITLES[group], tuple(found[0]), listed, MEANINGS[group] + note)
+
+
+def _leading(lists: Sequence[Sequence[str]]) -> list[str]:
+    """Return the parts that all lists begin with."""
+    together = takewhile(lambda parts: len(set(parts)) == 1, zip(*lists, strict=False))
+    return [part for part, *_ in together]

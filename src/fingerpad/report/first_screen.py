@@ -14,10 +14,14 @@ from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscri
 from fingerpad.report.discrimination import draw_hit_rates
 from fingerpad.report.formatting import fixed, joined, number, whole_percent
 from fingerpad.report.parts import Drawing
+from fingerpad.report.single_unit import FITTED
 from fingerpad.report.skin_deflection import CYLINDER, draw_profiles
 from fingerpad.report.style import draw_rates, new_figure
 
 SIZE_IN = (4.6, 3.9)
+
+IN_THE_PAPER = "Trial 3"
+"""The trial that is closest to the observed deflection in the paper."""
 
 
 def first_screen(result: ReproductionResult) -> list[Drawing]:
@@ -48,7 +52,7 @@ def _draw_afferent(section: SingleUnitResult) -> Figure:
     """Draw the rates of the ramp over the position of the bar."""
     figure = new_figure(*SIZE_IN)
     axes = figure.subplots()
-    draw_rates(axes, section.shift_mm, section.dynamic_rate_hz, section.observed_dynamic_rate_hz, "model")
+    draw_rates(axes, section.shift_mm, section.dynamic_rate_hz, section.observed_dynamic_rate_hz, FITTED)
     axes.set(title="Level 2: afferent", xlabel="place of the bar [mm]", ylabel="rate in the ramp [spikes/s]")
     axes.legend(loc="upper left", fontsize=8.0)
     axes.set_ylim(top=1.25 * axes.get_ylim()[1])
@@ -72,7 +76,8 @@ def _skin(section: SkinDeflectionResult) -> str:
     listed = joined([f"{name} {fixed(fit, 2)}" for name, fit in fits.items()])
     return (
         f"Of the material trials, {best} is closest to the observed deflection under the cylinder "
-        f"(R²: {listed}); in the paper Trial 3 is."
+        f"(R²: {listed})"
+        + (", as in the paper." if best == IN_THE_PAPER else f"; in the paper {IN_THE_PAPER} is closest.")
     )
 
 

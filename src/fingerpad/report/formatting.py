@@ -129,6 +129,8 @@ def plain(value: Any, digits: int = 3, longest: int = 8) -> str:
 
     Examples
     --------
+    >>> plain(["direct, by SuperLU.", "multigrid, 5 levels."])
+    'direct, by SuperLU; multigrid, 5 levels'
     >>> plain(True), plain(0.5), plain("coarse"), plain([1, 2]), plain(list(range(40)))
     ('yes', '0.5', 'coarse', '1, 2', '40 values, 0 … 39')
     """
@@ -142,7 +144,8 @@ def plain(value: Any, digits: int = 3, longest: int = 8) -> str:
         )
     if isinstance(value, Sequence) and not isinstance(value, str):
         if len(value) <= longest:
-            return ", ".join(plain(item, digits, longest) for item in value) or ABSENT
+            items = [plain(item, digits, longest).removesuffix(".") for item in value]
+            return ("; " if any(", " in item for item in items) else ", ").join(items) or ABSENT
         known = [item for item in value if isinstance(item, int | float) and not math.isnan(item)]
         span = f", {number(min(known))} … {number(max(known))}" if known else ""
         return f"{len(value)} values{span}"

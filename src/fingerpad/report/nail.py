@@ -137,7 +137,6 @@ def _profiles(axes: Axes, profile: StressProfile) -> None:
 
 def caption_nail(section: NailBorder) -> str:
     """Caption of Figure 9."""
-    low, high = section.ratio_range
     return (
         "Predicted von Mises stress at the end of the hold, on the finger that the standard sphere deforms; "
         "nothing here was observed: (a, b) "
@@ -145,6 +144,6 @@ def caption_nail(section: NailBorder) -> str:
         f"{number(DECADES)} decades; (d) the back of the finger and (e) the section with the highest ratio, "
         "on a linear scale up to the highest stress at the border of the nail (its outline in white); (f) "
         "median and middle 80 % of all sections that cross that border. One half is computed; the other is "
-        "its mirror image. The paper shows high stresses at the border of the nail. Ratio of the border to "
-        f"the skin 2 to 3 mm away: {number(section.ratio)} ({number(low)} to {number(high)}). {section.text}"
+        "its mirror image. The paper shows high stresses at the border of the nail. "
+        f"{section.text}"
     )

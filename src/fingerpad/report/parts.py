@@ -184,7 +184,7 @@ class Page:
     chapters : sequence of Chapter
         In order.
     opening : sequence of Drawing, optional
-        Small figures side by side before the summary, each with one sentence as its caption.
+        Small figures side by side after the summary, each with one sentence as its caption.
     """
 
     heading: str

@@ -169,7 +169,7 @@ def _map(
     receptors: FloatArray,
 ) -> None:
     picture = axes.pcolormesh(
-        x, z, np.ma.masked_invalid(values.T), cmap=colours, norm=scale, shading="nearest"
+        x, z, np.ma.masked_where(~(values.T > 0.0), values.T), cmap=colours, norm=scale, shading="nearest"
     )
     silent = Rectangle((0, 0), 1, 1, transform=axes.transAxes, facecolor=PALE, hatch="//", edgecolor=GREY)
     silent.set(zorder=0, linewidth=0.0)
@@ -197,8 +197,9 @@ def caption_population(section: PopulationMaps) -> str:
         f"Predicted response of afferents all over the pad to a sphere of {number(section.curvature_per_m)} "
         f"1/m, at a depth of {protocol.DEPTH.value} mm. Left: the quantity as a height, as in the paper, but "
         "latencies on a logarithmic scale. Middle: the same on the deformed skin at the end of the hold, "
-        "seen from below, the tip to the right; afferents in grey skin do not respond. Right: seen from "
-        "above; circles are the receptors of Figures 7 and 8, hatched skin is silent. All afferents have "
+        f"seen from below, from x = {number(PAD_FROM_MM)} mm on the left to the tip on the right, in the "
+        "colours of the scale on the right; afferents in grey skin do not respond. Right: seen from above; "
+        "circles are the receptors of Figures 7 and 8, hatched skin does not respond. All afferents have "
         f"the parameters of the fitted afferent; nothing here was observed.{_resting(section.at_rest)}"
     )
 

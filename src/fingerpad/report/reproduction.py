@@ -160,7 +160,7 @@ def _of_run(part: Part, manifest: Manifest) -> Part:
 
 
 def reproduction_summary(result: ReproductionResult) -> list[str]:
-    """Return the paragraphs below the pictures of the levels: what was met and missed."""
+    """Return the paragraphs above the pictures of the levels: what was met and missed."""
     paragraphs = [verdict_sentence(result.comparison)]
     if result.single_unit_uncertainty is None:
         paragraphs.append(

@@ -24,6 +24,9 @@ BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
 STATIC_MARK_MM = 2.9
 """Position at which the paper's static difference is drawn, where no rates are. [mm]"""
 
+FITTED = "model (fitted)"
+"""Name of the line of the model, whose afferent was fitted to what was observed."""
+
 PAPER_FOLD, PAPER_START = 3, 2
 """Fold and start point whose steps the paper's Table 4 lists."""
 
@@ -47,7 +50,7 @@ def draw_single_unit(section: SingleUnitResult) -> Figure:
     )
     for axes, (title, predicted_hz, observed_hz, fss) in zip(figure.subplots(1, 2), phases, strict=True):
         axes.axvspan(-BAR_HALF_WIDTH_MM, BAR_HALF_WIDTH_MM, color="#f3f1ea", zorder=0)
-        draw_rates(axes, section.shift_mm, predicted_hz, observed_hz)
+        draw_rates(axes, section.shift_mm, predicted_hz, observed_hz, FITTED)
         axes.set_title(f"{title}, FSS = {fixed(fss, 2)}")
         axes.set_xlabel("position of the bar, proximal positive [mm]")
     dynamic, static = figure.axes

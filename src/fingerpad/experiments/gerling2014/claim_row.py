@@ -128,13 +128,14 @@ def measured_row(
 ) -> ClaimRow:
     """Return the row of a number that the paper prints: met from it on, or close to it."""
     difference = ours - published.value
+    shown = round(difference, digits) + 0.0  # not -0
     criterion = "judged: at least the paper's" if at_least else f"judged: within {CLOSE:.0%}"
     return ClaimRow(
         group=group,
         quantity=quantity,
         paper=f"{published.value:g}",
         ours=f"{ours:.{digits}f}",
-        difference=f"{difference:+.{digits}f}",
+        difference=f"{shown:+.{digits}f}" if shown else "0",
         status=status,
         verdict=judged(bool(difference >= 0.0 if at_least else abs(difference) <= CLOSE * published.value)),
         fitted_to=fitted_to,
