@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 from fingerpad.core.errors import InertiaWarning
 from fingerpad.core.files import write_atomically
@@ -161,9 +162,14 @@ def draw(runs: Sequence[Vibrated]) -> Figure:
     for time_ms in spikes:
         density.axvline(time_ms, ymax=0.06, color=BLACK, linewidth=0.6)
     frequencies = [1e3 / run.cycles.period_ms for run in runs]
+    names = [f"{frequency:g}" for frequency in frequencies]
     per_cycle = [spikes_of(run).size / run.cycles.count for run in runs]
     counts.loglog(frequencies, per_cycle, color=ORANGE, marker="o")
     counts.set(xlabel="frequency [Hz]", ylabel="spikes per cycle")
+    counts.set_xticks(frequencies, names)
+    counts.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    counts.yaxis.set_major_formatter("{x:g}")
+    counts.minorticks_off()
     for row, run in enumerate(runs):
         period = run.cycles.period_ms
         raster.plot(
@@ -171,7 +177,7 @@ def draw(runs: Sequence[Vibrated]) -> Figure:
             np.full(spikes_of(run).size, row), color=BLACK, marker="|", linestyle="none", markersize=9.0,
         )  # fmt: skip
     raster.set(xlabel="phase of the cycle", ylabel="frequency [Hz]", xlim=(0.0, 1.0))
-    raster.set_yticks(range(len(runs)), [f"{frequency:g}" for frequency in frequencies])
+    raster.set_yticks(range(len(runs)), names)
     return figure
 
 

@@ -119,6 +119,26 @@ def test_drawings_show_the_numbers_of_the_result(results):
     assert pad.collections[0].get_array().reshape(61, 61)[30, 30] == pytest.approx(middle, rel=1e-9)
 
 
+def test_few_sites_have_a_key_and_many_have_none(results):
+    times_ms, current_ma = [0.0, 50.0], np.outer([0.0, 2e-5], np.arange(1.0, 7.0))
+    few = fp.CurrentTraces(times_ms, current_ma).plot(Figure().add_subplot())
+    assert [text.get_text() for text in few.get_legend().get_texts()] == [f"site {n}" for n in range(1, 7)]
+    styles = {(line.get_color(), str(line._dash_pattern)) for line in few.lines}
+    assert len(styles) == 6
+    assert few.get_ylabel() == "current [nA]"
+    assert few.lines[0].get_ydata().tolist() == pytest.approx([0.0, 20.0])
+    many = fp.CurrentTraces(times_ms, np.ones((2, 7))).plot(Figure().add_subplot())
+    assert many.get_legend() is None
+    assert results["CurrentTraces"].plot(Figure().add_subplot()).get_legend() is None
+
+
+def test_the_key_of_types_lies_beside_the_map(results):
+    axes = Figure().add_subplot()
+    results["MixedResponse"].plot(axes, "map")
+    axes.figure.draw_without_rendering()
+    assert axes.get_legend().get_window_extent().x0 >= axes.get_window_extent().x1
+
+
 def test_without_axes_a_figure_of_pyplot_is_made(results):
     matplotlib.use("agg")
     from matplotlib import pyplot

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.core.checks import one_of
+from fingerpad.core.checks import FloatArray, one_of
 from fingerpad.core.displayed import Displayed
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
@@ -22,7 +22,8 @@ from fingerpad.report.discrimination_task_figures import draw_curves_of_measure,
 from fingerpad.report.mixed_responses import draw_map_by_type, draw_raster_by_type
 from fingerpad.report.population import QUANTITIES
 from fingerpad.report.recording_fit import draw_phase, recorded_phases
-from fingerpad.report.style import BLACK, BLUE, GREY, new_figure, png, say_nothing_to_draw
+from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, png, say_nothing_to_draw
+from fingerpad.report.three_levels import NANOAMPERE_PER_MA
 from fingerpad.report.touch import BONE, draw_section
 
 if TYPE_CHECKING:
@@ -36,6 +37,19 @@ if TYPE_CHECKING:
 PALE_SKIN = "#f7ece1"
 
 CURVE_POINTS = 200
+
+BESIDE: Any = {"fontsize": "small", "loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
+"""Place of a legend that must not lie on what is drawn."""
+
+SITE_STYLES: tuple[tuple[str, Any], ...] = (
+    (BLACK, "-"),
+    (BLUE, "--"),
+    (ORANGE, ":"),
+    (GREEN, "-."),
+    (GREY, "-"),
+    (BLUE, (0, (8, 2, 1, 2, 1, 2))),
+)
+"""Colour and dashes of the lines of a few sites."""
 
 QUANTITY_LABELS = {"stored": "strain energy density", "work": "work of the stress"}
 """Names of quantities in words, where these are not those of `SkinResponse.sample`."""
@@ -122,22 +136,33 @@ def draw_map(axes: Axes, response: ResponseMap, quantity: str = "static_rate_hz"
     phase, label, colours, _ = QUANTITIES[quantity]
     place = response.positions_mm[:, [-1, 0]]
     drawn = axes.scatter(
-        place[:, 0], place[:, 1], c=getattr(response, quantity), cmap=colours, s=60.0, edgecolors=GREY
-    )
+        place[:, 0], place[:, 1], c=getattr(response, quantity), cmap=colours, s=60.0, edgecolors=GREY,
+        clip_on=False,
+    )  # fmt: skip
     axes.figure.colorbar(drawn, ax=axes, label=f"{phase}: {label}")
     axes.set(xlabel="across, z [mm]", ylabel="along, x [mm]", aspect="equal")
 
 
 def draw_traces(axes: Axes, traces: SedTraces) -> None:
     """Draw what the static term follows over time, a line per site."""
-    axes.plot(traces.times_ms, traces.sed_kpa, color=BLACK, linewidth=0.8)
+    _draw_by_site(axes, traces.times_ms, traces.sed_kpa)
     axes.set(xlabel="time [ms]", ylabel=_label(traces.static_quantity))
 
 
 def draw_currents(axes: Axes, traces: CurrentTraces) -> None:
     """Draw membrane currents over time, a line per site."""
-    axes.plot(traces.times_ms, traces.current_ma, color=BLACK, linewidth=0.8)
-    axes.set(xlabel="time [ms]", ylabel="current [mA]")
+    _draw_by_site(axes, traces.times_ms, NANOAMPERE_PER_MA * traces.current_ma)
+    axes.set(xlabel="time [ms]", ylabel="current [nA]")
+
+
+def _draw_by_site(axes: Axes, times_ms: FloatArray, values: FloatArray) -> None:
+    """Draw a line per site; a few sites have their own styles and a key, many are thin black lines."""
+    if not 1 < values.shape[1] <= len(SITE_STYLES):
+        axes.plot(times_ms, values, color=BLACK, linewidth=0.8)
+        return
+    for site, (column, (colour, dashes)) in enumerate(zip(values.T, SITE_STYLES, strict=False), start=1):
+        axes.plot(times_ms, column, color=colour, linestyle=dashes, linewidth=1.2, label=f"site {site}")
+    axes.legend(**BESIDE)
 
 
 def draw_types(axes: Axes, response: MixedResponse) -> None:
@@ -148,7 +173,7 @@ def draw_types(axes: Axes, response: MixedResponse) -> None:
 def draw_types_map(axes: Axes, response: MixedResponse) -> None:
     """Draw where the afferents of each type lie, with larger marks for more spikes."""
     draw_map_by_type(axes, response.maps)
-    axes.legend(fontsize="small")
+    axes.legend(**BESIDE)
 
 
 def draw_hit_rates(axes: Axes, rates: HitRates) -> None:
