@@ -5,9 +5,11 @@ import pickle
 from dataclasses import dataclass, fields, replace
 
 import pytest
+from pydantic import BaseModel
 
 import fingerpad as fp
-from fingerpad.core.keywords import OtherName, other_names
+from fingerpad.core.displayed import Result
+from fingerpad.core.keywords import KnownKeywords, OtherName, other_names
 from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.experiments.stimuli import read_stimuli
 from fingerpad.geometry.names import INDENTERS, SIZE_UNITS, sizes_of
@@ -121,6 +123,26 @@ def test_editors_see_every_name():
             "indenter must have width_mm once: got 'bar:3:width_mm=4'.",
         ),
         (lambda: indenter_named("sphere:=4"), "Sphere has no :"),
+        (lambda: fp.sine(0.8, 0.1, 20.0), "sine needs cycles: it is not given."),
+        (lambda: fp.sine(0.8, 0.1), "sine needs frequency_hz, cycles: they are not given."),
+        (lambda: fp.Union([]), "Union needs at_mm: it is not given."),
+        (lambda: fp.ReducedRange(), "ReducedRange needs depth_mm: it is not given."),
+        (lambda: fp.ReducedRange(depth=1.0), "ReducedRange has no depth: did you mean depth_mm?"),
+        (lambda: fp.save_figure("a.png", None), "save_figure needs response: it is not given."),
+        (lambda: fp.read_height_map("x.png"), "read_height_map needs pitch_mm: it is not given."),
+        (lambda: fp.embossed_text("T", cap_mm=5), "embossed_text has no cap_mm: did you mean capital_mm?"),
+        (lambda: fp.Fingertip("child"), "got 'child', write Fingertip.of('child')."),
+        (lambda: fp.RampAndHold(force_mn=60), "RampAndHold has no force_mn: take ForceRampAndHold."),
+        (lambda: fp.ForceRampAndHold(depth_mm=1), "ForceRampAndHold has no depth_mm: take RampAndHold."),
+        (lambda: fp.indent(fp.Fingertip, fp.Sphere()), "finger must be made from its class: got Fingertip, "),
+        (lambda: fp.indent(fp.Fingertip(), fp.Sphere), "got Sphere, call it: Sphere()."),
+        (lambda: fp.Hencky(10.0), "Hencky needs bulk_kpa: it is not given."),
+        (
+            lambda: fp.Fingertip.of("child", like="adult"),
+            "dermis_mm: got multiple values for argument 'like'.",
+        ),
+        (lambda: fp.Sphere(287.0, 2.0), "Sphere takes curvature_per_m: got too many positional arguments."),
+        (lambda: fp.notebook_progress(1), "notebook_progress takes no argument: got too many"),
     ],
 )
 def test_what_a_class_or_function_does_not_have_is_refused_in_one_sentence(make, said):
@@ -129,6 +151,25 @@ def test_what_a_class_or_function_does_not_have_is_refused_in_one_sentence(make,
     assert said in str(refused.value)
     assert str(refused.value)[-1] in ".?"
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("name", fp.__all__)
+def test_what_a_user_calls_answers_wrong_arguments_in_one_sentence(name):
+    found = getattr(fp, name)
+    if isinstance(found, type):
+        checked = isinstance(found, KnownKeywords)
+        made_by_fingerpad = issubclass(found, Result | Exception | BaseModel)
+        assert checked or made_by_fingerpad
+    else:
+        assert inspect.unwrap(found) is not found
+
+
+def test_a_type_error_of_the_function_itself_stays():
+    def course(time_ms):
+        return len(time_ms)
+
+    with pytest.raises(TypeError, match="has no len"):
+        fp.sampled(100.0, course)
 
 
 def test_a_body_of_ones_own_has_the_hint_and_its_own_other_names():

@@ -114,6 +114,10 @@ def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
 def instance(name: str, value: _Kind, kind: type) -> _Kind:
     """Return `value` if it is a `kind`, else raise `InputError`."""
     if not isinstance(value, kind):
+        if isinstance(value, type) and issubclass(value, kind):
+            raise InputError(
+                f"{name} must be made from its class: got {value.__name__}, call it: {value.__name__}()."
+            )
         raise InputError(f"{name} must be of type {kind.__name__}: got {shown(value)}.")
     return value
 

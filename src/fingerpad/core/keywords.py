@@ -70,7 +70,7 @@ def got(value: Any, known: Collection[str], shown: str | None = None) -> str:
 
 
 def known_keywords(function: Callable[_Given, _Made]) -> Callable[_Given, _Made]:
-    """Make a function raise `InputError` for a keyword that it does not have.
+    """Make a function raise `InputError` for a keyword that it does not have, and for an argument too few.
 
     Examples
     --------
@@ -80,22 +80,56 @@ def known_keywords(function: Callable[_Given, _Made]) -> Callable[_Given, _Made]
     >>> area_mm2(2.0, heigth_mm=3.0)
     Traceback (most recent call last):
     fingerpad.core.errors.InputError: area_mm2 has no heigth_mm: did you mean height_mm?
+    >>> area_mm2(2.0)
+    Traceback (most recent call last):
+    fingerpad.core.errors.InputError: area_mm2 needs height_mm: it is not given.
     """
-    names = tuple(name for name in inspect.signature(function).parameters if name != "cls")
+    signature = inspect.signature(function)
+    names = tuple(name for name in signature.parameters if name != "cls")
+    takes_any = any(part.kind is part.VAR_KEYWORD for part in signature.parameters.values())
     owner = function.__qualname__.rpartition("<locals>.")[2]
 
     @wraps(function)
     def checked(*args: _Given.args, **given: _Given.kwargs) -> _Made:
-        _refuse_unknown(given, names, owner)
-        return function(*args, **given)
+        if not takes_any:
+            _refuse_unknown(given, names, owner)
+        try:
+            return function(*args, **given)
+        except TypeError:
+            _refuse_misfit(signature, args, given, owner)
+            raise
 
     return checked
 
 
-def _refuse_unknown(given: Collection[str], known: Collection[str], owner: str) -> None:
+def _refuse_unknown(
+    given: Collection[str], known: Collection[str], owner: str, elsewhere: Mapping[str, str] | None = None
+) -> None:
     for name in given:
+        if name not in known and name in (elsewhere or ()):
+            raise InputError(f"{owner} has no {name}: take {(elsewhere or {})[name]}.")
         if name not in known:
             raise InputError(f"{owner} has no {name}: {did_you_mean(name, known, owner)}")
+
+
+def _refuse_misfit(
+    signature: inspect.Signature, args: tuple[Any, ...], given: Mapping[str, Any], owner: str
+) -> None:
+    """Raise `InputError` if a call gives too few arguments, too many, or one of them twice."""
+    parts = {name: part for name, part in signature.parameters.items() if name != "cls"}
+    try:
+        taken = signature.bind_partial(*args, **given).arguments
+    except TypeError as error:
+        raise InputError(f"{owner} takes {', '.join(parts) or 'no argument'}: got {error}.") from None
+    needed = [
+        name
+        for name, part in parts.items()
+        if part.default is part.empty and part.kind not in (part.VAR_POSITIONAL, part.VAR_KEYWORD)
+    ]
+    missing = [name for name in needed if name not in taken]
+    if missing:
+        are = "it is" if len(missing) == 1 else "they are"
+        raise InputError(f"{owner} needs {', '.join(missing)}: {are} not given.") from None
 
 
 class OtherName:
@@ -145,19 +179,23 @@ class OtherName:
 
 
 class KnownKeywords(ABCMeta):
-    """Metaclass of classes that refuse unknown keywords with a hint, and take each `OtherName`."""
+    """Metaclass of classes that refuse wrong arguments with a hint, and take each `OtherName`."""
+
+    keywords_of_others: Mapping[str, str] = {}
+    """Classes that have a keyword which this one may be given, by the keyword."""
 
     def __call__(cls, *args: Any, **given: Any) -> Any:
         """Make an instance from fields and other names."""
         if not given:
-            return super().__call__(*args)
+            return cls._of_fields(*args)
         fields, others = _fields(cls), other_names(cls)
         if not any(part.kind is part.VAR_KEYWORD for part in fields):
             names = [part.name for part in fields]
-            _refuse_unknown(given, [*names, *(name for name in others if name not in names)], cls.__name__)
+            known = [*names, *(name for name in others if name not in names)]
+            _refuse_unknown(given, known, cls.__name__, cls.keywords_of_others)
         spelled = {name: others[name] for name in given if name in others}
         if not spelled:
-            return super().__call__(*args, **given)
+            return cls._of_fields(*args, **given)
         made = {name: value for name, value in given.items() if name not in spelled}
         taken = {part.name: part.name for part in fields[: len(args)]} | dict.fromkeys(made, "")
         for names, values in _meanings(spelled, given):
@@ -168,9 +206,17 @@ class KnownKeywords(ABCMeta):
                 taken[name] = names[0]
             made |= values
         try:
-            return super().__call__(*args, **made)
+            return cls._of_fields(*args, **made)
         except InputError as error:
             raise InputError(_in_words_of(spelled, str(error))) from error
+
+    def _of_fields(cls, *args: Any, **given: Any) -> Any:
+        """Make an instance from its fields alone."""
+        try:
+            return super().__call__(*args, **given)
+        except TypeError:
+            _refuse_misfit(inspect.Signature(_fields(cls)), args, given, cls.__name__)
+            raise
 
     @property
     def __signature__(cls) -> inspect.Signature:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from fingerpad.core.checks import finite
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.values import converted
 
 RAMP, HOLD = "ramp", "hold"
@@ -15,7 +16,7 @@ RAMP, HOLD = "ramp", "hold"
 
 @dataclass(frozen=True)
 @converted
-class Phase:
+class Phase(metaclass=KnownKeywords):
     """A named part of a touch.
 
     Parameters

@@ -10,6 +10,7 @@ from contextvars import ContextVar
 from typing import TYPE_CHECKING, Protocol
 
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 
 if TYPE_CHECKING:
     import rich.progress
@@ -245,6 +246,7 @@ def _bars(name: str, console: Console | None = None) -> rich.progress.Progress:
     )  # fmt: skip
 
 
+@known_keywords
 def notebook_progress() -> Progress:
     """Progress in a notebook: a bar below the cell, as on a terminal.
 

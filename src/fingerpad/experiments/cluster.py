@@ -17,6 +17,7 @@ from typing import Any
 
 from fingerpad.core.engine import Outcomes, Work
 from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.logger import LOGGER
 from fingerpad.experiments.manifest import software
 
@@ -30,7 +31,7 @@ _CONNECT_S = 10.0
 
 
 @dataclass(frozen=True)
-class Cluster:
+class Cluster(metaclass=KnownKeywords):
     """Engine whose work is done by the workers of a Dask scheduler.
 
     Each task uses one thread, so that a worker shall have one process per core and one thread per process.

@@ -31,6 +31,7 @@ from fingerpad import __version__
 from fingerpad.core.checks import instance, one_of
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import path_of, write_atomically
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import ResponseMap, SpikeTrains
 from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.skin.fields import FIELDS, Field, Place, Times, stored_fields
@@ -135,6 +136,7 @@ PARTS = {**MESH_PARTS, **OBJECT_PARTS, **RESPONSE_PARTS}
 """Variables beside the fields of the press, by name."""
 
 
+@known_keywords
 def touch_dataset(
     skin: SkinResponse,
     response: ResponseMap | None = None,
@@ -202,6 +204,7 @@ def touch_dataset(
     return xarray.Dataset(variables, coordinates, _attributes(skin, response, seed))
 
 
+@known_keywords
 def write_touch(
     path: str | Path,
     skin: SkinResponse,
@@ -259,6 +262,7 @@ def write_touch(
     return (path,)
 
 
+@known_keywords
 def read_touch(path: str | Path) -> xarray.Dataset:
     """Read the result of a touch, and check it.
 

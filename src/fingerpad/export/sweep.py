@@ -14,6 +14,7 @@ import numpy as np
 
 from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.experiments.descriptions.values import Content
 from fingerpad.experiments.manifest import software
@@ -90,6 +91,7 @@ def check_sweep(sweep: Sweep, out: Path, any_size: bool = False) -> None:
     sweep.check()
 
 
+@known_keywords
 def run_sweep(
     sweep: str | Path | Content | SweepDescription | Sweep,
     out: str | Path,

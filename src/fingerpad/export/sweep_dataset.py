@@ -26,6 +26,7 @@ import numpy as np
 
 from fingerpad.core.errors import InputError, StoreError, shown
 from fingerpad.core.files import path_of
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.experiments.descriptions.values import Content
 from fingerpad.experiments.sweep.description import OBSERVER, Sweep, sweep_of
@@ -309,6 +310,7 @@ class SweepFile:
         return tuple(int(index) for index in np.unravel_index(number, shape)) if shape else ()
 
 
+@known_keywords
 def open_sweep(path: str | Path) -> xarray.Dataset:
     """Open the results of a sweep; numbers are read when they are used.
 
@@ -339,6 +341,7 @@ def check_sweep_data(data: xarray.Dataset) -> None:
         raise InputError(f"data must be a data set from open_sweep: got {shown(data)}.")
 
 
+@known_keywords
 def observe_sweep(data: xarray.Dataset, observer: Content, grid: Content | None = None) -> xarray.DataArray:
     """Hit rates of other observers than those of the sweep; nothing is pressed and no afferent responds.
 
@@ -385,6 +388,7 @@ def sweep_settings(data: xarray.Dataset) -> Sweep:
     return sweep_of(json.loads(data.attrs["sweep"]), data.attrs.get("source", "sweep"))
 
 
+@known_keywords
 def setting_touch(data: xarray.Dataset, **where: int) -> Content:
     """Touch of one setting in the words of a file, for `run_touch`: figures, NWB, VTU and other files of it.
 
@@ -411,6 +415,7 @@ def setting_number(sweep: Sweep, where: Mapping[str, int]) -> int:
     return int(np.ravel_multi_index(index, sweep.shape))
 
 
+@known_keywords
 def setting_spikes(data: xarray.Dataset) -> SpikeTrains:
     """Spike trains of the receptors of one setting.
 

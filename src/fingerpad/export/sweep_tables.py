@@ -13,6 +13,7 @@ import numpy as np
 from fingerpad import __version__
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import ResponseMap
 from fingerpad.export.dataset import first_line, library
 from fingerpad.export.responses import PLACES
@@ -35,6 +36,7 @@ TABLE, TABLE_VERSION = "fingerpad sweep table", 1
 _RATES = ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms", "spike_count")
 
 
+@known_keywords
 def write_sweep_table(data: xarray.Dataset, path: str | Path) -> Path:
     """Write rates, latencies and numbers of spikes as a table, one row per setting and receptor.
 
@@ -80,6 +82,7 @@ def write_sweep_table(data: xarray.Dataset, path: str | Path) -> Path:
     return path
 
 
+@known_keywords
 def read_sweep_table(path: str | Path) -> pandas.DataFrame:
     """Read a table that `write_sweep_table` wrote.
 
@@ -124,6 +127,7 @@ def read_sweep_table(path: str | Path) -> pandas.DataFrame:
     return table
 
 
+@known_keywords
 def setting_response(data: xarray.Dataset, **where: int) -> ResponseMap:
     """Responses of the receptors in one setting, as `Population.respond` returned them.
 
@@ -162,6 +166,7 @@ def setting_response(data: xarray.Dataset, **where: int) -> ResponseMap:
     )
 
 
+@known_keywords
 def write_sweep_spikes(data: xarray.Dataset, path: str | Path, **where: int) -> Path:
     """Write the spikes of a sweep as one session of NWB: a trial per setting, a unit per receptor.
 

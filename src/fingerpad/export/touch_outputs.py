@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.progress import Progress
 from fingerpad.experiments import schemas
 from fingerpad.experiments.descriptions.pressed import PressedTouch, press_described
@@ -87,6 +88,7 @@ def check_described(described: DescribedTouch) -> None:
                 )
 
 
+@known_keywords
 def run_touch(
     touch: str | Path | Content | TouchDescription | DescribedTouch,
     out: str | Path,

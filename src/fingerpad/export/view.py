@@ -33,6 +33,7 @@ from scipy.spatial import cKDTree
 from fingerpad.core.checks import FloatArray, finite, instance, one_of, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.export.dataset import check_touch, read_touch, spike_trains
 from fingerpad.report.style import BLACK, BLUE, STYLE, new_figure, say_nothing_to_draw
@@ -73,6 +74,7 @@ _FROM_BELOW = (np.array([0.10, -1.0, -0.22]), np.array([0.0, 0.0, 1.0]))
 """The same where the skin is shown."""
 
 
+@known_keywords
 def save_view(
     path: str | Path,
     touch: xarray.Dataset | str | Path,

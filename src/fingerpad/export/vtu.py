@@ -19,6 +19,7 @@ import numpy as np
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text, write_atomically
+from fingerpad.core.keywords import known_keywords
 from fingerpad.export.job import wedge_nodes
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.press import Deformation
@@ -116,6 +117,7 @@ class VtuSeries:
     press: Mapping[str, np.ndarray]
 
 
+@known_keywords
 def read_vtu_series(path: str | Path) -> VtuSeries:
     """Read the files that `write_vtu_series` wrote.
 

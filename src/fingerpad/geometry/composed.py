@@ -10,6 +10,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, float_array, instance, not_negative, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.values import converted
 from fingerpad.geometry.indenters import Bar, Indenter, Plate
 from fingerpad.geometry.relief import PIXELS, REACH_MM, RELIEF_MM, WIDTHS_MM, narrowest_relief
@@ -139,6 +140,7 @@ class Union(Indenter):
         return both / length, slope / np.linalg.norm(slope, axis=1)[:, None]
 
 
+@known_keywords
 def ridges(
     centres_mm: Sequence[float], widths_mm: Sequence[float], fillet_mm: float = 0.1, height_mm: float = 1.0
 ) -> Union:

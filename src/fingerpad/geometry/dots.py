@@ -8,6 +8,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, float_array, instance, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.values import converted
 from fingerpad.geometry.indenters import Indenter
 
@@ -90,6 +91,7 @@ class Dots(Indenter):
         return np.minimum(ball, plate), np.where((ball < plate)[:, None], direction, [0.0, 1.0, 0.0])
 
 
+@known_keywords
 def braille(text: str, along_finger: bool = True) -> Dots:
     """Braille of some lower-case letters, its middle on the indenter's axis.
 

@@ -12,6 +12,7 @@ from numba import njit
 
 from fingerpad.core.checks import FloatArray, float_array, one_of, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.values import converted
 from fingerpad.geometry.indenters import Indenter, rounded
 from fingerpad.geometry.outline_union import joined_outlines
@@ -153,6 +154,7 @@ class Embossed(Indenter):
         return widths
 
 
+@known_keywords
 def embossed_text(
     text: str,
     capital_mm: float = 6.0,

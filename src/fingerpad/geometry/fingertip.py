@@ -216,6 +216,12 @@ class Fingertip(Displayed, Finger):
     nail_x_mm: tuple[float, ...] = published.NAIL_X.value
     nail_half_width_mm: float = published.NAIL_HALF_WIDTH.value
 
+    def __new__(cls, *given: object, **_: object) -> Fingertip:
+        """Refuse the name of a preset, which is that of `of`."""
+        if given and isinstance(given[0], str):
+            raise InputError(f"Fingertip takes measures: got {given[0]!r}, write Fingertip.of({given[0]!r}).")
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
         _size("length_mm", self.length_mm)
         for name in ("stratum_corneum_mm", "living_epidermis_mm", "dermis_mm", "spine_end_x_mm"):

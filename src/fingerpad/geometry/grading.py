@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 from fingerpad.core.checks import FloatArray, finite, one_of, positive, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.values import converted
 
 RESOLUTIONS = ("quick", "standard", "paper")
@@ -30,7 +31,7 @@ MOST_ELEMENTS = 2_000_000
 
 @dataclass(frozen=True)
 @converted
-class Grading:
+class Grading(metaclass=KnownKeywords):
     """Fine zone of the mesh of a finger and sizes of its elements.
 
     Parameters

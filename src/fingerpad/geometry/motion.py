@@ -48,7 +48,7 @@ class Pose:
 
 @dataclass(frozen=True)
 @converted
-class Cycles:
+class Cycles(metaclass=KnownKeywords):
     """A part of a motion that repeats itself.
 
     Parameters
@@ -168,6 +168,8 @@ class Motion(metaclass=KnownKeywords):
 
 class _OneRamp(Motion):
     """A ramp at a constant rate from 0, then a hold."""
+
+    keywords_of_others = {"depth_mm": "RampAndHold", "force_mn": "ForceRampAndHold"}  # noqa: RUF012
 
     ramp_ms: float
     hold_ms: float

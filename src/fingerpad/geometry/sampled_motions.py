@@ -11,6 +11,7 @@ from scipy.optimize import minimize_scalar
 
 from fingerpad.core.checks import FloatArray, instance, positive, whole
 from fingerpad.core.errors import InputError, shown
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.phases import Phase
 from fingerpad.geometry.trajectory import POSE_COLUMNS, Trajectory, samples_of_line
 
@@ -27,6 +28,7 @@ SHORTEST_SHARE = 1e-9
 """Duration of a piece over that of the whole motion, below which the function jumps."""
 
 
+@known_keywords
 def sampled(
     end_ms: float,
     depth_mm: Course | None = None,
@@ -131,6 +133,7 @@ def sampled(
     return Trajectory(tuple(times), **columns, phases=tuple(phases))
 
 
+@known_keywords
 def reduced(motion: Trajectory, tolerance: float = TOLERANCE) -> Trajectory:
     """Leave out samples of a recording that lie close to a line between others; each is a step to solve at.
 

@@ -14,6 +14,7 @@ from numba import njit
 
 from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, int_array, not_negative, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.values import converted
 from fingerpad.geometry.closest_point import Triangles
 from fingerpad.geometry.indenters import Indenter
@@ -240,6 +241,7 @@ def _raise_to_triangles(
                     height[i, k] = max(height[i, k], y)
 
 
+@known_keywords
 def height_surface(
     heights_mm: FloatArray,
     pitch_mm: float,

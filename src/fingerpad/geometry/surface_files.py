@@ -11,6 +11,7 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, IntArray, float_array, one_of, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of
+from fingerpad.core.keywords import known_keywords
 from fingerpad.geometry.surface import LARGEST_MM, SMALLEST_MM, SMOOTH_BELOW_DEG, Surface, height_surface
 
 UNITS_MM = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
@@ -29,6 +30,7 @@ _AXES = {
 }
 
 
+@known_keywords
 def read_surface(
     path: str | Path,
     unit: str = "mm",
@@ -130,6 +132,7 @@ def _welded(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray
     return ahead[is_new], number[faces]
 
 
+@known_keywords
 def read_height_map(
     path: str | Path,
     pitch_mm: float,

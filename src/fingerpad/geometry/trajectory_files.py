@@ -11,6 +11,7 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, finite
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.phases import Phase
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.core.units import MN_PER_N, MS_PER_S
@@ -38,6 +39,7 @@ GAP, SAME_STEP, REGULAR_SHARE = 5.0, 0.01, 0.9
 the median within 1 %: the file is a recording at a fixed rate. A line replaces a few lost samples."""
 
 
+@known_keywords
 def read_trajectory(
     path: Path | str, *, first_touch_mm: float = 0.0, phases: Sequence[Phase] = ()
 ) -> Trajectory:

@@ -25,6 +25,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, finite, not_negative, positive
 from fingerpad.core.errors import InputError, shown
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.values import converted
 from fingerpad.mechanics.energy import CARRIED, SECOND, differentiate, translate
 
@@ -54,7 +55,7 @@ class Law(Protocol):
 
 @dataclass(frozen=True)
 @converted
-class Energy:
+class Energy(metaclass=KnownKeywords):
     """A law of your own: its energy as a formula in the principal stretches or invariants.
 
     A formula without a term that mixes J with a change of shape keeps its pressure while it relaxes; of any
@@ -160,7 +161,7 @@ _PROBES = np.array([[0.3, -0.1, -0.2, 0.1], [-0.4, 0.25, 0.15, -0.2], [0.05, 0.1
 
 
 @dataclass(frozen=True)
-class _OfModuli:
+class _OfModuli(metaclass=KnownKeywords):
     """Common part of laws whose energy is proportional to their coefficients in kPa."""
 
     def scaled(self, factor: float) -> Self:

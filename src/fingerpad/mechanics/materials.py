@@ -10,6 +10,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, finite, float_array, instance, not_negative, one_of, positive
 from fingerpad.core.errors import InputError, MaterialWarning, shown
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.values import converted
 from fingerpad.mechanics.laws import (
     Energy,
@@ -41,7 +42,7 @@ def has_formulas(law: FloatArray) -> bool | None:
 
 @dataclass(frozen=True)
 @converted
-class Prony:
+class Prony(metaclass=KnownKeywords):
     """Relaxation of the deviatoric stress: g(t) = 1 - sum g_i (1 - exp(-t / tau_i)).
 
     Parameters
@@ -85,7 +86,7 @@ class Prony:
 
 @dataclass(frozen=True)
 @converted
-class Material:
+class Material(metaclass=KnownKeywords):
     """A tissue: a strain energy and how its stress relaxes.
 
     Parameters
@@ -243,7 +244,7 @@ class Material:
 
 @dataclass(frozen=True)
 @converted
-class Tissues:
+class Tissues(metaclass=KnownKeywords):
     """The four layers of the fingertip from the outside in.
 
     Parameters

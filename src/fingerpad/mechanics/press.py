@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 from fingerpad.core.checks import FloatArray, float_array, increasing, positive, whole
 from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.progress import share_done
 from fingerpad.core.values import converted
 from fingerpad.geometry.indenters import Indenter
@@ -111,7 +112,7 @@ LIFT_MM = 100.0
 
 @dataclass(frozen=True)
 @converted
-class PressSettings:
+class PressSettings(metaclass=KnownKeywords):
     """Steps in time and tolerances of a press.
 
     Parameters

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fingerpad.core.checks import one_of
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data import tissues as published
 from fingerpad.data.published import Published
@@ -128,6 +129,7 @@ TISSUES: dict[str, Callable[[], Tissues]] = {
 }
 
 
+@known_keywords
 def named_tissues(name: str) -> Tissues:
     """Tissues by name.
 

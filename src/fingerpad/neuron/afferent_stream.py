@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, finite, float_array, instance, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.exact_spikes import continued_trains
 
 
-class AfferentStream:
+class AfferentStream(metaclass=KnownKeywords):
     """Afferents of one type that respond as the samples come.
 
     Parameters

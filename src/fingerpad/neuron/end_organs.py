@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array, one_of, positive, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.layouts import Place
 from fingerpad.core.random_streams import Purpose, uniforms
 from fingerpad.core.signals import SedTraces
@@ -19,7 +20,7 @@ _SUM_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 @converted
-class EndOrgans:
+class EndOrgans(metaclass=KnownKeywords):
     """Positions and weights of the end organs of every afferent.
 
     What the afferent follows is the weighted sum of what its end organs follow, or what the strongest of them

@@ -11,6 +11,7 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, instance, positive, whole
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.layouts import Place
 from fingerpad.core.patterns import poisson_disc
 from fingerpad.core.regions import Region
@@ -89,7 +90,7 @@ class MixedResponse(Result):
 
 @dataclass(frozen=True)
 @converted
-class MixedPopulation:
+class MixedPopulation(metaclass=KnownKeywords):
     """Populations of several types in the same skin.
 
     Parameters

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array, not_negative, pair, positive, whole
 from fingerpad.core.errors import InputError, TissuesWarning, level_of_caller, shown
-from fingerpad.core.keywords import known_keywords
+from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.layouts import MOST_RECEPTORS, Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import ResponseMap, SedTraces, Skin, traces_below
@@ -80,7 +80,7 @@ def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
 
 @dataclass(frozen=True)
 @converted
-class Population:
+class Population(metaclass=KnownKeywords):
     """Afferents of one type at different positions of the skin, with their sensitivities and end organs.
 
     Parameters

@@ -19,6 +19,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, instance, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.data.neuron import HUMAN_QUANTITY
 from fingerpad.geometry.trajectory import Trajectory
@@ -47,6 +48,7 @@ Solve = Callable[[Sequence[Touch], str], list[SkinResponse]]
 """Solves touches of a named stage, in their order."""
 
 
+@known_keywords
 def reduce_touch(
     training: ReducedTraining,
     solve: Solve | None = None,

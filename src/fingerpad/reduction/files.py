@@ -13,6 +13,7 @@ import numpy as np
 from fingerpad.core.checks import instance
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import check_file, path_of, write_atomically
+from fingerpad.core.keywords import known_keywords
 from fingerpad.reduction.interpolation import Axis
 from fingerpad.reduction.model import ReducedModel, origin_of
 from fingerpad.skin.indentation import Touch
@@ -37,6 +38,7 @@ ARRAYS = (
 """Fields of `ReducedModel` that are arrays."""
 
 
+@known_keywords
 def write_reduced(model: ReducedModel, path: str | Path) -> None:
     """Write a reduced touch, as a whole or not at all.
 
@@ -67,6 +69,7 @@ def write_reduced(model: ReducedModel, path: str | Path) -> None:
     write_atomically(path_of("path", path), buffer.getvalue())
 
 
+@known_keywords
 def read_reduced(path: str | Path, touch: Touch | None = None) -> ReducedModel:
     """Read a reduced touch.
 

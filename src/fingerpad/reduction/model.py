@@ -17,6 +17,7 @@ from typing import cast
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.reduction.interpolation import Axis, chebyshev_points, lagrange
@@ -56,7 +57,7 @@ def depth_basis(depth_mm: FloatArray, deepest_mm: float, degree: int) -> FloatAr
 
 
 @dataclass(frozen=True, repr=False)
-class ReducedModel:
+class ReducedModel(metaclass=KnownKeywords):
     """What a reduced touch is evaluated from.
 
     Parameters

@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 from fingerpad.core.checks import FloatArray, finite, float_array, instance, not_negative
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.reduction.interpolation import weighted
 from fingerpad.reduction.model import GRID_POINTS, ReducedModel
 from fingerpad.reduction.relaxation import amplitudes, depth_scale, filter_step, lost
@@ -82,7 +83,7 @@ class ReducedSample(Result):
         )
 
 
-class ReducedTouch:
+class ReducedTouch(metaclass=KnownKeywords):
     """State of a touch that is evaluated sample by sample.
 
     Parameters

@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 
 from fingerpad.core.checks import finite, instance, one_of, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.values import converted
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS
@@ -65,7 +66,7 @@ FEWEST_POINTS = 3
 
 @dataclass(frozen=True)
 @converted
-class ReducedRange:
+class ReducedRange(metaclass=KnownKeywords):
     """Poses that a reduced touch serves.
 
     Parameters
@@ -168,7 +169,7 @@ class TrainingPose:
 
 @dataclass(frozen=True)
 @converted
-class ReducedTraining:
+class ReducedTraining(metaclass=KnownKeywords):
     """All presses behind a reduced touch.
 
     Parameters

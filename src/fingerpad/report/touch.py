@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.files import path_of
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import ResponseMap
 from fingerpad.core.units import cosine_and_sine
 from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure, say_nothing_to_draw, write_png
@@ -41,6 +42,7 @@ BONE = "#9a9488"
 """Colour of bone and nail."""
 
 
+@known_keywords
 def save_figure(
     path: str | Path, skin: SkinResponse, response: ResponseMap, indenter: Indenter | None = None
 ) -> Path:

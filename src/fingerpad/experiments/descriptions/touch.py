@@ -14,6 +14,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, Strict
 
 from fingerpad.core.files import path_of, read_text
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.experiments.descriptions.parts import DEFAULT, AfferentChoice, PopulationSettings
 from fingerpad.experiments.descriptions.population import afferent_of, population_of
@@ -213,6 +214,7 @@ class DescribedTouch:
         return {name: hashlib.sha256(content).hexdigest() for name, content in contents.items()}
 
 
+@known_keywords
 def read_touch_description(source: str | Path) -> DescribedTouch:
     r"""Read the description of a touch from a YAML file.
 
