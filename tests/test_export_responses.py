@@ -132,6 +132,12 @@ def test_a_session_that_cannot_be_is_refused_and_nothing_is_written(tmp_path, ch
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_session_has_the_ending_of_one(tmp_path):
+    with pytest.raises(InputError, match=r"A session is written as .nwb, .h5, .hdf5: got s.csv\."):
+        write_responses_nwb(tmp_path / "s.csv", responses_to_two_touches())
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_missing_library_is_named_with_the_extra_that_brings_it(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pynwb", None)
     with pytest.raises(InputError, match=r"pip install 'fingerpad\[nwb\]'"):

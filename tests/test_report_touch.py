@@ -144,6 +144,31 @@ def test_a_silent_population_is_reported_silent(skin):
     assert [text.get_text() for text in axes.texts] == ["no afferent fires a spike"]
 
 
+@pytest.mark.parametrize(
+    ("name", "change", "said"),
+    [
+        (
+            "a.png",
+            lambda skin, response: (response, skin),
+            "skin must be of type SkinResponse: got ResponseMap",
+        ),
+        (
+            "a.png",
+            lambda skin, response: (skin, fp.Sphere(), response),
+            "response must be of type ResponseMap",
+        ),
+        ("a.png", lambda skin, response: (skin, response, response), "indenter must be of type Indenter"),
+        ("a.xyz", lambda skin, response: (skin, response), r"A figure is written as \.png: got a\.xyz\."),
+        ("a", lambda skin, response: (skin, response), r"A figure is written as \.png: got a\."),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_and_nothing_is_written(skin, tmp_path, name, change, said):
+    response = fp.Population.grid(density_per_cm2=10).respond(skin)
+    with pytest.raises(fp.InputError, match=said):
+        fp.save_figure(tmp_path / name, *change(skin, response))
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_the_picture_is_saved_with_folders_on_the_way(skin, tmp_path):
     response = fp.Population.grid(density_per_cm2=100).respond(skin)
     saved = fp.save_figure(tmp_path / "new" / "touch.png", skin, response)

@@ -140,6 +140,12 @@ def test_a_touch_without_afferents_and_object_is_drawn(data, tmp_path):
     assert save_view(tmp_path / "bare.png", bare, time_ms=1000.0)
 
 
+def test_a_response_of_the_skin_is_drawn_without_afferents(tmp_path):
+    skin = fp.indent(fp.Fingertip(), fp.Sphere(287), fp.RampAndHold(depth_mm=0.3))
+    (picture,) = save_view(tmp_path / "a.png", skin, field="pressure")
+    assert picture.stat().st_size > 10_000
+
+
 def test_what_is_no_data_set_is_refused_and_a_changed_description_is_not(data, tmp_path):
     with pytest.raises(fp.InputError, match="touch must be of type Dataset"):
         save_view(tmp_path / "a.png", 5)

@@ -17,6 +17,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.signals import ResponseMap
 from fingerpad.core.units import MS_PER_S
+from fingerpad.experiments.recording_files import SUFFIXES_OF_NWB
 from fingerpad.export.responses import PLACES
 
 _RESOLUTION_S = 1e-9
@@ -39,7 +40,7 @@ def write_responses_nwb(
     Parameters
     ----------
     path : Path
-        The file, written as a whole; folders are created if needed.
+        The file, .nwb, .h5 or .hdf5, written as a whole; folders are created if needed.
     responses : mapping of str to ResponseMap
         Responses of the same receptors, by the names of the touches. Each lasts as long as its motion.
     duration_ms : float, optional
@@ -57,8 +58,9 @@ def write_responses_nwb(
     Raises
     ------
     InputError
-        If there is no indentation, receptors differ between indentations, a duration is not valid, a spike is
-        later than `duration_ms`, `started` has no time zone, or pynwb is not installed.
+        If the file has another ending, there is no indentation, receptors differ between indentations, a
+        duration is not valid, a spike is later than `duration_ms`, `started` has no time zone, or pynwb is
+        not installed.
     StoreError
         If the file cannot be written.
 
@@ -71,6 +73,9 @@ def write_responses_nwb(
     ...     write_responses_nwb(Path(folder) / "session.nwb", {"ball": response}, 1000.0).name
     'session.nwb'
     """
+    file = path_of("path", path)
+    if file.suffix not in SUFFIXES_OF_NWB:
+        raise InputError(f"A session is written as {', '.join(SUFFIXES_OF_NWB)}: got {file.name}.")
     not_negative("pause_ms", pause_ms, "ms")
     instance("responses", responses, Mapping)
     began = started or datetime.now(UTC)
@@ -84,7 +89,7 @@ def write_responses_nwb(
         pynwb = require_pynwb()
         session = pynwb.NWBFile(
             f"simulated by fingerpad {__version__}",
-            path_of("path", path).stem,
+            file.stem,
             began,
             experiment_description="Simulated touch of a fingertip: finite elements and afferents.",
             keywords=["simulation", "touch", "tactile afferents"],
@@ -120,10 +125,10 @@ def write_responses_nwb(
                 **dict(zip(columns, place, strict=True)),
             )
         unfinished = Path(folder) / "session.nwb"
-        with pynwb.NWBHDF5IO(str(unfinished), mode="w") as file:
-            file.write(session)
-        write_atomically(path_of("path", path), unfinished.read_bytes())
-    return path_of("path", path)
+        with pynwb.NWBHDF5IO(str(unfinished), mode="w") as opened:
+            opened.write(session)
+        write_atomically(file, unfinished.read_bytes())
+    return file
 
 
 def _places(responses: Mapping[str, ResponseMap]) -> np.ndarray:

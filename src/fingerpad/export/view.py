@@ -35,9 +35,10 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.progress import NoProgress, Progress
-from fingerpad.export.dataset import check_touch, read_touch, spike_trains
+from fingerpad.export.dataset import check_touch, read_touch, spike_trains, touch_dataset
 from fingerpad.report.style import BLACK, BLUE, STYLE, new_figure, say_nothing_to_draw
 from fingerpad.report.touch import BONE, DECADES, SKIN
+from fingerpad.skin.sampling import SkinResponse
 
 if TYPE_CHECKING:
     import xarray
@@ -77,7 +78,7 @@ _FROM_BELOW = (np.array([0.10, -1.0, -0.22]), np.array([0.0, 0.0, 1.0]))
 @known_keywords
 def save_view(
     path: str | Path,
-    touch: xarray.Dataset | str | Path,
+    touch: xarray.Dataset | SkinResponse | str | Path,
     *,
     field: str = "sed",
     time_ms: float | None = None,
@@ -90,8 +91,9 @@ def save_view(
     ----------
     path : str or Path
         The file: .png, .gif, or .mp4, which the program ffmpeg has to be installed for.
-    touch : xarray.Dataset, str or Path
-        From `touch_dataset`, or what `write_touch` wrote.
+    touch : xarray.Dataset, SkinResponse, str or Path
+        From `touch_dataset`, a response of the skin, which is drawn without afferents, or what `write_touch`
+        wrote.
     field : str
         "sed", "displacement" (on the plane of symmetry), "pressure", "shear", "slip" (on the skin), or the
         name of another variable at nodes or elements. Of a vector its length is shown.
@@ -135,6 +137,8 @@ def save_view(
     require_pyvista()
     if isinstance(touch, str | Path):
         data = read_touch(touch)
+    elif isinstance(touch, SkinResponse):
+        data = touch_dataset(touch)
     else:
         data = instance("touch", touch, import_module("xarray").Dataset)
         check_touch("touch", data)

@@ -12,7 +12,8 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checks import FloatArray, instance
+from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import ResponseMap
@@ -66,6 +67,8 @@ def save_figure(
 
     Raises
     ------
+    InputError
+        If the file does not end in .png, or an argument is of another type.
     StoreError
         If the file cannot be written.
 
@@ -80,7 +83,17 @@ def save_figure(
     >>> fp.save_figure(Path(mkdtemp()) / "touch.png", skin, response, sphere).name
     'touch.png'
     """
-    return write_png(lambda parts: draw(*parts), (skin, response, indenter), path_of("path", path))
+    from fingerpad.geometry.indenters import Indenter
+    from fingerpad.skin.sampling import SkinResponse
+
+    file = path_of("path", path)
+    if file.suffix.lower() != ".png":
+        raise InputError(f"A figure is written as .png: got {file.name}.")
+    instance("skin", skin, SkinResponse)
+    instance("response", response, ResponseMap)
+    if indenter is not None:
+        instance("indenter", indenter, Indenter)
+    return write_png(lambda parts: draw(*parts), (skin, response, indenter), file)
 
 
 def draw(skin: SkinResponse, response: ResponseMap, indenter: Indenter | None = None) -> Figure:
