@@ -40,6 +40,8 @@ ONE = [[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [0.0, 10.0, 0.0]]
 SAID = {
     "truncated.stl": "234 bytes for 3 triangles: got 214 bytes",
     "too-few.stl": "434 bytes for 7 triangles: got 134 bytes",
+    "header.stl": "header.stl is no STL file: one of text begins with 'solid'",
+    "words.stl": "words.stl is no STL file: one of text begins with 'solid'",
     "beyond.ply": "0 to 2: got numbers 0 to 7",
     "turned.obj": "outer sides on one side: 1 edges do not, one at",
     "three.obj": "two triangles at most along each edge",
@@ -58,6 +60,7 @@ SURFACES = {
     "empty.stl": "",
     "header.stl": bytes(80),
     "spaces.stl": "   \n \n",
+    "words.stl": "a dot\n",
     "no-triangle.stl": binary_stl([]),
     "truncated.stl": binary_stl([ONE] * 3, cut=20),
     "too-few.stl": binary_stl([ONE], count=7),
@@ -227,8 +230,12 @@ def test_images_that_do_not_hold_heights_are_refused(tmp_path):
     translucent = grey.convert("RGBA")
     translucent.putpixel((3, 3), (0, 0, 0, 0))
     translucent.save(tmp_path / "alpha.png")
+    Image.new("L", (20, 20)).save(tmp_path / "black.png")
+    Image.new("I;16", (20, 20), 9000).save(tmp_path / "uniform.tif")
     for name in ("cut.png", "large.png", "row.png", "colour.png", "alpha.png"):
         _refused(name, lambda name=name: read_height_map(tmp_path / name, 0.1))
+    for name in ("black.png", "uniform.tif"):
+        assert "all are equal" in _refused(name, lambda name=name: read_height_map(tmp_path / name, 0.1))
 
 
 @pytest.mark.parametrize(

@@ -120,12 +120,14 @@ def test_a_function_of_place_and_rotation_is_sampled_with_the_depth():
         (lambda: sampled(100.0, lambda t: float(t > 30.0)), "must not jump: it does at 30 ms"),
         (
             lambda: sampled(100.0, lambda t: math.nan if t > 50.0 else t),
-            "depth_mm must be finite at all times",
+            "depth_mm at .* ms must be a finite number: got nan",
         ),
+        (lambda: sampled(100.0, lambda t: "a"), "depth_mm at 0 ms must be a finite number: got 'a'"),
+        (lambda: sampled(100.0, lambda t: t, x_mm=lambda t: None), "x_mm at 0 ms must be .*: got None"),
         (lambda: sampled(100.0, lambda t: 1.0 + t), "depth_mm must begin with 0 or less"),
         (lambda: sampled(0.0, lambda t: t), "end_ms must be greater than 0"),
     ],
-    ids=["none", "jump", "nan", "start", "end"],
+    ids=["none", "jump", "nan", "text", "nothing", "start", "end"],
 )
 def test_functions_that_cannot_be_followed_are_refused(make, said):
     with pytest.raises(InputError, match=said):

@@ -201,8 +201,10 @@ def test_braille_cells_have_their_dots_and_distances():
     np.testing.assert_allclose(np.ptp(cell, axis=0), [2.34, 4.68])
     two = np.array(braille("aa", along_finger=False).at_mm)
     assert np.ptp(two[:, 0]) == pytest.approx(6.2)
-    with pytest.raises(InputError, match="letters a to z"):
-        braille("7")
+    with pytest.raises(InputError, match=r"letters a to z and spaces: got 'A7'\.$"):
+        braille("A7")
+    with pytest.raises(InputError, match="got 'L a'; write 'l a'"):
+        braille("L a")
 
 
 @pytest.mark.parametrize("along_finger", [True, False])

@@ -278,6 +278,11 @@ def test_sites_that_are_no_places_are_refused(sites):
         response(layered_block()).sed(sites)
 
 
+def test_a_single_place_is_told_to_be_a_list():
+    with pytest.raises(InputError, match=r"must be a list of places, such as \[\(x, z\)\] .*shape \(2,\)"):
+        response(layered_block()).sed((1.0, 0.0))
+
+
 def test_body_without_epidermis_has_nothing_to_read():
     mesh = block_mesh([0.0, 1.0, 2.0], [0.0, 1.0], [0.0, 1.0], layers=[2])
     with pytest.raises(InputError, match="no living epidermis"):

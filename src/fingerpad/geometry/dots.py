@@ -121,7 +121,9 @@ def braille(text: str, along_finger: bool = True) -> Dots:
     instance("text", text, str)
     unknown = sorted(set(text) - set(_LETTERS) - {" "})
     if unknown or not text.strip():
-        raise InputError(f"text must have letters a to z and spaces: got {text!r}.")
+        low = text.lower()
+        instead = f"; write {low!r}" if low != text and not set(low) - set(_LETTERS) - {" "} else ""
+        raise InputError(f"text must have letters a to z and spaces: got {text!r}{instead}.")
     places = [
         (
             cell * BRAILLE_CELL_MM + (int(dot) > 3) * BRAILLE_PITCH_MM,

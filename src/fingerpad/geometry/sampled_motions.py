@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from fingerpad.core.checks import FloatArray, instance, positive, whole
+from fingerpad.core.checks import FloatArray, finite, instance, positive, whole
 from fingerpad.core.errors import InputError, shown
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.phases import Phase
@@ -88,15 +88,12 @@ def sampled(
         raise InputError("A trajectory needs either depth_mm or force_mn: give one of them.")
 
     def values_at(times: FloatArray) -> FloatArray:
-        table = np.array(
-            [[course(float(time)) for course in courses.values()] for time in times], dtype=float
+        return np.array(
+            [
+                [finite(f"{name} at {time:g} ms", course(float(time))) for name, course in courses.items()]
+                for time in times
+            ]
         )
-        if not np.isfinite(table).all():
-            row, column = np.argwhere(~np.isfinite(table))[0]
-            raise InputError(
-                f"{list(courses)[column]} must be finite at all times: it is not at {times[row]:g} ms."
-            )
-        return table
 
     scale = _extent(values_at(np.linspace(0.0, end, looks + 1)))
 

@@ -18,7 +18,8 @@ UNITS_MM = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
 """Units of length of a file. [mm]"""
 
 MESHES = (".stl", ".obj", ".ply")
-MAPS = (".png", ".tif", ".tiff", ".npy", ".csv")
+IMAGES = (".png", ".tif", ".tiff")
+MAPS = (*IMAGES, ".npy", ".csv")
 
 MOST_HEIGHTS = 2_000_000
 """Largest number of heights in a map."""
@@ -163,7 +164,8 @@ def read_height_map(
     Raises
     ------
     InputError
-        If the file cannot be read, is no plane of finite numbers, or has more than 2,000,000 heights.
+        If the file cannot be read, is no plane of finite numbers, has more than 2,000,000 heights, or is an
+        image of one shade.
     """
     file = path_of("path", path)
     positive("pitch_mm", pitch_mm, "mm")
@@ -191,6 +193,11 @@ def read_height_map(
         raise InputError(
             f"{file.name} must hold finite heights: {len(wrong)} are not, first in row {wrong[0][0] + 1} and "
             f"column {wrong[0][1] + 1}."
+        )
+    if heights.size > 1 and file.suffix.lower() in IMAGES and not np.ptp(heights):
+        raise InputError(
+            f"{file.name} must have shades that differ, which are heights: all are equal; for a flat body "
+            "take a FlatPunch or a Bar."
         )
     if np.abs(heights).max(initial=0.0) * height_mm > LARGEST_MM:
         raise InputError(
@@ -282,6 +289,11 @@ def _check_length(file: Path) -> None:
         begin = opened.read(84)
     if file.suffix.lower() != ".stl" or begin.lstrip()[:5].lower() == b"solid":
         return
+    if size < 84:
+        raise InputError(
+            f"{file.name} is no STL file: one of text begins with 'solid', any other has 84 bytes or more; "
+            f"got {size} bytes, save it again as STL."
+        )
     count = int.from_bytes(begin[80:84], "little")
     if size != 84 + 50 * count:
         raise InputError(

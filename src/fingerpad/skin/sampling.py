@@ -408,9 +408,12 @@ def places_below(receptors: Receptors, sites: ArrayLike) -> Any:
     InputError
         If `sites` is not an array of pairs or triples, or one is not on the skin.
     """
-    points = float_array("sites", sites, 2)
-    if points.shape[1] not in (2, 3):
-        raise InputError(f"sites needs columns x and z, or x, y and z, in mm: got shape {points.shape}.")
+    points = float_array("sites", sites, None)
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise InputError(
+            "sites must be a list of places, such as [(x, z)] or [(x, y, z)], in mm: got shape "
+            f"{points.shape}."
+        )
     return _places_of(_Sites(receptors, points))
 
 
