@@ -241,8 +241,8 @@ def test_the_schema_accepts_what_is_accepted_and_explains_every_key():
 
 BALL = "object: {kind: sphere, radius_mm: 4}\n"
 WRONG = [
-    ("", "the file must be a mapping of keys to values: got None"),
-    ("# nothing\n", "must be a mapping of keys to values"),
+    ("", "touch.yaml, the file is empty: write what is pressed, as the example of `fingerpad init`."),
+    ("# nothing\n", "the file is empty"),
     ("- object: sphere\n", "must be a mapping of keys to values"),
     ("just words\n", "must be a mapping of keys to values: got 'just words'"),
     ("42\n", "must be a mapping of keys to values: got 42"),
@@ -302,7 +302,7 @@ WRONG = [
     ("object: {kind: dots, at_mm: []}\n", "object: at_mm must"),
     (
         "object: {kind: braille, text: A}\n",
-        "line 1, object: text must have letters a to z and spaces: got 'A'",
+        "line 1, object: text must have letters a to z and spaces: got 'A'; write 'a'.",
     ),
     ("object: {kind: braille, text: 7}\n", "object.text must be a text: got 7"),
     (

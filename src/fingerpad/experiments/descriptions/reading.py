@@ -220,6 +220,8 @@ def error_sentence(error: ValidationError, kind: type[Part]) -> str:
         known = _keys_at(first["loc"][:-1], kind)
         return f"{where} is unknown: {did_you_mean(str(path[-1]), known, place_text(path[:-1]))}"
     expected = _EXPECTED.get(first["type"], first["msg"])
+    if first.get("input") is None and not path:
+        return f"{where} {expected}: it is empty."
     value, allowed = first.get("input"), first.get("ctx", {}).get("allowed", ())
     return f"{where} {expected}: {got(value, allowed, _SHOWN.repr(value))}"
 

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, Strict
 
+from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.plain_yaml import read_yaml
@@ -248,4 +249,6 @@ def read_touch_description(source: str | Path) -> DescribedTouch:
 def described_touch(content: Content | Any, source: str = "touch", text: str = "") -> DescribedTouch:
     """Build the description of a touch from plain values; arguments as of `DescribedTouch`."""
     with Origin(source, text).located():
+        if content is None:
+            raise InputError("the file is empty: write what is pressed, as the example of `fingerpad init`.")
         return DescribedTouch(part_from(TouchDescription, content), source, text)
