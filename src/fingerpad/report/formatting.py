@@ -98,8 +98,8 @@ def spelled(key: str) -> str:
 
     Examples
     --------
-    >>> spelled("peak_memory_mb"), spelled("time_constant_ms"), spelled("worst_scaled_jacobian")
-    ('peak memory [MB]', 'time constant [ms]', 'worst scaled jacobian')
+    >>> spelled("peak_memory_mb"), spelled("largest_contact_mm2"), spelled("worst_scaled_jacobian")
+    ('peak memory [MB]', 'largest contact [mm²]', 'worst scaled jacobian')
     """
     words = key.split("_")
     for length, unit in ((2, _UNITS.get("_".join(words[-2:]))), (1, _UNITS.get(words[-1]))):
@@ -112,6 +112,8 @@ _UNITS = {
     "per_m": "1/m",
     "per_mm": "1/mm",
     "mm": "mm",
+    "mm2": "mm²",
+    "mm3": "mm³",
     "ms": "ms",
     "s": "s",
     "mb": "MB",
