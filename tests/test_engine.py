@@ -221,9 +221,18 @@ def test_a_task_of_another_version_is_refused_by_the_worker(monkeypatch):
 
 def test_an_address_without_a_scheduler_is_refused(monkeypatch):
     monkeypatch.setattr(module, "_CONNECT_S", 0.5)
-    for address in ("tcp://127.0.0.1:1", "nonsense://x"):
-        with pytest.raises(InputError, match=r"^--scheduler must .*: .* cannot be reached; .*\.$"):
-            Cluster(address).check()
+    with pytest.raises(InputError, match=r"^--scheduler must .*: .* cannot be reached; .*\.$"):
+        Cluster("tcp://127.0.0.1:1").check()
+
+
+@pytest.mark.parametrize(
+    "address", ["localhost", "tcp://localhost", "nonsense://x:1", "tcp://localhost:x", ""]
+)
+def test_an_address_that_nobody_can_have_is_refused_before_anything_connects(address, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(distributed, "Client", pytest.fail)
+    with pytest.raises(InputError, match=rf"with a port, such as tcp://localhost:8786: got '{address}'\.$"):
+        Cluster(address).check()
 
 
 def test_without_dask_the_error_says_what_to_install(monkeypatch):

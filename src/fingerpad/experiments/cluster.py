@@ -87,6 +87,7 @@ class Cluster(metaclass=KnownKeywords):
     def _client(self, patience_s: float) -> Iterator[Any]:
         """Connect, within a time; close without a word about what is cancelled."""
         distributed = _library()
+        _check_address(self.address)
         began = time.monotonic()
         while True:
             try:
@@ -119,6 +120,18 @@ class Cluster(metaclass=KnownKeywords):
             except Exception as error:  # a client that is closed while it reconnects raises what that raised
                 LOGGER.debug("The client of %s closed with %r.", self.address, error)
             said.setLevel(level)
+
+
+def _check_address(address: str) -> None:
+    """Raise `InputError` for an address that nobody can have: its client could not be closed again."""
+    if address.startswith("inproc://"):  # a scheduler in this process
+        return
+    try:
+        import_module("distributed.comm").get_address_host_port(address)
+    except ValueError as error:
+        raise InputError(
+            f"--scheduler must be an address with a port, such as tcp://localhost:8786: got {address!r}."
+        ) from error
 
 
 def _finished(
