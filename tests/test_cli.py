@@ -101,7 +101,14 @@ def test_without_a_command_the_help_is_shown(call):
         (["fit", "--example", "--resolution", "quick"], "'--example' requires an argument", "'--resolution'"),
         (["validate", "--example", "--out", "here"], "'--example' requires an argument", "'--out'"),
         (["reproduce", "--out", "--no-extended"], "'--out' requires an argument", "'--no-extended'"),
-        (["export"], "Missing argument", "'folder'"),
+        (["reproduce", "--quick"], "No such option: --quick; write --resolution quick", "quick"),
+        (["reproduce", "--quickly"], "No such option: --quickly.", "--quickly"),
+        (["export"], "Missing argument", "'FOLDER'"),
+        (["view"], "Missing argument", "'RESULT'"),
+        (["store"], "store needs a command: list, verify, prune", "list"),
+        (["store", "verify"], "Missing argument", "'FOLDER'"),
+        (["store", "verify", "."], "FOLDER must hold stored indentations: . has none", "."),
+        (["export", "out", "--elastic-moduli", "long_term"], "elastic_moduli is for calculix", "vtu"),
         (["export", "out", "--indenter", "cone"], "indenter must be one of sphere, cylinder, bar", "'cone'"),
         (
             ["export", "out", "--indenter", "bar", "--curvature", "287"],
@@ -128,6 +135,19 @@ def test_without_a_command_the_help_is_shown(call):
 )
 def test_misuse_is_one_sentence_and_status_2_and_nothing_is_written(call, is_refused, arguments, named, came):
     is_refused(call(*arguments), "fingerpad", named, came)
+
+
+@pytest.mark.parametrize(
+    ("words", "package", "extra"),
+    [
+        (["export", "out"], "vtkmodules.vtkIOXML", "vtk"),
+        (["export", "out", "--format", "netcdf"], "xarray", "netcdf"),
+        (["lab", "--folder", "out"], "panel.custom", "lab"),
+    ],
+)
+def test_without_its_extra_nothing_is_written(call, is_refused, monkeypatch, words, package, extra):
+    monkeypatch.setitem(sys.modules, package, None)
+    is_refused(call(*words), "fingerpad", "pip install", f"fingerpad[{extra}]")
 
 
 @pytest.mark.parametrize("below", ["", "/deeper", "/deeper/still"])

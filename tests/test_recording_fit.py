@@ -490,7 +490,7 @@ def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_pa
     ("arguments", "content", "said"),
     [
         ([], ROWS, "fit needs recordings and --stimulus, or --example"),
-        (["mine.csv"], ROWS, "fit needs recordings and --stimulus, or --example"),
+        (["mine.csv"], ROWS, "--stimulus is missing: write --stimulus bar"),
         (["none.csv", "--stimulus", "bar"], ROWS, "none.csv must be a file that can be read"),
         (["mine.csv", "--stimulus", "none.csv"], ROWS, "none.csv must be a file that can be read"),
         (

@@ -16,7 +16,9 @@ SPHERE, QUICK, ADULT = "sphere", "quick", "adult"
 
 
 def export_command(
-    folder: Annotated[Path, typer.Argument(help="Folder for the files; it is created if needed.")],
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Folder for the files; it is created if needed.")
+    ],
     indenter: Annotated[
         str,
         typer.Option(
@@ -61,7 +63,7 @@ def export_command(
     """Press an indenter into the finger and write the touch as a table, for ParaView or another solver."""
     from fingerpad.core.checks import one_of
     from fingerpad.experiments.descriptions.touch import described_touch, read_touch_description
-    from fingerpad.export.formats import export_touch
+    from fingerpad.export.formats import check_format, export_touch
 
     one_of("format", format_name, FORMAT_CHOICES)
     if curvature is not None and indenter != SPHERE:
@@ -98,6 +100,7 @@ def export_command(
             },
             "the touch",
         ).touch
+    check_format(format_name, elastic_moduli)
     make_writable(folder, "FOLDER")
     with interruptible("Files that exist are complete; the others were not written."):
         files = export_touch(folder, touch, format_name, elastic_moduli)

@@ -133,9 +133,13 @@ def fit_command(
         options = f"--stimulus bar --resolution quick --out {example / 'fit'}"
         typer.echo(f"Try: fingerpad fit {example / EXAMPLE} {options}")
         return
-    if recordings is None or stimulus is None:
+    if recordings is None:
         raise InputError(
             "fit needs recordings and --stimulus, or --example FOLDER: see fingerpad fit --help."
+        )
+    if stimulus is None:
+        raise InputError(
+            f"--stimulus is missing: write --stimulus {BAR}, or name the file of the stimuli of {recordings}."
         )
     sizes = {"width": width, "fillet": fillet, "depth": depth}
     one_of("resolution", resolution or STANDARD, RESOLUTION_CHOICES)

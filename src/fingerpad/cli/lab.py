@@ -32,10 +32,12 @@ def lab_command(
 ) -> None:
     """Press objects into the finger in the browser, on this computer alone."""
     from fingerpad.lab.laboratory import Laboratory
-    from fingerpad.lab.server import serve
+    from fingerpad.lab.server import require_panel, serve
     from fingerpad.lab.static import write_static
 
     with interruptible("The next laboratory in the same folder presses nothing again."):
+        if static is None:
+            require_panel()
         laboratory = Laboratory(folder, ranges or (), engine(jobs, None))
         make_writable(folder, "--folder")
         if static is not None:

@@ -11,6 +11,19 @@ import typer.core
 from fingerpad.cli.choices import MATERIAL_CHOICES, RESOLUTION_CHOICES
 from fingerpad.cli.running import interruptible
 
+RESOLUTIONS_AS_OPTIONS = tuple(f"--{name}" for name in RESOLUTION_CHOICES)
+"""Values of `--resolution` as they may be mistaken for options."""
+
+
+class Group(typer.core.TyperGroup):
+    """A command with commands of its own, which it names where none is given."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words after the name of the command."""
+        if not args:
+            ctx.fail(f"{ctx.info_name} needs a command: {', '.join(self.list_commands(ctx))}")
+        return super().parse_args(ctx, args)
+
 
 class Command(typer.core.TyperCommand):
     """A command that does not take an option's name for the value of another, and ends well by a signal."""
@@ -24,7 +37,11 @@ class Command(typer.core.TyperCommand):
             # As a path an empty word would mean the current folder.
             if not word and (before in ("--out", "--example") or before not in with_argument):
                 ctx.fail(f"{before} must not be empty: write a name, or leave it out")
-        for word, following in pairwise(args[: args.index("--")] if "--" in args else args):
+        words = args[: args.index("--")] if "--" in args else args
+        for word in words:
+            if word not in names and word in RESOLUTIONS_AS_OPTIONS and "--resolution" in names:
+                ctx.fail(f"No such option: {word}; write --resolution {word.removeprefix('--')}")
+        for word, following in pairwise(words):
             if word in with_argument and following in names:
                 ctx.fail(f"Option {word!r} requires an argument: got {following!r}; write its value first")
         return super().parse_args(ctx, args)

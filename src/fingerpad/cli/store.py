@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fingerpad.cli.options import Command, number_option
+from fingerpad.cli.options import Command, Group, number_option
 from fingerpad.core.errors import InputError, StoreError
 
 if TYPE_CHECKING:
@@ -18,10 +18,12 @@ if TYPE_CHECKING:
 SECONDS_PER_DAY = 86_400.0
 
 store_app = typer.Typer(
-    help="List, verify or prune the stored indentations of a folder.", add_completion=False
+    help="List, verify or prune the stored indentations of a folder.", add_completion=False, cls=Group
 )
 
-Folder = Annotated[Path, typer.Argument(help="Folder of a run, or its folder `indentations`.")]
+Folder = Annotated[
+    Path, typer.Argument(metavar="FOLDER", help="Folder of a run, or its folder `indentations`.")
+]
 
 
 def _store(folder: Path) -> Store:
@@ -32,7 +34,10 @@ def _store(folder: Path) -> Store:
     found = inner if inner.is_dir() else folder
     if not found.is_dir():
         raise InputError(f"FOLDER must be a folder of stored indentations: {folder} is none.")
-    return Store(found)
+    store = Store(found)
+    if found.name != STORE_FOLDER and not store.files():
+        raise InputError(f"FOLDER must hold stored indentations: {folder} has none; name that of a run.")
+    return store
 
 
 @store_app.command("list", cls=Command)

@@ -14,7 +14,10 @@ from fingerpad.core.errors import InputError
 
 def view_command(
     result: Annotated[
-        Path, typer.Argument(help="Touch as .nc or .zarr, or the folder that holds touch.nc or touch.zarr.")
+        Path,
+        typer.Argument(
+            metavar="RESULT", help="Touch as .nc or .zarr, or the folder that holds touch.nc or touch.zarr."
+        ),
     ],
     out: Annotated[
         Path | None,

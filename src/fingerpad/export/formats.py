@@ -66,17 +66,22 @@ def export_touch(
     InputError
         If the format is unknown or cannot express this indentation.
     """
+    check_format(format_name, elastic_moduli)  # first, since solving takes its time
+    if format_name in RESULTS:
+        name, write = RESULTS[format_name]
+        return write(path_of("folder", folder) / name, touch.solve(whole=format_name in REQUIRED))
+    return (write_deck(folder, job_of(touch), format_name, elastic_moduli),)
+
+
+def check_format(format_name: str, elastic_moduli: str | None = None) -> None:
+    """Raise `InputError` if there is no such format, or its library is missing."""
     one_of("format", format_name, FORMATS)
     if elastic_moduli is not None and format_name != "calculix":
         raise InputError(
             f"elastic_moduli is for calculix, which has no relaxation, not for {format_name}: leave it out."
         )
-    if format_name in RESULTS:
-        if whole := format_name in REQUIRED:
-            REQUIRED[format_name]()  # first, since solving takes its time
-        name, write = RESULTS[format_name]
-        return write(path_of("folder", folder) / name, touch.solve(whole=whole))
-    return (write_deck(folder, job_of(touch), format_name, elastic_moduli),)
+    if format_name in REQUIRED:
+        REQUIRED[format_name]()
 
 
 def write_deck(folder: Path, job: Job, format_name: str, elastic_moduli: str | None = None) -> Path:

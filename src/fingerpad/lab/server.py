@@ -93,6 +93,14 @@ def reply_to(laboratory: Laboratory, message: Any) -> dict[str, Any]:
     return reply
 
 
+def require_panel() -> None:
+    """Raise `InputError` if Panel is not installed."""
+    try:
+        import panel.custom  # noqa: F401
+    except ImportError as error:
+        raise InputError("The laboratory needs Panel: pip install 'fingerpad[lab]'.") from error
+
+
 def serve(laboratory: Laboratory, port: int = 0, ready: Callable[[str], None] = print) -> None:
     """Serve the page on the loopback interface until the process is interrupted.
 
@@ -110,12 +118,10 @@ def serve(laboratory: Laboratory, port: int = 0, ready: Callable[[str], None] = 
     InputError
         If Panel is not installed, or the port is none or taken.
     """
-    try:
-        from panel.custom import JSComponent
-        from panel.io.server import get_server
-        from param import String
-    except ImportError as error:
-        raise InputError("The laboratory needs Panel: pip install 'fingerpad[lab]'.") from error
+    require_panel()
+    from panel.custom import JSComponent
+    from panel.io.server import get_server
+    from param import String
 
     class Page(JSComponent):
         spec = String(json.dumps(spec_of(laboratory)))
