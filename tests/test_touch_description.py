@@ -475,6 +475,8 @@ def test_a_touch_is_pressed_once_and_its_outputs_are_what_python_computes(call, 
     Path("touch.yaml").write_text(json.dumps(content), encoding="utf-8")
     status, printed, error = call("touch", "touch.yaml", "--out", "out")
     assert (status, error) == (0, "")
+    shown = Path("out/touch.html").read_text(encoding="utf-8")
+    assert all(words in shown for words in ("largest contact [mm²]", "number of times", "jacobian [mm³]"))
     assert "afferents fire" in printed
     written = {str(path.relative_to("out")) for path in Path("out").rglob("*") if path.is_file()}
     assert {
