@@ -351,8 +351,8 @@ class _Press:
         """Refuse a force as soon as it has pushed the indenter too deep."""
         if depth_mm > self.deepest_mm and self.stimulus.by_force and self.stimulus.stays:
             raise InputError(
-                f"force_mn must not push the indenter deeper than {self.deepest_mm:.2f} mm: it is there after "
-                f"{time_ms:.4g} ms, at {self.stimulus.prescribed_at(time_ms):.4g} of "
+                f"force_mn must not push the indenter deeper than {self.deepest_mm:.2f} mm: it is there "
+                f"after {time_ms:.4g} ms, at {self.stimulus.prescribed_at(time_ms):.4g} of "
                 f"{self.stimulus.largest:g} mN; give less force, in mN."
             )
 
