@@ -233,7 +233,7 @@ def test_stimuli_name_finger_tissues_and_resolution_and_options_replace_them(wri
             "name,object,motion.kind,motion.file\ntip,bar,recorded,no.csv\n",
             "line 2, motion: no.csv must",
         ),
-        ("a.yaml", "", "a.yaml, the file must be a mapping of keys to values: got None"),
+        ("a.yaml", "", "a.yaml, the file must be a mapping of keys to values: it is empty"),
         ("a.yaml", "- {name: tip}\n", "a.yaml, the file must be a mapping of keys to values: got "),
         ("a.yaml", "stimuli:\n- tip\n", "a.yaml, line 2, stimuli[1] must be a mapping"),
         ("a.yaml", "stimuli: []\n", "a.yaml, line 1, stimuli must have at least one entry"),

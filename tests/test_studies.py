@@ -898,7 +898,7 @@ def test_rows_say_what_was_fitted_if_and_only_if_something_was():
     ("quantity", "published", "ours", "difference"),
     [
         (OUT_OF_SAMPLE, f"{paper.FSS_OUT_OF_SAMPLE.value:g}", "0.820", "+0.010"),
-        ("Dynamic rate, largest [spikes/s]", "212", "212", "+0"),
+        ("Dynamic rate, largest [spikes/s]", "212", "212", "0"),
         (
             NOISE,
             f"{psychophysics.NOISE_SIGMA.value:g}",

@@ -513,7 +513,7 @@ def test_invalid_values_are_refused_in_one_sentence_with_their_position(parts, s
         ("question: a\nquestion: b\n", "mine.yaml, line 2: question is repeated, keep one."),
         ("question: [a\n", "mine.yaml cannot be read as YAML"),
         ("- 1\n- 2\n", "mine.yaml, the file must be a mapping of keys to values: got [1, 2]."),
-        ("", "mine.yaml, the file must be a mapping of keys to values: got None."),
+        ("", "mine.yaml, the file must be a mapping of keys to values: it is empty."),
         ("question: &a [*a]\n", "mine.yaml cannot be read as YAML (it has an anchor or an alias"),
         ("[" * 600, "mine.yaml cannot be read as YAML"),
         ("{[1]: 2}", "mine.yaml cannot be read as YAML"),
