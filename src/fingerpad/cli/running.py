@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import write_atomically
+from fingerpad.core.files import check_new, write_atomically
 from fingerpad.core.logger import LOGGER
 from fingerpad.core.progress import Bars, Lines, NoProgress, Progress
 
@@ -114,8 +114,7 @@ def make_writable(folder: Path, name: str = "--out") -> None:
 def write_examples(folder: Path, files: Mapping[str, bytes], name: str = "--out") -> None:
     """Write example files into a folder, unless one of them exists: a user may have changed it."""
     for file in files:
-        if (folder / file).exists():
-            raise InputError(f"{folder / file} exists and is not overwritten: choose another folder.")
+        check_new(folder / file, "folder")
     make_writable(folder, name)
     for file, content in files.items():
         write_atomically(folder / file, content)

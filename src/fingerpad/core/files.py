@@ -97,6 +97,12 @@ def check_file(path: Path, largest_mb: float) -> Path:
     return path
 
 
+def check_new(path: Path, another: str = "name") -> None:
+    """Raise `InputError` if a file exists that a user may have changed; `another` of what to choose."""
+    if path.exists():
+        raise InputError(f"{path} exists and is not overwritten: choose another {another}.")
+
+
 def read_text(path: Path) -> str:
     """Return the text of a file in UTF-8, else raise `InputError`."""
     try:

@@ -106,10 +106,10 @@ def _refuse_unknown(
     given: Collection[str], known: Collection[str], owner: str, elsewhere: Mapping[str, str] | None = None
 ) -> None:
     for name in given:
-        if name not in known and name in (elsewhere or ()):
-            raise InputError(f"{owner} has no {name}: take {(elsewhere or {})[name]}.")
         if name not in known:
-            raise InputError(f"{owner} has no {name}: {did_you_mean(name, known, owner)}")
+            other = (elsewhere or {}).get(name)
+            hint = f"take {other}." if other else did_you_mean(name, known, owner)
+            raise InputError(f"{owner} has no {name}: {hint}")
 
 
 def _refuse_misfit(

@@ -43,8 +43,8 @@ def write_touch_page(result: TouchFile, draw: Callable[[], Figure], folder: Path
         "Left: strain energy density in the middle plane of the finger at the end of the touch. Right: depth "
         "over time, and the spikes of the afferents that fire."
     )
-    facts = asdict(result.summary)
-    facts = {"number of times" if name == "times" else name: value for name, value in facts.items()}
+    numbers = asdict(result.summary).items()
+    facts = {"number of times" if name == "times" else name: value for name, value in numbers}
     page = Page(
         result.touch.title,
         "A finite-element fingertip and a population of slowly adapting afferents. "

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.files import path_of, write_atomically
+from fingerpad.core.files import check_new, path_of, write_atomically
 from fingerpad.experiments import schemas
 
 EXAMPLE = f"""\
@@ -62,8 +61,7 @@ def write_example(path: Path) -> Path:
         If the folder cannot be written.
     """
     path = path_of("path", path)
-    if path.exists():
-        raise InputError(f"{path} exists and is not overwritten: choose another name.")
+    check_new(path)
     schema = json.dumps(schemas.touch_schema(), indent=1)
     write_atomically(path.parent / schemas.TOUCH_SCHEMA, schema.encode())
     write_atomically(path, EXAMPLE.encode())
