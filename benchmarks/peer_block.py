@@ -23,7 +23,8 @@ from fingerpad.geometry.mesh import Mesh, block_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
 
 LENGTH_MM, WIDTH_MM = 14.0, 12.0
 BORDERS_MM = (0.0, 0.471, 1.624, 5.0)

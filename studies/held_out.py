@@ -36,7 +36,7 @@ from fingerpad.geometry.edged_indenters import Grating
 from fingerpad.geometry.indenters import FlatPunch, Indenter, Plate
 from fingerpad.geometry.mesh_quality import jacobian_at_gauss
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import firing_rate_hz, modulation_index

@@ -18,7 +18,7 @@ from fingerpad.geometry.indenters import FlatPunch, Sphere
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.motions import repeated
 from fingerpad.geometry.trajectory import Trajectory
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, write_png
 from fingerpad.skin.indentation import CONTACT_POINT_MM, indent

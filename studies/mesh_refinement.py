@@ -20,7 +20,7 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, sphere_discrimination
 from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.grading import Grading
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.skin.behaviour import code_hash

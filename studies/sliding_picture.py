@@ -13,7 +13,7 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.trajectory import Trajectory
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.report.style import BLACK, BLUE, GREEN, ORANGE, new_figure, write_png
 from fingerpad.skin.indentation import touch_of

@@ -111,8 +111,8 @@ def test_annotations_and_messages_of_errors_do_not_count():
 @pytest.mark.parametrize(
     ("name", "old", "new"),
     [
-        ("mechanics/press.py", r"^PENETRATION_SHARE = 0\.1", "PENETRATION_SHARE = 0.10000001"),
-        ("mechanics/press.py", r"ramp_steps: int = 8", "ramp_steps: int = 9"),
+        ("mechanics/press_settings.py", r"^PENETRATION_SHARE = 0\.1", "PENETRATION_SHARE = 0.10000001"),
+        ("mechanics/press_settings.py", "ramp_steps: int = 8", "ramp_steps: int = 9"),
         ("mechanics/fields.py", r"\*\* \(1\.0 / 3\.0\)", "** (1.0 / 3.1)"),
         ("mechanics/fields.py", r"mean = 0\.5 \*", "mean = 0.6 *"),
         ("geometry/fingertip.py", r"^SMOOTHING = 5e-7", "SMOOTHING = 6e-7"),

@@ -12,7 +12,7 @@ from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, Plate
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.skin.indentation import Touch
 

@@ -15,7 +15,8 @@ from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.linear import free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.store import Store, touch_key

@@ -16,7 +16,7 @@ from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, MaterialTable, Tissues
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.skin.fields import FIELDS, Place, sampled_fields
 from fingerpad.skin.indentation import Touch, indent, settings_of, touch_of

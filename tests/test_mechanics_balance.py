@@ -21,7 +21,8 @@ from fingerpad.mechanics.balance import (
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.element import SHAPE_DERIVATIVES
 from fingerpad.mechanics.materials import Hyperfoam, Material, MaterialTable, Prony
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
     StressHistory,

@@ -9,7 +9,8 @@ from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import Contact, Placement, place
 from fingerpad.mechanics.materials import Material
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
 
 RADIUS = 2.0
 SPHERE = Sphere(curvature_per_m=1000.0 / RADIUS)

@@ -16,7 +16,8 @@ from fingerpad.mechanics.friction import Anchors, Approach, by_secants, dragged,
 from fingerpad.mechanics.linear import free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.indentation import touch_of
 from fingerpad.skin.store import touch_key
 

@@ -11,7 +11,9 @@ from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.contact import Contact, Placement, place
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.middles import Middles
-from fingerpad.mechanics.press import PressSettings, press, sag_mm
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
+from fingerpad.mechanics.small_bodies import sag_mm
 
 SPACING_MM = 0.5
 BALL = Sphere(curvature_per_m=1000.0 / 0.4)

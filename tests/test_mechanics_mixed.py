@@ -16,7 +16,8 @@ from fingerpad.mechanics.laws import Hencky, Polynomial
 from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.mixed import Pressures, exchange_pressure
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
 
 SHEAR, BULK = 3.0, 700.0
 BLOCK = block_mesh([0.0, 1.0, 2.2], [0.0, 0.7, 1.9], [0.0, 1.3], layers=[0, 1])

@@ -18,7 +18,8 @@ from fingerpad.mechanics.linear import LinearSolver, free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material, MaterialTable, Prony
 from fingerpad.mechanics.multigrid import Multigrid
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
 
 SMALL = block_mesh(
     np.arange(7.0), [0.0, 0.3, 0.5, 1.5], np.array([0.0, 0.5, 1.0, 1.5, 2.5, 3.5]), [0, 2, 3], symmetric=True

@@ -15,7 +15,8 @@ from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings, _Search
-from fingerpad.mechanics.press import PressSettings, _Press, press
+from fingerpad.mechanics.press import _Press, press
+from fingerpad.mechanics.press_settings import PressSettings
 
 BALL = Sphere(curvature_per_m=500.0)
 SIX = [Line(), Cylinder(3.0), Bar(2.0, 0.3), BALL, FlatPunch(2.0, 0.3), Plate()]
@@ -95,7 +96,7 @@ def test_a_shifted_tangent_leads_to_the_same_equilibrium(monkeypatch):
     done = pressed(block(), Bar(1.7, 0.1), NewtonSettings(persistent=True))
     assert any(shifted)
     np.testing.assert_allclose(done.force_mn[-1], usual.force_mn[-1], rtol=1e-3)
-    assert done.energy.relative_imbalance <= 0.01  # as in the next test
+    assert done.energy.relative_imbalance <= 0.015  # what the snap sets free, as in the next test
 
 
 @pytest.mark.parametrize("ramp_steps", [3, 4, 5, 6, 8, 12])
@@ -146,7 +147,7 @@ def test_a_search_about_a_small_body_may_take_more_newton_steps(monkeypatch):
         finest_mm=0.08,
     )
     assert small_body().force_mn[-1] > 0.0
-    monkeypatch.setattr("fingerpad.mechanics.press.SMALL_BODY_STEPS", 1)
+    monkeypatch.setattr("fingerpad.mechanics.small_bodies.MORE_NEWTON_STEPS", 1)
     with pytest.raises(ConvergenceError, match="after 5 Newton steps"):
         small_body()
 

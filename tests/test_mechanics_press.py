@@ -20,7 +20,8 @@ from fingerpad.mechanics.contact import Contact, place
 from fingerpad.mechanics.linear import KeptFactor, LinearSolver, free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material, MaterialTable, Prony
 from fingerpad.mechanics.newton import NewtonSettings, find_equilibrium
-from fingerpad.mechanics.press import PressSettings, _Press, press
+from fingerpad.mechanics.press import _Press, press
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.viscoelastic import StepCoefficients
 
 PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))

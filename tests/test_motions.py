@@ -19,7 +19,7 @@ from fingerpad.geometry.paths import check_path
 from fingerpad.geometry.sampled_motions import reduced, sampled
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.geometry.trajectory_files import read_trajectory
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.indentation import touch_of
 
 AT_MM = (17.37, 0.0)

@@ -13,7 +13,7 @@ from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Plate, Sphere
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.probing import check_gap, mirrored, traced_front
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.indentation import Touch, touch_of
 from fingerpad.skin.store import touch_key
 

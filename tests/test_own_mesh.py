@@ -25,7 +25,7 @@ from fingerpad.geometry.mesh_parts import MeshParts, finger_from
 from fingerpad.geometry.mesh_quality import jacobian_at_gauss
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.triangles import closest_on_triangles
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.free_receptors import FreeReceptors
 from fingerpad.skin.indentation import touch_of
 from fingerpad.skin.section import middle_section

@@ -11,7 +11,8 @@ from fingerpad.geometry.motion import Pose
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.contact import Placement, place, rotation_of
 from fingerpad.mechanics.materials import Material, Prony
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.indentation import touch_of
 
 PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))

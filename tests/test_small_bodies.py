@@ -9,7 +9,8 @@ from fingerpad.core.errors import ConvergenceError
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Bar, FlatPunch, Sphere
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.press import PressSettings, _Press
+from fingerpad.mechanics.press import _Press
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.indentation import touch_of
 
 

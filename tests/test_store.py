@@ -24,7 +24,7 @@ from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, 
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.materials import Prony
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.skin.fields import FIELDS, Field, Place, Times
 from fingerpad.skin.indentation import Touch

@@ -19,7 +19,7 @@ from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.probing import check_gap
 from fingerpad.geometry.surface import Surface, height_surface
 from fingerpad.geometry.surface_files import MOST_HEIGHTS, read_height_map, read_surface
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.indentation import touch_of
 from fingerpad.skin.store import touch_key
 

@@ -19,7 +19,8 @@ from fingerpad.mechanics import newton
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.indentation import touch_of
 
 PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))

@@ -20,7 +20,7 @@ from fingerpad.geometry.indenter_grading import (
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.skin.indentation import Touch, touch_of
 from fingerpad.skin.store import touch_key

@@ -20,7 +20,8 @@ from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.cycles import PronyCycle
 from fingerpad.mechanics.inertia import fastest_hz, moved_mass_mg, resonance_hz
 from fingerpad.mechanics.materials import Material, MaterialTable, Prony
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.viscoelastic import StepCoefficients, StressHistory
 from fingerpad.skin.indentation import touch_of
 

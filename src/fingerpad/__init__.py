@@ -72,7 +72,7 @@ if TYPE_CHECKING:
         Prony,
         Tissues,
     )
-    from fingerpad.mechanics.press import PressSettings
+    from fingerpad.mechanics.press_settings import PressSettings
     from fingerpad.mechanics.tissues import named_tissues
     from fingerpad.neuron.afferent import Afferent
     from fingerpad.neuron.afferent_stream import AfferentStream
@@ -251,7 +251,7 @@ _HOMES = {
         "Prony",
         "Tissues",
     ),
-    "mechanics.press": ("PressSettings",),
+    "mechanics.press_settings": ("PressSettings",),
     "mechanics.tissues": ("named_tissues",),
     "neuron.population": ("Population",),
     "report.touch": ("save_figure",),

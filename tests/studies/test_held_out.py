@@ -20,7 +20,7 @@ from fingerpad.geometry.indenters import Plate
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.materials import Material
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population

@@ -16,7 +16,7 @@ from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.skin.indentation import touch_of

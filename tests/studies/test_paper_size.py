@@ -14,7 +14,7 @@ from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import block_mesh, finger_mesh
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.indentation import touch_of
 from studies import paper_size
 from studies.mesh_refinement import PEAK_SHIFT

@@ -14,7 +14,8 @@ from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
 
 from .case import Row, at_least, at_most, case, near
 from .solid import Solid

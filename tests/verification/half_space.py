@@ -22,7 +22,8 @@ from fingerpad.mechanics.fields import cauchy_stress
 from fingerpad.mechanics.linear import LinearSolver, choose_preconditioner, free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.newton import NewtonSettings, find_equilibrium
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.skin_contact import SkinContact, skin_contact
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,

@@ -22,7 +22,8 @@ from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import Deformation, PressSettings, press
+from fingerpad.mechanics.press import Deformation, press
+from fingerpad.mechanics.press_settings import PressSettings
 
 YOUNG_KPA, POISSON = (136.0, 136.0, 80.0, 34.0), 0.48
 LAYERS = (0, 0, 1, 2, 2, 2, 3, 3, 3, 3)

@@ -25,7 +25,8 @@ from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.laws import Polynomial
 from fingerpad.mechanics.materials import Material, Tissues
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.indentation import Touch
 
 from . import calculix

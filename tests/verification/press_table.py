@@ -33,7 +33,7 @@ from fingerpad.geometry.grading import Grading, Strip
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Sphere
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.trajectory import Trajectory
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.behaviour import code_hash
 from fingerpad.skin.indentation import CONTACT_POINT_MM, touch_of
 

@@ -12,7 +12,8 @@ from fingerpad.geometry.motions import sine
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Polynomial, Prony
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import PressSettings, press
+from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
     StressHistory,

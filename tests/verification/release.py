@@ -16,7 +16,8 @@ from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import Deformation, PressSettings, press
+from fingerpad.mechanics.press import Deformation, press
+from fingerpad.mechanics.press_settings import PressSettings
 
 from . import balance
 from .case import Row, at_most, case, equal, near

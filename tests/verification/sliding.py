@@ -12,7 +12,8 @@ from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import Deformation, PressSettings, press
+from fingerpad.mechanics.press import Deformation, press
+from fingerpad.mechanics.press_settings import PressSettings
 
 from .case import Row, at_most, case, equal, near
 from .half_space import lines, round_mesh

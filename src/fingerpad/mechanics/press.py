@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from importlib import import_module
 
 import numpy as np
 from scipy.optimize import brentq
 
-from fingerpad.core.checks import FloatArray, float_array, increasing, positive, whole
+from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.progress import share_done
-from fingerpad.core.values import converted
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.mesh_checks import check_mesh
 from fingerpad.geometry.mesh_quality import element_place, squeezed_most
-from fingerpad.geometry.motion import Motion, Stimulus
+from fingerpad.geometry.motion import Stimulus
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.balance import (
     EnergyBalance,
@@ -47,10 +45,11 @@ from fingerpad.mechanics.linear import (
     free_degrees_of_freedom,
 )
 from fingerpad.mechanics.materials import Material, MaterialTable
-from fingerpad.mechanics.middles import Middles
 from fingerpad.mechanics.mixed import MIXED_POISSON
 from fingerpad.mechanics.newton import FIRST_DEPTH_MM, Equilibrium, NewtonSettings, find_equilibrium
+from fingerpad.mechanics.press_settings import MOST_SOLVED, SAME_TIME, PressSettings
 from fingerpad.mechanics.skin_contact import SkinContact, skin_contact
+from fingerpad.mechanics.small_bodies import contact_about, steps_of_advance
 from fingerpad.mechanics.steps import Phase, adaptive_steps, steps_at
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
@@ -61,126 +60,14 @@ from fingerpad.mechanics.viscoelastic import (
 
 LOGGER = logging.getLogger(__name__)
 
-MOST_SOLVED = 10
-"""Equal cycles up to which all are solved."""
-
-
-PENETRATION_SHARE = 0.1
-"""Largest penetration over depth, as a share of the tolerance of SED: SED grows as the square of depth or
-faster, and what augmentation leaves open differs from step to step."""
-
-
 MOST_CONTINUED = 4.0
 """Largest factor by which the last step of the skin is extended for the next guess."""
-
-
-SAME_TIME = 1e-9
-"""Times closer than this, over the end of the motion, are one."""
-
-LONGEST_STEP = 1.0
-"""Largest advance of a small body in one step, over its smallest elements. In longer steps, skin at the rim
-of a punch of 1 mm slid off it where shorter ones hold it."""
-
-SMALL_BODY_PENETRATION = 0.1
-"""Penetration accepted about a small body, over its smallest elements."""
-
-SMALL_BODY_SAGS, SAG_OF_WIDTH = (0.125, 0.5), 1.0 / 60
-"""Least and largest sag of a facet that follows a small body, over its smallest elements, and the sag over
-its half-width. The least is that of a chord as long as the radius. With the least everywhere, nodes and
-middles at the edge of a wide body take turns in contact, and each turn loses a little work."""
-
-SMALL_BODY_STIFFNESS_KPA = 20_000.0
-"""Penalty of contact about a small body, times its smallest elements. Such a body presses with 300 kPa and
-more on skin that is stretched. Each augmentation that corrects a penetration sets points there free, so they
-may not penetrate by more than a few percent of these elements. [kPa]"""
-
-SMALL_BODY_STICK = 60_000.0
-"""Stiffness per area of skin that sticks to a small body. Softer skin yields by a good part of an element
-under 1 MPa; with a stiffer one the renewal of friction finds no end. [kPa/mm]"""
-
-SMALL_BODY_STEPS = 3
-"""Newton steps of one search about a small body, over those of others: nodes find their place one after the
-other, and friction is renewed after each."""
 
 LARGEST_DROP = 0.1
 """Largest share by which the force may fall in a step that drives the indenter deeper."""
 
-
 LIFT_MM = 100.0
 """How far an indenter without force is lifted while the skin below it is solved. [mm]"""
-
-
-@dataclass(frozen=True)
-@converted
-class PressSettings(metaclass=KnownKeywords):
-    """Steps in time and tolerances of a press.
-
-    Parameters
-    ----------
-    ramp_steps, hold_steps : int
-        Steps in the two phases; with a tolerance of SED, the steps of this division that are tried first.
-    newton : NewtonSettings
-        Tolerances of each step.
-    sed_tolerance : float, optional
-        If given, steps are as long as this bound on the error of SED in time allows, between the steps too
-        when SED is taken as linear there. It is relative to the largest SED and holds in the living
-        epidermis, or everywhere in a mesh without one.
-    times_ms : tuple of float
-        Times at which the result is wanted, beside those of the steps; each is solved at exactly. [ms]
-    cycle_tolerance : float, optional
-        Of a motion with more than `MOST_SOLVED` equal cycles, only so many are solved as this bound on the
-        error of SED asks for, and the others are interpolated (see `cycles`). It is relative to the largest
-        SED, at the same places. None solves all of them, as do friction and `sed_tolerance`.
-
-    Raises
-    ------
-    InputError
-        If a number is out of its range, or the times do not increase from above 0.
-    """
-
-    ramp_steps: int = 8
-    hold_steps: int = 8
-    newton: NewtonSettings = field(default_factory=NewtonSettings)
-    sed_tolerance: float | None = None
-    times_ms: tuple[float, ...] = ()
-    cycle_tolerance: float | None = 0.01
-
-    def __post_init__(self) -> None:
-        wanted = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
-        if wanted.size and wanted[0] <= 0.0:
-            raise InputError(f"times_ms must lie above 0, which is solved anyway: got {wanted[0]:g}.")
-        object.__setattr__(self, "times_ms", tuple(wanted.tolist()))
-        whole("ramp_steps", self.ramp_steps, at_least=1)
-        whole("hold_steps", self.hold_steps, at_least=1)
-        for name in ("sed_tolerance", "cycle_tolerance"):
-            tolerance = getattr(self, name)
-            if tolerance is not None and positive(name, tolerance) >= 1.0:
-                raise InputError(f"{name} must be below 1: got {tolerance!r}.")
-
-    def steps_ms(self, motion: Motion) -> FloatArray:
-        """List the times to solve a motion at, from 0, without a tolerance of SED. [ms]
-
-        Raises
-        ------
-        InputError
-            If a wanted time lies beyond the end of the motion.
-        """
-        return self._with_wanted(motion, motion.step_times_ms(self.ramp_steps, self.hold_steps))
-
-    def smooth_ends_ms(self, motion: Motion) -> FloatArray:
-        """List the ends of the parts of a motion within which a tolerance of SED chooses the steps. [ms]"""
-        return self._with_wanted(motion, np.array([*motion.corners_ms, motion.end_ms]))
-
-    def _with_wanted(self, motion: Motion, times_ms: FloatArray) -> FloatArray:
-        wanted = np.array(self.times_ms)
-        if wanted.size and wanted[-1] > motion.end_ms:
-            raise InputError(
-                f"times_ms must lie within the motion, which ends at {motion.end_ms:g} ms: got "
-                f"{wanted[-1]:g} ms."
-            )
-        # A step of no length cannot be solved, so that a time which is there but for rounding stays as it is.
-        apart = np.abs(wanted[:, None] - times_ms).min(axis=1) > SAME_TIME * motion.end_ms
-        return np.union1d(times_ms, wanted[apart])
 
 
 @dataclass(frozen=True)
@@ -390,7 +277,7 @@ class _Press:
         if self.stimulus.by_force:
             return 1
         before_mm, after_mm = self.stimulus.prescribed_at([begin_ms, end_ms])
-        return max(1, int(np.ceil(abs(after_mm - before_mm) / (LONGEST_STEP * self.finest_mm) - 1e-9)))
+        return steps_of_advance(abs(after_mm - before_mm), self.finest_mm)
 
     def continued(self, start: _Moment, target_ms: float) -> float:
         """Advance of the indenter in a step over that in the step before: how far the skin is expected to go.
@@ -546,9 +433,7 @@ def press(
     sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
     contact = Contact(indenter, placement, nodes, area_mm2, friction=check_friction(friction, indenter))
     if np.isfinite(finest_mm):
-        middles = Middles.of(mesh, sparsity, nodes, sag_mm(indenter, finest_mm))
-        penalty = SMALL_BODY_STIFFNESS_KPA / finest_mm
-        contact = replace(contact, penalty=penalty, stick_penalty=SMALL_BODY_STICK, middles=middles)
+        contact = contact_about(contact, mesh, sparsity, finest_mm)
     gripped = nodes if indenter.grips else NO_NODES
     free = free_degrees_of_freedom(len(mesh.nodes_mm), mesh.fixed_nodes, mesh.symmetry_nodes, gripped)
     poisson = max(materials[layer].poisson for layer in np.unique(mesh.layer))
@@ -558,7 +443,7 @@ def press(
 
     chosen = np.arange(len(mesh.elements)) if watched is None else watched
     follow = Watched(chosen, mesh.nodes_mm, mesh.elements[chosen], mesh.layer[chosen], table)
-    newton = _newton_settings(settings, finest_mm)
+    newton = settings.newton_about(finest_mm)
     job = _Press(body, contact, stimulus, solver, newton, follow, finest_mm, deepest_mm)
     moment = job.unloaded()
     reached, slips, values = [], [], [moment.fields.values]
@@ -641,33 +526,6 @@ def _check_bone(mesh: Mesh, indenter: Indenter, placement: Placement, stimulus: 
             f"depth_mm must stay below {deepest_mm:.4g} mm{at}, where the {type(indenter).__name__} meets "
             f"the bone: got {depth_mm:g} mm."
         )
-
-
-def sag_mm(indenter: Indenter, finest_mm: float) -> float:
-    """How deep the middle of a facet may lie within a small body. [mm]
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.indenters import Bar, Sphere
-    >>> sag_mm(Sphere(4000.0), finest_mm=0.08), sag_mm(Bar(3.0, 0.05), finest_mm=0.05)
-    (0.01, 0.025)
-    """
-    narrowest_mm = min(indenter.half_width_mm, indenter.narrowest_mm / 2)
-    least, most = SMALL_BODY_SAGS
-    return float(np.clip(SAG_OF_WIDTH * narrowest_mm, least * finest_mm, most * finest_mm))
-
-
-def _newton_settings(settings: PressSettings, finest_mm: float) -> NewtonSettings:
-    """Tolerances of each step, tight enough for the bound on SED, and persistence about a small body."""
-    newton = settings.newton
-    if np.isfinite(finest_mm):
-        least_mm = SMALL_BODY_PENETRATION * finest_mm
-        most = SMALL_BODY_STEPS * newton.most_iterations
-        newton = replace(newton, persistent=True, most_iterations=most, least_penetration_mm=least_mm)
-    if settings.sed_tolerance is None:
-        return newton
-    penetration = min(newton.penetration_tolerance, PENETRATION_SHARE * settings.sed_tolerance)
-    return replace(newton, penetration_tolerance=penetration)
 
 
 def _moments(job: _Press, settings: PressSettings, times: FloatArray) -> Iterator[_Moment]:

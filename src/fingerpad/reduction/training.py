@@ -25,7 +25,7 @@ from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.geometry.indenter_grading import grading_along
 from fingerpad.geometry.motion import STILL, Pose
 from fingerpad.geometry.trajectory import Trajectory
-from fingerpad.mechanics.press import PressSettings
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.reduction.interpolation import Axis
 from fingerpad.skin.indentation import LARGEST_TILT_DEG, Touch, settings_of
 

@@ -32,7 +32,8 @@ from fingerpad.mechanics.contact import Placement, check_friction, place, rotati
 from fingerpad.mechanics.inertia import warn_of_inertia
 from fingerpad.mechanics.kernels import KERNELS
 from fingerpad.mechanics.materials import Tissues
-from fingerpad.mechanics.press import Deformation, PressSettings, press
+from fingerpad.mechanics.press import Deformation, press
+from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.skin.fields import stored_fields
 from fingerpad.skin.sampling import SkinResponse, places_below, receptors_of

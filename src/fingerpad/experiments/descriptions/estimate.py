@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingerpad.experiments.descriptions.touch import DescribedTouch
-from fingerpad.mechanics.press import MOST_SOLVED
+from fingerpad.mechanics.press_settings import MOST_SOLVED
 from fingerpad.skin.indentation import Touch
 
 STEP_S = 1.8e-5
