@@ -320,10 +320,10 @@ the bone: by the paper's ramp of 50 ms, with the hold of 950 ms. The last rows s
 of 50 ms and a hold of 100 ms. Largest force [mN], largest SED of the living
 epidermis [kPa], energy imbalance (wanted: at most 0.005) and time [s] of one process while others had the
 machine. Differences are relative (wanted: 5 % in force and 10 % in SED for quick, 2 % and 4 % for standard).
-The finer mesh divides all elements of standard by 1.5 in each direction; default tissues, with friction. SED is
-the mean through the living epidermis, which is one element at quick and standard and two on the finer mesh.
-What is empty was not pressed. A failure ends in an error; nothing is stored. Rows come from several versions
-of the code, which docs/verification/presses.csv names.
+The finer mesh divides all elements of standard by 1.5 in each direction; default tissues, with friction.
+SED is the mean through the living epidermis, which is one element at quick and standard and two on the finer
+mesh. What is empty was not pressed. A failure ends in an error; nothing is stored. Rows come from several
+versions of the code, which docs/verification/presses.csv names.
 
 `make verification` presses what has no row of the present code, and writes this page.
 [small-bodies](decisions/small-bodies.md) tells how such bodies are meshed.
