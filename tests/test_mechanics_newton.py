@@ -84,7 +84,8 @@ def test_skin_that_slides_round_an_edge_is_followed(indenter):
 
 def test_a_shifted_tangent_leads_to_the_same_equilibrium(monkeypatch):
     """Every indefinite tangent is shifted, and none is taken without the curvature of the body."""
-    usual = pressed(block(), Bar(1.7, 0.1), NewtonSettings())
+    steps = 16  # with 3 to 12 the snap loses up to 1.4 % of the work, with 16 0.6 %
+    usual = pressed(block(), Bar(1.7, 0.1), NewtonSettings(), ramp_steps=steps)
     shifted = []
     found = _Search.found
     monkeypatch.setattr("fingerpad.mechanics.newton.MOST_STRAIGHT", 0)
@@ -93,10 +94,10 @@ def test_a_shifted_tangent_leads_to_the_same_equilibrium(monkeypatch):
         "found",
         lambda search, *how: shifted.append(search.was_shifted) or found(search, *how),
     )
-    done = pressed(block(), Bar(1.7, 0.1), NewtonSettings(persistent=True))
+    done = pressed(block(), Bar(1.7, 0.1), NewtonSettings(persistent=True), ramp_steps=steps)
     assert any(shifted)
     np.testing.assert_allclose(done.force_mn[-1], usual.force_mn[-1], rtol=1e-3)
-    assert done.energy.relative_imbalance <= 0.015  # what the snap sets free, as in the next test
+    assert done.energy.relative_imbalance <= 0.01
 
 
 @pytest.mark.parametrize("ramp_steps", [3, 4, 5, 6, 8, 12])
