@@ -5,6 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.grading import resolution_grading
+from fingerpad.geometry.mesh import finger_mesh
 from studies.pages.mesh_refinement import MESH_REFINEMENT
 from studies.pages.paper_size import PAPER_SIZE, summary
 
@@ -47,6 +50,18 @@ def test_the_page_of_presses_shows_the_stored_rows():
     assert press_table.TABLE_PAGE.read_text(encoding="utf-8") == press_table.page_text(
         press_table.read_rows()
     )
+
+
+def test_a_mean_through_the_epidermis_is_at_the_same_depth_with_any_number_of_elements():
+    """Heights of elements stand for SED that changes with depth."""
+    means = []
+    for elements in (1, 2, 3):
+        grading = replace(resolution_grading("quick", 17.37), living_epidermis=elements)
+        mesh = finger_mesh(Fingertip(), grading)
+        heights_mm = mesh.nodes_mm[mesh.elements].mean(axis=1)[None, :, 1]
+        means.append(press_table.through_epidermis(mesh, heights_mm))
+    np.testing.assert_allclose(means[1], means[0], atol=1e-4)
+    np.testing.assert_allclose(means[2], means[0], atol=1e-4)
 
 
 def test_the_page_ends_with_the_stored_runs_which_belong_to_no_case():
