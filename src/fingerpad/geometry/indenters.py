@@ -142,6 +142,12 @@ class Indenter(metaclass=KnownKeywords):
         """Radius of a round face and of its rounded rim; None without one. [mm]"""
         return None
 
+    @property
+    def sharpest_mm(self) -> float:
+        """Radius of the sharpest edge or of the rim; infinite without one. [mm]"""
+        rim = () if self.rim_mm is None else (self.rim_mm[1],)
+        return min([*rim, *(radius for _, radius in self.edges_mm(0.0))], default=np.inf)
+
     def rounded_to(self, radius_mm: float) -> Indenter:
         """Return the body with edges or a rim of at least this radius [mm], where it has any."""
         return self

@@ -279,14 +279,23 @@ def by_secants(tried: Sequence[tuple[Anchors, Anchors]]) -> Anchors:
     return tried[-1][1].with_cones(likely.reshape(-1, 3))
 
 
-def slid_mm(found: Anchors, after: Anchors) -> FloatArray:
+def slid_mm(found: Anchors, after: Anchors, normal_before: FloatArray) -> FloatArray:
     """How far each node slid over the indenter in a step: the way that its anchor was dragged, (n,). [mm]
 
     Parameters
     ----------
     found, after : Anchors
         Of the equilibrium found, and dragged along for the next step.
+    normal_before : array (n, 3)
+        Normals of the indenter where the anchors were before, in its frame.
+
+    Notes
+    -----
+    Between two normals that differ by the angle t the way is an arc. Its chord, projected along the face at
+    its end, is shorter by sin(t) / t.
     """
     n = found.normal
     way = after.anchor_mm - found.anchor_mm
-    return np.linalg.norm(way - n * (n * way).sum(axis=1)[:, None], axis=1)
+    projected_mm = np.linalg.norm(way - n * (n * way).sum(axis=1)[:, None], axis=1)
+    turned = np.arccos(np.clip((n * normal_before).sum(axis=1), 0.0, 1.0))
+    return projected_mm / np.sinc(turned / np.pi)

@@ -437,7 +437,7 @@ class _Search:
         if self.load.anchors is not None and self.lagging.anchors is not None:
             anchors = self.lagging.anchors
             carried = self.load.contact.carried(anchors, now.contact, now.positions_mm, now.depth_mm)
-            slid = slid_mm(anchors, carried)
+            slid = slid_mm(anchors, carried, self.load.contact.gap(anchors.anchor_mm)[1])
             heat_uj = float(0.5 * (self.load.anchors.limit_mn + anchors.limit_mn) @ slid)
         return Equilibrium(
             displacement_mm=now.displacement_mm,

@@ -49,7 +49,7 @@ from fingerpad.mechanics.mixed import MIXED_POISSON
 from fingerpad.mechanics.newton import FIRST_DEPTH_MM, Equilibrium, NewtonSettings, find_equilibrium
 from fingerpad.mechanics.press_settings import MOST_SOLVED, SAME_TIME, PressSettings
 from fingerpad.mechanics.skin_contact import SkinContact, skin_contact
-from fingerpad.mechanics.small_bodies import contact_about, steps_of_advance
+from fingerpad.mechanics.small_bodies import contact_about, steps_of_advance, steps_of_slide
 from fingerpad.mechanics.steps import Phase, adaptive_steps, steps_at
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
@@ -274,10 +274,13 @@ class _Press:
 
     def parts(self, begin_ms: float, end_ms: float) -> int:
         """Return the number of equal steps between two times, none of them longer than allowed."""
+        before, after = self.stimulus.pose_at(begin_ms), self.stimulus.pose_at(end_ms)
+        aside_mm = float(np.hypot(after.x_mm - before.x_mm, after.z_mm - before.z_mm))
+        slide = steps_of_slide(aside_mm, self.contact.indenter)
         if self.stimulus.by_force:
-            return 1
+            return slide
         before_mm, after_mm = self.stimulus.prescribed_at([begin_ms, end_ms])
-        return steps_of_advance(abs(after_mm - before_mm), self.finest_mm)
+        return max(slide, steps_of_advance(abs(after_mm - before_mm), self.finest_mm))
 
     def continued(self, start: _Moment, target_ms: float) -> float:
         """Advance of the indenter in a step over that in the step before: how far the skin is expected to go.

@@ -21,6 +21,10 @@ LONGEST_STEP = 1.0
 """Largest advance of the indenter in one step, over the smallest elements. In longer steps, skin at the rim
 of a punch of 1 mm slid off it where shorter ones hold it."""
 
+LONGEST_SLIDE = 1.0 / 6
+"""Longest way aside of an edge in one step, over its radius. The force on a node rises and falls as it passes
+the edge, and with longer steps the heat of friction there is not found."""
+
 LEAST_PENETRATION = 0.1
 """Penetration that is accepted at any depth, over the smallest elements."""
 
@@ -98,4 +102,20 @@ def steps_of_advance(advance_mm: float, finest_mm: float) -> int:
     >>> steps_of_advance(0.4, finest_mm=0.05), steps_of_advance(0.4, finest_mm=float("inf"))
     (8, 1)
     """
-    return max(1, int(np.ceil(advance_mm / (LONGEST_STEP * finest_mm) - 1e-9)))
+    return _steps(advance_mm, LONGEST_STEP * finest_mm)
+
+
+def steps_of_slide(way_mm: float, indenter: Indenter) -> int:
+    """Return the number of equal steps of a way aside, none of them longer than the edges allow.
+
+    Examples
+    --------
+    >>> from fingerpad.geometry.indenters import Bar, Sphere
+    >>> steps_of_slide(0.4, Bar(3.0, fillet_mm=0.3)), steps_of_slide(0.4, Sphere())
+    (8, 1)
+    """
+    return _steps(way_mm, LONGEST_SLIDE * indenter.sharpest_mm)
+
+
+def _steps(way_mm: float, longest_mm: float) -> int:
+    return max(1, int(np.ceil(way_mm / longest_mm - 1e-9)))
