@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fingerpad.geometry.indenter_grading import SHARPEST_MM
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.assembly import Sparsity
@@ -108,13 +109,15 @@ def steps_of_advance(advance_mm: float, finest_mm: float) -> int:
 def steps_of_slide(way_mm: float, indenter: Indenter) -> int:
     """Return the number of equal steps of a way aside, none of them longer than the edges allow.
 
+    Edges that are sharper than any mesh made for them count as round as the sharpest of these.
+
     Examples
     --------
     >>> from fingerpad.geometry.indenters import Bar, Sphere
-    >>> steps_of_slide(0.4, Bar(3.0, fillet_mm=0.3)), steps_of_slide(0.4, Sphere())
-    (8, 1)
+    >>> [steps_of_slide(0.1, body) for body in (Bar(fillet_mm=0.3), Bar(fillet_mm=0.0), Sphere())]
+    [2, 12, 1]
     """
-    return _steps(way_mm, LONGEST_SLIDE * indenter.sharpest_mm)
+    return _steps(way_mm, LONGEST_SLIDE * max(indenter.sharpest_mm, SHARPEST_MM))
 
 
 def _steps(way_mm: float, longest_mm: float) -> int:
