@@ -1,4 +1,4 @@
-"""Pictures of docs/mechanics.md: one press with all it returns, a silent afferent, and a small probe.
+"""Pictures of docs/mechanics.md: a whole result, a silent afferent, a small probe and a press that stops.
 
 `python -m studies.mechanics_pictures` draws them again.
 """
@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.indenters import FlatPunch, Sphere
+from fingerpad.geometry.indenters import Cylinder, FlatPunch, Line, Sphere
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.motions import repeated
 from fingerpad.geometry.trajectory import Trajectory
@@ -30,6 +30,8 @@ PRESSED = Trajectory((0.0, 40.0, 300.0, 340.0, 500.0), (0.0, 1.0, 1.0, 0.0, 0.0)
 PROBE = FlatPunch(diameter_mm=1.0, fillet_mm=0.1)
 PROBED = RampAndHold(depth_mm=1.0, ramp_ms=50.0, hold_ms=20.0)
 FINE = PressSettings(ramp_steps=20, hold_steps=6)
+CUT = RampAndHold(depth_mm=2.6, ramp_ms=50.0, hold_ms=20.0)  # 3 mm stop at 2.66 mm
+DEEP = RampAndHold(depth_mm=3.0, ramp_ms=50.0, hold_ms=20.0)
 TOUCHES = repeated(0.8, touches=2, ramp_ms=50.0, hold_ms=400.0, pause_ms=200.0)
 SITES_MM = [(CONTACT_POINT_MM[0] + along_mm, 0.0) for along_mm in (0.0, 1.0, 2.0)]
 
@@ -50,20 +52,50 @@ def probed() -> SkinResponse:
     return indent(Fingertip(), PROBE, PROBED, settings=PressSettings(ramp_steps=10, hold_steps=1))
 
 
+def stopped() -> tuple[SkinResponse, SkinResponse]:
+    """Press a wire until shortly before it stops, and what the error advises."""
+    steps = PressSettings(ramp_steps=13, hold_steps=1)
+    advised = indent(Fingertip(), Cylinder(diameter_mm=0.5), DEEP, friction=0.5, settings=steps)
+    return indent(Fingertip(), Line(), CUT, settings=steps), advised
+
+
+def draw_stopped(presses: tuple[SkinResponse, SkinResponse]) -> Figure:
+    """Draw the deformed mesh below the wire with its energy density, and both forces over depth."""
+    wire, cylinder = presses
+    figure = new_figure(8.0, 3.6)
+    section, curve = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
+    _draw_section(section, wire, least_kpa=0.1, largest_kpa=100.0)
+    section.set(xlim=(16.5, 18.3), ylim=(-6.5, -8.9))
+    for skin, label, colour, line in ((wire, "Line", BLUE, "-"), (cylinder, "Cylinder 0.5 mm", ORANGE, "--")):
+        ramp = skin.times_ms <= CUT.ramp_ms
+        curve.plot(
+            skin.depth_mm[ramp], skin.force_mn[ramp], color=colour, linestyle=line, marker=".", label=label
+        )
+    curve.set(xlabel="depth [mm]", ylabel="force [mN]")
+    curve.legend()
+    return figure
+
+
+def _draw_section(axes: Axes, skin: SkinResponse, least_kpa: float, largest_kpa: float) -> None:
+    """Draw the deformed mesh along the midline at the end, coloured by energy density."""
+    mesh = skin.mesh
+    nodes = (mesh.nodes_mm + skin.displacement_mm)[mesh.grid[:, 0]]
+    sed = skin.sed_kpa[-1].reshape(mesh.shape)[:, 0]
+    shown = axes.pcolormesh(
+        nodes[..., 0], nodes[..., 1], sed, norm=LogNorm(least_kpa, largest_kpa), cmap="cividis",
+        edgecolors="white", linewidth=0.2,
+    )  # fmt: skip
+    axes.figure.colorbar(shown, ax=axes, label="stored energy density [kPa]")
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    axes.grid(visible=False)
+
+
 def draw_small_probe(skin: SkinResponse) -> Figure:
     """Draw the deformed mesh below the probe with its energy density, and force over depth."""
     figure = new_figure(8.0, 3.6)
     section, curve = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
-    mesh = skin.mesh
-    nodes = (mesh.nodes_mm + skin.displacement_mm)[mesh.grid[:, 0]]
-    sed = skin.sed_kpa[-1].reshape(mesh.shape)[:, 0]
-    shown = section.pcolormesh(
-        nodes[..., 0], nodes[..., 1], sed, norm=LogNorm(0.01, 10.0), cmap="cividis", edgecolors="white",
-        linewidth=0.2,
-    )  # fmt: skip
-    figure.colorbar(shown, ax=section, label="stored energy density [kPa]")
-    section.set(xlim=(15.6, 19.2), ylim=(-7.2, -10.0), xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
-    section.grid(visible=False)
+    _draw_section(section, skin, least_kpa=0.01, largest_kpa=10.0)
+    section.set(xlim=(15.6, 19.2), ylim=(-7.2, -10.0))
     ramp = skin.times_ms <= PROBED.ramp_ms
     curve.plot(skin.depth_mm[ramp], skin.force_mn[ramp], color=BLUE, marker=".")
     curve.set(xlabel="depth [mm]", ylabel="force [mN]")
@@ -136,3 +168,4 @@ if __name__ == "__main__":
     write_png(draw_one_result, pressed(), IMAGES / "one-result.png")
     write_png(draw_released, touched_twice(), IMAGES / "released-afferent.png")
     write_png(draw_small_probe, probed(), IMAGES / "small-probe.png")
+    write_png(draw_stopped, stopped(), IMAGES / "stopped-press.png")
