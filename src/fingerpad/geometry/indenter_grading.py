@@ -9,6 +9,7 @@ import numpy as np
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import cosine_and_sine
+from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import Grading, Strip, covering, resolution_grading
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.motion import Pose
@@ -18,6 +19,9 @@ THIN_SIZE_MM = 0.025
 
 EDGE_SIZE_MM = {"quick": 0.2, "standard": 0.1, "paper": 0.1}
 """Size of elements across edges that are parallel to grid lines, as those of the paper's bar. [mm]"""
+
+RIDGE_SIZE_MM = EDGE_SIZE_MM | {"quick": 0.15}
+"""The same below a grating with blunt lips: with 0.2 mm SED was up to 18 % larger than at standard."""
 
 OBLIQUE_SIZE_MM = {"quick": 0.3, "standard": 0.2, "paper": 0.1}
 """Size of elements under edges that cross grid lines at an angle. [mm]"""
@@ -56,7 +60,11 @@ LEAST_ACROSS_RADIUS = 5
 LONGEST_REACH_MM, LONGEST_SLIDING_REACH_MM = 5.0, 10.0
 """Largest half-extents of a fine zone, of an indenter that stays and along one that moves aside: skin farther
 away curves away. Far from its middle a wide body presses lightly, which a coarse mesh bears; but ridges that
-slide over elements of their own size find no equilibrium. [mm]"""
+slide over elements of their own size find no equilibrium, and those that touch the skin first are missed
+(`first_touch_mm`). [mm]"""
+
+OUTLINE_STEP_MM = 0.1
+"""Distance of the places at which the outline of the pad is compared. [mm]"""
 
 
 def grading_about(
@@ -136,7 +144,9 @@ def grading_about(
         reach = BEYOND_TIP * indenter.tip_radius_mm
         return _with_strips(grading, [(-reach, reach, size)], along, across, z_mm)
     if indenter.edge_reach_mm > 0.0:
-        largest = EDGE_SIZE_MM if along or across else OBLIQUE_SIZE_MM
+        blunt = indenter.edge_reach_mm > LONGEST_REACH_MM and indenter.sharpest_mm > BENT_MM
+        parallel = RIDGE_SIZE_MM if blunt else EDGE_SIZE_MM
+        largest = parallel if along or across else OBLIQUE_SIZE_MM
         size = min(largest[resolution], indenter.narrowest_mm / ACROSS_GROOVE)
         grading = _finer_across_edges(grading, size, indenter.edge_reach_mm, spin_deg)
     sharp = [
@@ -184,24 +194,28 @@ def _with_strips(
 
 
 def grading_along(
+    finger: Finger,
     indenter: Indenter,
     resolution: str,
-    x_mm: float,
-    z_mm: float,
-    spin_deg: float,
+    at_mm: tuple[float, float],
     poses: Sequence[Pose],
-    finger_size: float = 1.0,
+    tilt_deg: float = 0.0,
+    spin_deg: float = 0.0,
 ) -> Grading:
-    """Grading that is fine under an indenter wherever it goes.
+    """Grading that is fine under an indenter wherever it goes, and where its ridges or dots first touch.
 
     Parameters
     ----------
-    indenter, resolution, x_mm, z_mm, spin_deg
+    finger : Finger
+        The finger.
+    indenter, resolution, spin_deg
         As for `grading_about`, at first touch.
+    at_mm : (float, float)
+        x and z of its axis on the skin at first touch. [mm]
     poses : sequence of Pose
         Poses between which it moves along straight lines.
-    finger_size : float
-        `Fingertip.relative_size`, see `resolution_grading`.
+    tilt_deg : float
+        Rotation about z at first touch, as of a `Touch`. [degrees]
 
     Returns
     -------
@@ -210,27 +224,63 @@ def grading_along(
 
     Examples
     --------
+    >>> from fingerpad.geometry.fingertip import Fingertip
     >>> from fingerpad.geometry.indenters import Sphere
-    >>> slides = grading_along(Sphere(), "quick", 17.0, 0.0, 0.0, [Pose(), Pose(x_mm=4.0)])
+    >>> slides = grading_along(Fingertip(), Sphere(), "quick", (17.0, 0.0), [Pose(), Pose(x_mm=4.0)])
     >>> slides.centre_mm, round(slides.half_length_mm, 2)
     (19.0, 6.48)
     """
+    (x_mm, z_mm), size = at_mm, finger.relative_size
     places = {(pose.x_mm, pose.z_mm, pose.spin_deg) for pose in poses}
     outermost = sorted(places, key=lambda place: (place[2], place[0], place[1]))
     gradings = [
-        grading_about(
-            indenter, resolution, x_mm + x, z_mm + z, spin_deg + spin, finger_size, moves=len(places) > 1
-        )
+        grading_about(indenter, resolution, x_mm + x, z_mm + z, spin_deg + spin, size, moves=len(places) > 1)
         for x, z, spin in outermost
     ]
     joint = covering(gradings)
-    if not (joint.finer_along or joint.finer_across):
+    if joint.finer_along or joint.finer_across:
+        joint = replace(
+            joint,
+            finer_along=_swept([grading.finer_along for grading in gradings]),
+            finer_across=_swept([grading.finer_across for grading in gradings]),
+        )
+    longest = LONGEST_REACH_MM * min(size, 1.0)
+    is_wide = np.isfinite(indenter.narrowest_mm) and indenter.half_width_mm + 1.0 > longest
+    if not (is_wide and isinstance(finger, Fingertip)):  # the mesh of any other finger is its own
         return joint
-    return replace(
-        joint,
-        finer_along=_swept([grading.finer_along for grading in gradings]),
-        finer_across=_swept([grading.finer_across for grading in gradings]),
-    )
+    first = first_touch_mm(finger, x_mm, indenter.half_width_mm, tilt_deg)
+    return covering([joint, replace(joint, centre_mm=first, half_length_mm=longest)])
+
+
+def first_touch_mm(finger: Fingertip, x_mm: float, half_width_mm: float, tilt_deg: float) -> float:
+    """Where a flat face that presses on a finger first touches its midline, x. [mm]
+
+    Parameters
+    ----------
+    finger : Fingertip
+        The finger.
+    x_mm, half_width_mm : float
+        Place of the face's axis, and half of its extent along the finger. [mm]
+    tilt_deg : float
+        Rotation of the face about z. [degrees]
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    The default pad is highest 7 mm from its middle. A face that is tilted touches it there.
+
+    >>> from fingerpad.geometry.fingertip import Fingertip
+    >>> [round(first_touch_mm(Fingertip(), 17.37, np.inf, tilt), 1) for tilt in (0.0, 8.0)]
+    [10.3, 17.4]
+    """
+    begin, end = max(x_mm - half_width_mm, 0.0), min(x_mm + half_width_mm, finger.length_mm)
+    x = np.linspace(begin, end, int(np.ceil((end - begin) / OUTLINE_STEP_MM)) + 1)
+    cosine, sine = cosine_and_sine(tilt_deg)
+    skin = finger.skin_point(x, 0.0)
+    return float(x[(cosine * skin[:, 1] - sine * skin[:, 0]).argmin()])
 
 
 def _swept(strips: Sequence[tuple[Strip, ...]]) -> tuple[Strip, ...]:

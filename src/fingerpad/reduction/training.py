@@ -267,7 +267,7 @@ class ReducedTraining(metaclass=KnownKeywords):
         corners = itertools.product(*(getattr(range_, name) for name in SPACING))
         poses = [Pose(), *(Pose(*corner) for corner in corners)]
         grading = grading_along(
-            body, self.resolution, *base.at_mm, base.spin_deg, poses, base.finger.relative_size
+            base.finger, body, self.resolution, base.at_mm, poses, base.tilt_deg, base.spin_deg
         )
         steps = settings_of(self.resolution)
         if stimulus is None:

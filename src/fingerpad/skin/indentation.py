@@ -326,7 +326,7 @@ def touch_of(
         tissues=materials if isinstance(materials, Tissues) else named_tissues(materials),
         grading=grading
         or finger.own_grading(x, z)
-        or grading_along(indenter, resolution, x, z, spin_deg, stimulus.poses, finger.relative_size),
+        or grading_along(finger, indenter, resolution, (x, z), stimulus.poses, tilt_deg, spin_deg),
         settings=replace(settings, times_ms=tuple(times_ms)) if len(times_ms) else settings,
         at_mm=(x, z),
         tilt_deg=tilt_deg,

@@ -339,11 +339,11 @@ def _zone(stimulus: NamedStimulus, conditions: Conditions) -> Grading:
         return conditions.sphere_grading()
     with moved(stimulus.in_file), about():
         return grading_along(
+            conditions.finger,
             stimulus.indenter,
             conditions.resolution,
-            conditions.receptor_x_mm + stimulus.x_mm,
-            stimulus.z_mm,
-            stimulus.spin_deg,
+            (conditions.receptor_x_mm + stimulus.x_mm, stimulus.z_mm),
             stimulus.motion.poses,
-            conditions.finger.relative_size,
+            stimulus.tilt_on(conditions.finger),
+            stimulus.spin_deg,
         )

@@ -169,6 +169,10 @@ class TactileStimulus:
     spin_deg: float = 0.0
     friction: float = 0.0
 
+    def tilt_on(self, finger: Finger) -> float:
+        """Tilt of the indenter on a finger. [degrees]"""
+        return straight_tilt_deg(finger, self.indenter) if self.tilt_deg is None else self.tilt_deg
+
     def touch(
         self,
         finger: Finger,
@@ -197,7 +201,6 @@ class TactileStimulus:
         PlacedError
             If they do not fit each other, with the part of a file that is about it.
         """
-        tilt_deg = straight_tilt_deg(finger, self.indenter) if self.tilt_deg is None else self.tilt_deg
         with about():
             return touch_of(
                 finger,
@@ -207,7 +210,7 @@ class TactileStimulus:
                 resolution,
                 (finger.contact_mm[0] + self.x_mm, finger.contact_mm[1] + self.z_mm),
                 grading,
-                tilt_deg,
+                self.tilt_on(finger),
                 friction=self.friction,
                 spin_deg=self.spin_deg,
                 times_ms=times_ms,
