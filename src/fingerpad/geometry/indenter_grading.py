@@ -63,8 +63,9 @@ away curves away. Far from its middle a wide body presses lightly, which a coars
 slide over elements of their own size find no equilibrium, and those that touch the skin first are missed
 (`first_touch_mm`). [mm]"""
 
-OUTLINE_STEP_MM = 0.1
-"""Distance of the places at which the outline of the pad is compared. [mm]"""
+OUTLINE_STEP_MM, STRAIGHT_MM = 0.1, 1.0
+"""Distance of the places at which the outline of the pad is compared. Largest distance of first touch from
+the axis of an indenter that presses straight. [mm]"""
 
 
 def grading_about(
@@ -249,6 +250,8 @@ def grading_along(
     if not (is_wide and isinstance(finger, Fingertip)):  # the mesh of any other finger is its own
         return joint
     first = first_touch_mm(finger, x_mm, indenter.half_width_mm, tilt_deg)
+    if abs(first - x_mm) <= STRAIGHT_MM:
+        return joint
     return covering([joint, replace(joint, centre_mm=first, half_length_mm=longest)])
 
 
