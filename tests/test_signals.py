@@ -10,6 +10,8 @@ from pathlib import Path
 import psutil
 import pytest
 
+from fingerpad.cli.running import Terminated, signals_raise
+
 LIMIT_S = 60.0
 AT_ONCE_S = 1.0
 
@@ -57,6 +59,24 @@ def test_a_signal_ends_everything_at_once_with_a_sentence(
     finally:
         program.kill()
         program.communicate()
+
+
+def import_that_hides(sent: signal.Signals) -> None:
+    """Behave as a module in C whose import a signal breaks off."""
+    try:
+        signal.raise_signal(sent)
+    except KeyboardInterrupt:
+        raise ImportError("initialization failed") from None
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_that_an_import_hides_still_stops(sent: signal.Signals) -> None:
+    """It ended a command with a traceback and status 1."""
+    with pytest.raises(KeyboardInterrupt) as caught, signals_raise():
+        import_that_hides(sent)
+    assert isinstance(caught.value, Terminated) == (sent == signal.SIGTERM)
+    with pytest.raises(ImportError), signals_raise():
+        raise ImportError("no signal came")
 
 
 def test_a_worker_that_is_just_starting_ignores_ctrl_c(tmp_path: Path) -> None:

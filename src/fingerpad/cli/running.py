@@ -35,21 +35,31 @@ class Terminated(KeyboardInterrupt):
 
 @contextmanager
 def signals_raise() -> Iterator[None]:
-    """Let the first Ctrl-C and the first SIGTERM raise, and let a second one end the process at once."""
+    """Let the first Ctrl-C and the first SIGTERM raise, and let a second one end the process at once.
+
+    Modules in C turn what is raised while they are imported into an `ImportError`.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
+    came: list[type[KeyboardInterrupt]] = []
+
     def raise_once(number: int, frame: object) -> None:
         for each in before:
             signal.signal(each, signal.SIG_DFL)
-        raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
+        came.append(Terminated if number == signal.SIGTERM else KeyboardInterrupt)
+        raise came[0]
 
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     for number in before:
         signal.signal(number, raise_once)
     try:
         yield
+    except Exception as error:
+        if came:
+            raise came[0] from error
+        raise
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
