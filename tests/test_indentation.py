@@ -10,7 +10,7 @@ from fingerpad.geometry.dots import Dots
 from fingerpad.geometry.edged_indenters import Edge, Grating
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
-from fingerpad.geometry.indenter_grading import THIN_SIZE_MM, first_touch_mm, grading_about
+from fingerpad.geometry.indenter_grading import THIN_SIZE_MM, first_touch_x_mm, grading_about
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.trajectory import Trajectory
@@ -298,7 +298,7 @@ def test_force_of_a_grating_is_that_of_a_mesh_that_is_fine_everywhere(x_mm):
 def test_fine_mesh_reaches_to_the_first_touch_of_wide_ridges_and_dots_alone():
     """A body that is pressed straight touches at its axis, and a flat one needs no fine mesh elsewhere."""
     field = Dots([(x, 0.0) for x in np.arange(-12.0, 12.1, 2.4)])
-    motion, highest_mm = RampAndHold(depth_mm=0.3), first_touch_mm(FINGER, 17.37, np.inf, 0.0)
+    motion, highest_mm = RampAndHold(depth_mm=0.3), first_touch_x_mm(FINGER, 17.37, np.inf, 0.0)
     for body, tilt_deg, reaches in (
         (Grating(), 0.0, True), (field, 0.0, True), (Grating(), 8.0, False),
         (field, 8.0, False), (Bar(), 0.0, False), (Plate(), 0.0, False),

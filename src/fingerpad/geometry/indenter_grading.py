@@ -61,7 +61,7 @@ LONGEST_REACH_MM, LONGEST_SLIDING_REACH_MM = 5.0, 10.0
 """Largest half-extents of a fine zone, of an indenter that stays and along one that moves aside: skin farther
 away curves away. Far from its middle a wide body presses lightly, which a coarse mesh bears; but ridges that
 slide over elements of their own size find no equilibrium, and those that touch the skin first are missed
-(`first_touch_mm`). [mm]"""
+(`first_touch_x_mm`). [mm]"""
 
 OUTLINE_STEP_MM, STRAIGHT_MM = 0.1, 1.0
 """Distance of the places at which the outline of the pad is compared. Largest distance of first touch from
@@ -145,8 +145,8 @@ def grading_about(
         reach = BEYOND_TIP * indenter.tip_radius_mm
         return _with_strips(grading, [(-reach, reach, size)], along, across, z_mm)
     if indenter.edge_reach_mm > 0.0:
-        blunt = indenter.edge_reach_mm > LONGEST_REACH_MM and indenter.sharpest_mm > BENT_MM
-        parallel = RIDGE_SIZE_MM if blunt else EDGE_SIZE_MM
+        blunt_ridges = indenter.edge_reach_mm > LONGEST_REACH_MM and indenter.sharpest_mm > BENT_MM
+        parallel = RIDGE_SIZE_MM if blunt_ridges else EDGE_SIZE_MM
         largest = parallel if along or across else OBLIQUE_SIZE_MM
         size = min(largest[resolution], indenter.narrowest_mm / ACROSS_GROOVE)
         grading = _finer_across_edges(grading, size, indenter.edge_reach_mm, spin_deg)
@@ -249,13 +249,13 @@ def grading_along(
     is_wide = np.isfinite(indenter.narrowest_mm) and indenter.half_width_mm + 1.0 > longest
     if not (is_wide and isinstance(finger, Fingertip)):  # the mesh of any other finger is its own
         return joint
-    first = first_touch_mm(finger, x_mm, indenter.half_width_mm, tilt_deg)
+    first = first_touch_x_mm(finger, x_mm, indenter.half_width_mm, tilt_deg)
     if abs(first - x_mm) <= STRAIGHT_MM:
         return joint
     return covering([joint, replace(joint, centre_mm=first, half_length_mm=longest)])
 
 
-def first_touch_mm(finger: Fingertip, x_mm: float, half_width_mm: float, tilt_deg: float) -> float:
+def first_touch_x_mm(finger: Fingertip, x_mm: float, half_width_mm: float, tilt_deg: float) -> float:
     """Where a flat face that presses on a finger first touches its midline, x. [mm]
 
     Parameters
@@ -276,7 +276,7 @@ def first_touch_mm(finger: Fingertip, x_mm: float, half_width_mm: float, tilt_de
     The default pad is highest 7 mm from its middle. A face that is tilted touches it there.
 
     >>> from fingerpad.geometry.fingertip import Fingertip
-    >>> [round(first_touch_mm(Fingertip(), 17.37, np.inf, tilt), 1) for tilt in (0.0, 8.0)]
+    >>> [round(first_touch_x_mm(Fingertip(), 17.37, np.inf, tilt), 1) for tilt in (0.0, 8.0)]
     [10.3, 17.4]
     """
     begin, end = max(x_mm - half_width_mm, 0.0), min(x_mm + half_width_mm, finger.length_mm)
