@@ -224,7 +224,7 @@ def test_an_afferent_is_ours_or_ones_own_numbers_or_of_a_file_of_results(tmp_pat
     quantities = {"dynamic_quantity": "stored", "static_quantity": "work"}
     for name, kind, results in (
         ("fit.json", FitFile, {"fit": {"parameters": six}, **quantities}),
-        ("results.json", ReproductionResult, {"single_unit": {"parameters": six, **quantities}}),
+        ("results.json", ReproductionResult, {"human": {"single_unit": {"parameters": six, **quantities}}}),
     ):
         named, version = file_format(kind)
         (tmp_path / name).write_text(json.dumps(results | {"format": named, "format_version": version}))

@@ -69,7 +69,7 @@ def validate_command(
         raise InputError("validate needs a file of observations, or --example KIND: see --help.")
     model = FingertipModel(
         Conditions(resolution=resolution, materials=materials),
-        None if afferent is None else fitted_afferent(afferent),
+        None if afferent is None else fitted_afferent(afferent, materials),
         loading,
         static_window,
     )

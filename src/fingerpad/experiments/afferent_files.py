@@ -6,17 +6,22 @@ from pathlib import Path
 
 from fingerpad.core.errors import InputError, StoreError, shown
 from fingerpad.core.files import read_text
+from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments import schemas
+from fingerpad.mechanics.materials import Tissues
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 
 
-def fitted_afferent(path: Path) -> Afferent:
+def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> Afferent:
     """Afferent of a file of results: `fit.json`, or `results.json` of a reproduction.
 
     Parameters
     ----------
     path : Path
         Written by `fingerpad fit` or `fingerpad reproduce`.
+    tissues : str or Tissues, optional
+        Tissues that are pressed. A reproduction holds two afferents, that of `human` and that of its first
+        column, which is taken for all tissues but `human`.
 
     Returns
     -------
@@ -33,7 +38,8 @@ def fitted_afferent(path: Path) -> Afferent:
     except (InputError, StoreError) as error:
         raise InputError(f"afferent: {error}") from error
     try:
-        fitted = values["fit" if "fit" in values else "single_unit"]
+        column = "human" if tissues == "human" else "paper"
+        fitted = values["fit"] if "fit" in values else values[column]["single_unit"]
         named = values if "fit" in values else fitted
         parameters = [fitted["parameters"][name] for name in PARAMETER_NAMES]
         quantities = {name: named[name] for name in ("dynamic_quantity", "static_quantity")}

@@ -167,15 +167,38 @@ class Runner:
         solved = self.solve(
             (touch for touches in groups.values() for touch in touches.values()), on_failed=on_failed
         )
+        return self.read(groups, solved, complete=on_failed is None)
+
+    def read(
+        self, groups: Mapping[str, Mapping[Any, Touch]], solved: Collection[Path] = (), complete: bool = True
+    ) -> dict[str, dict[Any, SkinResponse]]:
+        """Read the indentations of several groups, and note how many of them this run solved.
+
+        Parameters
+        ----------
+        groups : mapping of str to mapping of key to Touch
+            Touches of each part of the experiment, by its name.
+        solved : collection of Path, optional
+            Files that `solve` returned.
+        complete : bool, optional
+            Whether all must be stored; otherwise those that are not are left out.
+        """
         responses = {}
         for name, wanted in groups.items():
-            touches = {
-                key: touch for key, touch in wanted.items() if on_failed is None or self.store.holds(touch)
-            }
+            touches = {key: touch for key, touch in wanted.items() if complete or self.store.holds(touch)}
             responses[name] = self.load(name, touches)
             computed = sum(self.store.path(touch) in solved for touch in touches.values())
             self._stages[-1] = replace(self._stages[-1], computed=computed)
         return responses
+
+    @property
+    def stages(self) -> tuple[StageSummary, ...]:
+        """Stages so far."""
+        return tuple(self._stages)
+
+    def add_stages(self, stages: Iterable[StageSummary]) -> None:
+        """Add stages of another process that read from the same folder."""
+        self._stages.extend(stages)
 
     def manifest(
         self,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import takewhile
 
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Verdict, count_by_verdict
+from fingerpad.experiments.gerling2014.statements import Statement
 from fingerpad.report.formatting import joined, plain
 from fingerpad.report.parts import Kind, Row, Table
 
@@ -14,6 +15,7 @@ SIGNS = {
     Verdict.MISSED: "✗",
     Verdict.NOT_JUDGED: "○",
     Verdict.NOT_DECIDABLE: "?",
+    Verdict.NOT_APPLICABLE: "–",
 }
 """Sign of each verdict; they differ without colour."""
 
@@ -22,6 +24,7 @@ KINDS: dict[Verdict, Kind] = {
     Verdict.MISSED: "missed",
     Verdict.NOT_JUDGED: "open",
     Verdict.NOT_DECIDABLE: "open",
+    Verdict.NOT_APPLICABLE: "open",
 }
 """How a row is marked by its verdict."""
 
@@ -61,6 +64,54 @@ def comparison_tables(rows: Sequence[ClaimRow], brief: bool = False) -> list[Tab
     """
     by_group = {group: [row for row in rows if row.group is group] for group in Group}
     return [_counts(rows), *(_of_group(group, found, brief) for group, found in by_group.items() if found)]
+
+
+def count_sentence(statements: Sequence[Statement], name: str) -> str:
+    """Count the statements that can fail by their verdict with one set, and list what is missed."""
+    verdicts = {each.statement: getattr(each, f"verdict_{name}") for each in statements}
+    fitted = {each.statement for each in statements if getattr(each, f"fitted_{name}")}
+    found = [verdict for statement, verdict in verdicts.items() if statement not in fitted]
+    counted = [
+        f"{found.count(verdict)} {verdict.value}"
+        for verdict in Verdict
+        if verdict in found or verdict in (Verdict.MET, Verdict.MISSED)
+    ]
+    missed = [statement for statement, verdict in verdicts.items() if verdict is Verdict.MISSED]
+    return (
+        f"{name}: of {len(statements)} statements of the paper that can fail, {joined(counted)}"
+        + (f", {len(fitted)} fitted" if fitted else "")
+        + (f". Missed: {'; '.join(missed)}." if missed else ".")
+    )
+
+
+def statement_table(statements: Sequence[Statement]) -> Table:
+    """Return every statement that can fail with our value and verdict of both sets."""
+    return Table(
+        TITLES[Group.STATEMENT],
+        ("section", "statement", "the paper", "`paper`", "", "`human`", ""),
+        [
+            Row(
+                (
+                    each.section,
+                    each.statement,
+                    each.published,
+                    each.paper,
+                    _marked(each.verdict_paper, each.fitted_paper),
+                    each.human,
+                    _marked(each.verdict_human, each.fitted_human),
+                ),
+                KINDS[each.verdict_paper],
+            )
+            for each in statements
+        ],
+        "`paper` is the paper's own system: Trial 3 with a Poisson's ratio of 0.40, strain energy density in "
+        "both terms, response surfaces. `human` serves all three levels.",
+    )
+
+
+def _marked(verdict: Verdict, fitted: str) -> str:
+    """Sign and words of a verdict, and whether something was fitted to it."""
+    return f"{SIGNS[verdict]} {verdict.value}" + (" (fitted)" if fitted else "")
 
 
 def verdict_sentence(rows: Sequence[ClaimRow]) -> str:

@@ -26,7 +26,7 @@ IN_THE_PAPER = "Trial 3"
 
 def first_screen(result: ReproductionResult) -> list[Drawing]:
     """Return a picture of each level, with its result as the caption."""
-    skin, afferent, percept = result.skin_deflection, result.single_unit, result.discrimination
+    skin, afferent, percept = result.skin_deflection, result.paper.single_unit, result.paper.discrimination
     return [
         Drawing("level_1_skin", "Skin", partial(_draw_skin, skin), _skin(skin)),
         Drawing("level_2_afferent", "Afferent", partial(_draw_afferent, afferent), _afferent(afferent)),

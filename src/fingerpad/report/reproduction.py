@@ -7,9 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from fingerpad.data import STATUSES
-from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
-from fingerpad.experiments.manifest import Manifest
-from fingerpad.report.comparison import comparison_tables, verdict_sentence
+from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult, SetResult
+from fingerpad.report.comparison import comparison_tables, count_sentence, statement_table
 from fingerpad.report.curvature_thresholds import caption_thresholds, draw_thresholds, threshold_tables
 from fingerpad.report.discrimination import (
     caption_criterion,
@@ -78,8 +77,24 @@ def reproduction_page(result: ReproductionResult) -> Page:
         f"{edition(result.manifest)}",
         reproduction_summary(result),
         [
-            Chapter("Comparison with the paper", comparison_tables(result.comparison)),
-            *_levels(result),
+            Chapter("The paper, statement by statement", [statement_table(result.statements)]),
+            Chapter("Tissues", [tissue_table(result.tissues)]),
+            Chapter(
+                "Level 1: skin",
+                illustrated(
+                    result.skin_deflection,
+                    skin_deflection_tables,
+                    (
+                        4,
+                        "skin_deflection",
+                        "Deflection of the skin",
+                        draw_skin_deflection,
+                        caption_skin_deflection,
+                    ),
+                ),
+            ),
+            *_levels("paper", result.paper),
+            *_levels("human", result.human),
             Chapter("Published numbers used", input_tables(result.inputs)),
             manifest_chapter(result.manifest),
         ],
@@ -87,15 +102,14 @@ def reproduction_page(result: ReproductionResult) -> Page:
     )
 
 
-def _levels(result: ReproductionResult) -> list[Chapter]:
-    """Return the chapters in the paper's order of figures, 1 to 9, then what goes beyond the paper."""
+def _levels(name: str, result: SetResult) -> list[Chapter]:
+    """Return the chapters of one set in the paper's order of figures, then what goes beyond the paper."""
     chapters: dict[str, Sequence[Part]] = {
         "The finger": illustrated(
             result.mesh,
             None,
             (1, "mesh", "Mesh of the finger and its four layers", draw_mesh, caption_mesh),
         ),
-        "Tissues": [tissue_table(result.tissues)],
         "Three levels": illustrated(
             result.levels,
             None,
@@ -103,11 +117,6 @@ def _levels(result: ReproductionResult) -> list[Chapter]:
         ),
         "From rates to a percept": illustrated(
             result.discrimination, None, (3, "steps", "Steps to a hit rate", draw_steps, caption_steps)
-        ),
-        "Level 1: skin": illustrated(
-            result.skin_deflection,
-            skin_deflection_tables,
-            (4, "skin_deflection", "Deflection of the skin", draw_skin_deflection, caption_skin_deflection),
         ),
         "Level 2: single afferent": illustrated(
             result.single_unit,
@@ -144,25 +153,25 @@ def _levels(result: ReproductionResult) -> list[Chapter]:
             (12, "curvature_thresholds", "Thresholds of curvature", draw_thresholds, caption_thresholds),
         ),
     }
+    chapters["Comparison"] = comparison_tables(result.comparison)
     return [
-        Chapter(title, [_of_run(part, result.manifest) for part in parts])
+        Chapter(f"{name}: {title}", [_of_set(part, name) for part in parts])
         for title, parts in chapters.items()
         if parts
     ]
 
 
-def _of_run(part: Part, manifest: Manifest) -> Part:
-    """Put the number of a figure before the name of its file, and the run behind its caption."""
+def _of_set(part: Part, name: str) -> Part:
+    """Put the number of a figure and the set before the name of its file."""
     if not isinstance(part, Drawing):
         return part
-    caption = f"{part.caption} Run: {manifest.resolution} resolution, tissues {manifest.materials}."
-    return replace(part, name=f"figure_{part.number}_{part.name}", caption=caption)
+    return replace(part, name=f"figure_{part.number}_{part.name}_{name}", title=f"{part.title}, {name}")
 
 
 def reproduction_summary(result: ReproductionResult) -> list[str]:
     """Return the paragraphs above the pictures of the levels: what was met and missed."""
-    paragraphs = [verdict_sentence(result.comparison)]
-    if result.single_unit_uncertainty is None:
+    paragraphs = [count_sentence(result.statements, name) for name in ("paper", "human")]
+    if result.paper.single_unit_uncertainty is None:
         paragraphs.append(
             "Parts beyond the paper were not run: uncertainty of the fit and curvature thresholds "
             "(`fingerpad reproduce --extended`)."

@@ -66,7 +66,7 @@ def afferent_of(chosen: AfferentSettings | str, tissues: str, beside: Path = Pat
     fitted = Afferent.for_tissues(tissues)
     if isinstance(chosen, AfferentSettings):
         return replace(fitted, **chosen.given)
-    return fitted if chosen == DEFAULT else fitted_afferent(Path(beside) / chosen)
+    return fitted if chosen == DEFAULT else fitted_afferent(Path(beside) / chosen, tissues)
 
 
 def population_of(

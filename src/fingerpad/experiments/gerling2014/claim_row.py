@@ -35,7 +35,9 @@ class Verdict(StrEnum):
     NOT_JUDGED = "not judged"
     """It cannot be compared: the paper gives no number, or not the inputs behind its number."""
     NOT_DECIDABLE = "not decidable"
-    """The outcome depends on a reading that the paper leaves open."""
+    """The outcome depends on a reading that the paper leaves open, or lies within the Monte-Carlo error."""
+    NOT_APPLICABLE = "does not apply"
+    """The set of tissues has nothing to compare."""
 
 
 @result_class
@@ -46,6 +48,8 @@ class ClaimRow:
     ----------
     group : Group
         What the row can show.
+    section : str
+        Section of the paper; empty for our own additions.
     quantity : str
         What is compared.
     paper, ours, difference : str
@@ -77,6 +81,7 @@ class ClaimRow:
     """
 
     group: Group
+    section: str = ""
     quantity: str
     paper: str
     ours: str
@@ -117,6 +122,7 @@ def count_by_verdict(rows: Sequence[ClaimRow], group: Group) -> dict[Verdict, in
 
 def measured_row(
     group: Group,
+    section: str,
     quantity: str,
     published: Published[float],
     ours: float,
@@ -132,6 +138,7 @@ def measured_row(
     criterion = "judged: at least the paper's" if at_least else f"judged: within {CLOSE:.0%}"
     return ClaimRow(
         group=group,
+        section=section,
         quantity=quantity,
         paper=f"{published.value:g}",
         ours=f"{ours:.{digits}f}",

@@ -1,7 +1,7 @@
 """The paper's statements about discrimination beside the numbers of this run.
 
 Each verdict compares a statistic with a bound, or two statistics with each other. Where chance could decide,
-a difference counts if it exceeds two Monte-Carlo errors.
+a difference counts if it exceeds two Monte-Carlo errors; closer to its bound a statement is not decidable.
 """
 
 from __future__ import annotations
@@ -71,7 +71,31 @@ def discrimination_claims(found: SphereDiscrimination, fitted_to_people: bool) -
     ]
 
 
+def _at_most(estimate: Estimate, bound: float) -> Verdict:
+    """Verdict of a bound from above; not decidable within two Monte-Carlo errors of it."""
+    reach = ERRORS * estimate.error
+    if abs(estimate.value - bound) <= reach:
+        return Verdict.NOT_DECIDABLE
+    return judged(estimate.value < bound)
+
+
+_OPPOSITE = {Verdict.MET: Verdict.MISSED, Verdict.MISSED: Verdict.MET}
+
+
+def _above(estimate: Estimate, bound: float) -> Verdict:
+    """Verdict of a bound from below, as `_at_most`."""
+    verdict = _at_most(estimate, bound)
+    return _OPPOSITE.get(verdict, verdict)
+
+
+def _all(*verdicts: Verdict) -> Verdict:
+    """Missed if one is, else not decidable if one is, else met."""
+    order = (Verdict.MISSED, Verdict.NOT_DECIDABLE, Verdict.MET)
+    return min(verdicts, key=order.index)
+
+
 def _row(
+    section: str,
     quantity: str,
     paper: str,
     ours: str,
@@ -84,6 +108,7 @@ def _row(
     """Return the row of a statement about discrimination; all rest on the same inputs."""
     return ClaimRow(
         group=group,
+        section=section,
         quantity=quantity,
         paper=paper,
         ours=ours,
@@ -100,6 +125,7 @@ def _noise(found: SphereDiscrimination, fitted_to: str) -> ClaimRow:
     expected = " and ".join(f"{rise:.0%}" if rise == rise else "none" for rise in needed)
     return measured_row(
         Group.FITTED,
+        "3.3",
         "Noise sigma_1 that fits Goodwin's two points",
         psychophysics.NOISE_SIGMA,
         found.noise_sigma,
@@ -121,10 +147,11 @@ def _targets(found: SphereDiscrimination, fitted_to: str) -> list[ClaimRow]:
             )
         ),
         _row(
+            "",
             "Static hit rates between Goodwin's points, largest distance from their line in z",
             "on the line (two points)",
             _text(farthest),
-            judged(farthest.value <= FROM_LINE),
+            _at_most(farthest, FROM_LINE),
             f"judged: within {FROM_LINE:g} at both positions; only 296 and 365 /m were observed, the line "
             "is our interpolation",
             group=Group.ADDITION,
@@ -133,14 +160,16 @@ def _targets(found: SphereDiscrimination, fitted_to: str) -> list[ClaimRow]:
 
 
 def _at_point(curvature_per_m: float, observed: float, ours: list[Estimate], fitted_to: str) -> ClaimRow:
-    away = [rate.value - observed for rate in ours]
+    away = [Estimate(value=rate.value - observed, error=rate.error) for rate in ours]
+    sizes = [Estimate(value=abs(each.value), error=each.error) for each in away]
     return _row(
+        "3.3",
         f"Hit rate at {curvature_per_m:g} /m, static Gradient Sum at {' and '.join(PLACES)}, noise fitted",
         f"{observed:g} (Goodwin)",
         ", ".join(map(_text, ours)),
-        judged(max(map(abs, away)) <= CLOSE_POINTS),
+        _all(*(_at_most(size, CLOSE_POINTS) for size in sizes)),
         f"judged: within {CLOSE_POINTS:g} at both positions, for which there is one noise",
-        ", ".join(f"{each:+.3f}" for each in away),
+        ", ".join(f"{each.value:+.3f}" for each in away),
         Group.FITTED,
         fitted_to,
     )
@@ -150,20 +179,21 @@ def _fits_best(found: SphereDiscrimination, before: str) -> ClaimRow:
     """Judge the three measures at one noise, and each at the noise that fits it best."""
     misfit, above = found.statistics.misfit, found.statistics.misfit_above_static
     at_own = {name: reading for name in MEASURES if (reading := _used(found.reasons, name))}
-    at_one_noise = all(_more(above[name]) for name in MEASURES[1:] if name in above)
+    at_one_noise = _all(*(_above(above[name], 0.0) for name in MEASURES[1:] if name in above), Verdict.MET)
     # A measure that no noise fits has no misfit of its own, and fits worse than any other.
     own = {name: _or_infinite(reading.misfit) for name, reading in at_own.items()}
-    at_own_noise = all(own["static"] < own[name] for name in MEASURES[1:] if name in own)
+    at_own_noise = judged(all(own["static"] < own[name] for name in MEASURES[1:] if name in own))
     return _row(
+        "3.3",
         "Static rates fit best, by root mean square distance to Goodwin's points",
         "static best of three",
         "at one noise "
-        + ", ".join(f"{name} {_text(misfit[name])}" for name in MEASURES if name in misfit)
-        + "; each at its own best noise "
+        + ", ".join(f"{name} {_brief(misfit[name])}" for name in MEASURES if name in misfit)
+        + "; each at its own "
         + ", ".join(f"{name} {_or_none(reading.misfit)}" for name, reading in at_own.items()),
-        judged(at_one_noise and at_own_noise),
-        f"at one noise, that of static rates: {judged(at_one_noise)} (the others at least two Monte-Carlo "
-        f"errors farther); each at its own: {judged(at_own_noise)}, noise "
+        _all(at_one_noise, at_own_noise),
+        f"at one noise, that of static rates: {at_one_noise} (the others at least two Monte-Carlo "
+        f"errors farther); each at its own: {at_own_noise}, noise "
         + ", ".join(f"{name} {_or_none(reading.noise_sigma)}" for name, reading in at_own.items())
         + f"; judged: both; {before}",
     )
@@ -171,22 +201,30 @@ def _fits_best(found: SphereDiscrimination, before: str) -> ClaimRow:
 
 def _shift(statistics: DiscriminationStatistics, before: str) -> list[ClaimRow]:
     shift, above = statistics.shift, statistics.shift_above_static
+    note = f"judged: at most {CLOSE_POINTS:g}; {before}"
     rows = [
-        _row(
-            "Static hit rates with the 0.2 mm shift, largest change",
-            "robust",
-            _text(shift["static"]),
-            judged(shift["static"].value <= CLOSE_POINTS),
-            f"judged: at most {CLOSE_POINTS:g}; {before}",
+        _row(section, quantity, "robust", _brief(shift[name]), _at_most(shift[name], CLOSE_POINTS), note)
+        for section, quantity, name in (
+            (
+                "3.3",
+                "Robust to the 0.2 mm shift, static Gradient Sum, largest change of a hit rate",
+                "static",
+            ),
+            (
+                "4.2",
+                "Robust to the 0.2 mm shift, Euclidean Distance, largest change of a hit rate",
+                "euclidean",
+            ),
         )
     ]
     if "dynamic" in shift:
         rows.append(
             _row(
+                "3.3",
                 "Hit rates diverge with the 0.2 mm shift, dynamic, largest change",
                 "diverge",
-                _text(shift["dynamic"]),
-                judged(_more(above["dynamic"]) and shift["dynamic"].value > CLOSE_POINTS),
+                _brief(shift["dynamic"]),
+                _all(_above(above["dynamic"], 0.0), _above(shift["dynamic"], CLOSE_POINTS)),
                 f"judged: more than {CLOSE_POINTS:g}, and than static by two Monte-Carlo errors",
                 f"{above['dynamic'].value:+.3f} against static",
             )
@@ -223,12 +261,13 @@ def _latency_shift(found: SphereDiscrimination) -> list[ClaimRow]:
     )
     return [
         _row(
-            "Hit rates diverge with the 0.2 mm shift, latency, largest change by reading",
+            "3.3",
+            "Hit rates diverge with the 0.2 mm shift, latency, largest change",
             "diverge",
-            listed,
+            f"{min(known):.3f} to {max(known):.3f} by reading",
             verdict,
-            f"{why} (docs/decisions/silent-receptors.md); each reading at the noise that fits people best, "
-            f"diverging: more than {CLOSE_POINTS:g}",
+            f"{why} (docs/decisions/silent-receptors.md): {listed}; each reading at the noise that fits "
+            f"people best, diverging: more than {CLOSE_POINTS:g}",
         )
     ]
 
@@ -238,20 +277,21 @@ def _rises(found: SphereDiscrimination, before: str) -> list[ClaimRow]:
     for measure in MEASURES:
         if drawn := found.gradient_sum.get(measure):
             steps = found.statistics.smallest_rise[measure]
-            rises = [_more(step) for step in steps]
+            rises = [_above(step, 0.0) for step in steps]
             curves = [
                 f"at {place} {', '.join(f'{rate:.2f}' for rate in rates)} (smallest step {_text(step)})"
                 for place, rates, step in zip(
                     PLACES, (drawn.hit_rate, drawn.hit_rate_shifted), steps, strict=True
                 )
             ]
-            at = [place for place, each in zip(PLACES, rises, strict=True) if each]
+            at = [place for place, each in zip(PLACES, rises, strict=True) if each is Verdict.MET]
             rows.append(
                 _row(
+                    "3.3",
                     f"Hit rate rises with curvature, {measure} Gradient Sum",
                     "rises",
-                    "rises" if all(rises) else f"rises at {at[0]} only" if at else "does not",
-                    judged(all(rises)),
+                    "rises" if len(at) == len(PLACES) else f"rises at {at[0]} only" if at else "does not",
+                    _all(*rises),
                     "; ".join([*curves, JUDGED_RISE, *([before] if measure == "static" else [])]),
                 )
             )
@@ -264,49 +304,54 @@ def _variants(statistics: DiscriminationStatistics) -> list[ClaimRow]:
     few, wide = statistics.ten_matrices, statistics.criterion
     rows = (
         (
+            "3.3",
             "More noise lowers the curve, smallest fall of the mean hit rate from one noise to the next",
             "lowers",
             _text(fall.smallest_fall),
-            _more(fall.smallest_fall),
+            _above(fall.smallest_fall, 0.0),
             f"sigma_1 of {fall.noise_sigma[0]:g} to {fall.noise_sigma[-1]:g} in steps of 0.01",
             "",
         ),
         (
+            "3.3",
             "10 noise matrices instead of 100 widen the error bars",
             "wider",
             f"{_text(few.ratio, 2)} times",
-            _more(few.ratio, 1.0),
+            _above(few.ratio, 1.0),
             f"largest change of a mean {_text(few.change)}",
             "",
         ),
         (
+            "3.3",
             "A criterion that varies by 0.02 instead of 0.01 widens the error bars",
             "wider",
             f"{_text(wide.ratio, 2)} times",
-            _more(wide.ratio, 1.0),
+            _above(wide.ratio, 1.0),
             "the decision point varies; other readings: docs/decisions/decision-criterion.md",
             "",
         ),
         (
+            "3.3",
             "A criterion that varies by 0.02 instead of 0.01 does not change the means, largest change",
             "unchanged",
             _text(wide.change),
-            wide.change.value <= CLOSE_POINTS,
+            _at_most(wide.change, CLOSE_POINTS),
             f"judged: at most {CLOSE_POINTS:g}",
             "",
         ),
         (
+            "2.2.3",
             "The mean of 10 hit rates is not stable, that of 100 is: standard deviation of the means",
             "10 unstable",
             f"{_text(unsteady.few, 4)} against {_text(unsteady.many, 4)}",
-            _more(unsteady.ratio, 1.0),
+            _above(unsteady.ratio, 1.0),
             "repeated judgements of the same sums",
             f"{unsteady.ratio.value:.2f} times",
         ),
     )
     return [
-        _row(quantity, paper, ours, judged(met), note, difference, Group.DEFINITION)
-        for quantity, paper, ours, met, note, difference in rows
+        _row(section, quantity, paper, ours, verdict, note, difference, Group.DEFINITION)
+        for section, quantity, paper, ours, verdict, note, difference in rows
     ]
 
 
@@ -314,18 +359,28 @@ def _euclidean(
     statistics: DiscriminationStatistics, reasons: DiscrepancyAnalysis, fitted_to_people: bool
 ) -> ClaimRow:
     misfit, above, own = statistics.misfit, statistics.misfit_above_static, reasons.euclidean
-    others = [misfit[name].value for name in MEASURES[1:] if name in misfit]
-    ours = misfit["euclidean"].value
+    closer = [
+        _above(
+            Estimate(
+                value=misfit[name].value - misfit["euclidean"].value,
+                error=math.hypot(misfit[name].error, misfit["euclidean"].error),
+            ),
+            0.0,
+        )
+        for name in MEASURES[1:]
+        if name in misfit
+    ]
     alone = (
         f"with a separate noise of {own.noise_sigma:.3f}: {own.misfit:.3f}"
         if own.hit_rate is not None
         else "no separate noise fits the points"
     )
     return _row(
+        "4.2",
         "Euclidean Distance of static rates fits too, by root mean square distance to Goodwin's points",
         "fits",
-        _text(misfit["euclidean"]),
-        judged(ours <= FROM_LINE and all(ours < other for other in others)),
+        _brief(misfit["euclidean"]),
+        _all(_at_most(misfit["euclidean"], FROM_LINE), *closer),
         f"judged: at most {FROM_LINE:g} and closer than dynamic rates and latencies; {alone}",
         f"{above['euclidean'].value:+.3f} against the static Gradient Sum",
         Group.FITTED if fitted_to_people else Group.STATEMENT,
@@ -350,6 +405,6 @@ def _text(estimate: Estimate, digits: int = 3) -> str:
     return f"{estimate.value:.{digits}f} ± {estimate.error:.{digits}f}"
 
 
-def _more(estimate: Estimate, than: float = 0.0) -> bool:
-    """Whether an estimate is larger than a number by two of its errors."""
-    return estimate.value - than > ERRORS * estimate.error
+def _brief(estimate: Estimate) -> str:
+    """Two digits, which another machine has as well."""
+    return f"{estimate.value:.2g}"

@@ -1,13 +1,15 @@
-"""The whole paper in one run: indentations, fit, discrimination, comparison with the paper."""
+"""The whole paper in one run: two sets of tissues, each pressed, fitted, judged beside the paper."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from fingerpad.core.engine import Engine, engine_of
+from fingerpad.core.checks import one_of
+from fingerpad.core.engine import Engine, Processes, engine_of
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
 from fingerpad.core.signals import STORED_ENERGY
@@ -28,6 +30,7 @@ from fingerpad.experiments.gerling2014 import (
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow
 from fingerpad.experiments.gerling2014.comparison import comparison
 from fingerpad.experiments.gerling2014.curvature_thresholds import CurvatureThresholds
+from fingerpad.experiments.gerling2014.firing_course import FiringCourse, firing_course
 from fingerpad.experiments.gerling2014.mesh_picture import MeshPicture
 from fingerpad.experiments.gerling2014.nail_border import NailBorder
 from fingerpad.experiments.gerling2014.response_maps import PopulationMaps
@@ -36,29 +39,42 @@ from fingerpad.experiments.gerling2014.single_unit_uncertainty import Uncertaint
 from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult
 from fingerpad.experiments.gerling2014.skin_force import SkinForce
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
-from fingerpad.experiments.gerling2014.summary import Summary, summary
+from fingerpad.experiments.gerling2014.statements import Statement, paired
+from fingerpad.experiments.gerling2014.summary import Summaries, Summary, summary
 from fingerpad.experiments.gerling2014.three_levels import ThreeLevels
-from fingerpad.experiments.manifest import Manifest
+from fingerpad.experiments.manifest import Manifest, StageSummary
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.tissue_sets import TissueLayer, tissue_layers
+from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.inference.fitting.methods import Method
 from fingerpad.inference.start_points import response_surface
+from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.sampling import SkinResponse
 
 STANDARD_SPHERE = (sphere_discrimination.POSITIONS_MM[0], sphere_discrimination.CURVATURES[0])
 
+PAPER, HUMAN = "paper", "human"
+"""The two columns of a reproduction: the paper's own system, and the set that serves all three levels."""
+
 
 @dataclass(frozen=True)
 class Reproduction:
-    """A run of all parts of the paper.
+    """A run of all parts of the paper with two sets of tissues.
 
     Parameters
     ----------
-    conditions : Conditions
-        Finger, tissues, accuracy and seed.
     folder : Path
         Where finished indentations are stored.
+    resolution : {"standard", "quick", "paper"}
+        How fine meshes and steps are.
+    seed : int
+        Seed of the observers' noise.
+    tissues : str
+        Tissues of the column `paper`: a name whose afferent follows strain energy density. "paper" is
+        Trial 3 with a Poisson's ratio of 0.40, which is our reading; "trial3" is Trial 3 to the letter, 0.48.
+    finger : Fingertip or FingerMesh
+        The finger.
     jobs : int or Engine
         Processes, or the engine that solves the indentations; the numbers do not depend on it.
     extended : bool, optional
@@ -66,18 +82,30 @@ class Reproduction:
         By default not at "quick" resolution, where this takes half as long again.
     """
 
-    conditions: Conditions
     folder: Path
+    resolution: str = "standard"
+    seed: int = 0
+    tissues: str = PAPER
+    finger: Finger = field(default_factory=Fingertip)
     jobs: int | Engine = 1
     extended: bool | None = None
 
     def __post_init__(self) -> None:
         engine_of(self.jobs)
+        one_of("tissues", self.tissues, tuple(name for name in TISSUES if name != HUMAN))
 
     @property
     def goes_beyond(self) -> bool:
         """Whether this run goes beyond the paper."""
-        return self.conditions.resolution != "quick" if self.extended is None else self.extended
+        return self.resolution != "quick" if self.extended is None else self.extended
+
+    @property
+    def conditions(self) -> dict[str, Conditions]:
+        """Conditions of each column, by its name."""
+        return {
+            name: Conditions(self.resolution, self.seed, tissues, self.finger)
+            for name, tissues in ((PAPER, self.tissues), (HUMAN, HUMAN))
+        }
 
 
 @result_class
@@ -106,6 +134,42 @@ class PublishedNumber:
 
 
 @result_class
+class SetResult:
+    """What one set of tissues with its afferent gives on all levels.
+
+    Parameters
+    ----------
+    tissues : str
+        Name of the set.
+    mesh, levels : MeshPicture, ThreeLevels
+        The mesh under the standard sphere, and that indentation on all levels.
+    skin_force : SkinForce
+        Level 1: deflection and force.
+    single_unit, firing : SingleUnitResult, FiringCourse
+        Level 2: rates under the bar and their fit; when the afferent fires, and what drives it.
+    discrimination, population, nail : SphereDiscrimination, PopulationMaps, NailBorder
+        Level 3.
+    single_unit_uncertainty, curvature_thresholds : UncertaintyResult, CurvatureThresholds, optional
+        What goes beyond the paper, None where it was not asked for.
+    comparison : tuple of ClaimRow
+        The paper's numbers beside ours.
+    """
+
+    tissues: str
+    mesh: MeshPicture
+    levels: ThreeLevels
+    skin_force: SkinForce
+    single_unit: SingleUnitResult
+    firing: FiringCourse
+    discrimination: SphereDiscrimination
+    population: PopulationMaps
+    nail: NailBorder
+    single_unit_uncertainty: UncertaintyResult | None = None
+    curvature_thresholds: CurvatureThresholds | None = None
+    comparison: tuple[ClaimRow, ...]
+
+
+@result_class
 class ReproductionResult:
     """Result of a reproduction, the content of `results.json`.
 
@@ -113,20 +177,14 @@ class ReproductionResult:
     ----------
     format, format_version : str, int
         Of the file.
-    summary : Summary
-        A few plain numbers.
-    mesh, levels : MeshPicture, ThreeLevels
-        The mesh under the standard sphere, and that indentation on all levels.
-    skin_deflection, skin_force : SkinDeflectionResult, SkinForce
-        Level 1: the paper's three trials, and the tissues of the run.
-    single_unit : SingleUnitResult
-        Level 2.
-    discrimination, population, nail : SphereDiscrimination, PopulationMaps, NailBorder
-        Level 3.
-    single_unit_uncertainty, curvature_thresholds : UncertaintyResult, CurvatureThresholds, optional
-        What goes beyond the paper, None where it was not asked for.
-    comparison : tuple of ClaimRow
-        The paper's numbers beside ours.
+    summary : Summaries
+        A few plain numbers of both sets.
+    statements : tuple of Statement
+        Every statement of the paper that can fail, with our value and verdict of both sets.
+    skin_deflection : SkinDeflectionResult
+        Level 1: the paper's three trials.
+    paper, human : SetResult
+        The paper's own system, and the set that serves all three levels.
     tissues : tuple of TissueLayer
         Every named set of tissues, those of the run and of the trials among them.
     inputs : tuple of PublishedNumber
@@ -136,26 +194,19 @@ class ReproductionResult:
     """
 
     format: Literal["fingerpad reproduction"] = "fingerpad reproduction"
-    format_version: Literal[4] = 4
-    summary: Summary
-    mesh: MeshPicture
-    levels: ThreeLevels
+    format_version: Literal[5] = 5
+    summary: Summaries
+    statements: tuple[Statement, ...]
     skin_deflection: SkinDeflectionResult
-    skin_force: SkinForce
-    single_unit: SingleUnitResult
-    discrimination: SphereDiscrimination
-    population: PopulationMaps
-    nail: NailBorder
-    single_unit_uncertainty: UncertaintyResult | None = None
-    curvature_thresholds: CurvatureThresholds | None = None
-    comparison: tuple[ClaimRow, ...]
+    paper: SetResult
+    human: SetResult
     tissues: tuple[TissueLayer, ...]
     inputs: tuple[PublishedNumber, ...]
     manifest: Manifest
 
 
 def reproduce(run: Reproduction, progress: Progress | None = None) -> ReproductionResult:
-    """Run the three validations and compare them with the paper.
+    """Run the three validations with both sets and compare them with the paper.
 
     Parameters
     ----------
@@ -167,7 +218,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
     Returns
     -------
     ReproductionResult
-        All but the times, dates and memory of `manifest` depend on the conditions only.
+        All but the times, dates and memory of `manifest` and `summary` depend on the conditions only.
 
     Raises
     ------
@@ -176,84 +227,135 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
     StoreError
         If a stored indentation is damaged or the folder cannot be written.
     """
-    runner, conditions = Runner(run.folder, run.jobs, progress), run.conditions
-
-    spheres = sphere_discrimination.discrimination_touches(conditions)
-    wanted: dict[str, Mapping[Any, Touch]] = {
-        # The longest indentations first: short ones fill the end, and hardly a core waits for another.
-        "nail": {"nail": nail_border.nail_touch(conditions)},
-        "skin deflection": skin_deflection.deflection_touches(conditions),
-        "force": skin_force.force_touches(conditions),
-        "bar, 36 shifts": dict(enumerate(single_unit.bar_touches(conditions))),
-        "spheres": spheres,
-    }
-    if run.goes_beyond:
-        wanted["spheres, other curvatures"] = curvature_thresholds.threshold_touches(conditions)
-    responses = runner.responses(wanted)
-    deflection, bar_responses = responses["skin deflection"], responses["bar, 36 shifts"]
-    sphere_responses, nail_response = responses["spheres"], responses["nail"]["nail"]
-
-    with runner.stage("fit and discrimination", 3) as advance:
-        quantity = conditions.quantity
-        bar_sed = single_unit.receptor_sed(list(bar_responses.values()), quantity, quantity)
-        problem = single_unit.rate_problem(bar_sed)
-        method = _method(conditions, sphere_responses)
-        best, folds = single_unit.fit(problem, method=method)
-        advance()
-        afferent = Afferent.from_parameters(
-            best.parameters, dynamic_quantity=quantity, static_quantity=quantity
-        )
-        discrimination = sphere_discrimination.discriminate_spheres(
-            sphere_responses, afferent, conditions.seed
-        )
-        advance()
-        unit = single_unit.single_unit_result(problem, best, folds, afferent, method.name)
-        standard = sphere_responses[STANDARD_SPHERE]
-        population = response_maps.population_maps(standard, afferent)
-        levels = three_levels.three_levels(standard, afferent)
-        nail = nail_border.nail_border(nail_response)
-        advance()
-    uncertainty: UncertaintyResult | None = None
-    thresholds: CurvatureThresholds | None = None
-    if run.goes_beyond:
-        with runner.stage("beyond the paper", 2) as advance:
-            uncertainty = single_unit_uncertainty.uncertainty_result(
-                bar_sed, best.parameters, conditions.seed
-            )
+    runner, columns = Runner(run.folder, run.jobs, progress), run.conditions
+    trials = {"skin deflection": skin_deflection.deflection_touches(columns[PAPER])}
+    parts = {name: set_touches(conditions, run.goes_beyond) for name, conditions in columns.items()}
+    # The longest indentations first: short ones fill the end, and hardly a core waits for another.
+    longest_first = [*(each["nail"] for each in parts.values()), trials["skin deflection"]]
+    longest_first += [each[part] for part in parts[PAPER] for each in parts.values() if part != "nail"]
+    solved = frozenset(runner.solve(touch for touches in longest_first for touch in touches.values()))
+    pressed = runner.read(trials, solved)["skin deflection"]
+    deflection = skin_deflection.deflection_result(pressed)
+    found: dict[str, tuple[SetResult, Summary, tuple[StageSummary, ...]]] = {}
+    with runner.stage("fits and discrimination", len(columns)) as advance:
+        work = partial(_set_in_process, folder=runner.folder, deflection=deflection, solved=solved, run=run)
+        names = tuple(columns)
+        for number, outcome in Processes(min(len(names), runner.jobs)).map(work, names):
+            found[names[number]] = outcome()
             advance()
-            centred = {
-                curvature: skin for (position, curvature), skin in sphere_responses.items() if position == 0.0
-            }
-            thresholds = curvature_thresholds.curvature_thresholds(
-                centred | responses["spheres, other curvatures"],
-                afferent,
-                discrimination.noise_sigma,
-                conditions.seed,
-            )
-            advance()
-    meshes = {"sphere": spheres[STANDARD_SPHERE].mesh, "bar": bar_responses[0].mesh} | {
-        name: deflection["trial3", name].mesh for name in skin_deflection.INDENTERS
+    (paper, of_paper, stages), (human, of_human, more_stages) = found[PAPER], found[HUMAN]
+    runner.add_stages((*stages, *more_stages))
+    sphere, bar = parts[PAPER]["spheres"][STANDARD_SPHERE], parts[PAPER]["bar, 36 shifts"][0]
+    meshes = {"sphere": sphere.mesh, "bar": bar.mesh} | {
+        name: pressed["trial3", name].mesh for name in skin_deflection.INDENTERS
     }
-    skin = skin_deflection.deflection_result(deflection)
-    force = skin_force.skin_force(responses["force"])
-    manifest = runner.manifest(conditions, meshes, half_model=not spheres[STANDARD_SPHERE].grading.full)
+    manifest = runner.manifest(columns[PAPER], meshes, half_model=not sphere.grading.full)
+    manifest = replace(manifest, materials=f"{paper.tissues} and {human.tissues}")
+    of_paper, of_human = (
+        replace(each, wall_s=manifest.wall_s, peak_memory_mb=manifest.peak_memory_mb)
+        for each in (of_paper, of_human)
+    )
     return ReproductionResult(
-        summary=summary(force, unit, afferent, discrimination, thresholds, manifest),
-        mesh=mesh_picture.mesh_picture(standard.mesh, RECEPTOR_X_MM),
-        levels=levels,
-        skin_deflection=skin,
-        skin_force=force,
-        single_unit=unit,
-        discrimination=discrimination,
-        population=population,
-        nail=nail,
-        single_unit_uncertainty=uncertainty,
-        curvature_thresholds=thresholds,
-        comparison=tuple(comparison(manifest.materials, skin, force, unit, discrimination, nail, thresholds)),
+        summary=Summaries(
+            paper=of_paper,
+            human=of_human,
+            wall_s=manifest.wall_s,
+            peak_memory_mb=manifest.peak_memory_mb,
+        ),
+        statements=paired(paper.comparison, human.comparison),
+        skin_deflection=deflection,
+        paper=paper,
+        human=human,
         tissues=tissue_layers(),
         inputs=tuple(PublishedNumber(**asdict(number)) for number in all_published()),
         manifest=manifest,
     )
+
+
+def set_touches(conditions: Conditions, goes_beyond: bool = False) -> dict[str, dict[Any, Touch]]:
+    """Touches of one set of tissues, by the part of the paper that they belong to."""
+    touches: dict[str, dict[Any, Touch]] = {
+        "nail": {"nail": nail_border.nail_touch(conditions)},
+        "force": dict(skin_force.force_touches(conditions)),
+        "bar, 36 shifts": dict(enumerate(single_unit.bar_touches(conditions))),
+        "spheres": dict(sphere_discrimination.discrimination_touches(conditions)),
+    }
+    if goes_beyond:
+        touches["spheres, other curvatures"] = dict(curvature_thresholds.threshold_touches(conditions))
+    return touches
+
+
+def _set_in_process(
+    name: str,
+    threads: int | None,
+    folder: Path,
+    deflection: SkinDeflectionResult,
+    solved: Collection[Path],
+    run: Reproduction,
+) -> tuple[SetResult, Summary, tuple[StageSummary, ...]]:
+    """Read the stored indentations of one column, and analyse them; also tell what was read."""
+    conditions, runner = run.conditions[name], Runner(folder)
+    touches = set_touches(conditions, run.goes_beyond)
+    responses = runner.read(touches, solved)
+    made, numbers = set_result(conditions, responses, deflection)
+    stages = tuple(replace(stage, name=f"{name}: {stage.name}") for stage in runner.stages)
+    return made, numbers, stages
+
+
+def set_result(
+    conditions: Conditions,
+    responses: Mapping[str, Mapping[Any, SkinResponse]],
+    deflection: SkinDeflectionResult,
+) -> tuple[SetResult, Summary]:
+    """Fit the afferent of one set of tissues, let observers judge its spikes, and compare with the paper.
+
+    Parameters
+    ----------
+    conditions : Conditions
+        Of the set.
+    responses : mapping of str to mapping of key to SkinResponse
+        Of all `set_touches`, by part.
+    deflection : SkinDeflectionResult
+        The paper's three trials.
+    """
+    bars, spheres = list(responses["bar, 36 shifts"].values()), dict(responses["spheres"])
+    quantity = conditions.quantity
+    bar_sed = single_unit.receptor_sed(bars, quantity, quantity)
+    problem = single_unit.rate_problem(bar_sed)
+    method = _method(conditions, spheres)
+    best, folds = single_unit.fit(problem, method=method)
+    afferent = Afferent.from_parameters(best.parameters, dynamic_quantity=quantity, static_quantity=quantity)
+    discrimination = sphere_discrimination.discriminate_spheres(spheres, afferent, conditions.seed)
+    unit = single_unit.single_unit_result(problem, best, folds, afferent, method.name)
+    course = firing_course(bar_sed, single_unit.receptor_sed(bars), afferent, responses["force"])
+    force = skin_force.skin_force(responses["force"])
+    nail = nail_border.nail_border(responses["nail"]["nail"])
+    uncertainty: UncertaintyResult | None = None
+    thresholds: CurvatureThresholds | None = None
+    if others := responses.get("spheres, other curvatures"):
+        uncertainty = single_unit_uncertainty.uncertainty_result(bar_sed, best.parameters, conditions.seed)
+        centred = {curvature: skin for (position, curvature), skin in spheres.items() if position == 0.0}
+        thresholds = curvature_thresholds.curvature_thresholds(
+            centred | dict(others), afferent, discrimination.noise_sigma, conditions.seed
+        )
+    tissues = str(conditions.materials)
+    standard = spheres[STANDARD_SPHERE]
+    rows = comparison(tissues, deflection, force, unit, course, discrimination, nail, thresholds)
+    made = SetResult(
+        tissues=tissues,
+        mesh=mesh_picture.mesh_picture(standard.mesh, RECEPTOR_X_MM),
+        levels=three_levels.three_levels(standard, afferent),
+        skin_force=force,
+        single_unit=unit,
+        firing=course,
+        discrimination=discrimination,
+        population=response_maps.population_maps(standard, afferent),
+        nail=nail,
+        single_unit_uncertainty=uncertainty,
+        curvature_thresholds=thresholds,
+        comparison=tuple(rows),
+    )
+    return made, summary(force, unit, afferent, discrimination, thresholds)
 
 
 def _method(conditions: Conditions, spheres: dict[tuple[float, float], SkinResponse]) -> Method:

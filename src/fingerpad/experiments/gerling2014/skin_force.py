@@ -38,15 +38,20 @@ class SkinForce:
     disc_1mm_n: Number
 
 
+def plate(depth_mm: float) -> str:
+    """Name of the touch of the flat plate at one of `PLATE_DEPTHS_MM`."""
+    return f"plate {depth_mm:g} mm"
+
+
 def force_touches(conditions: Conditions) -> dict[str, Touch]:
     """Touches of the cylinder, of the plate at both depths and of the disc, by name.
 
     The flat indenters press straight down at the point of contact, as `fingerpad.indent` does.
     """
     cylinder = Cylinder()
-    flat = {
-        f"plate {depth_mm:g} mm": (Plate(), RampAndHold(depth_mm=depth_mm)) for depth_mm in PLATE_DEPTHS_MM
-    } | {"disc": (FlatPunch(), RampAndHold(depth_mm=protocol.DEPTH.value))}
+    flat = {plate(depth_mm): (Plate(), RampAndHold(depth_mm=depth_mm)) for depth_mm in PLATE_DEPTHS_MM} | {
+        "disc": (FlatPunch(), RampAndHold(depth_mm=protocol.DEPTH.value))
+    }
     return {
         "cylinder": conditions.touch(
             cylinder, conditions.receptor_x_mm, conditions.deflection_grading(cylinder)
@@ -68,7 +73,7 @@ def skin_force(responses: Mapping[str, SkinResponse]) -> SkinForce:
     force_n = {name: float(skin.force_mn[-1]) / MN_PER_N for name, skin in responses.items()}
     return SkinForce(
         deflection_r2=deflection_r2(responses["cylinder"].surface_profile()),
-        plate_1mm_n=force_n["plate 1 mm"],
-        plate_2mm_n=force_n["plate 2 mm"],
+        plate_1mm_n=force_n[plate(1.0)],
+        plate_2mm_n=force_n[plate(2.0)],
         disc_1mm_n=force_n["disc"],
     )

@@ -1,4 +1,4 @@
-"""A reproduction in a few plain numbers: the block `summary` of `results.json`."""
+"""A reproduction in a few plain numbers: the block `summary` of `results.json`, one set beside the other."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from fingerpad.experiments.gerling2014.response_maps import resting_response
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.skin_force import SkinForce
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
-from fingerpad.experiments.manifest import Manifest
 from fingerpad.neuron.afferent import Afferent
 
 
@@ -39,7 +38,7 @@ class Summary:
     weber_144, weber_287 : float
         Curvature threshold at 75 % over the standard; NaN where it was not asked for or does not exist.
     wall_s, peak_memory_mb : float
-        Of the run. [s, MB]
+        Of the whole run, both sets. [s, MB]
     """
 
     deflection_r2: Number
@@ -58,6 +57,16 @@ class Summary:
     hit_rate_365: tuple[Number, Number]
     weber_144: Number
     weber_287: Number
+    wall_s: float = 0.0
+    peak_memory_mb: float = 0.0
+
+
+@result_class
+class Summaries:
+    """Numbers of both sets, and time and memory of the whole run."""
+
+    paper: Summary
+    human: Summary
     wall_s: float
     peak_memory_mb: float
 
@@ -68,9 +77,8 @@ def summary(
     afferent: Afferent,
     discrimination: SphereDiscrimination,
     thresholds: CurvatureThresholds | None,
-    manifest: Manifest,
 ) -> Summary:
-    """Collect the numbers.
+    """Collect the numbers of one set; time and memory are known when the run ends.
 
     Parameters
     ----------
@@ -80,8 +88,6 @@ def summary(
         The fitted one.
     thresholds : CurvatureThresholds or None
         Where they were asked for.
-    manifest : Manifest
-        What ran.
     """
     dynamic, static = unit.modulation.dynamic.ours, unit.modulation.static.ours
     centred, shifted = (place.at_goodwin for place in discrimination.statistics.targets)
@@ -103,8 +109,6 @@ def summary(
         hit_rate_365=at_365,
         weber_144=weber_fraction(thresholds, 144.0),
         weber_287=weber_fraction(thresholds, 287.0),
-        wall_s=manifest.wall_s,
-        peak_memory_mb=manifest.peak_memory_mb,
     )
 
 
