@@ -217,6 +217,18 @@ def test_the_shipped_ranges_are_whole(tmp_path: Path) -> None:
         Laboratory(tmp_path, [shipped()[0], shipped()[0]])
 
 
+def test_a_thin_plate_from_a_file_can_be_pressed(tmp_path: Path) -> None:
+    """It ended in a traceback: the skin was behind the plate where its first touch was sought."""
+    corners = [f"v {x} {y} {z}" for x in (-2, 2) for y in (-1, 0) for z in (-2, 2)]
+    faces = ["f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]
+    (tmp_path / "plate.obj").write_text("\n".join([*corners, *faces]), encoding="utf-8")
+    asked = "object: {kind: surface, path: plate.obj, up: +y}\nrange: {depth_mm: 1, tilt_deg: [-10, 10]}\n"
+    (tmp_path / "plate.yaml").write_text(asked, encoding="utf-8")
+    training = Laboratory(tmp_path / "kept", [tmp_path / "plate.yaml"]).described(LabState("plate")).training
+    edge_mm = 2.0 * np.tan(np.deg2rad(10.0))
+    assert [-edge_mm < pose.first_touch_mm <= 0.0 for pose in training.poses()] == [True] * 3
+
+
 def test_a_laboratory_that_is_refused_leaves_no_folder(tmp_path: Path) -> None:
     folder = tmp_path / "lab"
     command = [sys.executable, "-m", "fingerpad", "lab", str(tmp_path / "none.yaml"), "--folder", str(folder)]

@@ -1,7 +1,7 @@
 """A reduced touch: interpolation, relaxation, streaming, files, and agreement with the full solver."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +11,14 @@ from scipy.integrate import solve_ivp
 import fingerpad as fp
 from fingerpad.cli import main
 from fingerpad.core.signals import SedTraces
+from fingerpad.geometry.motion import Pose
 from fingerpad.reduction.building import joint_bounds, largest_errors
 from fingerpad.reduction.interpolation import Axis, chebyshev_points, lagrange
 from fingerpad.reduction.model import AT_ONCE
 from fingerpad.reduction.relaxation import amplitudes, depth_scale, filtered, lost
 from fingerpad.reduction.retreat import LEVELS, Springs, levels_mm, slope_changes
 from fingerpad.reduction.streaming import read_local
-from fingerpad.reduction.training import ReducedRange, ReducedTraining
+from fingerpad.reduction.training import ReducedRange, ReducedTraining, first_touch_mm
 
 DEEPEST_MM = 1.0
 
@@ -283,6 +284,40 @@ def test_a_pose_aside_is_met_as_by_an_indenter_that_moves_there() -> None:
         along = off @ base.placement.axis
         assert np.linalg.norm(off - along * base.placement.axis) < 1e-6
         assert pose.first_touch_mm == pytest.approx(along, abs=1e-9)
+
+
+@dataclass(frozen=True)
+class Leaf(fp.Indenter):
+    """Wide plate that skin nodes are soon behind of."""
+
+    thickness_mm: float = 0.1
+
+    def gap(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        middle = points_mm[:, 1] + 0.5 * self.thickness_mm
+        return np.abs(middle) - 0.5 * self.thickness_mm, np.sign(middle)[:, None] * [0.0, 1.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    "body",
+    [Leaf(), fp.Plate(), fp.Union([Leaf(), fp.Sphere(radius_mm=1.0)], [(0, 0, 0), (2, -3, 0)])],
+    ids=["thin", "without an end", "of parts"],
+)
+@pytest.mark.parametrize("tilt_deg", [-40.0, 0.0, 15.0])
+def test_a_tilted_face_meets_the_skin_where_it_does_in_closed_form(
+    body: fp.Indenter, tilt_deg: float
+) -> None:
+    """The root was sought over 6 mm to either side: behind a thin body, and too near to a tilted plate."""
+    touch = fp.touch_of(fp.Fingertip(), body)
+    skin_mm = touch.mesh.nodes_mm[touch.mesh.skin_nodes] - touch.placement.origin_mm
+    sine, cosine = np.sin(np.deg2rad(tilt_deg)), np.cos(np.deg2rad(tilt_deg))
+    expected = (skin_mm[:, 1] - skin_mm[:, 0] * sine / cosine).min()
+    assert first_touch_mm(touch, Pose(tilt_deg=tilt_deg)) == pytest.approx(expected, abs=1e-8)
+
+
+def test_a_wire_meets_the_skin_at_its_place() -> None:
+    """Its gap is that of a plate: it was lifted to the highest place of the pad."""
+    touch = fp.touch_of(fp.Fingertip(), fp.Line())
+    assert [pose.meets_mm for pose in ReducedTraining(touch, ReducedRange(0.5)).poses()] == [0.0]
 
 
 def test_streamed_spikes_are_those_of_one_go() -> None:

@@ -45,8 +45,8 @@ PRESSED_AGAIN_MS = (0.0, 20.0, 1020.0, 1040.0, 1540.0, 1590.0, 1890.0)
 PRESSED_AGAIN = (0.0, 0.45, 0.45, 1.0, 1.0, 0.6, 0.6)
 """Motion that shows how what has relaxed counts at other depths: times [ms], depths over the largest."""
 
-LONGEST_WAY_MM = 6.0
-"""How far above or below the first touch of the touch any pose meets the skin. [mm]"""
+MET_MM, MOST_ADVANCES = 1e-9, 1000
+"""Gap at which a tilted indenter meets the skin [mm], and steps of the search for it."""
 
 MOVE_MS = 50.0
 """Time to move aside, and time to approach, both without contact. [ms]"""
@@ -310,10 +310,35 @@ def _pressed(pose: Pose, meets_mm: float, depth_mm: float) -> Trajectory:
 
 
 def first_touch_mm(touch: Touch, pose: Pose) -> float:
-    """Depth at which the indenter in a pose meets the undeformed skin, along its pressing. [mm]"""
+    """Depth at which the indenter in a pose meets the undeformed skin, along its pressing. [mm]
+
+    From afar it advances by its gap, which is the distance to the skin or less: so it meets the skin with its
+    face, however thin the body is behind that.
+
+    Raises
+    ------
+    InputError
+        If it passes by the skin.
+    """
+    if pose == STILL:
+        return 0.0
     placement, skin_mm = touch.placement.moved(pose), touch.mesh.nodes_mm[touch.mesh.skin_nodes]
 
     def gap_mm(depth_mm: float) -> float:
         return float(touch.body.gap(placement.to_local(skin_mm, depth_mm))[0].min())
 
-    return float(brentq(gap_mm, -LONGEST_WAY_MM, LONGEST_WAY_MM, xtol=1e-9))
+    far_mm = float(np.linalg.norm(skin_mm - placement.origin_mm, axis=1).max())
+    depth_mm = before_mm = -2.0 * far_mm
+    for _ in range(MOST_ADVANCES):
+        distance_mm = gap_mm(depth_mm)
+        if abs(distance_mm) <= MET_MM:
+            return depth_mm
+        if distance_mm < 0.0 and depth_mm > before_mm:  # the gap was more than the distance
+            return float(brentq(gap_mm, before_mm, depth_mm, xtol=MET_MM))
+        if distance_mm < 0.0 or depth_mm > far_mm:
+            break
+        before_mm, depth_mm = depth_mm, depth_mm + distance_mm
+    raise InputError(
+        f"tilt_deg must keep {type(touch.indenter).__name__} on the skin: at {pose.tilt_deg:g} degrees "
+        "it never touches a node of the skin; take a smaller range."
+    )
