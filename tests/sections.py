@@ -93,7 +93,6 @@ def discrimination_section() -> dict:
         "noise_sigma": 0.12,
         "noise_fit_error": 0.01,
         "noise_sigma_paper": 0.055,
-        "noise_sigma_beside": [0.055, 0.19],
         "sessions": 5,
         "goodwin": {
             "curvature_per_m": [296.0, 365.0],
@@ -177,8 +176,6 @@ def discrimination_section() -> dict:
             "sigma_0.025": rates(0.0, 0.01),
             "sigma_0.055": rates(0.0, 0.01),
             "sigma_0.085": rates(0.0, 0.02),
-            "noise_below": rates(0.0, 0.01),
-            "noise_above": rates(0.0, 0.02),
             "ten_matrices": rates(0.02, 0.06),
             "criterion_0.01": rates(0.01, 0.03),
             "criterion_0.02": rates(0.01, 0.06),

@@ -918,8 +918,8 @@ def test_figure_7_keeps_the_papers_letters_and_shows_people_in_every_panel():
     assert titles[0] == "(a) Gradient Sum, static σ₁ = 0.12"
     assert titles[3] == "(d) Euclidean, static σ₁ = 0.12"
     assert titles[4:7] == [
-        "(e) Gradient Sum, static σ₁ = 0.055",
-        "(f) Gradient Sum, static σ₁ = 0.19",
+        "(e) Gradient Sum, static σ₁ = 0.025",
+        "(f) Gradient Sum, static σ₁ = 0.085",
         "(g) Gradient Sum, static σ₁ = 0.12, 10 matrices",
     ]
     for axes in panels:

@@ -366,7 +366,7 @@ def test_every_strategy_measure_and_variant_has_six_hit_rates_at_both_positions(
         discrimination.euclidean["static"],
         *discrimination.variants.values(),
     ]
-    assert len(discrimination.variants) == 8 + 2 + 2 + 2  # noises, both sides, tens, criteria
+    assert len(discrimination.variants) == 8 + 2 + 2  # noises, tens, criteria
     for table in tables:
         for values in asdict(table).values():
             assert np.shape(values) == (6,)
@@ -379,14 +379,6 @@ def test_more_noise_lowers_the_hit_rates(discrimination):
     variants = discrimination.variants
     rates = [np.mean(variants[f"sigma_{sigma}"].hit_rate) for sigma in ("0.025", "0.055", "0.085")]
     assert rates[0] > rates[1] > rates[2]
-
-
-def test_noise_below_and_above_brackets_the_fitted_one(discrimination):
-    below, above = discrimination.noise_sigma_beside
-    assert below < discrimination.noise_sigma < above
-    variants = discrimination.variants
-    rates = [variants["noise_below"], discrimination.gradient_sum["static"], variants["noise_above"]]
-    assert (np.diff([found.hit_rate.mean() for found in rates]) < 0.0).all()
 
 
 def test_a_seed_gives_the_same_bits_and_another_seed_gives_others(discrimination):

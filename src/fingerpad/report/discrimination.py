@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.data import psychophysics
 from fingerpad.experiments.gerling2014.discrepancy import CriterionErrorBars
-from fingerpad.experiments.gerling2014.discrimination_sessions import BESIDE
 from fingerpad.experiments.gerling2014.goodwin import GoodwinHitRates
 from fingerpad.experiments.gerling2014.sphere_discrimination import ObserverHitRates, SphereDiscrimination
 from fingerpad.report.formatting import fixed, number, whole_percent, with_error
@@ -117,19 +117,21 @@ def observer_panels(section: SphereDiscrimination) -> list[Panel]:
     Returns
     -------
     list of (str, ObserverHitRates or None)
-        The codes (None for a measure without responses), noise on either side of the fitted
-        one, 10 noise matrices, and last the paper's noise, which has no panel in the paper.
+        The codes (None for a measure without responses), the paper's noise on either side of its best, 10
+        noise matrices, and last the paper's best noise.
     """
     sums, variants, static = section.gradient_sum, section.variants, CODES["static"]
     best = f"σ₁ = {number(section.noise_sigma)}"
-    printed = f"sigma_{section.noise_sigma_paper:g}"
-    levels = zip(section.noise_sigma_beside, BESIDE, strict=True)
+
+    def at(sigma: float) -> Panel:
+        return f"{static}\nσ₁ = {sigma:g}", variants[f"sigma_{sigma:g}"]
+
     rates = {**sums, "euclidean": section.euclidean["static"]}
     return [
         *((f"{label}\n{best}", rates.get(name)) for name, label in CODES.items()),
-        *((f"{static}\nσ₁ = {number(sigma)}", variants[name]) for sigma, name in levels),
+        *map(at, psychophysics.NOISE_SIGMA_SHOWN.value),
         (f"{static}\n{best}, 10 matrices", variants["ten_matrices"]),
-        (f"{static}\nσ₁ = {printed.removeprefix('sigma_')}", variants[printed]),
+        at(section.noise_sigma_paper),
     ]
 
 
@@ -223,9 +225,9 @@ def caption_observers(section: SphereDiscrimination) -> str:
         f"away. Diamonds: observed in people (Goodwin et al. 1991), with {_interval(section.goodwin)}. (a-c) "
         "Gradient Sum of static rates, dynamic rates and first-spike latencies, (d) Euclidean Distance of "
         f"static rates, all with noise σ₁ = {number(section.noise_sigma)}, which was fitted to the diamonds "
-        f"with the code of (a); the paper's best noise is {number(section.noise_sigma_paper)}. (e, f) Noise "
-        "on either side of the fitted one, by the ratios of the paper's 0.025 and 0.085 to its 0.055; (g) "
-        "10 noise matrices in place of 100; (h) the paper's noise. In the paper the static Gradient Sum "
+        f"with the code of (a); the paper's best noise is {number(section.noise_sigma_paper)}. (e, f) The "
+        "paper's noise on either side of its best; (g) 10 noise matrices in place of 100; (h) the paper's "
+        "best noise. In the paper the static Gradient Sum "
         "fits best and hardly depends on the shift, dynamic rates and latencies depend on it, more noise "
         "lowers the curve, and fewer matrices widen the bars."
     )

@@ -31,9 +31,6 @@ SESSIONS = 5
 SWEPT_NOISE = tuple(round(0.015 + 0.01 * step, 3) for step in range(8))
 """Noise sigma_1 that is tried, over the paper's range."""
 
-BESIDE = ("noise_below", "noise_above")
-"""Observers whose noise lies on either side of the fitted one."""
-
 FEW = 10
 """Noise matrices, and hit rates, of the paper's smaller experiments."""
 
@@ -45,21 +42,6 @@ CRITERION_SIGMAS = psychophysics.DECISION_CRITERION_SIGMA.value
 _PAPER = Experiment()
 _FIRST_SESSION = 1
 """Session 0 of a seed belongs to the fit of the noise."""
-
-
-def noise_beside(noise_sigma: float) -> tuple[float, float]:
-    """Return the noise of the observers `BESIDE`.
-
-    Its ratios to the fitted noise are those of the paper's 0.025 and 0.085 (Figure 7, e and f) to its 0.055.
-
-    Examples
-    --------
-    >>> [round(sigma, 3) for sigma in noise_beside(0.11)]
-    [0.05, 0.17]
-    """
-    lower, higher = psychophysics.NOISE_SIGMA_SHOWN.value
-    ratio = noise_sigma / psychophysics.NOISE_SIGMA.value
-    return ratio * lower, ratio * higher
 
 
 @dataclass(frozen=True)
@@ -128,8 +110,8 @@ def observe(
     Returns
     -------
     Observers
-        Named by measure; "euclidean", "sigma_0.055" and the like, "noise_below" and "noise_above",
-        "ten_matrices", "ten_hit_rates", "criterion_0.01" and the like for those of the static rates.
+        Named by measure; "euclidean", "sigma_0.055" and the like, "ten_matrices", "ten_hit_rates",
+        "criterion_0.01" and the like for those of the static rates.
 
     Raises
     ------
@@ -176,8 +158,7 @@ def _judge(
         for name, one in measures.items()
         if name != "static"
     }
-    named = dict(zip(BESIDE, noise_beside(noise_sigma), strict=True))
-    named |= {"static": noise_sigma} | {f"sigma_{sigma:g}": sigma for sigma in SWEPT_NOISE}
+    named = {"static": noise_sigma} | {f"sigma_{sigma:g}": sigma for sigma in SWEPT_NOISE}
     by_level = sums(np.array([static] * len(named)), pairs, np.array(list(named.values())), _PAPER)
     by_name = dict(zip(named, by_level, strict=True))
     rates |= {name: hit_rates_of_sums(one, seed, session=session) for name, one in by_name.items()}

@@ -20,7 +20,6 @@ from fingerpad.experiments.gerling2014.discrimination_sessions import (
     SESSIONS,
     Measured,
     Observers,
-    noise_beside,
     observe,
 )
 from fingerpad.experiments.gerling2014.discrimination_statistics import (
@@ -90,8 +89,6 @@ class SphereDiscrimination:
         The spheres, the standard first. [1/m]
     noise_sigma, noise_fit_error, noise_sigma_paper : float
         Fitted noise, root mean square error of the fit [0-1], and the paper's noise.
-    noise_sigma_beside : (float, float)
-        Noise of the variants "noise_below" and "noise_above", on either side of the fitted one.
     goodwin : GoodwinHitRates
         Of people.
     gradient_sums : dict of array (n_positions, 7)
@@ -112,7 +109,6 @@ class SphereDiscrimination:
     noise_sigma: float
     noise_fit_error: float
     noise_sigma_paper: float
-    noise_sigma_beside: tuple[float, float]
     goodwin: GoodwinHitRates
     gradient_sums: dict[str, Matrix]
     gradient_sum: dict[str, ObserverHitRates]
@@ -237,7 +233,6 @@ def discriminate_spheres(
         noise_sigma=noise.noise_sigma,
         noise_fit_error=noise.root_mean_square_error,
         noise_sigma_paper=psychophysics.NOISE_SIGMA.value,
-        noise_sigma_beside=noise_beside(noise.noise_sigma),
         goodwin=goodwin_hit_rates_at(CURVATURES[1:]),
         gradient_sums={
             name: np.array([gradient_sum(one.responses, one.neighbours) for one in both])
