@@ -23,7 +23,7 @@ from fingerpad.psychophysics.counts import log_probability
 from fingerpad.psychophysics.functions import SIGMOIDS
 from fingerpad.psychophysics.maximum_likelihood import _gradient, maximise_likelihood
 from fingerpad.psychophysics.psychometric import working_point
-from fingerpad.psychophysics.uncertainty import weighted_quantiles
+from fingerpad.psychophysics.uncertainty import STEEPEST, weighted_quantiles
 
 LEVELS = np.array([2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
 TRUTH = PsychometricFunction(threshold=5.0, width=4.0, guess=0.5, lapse=0.02)
@@ -197,12 +197,12 @@ def test_posterior_intervals_have_their_nominal_coverage(fits):
 
 
 def test_bootstrap_intervals_have_their_nominal_coverage():
+    fits = [
+        fit_psychometric(LEVELS, counts, [TRIALS] * 7, lapse=0.02) for counts in judged(TRUTH, 200, seed=78)
+    ]
+    # A step has no bootstrap.
     covered = np.mean(
-        [
-            held(bootstrap(fit_psychometric(LEVELS, counts, [TRIALS] * 7, lapse=0.02), seed, 120))
-            for seed, counts in enumerate(judged(TRUTH, 200, seed=78))
-        ],
-        axis=0,
+        [held(bootstrap(fit, seed, 120)) for seed, fit in enumerate(fits) if not fit.is_step], axis=0
     )
     assert ((covered >= 0.90) & (covered <= 0.98)).all(), covered
 
@@ -211,7 +211,7 @@ def test_posterior_on_a_grid_is_that_of_brute_force():
     fit = fit_psychometric(LEVELS[2:5], [12, 15, 19], [20] * 3, lapse=0.0)
     model = fit.model
     m = np.linspace(model.lower[0], model.upper[0], 1501)
-    w = np.linspace(model.lower[1], model.upper[1], 1501)
+    w = np.linspace(model.lower[1] + math.log(STEEPEST), model.upper[1], 1501)
     points = np.zeros((m.size, w.size, 5)) + model.lower
     points[..., 0], points[..., 1] = m[:, None], w
     mass = np.exp(model.log_likelihood(fit.counts.n_correct, points) - fit.log_likelihood)
@@ -326,4 +326,26 @@ def test_levels_that_do_not_contain_the_threshold_are_an_error():
 def test_a_step_is_fitted_and_its_width_is_reported_on_the_bound():
     step = fit_psychometric([1, 2, 3, 4], [50, 50, 100, 100], [100] * 4, lapse=0.0)
     assert step.at_bounds == ("width",)
-    assert 2.0 < step.threshold(0.75) < 3.0
+    assert 2.0 < step.threshold() < 3.0
+    with pytest.raises(ConvergenceError, match=r"not determined by these data: .* 2 and 3; measure"):
+        bootstrap(step, seed=1)
+
+
+@pytest.mark.parametrize("levels", [LEVELS, [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0]])
+def test_a_step_may_lie_anywhere_between_its_two_levels(levels):
+    """All thresholds between the two levels explain the counts alike."""
+    step = fit_psychometric(levels, [0, 0, 0, 20, 20, 20, 20], [20] * 7, guess=0.0, lapse=0.0)
+    assert step.is_step
+    lower, upper = posterior(step).threshold_interval()
+    share = (np.array([lower, upper]) - levels[2]) / (levels[3] - levels[2])
+    assert share == pytest.approx([0.025, 0.975], abs=0.03)
+
+
+def test_the_threshold_is_one_level_everywhere():
+    fit = fit_psychometric([260, 275, 300, 315], [4, 20, 83, 97], [100] * 4, guess=0.0, lapse=0.0)
+    threshold = fit.function.threshold
+    assert fit.threshold() == fit.threshold(0.5) == threshold == pytest.approx(287.0, abs=1.0)
+    assert f"threshold {threshold:.3g} (at 50 %)" in repr(fit)
+    assert f"threshold {threshold:.3g} (at 50 %)" in fit.plot().get_xlabel()
+    cloud = posterior(fit)
+    assert cloud.threshold_interval() == cloud.interval("threshold")

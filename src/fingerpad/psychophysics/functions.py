@@ -221,13 +221,13 @@ class PsychometricFunction:
             self.lapse,
         )
 
-    def level_at(self, proportion_correct: float = 0.75) -> float:
+    def level_at(self, proportion_correct: float | None = None) -> float:
         """Level at which psi has a value.
 
         Parameters
         ----------
         proportion_correct : float, optional
-            Between guess and 1 - lapse. [0-1]
+            Between guess and 1 - lapse; by default half-way between them, where the threshold is. [0-1]
 
         Returns
         -------
@@ -239,6 +239,8 @@ class PsychometricFunction:
         InputError
             If psi does not reach that value.
         """
+        if proportion_correct is None:
+            return self.threshold
         wanted = finite("proportion_correct", proportion_correct)
         if not self.guess < wanted < 1.0 - self.lapse:
             raise InputError(
@@ -247,13 +249,13 @@ class PsychometricFunction:
             )
         return float(level_at(self.shape, wanted, self.threshold, self.width, self.guess, self.lapse))
 
-    def slope(self, proportion_correct: float = 0.75) -> float:
+    def slope(self, proportion_correct: float | None = None) -> float:
         """Slope of psi, its derivative by the level, where psi has a value.
 
         Parameters
         ----------
         proportion_correct : float, optional
-            Between guess and 1 - lapse. [0-1]
+            As in `level_at`. [0-1]
 
         Returns
         -------

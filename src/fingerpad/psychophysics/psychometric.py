@@ -57,8 +57,8 @@ class PsychometricFit(Result):
 
     def __repr__(self) -> str:
         return (
-            f"PsychometricFit({self.function.sigmoid}, threshold {self.threshold():.3g} in the unit of "
-            f"the levels, {int(self.counts.n_trials.sum())} judgements of {self.counts.levels.size} levels)"
+            f"PsychometricFit({self.function.sigmoid}, threshold {self.threshold_label}, "
+            f"{int(self.counts.n_trials.sum())} judgements of {self.counts.levels.size} levels)"
         )
 
     @property
@@ -83,6 +83,20 @@ class PsychometricFit(Result):
         return tuple(name for name, there in zip(PARAMETERS, on & self.model.free, strict=True) if there)
 
     @property
+    def is_step(self) -> bool:
+        """Whether the curve is as steep as its bound allows.
+
+        The data then determine no width and no slope, and the threshold only to within two levels.
+        """
+        return bool(self.model.free[WIDTH] and np.isclose(self.point[WIDTH], self.model.lower[WIDTH]))
+
+    @property
+    def threshold_label(self) -> str:
+        """The threshold and the proportion there, in words."""
+        at = f"{self.threshold():.3g} (at {100.0 * float(self.predict([self.threshold()])[0]):.3g} %)"
+        return f"{at}, width not determined by these data" if self.is_step else at
+
+    @property
     def deviance(self) -> float:
         """Twice the difference in log likelihood to a model that fits every proportion exactly."""
         perfect = log_probability(
@@ -94,11 +108,11 @@ class PsychometricFit(Result):
         """Proportion correct (n_levels,) at any levels; see `PsychometricFunction.predict`."""
         return self.function.predict(levels)
 
-    def threshold(self, proportion_correct: float = 0.75) -> float:
+    def threshold(self, proportion_correct: float | None = None) -> float:
         """Level at which a proportion of judgements is correct; see `PsychometricFunction.level_at`."""
         return self.function.level_at(proportion_correct)
 
-    def slope(self, proportion_correct: float = 0.75) -> float:
+    def slope(self, proportion_correct: float | None = None) -> float:
         """Slope of the proportion there, per unit of the level; see `PsychometricFunction.slope`."""
         return self.function.slope(proportion_correct)
 

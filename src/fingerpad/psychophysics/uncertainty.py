@@ -5,8 +5,9 @@ computed.
 
 - Bootstrap: counts are sampled from the fitted function repeatedly, and fitted in the same way.
 - Posterior: Bayes' rule on a grid over the fitted parameters, with a prior flat in the threshold, the
-  logarithm of the width, guess, lapse and overdispersion, within the bounds of the fit. A coarse grid finds
-  the region of the posterior, a fine grid covers it; no random numbers are used.
+  logarithm of the width, guess, lapse and overdispersion, within the bounds of the fit; the width may be
+  smaller, so that a step between two levels may lie anywhere between them. A coarse grid finds the region of
+  the posterior, a fine grid covers it; no random numbers are used.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, finite, float_array, instance, one_of, whole
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Purpose, uniforms
 from fingerpad.psychophysics.counts import log_probability
 from fingerpad.psychophysics.functions import SIGMOIDS, Sigmoid, checked_levels, level_at, proportion
@@ -34,13 +35,16 @@ from fingerpad.psychophysics.maximum_likelihood import (
 from fingerpad.psychophysics.psychometric import PsychometricFit
 
 COARSE_POINTS = 21
-FINE_POINTS = {1: (401,), 2: (81, 81), 3: (41, 35, 13), 4: (31, 27, 13, 13), 5: (21, 19, 9, 9, 9)}
+FINE_POINTS = {1: (401,), 2: (81, 81), 3: (81, 35, 13), 4: (31, 27, 13, 13), 5: (21, 19, 9, 9, 9)}
 """Points of the fine grid along each fitted parameter, by the number of parameters."""
 
 NEGLIGIBLE = 1e-5
 """Share of its maximum below which a posterior is neglected."""
 
 REFINEMENTS = 2
+
+STEEPEST = 0.01
+"""Smallest width of the prior over that of the fit."""
 
 
 @dataclass(frozen=True)
@@ -89,14 +93,14 @@ class FunctionCloud:
         return self._central(self.values[:, PARAMETERS.index(parameter)], probability)
 
     def threshold_interval(
-        self, proportion_correct: float = 0.75, probability: float = 0.95
+        self, proportion_correct: float | None = None, probability: float = 0.95
     ) -> tuple[float, float]:
         """Central interval of the level at which a proportion of judgements is correct.
 
         Parameters
         ----------
         proportion_correct : float, optional
-            [0-1]
+            By default the threshold, where F is one half. [0-1]
         probability : float, optional
             Coverage of the true value. [0-1]
 
@@ -112,8 +116,10 @@ class FunctionCloud:
         """
         return self._central(self.thresholds(proportion_correct), probability)
 
-    def thresholds(self, proportion_correct: float = 0.75) -> FloatArray:
+    def thresholds(self, proportion_correct: float | None = None) -> FloatArray:
         """Level (n_functions,) at which each function has a value; infinite if it does not reach it."""
+        if proportion_correct is None:
+            return self.values[:, THRESHOLD]
         wanted = _share("proportion_correct", proportion_correct)
         threshold, width, guess, lapse, _ = self.values.T
         return level_at(self.shape, wanted, threshold, width, guess, lapse)
@@ -214,7 +220,7 @@ def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> Func
     InputError
         If a number is not whole or not positive.
     ConvergenceError
-        If a replicate cannot be fitted.
+        If a replicate cannot be fitted, or the fit is a step: its replicates are steps at the same place.
 
     Examples
     --------
@@ -224,6 +230,13 @@ def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> Func
     >>> bool(lower < fit.threshold(0.75) < upper)
     True
     """
+    if instance("fit", fit, PsychometricFit).is_step:
+        levels = fit.counts.levels
+        above = int(np.clip(np.searchsorted(levels, fit.threshold()), 1, levels.size - 1))
+        raise ConvergenceError(
+            "An interval by bootstrap is not determined by these data: the curve rises between the levels "
+            f"{levels[above - 1]:g} and {levels[above]:g}; measure more levels there, or take posterior(fit)."
+        )
     points, _ = maximise_likelihood(fit.model, drawn_counts(fit, seed, n_replicates))
     return _cloud(fit, points, np.full(len(points), 1.0 / len(points)))
 
@@ -286,14 +299,21 @@ def posterior(fit: PsychometricFit) -> FunctionCloud:
     n_free = int(model.free.sum())
     if n_free == 0:
         return _cloud(fit, fit.point[np.newaxis], np.ones(1))
-    lower, upper = model.lower[model.free], model.upper[model.free]
+    lower, upper = model.lower.copy(), model.upper
+    if model.free[WIDTH]:
+        lower[WIDTH] += np.log(STEEPEST)
+    lower, upper = lower[model.free], upper[model.free]
+    sizes = (COARSE_POINTS,) * min(n_free, 3) + (9,) * (n_free - 3)
     # A grid finds the region of the posterior; a narrow posterior needs a second one.
-    for _ in range(REFINEMENTS):
-        axes, weights = _grid_posterior(
-            fit, lower, upper, (COARSE_POINTS,) * min(n_free, 3) + (9,) * (n_free - 3)
-        )
-        lower, upper = _where_it_is(axes, weights, lower, upper)
-    axes, weights = _grid_posterior(fit, lower, upper, FINE_POINTS[n_free])
+    for step in range(REFINEMENTS):
+        axes = _centres(lower, upper, sizes)
+        if step == 0 and model.free[THRESHOLD]:
+            # The posterior of a step lies between two levels, which may be close to each other.
+            between = 0.5 * (model.coordinates[1:] + model.coordinates[:-1])
+            axes[THRESHOLD] = np.union1d(axes[THRESHOLD], between)
+        lower, upper = _where_it_is(axes, _heights(fit, axes), lower, upper)
+    axes = _centres(lower, upper, FINE_POINTS[n_free])
+    weights = np.exp(_heights(fit, axes))
     points = _grid_points(model, axes)
     kept = weights.ravel() > 0.1 * NEGLIGIBLE * weights.max()
     return _cloud(fit, points[kept], weights.ravel()[kept] / weights.ravel()[kept].sum())
@@ -307,34 +327,30 @@ def _grid_points(model: Model, axes: list[FloatArray]) -> FloatArray:
     return points
 
 
-def _grid_posterior(
-    fit: PsychometricFit, lower: FloatArray, upper: FloatArray, sizes: tuple[int, ...]
-) -> tuple[list[FloatArray], FloatArray]:
-    """Centres of the cells of a grid, and the posterior probability of each cell (midpoint rule)."""
-    axes = [
+def _centres(lower: FloatArray, upper: FloatArray, sizes: tuple[int, ...]) -> list[FloatArray]:
+    """Centres of equal cells between bounds, along each axis."""
+    return [
         low + (high - low) * (np.arange(size) + 0.5) / size
         for low, high, size in zip(lower, upper, sizes, strict=True)
     ]
+
+
+def _heights(fit: PsychometricFit, axes: list[FloatArray]) -> FloatArray:
+    """Logarithm of the likelihood over its maximum, at every point of a grid."""
     heights = fit.model.log_likelihood(fit.counts.n_correct, _grid_points(fit.model, axes))
-    weights = np.exp(heights - heights.max())
-    return axes, (weights / weights.sum()).reshape(sizes)
+    return (heights - heights.max()).reshape([axis.size for axis in axes])
 
 
 def _where_it_is(
-    axes: list[FloatArray], weights: FloatArray, lower: FloatArray, upper: FloatArray
+    axes: list[FloatArray], heights: FloatArray, lower: FloatArray, upper: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Bounds of the cells above `NEGLIGIBLE` along each axis, and one cell more on each side."""
+    """Bounds of the points above `NEGLIGIBLE` along each axis: the next points on each side."""
     ends = []
     for index, axis in enumerate(axes):
         others = tuple(other for other in range(len(axes)) if other != index)
-        matters = np.flatnonzero(weights.max(axis=others) > NEGLIGIBLE * weights.max())
-        cell = (upper[index] - lower[index]) / axis.size
-        ends.append(
-            (
-                max(lower[index], axis[matters[0]] - 1.5 * cell),
-                min(upper[index], axis[matters[-1]] + 1.5 * cell),
-            )
-        )
+        matters = np.flatnonzero(heights.max(axis=others) > np.log(NEGLIGIBLE))
+        around = np.concatenate([[lower[index]], axis, [upper[index]]])
+        ends.append((around[matters[0]], around[matters[-1] + 2]))
     return np.array([low for low, _ in ends]), np.array([high for _, high in ends])
 
 

@@ -123,8 +123,8 @@ def _with_error(value: float, error: float) -> str:
     return ABSENT if math.isnan(value) else f"{fixed(value, 3)} ± {fixed(error, 3)}"
 
 
-def _interval(ends: Sequence[float]) -> str:
-    return " … ".join(number(end) for end in ends)
+def _interval(ends: Sequence[float] | None) -> str:
+    return ABSENT if ends is None else " … ".join(number(end) for end in ends)
 
 
 def _thresholds(found: TaskResult) -> Table:
@@ -139,7 +139,8 @@ def _thresholds(found: TaskResult) -> Table:
     )  # fmt: skip
     note = (
         "Difference: from the standard to the threshold. Intervals: of an experiment with the trials per "
-        "comparison of the task. Slope: of the hit rate at the threshold, per unit."
+        "comparison of the task. Slope: of the hit rate at the threshold, per unit. Where bootstrap "
+        "and slope are missing, the curve rises between two comparisons: add some between them."
     )
     return Table("Thresholds", columns, rows, note)
 
@@ -155,7 +156,7 @@ def _threshold_cells(side: SideCurve) -> tuple[str, ...]:
         _interval(threshold.posterior_interval),
         _interval(threshold.bootstrap_interval),
         ABSENT if share is None else whole_percent(share),
-        number(side.fit.slope),
+        ABSENT if math.isnan(side.fit.slope) else number(side.fit.slope),
     )
 
 

@@ -243,11 +243,10 @@ def draw_curve(axes: Axes, fit: PsychometricFit) -> None:
     levels = fit.counts.levels
     room = 0.1 * float(np.ptp(levels))
     at = np.linspace(levels.min() - room, levels.max() + room, CURVE_POINTS)
-    threshold = fit.threshold()
     axes.plot(at, fit.predict(at), color=BLUE)
     axes.plot(levels, fit.counts.proportion, "o", color=BLACK)
-    axes.axvline(threshold, color=GREY, linestyle=":")
-    axes.set(xlabel=f"level; threshold {threshold:.3g}", ylabel="proportion correct", ylim=(0.0, 1.05))
+    axes.axvline(fit.threshold(), color=GREY, linestyle=":")
+    axes.set(xlabel=f"level; threshold {fit.threshold_label}", ylabel="proportion correct", ylim=(0.0, 1.05))
 
 
 def draw_finger(axes: Axes, finger: Fingertip) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -54,14 +55,15 @@ class CurveThreshold:
     over_standard : float, optional
         Difference over the standard (Weber fraction); absent where the standard is 0.
     bootstrap_interval, posterior_interval : (float, float)
-        Confidence and credible interval of the difference. [unit of what varies]
+        Confidence and credible interval of the difference; the former is absent where no comparison lies on
+        the rise of the curve. [unit of what varies]
     """
 
     proportion: float
     difference: Number
     level: Number
     over_standard: float | None
-    bootstrap_interval: tuple[Number, Number]
+    bootstrap_interval: tuple[Number, Number] | None
     posterior_interval: tuple[Number, Number]
 
 
@@ -89,7 +91,7 @@ class CurveFit:
     threshold : CurveThreshold
         At the proportion that the task asks for.
     slope : float
-        Of the hit rate at the threshold. [1/unit of what varies]
+        Of the hit rate at the threshold; NaN where no comparison lies on the rise. [1/unit of what varies]
     lapse : float
         What is missing to 1 far above the threshold. [0-1]
     at_bounds : tuple of str
@@ -344,7 +346,7 @@ def _curve_fit(
     )
     wanted = settings.proportion
     threshold = fit.threshold(wanted)
-    of_bootstrap, of_posterior = bootstrap(fit, seed), posterior(fit)
+    of_posterior = posterior(fit)
     at = np.linspace(0.0, 1.05 * difference[-1], CURVE_POINTS + 1)[1:]
     low, high = of_posterior.band(at, CREDIBLE)
     return CurveFit(
@@ -355,10 +357,12 @@ def _curve_fit(
             difference=threshold,
             level=standard + sign * threshold,
             over_standard=threshold / abs(standard) if standard else None,
-            bootstrap_interval=of_bootstrap.threshold_interval(wanted, CREDIBLE),
+            bootstrap_interval=(
+                None if fit.is_step else bootstrap(fit, seed).threshold_interval(wanted, CREDIBLE)
+            ),
             posterior_interval=of_posterior.threshold_interval(wanted, CREDIBLE),
         ),
-        slope=fit.slope(wanted),
+        slope=math.nan if fit.is_step else fit.slope(wanted),
         lapse=fit.function.lapse,
         at_bounds=fit.at_bounds,
         curve=CurvePoints(
