@@ -1,5 +1,6 @@
 """The pages name only files, headings, objects and commands that exist."""
 
+import ast
 import pkgutil
 import re
 from pathlib import Path
@@ -85,6 +86,35 @@ def test_commands_and_their_options_exist(page: Path) -> None:
             if called[1] not in known or not options <= known[called[1]] | {*GENERAL_OPTIONS}:
                 lost.append(line)
     assert lost == []
+
+
+def test_options_and_keywords_that_an_error_names_exist() -> None:
+    """Texts in `raise` name only options of the command line, and keywords that a function takes."""
+    trees = {path: ast.parse(path.read_text("utf-8")) for path in (ROOT / "src").rglob("*.py")}
+    nodes = [(path, node) for path, tree in trees.items() for node in ast.walk(tree)]
+    keywords = {node.arg for _, node in nodes if isinstance(node, ast.arg)}
+    keywords |= {
+        node.target.id
+        for _, node in nodes
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)
+    }
+    options, groups = set(GENERAL_OPTIONS), [typer.main.get_command(app)]
+    while groups:
+        group = groups.pop()
+        options |= {option for parameter in group.params for option in parameter.opts}
+        groups += getattr(group, "commands", {}).values()
+    lost, seen = set(), 0
+    for path, node in nodes:
+        for part in ast.walk(node) if isinstance(node, ast.Raise) else ():
+            if isinstance(part, ast.Constant) and isinstance(part.value, str):
+                named_options = set(re.findall(r"(?<!\S)--[a-z][\w-]+", part.value))
+                named_keywords = set(re.findall(r"(?<![\w.])([a-z_]+)=(?!=)", part.value))
+                seen += len(named_options | named_keywords)
+                lost |= {
+                    (path.name, name) for name in (named_options - options) | (named_keywords - keywords)
+                }
+    assert lost == set()
+    assert seen > 50
 
 
 def test_the_index_of_decisions_has_the_heading_of_each_page() -> None:

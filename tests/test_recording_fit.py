@@ -202,6 +202,15 @@ def test_a_soft_threshold_is_recovered_from_its_spikes_within_their_information(
     assert len(report.fit_tables(fitted)) == 6
 
 
+def test_regular_trains_advise_what_the_fit_has():
+    """One train per stimulus that an afferent without noise fires: no width of the threshold is likeliest."""
+    regular = SpikeRecordings(NAMES, AFFERENT.spikes(SED), 1000.0)
+    with pytest.raises(
+        ConvergenceError, match="more than once, or choose another method, such as least_squares"
+    ):
+        study.fit_recordings(SED, regular, np.arange(8) % 2, method="likelihood")
+
+
 # What a fit says
 
 

@@ -144,7 +144,7 @@ def _maximise(
             damping *= 10.0
             if damping > _MOST_DAMPING:
                 raise ConvergenceError(
-                    "fit_spikes found no step that raises log L: try another start.", _lines(history)
+                    "fit_spikes found no step that raises log L: give another start=.", _lines(history)
                 )
         here, (value, gradient, information) = there, trial
         damping = max(0.1 * damping, 1e-12)
@@ -156,7 +156,8 @@ def _maximise(
                 _lines(history),
             )
     raise ConvergenceError(
-        f"fit_spikes has not converged after {most_steps} steps: allow more.", _lines(history)
+        f"fit_spikes has not converged after {most_steps} steps: give more, most_steps={10 * most_steps}.",
+        _lines(history),
     )
 
 

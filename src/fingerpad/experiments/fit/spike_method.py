@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray
+from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.experiments.fit.methods import Prepared, Recordings, check_spikes
 from fingerpad.experiments.fit.results import SpikeFitSummary
@@ -53,7 +54,15 @@ class MaximumLikelihood:
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Climb to the likeliest parameters; the problem only scores them."""
         clock = time.perf_counter()
-        found = fit_spikes(self.of(chosen), spike_start())
+        try:
+            found = fit_spikes(self.of(chosen), spike_start())
+        except ConvergenceError as error:
+            raise ConvergenceError(
+                f"likelihood is not determined by the spikes of {len(chosen)} stimuli "
+                f"({str(error).partition(':')[0]}): record each stimulus more than once, or choose another "
+                "method, such as least_squares.",
+                error.history,
+            ) from error
         seconds = time.perf_counter() - clock
         score = problem.score(found.parameters, chosen)
         return Fit(found.parameters, score, len(found.history), seconds, ())

@@ -197,7 +197,8 @@ def maximise(
         base = _read_only(best)
         history.append(FitStep(base, highest))
     raise ConvergenceError(
-        f"maximise has not converged after {most_iterations} iterations: allow more or larger increments.",
+        f"maximise has not converged after {most_iterations} iterations: give more, "
+        f"most_iterations={10 * most_iterations}, or larger increments=.",
         tuple(f"iteration {number}: {step.score:.6g}" for number, step in enumerate(history)),
     )
 
