@@ -1,5 +1,6 @@
 """The levels of the reproduction: indentations as in the paper, and statements about their results."""
 
+from copy import deepcopy
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -21,8 +22,10 @@ from fingerpad.experiments.gerling2014 import (
     sphere_discrimination,
 )
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Verdict
+from fingerpad.experiments.gerling2014.firing_course import FiringCourse, _dynamic_share, _peak_ms
 from fingerpad.experiments.gerling2014.skin_force import SkinForce
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
+from fingerpad.experiments.gerling2014.statements import paired
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, Cylinder, Line, Sphere
@@ -31,6 +34,7 @@ from fingerpad.geometry.motion import RampAndHold
 from fingerpad.inference.start_points import increments, printed_starts, start_points
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SurfaceProfile
 from sections import (
@@ -138,8 +142,8 @@ def test_materials_of_the_conditions_reach_the_later_studies_but_not_the_trials(
         (lambda: Conditions(materials="humann"), "materials must be one of human, paper, .*got 'humann'"),
         (lambda: Conditions(seed=-1), "seed must be a whole number of at least 0: got -1"),
         (lambda: Conditions(seed=0.5), "seed must be a whole number: got 0.5"),
-        (lambda: Reproduction(Conditions(), "here", jobs=0), "jobs must be a whole number of at least 1"),
-        (lambda: Reproduction(Conditions(), "here", jobs=True), "jobs must be a whole number of at least 1"),
+        (lambda: Reproduction("here", jobs=0), "jobs must be a whole number of at least 1"),
+        (lambda: Reproduction("here", jobs=True), "jobs must be a whole number of at least 1"),
     ],
 )
 def test_unusable_conditions_are_refused(wrong, said):
@@ -622,6 +626,23 @@ def _area(x, y):
     return 0.5 * abs((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
 
 
+# When an afferent fires and what drives it
+
+
+def test_charges_of_both_terms_and_the_shortest_interval_are_those_of_closed_forms():
+    """SED rises by 2 kPa in 50 ms and stays: the terms have charges of 2 k_d and of 50 k_s in the ramp."""
+    sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], [50.0])
+    afferent = Afferent.from_parameters(
+        [1e-7, 2e-4, 1e-6, 60.0, 1e-6, 50.0], dynamic_quantity="stored", static_quantity="stored"
+    )
+    dynamic, static = 2e-4 * 2.0, 1e-6 * 0.5 * 2.0 * 50.0
+    ramp, hold = (_dynamic_share(sed, afferent, *phase) for phase in ((0.0, 50.0), (50.0, 1000.0)))
+    np.testing.assert_allclose(ramp, dynamic / (dynamic + static), rtol=1e-9)
+    np.testing.assert_allclose(hold, 0.0, atol=1e-12)
+    assert _peak_ms(np.array([3.0, 20.0, 31.0, 44.0])) == 31.0
+    assert np.isnan(_peak_ms(np.array([3.0])))
+
+
 # Paper beside ours
 
 
@@ -645,7 +666,8 @@ def good_results():
     dynamic = {"minimum_hz": 54.0, "maximum_hz": 212.0, "difference_hz": 158.0, "index": 0.6}
     static = {"minimum_hz": 5.0, "maximum_hz": 57.0, "difference_hz": 52.0, "index": 0.8}
     scores = {"fss_train": 0.85, "fss_test": 0.84}
-    climbs = [{"start": start, "runs": 1, "history": [], **scores} for start in (1, 2)]
+    history = [{"iteration": step, "fss": fss, "parameters": {}} for step, fss in enumerate((0.78, 0.85))]
+    climbs = [{"start": start, "runs": 1, "history": history, **scores} for start in (1, 2)]
     fold = {"start": 1, "testing_shift_mm": [], "fss_start": [0.7, 0.78], "parameters": {}, "climbs": climbs}
     rates = ("dynamic_rate_hz", "static_rate_hz", "observed_dynamic_rate_hz", "observed_static_rate_hz")
     return {
@@ -662,14 +684,23 @@ def good_results():
             "static_quantity": "stored",
             "parameters": {},
             "units": {},
-            "shift_mm": [],
-            **{name: [] for name in rates},
+            "shift_mm": [-0.1, 0.1],
+            **{name: [50.0, 60.0] if "static" in name else [90.0, 200.0] for name in rates},
             "start_points": [],
-            "folds": [{"fold": number, **fold, **scores} for number in range(1, 7)],
+            "folds": [{"fold": number, **deepcopy(fold), **scores} for number in range(1, 7)],
             "modulation": {
                 "dynamic": {"ours": dynamic, "observed": dynamic},
                 "static": {"ours": static, "observed": static},
             },
+        },
+        "firing": {
+            "peak_ms": [None, 35.0, 40.0, 20.0],
+            "window_ms": [30.0, 50.0],
+            "dynamic_share_ramp": [0.1, 0.8, 0.9, 0.7],
+            "dynamic_share_hold": [0.9, 0.1, 0.0, 0.2],
+            "sed_r2": 0.9,
+            "depth_mm": [1.0, 2.0],
+            "static_rate_by_depth_hz": [5.0, 20.0],
         },
         "discrimination": discrimination_section() | {"noise_sigma": 0.06},
         "nail": nail_section(),
@@ -685,6 +716,7 @@ def compared(results, materials="paper"):
         "skin_deflection": skin_deflection.SkinDeflectionResult,
         "skin_force": SkinForce,
         "single_unit": single_unit.SingleUnitResult,
+        "firing": FiringCourse,
         "discrimination": SphereDiscrimination,
         "nail": nail_border.NailBorder,
     }
@@ -694,12 +726,7 @@ def compared(results, materials="paper"):
 def test_a_good_run_meets_every_criterion_that_can_be_judged():
     found = rows(good_results())
     others = {name: row.verdict for name, row in found.items() if row.verdict is not Verdict.MET}
-    # The shifts of the paper's fold 3 are unknown, and it shows the border of the nail without a number.
-    assert [name.split()[0] for name, verdict in others.items() if verdict is Verdict.NOT_JUDGED] == [
-        "Fold",
-        "Von",
-    ]
-    assert len(others) == 2
+    assert others == {}
     assert len(compared(good_results())) == len(found) > 20
     for row in found.values():
         assert row.paper
@@ -724,15 +751,25 @@ OWN_R2 = "Tissues of the run, deflection under the cylinder, R²"
 PLATE = "Tissues of the run, force of a flat plate {} mm deep [N]"
 OUT_OF_SAMPLE = "Single unit, FSS out of sample (mean of six folds)"
 IN_SAMPLE = "Single unit, FSS in sample (all 36 shifts)"
-FOLD_3 = "Fold 3, start point 2: FSS at the start, fitted, of the testing set"
+FOLD_3 = "Start point 2, fold 3: FSS of the training set rises, and what it reaches"
+FOLD_3_TEST = "Start point 2, fold 3: FSS of the testing set"
+CORRELATES = "SED at the receptor correlates with the observed static rate, R²"
+DOMINATES = "The dynamic term dominates while the bar moves, the static term thereafter"
+WINDOW = "The window of 30-50 ms has the highest firing"
+EDGE = "The edge raises the static rate less than the dynamic rate [spikes/s]"
+MOVEMENT = "The response is more vigorous in the movement than in the hold, mean rate [spikes/s]"
+DEPTH = "The response grows with the depth, mean static rate under a flat plate [spikes/s]"
+NAIL = "Stress is concentrated at the border of the nail (von Mises, over that 2 to 3 mm away)"
+STATIC = "Static rate, difference [spikes/s]"
 NOISE = "Noise sigma_1 that fits Goodwin's two points"
 MODULATION = ("single_unit", "modulation", "dynamic", "ours")
 RISES = "Hit rate rises with curvature, {} Gradient Sum"
 HIT_RATE = "Hit rate at {} /m, static Gradient Sum at 0.0 mm and 0.2 mm, noise fitted"
-ORDER = "Order of the three trials: deflection of Trials 1 and 2 less that of Trial 3 [mm]"
-LATENCY = "Hit rates diverge with the 0.2 mm shift, latency, largest change by reading"
+ORDER = "Line load: Trial 1 overshoots and Trial 2 undershoots Trial 3, in both regions [mm]"
+LATENCY = "Hit rates diverge with the 0.2 mm shift, latency, largest change"
 BEST = "Static rates fit best, by root mean square distance to Goodwin's points"
-ROBUST = "Static hit rates with the 0.2 mm shift, largest change"
+ROBUST = "Robust to the 0.2 mm shift, static Gradient Sum, largest change of a hit rate"
+ROBUST_EUCLIDEAN = "Robust to the 0.2 mm shift, Euclidean Distance, largest change of a hit rate"
 DIVERGE = "Hit rates diverge with the 0.2 mm shift, {}, largest change"
 LOWERS = "More noise lowers the curve, smallest fall of the mean hit rate from one noise to the next"
 MATRICES = "10 noise matrices instead of 100 widen the error bars"
@@ -757,45 +794,46 @@ READINGS = ("discrimination", "reasons", "readings")
         (worse("skin_force", "plate_2mm_n", 0.499), {PLATE.format(2)}),
         (worse("single_unit", "fss_out_of_sample", 0.8099), {OUT_OF_SAMPLE}),
         (worse("single_unit", "fss_in_sample", 0.8199), {IN_SAMPLE}),
-        (worse("single_unit", "folds", 2, "fss_test", 0.1), set()),
-        (worse("single_unit", "folds", 3, "fss_test", 0.1), set()),
+        (worse("single_unit", "folds", 3, "climbs", 1, "fss_train", 0.81), {FOLD_3}),
+        (worse("firing", "sed_r2", 0.8), {CORRELATES}),
+        (worse("firing", "dynamic_share_ramp", [0.9, 0.4, 0.9, 0.3]), {DOMINATES}),
+        (worse("firing", "dynamic_share_hold", [0.1, 0.6, 0.1, 0.7]), {DOMINATES}),
+        (worse("firing", "peak_ms", [None, 29.0, 29.0, 40.0]), {WINDOW}),
+        (worse("firing", "peak_ms", [40.0, 51.0, 40.0, 60.0]), {WINDOW}),
+        (worse("firing", "static_rate_by_depth_hz", [20.0, 20.0]), {DEPTH}),
+        (worse("single_unit", "modulation", "static", "ours", "difference_hz", 159.0), {EDGE, STATIC}),
+        (worse("single_unit", "dynamic_rate_hz", [50.0, 60.0]), {MOVEMENT}),
+        (worse("nail", "ratio_range", [0.99, 3.0]), {NAIL}),
+        (worse(*STATISTICS, "shift", "euclidean", "value", 0.04), {ROBUST_EUCLIDEAN}),
         (worse("discrimination", "noise_sigma", 0.0661), {NOISE}),
         (worse("discrimination", "noise_sigma", 0.0439), {NOISE}),
         (worse(*MODULATION, "maximum_hz", 212 * 1.21), {"Dynamic rate, largest [spikes/s]"}),
         (worse(*MODULATION, "maximum_hz", 212 * 0.79), {"Dynamic rate, largest [spikes/s]"}),
         (worse(*MODULATION, "minimum_hz", 0.0), {"Dynamic rate, smallest under the flat face [spikes/s]"}),
-        (worse(*STATISTICS, "targets", 0, "at_goodwin", 0, "value", 0.549), {HIT_RATE.format(296)}),
-        (worse(*STATISTICS, "targets", 1, "at_goodwin", 0, "value", 0.611), {HIT_RATE.format(296)}),
-        (worse(*STATISTICS, "targets", 1, "at_goodwin", 1, "value", 0.919), {HIT_RATE.format(365)}),
-        (worse(*STATISTICS, "targets", 1, "largest_from_line", "value", 0.051), {LINE}),
-        (worse(*STATISTICS, "misfit_above_static", "latency", "value", 0.0019), {BEST}),
-        (worse(*STATISTICS, "shift", "static", "value", 0.031), {ROBUST}),
-        (worse(*STATISTICS, "shift", "dynamic", "value", 0.029), {DIVERGE.format("dynamic")}),
-        (worse(*STATISTICS, "shift_above_static", "dynamic", "value", 0.0), {DIVERGE.format("dynamic")}),
+        (worse(*STATISTICS, "targets", 0, "at_goodwin", 0, "value", 0.547), {HIT_RATE.format(296)}),
+        (worse(*STATISTICS, "targets", 1, "at_goodwin", 0, "value", 0.613), {HIT_RATE.format(296)}),
+        (worse(*STATISTICS, "targets", 1, "at_goodwin", 1, "value", 0.917), {HIT_RATE.format(365)}),
+        (worse(*STATISTICS, "targets", 1, "largest_from_line", "value", 0.053), {LINE}),
+        (worse(*STATISTICS, "misfit_above_static", "latency", "value", -0.0021), {BEST}),
+        (worse(*STATISTICS, "shift", "static", "value", 0.0321), {ROBUST}),
+        (worse(*STATISTICS, "shift", "dynamic", "value", 0.0279), {DIVERGE.format("dynamic")}),
+        (worse(*STATISTICS, "shift_above_static", "dynamic", "value", -0.0021), {DIVERGE.format("dynamic")}),
         (worse(*READINGS, 0, "misfit", 0.061), {BEST}),
         (worse(*READINGS, 0, "misfit", None), {BEST}),
         (worse(*READINGS, 2, "misfit", None), set()),
         (
-            worse(*STATISTICS, "smallest_rise", "static", 0, "value", 0.0019),
+            worse(*STATISTICS, "smallest_rise", "static", 0, "value", -0.0021),
             {RISES.format("static")},
-        ),
-        (
-            worse(*STATISTICS, "smallest_rise", "static", 0, "value", None),
-            {RISES.format("static")},
-        ),
-        (
-            worse(*STATISTICS, "smallest_rise", "latency", 1, "error", 0.1),
-            {RISES.format("latency")},
         ),
         (worse(*STATISTICS, "noise_lowers", "smallest_fall", "value", -0.02), {LOWERS}),
-        (worse(*STATISTICS, "ten_matrices", "ratio", "value", 1.001), {MATRICES}),
+        (worse(*STATISTICS, "ten_matrices", "ratio", "value", 0.997), {MATRICES}),
         (worse(*STATISTICS, "criterion", "ratio", "value", 0.9), {WIDER}),
         (worse(*STATISTICS, "criterion", "change", "value", 0.04), {LEAVES}),
-        (worse(*STATISTICS, "unsteadiness", "ratio", "error", 2.0), {STABLE}),
-        (worse(*STATISTICS, "misfit", "euclidean", "value", 0.051), {EUCLIDEAN}),
-        (worse(*STATISTICS, "misfit", "dynamic", "value", 0.015), {EUCLIDEAN}),
+        (worse(*STATISTICS, "unsteadiness", "ratio", "value", 0.5), {STABLE}),
+        (worse(*STATISTICS, "misfit", "euclidean", "value", 0.0521), {EUCLIDEAN}),
+        (worse(*STATISTICS, "misfit", "dynamic", "value", 0.01), {EUCLIDEAN}),
         (worse("skin_deflection", "trial1", "line", "deflection_mm", [2.0] * 25), {ORDER}),
-        (worse("skin_deflection", "trial2", "cylinder", "deflection_mm", [-1.0] * 25), {ORDER}),
+        (worse("skin_deflection", "trial2", "line", "deflection_mm", [-1.0] * 25), {ORDER}),
     ],
 )
 def test_a_number_made_worse_is_marked_as_a_miss_and_no_other(change, missed):
@@ -803,7 +841,26 @@ def test_a_number_made_worse_is_marked_as_a_miss_and_no_other(change, missed):
     change(results)
     found = rows(results)
     assert {name for name, row in found.items() if row.verdict is Verdict.MISSED} == missed
-    assert sum(row.verdict is Verdict.MET for row in found.values()) == len(found) - 2 - len(missed)
+    assert sum(row.verdict is Verdict.MET for row in found.values()) == len(found) - len(missed)
+
+
+@pytest.mark.parametrize(
+    ("change", "undecided"),
+    [
+        (worse(*STATISTICS, "shift", "static", "value", 0.0319), ROBUST),
+        (worse(*STATISTICS, "shift", "static", "value", 0.0281), ROBUST),
+        (worse(*STATISTICS, "targets", 1, "at_goodwin", 0, "value", 0.611), HIT_RATE.format(296)),
+        (worse(*STATISTICS, "smallest_rise", "latency", 1, "error", 0.1), RISES.format("latency")),
+        (worse(*STATISTICS, "misfit_above_static", "latency", "value", 0.0019), BEST),
+        (worse(*STATISTICS, "unsteadiness", "ratio", "error", 2.0), STABLE),
+        (worse("single_unit", "folds", 3, "climbs", 1, "fss_test", 0.1), FOLD_3_TEST),
+    ],
+)
+def test_a_number_within_two_errors_of_its_bound_is_not_decidable(change, undecided):
+    results = good_results()
+    change(results)
+    others = {name: row.verdict for name, row in rows(results).items() if row.verdict is not Verdict.MET}
+    assert others == {undecided: Verdict.NOT_DECIDABLE}
 
 
 def test_deflection_far_from_the_indenter_does_not_decide_between_trials():
@@ -841,22 +898,22 @@ def test_divergence_of_latencies_is_decided_where_readings_of_silent_receptors_a
     row = rows(results)[LATENCY]
     assert row.verdict is verdict
     for shift in shifts:
-        assert ("none" if shift is None else f"{shift:.3f}") in row.ours
+        assert ("none" if shift is None else f"{shift:.3f}") in row.note
 
 
-def test_fold_3_is_shown_without_a_verdict_and_without_a_start_point_that_a_fit_lacks():
+def test_the_session_of_fold_3_does_not_apply_to_a_fit_without_its_start_point():
     results = good_results()
-    row = rows(results)[FOLD_3]
-    assert (row.paper, row.ours, row.verdict) == (
-        "0.77, 0.82, 0.837",
-        "0.780, 0.850, 0.840",
-        Verdict.NOT_JUDGED,
-    )
-    fold = results["single_unit"]["folds"][2]
-    fold["climbs"], fold["fss_start"] = fold["climbs"][:1], [0.94]
-    row = rows(results)[FOLD_3]
-    assert (row.ours, row.verdict) == ("–, 0.850, 0.840", Verdict.NOT_JUDGED)
-    assert "no start point 2" in row.note
+    assert rows(results)[FOLD_3].ours == "from 0.78-0.78 to at least 0.85"
+    assert rows(results)[FOLD_3_TEST].ours == "0.84 to 0.84"
+    both = paired(compared(results), compared(results, "human"))
+    results["single_unit"]["method"] = "rates and hit rates"
+    human = paired(compared(good_results()), compared(results, "human"))
+    (absent,) = (each for each in human if each.statement == FOLD_3)
+    assert (absent.human, absent.verdict_human) == ("–", Verdict.NOT_APPLICABLE)
+    assert (absent.paper, absent.verdict_paper) == ("from 0.78-0.78 to at least 0.85", Verdict.MET)
+    assert len(human) == len(both)
+    sections = [[int(part) for part in each.section.split(".")] for each in both]
+    assert sections == sorted(sections)
 
 
 def test_what_was_fitted_depends_on_the_tissues_and_on_the_fit():

@@ -300,7 +300,7 @@ def _firing(unit: SingleUnitResult, found: FiringCourse) -> list[ClaimRow]:
             "well",
             f"{found.sed_r2:.2f}",
             found.sed_r2 >= WELL_R2,
-            f"judged: at least {WELL_R2:g}; line through 36 shifts, mean of the static window",
+            f"judged: at least {WELL_R2:g}; line through 36 shifts, middle of the static window",
         ),
         (
             "2.1.2",

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from scipy.interpolate import interp1d
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Number, Vector, result_class
@@ -32,7 +33,7 @@ class FiringCourse:
     dynamic_share_hold: Vector
     """The same in the hold, (n_shifts,). [1]"""
     sed_r2: Number
-    """R² of the line from SED in the hold to the observed static rates. [1]"""
+    """R² of the line from SED in the middle of the static window to the observed static rates. [1]"""
     depth_mm: Vector
     """Depths of a flat plate, (n_depths,). [mm]"""
     static_rate_by_depth_hz: Vector
@@ -60,14 +61,14 @@ def firing_course(
     """
     observed, (dynamic_ms, static_ms) = bar_firing_rates(), PAPER_WINDOWS_MS
     population = Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0))
-    in_hold = (sed.times_ms >= static_ms[0]) & (sed.times_ms <= static_ms[1])
+    in_hold = interp1d(sed.times_ms, sed.sed_kpa, axis=0)(0.5 * (static_ms[0] + static_ms[1]))
     ramp_ms, end_ms = protocol.RAMP.value, float(drive.times_ms[-1])
     return FiringCourse(
         peak_ms=np.array([_peak_ms(train) for train in afferent.spikes(drive)]),
         window_ms=(dynamic_ms[0], dynamic_ms[1]),
         dynamic_share_ramp=_dynamic_share(drive, afferent, 0.0, ramp_ms),
         dynamic_share_hold=_dynamic_share(drive, afferent, ramp_ms, end_ms),
-        sed_r2=float(np.corrcoef(sed.sed_kpa[in_hold].mean(axis=0), observed.static_rate_hz)[0, 1] ** 2),
+        sed_r2=float(np.corrcoef(in_hold, observed.static_rate_hz)[0, 1] ** 2),
         depth_mm=np.array(PLATE_DEPTHS_MM),
         static_rate_by_depth_hz=np.array(
             [population.respond(pressed[plate(depth)]).static_rate_hz.mean() for depth in PLATE_DEPTHS_MM]
