@@ -13,12 +13,21 @@ from typing import TypeVar
 
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.results import Number, Vector, from_json, read_results, result_class
-from fingerpad.experiments.gerling2014.claim_row import ClaimRow
+from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group
 from fingerpad.experiments.gerling2014.discrepancy import CriterionErrorBars
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
-from fingerpad.experiments.gerling2014.summary import Summary
-from fingerpad.report.comparison import comparison_tables, verdict_text
+from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
+from fingerpad.experiments.gerling2014.statements import Statement
+from fingerpad.experiments.gerling2014.summary import Summaries
+from fingerpad.report.comparison import (
+    comparison_tables,
+    count_sentence,
+    notes_table,
+    side_by_side,
+    statement_cells,
+    statement_table,
+)
 from fingerpad.report.discrimination import criterion_table
 from fingerpad.report.formatting import ABSENT, fixed, number
 from fingerpad.report.parts import Chapter, Paragraph
@@ -33,20 +42,6 @@ from studies.pages.markdown import markdown_table as table
 COMMAND = "python -m studies results"
 Kind = TypeVar("Kind")
 README_START, README_END = f"<!-- {COMMAND} writes this table -->", "<!-- end of the table -->"
-
-README_ROWS = (
-    ("skin", "Trial 3, deflection under the cylinder, R²"),
-    ("skin", "Tissues of the run, force of a flat plate 2 mm deep [N]"),
-    ("skin", "Order of the three trials: deflection of Trials 1 and 2 less that of Trial 3 [mm]"),
-    ("afferent", "Single unit, FSS out of sample (mean of six folds)"),
-    ("afferent", "Dynamic rate, largest [spikes/s]"),
-    ("afferent", "Static rate, difference [spikes/s]"),
-    ("percept", "Hit rate at 296 /m, static Gradient Sum at 0.0 mm and 0.2 mm, noise fitted"),
-    ("percept", "Hit rate at 365 /m, static Gradient Sum at 0.0 mm and 0.2 mm, noise fitted"),
-    ("percept", "Noise sigma_1 that fits Goodwin's two points"),
-    ("percept", "Static hit rates with the 0.2 mm shift, largest change"),
-)
-"""Rows of the README's table: the level, and the quantity as the comparison names it."""
 
 
 @result_class
@@ -127,24 +122,23 @@ class Percept:
 class Excerpt:
     """What of a run the pages show.
 
-    `summaries` holds a few plain numbers of this run and of runs with other tissues, by their names;
-    `indentations` counts them by part of the run; `single_unit` is the fit to the rates, fold by fold;
-    `criterion` has the error bars of a varied criterion.
+    Dictionaries go by the two sets, `paper` and `human`. `indentations` counts them by part of the run;
+    `single_unit` is the fit to the rates, fold by fold; `criterion` has the error bars of a varied criterion.
     """
 
     version: str
     resolution: str
-    materials: str
     seed: int
-    summaries: dict[str, Summary]
+    summary: Summaries
     indentations: dict[str, int]
-    comparison: tuple[ClaimRow, ...]
-    single_unit: SingleUnitResult
+    statements: tuple[Statement, ...]
+    comparison: dict[str, tuple[ClaimRow, ...]]
+    single_unit: dict[str, SingleUnitResult]
     methods: tuple[Method, ...]
     models: tuple[Model, ...]
     drives: tuple[Drive, ...]
-    percept: Percept
-    criterion: CriterionErrorBars
+    percept: dict[str, Percept]
+    criterion: dict[str, CriterionErrorBars]
 
 
 def read_excerpt(
@@ -152,7 +146,6 @@ def read_excerpt(
     methods: Path | None = None,
     drives: Path | None = None,
     before: Excerpt | None = None,
-    others: Sequence[Path] = (),
 ) -> Excerpt:
     """Take from the results of `fingerpad reproduce --extended` what the pages show.
 
@@ -166,8 +159,6 @@ def read_excerpt(
         The drives.json of `python -m studies drives`.
     before : Excerpt, optional
         What the pages show now; they keep those of its rows that no file replaces.
-    others : sequence of Path, optional
-        results.json of runs with other tissues, for their summaries.
 
     Raises
     ------
@@ -182,10 +173,7 @@ def read_excerpt(
         shown = replace(shown, methods=before.methods, models=before.models)
     if before is not None and driven is None:
         shown = replace(shown, drives=before.drives)
-    further = [read_results(other, ReproductionResult) for other in others]
-    kept = {} if before is None else before.summaries
-    named = {each.manifest.materials: each.summary for each in further}
-    return replace(shown, summaries=kept | named | shown.summaries)
+    return shown
 
 
 def _studied(path: Path, kind: type[Kind], study: str) -> Kind:
@@ -199,20 +187,16 @@ def excerpt(
     results: ReproductionResult, compared: FitMethods | None = None, drives: DriveResult | None = None
 ) -> Excerpt:
     """Pick from whole results what the pages show; what a run did not compute stays empty."""
-    found, manifest = results.discrimination, results.manifest
-    codes = {
-        f"Gradient Sum, {phase}": found.gradient_sum[phase] for phase in ("static", "dynamic", "latency")
-    }
-    codes["Euclidean Distance, static"] = found.euclidean["static"]
+    manifest, sets = results.manifest, {"paper": results.paper, "human": results.human}
     return Excerpt(
         version=manifest.version,
         resolution=manifest.resolution,
-        materials=manifest.materials,
         seed=manifest.seed,
-        summaries={manifest.materials: results.summary},
+        summary=results.summary,
         indentations={stage.name: stage.indentations for stage in manifest.stages if stage.indentations},
-        comparison=results.comparison,
-        single_unit=results.single_unit,
+        statements=results.statements,
+        comparison={name: found.comparison for name, found in sets.items()},
+        single_unit={name: found.single_unit for name, found in sets.items()},
         methods=tuple(
             Method(
                 method=row.method,
@@ -247,20 +231,27 @@ def excerpt(
             )
             for candidate in (drives.candidates if drives else ())
         ),
-        percept=Percept(
-            standard_per_m=found.curvature_per_m[0],
-            curvature_per_m=found.curvature_per_m[1:],
-            codes=tuple(
-                HitRates(code=name, hit_rate=rates.hit_rate, hit_rate_shifted=rates.hit_rate_shifted)
-                for name, rates in codes.items()
-            ),
-            noise_sigma=found.noise_sigma,
-            people_curvature_per_m=found.goodwin.curvature_per_m,
-            people=found.goodwin.hit_rate,
-            people_low=found.goodwin.low,
-            people_high=found.goodwin.high,
+        percept={name: _percept(found.discrimination) for name, found in sets.items()},
+        criterion={name: found.discrimination.reasons.criterion for name, found in sets.items()},
+    )
+
+
+def _percept(found: SphereDiscrimination) -> Percept:
+    measured = [phase for phase in ("static", "dynamic", "latency") if phase in found.gradient_sum]
+    codes = {f"Gradient Sum, {phase}": found.gradient_sum[phase] for phase in measured}
+    codes["Euclidean Distance, static"] = found.euclidean["static"]
+    return Percept(
+        standard_per_m=found.curvature_per_m[0],
+        curvature_per_m=found.curvature_per_m[1:],
+        codes=tuple(
+            HitRates(code=name, hit_rate=rates.hit_rate, hit_rate_shifted=rates.hit_rate_shifted)
+            for name, rates in codes.items()
         ),
-        criterion=found.reasons.criterion,
+        noise_sigma=found.noise_sigma,
+        people_curvature_per_m=found.goodwin.curvature_per_m,
+        people=found.goodwin.hit_rate,
+        people_low=found.goodwin.low,
+        people_high=found.goodwin.high,
     )
 
 
@@ -270,14 +261,14 @@ def results_page(shown: Excerpt) -> str:
         "# Results of the reproduction",
         "The numbers on this page come from one run of "
         f"`fingerpad reproduce --resolution {shown.resolution} --extended` "
-        f"(fingerpad {shown.version}, tissues {shown.materials}, seed {shown.seed}). "
+        f"(fingerpad {shown.version}, seed {shown.seed}). "
         f"`{COMMAND}` writes the page from `results.json`; do not edit it by hand. Other pages link to it. "
         "The times are in the [benchmarks](../benchmarks/README.md).",
-        "## Summary by set of tissues",
+        "## Summary of both sets",
         "The paper's value, or that of people, beside each set with its own drive and its own fit "
         "([which and why](decisions/paper-and-human.md)). The deflection and the force chose the moduli. The "
         "noise and the hit rates chose the afferent of the set `human`.",
-        _summaries(shown.summaries),
+        _summaries(shown.summary),
         "## Indentations",
         _indentations(shown.indentations),
         *map(
@@ -285,11 +276,22 @@ def results_page(shown: Excerpt) -> str:
             markdown_blocks(
                 Chapter(
                     "This run and the paper",
-                    [Paragraph(GROUPS), *comparison_tables(shown.comparison, brief=True)],
+                    [
+                        Paragraph(GROUPS),
+                        statement_table(shown.statements),
+                        notes_table(*shown.comparison.values()),
+                        *comparison_tables(*shown.comparison.values()),
+                    ],
                 )
             ),
         ),
-        *markdown_blocks(Chapter("One afferent under the bar", single_unit_tables(shown.single_unit))),
+        *(
+            block
+            for name, unit in shown.single_unit.items()
+            for block in markdown_blocks(
+                Chapter(f"One afferent under the bar, `{name}`", single_unit_tables(unit))
+            )
+        ),
         "## FSS by method of fitting",
         "Fractional sum of squares (FSS, Eqs. 12-14) of one afferent under the bar. "
         "Out of sample: mean of six folds. From `python -m studies methods`, on the same recordings. "
@@ -305,11 +307,17 @@ def results_page(shown: Excerpt) -> str:
         "([discussion](single-unit.md#quantities-that-drive-the-afferent)).",
         _drives(shown.drives),
         "## Hit rates",
-        f"Hit rate of each sphere against one of {number(shown.percept.standard_per_m)} /m. "
-        f"The noise, {fixed(shown.percept.noise_sigma, 3)}, is fitted to the two observed hit rates "
+        "Hit rate of each sphere against one of 287 /m. The noise is fitted to the two observed hit rates "
         "with the static Gradient Sum ([decision](decisions/noise-fitted.md)); all codes use it.",
-        _hit_rates(shown.percept),
-        *markdown_blocks(Chapter("Varied criterion", [criterion_table(shown.criterion)])),
+        *(
+            f"### `{name}`, noise {fixed(percept.noise_sigma, 3)}\n\n{_hit_rates(percept)}"
+            for name, percept in shown.percept.items()
+        ),
+        *(
+            block
+            for name, bars in shown.criterion.items()
+            for block in markdown_blocks(Chapter(f"Varied criterion, `{name}`", [criterion_table(bars)]))
+        ),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 
@@ -357,16 +365,21 @@ SUMMARY_ROWS = (
 """Field, name, value of the paper or of people, whether it was fitted or chosen in sample, and digits."""
 
 
-def _summaries(summaries: Mapping[str, Summary]) -> str:
+def _summaries(summary: Summaries) -> str:
     def shown(value: object, digits: int) -> str:
         values = value if isinstance(value, tuple) else (value,)
         return ", ".join(fixed(each, digits) for each in values)
 
     rows = [
-        (name, paper, *(shown(getattr(summary, field), digits) for summary in summaries.values()), basis)
+        (
+            name,
+            paper,
+            *(shown(getattr(each, field), digits) for each in (summary.paper, summary.human)),
+            basis,
+        )
         for field, name, paper, basis, digits in SUMMARY_ROWS
     ]
-    columns = ("quantity", "paper or people", *(f"`{name}`" for name in summaries), "fitted or predicted")
+    columns = ("quantity", "paper or people", "`paper`", "`human`", "fitted or predicted")
     return table(columns, rows)
 
 
@@ -446,23 +459,69 @@ def _hit_rates(percept: Percept) -> str:
 
 
 def readme_table(shown: Excerpt) -> str:
-    """Return the table of the README.
+    """Return the table of the README: every statement that can fail, with both sets."""
+    found = statement_table(shown.statements)
+    return table(tuple(found.columns), [tuple(row.cells) for row in found.rows])
 
-    Raises
-    ------
-    InputError
-        If the comparison lacks a row of `README_ROWS`.
-    """
-    rows = {row.quantity: row for row in shown.comparison}
-    if missing := [quantity for _, quantity in README_ROWS if quantity not in rows]:
-        raise InputError(f"The comparison must hold the rows of README_ROWS: it lacks {', '.join(missing)}.")
-    return table(
-        ("level", "quantity", "paper", "here", "verdict"),
-        [
-            (level, quantity, rows[quantity].paper, rows[quantity].ours, verdict_text(rows[quantity]))
-            for level, quantity in README_ROWS
-        ],
-    )
+
+SECTIONS = {
+    "2.1.1": ("Skin mechanics sub-model", "Mesh, layers and depth of the receptor are inputs here."),
+    "2.1.2": (
+        "Receptor membrane transduction sub-model",
+        "Eqs. 1 and 2 are implemented as printed, but for h.",
+    ),
+    "2.1.3": (
+        "Neural dynamics sub-model",
+        "Eqs. 3 to 5 are solved exactly; the paper's Runge-Kutta is an option.",
+    ),
+    "2.1.4": ("Populations of receptors", "Layout and density are inputs."),
+    "2.2.1": ("Skin mechanics validation", "Protocol; what it found is in 3.1."),
+    "2.2.2": (
+        "Single-unit fitting",
+        "Eqs. 6 to 14, folds and response surfaces as printed; results are in 3.2.",
+    ),
+    "2.2.3": ("Population validation", "Protocol; people's 0.58 and 0.95 are inputs. Results are in 3.3."),
+    "3.1": ("Skin mechanics validation, results", ""),
+    "3.2": ("Single-unit fitting, results", ""),
+    "3.3": ("Population validation, results", ""),
+    "4": ("Discussion", ""),
+    "4.2": ("Metrics of single-unit coding", ""),
+    "4.3": ("Other sources of information", ""),
+    "4.4": ("Model limitations", ""),
+}
+"""Sections of the paper that state something of the model: title, and what of it cannot fail here."""
+
+
+KINDS_OF_ROWS = {
+    Group.FITTED: "fitted or chosen in sample",
+    Group.DEFINITION: "follows from definitions",
+    Group.ADDITION: "our own addition",
+}
+
+
+def paper_page(shown: Excerpt) -> str:
+    """Return docs/paper.md: the paper section by section, each statement with the verdict of both sets."""
+    columns = ("statement", "the paper", "`paper`", "", "`human`", "")
+    rows: dict[str, list[tuple[str, ...]]] = {section: [] for section in SECTIONS}
+    for each in shown.statements:
+        rows[each.section].append(statement_cells(each))
+    for first, row in side_by_side(*shown.comparison.values()):
+        if first.section:
+            quantity, *cells, _ = row.cells
+            rows[first.section].append((f"{quantity} ({KINDS_OF_ROWS[first.group]})", *cells))
+    parts = [
+        "# The paper, section by section",
+        "Gerling et al. 2014. Every statement that the run judges, where the paper makes it, with our value "
+        f"and verdict of both sets; from the same run as [results](results.md), written by `{COMMAND}`. "
+        f"{_counts(shown.statements)}",
+    ]
+    for section, (title, told) in SECTIONS.items():
+        parts += [f"## {section} {title}", told, table(columns, rows[section]) if rows[section] else ""]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _counts(statements: Sequence[Statement]) -> str:
+    return " ".join(count_sentence(statements, name) for name in ("paper", "human"))
 
 
 def with_table(readme: str, shown: Excerpt) -> str:

@@ -13,11 +13,10 @@ from studies import chain_picture
 from studies.command_line_page import command_line_page
 from studies.results_page import (
     README_END,
-    README_ROWS,
     README_START,
     Excerpt,
     read_excerpt,
-    readme_table,
+    paper_page,
     results_page,
     with_table,
 )
@@ -51,23 +50,25 @@ def test_the_page_of_tissues_is_written_from_their_numbers():
     assert page("docs/tissues.md") == tissue_page()
 
 
+def test_the_page_of_the_paper_has_every_statement_and_every_section(shown):
+    written = page("docs/paper.md")
+    assert written == paper_page(shown)
+    assert all(f"| {each.statement} |" in written for each in shown.statements)
+
+
 def test_a_changed_number_changes_the_table_and_nothing_else_of_the_readme(shown):
-    rows = [
-        replace(row, ours="changed") if row.quantity == README_ROWS[0][1] else row for row in shown.comparison
-    ]
+    first, *others = shown.statements
     readme = f"before\n{README_START}\n| old |\n{README_END}\nafter\n"
-    written = with_table(readme, replace(shown, comparison=tuple(rows)))
-    assert written.startswith(f"before\n{README_START}\n| level |")
+    written = with_table(readme, replace(shown, statements=(replace(first, human="changed"), *others)))
+    assert written.startswith(f"before\n{README_START}\n| section |")
     assert written.endswith(f"{README_END}\nafter\n")
     assert "| changed |" in written
     assert "| old |" not in written
 
 
-def test_a_readme_without_its_marks_and_a_comparison_without_its_rows_are_refused(shown):
+def test_a_readme_without_its_marks_is_refused(shown):
     with pytest.raises(InputError, match=r"README\.md must hold"):
         with_table("no marks", shown)
-    with pytest.raises(InputError, match="lacks Trial 3"):
-        readme_table(replace(shown, comparison=()))
 
 
 def test_files_that_are_missing_or_of_another_kind_are_refused(tmp_path):
@@ -86,11 +87,12 @@ def test_the_picture_shows_the_hit_rates_of_the_run_and_all_axes_have_names(show
         settings=fp.PressSettings(ramp_steps=3, hold_steps=2),
     )
     response = fp.Population.grid(density_per_cm2=100).respond(skin)
-    figure = chain_picture.draw(skin, response, shown.percept)
+    percept = shown.percept["human"]
+    figure = chain_picture.draw(skin, response, percept)
     section, curve, motion, spikes, _ = figure.axes
     model, *_ = curve.lines
     assert model.get_xydata().tolist() == list(
-        map(list, zip(shown.percept.curvature_per_m, shown.percept.codes[0].hit_rate, strict=True))
+        map(list, zip(percept.curvature_per_m, percept.codes[0].hit_rate, strict=True))
     )
     assert all(axes.get_xlabel() and axes.get_ylabel() for axes in (section, curve, spikes))
     assert motion.get_ylabel() == "depth\n[mm]"

@@ -12,7 +12,8 @@ from fingerpad.core.results import from_json, to_json
 
 ROOT = Path(__file__).parents[2]
 README, DOCS = ROOT / "README.md", ROOT / "docs"
-PAGE, NUMBERS, PICTURE = DOCS / "results.md", DOCS / "results.json", DOCS / "images" / "chain.png"
+PAGE, PAPER = DOCS / "results.md", DOCS / "paper.md"
+NUMBERS, PICTURE = DOCS / "results.json", DOCS / "images" / "chain.png"
 COMMANDS, TISSUES = DOCS / "command-line.md", DOCS / "tissues.md"
 
 
@@ -29,31 +30,29 @@ def results_command(
         Path | None,
         typer.Option(help="drives.json of `python -m studies drives`. Default: keep the rows shown now."),
     ] = None,
-    others: Annotated[
-        list[Path] | None,
-        typer.Option("--other", help="results.json of a run with other tissues, for its summary."),
-    ] = None,
     picture: Annotated[
         bool, typer.Option(help="Also press the standard sphere and draw the README's picture.")
     ] = True,
 ) -> None:
-    """Write docs/results.md, docs/command-line.md, docs/tissues.md, and table and picture of the README."""
+    """Write the pages results, paper, command-line and tissues of docs, and table and picture of the README."""
     from fingerpad.report.style import write_png
     from studies import chain_picture, command_line_page, results_page, tissue_page
 
     shown = from_json(results_page.Excerpt, NUMBERS.read_bytes())
     if results is not None:
-        shown = results_page.read_excerpt(results, methods, drives, shown, others or ())
+        shown = results_page.read_excerpt(results, methods, drives, shown)
     readme = results_page.with_table(README.read_text(encoding="utf-8"), shown)
     write_atomically(NUMBERS, to_json(shown) + b"\n")
     write_atomically(PAGE, results_page.results_page(shown).encode())
+    write_atomically(PAPER, results_page.paper_page(shown).encode())
     write_atomically(README, readme.encode())
     write_atomically(COMMANDS, command_line_page.command_line_page().encode())
     write_atomically(TISSUES, tissue_page.tissue_page().encode())
-    written = [NUMBERS, PAGE, README, COMMANDS, TISSUES]
+    written = [NUMBERS, PAGE, PAPER, README, COMMANDS, TISSUES]
     if picture:
-        skin, response = chain_picture.touched(shown.percept.standard_per_m, shown.resolution)
-        write_png(lambda parts: chain_picture.draw(*parts), (skin, response, shown.percept), PICTURE)
+        percept = shown.percept["human"]
+        skin, response = chain_picture.touched(percept.standard_per_m, shown.resolution)
+        write_png(lambda parts: chain_picture.draw(*parts), (skin, response, percept), PICTURE)
         written.append(PICTURE)
     for path in written:
         typer.echo(f"Written: {path.relative_to(ROOT)}")

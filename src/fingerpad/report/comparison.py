@@ -1,13 +1,12 @@
-"""The paper beside a run: one table of counts, and one table of rows per group."""
+"""The paper beside a run: its statements that can fail, then one table per group of further rows."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import takewhile
 
-from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Verdict, count_by_verdict
-from fingerpad.experiments.gerling2014.statements import Statement
-from fingerpad.report.formatting import joined, plain
+from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Verdict
+from fingerpad.experiments.gerling2014.statements import ABSENT, Statement
+from fingerpad.report.formatting import joined
 from fingerpad.report.parts import Kind, Row, Table
 
 SIGNS = {
@@ -46,24 +45,54 @@ MEANINGS = {
 }
 
 
-def verdict_text(row: ClaimRow) -> str:
-    """Return sign and verdict of a row, under which reading, and whether the number was fitted."""
-    fitted = "(fitted)" if row.group is Group.FITTED else ""
-    return " ".join(text for text in (SIGNS[row.verdict], row.verdict.value, row.reading, fitted) if text)
-
-
-def comparison_tables(rows: Sequence[ClaimRow], brief: bool = False) -> list[Table]:
-    """Return the counts by group and verdict, then the rows of each group.
+def side_by_side(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> list[tuple[ClaimRow, Row]]:
+    """Return the rows that are no statement, each with its cells for both sets.
 
     Parameters
     ----------
-    rows : sequence of ClaimRow
-        The comparison.
-    brief : bool, optional
-        Whether to leave out the differences and the status of the inputs.
+    paper, human : sequence of ClaimRow
+        The comparison of each set.
     """
-    by_group = {group: [row for row in rows if row.group is group] for group in Group}
-    return [_counts(rows), *(_of_group(group, found, brief) for group, found in by_group.items() if found)]
+    by_name = [{row.quantity: row for row in rows} for rows in (paper, human)]
+    stated = {row.quantity for row in (*paper, *human) if row.group is Group.STATEMENT}
+    names = dict.fromkeys(row.quantity for row in (*paper, *human) if row.quantity not in stated)
+    return [_side_by_side([found.get(name) for found in by_name]) for name in names]
+
+
+def _side_by_side(both: Sequence[ClaimRow | None]) -> tuple[ClaimRow, Row]:
+    known = [row for row in both if row is not None]
+    cells = [known[0].quantity, known[0].paper]
+    for row in both:
+        cells += [ABSENT, ""] if row is None else [row.ours, _marked(row.verdict, row.fitted_to)]
+    told = dict.fromkeys("; ".join(text for text in (row.fitted_to, row.note) if text) for row in known)
+    # A number that one set was fitted to is shown as fitted.
+    first = min(known, key=lambda row: row.group is not Group.FITTED)
+    return first, Row((*cells, " | ".join(told)), KINDS[known[0].verdict])
+
+
+def comparison_tables(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> list[Table]:
+    """Return one table per group of rows that are no statement, both sets side by side."""
+    rows = side_by_side(paper, human)
+    columns = ("quantity", "the paper", "`paper`", "", "`human`", "", "what was fitted, and how it is judged")
+    return [
+        Table(TITLES[group], columns, [row for first, row in rows if first.group is group], MEANINGS[group])
+        for group in (Group.FITTED, Group.DEFINITION, Group.ADDITION)
+    ]
+
+
+def notes_table(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> Table:
+    """Return how each statement that can fail was judged, and what was fitted before, set by set."""
+    rows: dict[str, list[str]] = {}
+    for name, found in (("`paper`", paper), ("`human`", human)):
+        for row in found:
+            if row.group is Group.STATEMENT:
+                rows.setdefault(row.quantity, []).append(f"{name}: {row.note}")
+    return Table(
+        "How the statements are judged",
+        ("statement", "note"),
+        [Row((quantity, "; ".join(notes))) for quantity, notes in rows.items()],
+        MEANINGS[Group.STATEMENT],
+    )
 
 
 def count_sentence(statements: Sequence[Statement], name: str) -> str:
@@ -89,90 +118,21 @@ def statement_table(statements: Sequence[Statement]) -> Table:
     return Table(
         TITLES[Group.STATEMENT],
         ("section", "statement", "the paper", "`paper`", "", "`human`", ""),
-        [
-            Row(
-                (
-                    each.section,
-                    each.statement,
-                    each.published,
-                    each.paper,
-                    _marked(each.verdict_paper, each.fitted_paper),
-                    each.human,
-                    _marked(each.verdict_human, each.fitted_human),
-                ),
-                KINDS[each.verdict_paper],
-            )
-            for each in statements
-        ],
+        [Row((each.section, *statement_cells(each)), KINDS[each.verdict_paper]) for each in statements],
         "`paper` is the paper's own system: Trial 3 with a Poisson's ratio of 0.40, strain energy density in "
         "both terms, response surfaces. `human` serves all three levels.",
     )
 
 
+def statement_cells(each: Statement) -> tuple[str, ...]:
+    """Return what the paper says, and our value and verdict of both sets."""
+    paper, human = (
+        (getattr(each, name), _marked(getattr(each, f"verdict_{name}"), getattr(each, f"fitted_{name}")))
+        for name in ("paper", "human")
+    )
+    return each.statement, each.published, *paper, *human
+
+
 def _marked(verdict: Verdict, fitted: str) -> str:
     """Sign and words of a verdict, and whether something was fitted to it."""
     return f"{SIGNS[verdict]} {verdict.value}" + (" (fitted)" if fitted else "")
-
-
-def verdict_sentence(rows: Sequence[ClaimRow]) -> str:
-    """Return the counts of statements that can fail, with what was missed, and those of fitted numbers."""
-    missed = [
-        f"{row.quantity} ({row.ours}, the paper {row.paper})"
-        for row in rows
-        if row.group is Group.STATEMENT and row.verdict is Verdict.MISSED
-    ]
-    text = f"Of the statements of the paper that can fail, {_counted(rows, Group.STATEMENT)}."
-    if missed:
-        text += f" Missed: {'; '.join(missed)}."
-    return text + (
-        f" Of the numbers that were fitted or chosen in sample, {_counted(rows, Group.FITTED)}; these are no "
-        "predictions."
-    )
-
-
-def _counted(rows: Sequence[ClaimRow], group: Group) -> str:
-    counts = count_by_verdict(rows, group)
-    always = (Verdict.MET, Verdict.MISSED)
-    return joined(
-        [f"{count} {verdict.value}" for verdict, count in counts.items() if count or verdict in always]
-    )
-
-
-def _counts(rows: Sequence[ClaimRow]) -> Table:
-    return Table(
-        "Rows by group and verdict",
-        ("group", *(f"{SIGNS[verdict]} {verdict.value}" for verdict in Verdict)),
-        [
-            Row((TITLES[group], *(plain(count) for count in count_by_verdict(rows, group).values())))
-            for group in Group
-        ],
-    )
-
-
-def _of_group(group: Group, rows: Sequence[ClaimRow], brief: bool) -> Table:
-    """Return the rows of one group; what was fitted has a column where something was.
-
-    The status that all rows share stands once, below the table.
-    """
-    shared = "; ".join(_leading([row.status.split("; ") for row in rows]))
-    own = [row.status.removeprefix(shared).removeprefix("; ") for row in rows]
-    show = any(own) and not brief
-
-    def cells(row: ClaimRow, status: str) -> dict[str, str]:
-        found = {"quantity": row.quantity, "verdict": verdict_text(row)}
-        found |= {"paper": row.paper, "this run": row.ours}
-        found |= {} if brief else {"difference": row.difference}
-        found |= {"what was fitted": row.fitted_to} if group is Group.FITTED else {}
-        found |= {"status of further inputs" if shared else "status of the inputs": status} if show else {}
-        return found | {"note": row.note}
-
-    found = [cells(row, status) for row, status in zip(rows, own, strict=True)]
-    listed = [Row(tuple(each.values()), KINDS[row.verdict]) for each, row in zip(found, rows, strict=True)]
-    note = f" Status of the inputs of all rows: {shared}." if shared and not brief else ""
-    return Table(TITLES[group], tuple(found[0]), listed, MEANINGS[group] + note)
-
-
-def _leading(lists: Sequence[Sequence[str]]) -> list[str]:
-    """Return the parts that all lists begin with."""
-    together = takewhile(lambda parts: len(set(parts)) == 1, zip(*lists, strict=False))
-    return [part for part, *_ in together]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fingerpad.data import STATUSES
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult, SetResult
-from fingerpad.report.comparison import comparison_tables, count_sentence, statement_table
+from fingerpad.report.comparison import comparison_tables, count_sentence, notes_table, statement_table
 from fingerpad.report.curvature_thresholds import caption_thresholds, draw_thresholds, threshold_tables
 from fingerpad.report.discrimination import (
     caption_criterion,
@@ -95,6 +95,13 @@ def reproduction_page(result: ReproductionResult) -> Page:
             ),
             *_levels("paper", result.paper),
             *_levels("human", result.human),
+            Chapter(
+                "Further numbers beside the paper",
+                [
+                    notes_table(result.paper.comparison, result.human.comparison),
+                    *comparison_tables(result.paper.comparison, result.human.comparison),
+                ],
+            ),
             Chapter("Published numbers used", input_tables(result.inputs)),
             manifest_chapter(result.manifest),
         ],
@@ -153,7 +160,6 @@ def _levels(name: str, result: SetResult) -> list[Chapter]:
             (12, "curvature_thresholds", "Thresholds of curvature", draw_thresholds, caption_thresholds),
         ),
     }
-    chapters["Comparison"] = comparison_tables(result.comparison)
     return [
         Chapter(f"{name}: {title}", [_of_set(part, name) for part in parts])
         for title, parts in chapters.items()

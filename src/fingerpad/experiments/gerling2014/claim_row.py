@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from enum import StrEnum
 
 from fingerpad.core.results import result_class
@@ -58,8 +57,6 @@ class ClaimRow:
         How far the inputs can be trusted.
     verdict : Verdict
         Whether the claim is met.
-    reading : str
-        Under which reading of the paper the verdict holds; empty where there is one reading.
     fitted_to : str
         What was fitted to the observed number, or chosen by it. Rows of the group `FITTED` have it, and no
         others.
@@ -88,7 +85,6 @@ class ClaimRow:
     difference: str = ""
     status: str = ""
     verdict: Verdict
-    reading: str = ""
     fitted_to: str = ""
     note: str = ""
 
@@ -103,21 +99,6 @@ class ClaimRow:
 def judged(met: bool) -> Verdict:
     """Return the verdict of a criterion that holds or does not."""
     return Verdict.MET if met else Verdict.MISSED
-
-
-def count_by_verdict(rows: Sequence[ClaimRow], group: Group) -> dict[Verdict, int]:
-    """Count the rows of one group by their verdict; all verdicts are counted.
-
-    Examples
-    --------
-    >>> row = ClaimRow(
-    ...     group=Group.ADDITION, quantity="force", paper="", ours="0.2", verdict=Verdict.NOT_JUDGED
-    ... )
-    >>> count_by_verdict([row], Group.ADDITION)[Verdict.NOT_JUDGED]
-    1
-    """
-    found = [row.verdict for row in rows if row.group is group]
-    return {verdict: found.count(verdict) for verdict in Verdict}
 
 
 def measured_row(

@@ -114,9 +114,9 @@ def _order_of_trials(found: SkinDeflectionResult) -> ClaimRow:
         ),
         status=MATERIALS,
         verdict=judged(as_drawn),
-        reading="as the figure is drawn" if as_drawn else "",
-        note=f"mean deflection less that of Trial 3, {' and '.join(REGIONS_MM)}; on a deflection axis that "
-        "points down, the smaller deflection lies above: docs/decisions/order-of-the-trials.md",
+        note="judged as the figure is drawn: mean deflection less that of Trial 3, "
+        f"{' and '.join(REGIONS_MM)}; on a deflection axis that points down, the smaller deflection lies "
+        "above: docs/decisions/order-of-the-trials.md",
     )
 
 
