@@ -15,8 +15,8 @@ from studies.results_page import (
     README_END,
     README_START,
     Excerpt,
-    read_excerpt,
     paper_page,
+    read_excerpt,
     results_page,
     with_table,
 )

@@ -34,7 +34,7 @@ def results_command(
         bool, typer.Option(help="Also press the standard sphere and draw the README's picture.")
     ] = True,
 ) -> None:
-    """Write the pages results, paper, command-line and tissues of docs, and table and picture of the README."""
+    """Write results, paper, command-line and tissues of docs, and table and picture of the README."""
     from fingerpad.report.style import write_png
     from studies import chain_picture, command_line_page, results_page, tissue_page
 

@@ -51,7 +51,7 @@ class ClaimRow:
         Section of the paper; empty for our own additions.
     quantity : str
         What is compared.
-    paper, ours, difference : str
+    paper, ours : str
         As they are printed.
     status : str
         How far the inputs can be trusted.
@@ -82,7 +82,6 @@ class ClaimRow:
     quantity: str
     paper: str
     ours: str
-    difference: str = ""
     status: str = ""
     verdict: Verdict
     fitted_to: str = ""
@@ -101,6 +100,17 @@ def judged(met: bool) -> Verdict:
     return Verdict.MET if met else Verdict.MISSED
 
 
+def two_digits(value: float) -> str:
+    """Round to the two digits that another machine reproduces.
+
+    Examples
+    --------
+    >>> two_digits(172.7), two_digits(0.9339), two_digits(float("nan"))
+    ('170', '0.93', '–')
+    """
+    return "–" if value != value else f"{float(f'{value:.2g}'):g}"
+
+
 def measured_row(
     group: Group,
     section: str,
@@ -108,22 +118,19 @@ def measured_row(
     published: Published[float],
     ours: float,
     status: str,
-    digits: int = 3,
     at_least: bool = False,
     fitted_to: str = "",
     note: str = "",
 ) -> ClaimRow:
     """Return the row of a number that the paper prints: met from it on, or close to it."""
     difference = ours - published.value
-    shown = round(difference, digits) + 0.0  # not -0
     criterion = "judged: at least the paper's" if at_least else f"judged: within {CLOSE:.0%}"
     return ClaimRow(
         group=group,
         section=section,
         quantity=quantity,
         paper=f"{published.value:g}",
-        ours=f"{ours:.{digits}f}",
-        difference=f"{shown:+.{digits}f}" if shown else "0",
+        ours=two_digits(ours),
         status=status,
         verdict=judged(bool(difference >= 0.0 if at_least else abs(difference) <= CLOSE * published.value)),
         fitted_to=fitted_to,

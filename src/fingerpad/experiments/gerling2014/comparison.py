@@ -12,6 +12,7 @@ from fingerpad.experiments.gerling2014.claim_row import (
     Verdict,
     judged,
     measured_row,
+    two_digits,
 )
 from fingerpad.experiments.gerling2014.curvature_thresholds import CurvatureThresholds
 from fingerpad.experiments.gerling2014.discrimination_claims import discrimination_claims
@@ -82,8 +83,7 @@ def _deflection(found: SkinDeflectionResult) -> list[ClaimRow]:
             section="3.1",
             quantity="Trial 3, deflection under the cylinder, R²",
             paper=f"matches (figure); laboratory's later model {later:g}",
-            ours=f"{third.cylinder.r2:.3f}",
-            difference=f"{third.cylinder.r2 - later:+.3f}",
+            ours=two_digits(third.cylinder.r2),
             status=MATERIALS,
             verdict=judged(third.cylinder.r2 >= LEAST_R2),
             fitted_to="the inner moduli were identified from this profile",
@@ -129,7 +129,7 @@ def _force(materials: str, found: SkinForce) -> list[ClaimRow]:
             section="4" if by_profile else "",
             quantity="Tissues of the run, deflection under the cylinder, R²",
             paper=f"laboratory's later model {paper.LATER_DEFLECTION_R2.value:g}",
-            ours=f"{found.deflection_r2:.3f}",
+            ours=two_digits(found.deflection_r2),
             status=MATERIALS,
             verdict=judged(found.deflection_r2 >= LEAST_R2),
             fitted_to="the ratios of the moduli came from this profile" if by_profile else "",
@@ -139,7 +139,7 @@ def _force(materials: str, found: SkinForce) -> list[ClaimRow]:
                 group=_fitted_if(by_force),
                 quantity=f"Tissues of the run, force of a flat plate {depth_mm:g} mm deep [N]",
                 paper=f"people {low:g} to {high:g}",
-                ours=f"{ours:.2f}",
+                ours=two_digits(ours),
                 status=MATERIALS + "; observed range read",
                 verdict=judged(low <= ours <= high),
                 fitted_to="the common factor on the moduli was chosen by this force" if by_force else "",
@@ -223,7 +223,6 @@ def _single_unit(materials: str, found: SingleUnitResult) -> list[ClaimRow]:
                 published,
                 ours,
                 status,
-                digits=0,
                 fitted_to=FITTED_TO_RATES,
             )
             for quantity, published, ours in rates
@@ -298,7 +297,7 @@ def _firing(unit: SingleUnitResult, found: FiringCourse) -> list[ClaimRow]:
             "2.1.1",
             "SED at the receptor correlates with the observed static rate, R²",
             "well",
-            f"{found.sed_r2:.2f}",
+            two_digits(found.sed_r2),
             found.sed_r2 >= WELL_R2,
             f"judged: at least {WELL_R2:g}; line through 36 shifts, middle of the static window",
         ),
@@ -314,16 +313,16 @@ def _firing(unit: SingleUnitResult, found: FiringCourse) -> list[ClaimRow]:
             "2.2.2",
             f"The window of {start_ms:g}-{end_ms:g} ms has the highest firing",
             "has it",
-            f"at {within} of {fires} shifts",
+            f"at {two_digits(100 * within / max(fires, 1))} % of the shifts",
             within > MOST * fires,
             f"shortest interval between spikes, judged: within the window at more than {MOST:.0%} of the "
-            f"shifts with two spikes; before it at {before}",
+            f"shifts with two spikes; within it at {within} of {fires}, before it at {before}",
         ),
         (
             "3.2",
             "The edge raises the static rate less than the dynamic rate [spikes/s]",
             f"{paper.STATIC_RATE_DIFFERENCE.value:g} against {paper.DYNAMIC_RATE_DIFFERENCE.value:g}",
-            f"{static:.0f} against {dynamic:.0f}",
+            f"{two_digits(static)} against {two_digits(dynamic)}",
             static < dynamic,
             FITTED_TO_RATES,
         ),
@@ -331,7 +330,7 @@ def _firing(unit: SingleUnitResult, found: FiringCourse) -> list[ClaimRow]:
             "4.4",
             "The response is more vigorous in the movement than in the hold, mean rate [spikes/s]",
             "more vigorous",
-            f"{means[0]:.0f} against {means[1]:.0f}",
+            f"{two_digits(means[0])} against {two_digits(means[1])}",
             means[0] > means[1],
             f"mean over 36 shifts of the bar; {FITTED_TO_RATES}",
         ),
@@ -339,7 +338,10 @@ def _firing(unit: SingleUnitResult, found: FiringCourse) -> list[ClaimRow]:
             "4.4",
             "The response grows with the depth, mean static rate under a flat plate [spikes/s]",
             "grows",
-            f"{shallow:.0f} at {found.depth_mm[0]:g} mm, {deep:.0f} at {found.depth_mm[1]:g} mm",
+            ", ".join(
+                f"{two_digits(rate)} at {depth:g} mm"
+                for rate, depth in zip((shallow, deep), found.depth_mm, strict=True)
+            ),
             bool(deep > shallow),
             "mean of the population of 18 receptors",
         ),

@@ -16,6 +16,7 @@ from fingerpad.experiments.gerling2014.claim_row import (
     Verdict,
     judged,
     measured_row,
+    two_digits,
 )
 from fingerpad.experiments.gerling2014.discrepancy import USED, DiscrepancyAnalysis, Interpretation
 from fingerpad.experiments.gerling2014.discrimination_statistics import DiscriminationStatistics, Estimate
@@ -101,7 +102,6 @@ def _row(
     ours: str,
     verdict: Verdict,
     note: str,
-    difference: str = "",
     group: Group = Group.STATEMENT,
     fitted_to: str = "",
 ) -> ClaimRow:
@@ -112,7 +112,6 @@ def _row(
         quantity=quantity,
         paper=paper,
         ours=ours,
-        difference=difference,
         status=STATUS,
         verdict=verdict,
         fitted_to=fitted_to,
@@ -150,7 +149,7 @@ def _targets(found: SphereDiscrimination, fitted_to: str) -> list[ClaimRow]:
             "",
             "Static hit rates between Goodwin's points, largest distance from their line in z",
             "on the line (two points)",
-            _text(farthest),
+            _brief(farthest),
             _at_most(farthest, FROM_LINE),
             f"judged: within {FROM_LINE:g} at both positions; only 296 and 365 /m were observed, the line "
             "is our interpolation",
@@ -166,10 +165,9 @@ def _at_point(curvature_per_m: float, observed: float, ours: list[Estimate], fit
         "3.3",
         f"Hit rate at {curvature_per_m:g} /m, static Gradient Sum at {' and '.join(PLACES)}, noise fitted",
         f"{observed:g} (Goodwin)",
-        ", ".join(map(_text, ours)),
+        ", ".join(map(_brief, ours)),
         _all(*(_at_most(size, CLOSE_POINTS) for size in sizes)),
         f"judged: within {CLOSE_POINTS:g} at both positions, for which there is one noise",
-        ", ".join(f"{each.value:+.3f}" for each in away),
         Group.FITTED,
         fitted_to,
     )
@@ -226,7 +224,6 @@ def _shift(statistics: DiscriminationStatistics, before: str) -> list[ClaimRow]:
                 _brief(shift["dynamic"]),
                 _all(_above(above["dynamic"], 0.0), _above(shift["dynamic"], CLOSE_POINTS)),
                 f"judged: more than {CLOSE_POINTS:g}, and than static by two Monte-Carlo errors",
-                f"{above['dynamic'].value:+.3f} against static",
             )
         )
     return rows
@@ -264,7 +261,7 @@ def _latency_shift(found: SphereDiscrimination) -> list[ClaimRow]:
             "3.3",
             "Hit rates diverge with the 0.2 mm shift, latency, largest change",
             "diverge",
-            f"{min(known):.3f} to {max(known):.3f} by reading",
+            f"{two_digits(min(known))} to {two_digits(max(known))} by reading",
             verdict,
             f"{why} (docs/decisions/silent-receptors.md): {listed}; each reading at the noise that fits "
             f"people best, diverging: more than {CLOSE_POINTS:g}",
@@ -279,7 +276,7 @@ def _rises(found: SphereDiscrimination, before: str) -> list[ClaimRow]:
             steps = found.statistics.smallest_rise[measure]
             rises = [_above(step, 0.0) for step in steps]
             curves = [
-                f"at {place} {', '.join(f'{rate:.2f}' for rate in rates)} (smallest step {_text(step)})"
+                f"at {place} {', '.join(f'{rate:.2f}' for rate in rates)} (smallest step {_brief(step)})"
                 for place, rates, step in zip(
                     PLACES, (drawn.hit_rate, drawn.hit_rate_shifted), steps, strict=True
                 )
@@ -307,10 +304,9 @@ def _variants(statistics: DiscriminationStatistics) -> list[ClaimRow]:
             "3.3",
             "More noise lowers the curve, smallest fall of the mean hit rate from one noise to the next",
             "lowers",
-            _text(fall.smallest_fall),
+            _brief(fall.smallest_fall),
             _above(fall.smallest_fall, 0.0),
             f"sigma_1 of {fall.noise_sigma[0]:g} to {fall.noise_sigma[-1]:g} in steps of 0.01",
-            "",
         ),
         (
             "3.3",
@@ -318,8 +314,7 @@ def _variants(statistics: DiscriminationStatistics) -> list[ClaimRow]:
             "wider",
             f"{_text(few.ratio, 2)} times",
             _above(few.ratio, 1.0),
-            f"largest change of a mean {_text(few.change)}",
-            "",
+            f"largest change of a mean {_brief(few.change)}",
         ),
         (
             "3.3",
@@ -328,37 +323,34 @@ def _variants(statistics: DiscriminationStatistics) -> list[ClaimRow]:
             f"{_text(wide.ratio, 2)} times",
             _above(wide.ratio, 1.0),
             "the decision point varies; other readings: docs/decisions/decision-criterion.md",
-            "",
         ),
         (
             "3.3",
             "A criterion that varies by 0.02 instead of 0.01 does not change the means, largest change",
             "unchanged",
-            _text(wide.change),
+            _brief(wide.change),
             _at_most(wide.change, CLOSE_POINTS),
             f"judged: at most {CLOSE_POINTS:g}",
-            "",
         ),
         (
             "2.2.3",
             "The mean of 10 hit rates is not stable, that of 100 is: standard deviation of the means",
             "10 unstable",
-            f"{_text(unsteady.few, 4)} against {_text(unsteady.many, 4)}",
+            f"{_brief(unsteady.few)} against {_brief(unsteady.many)}",
             _above(unsteady.ratio, 1.0),
             "repeated judgements of the same sums",
-            f"{unsteady.ratio.value:.2f} times",
         ),
     )
     return [
-        _row(section, quantity, paper, ours, verdict, note, difference, Group.DEFINITION)
-        for section, quantity, paper, ours, verdict, note, difference in rows
+        _row(section, quantity, paper, ours, verdict, note, Group.DEFINITION)
+        for section, quantity, paper, ours, verdict, note in rows
     ]
 
 
 def _euclidean(
     statistics: DiscriminationStatistics, reasons: DiscrepancyAnalysis, fitted_to_people: bool
 ) -> ClaimRow:
-    misfit, above, own = statistics.misfit, statistics.misfit_above_static, reasons.euclidean
+    misfit, own = statistics.misfit, reasons.euclidean
     closer = [
         _above(
             Estimate(
@@ -382,7 +374,6 @@ def _euclidean(
         _brief(misfit["euclidean"]),
         _all(_at_most(misfit["euclidean"], FROM_LINE), *closer),
         f"judged: at most {FROM_LINE:g} and closer than dynamic rates and latencies; {alone}",
-        f"{above['euclidean'].value:+.3f} against the static Gradient Sum",
         Group.FITTED if fitted_to_people else Group.STATEMENT,
         "the afferent was fitted to people's hit rates by this code, too" if fitted_to_people else "",
     )
@@ -398,13 +389,12 @@ def _or_infinite(misfit: float) -> float:
 
 
 def _or_none(value: float) -> str:
-    return "none" if math.isnan(value) else f"{value:.3f}"
+    return "none" if math.isnan(value) else two_digits(value)
 
 
-def _text(estimate: Estimate, digits: int = 3) -> str:
+def _text(estimate: Estimate, digits: int = 2) -> str:
     return f"{estimate.value:.{digits}f} ± {estimate.error:.{digits}f}"
 
 
 def _brief(estimate: Estimate) -> str:
-    """Two digits, which another machine has as well."""
-    return f"{estimate.value:.2g}"
+    return two_digits(estimate.value)
