@@ -21,6 +21,7 @@ from fingerpad import __version__
 from fingerpad.core.compilation import SUBJECT
 from fingerpad.core.results import read_results, to_json
 from fingerpad.data import all_published
+from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.discrimination.task_files import read_task
 from fingerpad.experiments.discrimination.task_stimuli import task_touches
 from fingerpad.experiments.gerling2014 import single_unit
